@@ -119,7 +119,7 @@ def run(fake, use_trial):
 @pytest.fixture
 def study(tmp_path, monkeypatch):
     """Write a study file and read it; the folder stays importable for the test only."""
-    from sdnn.reproduction.studies import read_study
+    from sdnn.reproduction.report import read_study
 
     monkeypatch.setattr(sys, "path", [*sys.path])
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from sdnn.files import write_whole
-from sdnn.reproduction.studies import read_study
+from sdnn.reproduction.report import read_study
 from sdnn.runs.figures import figure_bytes
 from sdnn.runs.registry import title_of
 from sdnn.runs.report import require

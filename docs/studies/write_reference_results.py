@@ -17,7 +17,7 @@ from pathlib import Path
 from sdnn.files import csv_bytes
 from sdnn.reproduction import case_spec, plan_trials
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES
-from sdnn.reproduction.reference_results import FILE_NAME, HEADER, reference_results
+from sdnn.reproduction.claims import FILE_NAME, HEADER, reference_results
 from sdnn.runs import CaseResult, ResultStore, measure
 from sdnn.runs.results import STEP_MEASURES
 

@@ -32,22 +32,11 @@ def shown(value: Any) -> str:
 
 
 def array_of(name: str, value: Any, kinds: str = "fiub", what: str = "numbers") -> NDArray[Any]:
-    """Read an array, or lists of numbers; ValueError that names the argument for others.
+    """Read an array of any library, a number, or lists of such; ValueError for others.
 
-    Parameters
-    ----------
-    name
-        The argument.
-    value
-        An array of any library, a number, or lists of such. Masked arrays are refused: their mask
-        would be lost.
-    kinds
-        Letters of the possible types, as in ``numpy.dtype.kind``.
-    what
-        What these are in messages.
+    ``kinds`` are letters of the possible types, as in ``numpy.dtype.kind``, and ``what`` their word
+    in messages. Masked arrays are refused: their mask would be lost.
 
-    Examples
-    --------
     >>> array_of("levels", [0.5, "a"])
     Traceback (most recent call last):
     ValueError: levels must be numbers, got [0.5, 'a']

@@ -30,12 +30,8 @@ def with_infinities(ends: NDArray[Any]) -> NDArray[np.float64]:
 def flat_bounds(space: gym.Space[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the bounds of the vector to which Gymnasium flattens a space; infinite: none.
 
-    Raises
-    ------
-    TypeError
-        If it is none that Gymnasium flattens to a vector.
-    ValueError
-        If that has more than 2**20 variables.
+    TypeError if it is none that Gymnasium flattens to a vector; ValueError for more than 2**20
+    variables.
     """
     n_variables = _n_variables(space)
     if n_variables == 0:

@@ -8,37 +8,19 @@ import typing
 from typing import Any, NamedTuple
 
 from sdnn._core import (
-    AcrobotConfig,
-    Controller,
-    FuzzyQLearningConfig,
-    FuzzyRulesConfig,
-    GoalScheduleConfig,
-    LinearSDNNConfig,
-    ProtocolConfig,
-    QLearningConfig,
-    RBFNetworkConfig,
-    SarsaConfig,
-    SDNNCConfig,
-    SensorConfig,
+    AcrobotConfig as AcrobotConfig,
+    Controller as Controller,
+    FuzzyQLearningConfig as FuzzyQLearningConfig,
+    FuzzyRulesConfig as FuzzyRulesConfig,
+    GoalScheduleConfig as GoalScheduleConfig,
+    LinearSDNNConfig as LinearSDNNConfig,
+    ProtocolConfig as ProtocolConfig,
+    QLearningConfig as QLearningConfig,
+    RBFNetworkConfig as RBFNetworkConfig,
+    SarsaConfig as SarsaConfig,
+    SDNNCConfig as SDNNCConfig,
+    SensorConfig as SensorConfig,
 )
-
-__all__ = [
-    "WARM_UP",
-    "AcrobotConfig",
-    "Field",
-    "FuzzyQLearningConfig",
-    "FuzzyRulesConfig",
-    "GoalScheduleConfig",
-    "LinearSDNNConfig",
-    "ProtocolConfig",
-    "QLearningConfig",
-    "RBFNetworkConfig",
-    "SDNNCConfig",
-    "SarsaConfig",
-    "SensorConfig",
-    "fields_of",
-    "values_of",
-]
 
 
 class Field(NamedTuple):
@@ -102,6 +84,5 @@ def _complete(kind: Any) -> None:
 (WARM_UP,) = fields_of(Controller)
 """The number of steps of a warm-up, which agents and specifications share."""
 
-for _name in __all__:
-    if _name.endswith("Config"):
-        _complete(globals()[_name])
+for _kind in [kind for name, kind in vars().items() if name.endswith("Config")]:
+    _complete(_kind)

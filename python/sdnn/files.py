@@ -57,12 +57,8 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
     """Open a new file in the same folder; at the end it takes the place of ``path``.
 
     Its name is one that nobody can foresee. A link or a pipe of the name ``path`` is replaced:
-    nothing is written to where it leads.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written; one that was there before stays as it was.
+    nothing is written to where it leads. OSError if the file cannot be written; one that was there
+    before stays as it was.
     """
     if path.absolute().parent in _FOLDERS_OF_DEVICES:
         with naming(path), path.open("wb") as device:
@@ -106,10 +102,7 @@ def write_whole(path: Path, content: bytes | Iterable[bytes | memoryview]) -> No
 def open_regular(path: Path, max_bytes: int) -> BinaryIO:
     """Open a regular file for reading; never wait for the writer of a pipe.
 
-    Raises
-    ------
-    OSError
-        If it cannot be opened, or is a folder, a device, a pipe or larger than ``max_bytes``.
+    OSError if it cannot be opened, or is a folder, a device, a pipe or larger than ``max_bytes``.
     """
     file: BinaryIO = open(path, "rb", opener=_open_at_once)  # noqa: SIM115
     status = os.fstat(file.fileno())
@@ -290,12 +283,8 @@ def write_file(
 def read_file(path: Path, *kinds: str) -> tuple[Description, Arrays]:
     """Read the description and the arrays of a file of one of these kinds.
 
-    Raises
-    ------
-    OSError
-        If it cannot be read or is not a regular file.
-    ValueError
-        If it is damaged, of another program or kind, or of another version of the format.
+    OSError as of `open_regular`; ValueError if it is damaged, of another program or kind, or of
+    another version of the format.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from sdnn.cli import main
-from sdnn.reproduction.studies import read_study
+from sdnn.reproduction.report import read_study
 from sdnn.runs import AGENTS
 
 ROOT = Path(__file__).parents[2]

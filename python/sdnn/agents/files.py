@@ -29,12 +29,8 @@ def register(kind: type[Any]) -> None:
     """Make a class of agents known by its name; its ``rebuild`` makes one from a file.
 
     A class that is defined again, as in a notebook or by a script that is imported too, replaces
-    the one before.
-
-    Raises
-    ------
-    TypeError
-        If the name is that of a class of this package: a file could not tell them apart.
+    the one before. TypeError for the name of a class of this package: a file could not tell them
+    apart.
     """
     known = _CLASSES.get(kind.__name__, kind)
     is_ours = known.__module__.partition(".")[0] == "sdnn"
@@ -49,12 +45,8 @@ def register(kind: type[Any]) -> None:
 def read_agent(path: Path, *kinds: str) -> tuple[Any, Description, Arrays]:
     """Read a file of one of these kinds: its agent, its description and its arrays.
 
-    Raises
-    ------
-    OSError
-        If the file cannot be read.
-    ValueError
-        If it is damaged, of another kind or format, or does not fit together.
+    OSError if it cannot be read; ValueError if it is damaged, of another kind or format, or does
+    not fit together.
     """
     description, arrays = read_file(path, *kinds)
     name = description.get("class")
@@ -264,15 +256,7 @@ def _without_arrays(value: Any) -> Any:
 
 
 def read_training(path: Path) -> tuple[Any, SavedTraining]:
-    """Read an agent and its training.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be read.
-    ValueError
-        If it is damaged or holds no training.
-    """
+    """Read an agent and its training; errors as of `read_agent`."""
     agent, description, arrays = read_agent(path, "training")
 
     def array(name: str) -> NDArray[Any]:

@@ -8,8 +8,7 @@ from typing import Any
 import click
 
 from sdnn._core import presets
-from sdnn.cli.common import errors_in_a_line, print_forecast, run_and_report
-from sdnn.cli.executor_options import executor_options
+from sdnn.cli.common import errors_in_a_line, executor_options, print_forecast, run_and_report
 from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_experiments
 
 

@@ -7,8 +7,7 @@ from typing import Any
 
 import click
 
-from sdnn.cli.common import errors_in_a_line, print_forecast, run_and_report
-from sdnn.cli.executor_options import executor_options
+from sdnn.cli.common import errors_in_a_line, executor_options, print_forecast, run_and_report
 
 
 @click.command(short_help="Run a study: variants of any setting, trial by trial.")
@@ -56,7 +55,7 @@ def sweep(
     Finished trials are kept in OUT/results.sqlite, which `reproduce` may share; the same command
     continues where it stopped.
     """
-    from sdnn.reproduction.studies import add_claims, read_study
+    from sdnn.reproduction.report import add_claims, read_study
     from sdnn.runs.errors import ConfigError
     from sdnn.runs.sweep import SweepRequest, sweep as run
 

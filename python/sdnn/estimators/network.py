@@ -39,14 +39,8 @@ def code_bytes(codings: Sequence[Coding], pairs: Sequence[tuple[int, int]], n_un
 class InputCode:
     """Turns samples into bins, and bins into the code that the network reads.
 
-    Parameters
-    ----------
-    codings : sequence of Coding
-        One per input, fitted.
-    pairs : sequence of (int, int)
-        Ordered pairs (modified, modifier); equal ones for the plain pattern.
-    modified, modifiers : list of ndarray, shape (n_bins, n_units)
-        Per pair, the patterns of the modified input and of the modifier.
+    Each input has a fitted coding, each pair (modified, modifier) the patterns of both, shape
+    (n_bins, n_units); equal inputs in a pair stand for the plain pattern.
     """
 
     def __init__(

@@ -21,9 +21,9 @@ from sdnn.reproduction.cases import (
     Case,
     Experiment,
 )
+from sdnn.reproduction.claims import reference_results
 from sdnn.reproduction.cost import CostConfig, CostKey, CostRecord
 from sdnn.reproduction.figures import draw_cost, draw_experiment
-from sdnn.reproduction.reference_results import reference_results
 from sdnn.reproduction.report import Report
 from sdnn.runs.engine import Executor, Observer, PlannedTrial, ThreadExecutor, plan_of, run_trials
 from sdnn.runs.figures import figure_bytes
@@ -161,13 +161,9 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
     The files cover every experiment whose trials are all stored under the request's settings, not
     only those that were asked for now. None is written unless every trial is there.
 
-    Raises
-    ------
-    ValueError
-        If nothing can be run as the request says.
-    RunError
-        Before any trial if matplotlib or Jinja is not installed or the result file cannot be used;
-        later if the cluster cannot run trials any more: what was finished is stored.
+    RunError before any trial if matplotlib or Jinja is not installed or the result file cannot be
+    used; later if the cluster cannot run trials any more: what was finished is stored. ValueError
+    if nothing can be run as the request says.
     """
     require("matplotlib", "jinja2")
     begin = time.monotonic()

@@ -47,17 +47,7 @@ KeyPath: TypeAlias = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class ConfigFile:
-    """A file of settings.
-
-    Parameters
-    ----------
-    path
-        Its name ends in ``.toml`` or ``.json``.
-    text
-        Its content.
-    values
-        The values in it.
-    """
+    """A file of settings, in TOML or JSON by its name's ending: its text, and the values in it."""
 
     path: Path
     text: str
@@ -65,13 +55,7 @@ class ConfigFile:
 
     @classmethod
     def read(cls, path: str | Path) -> ConfigFile:
-        """Read a file.
-
-        Raises
-        ------
-        ConfigError
-            If it cannot be read, or holds no table; file and line are named.
-        """
+        """Read a file; ConfigError that names it, and the line, if it holds no table."""
         path = Path(path)
         if path.suffix not in (".toml", ".json"):
             raise ConfigError("", "must be a file whose name ends in .toml or .json", str(path))
@@ -101,10 +85,7 @@ class ConfigFile:
     def specification(self) -> dict[str, Any]:
         """Return the values of a specification: all but what only a run's configuration has.
 
-        Raises
-        ------
-        ConfigError
-            If it is the configuration of a run of another format.
+        ConfigError if it is the configuration of a run of another format.
         """
         if (found := self.values.get("format", FORMAT)) != FORMAT:
             raise ConfigError("format", f"must be {FORMAT}, got {found!r}: begin a new run")
@@ -155,10 +136,7 @@ class ConfigFile:
 def read_spec(path: str | Path) -> RunSpec:
     """Read a specification from a TOML or JSON file.
 
-    Raises
-    ------
-    ConfigError
-        If something is unknown or impossible; the message names file, line (of TOML) and key.
+    ConfigError that names file, line (of TOML) and key if something is unknown or impossible.
     """
     file = ConfigFile.read(path)
     try:

@@ -123,12 +123,8 @@ class Curve:
 def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
     """Make the curves of runs; those that differ in their seeds only become one.
 
-    With them comes a line about each run of which something could not be drawn.
-
-    Raises
-    ------
-    RunError
-        If there is nothing to draw yet, or rows cannot be read.
+    With them comes a line about each run of which something could not be drawn. RunError if there
+    is nothing to draw yet, or rows cannot be read.
     """
     made = [_curves_of_group(group) for group in groups_of(runs)]
     curves = [curve for own, _ in made for curve in own]

@@ -6,6 +6,7 @@ import importlib.util
 import json
 import sys
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -30,21 +31,9 @@ Ends = tuple[NDArray[np.float64], NDArray[np.float64]]
 Stream: TypeAlias = Literal["sensor_noise", "evaluation_sensor_noise"]
 
 
-class MeanOfNeighbours:
-    """A redundant sensor: the mean of two neighbouring variables; the last one's is the first.
-
-    Parameters
-    ----------
-    first, second
-        The variables' numbers.
-    """
-
-    def __init__(self, first: int, second: int) -> None:
-        self.first, self.second = first, second
-
-    def __call__(self, observation: NDArray[Any]) -> float:
-        """Observe them."""
-        return 0.5 * (float(observation[self.first]) + float(observation[self.second]))
+def mean_of(first: int, second: int, observation: NDArray[Any]) -> float:
+    """Observe the mean of two variables, by their numbers: a redundant sensor."""
+    return 0.5 * (float(observation[first]) + float(observation[second]))
 
 
 class EnvironmentSpec(Settings, frozen=True):
@@ -173,7 +162,7 @@ class EnvironmentSpec(Settings, frozen=True):
             env = UnitSensors(env, low, high)
             if self.redundant:
                 pairs = neighbours(low.size, self.redundant)
-                env = RedundantSensors(env, [MeanOfNeighbours(*pair) for pair in pairs])
+                env = RedundantSensors(env, [partial(mean_of, *pair) for pair in pairs])
             if self.noise:
                 env = NoisySensors(
                     env,
@@ -190,10 +179,7 @@ class EnvironmentSpec(Settings, frozen=True):
     def imported(self) -> bool:
         """Import the module that ``id`` names; False if there is none, or it was imported before.
 
-        Raises
-        ------
-        ConfigError
-            If it cannot be imported.
+        ConfigError if it cannot be imported.
         """
         module, colon, _ = self.id.rpartition(":")
         if not colon or module in sys.modules:

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sdnn.runs.comparison import Comparison, Measured
     from sdnn.runs.curves import Curve
+    from sdnn.runs.sweep import Comparison, Measured
 
 COLORS = (
     "#1f5a96", "#c2542d", "#3c7d4b", "#7a5195", "#8a6d1d", "#4a4a4a",

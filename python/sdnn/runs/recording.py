@@ -87,13 +87,9 @@ def record(
     It shows what environments draw between steps, where they have the render mode
     ``"rgb_array_list"`` themselves. The file's suffix chooses the format.
 
-    Raises
-    ------
-    RunError
-        If the suffix is another, a package is missing, the environment cannot be rendered, differs
-        or gives what cannot be evaluated, or there is no agent yet.
-    OSError
-        If the file cannot be written.
+    RunError if the suffix is another, a package is missing, the environment cannot be rendered,
+    differs or gives what cannot be evaluated, or there is no agent yet; OSError if the file cannot
+    be written.
     """
     if path.suffix not in SUFFIXES:
         raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")

@@ -45,12 +45,8 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     A subclass declares each setting as a field: its type with bounds and a description, and its
     default. Constructor, files, command-line options, JSON Schema and the documentation follow.
-    Tables in it may be given as settings or as mappings.
-
-    Raises
-    ------
-    ConfigError
-        If a value is of another type or out of its range; ``key`` names the field.
+    Tables in it may be given as settings or as mappings. A `ConfigError`, whose ``key`` names the
+    field, says that a value is of another type or out of its range.
     """
 
     def __post_init__(self) -> None:
@@ -90,10 +86,7 @@ def names_of(kind: type[Any]) -> tuple[str, ...]:
 def checked(kind: Any, value: Any, key: str) -> Any:
     """Return a value as its type has it: arrays as tuples, 1 as 1.0, tables as settings.
 
-    Raises
-    ------
-    ConfigError
-        If it does not fit.
+    ConfigError if it does not fit.
     """
     if isinstance(value, np.generic | np.ndarray):
         if isinstance(value, np.ma.MaskedArray) or value.dtype.kind not in "biufU":
@@ -152,13 +145,7 @@ def possible_words(word: str, possible: Iterable[str]) -> str:
 
 
 def check_names(values: Any, possible: Iterable[str], where: str = "", hint: str = "") -> None:
-    """Check that a table has no other keys than the possible ones.
-
-    Raises
-    ------
-    ConfigError
-        If it has, or is no table; the most similar possible keys come first.
-    """
+    """Check that a table has no other keys than the possible ones; ConfigError if it has."""
     if not isinstance(values, Mapping):
         raise ConfigError(where, f"must be a table, got {shown(values)}")
     known = tuple(possible)
@@ -171,19 +158,8 @@ def check_names(values: Any, possible: Iterable[str], where: str = "", hint: str
 def read(kind: type[AnySettings], values: Any, where: str = "") -> AnySettings:
     """Make settings of a table as JSON or TOML has it, with the tables in it.
 
-    Parameters
-    ----------
-    kind
-        The class.
-    values
-        The table; what is missing has its default.
-    where
-        The key of the table.
-
-    Raises
-    ------
-    ConfigError
-        If a key is unknown or missing, or a value does not fit.
+    What is missing has its default; ``where`` is the table's key. ConfigError if a key is unknown
+    or missing, or a value does not fit.
     """
     check_names(values, kind.__struct_fields__, where)
     with within(where):
@@ -194,24 +170,10 @@ def read(kind: type[AnySettings], values: Any, where: str = "") -> AnySettings:
 
 
 def changed(base: Any, values: Any, where: str, hint: str = "") -> Any:
-    """Return settings with other values of some fields.
+    """Return settings of an agent's part with the values of a table, whose key is ``where``.
 
-    Parameters
-    ----------
-    base
-        Settings of an agent's part: those of the core, which check themselves, or a frozen
-        dataclass.
-    values
-        A table of the changes.
-    where
-        Its key.
-    hint
-        Appended to an error about unknown keys.
-
-    Raises
-    ------
-    ConfigError
-        If a key is unknown, follows from others, or a value does not fit.
+    They are those of the core, which check themselves, or a frozen dataclass. ConfigError if a key
+    is unknown, follows from others, or a value does not fit; ``hint`` ends one about unknown keys.
     """
     names = names_of(type(base))
     if isinstance(values, Mapping) and "n_inputs" in values:

@@ -110,10 +110,7 @@ class Study(StudyFile):
         return tuple(planned.key for planned in self.trials(case_id, variant_id))
 
     def chosen(self, only: Collection[str] = ()) -> tuple[tuple[str, str], ...]:
-        """List the ids of case and variant of some variants (default: all).
-
-        A ValueError says that there is no such variant.
-        """
+        """List the ids of case and variant of some variants (default: all); ValueError if none."""
         known = [variant.id for variant in self.variants]
         for name in only:
             if name not in known:
@@ -138,15 +135,8 @@ class Study(StudyFile):
     def check(self, stored: Collection[TrialKey] = ()) -> None:
         """Make a trial of every specification once, so that nothing is run that could not be.
 
-        Parameters
-        ----------
-        stored
-            Trials that need not be run: specifications of which all are stored are not tried.
-
-        Raises
-        ------
-        ConfigError
-            If one is refused; it names the place of the setting.
+        Those of which all trials are stored are not tried. ConfigError that names the place of the
+        setting if one is refused.
         """
         tried: set[str] = set()
         for (case_id, variant_id), one in self.combinations.items():

@@ -111,21 +111,7 @@ class StudyVariant:
 
 
 class StudyFile:
-    """The tables of a study, read from its file.
-
-    Parameters
-    ----------
-    path
-        A TOML file. Modules that it imports are looked for beside it, too.
-    known_cases
-        Cases that the file may name.
-
-    Raises
-    ------
-    ConfigError
-        If the file cannot be read, or something in it is unknown or impossible; the message names
-        file, line and key.
-    """
+    """The tables of a study, read from its TOML file; ``known_cases`` may be named in it."""
 
     def __init__(self, path: Path, known_cases: Mapping[str, KnownCase]) -> None:
         self.file = ConfigFile.read(path)
@@ -143,10 +129,7 @@ class StudyFile:
     def spec(self, case: StudyCase, variant: StudyVariant) -> tuple[RunSpec, Layer]:
         """Put the layers of a variant in a case together; returns the settings as well.
 
-        Raises
-        ------
-        ConfigError
-            If a setting is unknown, has the wrong type or does not go with another.
+        ConfigError if a setting is unknown, has the wrong type or does not go with another.
         """
         own = (case.settings, variant.settings, variant.case_settings.get(case.id, {}))
         settings: Layer = {}

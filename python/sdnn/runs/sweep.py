@@ -1,22 +1,268 @@
-"""Run a study and write its results: the body of ``sdnn sweep``."""
+"""Run a study, compare its variants and write the results: the body of ``sdnn sweep``."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.files import csv_pieces, gzip_pieces, remove_abandoned_files
-from sdnn.runs.comparison import Addition, Comparison, compare, study_json, study_page
 from sdnn.runs.engine import Executor, Observer, PlannedTrial, ThreadExecutor, run_trials
 from sdnn.runs.figures import draw_study, figure_bytes
-from sdnn.runs.report import Finished, describe_call, require
+from sdnn.runs.registry import title_of
+from sdnn.runs.report import (
+    MEASURE_END,
+    PERCENT,
+    Finished,
+    Page,
+    Section,
+    Table,
+    describe_call,
+    format_estimate,
+    measure_cells,
+    measures_section,
+    require,
+    settings_section,
+)
+from sdnn.runs.results import (
+    FINAL_WINDOW,
+    MEASURES,
+    RETURN_MEASURES,
+    SHARE_STABLE,
+    STEP_MEASURES,
+    CaseResult,
+    Estimate,
+    MeasureName,
+    estimate_mean,
+    measure,
+    on_equal_terms,
+)
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.study import Study
-from sdnn.runs.trial import ROW_HEADER, records_digest, trial_rows
+from sdnn.runs.study import Combination, Study
+from sdnn.runs.study_file import StudyCase, StudyVariant
+from sdnn.runs.trial import ROW_HEADER, TrialRecord, records_digest, trial_rows
+
+MIN_TRIALS_TO_DIFFER = 6
+"""Fewer paired trials are all on one side by chance more often than once in twenty times."""
+
+DIFFERENCE_NOTE = (
+    "Differences are paired: a trial minus the reference's trial of the same number, which has the"
+    f" same seed; the mean over trials with its {PERCENT} bootstrap interval over trials, censored"
+    f" episodes as the last one. * marks intervals without 0 over at least {MIN_TRIALS_TO_DIFFER}"
+    " trials; where nothing differs, about one in twenty of them does so by chance."
+)
+SOLVED_NOTE = (
+    "end solved: trials that solve at least"
+    f" {100 * SHARE_STABLE:.0f} % of their last {FINAL_WINDOW} tests."
+)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A variant in a case, measured.
+
+    `differences` are means over trials of a measure minus that of the reference's trial of the same
+    number, with censored values as the last episode of the shorter one; there are none for the
+    reference itself and without it.
+    """
+
+    combination: Combination
+    result: CaseResult
+    differences: Mapping[MeasureName, Estimate]
+
+    @property
+    def variant(self) -> StudyVariant:
+        """The variant."""
+        return self.combination.variant
+
+    def differs(self, name: MeasureName) -> bool:
+        """Whether a difference's interval leaves 0 out, over `MIN_TRIALS_TO_DIFFER` or more."""
+        difference = self.differences.get(name)
+        if difference is None or self.result.n_trials < MIN_TRIALS_TO_DIFFER:
+            return False
+        return difference.lower > 0 or difference.upper < 0
+
+    @property
+    def solved_at_end(self) -> NDArray[np.bool_] | None:
+        """Which trials end solved, (n_trials,); None where tasks are judged by their return."""
+        shares = self.result.values.get("final_share_solved")
+        return None if shares is None else shares >= SHARE_STABLE
+
+    @property
+    def end_solved(self) -> str:
+        """How many trials end solved, such as ``"18 of 20"``; ``"-"`` if that is not measured."""
+        solved = self.solved_at_end
+        return "-" if solved is None else f"{int(solved.sum())} of {solved.size}"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What is complete of a study: by ids of case and variant, those that have every trial."""
+
+    study: Study
+    measured: Mapping[tuple[str, str], Measured]
+
+    @property
+    def cases(self) -> tuple[StudyCase, ...]:
+        """Cases of which something is there."""
+        shown = {case for case, _ in self.measured}
+        return tuple(case for case in self.study.cases if case.id in shown)
+
+    @property
+    def variants(self) -> tuple[StudyVariant, ...]:
+        """Variants of which something is there."""
+        shown = {variant for _, variant in self.measured}
+        return tuple(variant for variant in self.study.variants if variant.id in shown)
+
+    def of_case(self, case_id: str) -> tuple[Measured, ...]:
+        """List what is measured in a case, in the order of the variants."""
+        pairs = ((case_id, variant.id) for variant in self.study.variants)
+        return tuple(self.measured[pair] for pair in pairs if pair in self.measured)
+
+
+def compare(study: Study, records: Iterable[TrialRecord]) -> Comparison:
+    """Measure every variant of a study in every case of which all trials are among the records."""
+    by_key = {record.key: record for record in records}
+    results = {}
+    for pair, combination in study.combinations.items():
+        keys = study.keys(*pair)
+        if by_key.keys() >= set(keys):
+            has_returns = combination.spec.environment is not None
+            names = RETURN_MEASURES if has_returns else STEP_MEASURES
+            results[pair] = measure(combination.case.title, [by_key[key] for key in keys], names)
+    measured = {}
+    for (case, variant), result in results.items():
+        reference = None if variant == study.reference else results.get((case, study.reference))
+        # Trials of one number have the same seed.
+        differences = {
+            name: estimate_mean(np.subtract(*on_equal_terms(name, result, reference)))
+            for name in result.values
+            if reference is not None and name in reference.values
+        }
+        combination = study.combinations[case, variant]
+        measured[case, variant] = Measured(combination, result, differences)
+    return Comparison(study, measured)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Addition:
+    """What else the results of a study say, such as about claims: for the page and the JSON."""
+
+    sections: Sequence[Section] = ()
+    json: dict[str, Any] = field(default_factory=dict)
+
+
+def study_page(comparison: Comparison, digest: str, addition: Addition, picture: bytes) -> Page:
+    """Return the page of a study, with the digest of its rows and the SVG of its figure."""
+    study = comparison.study
+    n_all, n_measured = len(study.combinations), len(comparison.measured)
+    counts = {"variant": study.variants, "case": study.cases, "trial": range(study.n_trials)}
+    variants, cases, trials = (
+        f"{len(found)} {word}{'' if len(found) == 1 else 's'}" for word, found in counts.items()
+    )
+    missing = (
+        f"Not complete: {n_all - n_measured} of {n_all} combinations of case and variant lack"
+        " trials and are left out."
+    )
+    alt = f"{study.title}: each variant in each case, trial by trial"
+    file = Section(title=study.file.path.name, text=study.file.text)
+    titles = (
+        (f"{m.variant.title}, {m.result.title}, {title_of(m.result.agent)}", m.result)
+        for m in comparison.measured.values()
+    )
+    return Page(
+        title=study.title,
+        intro=f"{variants} in {cases}, {trials} each; reference: {study.reference}.",
+        warnings=[missing] if n_measured < n_all else [],
+        sections=[
+            Section(title="At a glance", picture=picture, alt=alt),
+            *addition.sections,
+            *_case_sections(comparison),
+            _measures(comparison),
+            Section(title="The study", folded=[file]),
+            settings_section(titles),
+        ],
+        source=f"Study {study.file.path.name}; root seed {study.seed}; digest of the rows"
+        f" {digest[:16]}; sdnn {_core.__version__}.",
+    )
+
+
+def _case_sections(comparison: Comparison) -> Iterator[Section]:
+    """For each case the table of measures, and that of differences if there are any."""
+    for case in comparison.cases:
+        measured = comparison.of_case(case.id)
+        names = [n for n in MEASURES if any(n in m.result.values for m in measured)]
+        words = tuple(name.replace("_", " ") for name in names)
+        end = ("end solved",) if any(m.solved_at_end is not None for m in measured) else ()
+        rows = [
+            (m.variant.title, title_of(m.result.agent), str(m.result.n_trials),
+             *(m.end_solved for _ in end), *measure_cells(m.result, names))
+            for m in measured
+        ]  # fmt: skip
+        header = ("variant", "agent", "trials", *end, *words, *MEASURE_END)
+        yield Section(table=Table(case.title, header, rows))
+        title = f"{case.title}: minus {comparison.study.reference}, trial by trial"
+        compared = [m for m in measured if m.differences]
+        rows = [(m.variant.title, *(_difference(m, n) for n in names)) for m in compared]
+        if rows:
+            yield Section(level=0, table=Table(title, ("variant", *words), rows))
+
+
+def _difference(measured: Measured, name: MeasureName) -> str:
+    if name not in measured.differences:
+        return "-"
+    text = format_estimate(measured.differences[name], name, sign="+")
+    return text + (" *" if measured.differs(name) else "")
+
+
+def _measures(comparison: Comparison) -> Section:
+    """Explain the measures shown, and which variants are the same."""
+    found, study = comparison.measured.values(), comparison.study
+    copies = ((v.id, study.same_as(v.id)) for v in study.variants)
+    notes = [f"The variant {variant} is the same as {first}." for variant, first in copies if first]
+    notes += [DIFFERENCE_NOTE] if any(m.differences for m in found) else []
+    notes += [SOLVED_NOTE] if any(m.solved_at_end is not None for m in found) else []
+    shown = {name for m in found for name in m.result.values}
+    return measures_section((name for name in MEASURES if name in shown), notes)
+
+
+def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[str, Any]:
+    """Return the results as values that JSON can hold; see `CaseResult.to_json`."""
+    study = comparison.study
+    return {
+        "title": study.title,
+        "file": study.file.path.name,
+        "n_trials": study.n_trials,
+        "seed": study.seed,
+        "reference": study.reference,
+        "version": _core.__version__,
+        "digest": digest,
+        "cases": [{"id": case.id, "title": case.title} for case in study.cases],
+        "variants": [
+            {"id": v.id, "title": v.title, "same_as": study.same_as(v.id)} for v in study.variants
+        ],
+        "results": [
+            {
+                "case": case,
+                "variant": variant,
+                "n_end_solved": None if m.solved_at_end is None else int(m.solved_at_end.sum()),
+                **m.result.to_json(),
+                "differences": {
+                    name: estimate.to_json(m.result.last_episode)
+                    for name, estimate in m.differences.items()
+                },
+            }
+            for (case, variant), m in comparison.measured.items()
+        ],
+        **addition.json,
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,18 +294,9 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finishe
     trial that raises leaves its variant out of the report and nothing else. There is no report if
     nothing is complete, or the run was interrupted.
 
-    Raises
-    ------
-    ConfigError
-        If the core refuses a configuration; no trial is run then.
-    ValueError
-        If there is no variant of that name.
-    PlotUnavailableError
-        If matplotlib or Jinja is not installed; no trial is run then.
-    StoreError
-        If the result file cannot be used.
-    ClusterError
-        If the cluster cannot run trials any more; what was finished is stored.
+    RunError before any trial if a configuration is refused, matplotlib or Jinja is not installed or
+    the result file cannot be used; later if the cluster cannot run trials any more: what was
+    finished is stored. ValueError if there is no variant of that name.
     """
     require("matplotlib", "jinja2")
     begin = time.monotonic()

@@ -13,7 +13,7 @@ from refusals import refuses
 from sdnn import config
 from sdnn.config import QLearningConfig, SDNNCConfig, fields_of
 
-KINDS = [getattr(config, name) for name in config.__all__ if name.endswith("Config")]
+KINDS = [kind for name, kind in vars(config).items() if name.endswith("Config")]
 FIELDS = [(kind, field) for kind in KINDS for field in fields_of(kind)]
 IDS = [f"{kind.__name__}.{field.name}" for kind, field in FIELDS]
 

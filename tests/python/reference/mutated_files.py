@@ -18,7 +18,7 @@ from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.agents.agent import load_agent
 from sdnn.coding import Symbolic, WithMissing
 from sdnn.estimators import libsdnn
-from sdnn.reproduction.studies import read_study
+from sdnn.reproduction.report import read_study
 from sdnn.runs import ResultStore, StoreError
 from sdnn.runs.config_file import read_spec
 from sdnn.runs.errors import RunError

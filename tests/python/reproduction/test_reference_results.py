@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import sdnn.reproduction.reference_results as reference_module
+import sdnn.reproduction.claims as reference_module
 import sdnn.reproduction.reproduce as reproduce_module
 from refusals import refuses
 from sdnn.reproduction import (
@@ -19,21 +19,19 @@ from sdnn.reproduction import (
 from sdnn.reproduction.cases import PAPER_EPISODES
 from sdnn.reproduction.claims import (
     CLAIMS,
+    HEADER,
     Check,
     CheckOutcome,
     Claim,
     ClaimOutcome,
     Growth,
     Median,
+    ReferenceResult,
     Subject,
     TenTrials,
     Verdict,
     is_paper_scale,
     judge_claims,
-)
-from sdnn.reproduction.reference_results import (
-    HEADER,
-    ReferenceResult,
     reference_results,
 )
 from sdnn.reproduction.report import Report

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from sdnn.reproduction.claims import Verdict
-from sdnn.reproduction.studies import StudyClaims, add_claims
-from sdnn.runs.comparison import compare, study_json, study_page
+from sdnn.reproduction.report import StudyClaims, add_claims
 from sdnn.runs.figures import draw_study, figure_bytes
 from sdnn.runs.report import format_estimate
 from sdnn.runs.results import Estimate
+from sdnn.runs.sweep import compare, study_json, study_page
 from sdnn.runs.trial import TrialRecord, TrialRows
 
 

@@ -11,11 +11,10 @@ from hypothesis import example, given, settings, strategies as st
 from markdown_it import MarkdownIt
 
 from sdnn.files import csv_bytes
-from sdnn.reproduction.studies import add_claims
-from sdnn.runs.comparison import compare, study_json, study_page
+from sdnn.reproduction.report import add_claims
 from sdnn.runs.figures import draw_study, figure_bytes
 from sdnn.runs.report import Page, Section, Table
-from sdnn.runs.sweep import trial_table
+from sdnn.runs.sweep import compare, study_json, study_page, trial_table
 from sdnn.runs.trial import TrialRecord, TrialRows
 
 FRAGMENTS = (
