@@ -177,9 +177,9 @@ void bind_linear_sdnn(py::module_& module) {
           "code",
           [](const LinearSDNN& net, const ArrayArgument<double>& state) {
             auto& workspace = bindings::workspace_of(net);
-            net.encode(bindings::vector(state, "state"), workspace, workspace.code);
+            net.read(bindings::vector(state, "state"), workspace);
             py::array_t<std::int8_t> out(static_cast<py::ssize_t>(net.n_slots()));
-            std::ranges::copy(workspace.code.signs(), out.mutable_data());
+            std::ranges::copy(workspace.code().signs(), out.mutable_data());
             return out;
           },
           py::arg("state"), "The paired code of a state, -1, 0 or +1: (n_inputs,) -> (n_slots,)")

@@ -15,13 +15,14 @@ LINEAR_PRESETS = presets_of(
 
 
 class SDNNSarsa(CodedAgent[LinearSDNNConfig, SarsaConfig]):
-    """An agent that learns Q(s, a) linear in the SDNN code, by true-online Sarsa(lambda).
+    """An agent that learns Q(s, a) linear in the SDNN code, by true-online traces.
 
     Values have no range that must be chosen, nothing depends on a planned end of the training, and
     all that is learned are integers: the same on every processor.
 
     A ``Box`` of actions is cut evenly into ``approximator.n_actions`` actions in each dimension;
-    Q(s, a) is the sum of the dimensions' parts, so the best action is exact.
+    Q(s, a) is the sum of the dimensions' parts, so the best action is exact. A ``Discrete`` of at
+    most 1,536 observations has a table: weights of its own for each.
 
     Parameters
     ----------

@@ -49,8 +49,11 @@ void live(Sarsa& agent, int n_steps, std::uint64_t seed) {
 
 // gamma = 1/2, alpha = 1, no trace: the value of what follows halves.
 TEST(Sarsa, OneStepTargetsByHand) {
-  Sarsa agent = agent_of(
-      {.learning_rate = 1.0, .discount = 0.5, .trace_decay = 0.0, .final_learning_rate = {}});
+  Sarsa agent = agent_of({.learning_rate = 1.0,
+                          .discount = 0.5,
+                          .trace_decay = 0.0,
+                          .bootstrap = Bootstrap::sarsa,
+                          .final_learning_rate = {}});
   const State a{0.1, 0.1}, b{0.9, 0.9};
   agent.learn(b, {2}, 8.0, b, true);
   EXPECT_NEAR(q(agent, b, 2), 8.0, 1e-3);

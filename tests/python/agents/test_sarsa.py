@@ -55,6 +55,8 @@ def test_weights_are_those_of_the_transcription(
         "traces": traces,
         "trace_decay": trace_decay,
         "discount": discount,
+        "epsilon": 0.0,
+        "final_epsilon": 0.0,
     }
     agent = _core.Sarsa(
         approximator=LinearSDNNConfig(**SMALL, action_window=window),
@@ -64,6 +66,8 @@ def test_weights_are_those_of_the_transcription(
     )
     slow = Sarsa(agent.action_value.code, n_actions, window, {**learning, "n_inputs": 2})
     for state, action, reward, next_state, end in life(seed, 25, n_actions, scale):
+        # Acting keeps sums for learning.
+        assert slow.value(state, agent.act(state)) == slow.best_value(state)
         for one in (agent, slow):
             one.learn(state, action, reward, next_state, end == "terminal")
             if end == "limit":
@@ -82,6 +86,29 @@ def test_a_full_step_corrects_the_whole_error_of_a_new_state():
     agent.learn([0.3, 0.7], [1], 5.0, [0.4, 0.7], True)
     np.testing.assert_allclose(agent.q_values([0.3, 0.7]), [0, 5, 0], rtol=1e-3)
     assert 0 < agent.q_values([0.35, 0.7])[1] < 5  # a neighbour learns from it
+
+
+def test_listed_states_have_a_table(tmp_path):
+    space = gym.spaces.Discrete(5, start=3)
+    agent = SDNNSarsa(space, gym.spaces.Discrete(2), seed=1)
+    for state, reward in ((3, 2.0), (7, -5.0)):
+        agent.learn(Transition(state, 1, reward, 4, terminated=True))
+    agent.save(tmp_path / "agent.safetensors")
+    for one in (agent, load_agent(tmp_path / "agent.safetensors")):
+        values = np.array([one.q_values(state) for state in range(3, 8)])
+        np.testing.assert_allclose(values[:, 1], [2, 0, 0, 0, -5], rtol=1e-6)
+        np.testing.assert_array_equal(values[:, 0], 0)
+
+
+@pytest.mark.parametrize(("n_states", "n_units"), [(1, 0), (2000, 0), (5, 40)])
+def test_too_many_states_or_given_units_have_patterns(n_states, n_units):
+    agent = SDNNSarsa(
+        gym.spaces.Discrete(n_states), gym.spaces.Discrete(2), seed=1,
+        approximator=LinearSDNNConfig(n_pattern_units=n_units),
+    )  # fmt: skip
+    assert agent.approximator.n_pattern_units == (n_units or 768)
+    agent.learn(Transition(0, 1, 2.0, 0, terminated=True))
+    assert agent.q_values(0)[1] == pytest.approx(2, rel=1e-3)
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])

@@ -55,6 +55,12 @@ class Sarsa:
             best += max(sum(sums[a : a + self.window]) for a in range(n))
         return best
 
+    def value(self, state, action) -> int:
+        return self._sum(self.code(state), action)
+
+    def best_value(self, state) -> int:
+        return self._best(self.code(state))
+
     def _double_unit(self) -> None:
         self.exponent = (self.exponent or 0) + 1
         self.weights = [[(w + 1) >> 1 for w in row] for row in self.weights]

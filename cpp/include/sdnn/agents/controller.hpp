@@ -28,6 +28,7 @@
 #include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/coding/symbol_patterns.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/check_fields.hpp"
@@ -290,6 +291,7 @@ class Controller {
   struct Unborn {};
 
   static constexpr double kLargestReward = 1e300;
+  static constexpr std::size_t kMostTableStates = 1536;
 
   Controller(ControllerConfig config, std::vector<coding::PatternTable> tables, Unborn)
       : config_(std::move(config)),
@@ -325,11 +327,13 @@ class Controller {
           if constexpr (requires { config.circular; }) fill_in_code(config);
         },
         approximator_);
+    std::vector<coding::PatternTable> tables = tables_;
+    if (is_table()) tables.assign(2, coding::one_hot_patterns(observations_.n_states()));
     if (reader != nullptr) {
-      expect_sizes(*reader, approximator_, actions_.n_actions(), !tables_.empty());
+      expect_sizes(*reader, approximator_, actions_.n_actions(), !tables.empty());
     }
     agent_.emplace(
-        make_agent(approximator_, config_.learning, actions_.n_actions(), config_.seed, tables_));
+        make_agent(approximator_, config_.learning, actions_.n_actions(), config_.seed, tables));
     if (auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&approximator_)) {
       if (n_dimensions() == 1) sdnn->n_actions = static_cast<int>(actions_.n_actions().front());
     }
@@ -354,9 +358,19 @@ class Controller {
     if (has(n_symbols) && config.n_symbols.empty()) config.n_symbols = n_symbols;
     if constexpr (requires { config.action_window; }) {
       if (config_.action.discrete) config.action_window = 1;
+      if (is_table()) config.n_pattern_units = static_cast<int>(observations_.n_states());
       config = approximators::with_pattern_units(config);
     }
     check_tables(n_symbols);
+  }
+
+  /// Whether a linear readout has weights of their own for every state: where these are listed and
+  /// not more than other codes have columns, and neither units nor patterns are given.
+  bool is_table() const noexcept {
+    const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&config_.approximator);
+    const std::size_t n = observations_.n_states();
+    return linear != nullptr && linear->n_pattern_units == 0 && tables_.empty() && n >= 2 &&
+           n <= kMostTableStates;
   }
 
   void check_tables(const std::vector<int>& n_symbols) const {

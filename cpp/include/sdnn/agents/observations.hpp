@@ -119,6 +119,13 @@ class Observations {
     return n_symbols;
   }
 
+  /// How many states there are where an observation is one symbol; else 0.
+  std::size_t n_states() const noexcept {
+    const bool is_symbol =
+        !config_.symbols.empty() && index(config_.symbols.front()[1]) == n_variables();
+    return is_symbol ? n_variables() : 0;
+  }
+
   /// Shapes: observation (n_variables,), state (n_inputs,). Throws std::invalid_argument naming the
   /// number of the observation, called `name`, that has no state. Requires that it is fitted.
   void scale(std::span<const double> observation, std::span<double> state,

@@ -99,6 +99,7 @@ inline LinearPreset paper_linear_preset(int n_inputs) {
                        .trace_decay = 0.0,
                        .bootstrap = Bootstrap::q_learning,
                        .schedule_steps = 0,
+                       .max_action_repeat = 1,
                        .final_learning_rate = {},
                        .final_epsilon = {}}};
 }

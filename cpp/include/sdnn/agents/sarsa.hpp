@@ -66,7 +66,6 @@ class Sarsa {
         action_value_(std::move(action_value)),
         exploration_(config, seed),
         workspace_(workspace()),
-        next_code_(action_value_.new_code()),
         episodes_(new_episode()) {
     apply_rates();
   }
@@ -160,8 +159,13 @@ class Sarsa {
     if (explore && exploration_.takes_random_action(episode.exploration, n_actions_of)) {
       return episode.exploration.kept;
     }
-    read(state, workspace_, !explore);
-    return best_of(workspace_, explore);
+    if (!explore) {
+      read(state, workspace_, true);
+      return best_of(workspace_, false);
+    }
+    action_value_.read_next(state, episode.next);
+    take_values(episode.next, workspace_.values, false);
+    return best_of(workspace_, true);
   }
 
   /// The action of the first dimension as a number in [-1, 1]: actions cut the range evenly.
@@ -181,9 +185,9 @@ class Sarsa {
     core::require_unit_values("next_state", next_state, n_inputs());
     Episode& episode = episodes_.of(environment);
     if (episode.waits && !std::ranges::equal(episode.next_state, state)) finish_at_end(episode);
-    action_value_.encode(state, workspace_.approximator, next_code_);
+    action_value_.read_next(state, episode.next);
     if (episode.waits) finish(episode, action);
-    std::swap(episode.code, next_code_);
+    std::swap(episode.present, episode.next);
     episode.state.assign(state.begin(), state.end());
     episode.action = action;
     episode.reward = reward;
@@ -225,8 +229,9 @@ class Sarsa {
   /// What belongs to the present episode in one environment.
   struct Episode {
     Readout::Trace trace;
-    Readout::Code code;  ///< of state
-    bool waits = false;  ///< the episode continues; with Sarsa, this transition is to be learned:
+    Readout::Workspace present;  ///< of state
+    Readout::Workspace next;     ///< of the state after it, or another
+    bool waits = false;          ///< the episode continues; with Sarsa, this transition is to be learned:
     std::vector<double> state;
     std::vector<std::size_t> action;
     double reward = 0.0;
@@ -237,7 +242,8 @@ class Sarsa {
 
   Episode new_episode() const {
     return {.trace = action_value_.trace(),
-            .code = action_value_.new_code(),
+            .present = action_value_.workspace(),
+            .next = action_value_.workspace(),
             .state = std::vector<double>(n_inputs()),
             .action = std::vector<std::size_t>(n_dimensions()),
             .next_state = std::vector<double>(n_inputs()),
@@ -272,7 +278,7 @@ class Sarsa {
       archive.expect(std::abs(episode.reward) <= kLargestReward, "reward", "a finite number");
       archive.expect(!Readout::is_too_large(episode.old_value), "old_value", "below 2^33 in size");
       archive.taking("reward", [&] { self.action_value_.fit_unit(episode.reward); });
-      self.action_value_.encode(episode.state, self.workspace_.approximator, episode.code);
+      self.action_value_.read(episode.state, episode.present);
     }
   }
 
@@ -317,13 +323,15 @@ class Sarsa {
     }
   }
 
-  /// Values in units, which are exact and in the same order.
   void read(std::span<const double> state, Workspace& workspace, bool averaged) const {
-    Readout::Workspace& of_readout = workspace.approximator;
-    action_value_.encode(state, of_readout, of_readout.code);
+    action_value_.read(state, workspace.approximator);
+    take_values(workspace.approximator, workspace.values, averaged);
+  }
+  /// Values in units, which are exact and in the same order.
+  void take_values(Readout::Workspace& read, std::vector<std::vector<double>>& values,
+                   bool averaged) const {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
-      std::ranges::copy(action_value_.sums(of_readout.code, of_readout, d, averaged),
-                        workspace.values[d].begin());
+      std::ranges::copy(action_value_.sums(read, d, averaged), values[d].begin());
     }
   }
 
@@ -342,10 +350,10 @@ class Sarsa {
     });
   }
 
-  std::int64_t best_sum(const Readout::Code& code) {
+  std::int64_t best_sum(Readout::Workspace& read) const {
     std::int64_t total = 0;
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
-      total += std::ranges::max(action_value_.sums(code, workspace_.approximator, d));
+      total += std::ranges::max(action_value_.sums(read, d));
     }
     return total;
   }
@@ -374,12 +382,12 @@ class Sarsa {
     return value;
   }
 
-  /// Continues the episode: in the state of next_code_, `action` is taken.
+  /// Continues the episode: in the state of episode.next, `action` is taken.
   void finish(Episode& episode, const Action& action) {
     if (config_.bootstrap == Bootstrap::q_learning) {
-      if (action_value_.sum(next_code_, action) < best_sum(next_code_)) end(episode);
+      if (action_value_.sum(episode.next, action) < best_sum(episode.next)) end(episode);
     } else {
-      correct(episode, in_range([&] { return action_value_.sum(next_code_, action); }));
+      correct(episode, in_range([&] { return action_value_.sum(episode.next, action); }));
     }
     episode.waits = false;
   }
@@ -392,8 +400,8 @@ class Sarsa {
 
   /// Learns a transition by the best value of its next state.
   void correct_by_best(Episode& episode) {
-    action_value_.encode(episode.next_state, workspace_.approximator, next_code_);
-    correct(episode, in_range([&] { return best_sum(next_code_); }));
+    action_value_.read_next(episode.next_state, episode.next);
+    correct(episode, in_range([&] { return best_sum(episode.next); }));
   }
 
   static void end(Episode& episode) noexcept {
@@ -405,7 +413,7 @@ class Sarsa {
   /// One step of learning, `next` being Q' in units.
   void correct(Episode& episode, std::int64_t next) {
     const std::int64_t value =
-        in_range([&] { return action_value_.sum(episode.code, episode.action); }, &next);
+        in_range([&] { return action_value_.sum(episode.present, episode.action); }, &next);
     const auto discount = static_cast<std::int64_t>(std::lround(config_.discount * (1 << 15)));
     const std::int64_t target = action_value_.units_of(episode.reward) +
                                 ((next * discount + (std::int64_t{1} << 14)) >> 15);
@@ -414,7 +422,7 @@ class Sarsa {
     episode.old_value = next;
     const auto decay = static_cast<std::int32_t>(
         std::lround(config_.discount * config_.trace_decay * approximators::kDecayOne));
-    halve_old_values(action_value_.learn(episode.code, episode.action, episode.trace,
+    halve_old_values(action_value_.learn(episode.present.code(), episode.action, episode.trace,
                                          {.error = target - value + drift,
                                           .correction = drift,
                                           .rate = rate_,
@@ -429,7 +437,6 @@ class Sarsa {
   std::int64_t n_learned_ = 0;
   std::int32_t rate_ = 0;  ///< alpha, kOne for 1
   Workspace workspace_;
-  Readout::Code next_code_;
   Episodes<Episode> episodes_;
 };
 

@@ -95,12 +95,20 @@ class LinearSDNN {
     std::int32_t n_active_ = 0;
   };
 
-  /// What one user needs to read the model.
-  struct Workspace {
-    Code code;
-    std::vector<coding::Bin> bins;
-    std::vector<std::uint64_t> words;
-    std::vector<std::int64_t> sums;  ///< of the units of a dimension
+  /// What one user needs to read the model: a state, its code, and the sums of rows over it, each
+  /// computed anew when its weights have changed.
+  class Workspace {
+   public:
+    const Code& code() const noexcept { return code_; }
+
+   private:
+    friend class LinearSDNN;
+    Code code_;
+    std::vector<coding::Bin> bins_, new_bins_;
+    std::vector<std::uint64_t> words_;
+    std::vector<std::int64_t> row_sums_;
+    std::vector<std::uint64_t> versions_;  ///< of the rows that were summed; 0: none
+    std::vector<std::int64_t> sums_;       ///< of the actions of a dimension
   };
 
   /// What one stream of experience needs: which weights had a part in the values before.
@@ -182,6 +190,7 @@ class LinearSDNN {
     }
     n_rows_ = row;
     weights_.resize(n_rows_ * n_slots());
+    versions_.resize(n_rows_, version_);
     if (config_.averaging_interval > 0) averaged_.resize(weights_.size());
   }
 
@@ -202,67 +211,78 @@ class LinearSDNN {
   std::optional<std::int32_t> exponent() const noexcept { return exponent_; }
 
   Workspace workspace() const {
-    return {new_code(), std::vector<coding::Bin>(n_inputs()),
-            std::vector<std::uint64_t>(2 * code_->n_words()), std::vector<std::int64_t>(n_rows_)};
+    Workspace workspace;
+    workspace.code_.active_.resize(n_slots());
+    workspace.code_.negative_.resize(n_slots());
+    workspace.words_.resize(2 * code_->n_words());
+    workspace.new_bins_.resize(n_inputs());
+    workspace.row_sums_.resize(n_rows_);
+    workspace.versions_.resize(n_rows_);
+    workspace.sums_.resize(n_rows_);
+    return workspace;
   }
   Trace trace() const { return {n_rows_, n_slots()}; }
-  Code new_code() const {
-    Code code;
-    code.active_.resize(n_slots());
-    code.negative_.resize(n_slots());
-    return code;
-  }
 
-  /// Shape: state (l,) in [0, 1]. Throws std::invalid_argument for another one.
-  void encode(std::span<const double> state, Workspace& workspace, Code& code) const {
-    code_->bins_of(state, workspace.bins);
-    std::uint64_t* const active = workspace.words.data();
+  /// Reads a state. Shape: state (l,) in [0, 1]. Throws std::invalid_argument for another one.
+  void read(std::span<const double> state, Workspace& workspace) const {
+    workspace.bins_.clear();
+    read_next(state, workspace);
+  }
+  /// The same where the workspace has read this model last: a state with the same code keeps the
+  /// sums of rows that have not changed.
+  void read_next(std::span<const double> state, Workspace& workspace) const {
+    code_->bins_of(state, workspace.new_bins_);
+    if (workspace.bins_ == workspace.new_bins_) return;
+    workspace.bins_ = workspace.new_bins_;
+    std::ranges::fill(workspace.versions_, 0);
+    std::uint64_t* const active = workspace.words_.data();
     std::uint64_t* const positive = active + code_->n_words();
-    code_->encode(workspace.bins, active, positive);
+    code_->encode(workspace.bins_, active, positive);
     std::size_t n_active = 0;
     for (std::size_t w = 0; w < code_->n_words(); ++w) {
       n_active += static_cast<std::size_t>(std::popcount(active[w]));
       positive[w] = active[w] & ~positive[w];
     }
+    Code& code = workspace.code_;
     code.n_active_ = static_cast<std::int32_t>(n_active);
     spread_bits(active, code_->n_words(), code.active_.data());
     spread_bits(positive, code_->n_words(), code.negative_.data());
   }
 
-  /// The dimension's part of Q(s, a) for each of its actions, in units; by the average of the
-  /// weights where `averaged` and there is one. Valid until the workspace is used again.
-  std::span<const std::int64_t> sums(const Code& code, Workspace& workspace, std::size_t d,
+  /// The dimension's part of Q(s, a) of the state that was read, for each of its actions, in units;
+  /// by the average of the weights where `averaged` and there is one. Valid until the workspace is
+  /// used again.
+  std::span<const std::int64_t> sums(Workspace& workspace, std::size_t d,
                                      bool averaged = false) const {
-    const std::vector<std::int32_t>& rows = averaged && n_snapshots_ > 0 ? averaged_ : weights_;
     const Dimension& dimension = dimensions_[d];
-    for (std::size_t i = 0; i < dimension.n_actions + window() - 1; ++i) {
-      workspace.sums[i] =
-          row_sum(&rows[(dimension.first_row + i) * n_slots()], code.masks(), n_slots());
+    const std::size_t end = dimension.first_row + dimension.n_actions + window() - 1;
+    sum_rows(dimension.first_row, end, averaged && n_snapshots_ > 0, workspace);
+    std::int64_t sum = 0;
+    for (std::size_t row = dimension.first_row; row < end; ++row) {
+      sum += workspace.row_sums_[row];
+      const std::size_t n_summed = row - dimension.first_row + 1;
+      if (n_summed < window()) continue;
+      workspace.sums_[n_summed - window()] = sum;
+      sum -= workspace.row_sums_[row + 1 - window()];
     }
-    if (window() > 1) {
-      for (std::size_t a = 0; a < dimension.n_actions; ++a) {
-        const auto first = workspace.sums.begin() + static_cast<std::ptrdiff_t>(a);
-        workspace.sums[a] =
-            std::accumulate(first, first + static_cast<std::ptrdiff_t>(window()), std::int64_t{0});
-      }
-    }
-    return {workspace.sums.data(), dimension.n_actions};
+    return {workspace.sums_.data(), dimension.n_actions};
   }
 
   /// The same as numbers, Q_d(state, a). Shapes: state (l,), out (n_actions(d),).
   void values(std::span<const double> state, Workspace& workspace, std::span<double> out,
               std::size_t d = 0, bool averaged = false) const {
     assert(out.size() == n_actions(d));
-    encode(state, workspace, workspace.code);
-    const auto units = sums(workspace.code, workspace, d, averaged);
+    read(state, workspace);
+    const auto units = sums(workspace, d, averaged);
     for (std::size_t a = 0; a < out.size(); ++a) out[a] = value_of(units[a]);
   }
 
-  /// Q(s, a) in units. Shape: action (n_dimensions,).
-  std::int64_t sum(const Code& code, std::span<const std::size_t> action) const noexcept {
+  /// Q(s, a) of the state that was read, in units. Shape: action (n_dimensions,).
+  std::int64_t sum(Workspace& workspace, std::span<const std::size_t> action) const noexcept {
     std::int64_t total = 0;
     for_window(action, [&](std::size_t row) {
-      total += row_sum(&weights_[row * n_slots()], code.masks(), n_slots());
+      sum_rows(row, row + 1, false, workspace);
+      total += workspace.row_sums_[row];
     });
     return total;
   }
@@ -272,7 +292,7 @@ class LinearSDNN {
     std::int64_t total = 0;
     for_window(action, [&](std::size_t row) {
       if (!trace.live_[row]) return;
-      total += row_sum(&trace.values_[row * n_slots()], code.masks(), n_slots());
+      total += sum_of_row(trace.values_, row, code);
     });
     return total;
   }
@@ -304,6 +324,7 @@ class LinearSDNN {
     ++*exponent_;
     for (std::int32_t& weight : weights_) weight = halved(weight);
     for (std::int32_t& weight : averaged_) weight = halved(weight);
+    std::ranges::fill(versions_, ++version_);
   }
   template <class Number>
   static Number halved(Number units) noexcept {
@@ -330,6 +351,7 @@ class LinearSDNN {
           std::clamp<std::int64_t>(scaled(before, step.decay, 13), -kLargestTrace, kLargestTrace));
     }
     int n_doubled = 0;
+    ++version_;
     std::int64_t error = std::clamp(step.error, -kLargestError, kLargestError);
     std::int64_t drift = std::clamp(step.correction, -kLargestError, kLargestError);
     while (std::max(std::abs(scaled(error, rate, 28)), std::abs(scaled(drift, rate, 28))) >=
@@ -359,6 +381,7 @@ class LinearSDNN {
         const RowUse use = learn_row(&weights_[row * n_slots()], &trace.values_[row * n_slots()],
                                      code.masks(), n_slots(), row_step);
         trace.live_[row] = use.traces != 0;
+        if (is_active || trace.live_[row]) versions_[row] = version_;
         used |= use.weights;
       }
     }
@@ -388,6 +411,7 @@ class LinearSDNN {
       archive.expect(!self.exponent_ || std::abs(*self.exponent_) <= 1100, "exponent",
                      "in [-1100, 1100]");
       archive.expect(self.n_steps_ >= 0 && self.n_snapshots_ >= 0, "n_steps", "0 or more");
+      std::ranges::fill(self.versions_, ++self.version_);
       self.identity_ = core::Identity();
     }
   }
@@ -404,6 +428,31 @@ class LinearSDNN {
   static constexpr std::int64_t kLargestError = (std::int64_t{1} << 34) - 1;
 
   std::size_t window() const noexcept { return static_cast<std::size_t>(config_.action_window); }
+
+  std::int64_t sum_of_row(const std::vector<std::int32_t>& rows, std::size_t row,
+                          const Code& code) const noexcept {
+    return row_sum(&rows[row * n_slots()], code.masks(), n_slots());
+  }
+  /// Sums rows first to end that have changed, or those of the average.
+  void sum_rows(std::size_t first, std::size_t end, bool averaged,
+                Workspace& workspace) const noexcept {
+    const std::vector<std::int32_t>& weights = averaged ? averaged_ : weights_;
+    constexpr std::size_t kMost = 64;
+    const std::int32_t* rows[kMost];
+    std::size_t places[kMost];
+    std::int64_t sums[kMost];
+    for (std::size_t row = first; row < end;) {
+      std::size_t n = 0;
+      for (; row < end && n < kMost; ++row) {
+        if (!averaged && workspace.versions_[row] == versions_[row]) continue;
+        places[n] = row;
+        rows[n++] = &weights[row * n_slots()];
+        workspace.versions_[row] = averaged ? 0 : versions_[row];
+      }
+      row_sums(rows, n, workspace.code_.masks(), n_slots(), sums);
+      for (std::size_t i = 0; i < n; ++i) workspace.row_sums_[places[i]] = sums[i];
+    }
+  }
 
   /// a * b / 2^n_bits, rounded to the nearest, halves up.
   static std::int64_t scaled(std::int64_t a, std::int64_t b, int n_bits) noexcept {
@@ -437,7 +486,9 @@ class LinearSDNN {
   std::vector<Dimension> dimensions_;
   std::size_t n_rows_ = 0;
   std::vector<std::int32_t> weights_;
-  std::vector<std::int32_t> averaged_;  ///< none without averaging
+  std::vector<std::int32_t> averaged_;   ///< none without averaging
+  std::vector<std::uint64_t> versions_;  ///< of each row of weights
+  std::uint64_t version_ = 1;            ///< the latest
   std::optional<std::int32_t> exponent_;
   std::int64_t n_steps_ = 0;
   std::int64_t n_snapshots_ = 0;

@@ -26,4 +26,14 @@ inline PatternTable symbol_patterns(int n_symbols, int n_units, bool balanced,
   return table;
 }
 
+/// A unit for each of n_symbols: only that symbol's is +1.
+///
+/// An input that is modified by itself then has one unit of each group that is not neutral, another
+/// for each symbol: what is learned is a table, exactly.
+inline PatternTable one_hot_patterns(std::size_t n_symbols) {
+  PatternTable table(n_symbols, n_symbols);
+  for (std::size_t symbol = 0; symbol < n_symbols; ++symbol) table.set(symbol, symbol);
+  return table;
+}
+
 }  // namespace sdnn::coding

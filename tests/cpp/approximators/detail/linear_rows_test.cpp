@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -51,6 +52,25 @@ TEST(LinearRows, SumsOfTheLargestWeightsAreExactOnEveryInstructionSet) {
                 static_cast<std::int64_t>(n) * ((1 << 23) - 1));
     });
   }
+}
+
+TEST(LinearRows, ManyRowsHaveTheSumsOfEach) {
+  const Rows code = random_rows(320, 1);
+  std::vector<Rows> rows;
+  std::vector<const std::int32_t*> pointers;
+  std::vector<std::int64_t> expected;
+  for (std::uint64_t i = 0; i < 11; ++i) {
+    rows.push_back(random_rows(320, i + 2));
+    pointers.push_back(rows.back().weights.data());
+    expected.push_back(row_sum(pointers.back(), code.code(), 320));
+  }
+  testing::on_every_instruction_set([&](auto) {
+    for (std::size_t n = 0; n <= pointers.size(); ++n) {
+      std::vector<std::int64_t> sums(n);
+      row_sums(pointers.data(), n, code.code(), 320, sums.data());
+      EXPECT_TRUE(std::equal(sums.begin(), sums.end(), expected.begin()));
+    }
+  });
 }
 
 TEST(LinearRows, AStepByHand) {

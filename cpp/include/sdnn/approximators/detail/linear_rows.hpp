@@ -45,19 +45,35 @@ SDNN_INLINE std::int32_t times_code(std::int32_t x, std::int32_t active,
 
 namespace detail {
 
-SDNN_INLINE std::int64_t row_sum_body(const std::int32_t* row, CodeMasks code,
-                                      std::size_t n_columns) noexcept {
+/// Rows that are summed in one pass over the code.
+inline constexpr std::size_t kRowsAtOnce = 4;
+
+template <std::size_t kRows>
+SDNN_INLINE void sum_rows_at_once(const std::int32_t* const* rows, CodeMasks code,
+                                  std::size_t n_columns, std::int64_t* sums) noexcept {
   constexpr std::size_t kBlock = 256;  // whose sum fits into 32 bits
-  std::int64_t total = 0;
+  std::fill_n(sums, kRows, 0);
   for (std::size_t first = 0; first < n_columns; first += kBlock) {
     const std::size_t last = std::min(n_columns, first + kBlock);
-    std::int32_t sum = 0;
+    std::int32_t of_block[kRows] = {};
     for (std::size_t j = first; j < last; ++j) {
-      sum += times_code(row[j], code.active[j], code.negative[j]);
+      const std::int32_t active = code.active[j];
+      const std::int32_t negative = code.negative[j];
+      for (std::size_t i = 0; i < kRows; ++i) {
+        of_block[i] += times_code(rows[i][j], active, negative);
+      }
     }
-    total += sum;
+    for (std::size_t i = 0; i < kRows; ++i) sums[i] += of_block[i];
   }
-  return total;
+}
+
+SDNN_INLINE void row_sums_body(const std::int32_t* const* rows, std::size_t n_rows, CodeMasks code,
+                               std::size_t n_columns, std::int64_t* sums) noexcept {
+  std::size_t i = 0;
+  for (; i + kRowsAtOnce <= n_rows; i += kRowsAtOnce) {
+    sum_rows_at_once<kRowsAtOnce>(rows + i, code, n_columns, sums + i);
+  }
+  for (; i < n_rows; ++i) sum_rows_at_once<1>(rows + i, code, n_columns, sums + i);
 }
 
 SDNN_INLINE RowUse learn_row_body(std::int32_t* weights, std::int32_t* traces, CodeMasks code,
@@ -101,10 +117,19 @@ SDNN_KERNEL(void, spread_bits,
             (const std::uint64_t* words, std::size_t n_words, std::int32_t* masks),
             (words, n_words, masks))
 
-/// The sum of a row's weights, times the code. Requires weights below 2^23 in size. Shapes: row and
-/// masks (n_columns,).
-SDNN_KERNEL(std::int64_t, row_sum, (const std::int32_t* row, CodeMasks code, std::size_t n_columns),
-            (row, code, n_columns))
+/// The sum of each row's weights, times the code. Requires weights below 2^23 in size. Shapes: rows
+/// and sums (n_rows,), each row and masks (n_columns,).
+SDNN_KERNEL(void, row_sums,
+            (const std::int32_t* const* rows, std::size_t n_rows, CodeMasks code,
+             std::size_t n_columns, std::int64_t* sums),
+            (rows, n_rows, code, n_columns, sums))
+
+/// The same of one row.
+inline std::int64_t row_sum(const std::int32_t* row, CodeMasks code, std::size_t n_columns) {
+  std::int64_t sum = 0;
+  row_sums(&row, 1, code, n_columns, &sum);
+  return sum;
+}
 
 /// One step of learning of a row. Shapes: weights, traces and masks (n_columns,).
 SDNN_KERNEL(RowUse, learn_row,
