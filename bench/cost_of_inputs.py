@@ -2,9 +2,9 @@
 
     python bench/cost_of_inputs.py [--only WORD] [--redraw]
 
-Measures what the store lacks and draws docs/cost-of-inputs.png. The paper's claim is quadratic
-growth: the network has l (l - 1) groups of columns. The fit leaves out the networks that are too
-large for their place in a shared last-level cache.
+Measures what the store lacks and draws docs/evidence/cost-of-inputs.png. The paper's claim is
+quadratic growth: the network has l (l - 1) groups of columns. The fit leaves out the networks that
+are too large for their place in a shared last-level cache.
 """
 
 from __future__ import annotations

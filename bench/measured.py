@@ -1,6 +1,6 @@
 """Runs what a store of benchmarks lacks, by the engine's loop, and reads what it holds.
 
-The store stands packed in a folder (docs/ has the published one) as benchmarks.sqlite.xz. While
+The store is packed in a folder (docs/evidence/ has the published one): benchmarks.sqlite.xz. While
 something runs it is unpacked beside it, and stays so after a kill or an error: the same command
 continues from there, and packs it once it ends.
 
@@ -43,7 +43,7 @@ from sdnn.runs.engine import (
 )
 from sdnn.runs.store import STORE_NAME, ResultStore
 
-DOCS = Path(__file__).parents[1] / "docs"
+EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
 PACKED = "benchmarks.sqlite.xz"
 POLL_SECONDS = 0.1  # between two looks at whether it was interrupted
 
@@ -57,7 +57,7 @@ def options(doc: str, *, seeds: int, jobs: int = 1) -> argparse.ArgumentParser:
     parser.add_argument("--seeds", type=int, default=seeds, help="repetitions (%(default)s)")
     parser.add_argument("--only", nargs="*", default=(), metavar="WORD", help="words of the keys")
     parser.add_argument("--jobs", type=int, default=jobs, help="processes (%(default)s)")
-    parser.add_argument("--folder", type=Path, default=DOCS, help="of store, figures and pages")
+    parser.add_argument("--folder", type=Path, default=EVIDENCE, help="of store, figures and pages")
     parser.add_argument("--redraw", action="store_true", help="measure nothing")
     return parser
 
@@ -67,7 +67,7 @@ def is_wanted(key: Key, given: argparse.Namespace) -> bool:
     return set(given.only) <= set(" ".join(map(str, key)).split())
 
 
-def measured(kind: str, folder: Path = DOCS) -> dict[Key, dict[str, Any]]:
+def measured(kind: str, folder: Path = EVIDENCE) -> dict[Key, dict[str, Any]]:
     """Read the measurements of a kind, sorted; also while they are being made."""
     with tempfile.TemporaryDirectory() as unpacked:
         place = folder if (folder / STORE_NAME).exists() else Path(unpacked)

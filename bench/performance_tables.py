@@ -1,9 +1,10 @@
-"""Puts the tables of benchmark runs into docs/performance.md.
+"""Put the tables of benchmark runs into docs/evidence/performance.md.
 
-    python bench/yardsticks.py > docs/performance.json && python bench/performance_tables.py
+    python bench/yardsticks.py > docs/evidence/performance.json
+    python bench/performance_tables.py
 
-The profile in docs/profile.json, made by bench/profile_trial.py, becomes the last table. Of a run
-on a processor with AVX-512, docs/performance-avx512.json, the page has the passes only.
+The profile in docs/evidence/profile.json, made by bench/profile_trial.py, becomes the last table.
+Of a run with AVX-512, docs/evidence/performance-avx512.json, the page has the passes only.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from page import markdown, show
 from sdnn.benchmarks.report import describe_run, tables, time_words
 from sdnn.runs.report import Table
 
-DOCS = Path(__file__).parents[1] / "docs"
-PAGE = DOCS / "performance.md"
+EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
+PAGE = EVIDENCE / "performance.md"
 DENSE_TITLES = {"numpy": "NumPy, 1 thread", "core": "sdnn's own kernel"}
 
 
 def stored(name: str) -> dict[str, Any]:
     """Read what a command printed."""
-    found: dict[str, Any] = json.loads((DOCS / f"{name}.json").read_text())
+    found: dict[str, Any] = json.loads((EVIDENCE / f"{name}.json").read_text())
     return found
 
 

@@ -2,7 +2,7 @@
 
 python bench/profile_trial.py build/bench/sdnn_bench   (built with -DSDNN_BUILD_BENCH=ON)
 
-Writes docs/profile.json; bench/performance_tables.py puts it into docs/performance.md.
+Writes docs/evidence/profile.json; bench/performance_tables.py puts it into performance.md there.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-PROFILE = Path(__file__).parents[1] / "docs" / "profile.json"
+PROFILE = Path(__file__).parents[1] / "docs" / "evidence" / "profile.json"
 TRIALS = {
     "4 inputs": "trial/inputs:4/noise:0/episodes:2000",
     "4 inputs, noise": "trial/inputs:4/noise:2/episodes:2000",

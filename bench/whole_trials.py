@@ -1,4 +1,4 @@
-"""Whole trials of 15,000 episodes beside dense products: a table of docs/performance.md.
+"""Whole trials of 15,000 episodes beside dense products: a table of docs/evidence/performance.md.
 
     python bench/whole_trials.py [--seeds 10] [--jobs 2] [--redraw]
 

@@ -1,6 +1,7 @@
 """Runs ``sdnn bench``, and what a pass is compared with: a dense product, and reading its bytes.
 
-    python bench/yardsticks.py > docs/performance.json && python bench/performance_tables.py
+    python bench/yardsticks.py > docs/evidence/performance.json
+    python bench/performance_tables.py
 
 NumPy's linear algebra has one thread.
 """

@@ -1,4 +1,4 @@
-"""Write docs/settings.md from the declarations of the settings: python docs/write_settings.py."""
+"""Write docs/reference/settings.md from the settings as they are declared."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from typing import Any
 
 from sdnn.runs.spec_schema import CORE, spec_schema
 
-PAGE = Path(__file__).parent / "settings.md"
+PAGE = Path(__file__).parent / "reference" / "settings.md"
 
 HEAD = """# Settings of a run
 
 <!-- Written by docs/write_settings.py from the declarations of the settings. -->
 
-The keys of files for `sdnn train --config FILE`, of `--set KEY=VALUE`, and of [studies](sweep.md).
-`approximator.*` and `learning.*` are those of the agent; defaults are the paper's, before the
-agent's preset. `sdnn train --schema` prints the same as JSON Schema.
+The keys of files for `sdnn train --config FILE`, of `--set KEY=VALUE`, and of
+[studies](../how-to/studies.md). `approximator.*` and `learning.*` are those of the agent;
+defaults are the paper's, before the agent's preset. `sdnn train --schema` prints
+the same as JSON Schema.
 
 A study without an environment is about the paper's acrobot, where some defaults differ: the preset
 is `paper`, the budget 15,000 episodes, and every 10 episodes there is an evaluation of one episode.

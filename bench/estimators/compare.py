@@ -1,11 +1,11 @@
-"""Measures, draws and writes what docs/regression.md shows.
+"""Measures, draws and writes what docs/how-to/regression.md shows.
 
     python bench/estimators/compare.py [--seeds 5] [--only WORD] [--redraw]
 
 The demonstration problem, the same with useless inputs, and data of scikit-learn, beside baselines
 that are tuned by cross-validation; and over 20 seeds the network alone, which
-docs/coming-from-libsdnn.md quotes. Tables are printed. The picture of the demonstration problem
-shows one network, trained here in a few seconds.
+docs/how-to/coming-from-libsdnn.md quotes. Tables are printed. The picture of the demonstration
+problem shows one network, trained here in a few seconds.
 """
 
 from __future__ import annotations

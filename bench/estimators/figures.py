@@ -1,4 +1,4 @@
-"""The figures of docs/regression.md, which compare.py draws."""
+"""The figures of docs/how-to/regression.md, which compare.py draws."""
 
 from __future__ import annotations
 

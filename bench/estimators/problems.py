@@ -2,7 +2,8 @@
 
     python bench/estimators/problems.py [--seeds 10] [--only WORD] [--redraw]
 
-Measures what the store lacks, draws docs/problems.png and writes the tables of docs/problems.md.
+Measures what the store lacks, draws problems.png and writes the tables of problems.md, both in
+docs/evidence.
 Needs sdnn[river], whose measured data are in the package.
 """
 

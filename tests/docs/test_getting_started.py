@@ -1,4 +1,4 @@
-"""What docs/getting-started.md shows works as it stands there."""
+"""What docs/tutorials/getting-started.md shows works as it stands there."""
 
 import re
 import subprocess
@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from sdnn.cli import main
 
 ROOT = Path(__file__).parents[2]
-TEXT = (ROOT / "docs" / "getting-started.md").read_text()
+TEXT = (ROOT / "docs" / "tutorials" / "getting-started.md").read_text()
 
 
 def blocks(language):

@@ -36,8 +36,10 @@ def pages(site):
 
 def test_every_document_is_a_page(site):
     found = set(pages(site))
-    for document in (ROOT / "docs").glob("*.md"):
-        assert f"{document.stem}/index.html" in found
+    for document in (ROOT / "docs").rglob("*.md"):
+        place = document.relative_to(ROOT / "docs")
+        folder = place.parent if place.stem == "README" else place.with_suffix("")
+        assert f"{folder.as_posix()}/index.html" in found
     assert "index.html" in found
 
 

@@ -1,4 +1,4 @@
-"""What docs/small-processors.md shows works as it stands there."""
+"""What docs/how-to/small-processors.md shows works as it stands there."""
 
 import re
 import shutil
@@ -11,7 +11,7 @@ from sdnn.agents import SDNNQLearning
 from sdnn.cli import main
 from sdnn.export import c_header
 
-TEXT = (Path(__file__).parents[2] / "docs" / "small-processors.md").read_text()
+TEXT = (Path(__file__).parents[2] / "docs" / "how-to" / "small-processors.md").read_text()
 
 
 def block(language):

@@ -14,7 +14,7 @@ from sdnn.reproduction.report import read_study
 from sdnn.runs import AGENTS
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "sweep.md").read_text()
+PAGE = (ROOT / "docs" / "how-to" / "studies.md").read_text()
 BLOCKS = re.findall(r"```(toml|python)\n(.*?)```", PAGE, re.DOTALL)
 STUDIES = sorted((ROOT / "docs" / "studies").glob("*.toml"))
 

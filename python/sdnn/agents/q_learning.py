@@ -169,7 +169,7 @@ class SDNNQLearning(CodedAgent[SDNNCConfig, QLearningConfig]):
     A ``Box`` of actions is cut evenly into the network's actions, 5 in each dimension by default;
     a ``Discrete`` space gives one window of hidden units per action. Actions of several dimensions
     have a network each, and Q(s, a) is the mean of their values: the best action is exact, one pass
-    per dimension; see docs/agents.md.
+    per dimension; see docs/how-to/agents.md.
 
     Parameters
     ----------

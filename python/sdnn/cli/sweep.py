@@ -49,8 +49,8 @@ def sweep(
 ) -> None:
     """Run the study in FILE: variants of any setting, compared trial by trial.
 
-    FILE is TOML; docs/sweep.md describes it. Tables, a figure and a page are written to OUT under
-    the name of the file.
+    FILE is TOML; docs/how-to/studies.md describes it. Tables, a figure and a page are written to
+    OUT under the name of the file.
 
     Finished trials are kept in OUT/results.sqlite, which `reproduce` may share; the same command
     continues where it stopped.

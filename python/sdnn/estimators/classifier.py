@@ -132,7 +132,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def predict_proba(self, X: ArrayLike) -> Floats:
         """Return a softmax of the scores, shape (n_samples, n_classes).
 
-        Its steepness is a constant; where calibration matters, see docs/regression.md and
+        Its steepness is a constant; where calibration matters, see docs/how-to/regression.md and
         scikit-learn's `CalibratedClassifierCV`. Needs several units per class.
         """
         return self._probabilities(self._bins(X), self._n_threads())

@@ -81,7 +81,7 @@ def c_header(agent: Agent[Any, Any], name: str, *, fraction_bits: int | None = N
 
     The header is C99 and C++, needs ``<stdint.h>`` only, no heap and no floating point. Its action
     is that of ``agent.act(observation, explore=False)``; where the agent would draw one of several
-    best actions, it takes the middle of their widest run. See docs/small-processors.md.
+    best actions, it takes the middle of their widest run. See docs/how-to/small-processors.md.
 
     Parameters
     ----------

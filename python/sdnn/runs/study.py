@@ -41,7 +41,7 @@ class Study(StudyFile):
     Parameters
     ----------
     path
-        A TOML file; ``docs/sweep.md`` describes it.
+        A TOML file; ``docs/how-to/studies.md`` describes it.
     known_cases
         Cases that the file may name, by their ids.
     n_trials, seed

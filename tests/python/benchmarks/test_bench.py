@@ -182,7 +182,7 @@ def test_the_page_shows_the_stored_run():
     text = module.PAGE.read_text()
     assert module.stored("performance")["quick"] is False
     assert sys.modules["page"].with_tables(text, module.page_tables()) == text, (
-        "docs/performance.md is not what is stored: run bench/performance_tables.py"
+        "docs/evidence/performance.md is not what is stored: run bench/performance_tables.py"
     )
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from measurements_for_tests import squared
 
-DOCS = Path(__file__).parents[3] / "docs"
+EVIDENCE = Path(__file__).parents[3] / "docs" / "evidence"
 BENCH = Path(__file__).parents[3] / "bench"
 FOLDERS = (BENCH, BENCH / "other_tasks")
 
@@ -51,15 +51,15 @@ def given(folder, *only, jobs=1):
 
 def test_page_has_the_tables_of_the_stored_trials(scripts):
     run, report, study = scripts.run, scripts.report, scripts.study
-    tables = report.tables(study, scripts.studies.curves(run.KIND, study, given(DOCS)))
-    solved = scripts.studies.curves(run.SOLVED_KIND, study, given(DOCS), run.until_solved)
+    tables = report.tables(study, scripts.studies.curves(run.KIND, study, given(EVIDENCE)))
+    solved = scripts.studies.curves(run.SOLVED_KIND, study, given(EVIDENCE), run.until_solved)
     tables["until solved"] = report.until_solved_table(study, solved)
-    text = (DOCS / "benchmarks.md").read_text()
+    text = (EVIDENCE / "benchmarks.md").read_text()
     assert scripts.page.with_tables(text, tables) == text, "run bench/other_tasks/run.py --redraw"
 
 
 def test_every_stored_trial_is_whole_and_of_ten_seeds(scripts):
-    found = scripts.studies.curves(scripts.run.KIND, scripts.study, given(DOCS))
+    found = scripts.studies.curves(scripts.run.KIND, scripts.study, given(EVIDENCE))
     assert len(found) == 78
     for trials in found.values():
         assert len(trials) == 10
@@ -161,8 +161,8 @@ def test_a_process_that_dies_is_reported(scripts, tmp_path, capsys):
 
 def test_only_chooses_by_words(scripts):
     key = ("SDNN, small", "CartPole", 3)
-    assert scripts.measured.is_wanted(key, given(DOCS, "CartPole", "3"))
-    assert not scripts.measured.is_wanted(key, given(DOCS, "Cart"))
+    assert scripts.measured.is_wanted(key, given(EVIDENCE, "CartPole", "3"))
+    assert not scripts.measured.is_wanted(key, given(EVIDENCE, "Cart"))
 
 
 def test_page_without_a_mark_is_refused(scripts):

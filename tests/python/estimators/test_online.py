@@ -70,7 +70,8 @@ def test_labels_one_at_a_time_have_the_bits_of_partial_fit(scheme):
 
 
 def test_the_loop_of_the_document_runs():
-    document = (Path(__file__).parents[3] / "docs" / "regression.md").read_text(encoding="utf-8")
+    page = Path(__file__).parents[3] / "docs" / "how-to" / "regression.md"
+    document = page.read_text(encoding="utf-8")
     (loop,) = re.findall(r"```python\n([^`]*in stream:.*?)```", document, re.S)
     random = np.random.RandomState(0).uniform(0, 1, (30, 2))
     stream = (({"wind": wind, "hour": hour}, 30 * wind * hour) for wind, hour in random)
