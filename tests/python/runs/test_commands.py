@@ -25,7 +25,7 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.cli import main
-from sdnn.cli.common import option_of, value_of
+from sdnn.cli.common import WARMING_UP, option_of, value_of
 from sdnn.environments import UnitSensors
 from sdnn.export import c_header
 from sdnn.runs import AGENTS, Run, RunSpec
@@ -76,7 +76,9 @@ def test_train_evaluate_plot_record(invoke, tmp_path):
     )
 
     figure, numbers = folder / "curves.png", folder / "curves.csv"
-    assert invoke("plot", folder).stdout == f"wrote {figure} and {numbers}\n"
+    written = invoke("plot", folder).stdout
+    assert str(figure) in written
+    assert str(numbers) in written
     drawn = list(csv.DictReader(numbers.read_text().splitlines()))
     rows = Run.open(folder).rows()
     assert [float(one["value"]) for one in drawn if one["kind"] == "evaluation"] == [
@@ -96,11 +98,13 @@ def test_train_evaluate_plot_record(invoke, tmp_path):
 @pytest.mark.filterwarnings("ignore:.*render_mode")
 def test_an_environment_that_cannot_be_rendered_is_not_recorded(invoke, tmp_path):
     done = invoke("train", "drifting_env:tests/Unseen-v0", *SHORT, "--out", "one")
-    assert done.stdout.splitlines()[-1] == "next: sdnn plot one, sdnn evaluate one"
+    commands = done.stdout.splitlines()[-1]
+    assert "sdnn plot one" in commands
+    assert "record" not in commands
     result = invoke("record", "one", "x.gif")
     assert (result.exit_code, result.stdout) == (1, "")
-    name = "drifting_env:tests/Unseen-v0"
-    assert result.stderr == f"Error: {name} cannot be rendered as pictures (rgb_array)\n"
+    assert "drifting_env:tests/Unseen-v0 cannot be rendered" in result.stderr
+    assert result.stderr.count("\n") == 1
     assert not (tmp_path / "x.gif").exists()
 
 
@@ -133,11 +137,9 @@ SCALED_LINES = [
 
 def test_what_a_noisy_or_redundant_run_observes_is_said_where_it_is_used_elsewhere(invoke):
     done = invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one")
-    assert done.stdout.splitlines()[-2] == (
-        "the agent observes variables scaled to [0, 1], 0 from -4 to 4, 1 from -2 to 3, and means"
-        " of neighbours (1): elsewhere it needs the same, as"
-        " sdnn.runs.Run.open('one').spec.make_env() gives it"
-    )
+    told = done.stdout.splitlines()[-2]
+    assert "0 from -4 to 4, 1 from -2 to 3, and means of neighbours (1)" in told
+    assert "sdnn.runs.Run.open('one').spec.make_env()" in told
     for source in ("one", "one/agent.safetensors", "one/checkpoint.safetensors"):
         done = invoke("export", source, "--c-header", "a.h")
         assert [line.strip() for line in done.stdout.splitlines()[2:]] == SCALED_LINES
@@ -703,10 +705,12 @@ def test_ranges_that_do_not_suit_are_named(invoke):
 
 
 def test_a_warm_up_that_is_not_over_is_told(invoke):
-    told = "the agent is still warming up: it acts at random and has learned nothing yet"
+    told = WARMING_UP
     begun = ("--steps", 59, "--evaluate-every", 50, "--evaluation-episodes", 1, *SMALL)
     lines = invoke("train", DRIFTING, *begun, "--out", "one").stdout.splitlines()
-    assert lines[1] == f"{told}; that takes 60 steps: sdnn resume one --steps N continues it"
+    assert lines[1].startswith(told)
+    assert "60 steps" in lines[1]
+    assert "sdnn resume one --steps N" in lines[1]
     assert invoke("evaluate", "one", "--episodes", 1).stdout.splitlines()[-1] == told
     assert invoke("record", "one", "x.gif", "--steps", 2).stdout.splitlines()[-1] == told
     evaluate = ("evaluate", "one", "--episodes", 1, "--json")
@@ -810,7 +814,9 @@ def test_a_signal_ends_the_step_and_the_run_goes_on_exactly(invoke, tmp_path, nu
     process.send_signal(number)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == code, errors
-    assert errors == f"{word}; sdnn resume cut continues it\n"
+    assert errors.startswith(word)
+    assert "sdnn resume cut" in errors
+    assert errors.count("\n") == 1
     assert not (tmp_path / "cut" / "agent.safetensors").exists()
     cut_at = Run.open("cut").rows()[-1]["step"]
     assert cut_at < 3000
