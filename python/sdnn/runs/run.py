@@ -48,7 +48,6 @@ from sdnn.runs.trial import (
     TrialKey,
     TrialRecord,
     TrialRows,
-    make_evaluation_env,
     training_trial,
 )
 
@@ -155,11 +154,7 @@ class Run:
                 " runs on over episodes, so that none can be repeated. Studies and `sdnn reproduce`"
                 " run it; sdnn.environments:sdnn/AcrobotSwingUp-v0 is the same acrobot",
             )
-        with closing(self.spec.make_env()) as env:
-            evaluation_env = make_evaluation_env(self.spec)
-            if evaluation_env is not None:
-                evaluation_env.close()
-            self.spec.make_agent(env)
+        training_trial(self.spec).close()
         if self.spec.output.tensorboard:
             tensorboard_in(self.folder)
 
@@ -321,17 +316,10 @@ class Run:
             trial = training_trial(spec, callbacks)
             trial.training.steps, trial.training.episodes = self.goal.steps, self.goal.episodes
             return trial
-
-        def load(
-            _spec: RunSpec, env: Any, evaluation_env: Any, callbacks: Iterable[Callback]
-        ) -> Training:
-            return Training.load(
-                self.folder / CHECKPOINT, env, callbacks=callbacks, evaluation_env=evaluation_env,
-                repeat_episodes=repeat_episodes,
-            )  # fmt: skip
-
         try:
-            return training_trial(spec, callbacks, load)
+            return training_trial(
+                spec, callbacks, self.folder / CHECKPOINT, repeat_episodes=repeat_episodes
+            )
         except UnrepeatedEpisodeError as error:
             begins = command_line("sdnn", "resume", self.folder, "--new-episode")
             raise RunError(f"{error}; {begins} begins a new one") from error

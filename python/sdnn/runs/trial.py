@@ -7,11 +7,12 @@ siblings), by the same protocol, bit for bit.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import gymnasium as gym
@@ -291,18 +292,18 @@ def rows_of(trial: Trial | TrainingTrial) -> TrialRows:
 class TrainingTrial:
     """A `sdnn.agents.Training` as a trial; its evaluations are the test episodes.
 
-    ``environments`` are closed at the end. It is finished when ``target``, one of the training's
+    ``environments`` closes them at the end. It is finished when ``target``, one of the training's
     callbacks, is reached, too.
     """
 
     def __init__(
         self,
         training: Training,
-        environments: Iterable[gym.Env[Any, Any] | None],
+        environments: ExitStack,
         target: StopTrainingOnRewardThreshold | None = None,
     ) -> None:
         self.training = training
-        self._open = [env for env in environments if env is not None]
+        self._environments = environments
         self._target = target
 
     @property
@@ -350,40 +351,41 @@ class TrainingTrial:
 
     def close(self) -> None:
         """Close the environments, if they are open still."""
-        environments, self._open = self._open, []
-        with ExitStack() as stack:
-            for env in environments:
-                stack.callback(env.close)
-
-
-MakeTraining: TypeAlias = Callable[
-    ["RunSpec", Any, "gym.Env[Any, Any] | None", Iterable[Callback]], Training
-]
-"""Makes or loads a training, from specification, environments and callbacks."""
+        self._environments.close()
 
 
 def training_trial(
-    spec: RunSpec, callbacks: Iterable[Callback] = (), make: MakeTraining | None = None
+    spec: RunSpec,
+    callbacks: Iterable[Callback] = (),
+    checkpoint: Path | None = None,
+    *,
+    repeat_episodes: bool = True,
 ) -> TrainingTrial:
     """Make the trial of a specification in Python; ConfigError if a part cannot be made.
 
-    Its rows are those of the compiled trial, bit for bit. ``make`` is `training_of` by default.
+    Its rows are those of the compiled trial, bit for bit. It resumes at the checkpoint, if there is
+    one; see `sdnn.agents.Training.load`.
     """
     target = None
     if spec.budget.target_return is not None:
         target = StopTrainingOnRewardThreshold(spec.budget.target_return)
         callbacks = (target, *callbacks)
-    with ExitStack() as stack:
-        env: Any = stack.enter_context(closing(spec.make_training_env()))
-        evaluation_env = make_evaluation_env(spec)
+    with ExitStack() as environments:
+        env: Any = environments.enter_context(closing(spec.make_training_env()))
+        evaluation_env = _make_evaluation_env(spec)
         if evaluation_env is not None:
-            stack.callback(evaluation_env.close)
-        training = (make or training_of)(spec, env, evaluation_env, callbacks)
-        stack.pop_all()
-    return TrainingTrial(training, (env, evaluation_env), target)
+            environments.callback(evaluation_env.close)
+        if checkpoint is None:
+            training = _training_of(spec, env, evaluation_env, callbacks)
+        else:
+            training = Training.load(
+                checkpoint, env, callbacks=callbacks, evaluation_env=evaluation_env,
+                repeat_episodes=repeat_episodes,
+            )  # fmt: skip
+        return TrainingTrial(training, environments.pop_all(), target)
 
 
-def make_evaluation_env(spec: RunSpec) -> gym.Env[Any, Any] | None:
+def _make_evaluation_env(spec: RunSpec) -> gym.Env[Any, Any] | None:
     """Make an environment for evaluations where there are any; there may be one robot only."""
     if not spec.is_evaluated:
         return None
@@ -394,7 +396,7 @@ def make_evaluation_env(spec: RunSpec) -> gym.Env[Any, Any] | None:
         raise ConfigError("protocol.evaluate_every", problem) from error
 
 
-def training_of(
+def _training_of(
     spec: RunSpec, env: Any, evaluation_env: gym.Env[Any, Any] | None, callbacks: Iterable[Callback]
 ) -> Training:
     """Make the training of a specification in environments that it has made.
