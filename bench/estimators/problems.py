@@ -51,7 +51,7 @@ from sklearn.neighbors import KNeighborsClassifier, KNeighborsRegressor
 from sklearn.neural_network import MLPClassifier, MLPRegressor
 from sklearn.svm import SVC, SVR
 
-from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
+from sdnn import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
 
 KIND = "problems"
 N_TRAINING = 500
@@ -217,6 +217,7 @@ REGRESSORS = {
 }
 CLASSIFIERS = {
     "SDNN": lambda seed, n_inputs: SDNNClassifier(random_state=seed),
+    "SDNN kernel ridge": lambda seed, n_inputs: SDNNKernelClassifier(),
     "SDNN, 4,000 columns": lambda seed, n_inputs: SDNNClassifier(
         n_pattern_units=short(n_inputs), random_state=seed
     ),

@@ -43,16 +43,18 @@ TABLES = {
 }
 
 
-def for_words(model, X):
-    """The model, which codes words as its library suggests."""
+def make_model(make, X, seed):
+    """A model with default settings, which codes words as its library suggests."""
     words = [name for name in X if is_word(X[name])]
+    levels = [X[name].cat.categories for name in words]
+    model = make(seed, X.shape[1] - len(words) + sum(map(len, levels)))
     if not words:
         return model
     if hasattr(model, "coding"):
         return model.set_params(coding=[(WithMissing(base=Symbolic()), words)])
     if hasattr(model, "categorical_features"):
         return model.set_params(categorical_features="from_dtype")
-    one_hot = OneHotEncoder(sparse_output=False, handle_unknown="ignore")
+    one_hot = OneHotEncoder(categories=levels, sparse_output=False)
     return make_pipeline(
         ColumnTransformer([("words", one_hot, words)], remainder="passthrough"), model
     )
@@ -94,7 +96,7 @@ def measure(problem, name, fold):
     )
     folds = splitter(N_FOLDS, shuffle=True, random_state=0).split(X, y)
     train, test = list(folds)[fold]
-    model = for_words(models[name](fold, X.shape[1]), X)
+    model = make_model(models[name], X, fold)
     begun = time.process_time()
     model.fit(X.iloc[train], y[train])
     fitted = time.process_time()

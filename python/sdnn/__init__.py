@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     )
     from sdnn.estimators import (
         SDNNClassifier as SDNNClassifier,
+        SDNNKernelClassifier as SDNNKernelClassifier,
         SDNNKernelRidge as SDNNKernelRidge,
         SDNNRegressor as SDNNRegressor,
     )

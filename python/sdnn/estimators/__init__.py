@@ -12,7 +12,10 @@ from sdnn.lazy import attach
 if TYPE_CHECKING:
     from sdnn.estimators.base import OutOfRangeWarning as OutOfRangeWarning
     from sdnn.estimators.classifier import SDNNClassifier as SDNNClassifier
-    from sdnn.estimators.kernel_ridge import SDNNKernelRidge as SDNNKernelRidge
+    from sdnn.estimators.kernel_ridge import (
+        SDNNKernelClassifier as SDNNKernelClassifier,
+        SDNNKernelRidge as SDNNKernelRidge,
+    )
     from sdnn.estimators.libsdnn import (
         read_model_file as read_model_file,
         read_parameter_file as read_parameter_file,

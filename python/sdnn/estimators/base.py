@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-import inspect
 import sys
 import warnings
 from numbers import Integral, Real
@@ -19,7 +18,15 @@ from sklearn.utils._param_validation import Interval, StrOptions
 
 from sdnn import _core
 from sdnn.estimators.fitted import Fitted
-from sdnn.estimators.inputs import Array, CodedInputs, Floats, Ints, Pairs, input_pairs
+from sdnn.estimators.inputs import (
+    Array,
+    CodedInputs,
+    Floats,
+    Ints,
+    Pairs,
+    add_sections,
+    input_pairs,
+)
 from sdnn.estimators.network import (
     FEW_SAMPLES,
     Network,
@@ -141,13 +148,7 @@ class BaseSDNN(Fitted, CodedInputs):
     def __init_subclass__(cls, **options: Any) -> None:
         """Add the parameters and attributes documented here to the docstring."""
         super().__init_subclass__(**options)
-        if cls.__doc__ and BaseSDNN.__doc__:
-            cls.__doc__ = inspect.cleandoc(cls.__doc__)
-            for section in inspect.cleandoc(BaseSDNN.__doc__).split("\n\n")[1:]:
-                title, rule, shared = section.split("\n", 2)
-                cls.__doc__ = cls.__doc__.replace(
-                    f"{title}\n{rule}\n", f"{title}\n{rule}\n{shared}\n", 1
-                )
+        add_sections(cls, BaseSDNN)
 
     @abc.abstractmethod
     def _check_samples(

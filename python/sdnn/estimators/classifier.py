@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import ClassifierMixin
 from sklearn.utils._param_validation import Interval, StrOptions
-from sklearn.utils.class_weight import compute_sample_weight
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.multiclass import (
     _ovr_decision_function,
@@ -21,8 +20,8 @@ from sklearn.utils.multiclass import (
 from sdnn import _core
 from sdnn.arguments import shown
 from sdnn.estimators.base import BaseSDNN
-from sdnn.estimators.inputs import Array, Floats, Ints
-from sdnn.estimators.training import LARGEST_WEIGHT, sample_weights, weighted_mean
+from sdnn.estimators.inputs import Array, Floats, Ints, class_labels
+from sdnn.estimators.training import class_weights, sample_weights, weighted_mean
 
 UNITS_EACH = 60
 MOST_UNITS = 1200
@@ -158,10 +157,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         return table, labels
 
     def _set_outputs(self, y: ArrayLike) -> int:
-        self.classes_: Array = unique_labels(y)
+        self.classes_: Array = class_labels(y)
         n_classes = len(self.classes_)
-        if n_classes < 2:
-            raise ValueError(f"at least two classes are needed, got one class: {self.classes_!r}")
         several, given = self.scheme == "one_vs_rest", self.n_units_per_class
         if given is not None and given > 1 and not several:
             raise ValueError(
@@ -196,17 +193,10 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         return (self._n_units_each * np.where(own, OWN_SHARE, 1 - OWN_SHARE),)
 
     def _presentations(self, targets: Ints, weights: Floats | None) -> Floats | None:
-        if self.class_weight is None:
-            return weights
-        each = compute_sample_weight(self.class_weight, self.classes_[targets])
-        if not np.all((each >= 0) & (each <= LARGEST_WEIGHT)):
-            raise ValueError(
-                f"class_weight must be numbers in [0, {LARGEST_WEIGHT}],"
-                f" got {shown(self.class_weight)}"
-            )
-        if weights is not None:
-            each = each * weights
-        return sample_weights(each, len(targets), name="class_weight times sample_weight")
+        each = class_weights(self.class_weight, self.classes_[targets])
+        if each is None or weights is None:
+            return weights if each is None else each
+        return sample_weights(each * weights, len(targets), name="class_weight times sample_weight")
 
     def _validation_score(self, bins: Ints, targets: Ints, weights: Floats | None) -> float:
         winners = self._winners(self._decision(bins, self._n_threads()))

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import assert_all_finite
+from sklearn.utils.multiclass import unique_labels
 from sklearn.utils.validation import validate_data
 
 from sdnn.arguments import shown
@@ -133,6 +135,29 @@ def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int, seed: in
     if not found:
         raise ValueError(f"pairs must not be empty, got {pairs!r}")
     return found
+
+
+def add_sections(cls: type, base: type) -> None:
+    """Add the sections of a base class's docstring, those it lacks before its examples."""
+    if not (cls.__doc__ and base.__doc__):
+        return
+    text = inspect.cleandoc(cls.__doc__)
+    for section in inspect.cleandoc(base.__doc__).split("\n\n")[1:]:
+        title, rule, content = section.split("\n", 2)
+        heading = f"{title}\n{rule}\n"
+        if heading in text:
+            text = text.replace(heading, f"{heading}{content}\n", 1)
+        else:
+            text = text.replace("Examples\n", f"{section}\n\nExamples\n", 1)
+    cls.__doc__ = text
+
+
+def class_labels(y: ArrayLike) -> Array:
+    """Return the labels, sorted; ValueError for fewer than two."""
+    classes: Array = unique_labels(y)
+    if len(classes) < 2:
+        raise ValueError(f"at least two classes are needed, got one class: {classes!r}")
+    return classes
 
 
 def as_it_came(X: Any) -> Any:

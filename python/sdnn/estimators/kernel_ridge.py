@@ -1,56 +1,213 @@
-"""Ridge regression with the kernel that the network approaches."""
+"""Ridge regression and classification with the kernel that the network approaches."""
 
 from __future__ import annotations
 
+import abc
 import dataclasses
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn.kernel_ridge import KernelRidge
+from scipy.optimize import minimize_scalar
+from scipy.special import log_softmax, softmax
+from sklearn.base import ClassifierMixin
+from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
+from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted
 
-from sdnn.estimators.inputs import CodedRegressor, Floats, input_pairs
+from sdnn.estimators.inputs import (
+    Array,
+    CodedInputs,
+    CodedRegressor,
+    Floats,
+    add_sections,
+    class_labels,
+    input_pairs,
+)
+from sdnn.estimators.leave_one_out import (
+    Rows,
+    Samples,
+    diagonal,
+    low_rank_diagonal,
+    portions,
+    solve,
+)
+from sdnn.estimators.training import class_weights, sample_weights
 from sdnn.kernel import N_UNITS, AnalyticKernel
 
-SAMPLES_AT_ONCE = 4096  # in prediction
+__all__ = ["SDNNKernelClassifier", "SDNNKernelRidge"]
 
-Self = TypeVar("Self", bound="SDNNKernelRidge")
+DEGREES = (1, 2, 3)
+LOG_STEEPNESS = (0.0, 5.0)  # bounds, for the softmax of scores
+
+Self = TypeVar("Self", bound="BaseKernelRidge")
 
 
-@dataclasses.dataclass(eq=False, repr=False)
-class SDNNKernelRidge(CodedRegressor):
-    """Kernel ridge regression with the network's kernel, as for infinitely many units.
+def of_degree(kernel: Floats, degree: int) -> Floats:
+    """Turn a kernel, in place, into that of functions of up to ``2 * degree`` inputs."""
+    if degree == 2:
+        kernel *= 0.5 + 0.5 * kernel
+    elif degree == 3:
+        kernel *= kernel * kernel
+    return kernel
 
-    For noisy samples of up to some thousand; it does not learn online.
+
+@dataclasses.dataclass(kw_only=True, eq=False, repr=False)
+class BaseKernelRidge(CodedInputs):
+    """Base class of `SDNNKernelRidge` and `SDNNKernelClassifier`, with the parameters of both.
 
     Parameters
     ----------
     coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
         As for `SDNNRegressor`.
-    alpha : float, default=0.1
-        Strength of the penalty, above 0; more for noisy targets.
+    alpha : float or "auto", default="auto"
+        Strength of the penalty, above 0. "auto" takes the one with the smallest error when each
+        sample is left out, by a closed formula.
+    degree : {1, 2, 3} or "auto", default="auto"
+        The kernel k itself, (k + k^2) / 2 or k^3: functions of up to 2, 4 or 6 inputs. "auto" takes
+        the one with the smallest error of the same kind.
     pairs : "all" or list of (modified, modifier), default="all"
         Pairs of features, by number or name; a modifier of None leaves a pattern plain. All pairs
         are as fast as one per feature.
+    max_components : int, default=2000
+        Most samples that span the solution. Up to so many samples it is exact, beyond that of low
+        rank (Nystroem's method).
+    random_state : int, RandomState or None, default=None
+        Draws the components from more samples.
 
     Attributes
     ----------
     kernel_ : AnalyticKernel
-    ridge_ : KernelRidge
-        Fitted to the kernel of the training sample.
-    X_fit_ : ndarray, shape (n_samples, n_features)
-    y_mean_ : ndarray, shape (n_outputs,) or ()
-        Mean targets, which are not penalized.
+        The kernel k.
+    alpha_, degree_ : float, int
+        The penalty and the degree in use.
+    leave_one_out_error_ : float
+        Mean squared error when each sample is left out, in variances of the targets.
+    X_fit_ : ndarray, shape (n_components, n_features)
+    dual_coef_, intercept_ : ndarray, shapes (n_components, n_outputs) and (n_outputs,)
+        Outputs are ``kernel @ dual_coef_ + intercept_``, with the kernel of the degree.
     n_features_in_, feature_names_in_ : int, ndarray of str
         As in scikit-learn.
 
     Notes
     -----
-    `fit` takes ``32 n_samples^2`` bytes, `predict` ``32768 n_samples``, and both ``8 n_bins^2`` per
-    different coding. Time grows with the cube of the sample.
+    For m components, or m samples if these are fewer, `fit` takes ``48 m^2`` bytes, ``98304 m``
+    more with low rank, `predict` ``65536 m``, and both ``8 n_bins^2`` per different coding. Time
+    grows with the cube of m, and beyond that with the number of samples.
+    """
+
+    alpha: float | str = "auto"
+    degree: int | str = "auto"
+    pairs: Any = "all"
+    max_components: int = 2000
+    random_state: Any = None
+
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        **CodedInputs._parameter_constraints,
+        "alpha": [Interval(Real, 0, np.inf, closed="neither"), StrOptions({"auto"})],
+        "degree": [Interval(Integral, 1, 3, closed="both"), StrOptions({"auto"})],
+        "pairs": [StrOptions({"all"}), "array-like"],
+        "max_components": [Interval(Integral, 10, 2**15, closed="both")],
+        "random_state": ["random_state"],
+    }
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Add the parameters and attributes documented here to the docstring."""
+        super().__init_subclass__(**options)
+        add_sections(cls, BaseKernelRidge)
+
+    def fit(self: Self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
+        """Learn ranges, alpha and degree, and a weight of each component.
+
+        Parameters
+        ----------
+        X : array_like, shape (n_samples, n_features)
+        y : array_like, shape (n_samples,) or (n_samples, n_outputs)
+            Several outputs for the regressor only.
+        sample_weight : array_like, shape (n_samples,), optional
+            How many samples each one counts for, by default 1.
+
+        Raises
+        ------
+        ValueError
+            For an impossible parameter or unusable data.
+        """
+        self._validate_params()
+        work = self._scratch()
+        work._fit(X, y, sample_weight)
+        self.__dict__ = work.__dict__
+        return self
+
+    @abc.abstractmethod
+    def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
+        """Check the samples and learn from them."""
+
+    @staticmethod
+    def _counted(table: Array, y: Array, sample_weight: Any) -> tuple[Array, Array, Floats]:
+        """Return the samples of weights above 0, and these weights."""
+        counts = sample_weights(sample_weight, len(table))
+        if counts is None:
+            return table, y, np.ones(len(table))
+        used = counts > 0
+        return table[used], y[used], counts[used]
+
+    def _solve(
+        self, X: Any, table: Array, targets: Floats, counts: Floats, factors: Floats | None = None
+    ) -> tuple[Floats, Rows]:
+        """Learn ranges, kernel, settings and solution; samples weigh counts times factors.
+
+        Returns the outputs of samples by models without them, and which samples these are.
+        """
+        weights = counts if factors is None else counts * factors
+        samples = Samples(targets, weights, 1 / np.maximum(counts, 1))
+        codings = self._codings(X, table)
+        pairs = None
+        if not isinstance(self.pairs, str):
+            pairs = input_pairs(self.pairs, self._feature_names(), table.shape[1])
+        fitted = [coding.fit(table[:, index], N_UNITS) for index, coding in enumerate(codings)]
+        self.kernel_ = AnalyticKernel(fitted, pairs=pairs)
+        components = np.arange(len(table))
+        if len(table) > self.max_components:
+            random = check_random_state(self.random_state)
+            components = np.sort(random.choice(components, self.max_components, replace=False))
+        self.X_fit_ = table[components]
+        alpha = None if self.alpha == "auto" else float(self.alpha)
+        base = self.kernel_(self.X_fit_)
+        solutions = {}
+        for degree in DEGREES if self.degree == "auto" else (int(self.degree),):
+            problem = diagonal(of_degree(base.copy(), degree), samples[components])
+            solutions[degree] = solve(problem, samples[components], alpha)
+            del problem  # before the next one takes as much memory
+        self.degree_ = min(solutions, key=lambda degree: solutions[degree].error)
+        solution = solutions[self.degree_]
+        if len(table) > len(components):
+            del base
+            problem = low_rank_diagonal(lambda rows: self._kernel(table[rows]), components, samples)
+            solution = solve(problem, samples, alpha)
+        self.alpha_, self.leave_one_out_error_ = solution.alpha, solution.error
+        self.dual_coef_, self.intercept_ = solution.dual, solution.intercept
+        return solution.left_out, solution.rows
+
+    def _kernel(self, table: Array) -> Floats:
+        """Return the kernel of samples and components."""
+        return of_degree(self.kernel_(table, self.X_fit_), self.degree_)
+
+    def _outputs(self, X: ArrayLike) -> Floats:
+        """Return the outputs of samples, shape (n_samples, n_outputs)."""
+        check_is_fitted(self, "dual_coef_")
+        table = self._finite(self._validated(X, reset=False), self.kernel_.codings)
+        parts = [self._kernel(table[rows]) @ self.dual_coef_ for rows in portions(len(table))]
+        outputs: Floats = np.concatenate(parts) + self.intercept_
+        return outputs
+
+
+@dataclasses.dataclass(kw_only=True, eq=False, repr=False)
+class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
+    """Kernel ridge regression with the network's kernel, as for infinitely many units.
+
+    Its settings need no search. It does not learn online.
 
     Examples
     --------
@@ -58,49 +215,89 @@ class SDNNKernelRidge(CodedRegressor):
     >>> from sdnn import SDNNKernelRidge
     >>> X = np.random.RandomState(0).uniform(size=(200, 2))
     >>> y = np.sin(6 * X[:, 0]) * X[:, 1]
-    >>> bool(SDNNKernelRidge(alpha=1e-3).fit(X[::2], y[::2]).score(X[1::2], y[1::2]) > 0.95)
+    >>> bool(SDNNKernelRidge().fit(X[::2], y[::2]).score(X[1::2], y[1::2]) > 0.95)
     True
     """
 
-    alpha: float = dataclasses.field(default=0.1, kw_only=True)
-    pairs: Any = dataclasses.field(default="all", kw_only=True)
-
-    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
-        **CodedRegressor._parameter_constraints,
-        "alpha": [Interval(Real, 0, np.inf, closed="neither")],
-        "pairs": [StrOptions({"all"}), "array-like"],
-    }
-
-    def fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Learn ranges, and weights of the training samples; y may have several outputs."""
-        work = self._scratch()
-        work._fit(X, y)
-        self.__dict__ = work.__dict__
-        return self
-
-    def _fit(self, X: ArrayLike, y: ArrayLike) -> None:
-        self._validate_params()
+    def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         table, targets = self._validated_numbers(X, y, reset=True)
-        codings = [
-            coding.fit(table[:, index], N_UNITS)
-            for index, coding in enumerate(self._codings(X, table))
-        ]
-        pairs = None
-        if not isinstance(self.pairs, str):
-            pairs = input_pairs(self.pairs, self._feature_names(), table.shape[1])
-        self.kernel_ = AnalyticKernel(codings, pairs=pairs)
-        self.X_fit_ = table
-        self.y_mean_ = targets.mean(axis=0)
-        self.ridge_ = KernelRidge(kernel="precomputed", alpha=self.alpha)
-        self.ridge_.fit(self.kernel_(table), targets - self.y_mean_)
+        table, targets, counts = self._counted(table, targets, sample_weight)
+        self._flat = targets.ndim == 1
+        self._solve(X, table, targets.reshape(len(table), -1), counts)
 
     def predict(self, X: ArrayLike) -> Floats:
         """Predict the outputs of samples, shape (n_samples,) or (n_samples, n_outputs)."""
-        check_is_fitted(self, "ridge_")
-        table = self._finite(self._validated(X, reset=False), self.kernel_.codings)
-        parts = [
-            self.ridge_.predict(self.kernel_(table[begin : begin + SAMPLES_AT_ONCE], self.X_fit_))
-            for begin in range(0, len(table), SAMPLES_AT_ONCE)
-        ]
-        values: Floats = self.y_mean_ + np.concatenate(parts)
-        return values
+        outputs = self._outputs(X)
+        return outputs[:, 0] if self._flat else outputs
+
+
+@dataclasses.dataclass(kw_only=True, eq=False, repr=False)
+class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
+    """Classification by kernel ridge with the network's kernel, on one-hot targets.
+
+    Its settings need no search. It does not learn online.
+
+    Parameters
+    ----------
+    class_weight : "balanced" or dict, optional
+        Weight of the samples of each class.
+
+    Attributes
+    ----------
+    classes_ : ndarray, shape (n_classes,)
+        The labels, sorted.
+    steepness_ : float
+        Of the softmax of scores; it has the smallest log loss when each sample is left out.
+
+    Examples
+    --------
+    >>> from sklearn.datasets import load_iris
+    >>> from sdnn import SDNNKernelClassifier
+    >>> X, y = load_iris(return_X_y=True)
+    >>> bool(SDNNKernelClassifier().fit(X[::2], y[::2]).score(X[1::2], y[1::2]) > 0.9)
+    True
+    """
+
+    class_weight: Any = None
+
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        **BaseKernelRidge._parameter_constraints,
+        "class_weight": [StrOptions({"balanced"}), dict, None],
+    }
+
+    def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
+        table, labels = self._validated(X, y, reset=True)
+        check_classification_targets(labels)
+        table, labels, counts = self._counted(table, labels, sample_weight)
+        self.classes_: Array = class_labels(labels)
+        one_hot = (labels[:, None] == self.classes_).astype(np.float64)
+        of_classes = class_weights(self.class_weight, labels)
+        left_out, rows = self._solve(X, table, one_hot, counts, of_classes)
+        weights = (counts if of_classes is None else counts * of_classes)[rows]
+
+        def loss(log_steepness: float) -> float:
+            logarithms = log_softmax(np.exp(log_steepness) * left_out, axis=1)
+            return -float(weights @ (one_hot[rows] * logarithms).sum(axis=1))
+
+        best = minimize_scalar(loss, bounds=LOG_STEEPNESS, method="bounded").x
+        self.steepness_ = float(np.exp(best))
+
+    def decision_function(self, X: ArrayLike) -> Floats:
+        """Return the score of each class, about 1 for its own samples and 0 for others.
+
+        Shape (n_samples, n_classes). Two classes: shape (n_samples,), positive for the second.
+        """
+        scores = self._outputs(X)
+        return scores[:, 1] - scores[:, 0] if len(self.classes_) == 2 else scores
+
+    def predict(self, X: ArrayLike) -> Array:
+        """Predict the labels of samples, shape (n_samples,)."""
+        winners = self._outputs(X).argmax(axis=1)  # first: it may raise NotFittedError
+        labels: Array = self.classes_[winners]
+        return labels
+
+    def predict_proba(self, X: ArrayLike) -> Floats:
+        """Return a softmax of the scores, shape (n_samples, n_classes)."""
+        scores = self._outputs(X)  # first: it may raise NotFittedError
+        probabilities: Floats = softmax(self.steepness_ * scores, axis=1)
+        return probabilities

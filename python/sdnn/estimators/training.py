@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from sklearn.utils.class_weight import compute_sample_weight
 
 from sdnn import _core
 from sdnn.arguments import shown
@@ -70,6 +71,18 @@ def sample_weights(
     if each.sum() > MOST_PRESENTED:
         raise ValueError(f"{name} must sum to at most {MOST_PRESENTED}, got {each.sum():.4g}")
     return each
+
+
+def class_weights(class_weight: Any, labels: Array) -> Floats | None:
+    """Return the weight of each sample by its class, or None without class weights."""
+    if class_weight is None:
+        return None
+    each: Floats = compute_sample_weight(class_weight, labels)
+    if not np.all((each >= 0) & (each <= LARGEST_WEIGHT)):
+        raise ValueError(
+            f"class_weight must be numbers in [0, {LARGEST_WEIGHT}], got {shown(class_weight)}"
+        )
+    return sample_weights(each, len(labels), name="class_weight")
 
 
 def weighted_mean(values: Array, weights: Floats | None) -> float:

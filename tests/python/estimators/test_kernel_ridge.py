@@ -1,4 +1,4 @@
-"""Ridge regression with the analytic kernel."""
+"""Ridge regression and classification with the analytic kernel."""
 
 import pickle
 import tracemalloc
@@ -11,7 +11,7 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.utils.estimator_checks import check_estimator
 
 from refusals import refuses
-from sdnn import SDNNKernelRidge, SDNNRegressor
+from sdnn import SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.coding import Circular, RandomInverse
 from sdnn.kernel import N_UNITS, AnalyticKernel
 
@@ -20,21 +20,136 @@ X = RANDOM.uniform(0, 1, (120, 4))
 Y = np.sin(5 * X[:, 0]) * X[:, 1] + X[:, 2]
 
 
+LABELS = np.array(["low", "middle", "high"])[np.digitize(Y, [0.2, 0.8])]
+
+
 @pytest.mark.filterwarnings("ignore")
-def test_check_estimator_finds_nothing():
-    results = check_estimator(SDNNKernelRidge(), on_skip=None, on_fail=None)
+@pytest.mark.parametrize("model", [SDNNKernelRidge(), SDNNKernelClassifier()])
+def test_check_estimator_finds_nothing(model):
+    results = check_estimator(model, on_skip=None, on_fail=None)
     other = {r["check_name"]: r["status"] for r in results if r["status"] != "passed"}
     assert set(other) <= {"check_array_api_input"}, other
     assert set(other.values()) <= {"skipped"}
 
 
-def test_it_solves_the_normal_equations():
-    model = SDNNKernelRidge(alpha=0.3).fit(X, Y)
+def kernels(degree, fresh=X):
+    """The kernel of a degree, of samples and all training samples, from the training ranges."""
     coding = RandomInverse()
-    kernel = AnalyticKernel([coding.fit(column, N_UNITS) for column in X.T])
-    weights = np.linalg.solve(kernel(X) + 0.3 * np.eye(len(X)), Y - Y.mean())
-    fresh = RANDOM.uniform(0, 1, (20, 4))
-    np.testing.assert_allclose(model.predict(fresh), Y.mean() + kernel(fresh, X) @ weights)
+    kernel = AnalyticKernel([coding.fit(column, N_UNITS) for column in X.T])(fresh, X)
+    return {1: kernel, 2: (kernel + kernel**2) / 2, 3: kernel**3}[degree]
+
+
+def ridge(kernel, y, weights, alpha, of_test):
+    """Weighted ridge regression with a constant that is not penalized, by its saddle point."""
+    n = len(y)
+    system = np.zeros((n + 1, n + 1))
+    system[:n, :n] = kernel + alpha * np.diag(1 / weights)
+    system[:n, n] = system[n, :n] = 1
+    solution = np.linalg.solve(system, np.append(y, 0))
+    return of_test @ solution[:n] + solution[n]
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_it_solves_the_normal_equations(degree):
+    weights = RANDOM.uniform(0.2, 3, len(X))
+    model = SDNNKernelRidge(alpha=0.3, degree=degree).fit(X, Y, weights)
+    fresh = RANDOM.uniform(0, 1, (20, 4)).clip(X.min(axis=0), X.max(axis=0))
+    wanted = ridge(kernels(degree), Y, weights, 0.3, kernels(degree, fresh))
+    np.testing.assert_allclose(model.predict(fresh), wanted)
+    assert (model.alpha_, model.degree_) == (0.3, degree)
+
+
+def test_settings_have_the_smallest_error_of_leaving_each_sample_out():
+    noisy = Y + np.random.RandomState(1).normal(0, 0.3, len(Y))
+
+    def error(degree, alpha):
+        kernel, ones, wrong = kernels(degree), np.ones(len(Y) - 1), []
+        for i in range(len(Y)):
+            rest = np.arange(len(Y)) != i
+            out = ridge(kernel[np.ix_(rest, rest)], noisy[rest], ones, alpha, kernel[i, rest])
+            wrong.append(out - noisy[i])
+        return np.mean(np.square(wrong)) / noisy.var()
+
+    chosen = SDNNKernelRidge().fit(X, noisy)
+    assert chosen.leave_one_out_error_ == pytest.approx(error(chosen.degree_, chosen.alpha_))
+    for degree in (1, 2, 3):
+        for factor in (0.1, 1, 10):
+            other = error(degree, factor * chosen.alpha_)
+            assert chosen.leave_one_out_error_ < other + 1e-9
+
+
+@pytest.mark.parametrize("kind", [SDNNKernelRidge, SDNNKernelClassifier])
+def test_a_sample_of_weight_two_is_as_two_samples(kind):
+    y = Y if kind is SDNNKernelRidge else LABELS
+    weights = RANDOM.randint(0, 4, len(X))
+    weighted = kind().fit(X, y, weights)
+    repeated = kind().fit(np.repeat(X, weights, axis=0), np.repeat(y, weights))
+    outputs = (
+        one.predict if kind is SDNNKernelRidge else one.predict_proba
+        for one in (weighted, repeated)
+    )
+    np.testing.assert_allclose(*(predict(X) for predict in outputs), atol=1e-8)
+
+
+@pytest.mark.parametrize("kind", [SDNNKernelRidge, SDNNKernelClassifier])
+def test_the_scale_of_weights_does_not_matter(kind):
+    y = Y if kind is SDNNKernelRidge else LABELS
+    weights = RANDOM.uniform(0, 1, len(X))
+    small, sums_to_one = kind().fit(X, y, weights), kind().fit(X, y, weights / weights.sum())
+    np.testing.assert_allclose(small.dual_coef_, sums_to_one.dual_coef_, rtol=1e-6, atol=1e-8)
+
+
+def test_low_rank_is_close_to_exact_and_takes_little_memory():
+    samples = np.random.RandomState(0).uniform(0, 1, (3000, 2))
+    y = np.sin(6 * samples[:, 0]) * samples[:, 1]
+    exact = SDNNKernelRidge(max_components=3000, alpha=0.1, degree=2).fit(samples[:1000], y[:1000])
+    same = clone(exact).set_params(max_components=999, random_state=0)
+    same.fit(samples[:1000], y[:1000])
+    np.testing.assert_allclose(same.predict(samples), exact.predict(samples), atol=0.01)
+    tracemalloc.start()
+    try:
+        low = SDNNKernelRidge(max_components=100, random_state=0).fit(samples, y)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert low.X_fit_.shape == (100, 2)
+    assert low.score(samples, y) > 0.98
+    assert peak < 98304 * 100 + 2 * 8 * 1000**2
+
+
+@pytest.mark.parametrize("max_components", [30, 2000])
+def test_classes_are_learned_with_their_probabilities(max_components):
+    random = np.random.RandomState(3)
+    samples = random.uniform(-1, 1, (900, 3))
+    noisy = samples[:, 0] * samples[:, 1] + 0.1 * random.normal(size=900)
+    labels = np.array(["no", "yes"])[(noisy > 0).astype(int)]
+    model = SDNNKernelClassifier(max_components=max_components, random_state=0)
+    model.fit(samples[:500], labels[:500])
+    probabilities = model.predict_proba(samples[500:])
+    np.testing.assert_allclose(probabilities.sum(axis=1), 1)
+    predicted = model.predict(samples[500:])
+    assert model.score(samples[500:], labels[500:]) > 0.8
+    np.testing.assert_array_equal(predicted, model.classes_[probabilities.argmax(axis=1)])
+    np.testing.assert_array_equal(predicted == "yes", model.decision_function(samples[500:]) > 0)
+    right = predicted == labels[500:]
+    assert abs(probabilities.max(axis=1).mean() - right.mean()) < 0.1
+    three = SDNNKernelClassifier().fit(X, LABELS)
+    assert three.decision_function(X).shape == (120, 3)
+    np.testing.assert_allclose(three.decision_function(X).sum(axis=1), 1)
+
+
+def test_class_weights_move_the_border():
+    rare = np.where(np.quantile(Y, 0.9) < Y, "rare", "usual")
+    noisy = X + np.random.RandomState(0).normal(0, 0.3, X.shape)
+    plain, balanced, none = (
+        SDNNKernelClassifier(class_weight=weight).fit(noisy, rare)
+        for weight in (None, "balanced", {"rare": 0, "usual": 1})
+    )
+    shares = [(one.predict(noisy) == "rare").mean() for one in (plain, balanced, none)]
+    assert shares[0] < shares[1]
+    assert shares[2] == 0
+    refuses("class_weight", SDNNKernelClassifier(class_weight={"rare": -1}).fit, X, rare)
+    refuses("class", SDNNKernelClassifier().fit, X, np.zeros(len(X)))
 
 
 def test_all_pairs_have_the_sum_over_each_pair():
@@ -49,9 +164,9 @@ def test_noise_is_penalized_where_the_network_learns_it():
     noisy = Y + np.random.RandomState(1).normal(0, 0.5, len(Y))
     fresh = np.random.RandomState(2).uniform(0, 1, (300, 4))
     true = np.sin(5 * fresh[:, 0]) * fresh[:, 1] + fresh[:, 2]
-    ridge = SDNNKernelRidge(alpha=1.0).fit(X, noisy).score(fresh, true)
+    ridge = SDNNKernelRidge().fit(X, noisy).score(fresh, true)
     network = SDNNRegressor(random_state=0).fit(X, noisy).score(fresh, true)
-    assert ridge > network + 0.1
+    assert ridge > network + 0.05
 
 
 def test_tables_and_searches_are_taken():
@@ -93,7 +208,7 @@ def test_memory_does_not_grow_with_the_features(pairs):
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert peak < 32 * n_samples**2 + 3 * 8 * n_bins**2
+    assert peak < 48 * n_samples**2 + 3 * 8 * n_bins**2
 
 
 def test_a_failed_fit_leaves_the_old_model(monkeypatch):
@@ -116,6 +231,8 @@ def test_a_failed_fit_leaves_the_old_model(monkeypatch):
         ({"alpha": 0}, "'alpha'"),
         ({"alpha": np.inf}, "'alpha'"),
         ({"alpha": "much"}, "'alpha'"),
+        ({"degree": 4}, "'degree'"),
+        ({"max_components": 1}, "'max_components'"),
         ({"pairs": [(0, 9)]}, "9"),
         ({"pairs": "budget"}, "pairs"),
         ({"coding": "unheard"}, "coding"),

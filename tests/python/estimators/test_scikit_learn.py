@@ -17,7 +17,7 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import sdnn
 from refusals import refuses
-from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor, _core
+from sdnn import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor, _core
 from sdnn.coding import Anchor, Circular, CoarseCodeWarning, RandomInverse
 
 RANDOM = np.random.RandomState(0)
@@ -168,7 +168,9 @@ OUTSIDE = {"validation_fraction": 1.0, "random_state": -1, "n_jobs": 5000, "alph
 """Values of the right type, where that is not -1."""
 
 
-@pytest.mark.parametrize("kind", [SDNNRegressor, SDNNClassifier, SDNNKernelRidge])
+@pytest.mark.parametrize(
+    "kind", [SDNNRegressor, SDNNClassifier, SDNNKernelRidge, SDNNKernelClassifier]
+)
 def test_every_parameter_is_checked_and_named(kind):
     """None of them takes an object of no type; nor a word or a number that it does not know."""
     names = [name for name in kind().get_params() if name not in ("coding", "pairs")]
@@ -178,7 +180,7 @@ def test_every_parameter_is_checked_and_named(kind):
             if name == "verbose" and bad == -1:
                 continue
             refuses(name, kind(**{name: bad}).fit, X, Y > 0)
-            if kind is not SDNNKernelRidge:
+            if hasattr(kind, "learn_one"):
                 options = {"classes": [0, 1]} if kind is SDNNClassifier else {}
                 refuses(name, kind(**{name: bad}).learn_one, X[0], 1, **options)
 
