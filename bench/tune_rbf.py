@@ -3,7 +3,7 @@
     python bench/tune_rbf.py [--only WORD] [--jobs 2] [--redraw]
 
 Runs the trials of 15,000 learning episodes that the store lacks and prints a table for each stage,
-which REPRODUCTION.md quotes.
+which docs/evidence/assumptions.md quotes.
 
 The criterion was fixed before any trial of this file was run: a trial's score is the mean of two
 shares of solved test episodes, EARLY and END, and a setting's is the median over its trials. The
