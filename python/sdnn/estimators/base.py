@@ -35,7 +35,13 @@ from sdnn.estimators.network import (
     units_for_pairs,
 )
 from sdnn.estimators.pair_selection import select_pairs, with_categories
-from sdnn.estimators.training import History, Trainer, run_epochs, sample_weights
+from sdnn.estimators.training import (
+    History,
+    Trainer,
+    presented,
+    run_epochs,
+    sample_weights,
+)
 
 Self = TypeVar("Self", bound="BaseSDNN")
 
@@ -189,7 +195,8 @@ class BaseSDNN(Fitted, CodedInputs):
         y : array_like, shape (n_samples,) or (n_samples, n_outputs)
             Several outputs for the regressor only.
         sample_weight : array_like, shape (n_samples,), optional
-            Mean number of presentations of each sample per epoch, by default 1.
+            Mean number of presentations of each sample per epoch, by default 1. If none reaches 1,
+            they are scaled to a mean of 1.
 
         Raises
         ------
@@ -248,8 +255,14 @@ class BaseSDNN(Fitted, CodedInputs):
         if self._earlier or history.earlier:
             self._earlier = history.earlier
 
-    def _partial_fit(self: Self, X: ArrayLike, y: ArrayLike, classes: ArrayLike | None) -> Self:
-        """Present samples once, in their order; all or nothing."""
+    def _partial_fit(
+        self: Self,
+        X: ArrayLike,
+        y: ArrayLike,
+        classes: ArrayLike | None,
+        sample_weight: ArrayLike | None,
+    ) -> Self:
+        """Present samples once, or as often as their weights say, in order; all or nothing."""
         work = self._scratch()
         first = not hasattr(self, "network_")
         if first:
@@ -261,7 +274,13 @@ class BaseSDNN(Fitted, CodedInputs):
         else:
             work._check_outputs(given, classes)
             work._note_inputs(work._finite(table, work.codings_))
-        work._learn(work.network_.input_code.bins(table), work._targets(given))
+        weights = sample_weights(sample_weight, len(table))
+        if weights is not None:
+            rows = presented(len(table), weights, 0, work._n_weighted)
+            work._n_weighted += len(table)
+            table, given = table[rows], given[rows]
+        if len(table):
+            work._learn(work.network_.input_code.bins(table), work._targets(given))
         self.__dict__ = work.__dict__
         return self
 
@@ -304,7 +323,7 @@ class BaseSDNN(Fitted, CodedInputs):
         code = draw_input_code(fitted, pairs, n_pattern_units, self.tables, code_seed)
         self.network_ = Network(code, n_units, seed=weight_seed)
         self._weight_seed = weight_seed
-        self.n_inputs_out_of_range_ = 0
+        self.n_inputs_out_of_range_ = self._n_weighted = 0
         self._note_inputs(table)
         return random
 

@@ -85,16 +85,23 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     }
 
     def partial_fit(
-        self: Self, X: ArrayLike, y: ArrayLike, classes: ArrayLike | None = None
+        self: Self,
+        X: ArrayLike,
+        y: ArrayLike,
+        classes: ArrayLike | None = None,
+        sample_weight: ArrayLike | None = None,
     ) -> Self:
         """Present the samples once, in order; any portions give the same weights.
+
+        With ``sample_weight`` each is presented so often in the mean: of weight 2 twice, of weight
+        1/2 every other one.
 
         They equal those of `fit` with ``max_iter=1, shuffle=False`` if ranges and categories are
         given; otherwise the first call learns them. ``classes``, all labels that can occur, must be
         given in the first call. Raises as `fit`.
         """
         self._require_classes(classes)
-        return self._partial_fit(X, y, classes)
+        return self._partial_fit(X, y, classes, sample_weight)
 
     def learn_one(self: Self, x: Any, y: Any, classes: ArrayLike | None = None) -> Self:
         """Learn one sample: `partial_fit` of one row, to the same bits, without its overhead.

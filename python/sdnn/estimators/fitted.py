@@ -41,6 +41,7 @@ class Learned:
     _counts_of_range: int
     _flat: bool
     _n_units_each: int
+    _n_weighted: int
     _scheme: str
     _weight_seed: int
 
@@ -54,6 +55,7 @@ class Fitted(Learned, BaseEstimator):
     coding: Any
     network_: Network
     _earlier: tuple[Network, ...] = ()
+    _n_weighted = 0  # samples that came to partial_fit with weights
 
     @property
     def _fitted_network(self) -> Network:

@@ -84,14 +84,19 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         "refit": ["boolean"],
     }
 
-    def partial_fit(self: Self, X: ArrayLike, y: ArrayLike) -> Self:
+    def partial_fit(
+        self: Self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None
+    ) -> Self:
         """Present the samples once, in order; any portions give the same weights.
+
+        With ``sample_weight`` each is presented so often in the mean: of weight 2 twice, of weight
+        1/2 every other one.
 
         They equal those of `fit` with ``max_iter=1, shuffle=False`` if ranges and categories are
         given; otherwise the first call learns them. With ``out_of_range="widen"`` targets widen the
         range one after the other, not all at once as in `fit`. Raises as `fit`.
         """
-        return self._partial_fit(X, y, None)
+        return self._partial_fit(X, y, None, sample_weight)
 
     def learn_one(self: Self, x: Any, y: Any) -> Self:
         """Learn one sample: `partial_fit` of one row, to the same bits, without its overhead.

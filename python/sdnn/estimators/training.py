@@ -92,8 +92,10 @@ def weighted_mean(values: Array, weights: Floats | None) -> float:
     return float(np.average(values, axis=0, weights=weights).mean())
 
 
-def presented(n_samples: int, weights: Floats | None, epoch: int) -> Ints:
+def presented(n_samples: int, weights: Floats | None, epoch: int, n_before: int = 0) -> Ints:
     """Return the samples of an epoch: one of weight 2 twice, one of 1/2 in every other epoch.
+
+    Of one epoch alone, samples of weight 1/2 come every other one; ``n_before`` were before these.
 
     >>> [presented(3, np.array([2.0, 0.5, 0.0]), epoch).tolist() for epoch in range(3)]
     [[0, 0, 1], [0, 0], [0, 0, 1]]
@@ -101,9 +103,20 @@ def presented(n_samples: int, weights: Floats | None, epoch: int) -> Ints:
     in_order = np.arange(n_samples, dtype=np.int32)
     if weights is None:
         return in_order
-    phases = in_order * 0.6180339887498949 % 1  # so that not all of them come together
+    phases = (n_before + in_order) * 0.6180339887498949 % 1  # so that not all come together
     times = np.floor(weights * (epoch + 1) + phases) - np.floor(weights * epoch + phases)
     return np.repeat(in_order, times.astype(np.int64))
+
+
+def presentations(weights: Floats | None) -> Floats | None:
+    """Return weights scaled to a mean of 1 if none reaches 1, as where they sum to 1.
+
+    >>> presentations(np.array([0.2, 0.6])).tolist()
+    [0.5, 1.5]
+    """
+    if weights is None or not 0 < weights.max() < 1:
+        return weights
+    return weights / weights.mean()
 
 
 def epochs_to_present_all(weights: Floats | None) -> int:
@@ -131,6 +144,7 @@ def run_epochs(
     """
     network: Network = model.network_
     history = History(network)
+    weights = presentations(weights)
     quiet, n_quiet = 0, epochs_to_present_all(weights)
     best: tuple[Network, int, tuple[Network, ...]] = network, 0, ()
     kept: deque[Network] = deque(maxlen=n_averaged_epochs - 1)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from sklearn.datasets import load_iris
+from sklearn.ensemble import AdaBoostClassifier
 from sklearn.multioutput import MultiOutputClassifier
 
 from refusals import refuses
@@ -305,6 +306,16 @@ def test_weights_of_samples_are_numbers_of_presentations(make):
     repeated = make(**given, max_iter=3).fit(X.repeat(times, 0), targets.repeat(times))
     same(weighted, repeated)
     assert (weighted.weights_ != plain.weights_).any()
+
+
+@pytest.mark.parametrize("make", [SDNNRegressor, SDNNClassifier])
+def test_weights_that_sum_to_one_train_as_those_with_a_mean_of_one(make):
+    targets = Y if make is SDNNRegressor else LABELS
+    weights = RANDOM.uniform(0.5, 1.5, len(Y))
+    one = make(**GIVEN, max_iter=3).fit(X, targets, weights / weights.sum())
+    same(one, make(**GIVEN, max_iter=3).fit(X, targets, weights / weights.mean()))
+    boosted = AdaBoostClassifier(SDNNClassifier(**GIVEN, max_iter=3), n_estimators=2)
+    assert boosted.fit(X, Y > 0).score(X, Y > 0) > 0.9
 
 
 def test_weights_of_samples_and_classes_are_multiplied():

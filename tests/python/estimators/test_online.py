@@ -15,6 +15,7 @@ from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import Circular, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators import OutOfRangeWarning
 from sdnn.estimators.network import FEW_SAMPLES, Network
+from sdnn.estimators.training import presented
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (200, 4))
@@ -394,3 +395,21 @@ def test_river_measures_and_wraps_what_has_probabilities():
     )
     stream = list(zip(ROWS, LABELS.tolist(), strict=True)) * 3
     assert evaluate.progressive_val_score(stream, wrapped, metrics.Accuracy()).get() > 0.7
+
+
+@pytest.mark.parametrize("size", [1, 7, 200])
+def test_weights_are_numbers_of_presentations_in_any_portions(size):
+    weights = np.tile([2.0, 0.5, 1.0, 0.25], 50)
+    model, times = regressor(), presented(200, weights, 0)
+    for begin in range(0, 200, size):
+        part = slice(begin, begin + size)
+        model.partial_fit(X[part], Y[part], sample_weight=weights[part])
+    other = regressor().partial_fit(X[times], Y[times])
+    np.testing.assert_array_equal(model.weights_, other.weights_)
+    assert len(times) == pytest.approx(weights.sum(), abs=2)
+    halves = classifier().partial_fit(X, LABELS, [0, 1, 2], np.full(200, 0.5))
+    assert (
+        0
+        < np.abs(halves.weights_).sum()
+        < np.abs(classifier().partial_fit(X, LABELS, [0, 1, 2]).weights_).sum()
+    )
