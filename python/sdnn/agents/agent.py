@@ -48,8 +48,6 @@ if TYPE_CHECKING:
 
     from sdnn.agents.callbacks import Callback
 
-__all__ = ["Agent", "load_agent"]
-
 _MOST_ENVIRONMENTS = 2**14
 _MANY_VARIABLES = 16
 

@@ -23,8 +23,6 @@ from sdnn.config import (
     SDNNCConfig,
 )
 
-__all__ = ["PRESETS", "Preset", "RBFQLearning", "SDNNQLearning"]
-
 
 class Preset(NamedTuple):
     """Settings that belong together, with a title of a few words."""

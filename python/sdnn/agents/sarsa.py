@@ -6,8 +6,6 @@ from sdnn import _core
 from sdnn.agents.q_learning import CodedAgent, presets_of
 from sdnn.config import LinearSDNNConfig, SarsaConfig
 
-__all__ = ["LINEAR_PRESETS", "SDNNSarsa"]
-
 LINEAR_PRESETS = presets_of(
     _core.linear_presets(), general={"angle_pairs": "find", "inputs": "relevant"}
 )

@@ -13,21 +13,6 @@ from sdnn import _core
 from sdnn.arguments import argument_error, array_of, has_methods, shown
 from sdnn.bounds import flat_bounds, with_infinities
 
-__all__ = [
-    "Actions",
-    "AnglePairs",
-    "Inputs",
-    "Observations",
-    "Ranges",
-    "action_space_of",
-    "observation_space_of",
-    "require_same_kind",
-    "require_single",
-    "require_unbatched",
-    "space_data",
-    "space_of",
-]
-
 Inputs: TypeAlias = Literal["all", "relevant"] | Sequence[int]
 """Which inputs of a state there are; variables: the relevant ones and, in any case, these."""
 
@@ -87,7 +72,7 @@ class Observations:
             find_angle_pairs=isinstance(angle_pairs, str) and angle_pairs == "find",
             symbols=list(_symbols_of(self._space)),
             relevant_only=is_list or inputs == "relevant",
-            inputs=inputs if is_list else (),
+            inputs=() if isinstance(inputs, str) else inputs,
         )
 
     def vector(self, name: str, observation: Any) -> NDArray[np.float64]:

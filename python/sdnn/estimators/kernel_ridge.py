@@ -37,8 +37,6 @@ from sdnn.estimators.leave_one_out import (
 from sdnn.estimators.training import class_weights, sample_weights
 from sdnn.kernel import N_UNITS, AnalyticKernel
 
-__all__ = ["SDNNKernelClassifier", "SDNNKernelRidge"]
-
 DEGREES = (1, 2, 3)
 LOG_STEEPNESS = (0.0, 5.0)  # bounds, for the softmax of scores
 

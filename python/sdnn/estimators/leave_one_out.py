@@ -16,8 +16,6 @@ from scipy.linalg import eigh
 
 from sdnn.estimators.inputs import Floats
 
-__all__ = ["Rows", "Samples", "Solution", "diagonal", "low_rank_diagonal", "portions", "solve"]
-
 ALPHAS = np.logspace(-6, 0, 19)  # to try, as shares of the sum of eigenvalues
 NEGLIGIBLE = 1e-12  # eigenvalues, as shares of the largest
 ROWS_AT_ONCE = 4096

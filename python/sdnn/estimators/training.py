@@ -116,7 +116,8 @@ def presentations(weights: Floats | None) -> Floats | None:
     """
     if weights is None or not 0 < weights.max() < 1:
         return weights
-    return weights / weights.mean()
+    scaled: Floats = weights / weights.mean()
+    return scaled
 
 
 def epochs_to_present_all(weights: Floats | None) -> int:

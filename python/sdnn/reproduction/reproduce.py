@@ -30,7 +30,8 @@ from sdnn.runs.figures import figure_bytes
 from sdnn.runs.registry import split_label
 from sdnn.runs.report import Finished, describe_call, require
 from sdnn.runs.results import CaseResult, measure
-from sdnn.runs.spec import PAPER_INTERVAL, AgentSpec, BudgetSpec, RunSpec
+from sdnn.runs.settings import AgentSpec, BudgetSpec
+from sdnn.runs.spec import PAPER_INTERVAL, RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import ROW_HEADER, TrialKey, TrialRecord, records_digest, trial_rows
 

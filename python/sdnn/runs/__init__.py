@@ -49,13 +49,13 @@ if TYPE_CHECKING:
         RunEvaluation as RunEvaluation,
         RunOutcome as RunOutcome,
     )
-    from sdnn.runs.spec import (
+    from sdnn.runs.settings import (
         AgentSpec as AgentSpec,
         BudgetSpec as BudgetSpec,
         OutputSpec as OutputSpec,
         ProtocolSpec as ProtocolSpec,
-        RunSpec as RunSpec,
     )
+    from sdnn.runs.spec import RunSpec as RunSpec
     from sdnn.runs.store import ResultStore as ResultStore
     from sdnn.runs.trial import (
         Trial as Trial,

@@ -39,8 +39,8 @@ from sdnn.machine import instruction_set
 from sdnn.runs.config_file import FORMAT, ConfigFile, read_spec
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line
-from sdnn.runs.settings import read
-from sdnn.runs.spec import BudgetSpec, RunSpec
+from sdnn.runs.settings import BudgetSpec, read
+from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import (
     Reason,

@@ -41,14 +41,6 @@ from sdnn.runs.settings import (
 )
 from sdnn.runs.trial import TrainingTrial, Trial, training_trial
 
-__all__ = [
-    "AgentSpec",
-    "BudgetSpec",
-    "OutputSpec",
-    "ProtocolSpec",
-    "RunSpec",
-]
-
 HASH_DIGITS = 16
 """Hexadecimal digits kept of a specification's SHA-256: 64 bits."""
 
