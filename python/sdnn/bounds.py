@@ -13,7 +13,7 @@ from sdnn.arguments import shown
 
 _MOST_VARIABLES = 2**20
 _LEAST_INTEGER_BYTES = 4
-"""Of whole numbers whose limits are those of their type rather than of what is observed."""
+"""Least size of whole numbers whose limits are those of the type, not of the observations."""
 
 
 def with_infinities(ends: NDArray[Any]) -> NDArray[np.float64]:

@@ -33,20 +33,20 @@ from numpy.typing import NDArray
 from sdnn._core import __version__
 
 PARTIAL_SUFFIX = ".partial"
-"""Of a file under way."""
+"""Suffix of a file that is being written."""
 _NAME_OF_PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 _ABANDONED_SECONDS = 60
-"""After which a file under way is nobody's, where files cannot be locked."""
+"""Age from which a partial file counts as abandoned, where files cannot be locked."""
 
 _FOLDERS_OF_DEVICES = tuple(map(Path, ("/dev", "/dev/fd", "/proc/self/fd")))
-"""What is named there, such as ``/dev/stdout``, is written to under its own name."""
+"""Names in these folders, such as ``/dev/stdout``, are written to and never replaced."""
 
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _NO_WAITING = getattr(os, "O_NONBLOCK", 0)
 
 _PIECE_CHARACTERS = 2**20
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""With which cells begin that a spreadsheet runs, but for numbers."""
+"""First characters of cells that a spreadsheet runs, unless they are numbers."""
 _NUMBER = re.compile(r"[+-]?\.?\d[\d.]*(e[+-]?\d+)?")
 _GZIP = 31
 """A window of 2**15 bytes, with the header of gzip."""
@@ -244,11 +244,11 @@ FORMAT = 1
 MAX_BYTES = 2**34
 
 _BEGINNING = b'{"__metadata__":{"sdnn":"{\\"checksum\\":\\"'
-"""Of the header, which follows 8 bytes that hold its length."""
+"""Start of the header, which follows 8 bytes that hold its length."""
 _CHECKSUM = slice(8 + len(_BEGINNING), 16 + len(_BEGINNING))
 
 _TYPES = ("BOOL", "I8", "I16", "I32", "I64", "U8", "U16", "U32", "U64", "F16", "F32", "F64")
-"""Of arrays, as safetensors names them: those of NumPy."""
+"""Types of arrays, as safetensors names them: those of NumPy."""
 
 Arrays = dict[str, NDArray[Any]]
 Description = dict[str, Any]

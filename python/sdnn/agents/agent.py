@@ -104,7 +104,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
     _controller: _core.Controller
     _scaling: Scaling | None = None
     wrappers: Sequence[Statistics] = ()
-    """What the wrappers of its training's environment have learned; kept in files."""
+    """Statistics of the wrappers of its training's environment; kept in files."""
     _next_episode: int = 0  # of `train` without a seed
     _tables: Sequence[NDArray[np.int8]] = ()
 
@@ -219,7 +219,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
     @property
     def scaling(self) -> Scaling | None:
-        """How its run scaled what it observes, with ``--noise`` or ``--redundant``; None: not.
+        """Scaling of the run's observations, with ``--noise`` or ``--redundant``; None without.
 
         May be set, and is kept in files. `train` and `evaluate` refuse environments that do not
         scale their observations then.
@@ -246,7 +246,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
     @property
     def n_environments(self) -> int:
-        """In how many environments at once the agent learns; may be set, from 1 to 2**14.
+        """Number of environments in which the agent learns at once, from 1 to 2**14; may be set.
 
         Each, from number 0, has an episode of its own; all else is shared. Where there are fewer
         than before, the transitions that wait in the others are learned. `train` sets it.

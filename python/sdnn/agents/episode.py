@@ -37,7 +37,7 @@ class UnrepeatedEpisodeError(ValueError):
 
 
 class UnusableStepError(ValueError):
-    """A step or reset of an environment cannot be used; the message says which and why."""
+    """A step or reset of an environment cannot be used; the message names it and the reason."""
 
 
 class Transition(NamedTuple):
@@ -294,7 +294,7 @@ class Episodes:
 
     @property
     def learned_before(self) -> list[Statistics]:
-        """What is learned before the present episode, or the next."""
+        """Steps and episodes learned before the present episode, or the next."""
         return self.learned if any(self.present) else statistics_of(self.wrappers)
 
     def leave(self) -> None:

@@ -142,7 +142,7 @@ def evaluate(
 
 
 class GreedyEpisode(NamedTuple):
-    """How far a greedy episode is."""
+    """State of a greedy episode."""
 
     n_steps: int
     total_reward: float

@@ -17,7 +17,7 @@ from sdnn.arguments import seed_of
 from sdnn.files import Arrays, Description, read_file, write_file
 
 _ARRAYS_OF_TRAINING = "training."
-"""How the names of arrays begin that are not the agent's."""
+"""Prefix of the names of arrays that are not the agent's."""
 
 _CLASSES: dict[str, type[Any]] = {}
 
@@ -29,8 +29,7 @@ def register(kind: type[Any]) -> None:
     """Make a class of agents known by its name; its ``rebuild`` makes one from a file.
 
     A class that is defined again, as in a notebook or by a script that is imported too, replaces
-    the one before. TypeError for the name of a class of this package: a file could not tell them
-    apart.
+    the one before. TypeError for the name of a class of this package, which files could confuse.
     """
     known = _CLASSES.get(kind.__name__, kind)
     is_ours = known.__module__.partition(".")[0] == "sdnn"
@@ -76,7 +75,7 @@ class _Numbers(msgspec.Struct, frozen=True):
 
 
 class Statistics(msgspec.Struct, frozen=True):
-    """What a wrapper has learned, by the names of its attributes, such as ``"obs_rms.mean"``."""
+    """Statistics of a wrapper by the names of its attributes, such as ``"obs_rms.mean"``."""
 
     wrapper: str
     numbers: dict[str, _Numbers]

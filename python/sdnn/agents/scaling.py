@@ -1,4 +1,4 @@
-"""How a run scaled the variables of its environment."""
+"""Scaling of a run's variables."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def neighbours(n_variables: int, n_redundant: int) -> Iterator[tuple[int, int]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Scaling:
-    """How a run with noise or redundant variables scales the observations of its environment.
+    """Scaling of the observations in a run with noise or redundant variables.
 
     ``ranges`` of the variables become [0, 1]; then follow ``n_redundant`` means of neighbours: of
     variables 0 and 1, of 1 and 2, ..., of the last and 0, and so on in a circle. ValueError for

@@ -14,10 +14,10 @@ from sdnn.arguments import argument_error, array_of, has_methods, shown
 from sdnn.bounds import flat_bounds, with_infinities
 
 Inputs: TypeAlias = Literal["all", "relevant"] | Sequence[int]
-"""Which inputs of a state there are; variables: the relevant ones and, in any case, these."""
+"""The inputs of a state; a list of variables is used in any case, beside the relevant ones."""
 
 AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
-"""Which variables are the cosine and the sine of one angle."""
+"""Pairs of variables that are the cosine and the sine of one angle."""
 
 Ranges: TypeAlias = Literal["adaptive"] | tuple[ArrayLike, ArrayLike]
 """Lowest and highest values, a number for all variables or one for each; or adaptive ones."""
@@ -383,7 +383,7 @@ def _key_of(data: Any) -> Any:
 
 _TYPES = ["|b1", "|i1", "<i2", "<i4", "<i8", "|u1", "<u2", "<u4", "<u8", "<f2", "<f4", "<f8"]
 _MOST_VALUES = 2**20
-"""Of a space that is read: more would ask for memory without need."""
+"""Most values of a space in a file: more would only take memory."""
 
 
 def _finite(values: NDArray[Any]) -> list[Any]:

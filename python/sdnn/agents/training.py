@@ -211,7 +211,7 @@ class Training:
 
     @property
     def n_environments(self) -> int:
-        """In how many environments at once the agent learns."""
+        """Number of environments in which the agent learns at once."""
         return self._episodes.n_environments
 
     @property

@@ -48,7 +48,7 @@ N_COLD = 2
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured."""
+    """Number and length of measurements."""
 
     n_rounds: int = 30  # turns that everything compared takes
     n_repetitions: int = 10  # per turn; N_COLD more go before them and are not counted
@@ -200,7 +200,7 @@ def measure_decisions(n_inputs: int, noise: float, effort: Effort) -> dict[str, 
 def measure_threads(n_inputs: int, noise: float, effort: Effort) -> dict[str, Any]:
     """Time equal trials alone and at once, in turns; the quickest of the runs.
 
-    Wall-clock times tell about the cores that are free; the processor's time per trial tells
+    Wall-clock times depend on the cores that are free; the processor's time per trial shows
     whether trials are in each other's way.
     """
 

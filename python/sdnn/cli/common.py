@@ -1,4 +1,4 @@
-"""What the commands share: options and values, errors and exit codes, and what is printed."""
+"""Parts that the commands share: options and values, errors and exit codes, and output."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def run_command(
 
 
 def _is_of_environment(error: BaseException) -> bool:
-    """Whether a method of an environment was at work when it was raised."""
+    """Whether it was raised in a method of an environment."""
     import gymnasium as gym
 
     frames = traceback.walk_tb(error.__traceback__)
@@ -223,14 +223,14 @@ def _lines_of_ranges(report: Mapping[str, Any]) -> Iterator[str]:
     if narrow:
         yield (
             f"{_variables(narrow)} moved within {_LITTLE_OF_A_RANGE:.0%} of the range:"
-            " the network can hardly tell such values apart; --range adaptive narrows ranges"
+            " the network can hardly distinguish such values; --range adaptive narrows ranges"
         )
     shares = enumerate(report["share_beyond_range"])
     clipped = [i for i, share in shares if share is not None and share > _OFTEN_BEYOND_A_RANGE]
     if clipped:
         yield (
             f"{_variables(clipped)} left the range more than {_OFTEN_BEYOND_A_RANGE:.0%} of the"
-            " time: the network cannot tell what is beyond; --range makes it wider"
+            " time: the network cannot distinguish values beyond it; --range makes it wider"
         )
 
 

@@ -1,4 +1,4 @@
-"""How the values of one input become binary patterns.
+"""Codings: the values of one input as binary patterns.
 
 A coding is a frozen dataclass; ``fit`` returns a copy with range, categories and bins known.
 

@@ -26,7 +26,7 @@ NAMES = ("classes_", "feature_names_in_")  # arrays whose type may be text
 
 
 class Learned:
-    """What is in files as it is: numbers, words and arrays of numbers."""
+    """Attributes that files hold unchanged: numbers, words and arrays of numbers."""
 
     n_corrected_: NDArray[np.int64]
     n_features_in_: int

@@ -23,7 +23,7 @@ SENSOR_NOISE = 0.02
 
 @dataclass(frozen=True)
 class Case:
-    """What the agents observe in one panel of a figure.
+    """The observations of the agents in one panel of a figure.
 
     Seeds are derived from `id`: cases that share it share their trials.
     """
@@ -91,7 +91,7 @@ COST = "cost"
 """The word on the command line for the measurement of costs, which has no trials."""
 
 WORDS = (*(experiment.id for experiment in EXPERIMENTS), COST, "all")
-"""What may be reproduced."""
+"""Words on the command line for what may be reproduced."""
 
 
 def select_experiments(word: str) -> tuple[Experiment, ...]:
@@ -101,5 +101,5 @@ def select_experiments(word: str) -> tuple[Experiment, ...]:
 
 
 def includes_cost(word: str) -> bool:
-    """Whether one of `WORDS` asks for the measurement of costs."""
+    """Whether one of `WORDS` includes the measurement of costs."""
     return word in (COST, "all")

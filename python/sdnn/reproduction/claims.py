@@ -118,7 +118,7 @@ Quantity: TypeAlias = Median | Growth
 
 @dataclass(frozen=True)
 class Check:
-    """A quantity, what the paper says of it, and the range in which it must lie, ends included."""
+    """A quantity, the paper's words, and the range in which it must lie, ends included."""
 
     quantity: Quantity
     paper: str
@@ -196,7 +196,7 @@ CLAIMS = (
 
 
 class Verdict(Enum):
-    """What our data say about a claim; the value is the word for a reader."""
+    """Outcome for a claim; the value is the word for a reader."""
 
     HOLDS = "holds"
     FAILS = "does not hold"

@@ -1,4 +1,4 @@
-"""How the cost of a step grows with the number of inputs: what is measured, and how.
+"""Measurement of the cost of a step against the number of inputs.
 
 Source: method.md, section 5.4, claim 9. A step is one whole decision of a learning agent without
 its environment: acting in a new random state and learning the transition to it. Times are the only
@@ -83,7 +83,7 @@ def cost_series(agents: Iterable[str] | None = None) -> tuple[CostSeries, ...]:
 
 
 class CostKey(NamedTuple):
-    """What makes two measurements the same: stored once, not measured again."""
+    """Identity of a measurement: equal ones are stored and measured once."""
 
     series: str
     n_inputs: int
@@ -105,7 +105,7 @@ class CostRecord:
 
     @property
     def key(self) -> CostKey:
-        """Which measurement it is."""
+        """Identity of the measurement."""
         return CostKey(self.series, self.n_inputs, self.config_hash)
 
     def to_json(self) -> dict[str, Any]:
@@ -133,7 +133,7 @@ def load_costs(store: ResultStore, config_hash: str) -> tuple[CostRecord, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class CostConfig:
-    """How thoroughly costs are measured.
+    """Effort of the measurement of costs.
 
     Each round gives the median over its steps; intervals are drawn from rounds.
     """

@@ -1,4 +1,4 @@
-"""The results of a run as a page and as JSON, and what a study says about the paper's claims."""
+"""The results of a run as a page and as JSON, and a study's verdicts on the paper's claims."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ _SHOWN = {
     Verdict.NOT_RUN: ("none", "not judged"),
 }
 VERDICT_KINDS = {verdict.value: kind for verdict, (kind, _) in _SHOWN.items()}
-"""How a page colors the word of a verdict."""
+"""Color of a verdict's word on a page."""
 
 
 @dataclass(frozen=True)
@@ -353,7 +353,7 @@ class StudyClaims:
         return tuple(found[number] for number in sorted(found))
 
     def moved(self, variant: str, outcome: ClaimOutcome) -> bool | None:
-        """Whether the verdict is not the one about the reference; None if one is missing."""
+        """Whether the verdict differs from that of the reference; None if one is missing."""
         reference = self.comparison.study.reference
         other = self.by_variant.get(reference, {}).get(outcome.claim.number)
         if variant == reference or other is None:
@@ -409,7 +409,7 @@ class StudyClaims:
 
     @cached_property
     def _results(self) -> dict[str, list[CaseResult]]:
-        """What is measured of each variant in the paper's cases."""
+        """Return the measures of each variant in the paper's cases."""
         results: dict[str, list[CaseResult]] = {v.id: [] for v in self.comparison.variants}
         for (case, variant), measured in self.comparison.measured.items():
             if case in PAPER_CASES and measured.combination.spec.environment is None:

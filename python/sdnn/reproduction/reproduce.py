@@ -41,7 +41,7 @@ QUICK_EPISODES = 300
 
 @dataclass(frozen=True)
 class Plan:
-    """What a request needs, in order, and what its report may show."""
+    """Trials that a request needs, in order, and those that its report may show."""
 
     trials: tuple[PlannedTrial, ...]
     costs: tuple[CostKey, ...]
@@ -51,7 +51,7 @@ class Plan:
 
 @dataclass(frozen=True, kw_only=True)
 class ReproduceRequest:
-    """What to run and where to put it.
+    """Selection of what to run, and the folder for the results.
 
     Files of other agents, presets, trials, episodes or seeds than the default have these in their
     names, and those of a quick look are marked so. Costs are always measured in this process.
@@ -86,9 +86,9 @@ class ReproduceRequest:
 
     @cached_property
     def plan(self) -> Plan:
-        """What is needed: made when first asked for, and once.
+        """The plan of the request, made at the first use.
 
-        A ValueError says that the trials are too short or too long, no agent has one of the ids, or
+        Raises ValueError if the trials are too short or too long, no agent has one of the ids, or
         only costs are asked for, of agents that have none.
         """
         by_id = {experiment.id: experiment for experiment in (*EXPERIMENTS, *self.experiments)}
@@ -134,7 +134,7 @@ class ReproduceRequest:
 
     @property
     def cost_config(self) -> CostConfig:
-        """How thoroughly costs are measured."""
+        """Effort of the measurement of costs."""
         return cost.QUICK_COST if self.quick else CostConfig()
 
     def file_name(self, name: str) -> str:
@@ -164,7 +164,7 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
 
     RunError before any trial if matplotlib or Jinja is not installed or the result file cannot be
     used; later if the cluster cannot run trials any more: what was finished is stored. ValueError
-    if nothing can be run as the request says.
+    if nothing can be run as requested.
     """
     require("matplotlib", "jinja2")
     begin = time.monotonic()
@@ -243,7 +243,7 @@ def collect(experiment: Experiment, records: Iterable[TrialRecord]) -> tuple[Cas
 def case_spec(case: Case, agent: str, n_episodes: int = PAPER_EPISODES) -> RunSpec:
     """Return the specification of an agent in a case: its defaults, the case's sensors.
 
-    A ValueError says that the agent takes no part in the case, or that there is no such agent.
+    Raises ValueError if the agent takes no part in the case, or if there is no such agent.
     """
     one_of("agent", agent, case.agents)
     name, preset = split_label(agent)

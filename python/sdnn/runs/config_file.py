@@ -23,12 +23,12 @@ else:
     import tomli as tomllib
 
 FORMAT = "sdnn-run-2"
-"""Of the configuration in a run's folder."""
+"""Format of the configuration in a run's folder."""
 
 MOST_BYTES = 2**20
-"""Of a file of settings."""
+"""Largest file of settings."""
 MOST_LEVELS = 32
-"""Of tables and arrays within each other."""
+"""Most levels of tables and arrays within each other."""
 _MOST_PARSED = 2**21
 """Bytes that are parsed to find a line; in larger files errors name no line."""
 
@@ -39,7 +39,7 @@ _REPLACED = {
     "protocol.evaluate_every_episodes": "protocol.evaluate_every",
     "agent.name": "agent.preset",
 }
-"""What an option replaces in a file, besides its own key."""
+"""Keys of a file that an option replaces besides its own."""
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 """Keys from the top of a document to a value; elements of arrays are numbers from 0."""

@@ -137,7 +137,7 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
 def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
     """Draw the curves of runs into a file, and write their numbers beside it as CSV; return both.
 
-    A RunError says that the name has another ending than those of `SUFFIXES`.
+    Raises RunError if the name has another ending than those of `SUFFIXES`.
     """
     if path.suffix not in SUFFIXES:
         raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")

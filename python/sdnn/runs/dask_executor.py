@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 
 ANSWER_SECONDS = 30.0  # a scheduler that leaves a question unanswered for so long is lost
 CONNECT_SECONDS = 5.0  # of one attempt
-WORKERS_SECONDS = 1.0  # between two looks at the list of workers
-RESULTS_SECONDS = 0.02  # between two looks at results
+WORKERS_SECONDS = 1.0  # between checks of the list of workers
+RESULTS_SECONDS = 0.02  # between checks of results
 PROGRESS_SECONDS = 2.0  # at least between two reports of a trial's progress
 PROGRESS_TOPIC = "sdnn-progress"
 PROBE_EPISODES = 10  # few, but they use every part of the agent and the task

@@ -112,7 +112,7 @@ class EnvironmentSpec(Settings, frozen=True):
 
     @property
     def has_other_sensors(self) -> bool:
-        """Whether the agent observes something else than what the environment gives."""
+        """Whether the agent's observations differ from the environment's."""
         return self.noise > 0.0 or self.redundant > 0
 
     def make(

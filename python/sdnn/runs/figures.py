@@ -171,7 +171,7 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
 
     Faint dots are trials, since outcomes often lie in two heaps; a large dot is their median, of
     shares their mean, and a bar its interval. It is filled for the reference and where a variant
-    differs from it. The footer says where the rows come from.
+    differs from it. The footer names the source of the rows.
     """
     cases = comparison.cases
     n_columns = min(len(cases), CASES_PER_ROW)

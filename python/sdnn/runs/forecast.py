@@ -1,4 +1,4 @@
-"""What experiments still need, and how long that takes: the body of ``--dry-run``."""
+"""Missing trials of experiments and their time: the output of ``--dry-run``."""
 
 from __future__ import annotations
 

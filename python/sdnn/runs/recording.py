@@ -26,7 +26,7 @@ SUFFIXES = (".gif", ".mp4")
 _PACKAGES = {".gif": ("PIL", "Pillow"), ".mp4": ("imageio_ffmpeg", "imageio-ffmpeg")}
 
 FRAMES_PER_SECOND = 30
-"""Where the environment gives no rate."""
+"""Rate for environments that give none."""
 
 _FASTEST_GIF = 50
 """Frames per second: viewers slow quicker ones down."""

@@ -44,7 +44,7 @@ MEASURE_END = ("decisions", "us/decision")
 """Header of the last `measure_cells`."""
 
 _MARKUP = re.compile(r"[\\`*_#<|~&@$]|\](?=[(\[])|:(?=//)|(?<=www)\.", re.IGNORECASE)
-"""What a Markdown text may not hold as it is; brackets may, where they make no link."""
+"""Characters that Markdown interprets; brackets only where they would make a link."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class Page:
 
     @property
     def notes(self) -> list[str]:
-        """What the tables mean."""
+        """Explanations below the tables."""
         notes = [note for part in self.sections for note in part.notes]
         terms = [f"{name}: {text}." for part in self.sections for name, text in part.terms.items()]
         return notes + terms
@@ -152,7 +152,7 @@ class Page:
         return "\n".join([*lines, "", markdown_text(self.source), ""])
 
     def to_html(self, call: str) -> str:
-        """Make it one self-contained HTML page; `call` says how it came about."""
+        """Make it one self-contained HTML page; `call` is the command that made it."""
         require("jinja2")
         from jinja2 import Environment, PackageLoader, StrictUndefined
 

@@ -1,4 +1,4 @@
-"""What is measured on the trials of an agent in a case, and statistics over trials.
+"""Measures of the trials of an agent in a case, and statistics over trials.
 
 Measures give a number for each trial, from its test episodes alone. They were fixed before the data
 of the noisy cases were seen. Their arrays hold one value per test episode, (n_tests,): ``episode``
@@ -150,16 +150,16 @@ MEASURES: dict[MeasureName, tuple[str, Callable[[TrialRows], float]]] = {
         lambda rows: float(np.mean(rows.episode_return)),
     ),
 }
-"""What each measure means, for a reader, and how it is taken from the rows of a trial."""
+"""Meaning of each measure, and the function that takes it from the rows of a trial."""
 
 RETURN_MEASURES: tuple[MeasureName, ...] = ("final_return", "mean_return")
-"""Of any task."""
+"""Measures of any task."""
 
 STEP_MEASURES: tuple[MeasureName, ...] = tuple(n for n in MEASURES if n not in RETURN_MEASURES)
-"""Of tasks that are to be solved in few steps, as the acrobot's."""
+"""Measures of tasks to be solved in few steps, such as the acrobot's."""
 
 CENSORED_MEASURES: tuple[MeasureName, ...] = ("episodes_to_learn", "episode_of_collapse")
-"""Of which it may only be known that they are beyond the last episode: then they are infinite."""
+"""Measures that are infinite if they lie beyond the last episode."""
 
 
 CONFIDENCE, BOOTSTRAP_SEED = 0.95, 2015
@@ -215,7 +215,7 @@ def estimate_median(values: ArrayLike) -> Estimate:
 def estimate_mean(values: ArrayLike) -> Estimate:
     """Return the mean of the values of trials, (n_trials,), with its interval; NaN gives NaN.
 
-    A ValueError says that there are no values or an infinite one.
+    Raises ValueError if there are no values or an infinite one.
 
     >>> estimate_mean([3.0, 3.0])
     Estimate(value=3.0, lower=3.0, upper=3.0)
@@ -231,7 +231,7 @@ def estimate_contrast(
 ) -> Estimate:
     """Compare the medians of two groups of trials; each group is resampled by itself.
 
-    NaN gives NaN; a ValueError says that a group has no values or an infinite one.
+    NaN gives NaN; ValueError if a group has no values or an infinite one.
 
     >>> estimate_contrast([7.0, 7.0], [4.0, 4.0, 4.0])
     Estimate(value=3.0, lower=3.0, upper=3.0)
@@ -375,7 +375,7 @@ def measure(
 ) -> CaseResult:
     """Measure the trials of an agent in a case of some title.
 
-    A ValueError says that there are no trials, or that their settings differ.
+    Raises ValueError if there are no trials, or if their settings differ.
     """
     settings = {(r.key.case_id, r.key.agent, r.key.config_hash) for r in records}
     if len(settings) != 1:

@@ -211,7 +211,7 @@ _CORE = {field.name: field for field in fields_of(ProtocolConfig)}
 
 
 class AgentSpec(Settings, frozen=True):
-    """Who learns."""
+    """Agent that learns."""
 
     name: Annotated[
         str,
@@ -258,7 +258,7 @@ class AgentSpec(Settings, frozen=True):
 
 
 class ProtocolSpec(Settings, frozen=True):
-    """How it learns and is evaluated."""
+    """Schedule of learning and evaluation."""
 
     n_envs: Annotated[
         Annotated[int, Meta(ge=1, le=4096)],
@@ -295,7 +295,7 @@ class ProtocolSpec(Settings, frozen=True):
 
 
 class BudgetSpec(Settings, frozen=True):
-    """How long it learns."""
+    """Length of the learning."""
 
     steps: Annotated[
         Count | None,
@@ -316,7 +316,7 @@ class BudgetSpec(Settings, frozen=True):
 
 
 class OutputSpec(Settings, frozen=True):
-    """What is written besides the rows; it changes none of them."""
+    """Output besides the rows; it changes none of them."""
 
     checkpoint_every: Annotated[Count, Meta(description="Steps between checkpoints.")] = 10_000
     tensorboard: Annotated[bool, Meta(description="Write the numbers for TensorBoard, too.")] = (

@@ -61,7 +61,7 @@ _OF_SPACES = ("observation_range", "angles", "angle_pairs", "inputs", "warm_up_s
 """Settings of agents in environments."""
 
 _UNUSED = AgentSpec(angle_pairs="none", inputs="all")
-"""What these are on the acrobot."""
+"""Values of these settings on the acrobot."""
 
 
 class RunSpec(Settings, frozen=True):
@@ -74,7 +74,7 @@ class RunSpec(Settings, frozen=True):
     Raises
     ------
     ConfigError
-        If a value cannot be used; ``key`` says which, with dots between tables.
+        If a value cannot be used; ``key`` names it, with dots between tables.
 
     Examples
     --------

@@ -30,11 +30,11 @@ SCHEMA_VERSION = 6
 APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 """Marks a SQLite file as ours (SQLite's header field of that name)."""
 BUSY_SECONDS = 60.0
-"""How long to wait for another process that writes the same file."""
+"""Seconds to wait for another process that writes the same file."""
 MOST_BYTES = 2**37
-"""Of the file; SQLite's check of it needs a bit for each page."""
+"""Largest file; SQLite's check of it needs a bit for each page."""
 MOST_BYTES_OF_VALUE = 2**24
-"""Of a text in the file."""
+"""Longest text in the file."""
 
 _SCHEMA = """
 CREATE TABLE runs (

@@ -23,7 +23,7 @@ from sdnn.runs.study_file import (
 from sdnn.runs.trial import TrialKey, opened
 
 DEFAULT = "default"
-"""The variant that others are compared with unless the file says otherwise, if there is one."""
+"""The variant that others are compared with unless the file names another, if there is one."""
 
 
 class Combination(NamedTuple):
@@ -61,7 +61,7 @@ class Study(StudyFile):
     Raises
     ------
     ConfigError
-        If the file cannot be read, or says something unknown or impossible; the message names
+        If the file cannot be read, or has something unknown or impossible; the message names
         file, line and key. What only agents and environments refuse is found by `check`.
     """
 

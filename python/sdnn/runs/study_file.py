@@ -26,16 +26,16 @@ BASE = "base"
 
 MOST_TRIALS = 100_000
 MOST_COMBINATIONS = 5_000
-"""Of a variant and a case."""
+"""Most combinations of a variant and a case."""
 MOST_SETTINGS = 5_000
-"""Of a table."""
+"""Most settings of a table."""
 
 TABLES = ("study", "base", "agents", "cases", "variants", "axes")
 _NAMED_VALUES = (("environment", "kwargs"), ("environment", "ranges"))
 
 
 class StudyHeader(Settings, frozen=True):
-    """What a study is called, how many trials it has, and what is compared."""
+    """Title of a study, number of trials and what is compared."""
 
     title: Annotated[str | None, Meta(description="For a reader. By default the file's name.")] = (
         None

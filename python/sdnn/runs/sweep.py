@@ -83,7 +83,7 @@ class Measured:
         return self.combination.variant
 
     def differs(self, name: MeasureName) -> bool:
-        """Whether a difference's interval leaves 0 out, over `MIN_TRIALS_TO_DIFFER` or more."""
+        """Whether the interval excludes 0, over at least `MIN_TRIALS_TO_DIFFER` trials."""
         difference = self.differences.get(name)
         if difference is None or self.result.n_trials < MIN_TRIALS_TO_DIFFER:
             return False
@@ -91,20 +91,20 @@ class Measured:
 
     @property
     def solved_at_end(self) -> NDArray[np.bool_] | None:
-        """Which trials end solved, (n_trials,); None where tasks are judged by their return."""
+        """Whether each trial ends solved, (n_trials,); None where tasks are judged by return."""
         shares = self.result.values.get("final_share_solved")
         return None if shares is None else shares >= SHARE_STABLE
 
     @property
     def end_solved(self) -> str:
-        """How many trials end solved, such as ``"18 of 20"``; ``"-"`` if that is not measured."""
+        """Number of trials that end solved: ``"18 of 20"``, or ``"-"`` if not measured."""
         solved = self.solved_at_end
         return "-" if solved is None else f"{int(solved.sum())} of {solved.size}"
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What is complete of a study: by ids of case and variant, those that have every trial."""
+    """Complete parts of a study, by ids of case and variant: those that have every trial."""
 
     study: Study
     measured: Mapping[tuple[str, str], Measured]
@@ -153,7 +153,7 @@ def compare(study: Study, records: Iterable[TrialRecord]) -> Comparison:
 
 @dataclass(frozen=True, kw_only=True)
 class Addition:
-    """What else the results of a study say, such as about claims: for the page and the JSON."""
+    """Additions to the results of a study, such as verdicts, for the page and the JSON."""
 
     sections: Sequence[Section] = ()
     json: dict[str, Any] = field(default_factory=dict)
@@ -195,7 +195,7 @@ def study_page(comparison: Comparison, digest: str, addition: Addition, picture:
 
 
 def _case_sections(comparison: Comparison) -> Iterator[Section]:
-    """For each case the table of measures, and that of differences if there are any."""
+    """Yield for each case the table of measures, and that of differences if there are any."""
     for case in comparison.cases:
         measured = comparison.of_case(case.id)
         names = [n for n in MEASURES if any(n in m.result.values for m in measured)]
