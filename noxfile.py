@@ -55,10 +55,12 @@ def cpp_sources():
 
 @quick()
 def style(session):
-    """Check format, lint and the direction of dependencies."""
+    """Check format, lint, words and the direction of dependencies."""
     session.run("ruff", "check", ".")
     session.run("ruff", "format", "--check", ".")
     session.run("clang-format", "--dry-run", "-Werror", *cpp_sources(), log=False)
+    session.run("codespell", "python", "cpp/include", "docs", "bench", *(ROOT.glob("*.md")))
+    pytest(session, "-q", "tests/docs/test_words.py")
     session.run("lint-imports", env={"PYTHONPATH": str(ROOT / "python")})
 
 

@@ -30,19 +30,19 @@ print(f"R2 in 5-fold cross-validation: {scores.mean():.3f}; noise allows {best:.
 # %% [markdown]
 # Now samples come in portions of 50, and the function's waves travel: after 100 portions they have
 # shifted by half a period. One model learns from the first 20 portions and then stays as it is;
-# the other goes on with `partial_fit`, one pass over each portion. Both are tested on each portion
-# before it is learned. Ranges are given, because later samples could leave those of the first.
+# the other continues with `partial_fit`, one pass over each portion. Both are tested on each
+# portion before it is learned. Ranges are given: later samples may exceed those of the first.
 
 # %%
 coding = RandomInverse(low=0.0, high=1.0)
 fixed = SDNNRegressor(coding, output_range=(-1.5, 1.5), random_state=0)
 online = SDNNRegressor(coding, output_range=(-1.5, 1.5), random_state=0)
-errors = {"stays as it is": [], "goes on learning": []}
+errors = {"stays as it is": [], "keeps learning": []}
 for portion in range(120):
     x = random.uniform(size=(50, 2))
     y = waves(x, 0.5 * max(portion - 20, 0) / 100) + random.normal(0.0, 0.1, 50)
     if portion >= 1:
-        for name, one in (("stays as it is", fixed), ("goes on learning", online)):
+        for name, one in (("stays as it is", fixed), ("keeps learning", online)):
             errors[name].append(np.sqrt(np.mean((one.predict(x) - y) ** 2)))
     if portion < 20:
         fixed.partial_fit(x, y)
@@ -53,7 +53,7 @@ for name, error in errors.items():
 
 # %% [markdown]
 # The noise alone has a standard deviation of 0.1, which no model can get below. The model that
-# goes on learning follows the waves a little behind them; the other one ends with the opposite of
+# keeps learning follows the waves a little behind them; the other one ends with the opposite of
 # the truth.
 
 # %%
