@@ -27,7 +27,7 @@ def test_the_actions_are_the_agents(name, target, tmp_path):
     check_all_actions(name, target, tmp_path)
 
 
-def test_symbols_are_told_by_readings_of_one_and_zero(target, tmp_path):
+def test_symbols_are_readings_of_one_and_zero(target, tmp_path):
     check_symbols(target, tmp_path)
 
 

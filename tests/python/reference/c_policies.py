@@ -337,7 +337,7 @@ def check_all_actions(name, target, folder):
 
 
 def check_symbols(target, folder):
-    """Symbols are told by readings of one and zero."""
+    """Symbols are readings of one and zero."""
     agent = symbols_agent()
     header = write_policy(folder, agent)
     command = build(folder, target)
