@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sdnn.runs import ConfigError, Run, RunOutcome
     from sdnn.runs.dask_executor import DaskExecutor
     from sdnn.runs.engine import ThreadExecutor
-    from sdnn.runs.report import Finished
+    from sdnn.runs.report import WrittenReport
 
 EXIT_FAILURE = 1
 PLAIN_WIDTH = 160
@@ -295,7 +295,7 @@ def _finite(value: Any) -> Any:
 
 
 def run_and_report(
-    context: click.Context, run: Callable[..., Finished], request: Any, *, as_json: bool
+    context: click.Context, run: Callable[..., WrittenReport], request: Any, *, as_json: bool
 ) -> None:
     """Run trials with a line of progress; print the results, what failed and how much is stored."""
     from rich.console import Console

@@ -28,7 +28,7 @@ from sdnn.reproduction.report import Report
 from sdnn.runs.engine import Executor, Observer, PlannedTrial, ThreadExecutor, plan_of, run_trials
 from sdnn.runs.figures import figure_bytes
 from sdnn.runs.registry import split_label
-from sdnn.runs.report import Finished, describe_call, require
+from sdnn.runs.report import WrittenReport, describe_call, require
 from sdnn.runs.results import CaseResult, measure
 from sdnn.runs.settings import AgentSpec, BudgetSpec
 from sdnn.runs.spec import PAPER_INTERVAL, RunSpec
@@ -156,7 +156,7 @@ class ReproduceRequest:
         return "-".join([stem, *marks]) + f".{kind}"
 
 
-def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) -> Finished:
+def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) -> WrittenReport:
     """Run what is missing; when all is there, draw the figures and write tables and page.
 
     The files cover every experiment whose trials are all stored under the request's settings, not
@@ -174,7 +174,7 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
         remove_abandoned_files(request.out)
         outcome = run_trials(plan.trials, store, executor=request.executor, observer=watcher)
         if outcome.failures or outcome.interrupted:
-            return Finished(outcome)
+            return WrittenReport(outcome)
         cost.measure_costs(plan.costs, request.cost_config, store, watcher)
         report, records = _read(request, store)
     drawn = {
@@ -189,7 +189,7 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
         contents[f"{name}.png"], contents[f"{name}.svg"] = figure_bytes(figure)
     contents["results.csv"] = csv_bytes(ROW_HEADER, trial_rows(records))
     page = report.page({name: contents[f"{name}.svg"] for name in drawn})
-    return Finished(outcome, page, table=report.to_json()).write(
+    return WrittenReport(outcome, page, table=report.to_json()).write(
         contents,
         lambda name: request.out / request.file_name(name),
         describe_call(outcome, time.monotonic() - begin, records),

@@ -138,7 +138,7 @@ class Executor(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunOutcome:
+class TrialsOutcome:
     """The result of `run_trials`.
 
     ``n_planned`` trials were needed, of which ``n_reused`` were stored before and ``n_run`` are
@@ -185,7 +185,7 @@ def run_trials(
     *,
     executor: Executor | None = None,
     observer: Observer | None = None,
-) -> RunOutcome:
+) -> TrialsOutcome:
     """Run the planned trials that are not stored, and store each as soon as it is finished.
 
     Ctrl-C and SIGTERM end the run after the chunks under way; finished trials are stored before it
@@ -239,7 +239,7 @@ def run_trials(
                         watcher.failed(trial, error)
                     case Noted(text):
                         watcher.noted(text)
-    return RunOutcome(
+    return TrialsOutcome(
         n_planned=len(planned),
         n_reused=n_reused,
         n_run=n_run,

@@ -19,7 +19,7 @@ import numpy as np
 
 from sdnn import machine
 from sdnn.files import write_whole
-from sdnn.runs.engine import RunOutcome
+from sdnn.runs.engine import TrialsOutcome
 from sdnn.runs.errors import PlotUnavailableError
 from sdnn.runs.results import (
     CONFIDENCE,
@@ -164,10 +164,10 @@ class Page:
 
 
 @dataclass(frozen=True)
-class Finished:
+class WrittenReport:
     """The outcome of the trials, and what was written of them: page, files, JSON's content."""
 
-    outcome: RunOutcome
+    outcome: TrialsOutcome
     page: Page | None = None
     files: tuple[Path, ...] = ()
     table: dict[str, Any] = field(default_factory=dict)
@@ -177,7 +177,7 @@ class Finished:
         contents: Mapping[str, bytes | Iterable[bytes]],
         path_of: Callable[[str], Path],
         call: str,
-    ) -> Finished:
+    ) -> WrittenReport:
         """Write the page, its table and other contents, each under its name, and return this."""
         assert self.page is not None
         everything = dict(contents) | {
@@ -206,7 +206,7 @@ def require(*packages: str) -> None:
         raise PlotUnavailableError(f"figures and reports need more packages: pip install {missing}")
 
 
-def describe_call(outcome: RunOutcome, seconds: float, shown: Iterable[TrialRecord]) -> str:
+def describe_call(outcome: TrialsOutcome, seconds: float, shown: Iterable[TrialRecord]) -> str:
     """Write how a page came about: wall time of the call, processor time of the trials shown."""
     processor_seconds = sum(record.seconds for record in shown)
     text = f"Processor time of the trials shown: {duration_words(processor_seconds)}."

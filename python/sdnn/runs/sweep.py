@@ -20,10 +20,10 @@ from sdnn.runs.registry import title_of
 from sdnn.runs.report import (
     MEASURE_END,
     PERCENT,
-    Finished,
     Page,
     Section,
     Table,
+    WrittenReport,
     describe_call,
     format_estimate,
     measure_cells,
@@ -287,7 +287,7 @@ class SweepRequest:
         return tuple(self.study.plan(self.only))
 
 
-def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finished:
+def sweep(request: SweepRequest, *, observer: Observer | None = None) -> WrittenReport:
     """Run what is missing, then draw and write everything that is complete.
 
     A variant in a case is complete when all its trials are stored, whether asked for now or not. A
@@ -310,11 +310,11 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finishe
         remove_abandoned_files(request.out)
         outcome = run_trials(plan, store, executor=request.executor, observer=observer)
         if outcome.interrupted:
-            return Finished(outcome)
+            return WrittenReport(outcome)
         records = store.load({key for pair in study.combinations for key in study.keys(*pair)})
     comparison = compare(study, records)
     if not comparison.measured:
-        return Finished(outcome)
+        return WrittenReport(outcome)
     complete = {key for pair in comparison.measured for key in study.keys(*pair)}
     shown = [record for record in records if record.key in complete]
     digest = records_digest(shown)
@@ -322,7 +322,7 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Finishe
     name = study.file.path.name
     footer = f"{name}; sdnn {_core.__version__}; digest of the rows {digest[:16]}"
     png, svg = figure_bytes(draw_study(comparison, footer))
-    done = Finished(
+    done = WrittenReport(
         outcome,
         page=study_page(comparison, digest, addition, svg),
         table=study_json(comparison, digest, addition),

@@ -15,7 +15,7 @@ from sdnn.reproduction import collect, draw_experiment, plan_trials, select_expe
 from sdnn.reproduction.report import Report
 from sdnn.reproduction.reproduce import ReproduceRequest, reproduce
 from sdnn.runs import AGENTS, PlotUnavailableError, ResultStore, measure
-from sdnn.runs.engine import RunOutcome
+from sdnn.runs.engine import TrialsOutcome
 from sdnn.runs.figures import SMOOTHED_TESTS, agent_colors, figure_bytes
 from sdnn.runs.report import describe_call, format_estimate
 from sdnn.runs.results import Estimate, running_median
@@ -242,7 +242,7 @@ def test_row_files_hold_every_test_episode_once(report, results):
 
 
 def test_page_is_one_file_with_everything(report, monkeypatch):
-    outcome = RunOutcome(n_planned=6, n_reused=0, n_run=6, failures=(), interrupted=False)
+    outcome = TrialsOutcome(n_planned=6, n_reused=0, n_run=6, failures=(), interrupted=False)
     monkeypatch.setattr("sdnn.machine.description", lambda: "a <machine>")
     page = report.page(PICTURES)
     html = page.to_html(describe_call(outcome, 61, ()))
