@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         read_model_file as read_model_file,
         read_parameter_file as read_parameter_file,
     )
+    from sdnn.estimators.outliers import OutlierWarning as OutlierWarning
     from sdnn.estimators.regressor import SDNNRegressor as SDNNRegressor
 
 _load, __dir__, __all__ = attach(globals())

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-import sys
-import warnings
 from numbers import Integral, Real
 from typing import Any, ClassVar, TypeVar
 
@@ -34,6 +32,7 @@ from sdnn.estimators.network import (
     draw_input_code,
     units_for_pairs,
 )
+from sdnn.estimators.outliers import warn_caller
 from sdnn.estimators.pair_selection import select_pairs, with_categories
 from sdnn.estimators.training import (
     History,
@@ -60,6 +59,8 @@ class BaseSDNN(Fitted, CodedInputs):
         How inputs become patterns: "random-inverse", "anchor", "circular", "symbolic", or an
         object of `sdnn.coding`; for all inputs, or for columns given as to scikit-learn's
         ColumnTransformer (other inputs have "random-inverse").
+    ranges : {"all", "robust"}, default="all"
+        Whether learned ranges reach to outliers, with an `OutlierWarning`, or leave them out.
     n_pattern_units : int, optional
         Units per pattern, even. None divides about 16,000 columns among the pairs.
     pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
@@ -316,9 +317,7 @@ class BaseSDNN(Fitted, CodedInputs):
         n_pattern_units = self.n_pattern_units or units_for_pairs(len(pairs))
         if n_pattern_units % 2:
             raise ValueError(f"n_pattern_units must be even, got {n_pattern_units}")
-        fitted = [
-            coding.fit(table[:, index], n_pattern_units) for index, coding in enumerate(codings)
-        ]
+        fitted = self._fit_codings(codings, table, n_pattern_units)
         self._require_memory(n_units, n_networks, n_pattern_units, fitted, pairs)
         code = draw_input_code(fitted, pairs, n_pattern_units, self.tables, code_seed)
         self.network_ = Network(code, n_units, seed=weight_seed)
@@ -431,18 +430,9 @@ class BaseSDNN(Fitted, CodedInputs):
         if self.out_of_range == "error":
             raise ValueError(f"X has {first}, but out_of_range is 'error'")
         if self.n_inputs_out_of_range_ == 0:
-            self._warn(f"X has {first}: values beyond a range are clipped")
+            message = f"X has {first}: values beyond a range are clipped"
+            warn_caller(message, OutOfRangeWarning)
         self.n_inputs_out_of_range_ += n_outside
-
-    @staticmethod
-    def _warn(message: str) -> None:
-        """Warn at the calling line outside this package and scikit-learn."""
-        level, frame = 1, sys._getframe()
-        while frame.f_back and frame.f_globals.get("__name__", "").startswith(
-            ("sdnn.", "sklearn.")
-        ):
-            level, frame = level + 1, frame.f_back
-        warnings.warn(message, OutOfRangeWarning, stacklevel=level)
 
     def _bins(self, X: Any) -> Ints:
         """Return the bins of samples to predict, checked."""

@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import assert_all_finite
+from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.multiclass import unique_labels
 from sklearn.utils.validation import validate_data
 
 from sdnn.arguments import shown
 from sdnn.coding import Coding, RandomInverse, WithMissing, coding_named
+from sdnn.estimators.outliers import OutlierWarning, numbers_to_range, usual_range, warn_caller
 
 Columns = int | str | slice | Sequence[int] | Sequence[str] | Sequence[bool] | Callable[[Any], Any]
 Pairs = list[tuple[int, int]]
@@ -178,8 +180,12 @@ class CodedInputs(BaseEstimator):
     """Validation of samples for estimators with a parameter ``coding``."""
 
     coding: Any = "random-inverse"
+    ranges: str = dataclasses.field(default="all", kw_only=True)
 
-    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {"coding": [str, Coding, list, tuple]}
+    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
+        "coding": [str, Coding, list, tuple],
+        "ranges": [StrOptions({"all", "robust"})],
+    }
 
     def set_params(self: Self, **params: Any) -> Self:
         """Set parameters; ``coding__length_scale`` and the like replace a field of the coding."""
@@ -238,6 +244,32 @@ class CodedInputs(BaseEstimator):
             self._need_two(table, "ranges and categories that are not given")
         self._finite(table, codings)
         return codings
+
+    def _fit_codings(self, codings: Sequence[Coding], table: Array, n_units: int) -> list[Coding]:
+        """Return the fitted coding of each input; ranges are learned as ``ranges`` says."""
+        fitted = []
+        for index, coding in enumerate(codings):
+            column = table[:, index]
+            numbers = numbers_to_range(coding, column)
+            if numbers is not None and np.isfinite(numbers).any():
+                low, high = self._range(f"column {index} of X", numbers[np.isfinite(numbers)])
+                column = column[~((numbers < low) | (numbers > high))]
+            fitted.append(coding.fit(column, n_units))
+        return fitted
+
+    def _range(self, name: str, values: Floats) -> tuple[float, float]:
+        """Return the range of values, without outliers if ``ranges`` says so; else warn of them."""
+        usual = usual_range(values)
+        ends = float(values.min()), float(values.max())
+        if self.ranges == "robust" or usual == ends:
+            return usual
+        value = ends[1] if ends[1] > usual[1] else ends[0]
+        warn_caller(
+            f"{name} has {value}, far from the other values, which are within {list(usual)}: "
+            "the range of all is too wide to tell those apart; ranges='robust' leaves it out",
+            OutlierWarning,
+        )
+        return ends
 
     def _need_two(self, samples: Array, what: str) -> None:
         """Raise ValueError, in scikit-learn's words, for a single sample."""
@@ -312,3 +344,8 @@ class CodedRegressor(RegressorMixin, CodedInputs):
             return table, np.asarray(targets, dtype=np.float64)
         except ValueError as error:
             raise ValueError(f"y must be numbers: {error}") from None
+
+    def _ranges_of(self, targets: Floats) -> tuple[Floats, Floats]:
+        """Return the lowest and highest targets of each output, as ``ranges`` says."""
+        low, high = zip(*(self._range("y", column) for column in targets.T), strict=True)
+        return np.array(low), np.array(high)

@@ -60,6 +60,9 @@ class BaseKernelRidge(CodedInputs):
     ----------
     coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
         As for `SDNNRegressor`.
+    ranges : {"all", "robust"}, default="all"
+        Whether learned ranges reach to outliers, with an `OutlierWarning`, or leave them out;
+        "robust" also clips targets.
     alpha : float or "auto", default="auto"
         Strength of the penalty, above 0. "auto" takes the one with the smallest error when each
         sample is left out, by a closed formula.
@@ -164,8 +167,7 @@ class BaseKernelRidge(CodedInputs):
         pairs = None
         if not isinstance(self.pairs, str):
             pairs = input_pairs(self.pairs, self._feature_names(), table.shape[1])
-        fitted = [coding.fit(table[:, index], N_UNITS) for index, coding in enumerate(codings)]
-        self.kernel_ = AnalyticKernel(fitted, pairs=pairs)
+        self.kernel_ = AnalyticKernel(self._fit_codings(codings, table, N_UNITS), pairs=pairs)
         components = np.arange(len(table))
         if len(table) > self.max_components:
             random = check_random_state(self.random_state)
@@ -221,7 +223,8 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
         table, targets = self._validated_numbers(X, y, reset=True)
         table, targets, counts = self._counted(table, targets, sample_weight)
         self._flat = targets.ndim == 1
-        self._solve(X, table, targets.reshape(len(table), -1), counts)
+        targets = targets.reshape(len(table), -1)
+        self._solve(X, table, targets.clip(*self._ranges_of(targets)), counts)
 
     def predict(self, X: ArrayLike) -> Floats:
         """Predict the outputs of samples, shape (n_samples,) or (n_samples, n_outputs)."""

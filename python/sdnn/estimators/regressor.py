@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from sklearn.utils._param_validation import Interval, StrOptions
 
 from sdnn.arguments import shown
-from sdnn.estimators.base import BaseSDNN
+from sdnn.estimators.base import BaseSDNN, OutOfRangeWarning
 from sdnn.estimators.inputs import Array, CodedRegressor, Floats, Ints
+from sdnn.estimators.outliers import warn_caller
 from sdnn.estimators.training import weighted_mean
 
 MARGIN = 0.2  # that a learned output range adds on either side
@@ -38,8 +39,9 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         Smallest and largest output; None widens the range of the first targets by a fifth on
         either side.
     out_of_range : {"clip", "widen", "error"}, default="clip"
-        Treatment of targets outside the output range; "widen" stretches what was learned. Inputs
-        outside their range are clipped unless "error". The first causes an `OutOfRangeWarning`.
+        Treatment of targets outside the output range; "widen" stretches what was learned, for each
+        sample of a stream by its width and margins at most. Inputs outside their range are clipped
+        unless "error". The first causes an `OutOfRangeWarning`.
     max_iter : int, default=30
         Largest number of epochs of `fit`, which stops early once nothing is corrected. Use fewer
         for noisy targets, say 5, and more for exact ones, say 300.
@@ -191,7 +193,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
                 )
             return given
         self._need_two(targets, "the output_range that is not given")
-        low, high = targets.min(axis=0), targets.max(axis=0)
+        low, high = self._ranges_of(targets)
         if np.any(np.maximum(-low, high) > FURTHEST):
             raise ValueError(f"y must be within {FURTHEST}, got [{low.min()}, {high.max()}]")
         margin = np.where(high > low, MARGIN * (high - low), np.maximum(1.0, np.abs(low)))
@@ -233,7 +235,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             raise ValueError(f"y has {ends}, but out_of_range is 'error'")
         if self.n_outputs_out_of_range_ == 0:
             then = "are clipped" if self.out_of_range == "clip" else "widen it"
-            self._warn(f"y has {ends}: values beyond the range {then}")
+            warn_caller(f"y has {ends}: values beyond the range {then}", OutOfRangeWarning)
         if self.out_of_range == "clip" or at_once:
             self.n_outputs_out_of_range_ += int(np.count_nonzero(outside))
         if self.out_of_range == "clip":
@@ -246,7 +248,11 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         for row in np.flatnonzero(outside.any(axis=1)).tolist():
             counts[begin:row] = self._in_counts(targets[begin:row])
             begin = row
-            self.n_outputs_out_of_range_ += self._widen(targets[row])
+            low, high = self.output_range_.T
+            nearest = targets[row].clip(
+                2 * low - high, 2 * high - low
+            )  # an outlier is not followed
+            self.n_outputs_out_of_range_ += self._widen(nearest)
         counts[begin:] = self._in_counts(targets[begin:])
         return counts
 

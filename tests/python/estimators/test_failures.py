@@ -76,6 +76,7 @@ def state_of(model):
     return pickle.dumps(model)
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # in generators
 @pytest.mark.parametrize("training", ["auto", "block"])
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("work", WORKS)

@@ -1,0 +1,142 @@
+"""Outliers are warned of, or left out of ranges, or cost little; clean data cause no warning."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from sdnn import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
+from sdnn.coding import Circular, RandomInverse, Symbolic, WithMissing
+from sdnn.estimators import OutlierWarning
+from sdnn.estimators.outliers import usual_range
+
+N = 200
+CLEAN = (
+    lambda r: r.normal(size=N),
+    lambda r: r.uniform(-1, 1, N),
+    lambda r: r.exponential(size=N),
+    lambda r: r.lognormal(0, 0.5, N),
+    lambda r: r.laplace(size=N),
+    lambda r: r.beta(0.5, 0.5, N),
+    lambda r: r.poisson(0.3, N).astype(float),
+    lambda r: (r.uniform(size=N) < 0.03).astype(float),
+    lambda r: np.where(r.uniform(size=N) < 0.97, 0, r.uniform(size=N)),
+    lambda r: np.where(r.uniform(size=N) < 0.5, 0, 9) + r.normal(size=N),
+    lambda r: np.full(N, 3.0),
+)
+
+
+def network(**options):
+    return SDNNRegressor(n_pattern_units=100, max_iter=15, random_state=0, **options)
+
+
+def problem(random, n=N):
+    X = random.uniform(-1, 1, (n, 3)) if random.randint(2) else random.normal(size=(n, 3))
+    return X, np.sin(2 * X[:, 0]) + X[:, 1]
+
+
+def with_outlier(random, X, y):
+    """The same with one value, one row or one target that is far from all others."""
+    X, y = X.copy(), y.copy()
+    row, far = random.randint(len(y)), 10 ** random.uniform(0.7, 6) * random.choice([-1, 1])
+    where = random.randint(3)
+    if where == 0:
+        y[row] = far * np.ptp(y)
+    else:
+        X[row, : where**2] = far * np.ptp(X)
+    return X, y
+
+
+def fit(model, X, y):
+    """The fitted model, and whether it warned of outliers."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        model.fit(X, y)
+    return model, any(issubclass(one.category, OutlierWarning) for one in caught)
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_an_outlier_is_warned_of_or_costs_little(seed):
+    random = np.random.RandomState(seed)
+    (X, y), (X_test, y_test) = problem(random), problem(np.random.RandomState(seed), 400)
+    make = network if seed % 2 else SDNNKernelRidge
+    clean, warned = fit(make(), X, y)
+    assert not warned
+    spoiled, warned = fit(make(), *with_outlier(random, X, y))
+    lost = clean.score(X_test, y_test) - spoiled.score(X_test, y_test)
+    assert warned or lost < 0.02
+    robust, warned = fit(make(ranges="robust"), *with_outlier(random, X, y))
+    assert not warned
+    assert clean.score(X_test, y_test) - robust.score(X_test, y_test) < 0.1
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_clean_data_cause_no_warning(seed):
+    random = np.random.RandomState(seed)
+    X = np.stack([make(random) for make in CLEAN], axis=1)[:, random.permutation(len(CLEAN))[:4]]
+    y = CLEAN[seed % len(CLEAN)](random)
+    options = {"n_pattern_units": 16, "max_iter": 1, "random_state": 0}
+    for model in (SDNNRegressor(**options), SDNNKernelRidge(degree=1)):
+        assert not fit(model, X, y)[1]
+    labels = X[:, 0] > np.quantile(X[:, 0], 0.4)
+    labels[:2] = True, False
+    for model in (SDNNClassifier(**options), SDNNKernelClassifier(degree=1)):
+        assert not fit(model, X, labels)[1]
+        assert fit(model, np.vstack([X[1:], X[:1] + 1e4]), labels)[1]
+
+
+def test_a_robust_range_is_that_of_all_without_outliers():
+    random = np.random.RandomState(0)
+    X, y = problem(random)
+    for make in (network, SDNNKernelRidge):
+        plain, robust = make().fit(X, y), make(ranges="robust").fit(X, y)
+        np.testing.assert_array_equal(plain.predict(X), robust.predict(X))
+
+
+def test_few_values_far_from_all_others_are_outliers():
+    usual = np.arange(100.0)
+    assert usual_range(np.append(usual, [1e6, 2e6, -1e9])) == (0, 99)
+    assert usual_range(np.append(np.zeros(100), [1.0, 1.0, 1e6])) == (0, 1)
+    assert usual_range(np.append(usual, np.full(20, 1e6))) == (0, 1e6)
+    assert usual_range(np.array([0.0, 0.1, 1e6])) == (0, 1e6)
+    assert usual_range(np.full(50, 7.0)) == (7, 7)
+    assert usual_range(np.append(usual, [1e308, -1e308])) == (0, 99)
+
+
+@pytest.mark.parametrize(
+    ("coding", "warns"),
+    [
+        (RandomInverse(), True),
+        ("anchor", True),
+        (WithMissing(), True),
+        (RandomInverse(spacing="quantile"), False),
+        (RandomInverse(low=0.0, high=1.0), False),
+        (Circular(), False),
+        (Symbolic(), False),
+    ],
+)
+def test_codings_warn_that_learn_a_range_of_equal_bins(coding, warns):
+    X = np.arange(100.0)[:, None] / 100
+    X[7] = 1e6
+    assert fit(network(coding=coding), X, np.arange(100.0))[1] == warns
+
+
+def test_the_first_samples_of_a_stream_are_checked_too():
+    X, y = problem(np.random.RandomState(0))
+    y[3] = 1e6
+    with pytest.warns(OutlierWarning, match="ranges='robust'") as caught:
+        network().partial_fit(X, y)
+    assert caught[0].filename == __file__
+
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+def test_a_range_recovers_from_an_outlier():
+    X, y = problem(np.random.RandomState(0), 1000)
+    model = network(out_of_range="widen").partial_fit(X[:100], y[:100])
+    width = np.ptp(model.output_range_)
+    model.learn_one(X[100], 1e6)
+    assert np.ptp(model.output_range_) < 3 * width
+    assert model.partial_fit(X[101:], y[101:]).score(X, y) > 0.9
+    for _ in range(30):
+        model.learn_one(X[0], 1e6)
+    assert model.output_range_[0, 1] > 1e6
