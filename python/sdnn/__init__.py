@@ -11,7 +11,7 @@ Packages, from the network up (each is imported when first used):
 - ``sdnn.export``: trained agents as C headers, also as the command ``sdnn export``
 - ``sdnn.reproduction``: the paper's experiments, also as the command ``sdnn reproduce``
 - ``sdnn.runs``: agents that learn in folders of their own, also as the command ``sdnn train``
-- ``sdnn.benchmarks``: how quick all this is here, also as the command ``sdnn bench``
+- ``sdnn.benchmarks``: speed on this machine, also as the command ``sdnn bench``
 
 ``sdnn.instruction_set()`` and ``sdnn.set_instruction_set(name)``: which vector instructions the
 core uses.

@@ -4,7 +4,7 @@ The C++ core reads and writes the format, too. A file is a safetensors file whos
 key, ``"sdnn"``: a JSON object of the kind, the format's number, the library's version, a
 description and a checksum at a fixed place, which covers every other byte. It is a CRC-32: it
 notices every error that spans at most 32 bits, and others but for one in 2**32. It protects
-against accidents. Files are data and run no code, whoever wrote them.
+against accidents. Files are data: reading one runs no code.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ _GZIP = 31
 def whole_file(path: Path) -> Iterator[BinaryIO]:
     """Open a new file in the same folder; at the end it takes the place of ``path``.
 
-    Its name is one that nobody can foresee. A link or a pipe of the name ``path`` is replaced:
+    Its name is unpredictable. A link or a pipe of the name ``path`` is replaced:
     nothing is written to where it leads. OSError if the file cannot be written; one that was there
     before stays as it was.
     """
@@ -168,7 +168,7 @@ def lock(descriptor: int) -> bool | None:
 
 
 def _new_file(path: Path) -> BinaryIO:
-    """Create the file under way, locked while it is open, so that nobody thinks it abandoned."""
+    """Create the partial file, locked while it is open: it does not count as abandoned."""
     while True:
         name = f"{path.name}.{secrets.token_hex(8)}{PARTIAL_SUFFIX}"
         file = path.with_name(name).open("xb")  # O_EXCL, which follows no link

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 class Interrupts:
     """A context in which a first signal calls ``ask_to_stop``; a second one acts as usual.
 
-    Signals that somebody else handles, and threads other than the main one, are left alone.
+    Signals with other handlers, and threads other than the main one, are left alone.
     ``received`` is the signal that came, if any.
     """
 

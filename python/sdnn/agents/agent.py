@@ -347,7 +347,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         """Return the controller; RuntimeError while it is warming up."""
         if self.is_warming_up:
             raise RuntimeError(
-                "the agent is still warming up: it knows no ranges of its observations until it has"
+                "the agent is still warming up: it has no ranges of its observations until it has"
                 f" learned {self._warm_up_steps} transitions, or is given observation_range"
             )
         return self._controller

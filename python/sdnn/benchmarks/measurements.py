@@ -62,7 +62,7 @@ QUICK = Effort(n_rounds=3, n_repetitions=2, n_episodes=10, n_runs=2)
 def run_benchmarks(*, quick: bool = False) -> dict[str, Any]:
     """Measure everything, about half a minute, and return what ``sdnn bench --json`` prints.
 
-    With `quick` there are few repetitions: to see that it works, not how quick it is.
+    With `quick` there are few repetitions, as a check that it works.
     """
     effort = QUICK if quick else Effort()
     return {

@@ -1,4 +1,4 @@
-"""The command ``sdnn bench``: how quick the library is here."""
+"""The command ``sdnn bench``: the library's speed on this machine."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import click
 from sdnn.cli.common import make_console
 
 
-@click.command(short_help="Measure how quick the library is on this machine.")
-@click.option("--quick", is_flag=True, help="Few repetitions: to see that it works.")
+@click.command(short_help="Measure the library's speed on this machine.")
+@click.option("--quick", is_flag=True, help="Few repetitions, as a check that it works.")
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON.")
 def bench(quick: bool, as_json: bool) -> None:
     """Measure how long the parts of a decision, decisions and trials take here.

@@ -244,7 +244,7 @@ class WithMissing(Coding):
         return np.array([not is_missing(value) for value in column.tolist()], dtype=bool)
 
     def _values(self, there: NDArray[Any]) -> NDArray[Any]:
-        """Return values as the base coding wants them; numbers must be finite."""
+        """Return values as the base coding takes them; numbers must be finite."""
         if not self.base.is_numeric:
             return there
         values = missing_as_nan(there)

@@ -1,6 +1,6 @@
 """The acrobot swing-up as a Gymnasium environment, redundant and noisy sensors as wrappers.
 
-Gymnasium knows the acrobot once this package is imported. An id can import it:
+Importing this package registers the acrobot with Gymnasium. An id can import it:
 
 >>> import gymnasium as gym
 >>> gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0").observation_space.shape

@@ -16,7 +16,7 @@ from sdnn.config import AcrobotConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.picture import AcrobotPicture
 
-# Gymnasium 1.0 knows this mode only and has no name for it.
+# Gymnasium 1.0 has this mode only, without a name.
 _AUTORESET = getattr(getattr(gym.vector, "AutoresetMode", None), "NEXT_STEP", "NextStep")
 
 

@@ -136,7 +136,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper: its number in method.md's list, its text, and what has to hold."""
+    """A claim of the paper: its number in REPRODUCTION.md, its text, and what has to hold."""
 
     number: int
     text: str
@@ -192,7 +192,7 @@ CLAIMS = (
            Check(Growth("rbf", 8, 4), "exponential", at_least=16),
            Check(Growth("rbf-plain", 8, 4), "exponential", at_least=16))),
 )  # fmt: skip
-"""The paper's nine claims, by their numbers in method.md's list."""
+"""The paper's nine claims, by their numbers in REPRODUCTION.md."""
 
 
 class Verdict(Enum):
@@ -371,7 +371,7 @@ class TenTrials:
     def _draw(self, subject: Subject) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Draw from the trials, (N_DRAWS, 10), and from resamples of them, (..., 10).
 
-        Each subject has a generator of its own, whoever else is drawn.
+        Each subject has a generator of its own.
         """
         generator = np.random.default_rng([BOOTSTRAP_SEED, *str(subject).encode()])
         size = self._measured[subject].n_trials
@@ -397,7 +397,7 @@ class TenTrials:
 
 
 # Reference results: more trials than a run of the paper's ten, on other seeds. They were run by
-# ``sdnn reproduce b --trials 100 --seed 1``, and anybody's run of it gives them again.
+# ``sdnn reproduce b --trials 100 --seed 1``.
 
 FILE_NAME = "reference-results.csv"
 HEADER = ("case", "agent", "config_hash", "root_seed", "trial", "rows_digest", *STEP_MEASURES)

@@ -38,7 +38,7 @@ def draw_experiment(
 ) -> Figure:
     """Draw an experiment: a panel per case, a line and an interquartile band per agent.
 
-    With `quick` the figure is marked as a quick look, which is no result.
+    With `quick` the figure is marked as a quick look, not a result.
     """
     n_columns = min(2, len(experiment.cases))
     n_rows = -(-len(experiment.cases) // n_columns)

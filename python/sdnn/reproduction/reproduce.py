@@ -64,7 +64,7 @@ class ReproduceRequest:
     n_episodes: int | None = None  # per trial; default the paper's, or `QUICK_EPISODES`
     seed: int = 0  # root of all seeds
     executor: Executor = field(default_factory=ThreadExecutor)
-    quick: bool = False  # whether this is a look at a fraction
+    quick: bool = False  # whether only a fraction is run
     agents: tuple[str, ...] = ()  # to run in every case instead of the case's own
     presets: tuple[str, ...] = ()  # under which SDNN-C runs beside the agents of every case
 

@@ -118,7 +118,7 @@ Message = Advanced | Finished | Failed | Noted
 
 
 class Executor(Protocol):
-    """Runs trials somewhere, ``jobs`` at the same time as far as it knows."""
+    """Runs trials somewhere, about ``jobs`` at the same time."""
 
     jobs: int
 

@@ -29,7 +29,7 @@ FRAMES_PER_SECOND = 30
 """Rate for environments that give none."""
 
 _FASTEST_GIF = 50
-"""Frames per second: viewers slow quicker ones down."""
+"""Largest rate: viewers slow faster ones down."""
 
 
 class Recording:

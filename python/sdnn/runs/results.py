@@ -278,7 +278,7 @@ def _check_finite(done: str, *groups: ArrayLike) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class TrialMeasures:
-    """Measures of the trials of an agent in a case, whether or not their rows are at hand."""
+    """Measures of the trials of an agent in a case, with or without their rows."""
 
     case_id: str
     agent: str

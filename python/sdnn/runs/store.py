@@ -164,7 +164,7 @@ class ResultStore:
     def add(self, record: TrialRecord, *, is_exact: bool = True) -> None:
         """Store a finished trial, or finish a run in progress, as a whole or not at all.
 
-        Storing the same trial again (another process was quicker) changes nothing. With
+        Storing the same trial again (after another process) changes nothing. With
         ``is_exact``, as for compiled trials, it must have the same rows each time.
 
         Raises
