@@ -29,9 +29,33 @@ using bindings::ArrayArgument;
 
 namespace {
 
-py::array_t<std::uint32_t> permutation(const SDNNC& network, std::size_t mu, std::size_t nu) {
-  const auto& units = network.state_code().permutation(mu, nu);
-  return py::array_t<std::uint32_t>(static_cast<py::ssize_t>(units.size()), units.data());
+/// What can be read of the code of a network's states.
+template <class Network>
+void bind_code(py::class_<Network>& network) {
+  network
+      .def(
+          "table",
+          [](const Network& net, std::size_t input) {
+            return bindings::signs_of(net.state_code().table(input));
+          },
+          py::arg("input"), "Patterns of an input: (n_bins, m) of -1, +1")
+      .def_property_readonly(
+          "pairs",
+          [](const Network& net) {
+            std::vector<std::pair<std::size_t, std::size_t>> pairs;
+            for (const auto& pair : net.state_code().groups()) {
+              pairs.emplace_back(pair.modified, pair.modifier);
+            }
+            return pairs;
+          },
+          "(mu, nu) of every group of x_SD, in its order")
+      .def(
+          "permutation",
+          [](const Network& net, std::size_t mu, std::size_t nu) {
+            const auto& units = net.state_code().permutation(mu, nu);
+            return py::array_t<std::uint32_t>(static_cast<py::ssize_t>(units.size()), units.data());
+          },
+          py::arg("mu"), py::arg("nu"), "sigma_mu_nu: (m,)");
 }
 
 /// weight(i, j) of all units and inputs: (n, D).
@@ -158,7 +182,10 @@ void bind_linear_sdnn(py::module_& module) {
       module, "LinearSDNNConfig",
       "Everything that defines a linear readout of the SDNN code; not in the paper.");
 
-  py::class_<LinearSDNN>(module, "LinearSDNN", "Q(s, a) linear in the SDNN code, in integers")
+  py::class_<LinearSDNN> linear(module, "LinearSDNN",
+                                "Q(s, a) linear in the SDNN code, in integers");
+  bind_code(linear);
+  linear
       .def(py::init([](const LinearSDNNConfig& config, const std::vector<std::size_t>& n_actions,
                        std::uint64_t seed) { return LinearSDNN(config, n_actions, seed); }),
            py::arg("config"), py::arg("n_actions"), py::arg("seed"))
@@ -167,12 +194,6 @@ void bind_linear_sdnn(py::module_& module) {
       .def_property_readonly("n_dimensions", &LinearSDNN::n_dimensions)
       .def_property_readonly("exponent", &LinearSDNN::exponent,
                              "A unit of values is 2 to this power; None before any reward")
-      .def(
-          "table",
-          [](const LinearSDNN& net, std::size_t input) {
-            return bindings::signs_of(net.state_code().table(input));
-          },
-          py::arg("input"), "Patterns of an input: (n_bins, m) of -1, +1")
       .def(
           "code",
           [](const LinearSDNN& net, const ArrayArgument<double>& state) {
@@ -237,8 +258,10 @@ void bind_approximators(py::module_& module) {
           },
           "Bytes of the patterns, by anchors and of symbols, plain and permuted.");
 
-  bind_network<SDNNC>(module, "SDNNC", "A network that gives Q(s, a) for every action at once")
-      .def(py::init<const SDNNCConfig&, std::uint64_t>(), py::arg("config"), py::arg("seed"))
+  auto sdnn_c =
+      bind_network<SDNNC>(module, "SDNNC", "A network that gives Q(s, a) for every action at once");
+  bind_code(sdnn_c);
+  sdnn_c.def(py::init<const SDNNCConfig&, std::uint64_t>(), py::arg("config"), py::arg("seed"))
       .def(py::init([](const SDNNCConfig& config, std::uint64_t seed,
                        const std::vector<ArrayArgument<std::int8_t>>& tables) {
              return SDNNC(config, bindings::tables_of(tables), seed);
@@ -263,23 +286,6 @@ void bind_approximators(py::module_& module) {
             return out;
           },
           py::arg("state"), "Inner potentials in lattice steps; shapes (l,) -> (n,)")
-      .def(
-          "table",
-          [](const SDNNC& net, std::size_t input) {
-            return bindings::signs_of(net.state_code().table(input));
-          },
-          py::arg("input"), "Patterns of an input: (n_bins, m) of -1, +1")
-      .def_property_readonly(
-          "pairs",
-          [](const SDNNC& net) {
-            std::vector<std::pair<std::size_t, std::size_t>> pairs;
-            for (const auto& pair : net.state_code().groups()) {
-              pairs.emplace_back(pair.modified, pair.modifier);
-            }
-            return pairs;
-          },
-          "(mu, nu) of every group of x_SD, in its order")
-      .def("permutation", &permutation, py::arg("mu"), py::arg("nu"), "sigma_mu_nu: (m,)")
       .def("weights", &weights, "A copy, in lattice steps: (n, D)")
       .def("thresholds", &thresholds, "A copy, in lattice steps: (n,)")
       .def(

@@ -648,6 +648,10 @@ class LinearSDNN:
         """
         The paired code of a state, -1, 0 or +1: (n_inputs,) -> (n_slots,)
         """
+    def permutation(self, mu: typing.SupportsInt | typing.SupportsIndex, nu: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.uint32]:
+        """
+        sigma_mu_nu: (m,)
+        """
     def table(self, input: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
         """
         Patterns of an input: (n_bins, m) of -1, +1
@@ -670,6 +674,11 @@ class LinearSDNN:
     @property
     def n_inputs(self) -> int:
         ...
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        """
+        (mu, nu) of every group of x_SD, in its order
+        """
 class GoalScheduleConfig:
     """
     How the goal tolerance lambda(k) falls with the learning episode k (section 4.1).

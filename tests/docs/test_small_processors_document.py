@@ -14,21 +14,34 @@ from sdnn.export import c_header
 TEXT = (Path(__file__).parents[2] / "docs" / "how-to" / "small-processors.md").read_text()
 
 
-def block(language):
-    (found,) = re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
-    return found
+def blocks(language):
+    return re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
+
+
+# What the loop of a learner has around it.
+AROUND = """
+#include "pole.h"
+int32_t *observation, *next_observation, reward;
+int terminated;
+int main(void) {
+%s
+}
+"""
 
 
 def test_the_examples_work(tmp_path, monkeypatch, skip_unless_ci):
     if shutil.which("gcc") is None:
         skip_unless_ci("needs gcc")
     monkeypatch.chdir(tmp_path)
-    names = {}
-    exec(compile(block("python"), "small-processors.md", "exec"), names)
-    assert Path("cartpole.h").read_text() == names["header"].text
-    Path("main.c").write_text(block("c"))
+    for text, name in zip(blocks("python"), ("cartpole", "pole"), strict=True):
+        names = {}
+        exec(compile(text, "small-processors.md", "exec"), names)
+        assert Path(f"{name}.h").read_text() == names["header"].text
+    policy, learner = blocks("c")
     options = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-ffreestanding")
-    subprocess.run(["gcc", *options, "-c", "main.c"], check=True)
+    for text in (policy, AROUND % learner):
+        Path("main.c").write_text(text)
+        subprocess.run(["gcc", *options, "-c", "main.c"], check=True)
 
 
 def test_the_names_and_options_exist():

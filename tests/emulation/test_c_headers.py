@@ -2,6 +2,7 @@
 
 import pytest
 
+from c_learners import LEARNERS, check_life
 from c_policies import (
     AGENTS,
     TARGETS,
@@ -25,6 +26,11 @@ def target(request, needs):
 @pytest.mark.parametrize("name", AGENTS)
 def test_the_actions_are_the_agents(name, target, tmp_path):
     check_all_actions(name, target, tmp_path)
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_it_learns_as_the_agent(name, target, tmp_path):
+    check_life(name, target, tmp_path, n_steps=1000)
 
 
 def test_symbols_are_readings_of_one_and_zero(target, tmp_path):

@@ -183,7 +183,7 @@ SHIPPED = (
     r"cpp/tools/[a-z_]+\.hpp|cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
     r"python/sdnn/([a-z_]+/){0,2}[a-z_]+\.pyi?|python/sdnn/py\.typed",
     r"python/sdnn/(runs/page\.html\.jinja|reproduction/reference-results\.csv)",
-    r"python/sdnn/export/c_header\.template",
+    r"python/sdnn/export/c_[a-z_]+\.template",
     r"(tests|bench|docs)/.*\.(py|c|cpp|hpp|txt|md|json|csv|png|gif|svg|toml|ipynb|bin|safetensors)",
 )
 """Every file of a source distribution matches one of these."""

@@ -21,16 +21,27 @@ from sdnn.cli.common import json_option, json_text, run_command, words_of_run
     help="A C99 header with the greedy policy, in integers: for small processors.",
 )
 @click.option(
+    "--learning",
+    is_flag=True,
+    help="The header has the agent itself, which continues to learn. For the agent sdnn-linear.",
+)
+@click.option(
     "--name", metavar="PREFIX", help="Prefix of its names.  [default: FILE without ending]"
 )
 @click.option(
     "--fraction-bits",
     type=click.IntRange(min=0, max=30),
-    help="Of readings and actions in fixed point.  [default: 16, or fewer where a range needs it]",
+    help="Of readings, actions and rewards in fixed point."
+    "  [default: 16, or fewer where a range needs it]",
 )
 @json_option
 def export(
-    source: Path, path: Path, name: str | None, fraction_bits: int | None, as_json: bool
+    source: Path,
+    path: Path,
+    learning: bool,
+    name: str | None,
+    fraction_bits: int | None,
+    as_json: bool,
 ) -> None:
     """Write the agent of RUN, a run's folder or an agent's file, in a form for other programs.
 
@@ -49,7 +60,10 @@ def export(
             raise click.ClickException(str(error)) from error
         try:
             header = c_header(
-                agent, path.stem if name is None else name, fraction_bits=fraction_bits
+                agent,
+                path.stem if name is None else name,
+                fraction_bits=fraction_bits,
+                learning=learning,
             )
         except ValueError as error:
             raise _usage_error(error, is_named=name is not None) from error
@@ -64,7 +78,8 @@ def export(
         return
     click.echo(
         f"wrote {path}: {header.flash_bytes:,} bytes of constants, {header.ram_bytes:,} bytes of"
-        f" arrays on the stack, {header.n_words:,} words of weights read per decision"
+        f" {'memory' if learning else 'arrays on the stack'},"
+        f" {header.n_words:,} words of weights read per decision"
     )
     if scaling is not None:
         click.echo("it observes each variable scaled from its range to [0, 1], as its run did:")

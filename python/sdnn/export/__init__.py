@@ -1,5 +1,7 @@
 """Trained agents in a form for other programs: C headers for small processors."""
 
-from sdnn.export.header import CHeader, c_header, export_c_header
+from sdnn.export.header import c_header, export_c_header
+from sdnn.export.image import load_image, save_image
+from sdnn.export.writer import CHeader
 
-__all__ = ["CHeader", "c_header", "export_c_header"]
+__all__ = ["CHeader", "c_header", "export_c_header", "load_image", "save_image"]

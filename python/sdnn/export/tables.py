@@ -27,7 +27,7 @@ class Tables:
         self.n_bytes += _BYTES[kind] * values.size
         if comment:
             self.lines.append(f"/* {comment} */")
-        form = "UINT32_C(0x{:08x})" if "weights" in name else "{}"
+        form = "UINT32_C(0x{:08x})" if kind == "uint32_t" and "weights" in name else "{}"
         stored = values if values.size else np.zeros(1, np.int64)  # C has no empty tables
         self.lines += table_lines(f"static const {kind} {name}", stored, form)
 

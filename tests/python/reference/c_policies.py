@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import gymnasium as gym
 import numpy as np
 
-from sdnn.agents import PRESETS, SDNNQLearning, Transition
-from sdnn.approximators import SDNNCConfig
+from sdnn.agents import PRESETS, SarsaConfig, SDNNQLearning, SDNNSarsa, Transition
+from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.coding import RandomInverse
 from sdnn.export import c_header, export_c_header
 
@@ -154,7 +154,27 @@ def partners_agent():
     )  # fmt: skip
 
 
+def linear_agent():
+    """A linear readout: windows of torques, an average, groups in twos and left over."""
+    return SDNNSarsa(
+        box(1.0, 2.0, 3.0, 1.0), box(2.0), seed=9, angle_pairs=[], inputs="all",
+        approximator=LinearSDNNConfig(
+            n_pattern_units=40, n_actions=9, action_window=3, averaging_interval=20
+        ),
+        learning=SarsaConfig(tie_rule="lowest"),
+    )  # fmt: skip
+
+
+def linear_vector_agent():
+    return SDNNSarsa(
+        box(2.0, 3.0), gym.spaces.MultiDiscrete([3, 4]), seed=10, angle_pairs=[], inputs="all",
+        approximator=LinearSDNNConfig(n_pattern_units=40, averaging_interval=0),
+    )  # fmt: skip
+
+
 AGENTS = {
+    "linear": linear_agent,
+    "linear-vector": linear_vector_agent,
     "discrete": discrete_agent,
     "partners": partners_agent,
     "circular": circular_agent,

@@ -127,6 +127,21 @@ def test_export_writes_a_c_header_of_a_run_or_an_agents_file(invoke, tmp_path):
     assert "text" not in told
 
 
+def test_export_writes_an_agent_that_learns(invoke):
+    linear = ("--agent", "sdnn-linear", "--out", "one")
+    assert invoke("train", DRIFTING, *SHORT, *linear).exit_code == 0
+    done = invoke("export", "one", "--c-header", "drift.h", "--learning")
+    assert done.exit_code == 0, done.output
+    header = c_header(Run.open("one").agent(), "drift", learning=True)
+    assert Path("drift.h").read_text() == header.text
+    assert f"{header.ram_bytes:,} bytes of memory" in done.stdout
+    assert invoke("train", DRIFTING, *SHORT, "--out", "two").exit_code == 0
+    done = invoke("export", "two", "--c-header", "b.h", "--learning")
+    assert done.exit_code == 1
+    assert "SDNNSarsa" in done.stderr
+    assert not Path("b.h").exists()
+
+
 SCALED = ("--noise", 0.01, "--redundant", 1, "--range", "-4:4", "--range", "1=-2:3")
 SCALED_LINES = [
     "observation[0]: variable 0, from -4.0 to 4.0",

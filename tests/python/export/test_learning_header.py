@@ -1,0 +1,115 @@
+"""An agent that learns in C against the library's, compiled for this processor, bit for bit.
+
+``nox -s emulation`` has other compilers and processors.
+"""
+
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from c_learners import LEARNERS, SMALL, build, check_life, discrete, lines_of, live, lived, sarsa
+from c_policies import STRICT, TARGETS, box, run
+from refusals import refuses
+from sdnn.agents import SDNNQLearning, SDNNSarsa
+from sdnn.export import c_header, load_image, save_image
+
+SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all")
+
+
+@pytest.fixture
+def target(needs):
+    needs(TARGETS["x86-64"].compiler)
+    return TARGETS["x86-64"]
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_it_acts_and_learns_as_the_agent(name, target, tmp_path):
+    check_life(name, target, tmp_path, options=SANITIZED)
+
+
+def test_a_trained_agent_continues_in_c(target, tmp_path):
+    agent = discrete()
+    live(agent, lines_of(agent, 500, 3, 16), 16)
+    header, command = build(tmp_path, agent, target)
+    lines = lines_of(agent, 500, 4, header.fraction_bits)
+    # The program gets an image that it refuses, and begins with what the header knows.
+    nothing = bytes(len(save_image(agent)))
+    came, image = lived(command, nothing, lines, agent.n_dimensions)
+    assert came == live(agent, lines, header.fraction_bits)
+    assert image == save_image(agent)
+
+
+def test_any_readings_and_rewards_are_defined(target, tmp_path):
+    """Ends of the numbers' range, and every kind of line in any order."""
+    for make in (discrete, sarsa):
+        folder = tmp_path / make.__name__
+        folder.mkdir()
+        agent = make()
+        _, command = build(folder, agent, target, *SANITIZED, "-fsanitize=address")
+        random = np.random.default_rng(0)
+        n = len(agent.observation_range[0])
+        lines = random.integers(-(2**31), 2**31, (5000, 2 * n + 3))
+        ends = random.choice([-(2**31), 2**31 - 1, 0, 1, -1], lines.shape)
+        lines = np.where(random.random(lines.shape) < 0.5, ends, lines)
+        lines[:, 0] = random.integers(0, 3, len(lines))
+        lines[:, -1] = random.random(len(lines)) < 0.1
+        came, image = lived(command, save_image(agent), lines.astype("<i4"), 1)
+        assert np.max(came) < len(agent.actions_of(0))
+        load_image(agent, image)
+
+
+@pytest.mark.parametrize("compiler", ["g++", "clang++"])
+def test_cpp_takes_it(compiler, needs, tmp_path):
+    needs(compiler)
+    (tmp_path / "agent.h").write_text(c_header(discrete(), "agent", learning=True).text)
+    (tmp_path / "main.cpp").write_text(
+        '#include "agent.h"\nstatic agent_agent a;\nint main() { agent_begin(&a); return 0; }\n'
+    )
+    options = ("-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-Werror")
+    run(compiler, *options, tmp_path / "main.cpp", "-o", tmp_path / "main")
+    run(tmp_path / "main")
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_memory_is_as_the_header_says(name, target, tmp_path):
+    header = c_header(LEARNERS[name](), "agent", learning=True)
+    (tmp_path / "agent.h").write_text(header.text)
+    source = '#include "agent.h"\n#include <stdio.h>\nint main(void)'
+    source += ' { printf("%d", (int)sizeof(agent_agent)); return 0; }\n'
+    (tmp_path / "size.c").write_text(source)
+    run(target.compiler, *STRICT, tmp_path / "size.c", "-o", tmp_path / "size")
+    assert int(run(tmp_path / "size")) == header.ram_bytes
+
+
+def test_what_is_no_image_of_the_agent_changes_nothing():
+    agent, other = discrete(), discrete()
+    live(agent, lines_of(agent, 300, 1, 16), 16)
+    image = save_image(agent)
+    before = save_image(other)
+    for place in range(0, len(image), 97):
+        damaged = bytearray(image)
+        damaged[place] ^= 4
+        with pytest.raises(ValueError, match=r"damaged|another seed"):
+            load_image(other, bytes(damaged))
+    for wrong in (image[:-1], image + b"x", b""):
+        refuses("image", load_image, other, wrong)
+    refuses("image", load_image, other, 3, error=TypeError)
+    refuses("image", load_image, sarsa(), image)
+    config = replace(SMALL, averaging_interval=8)
+    stranger = SDNNSarsa(
+        box(1.0, 2.0, 3.0), gym.spaces.Discrete(3, start=-1), seed=1, approximator=config,
+        inputs="all", angle_pairs=[],
+    )  # fmt: skip
+    refuses("image", load_image, stranger, image)
+    assert save_image(other) == before
+    load_image(other, image)
+    assert save_image(other) == image
+
+
+def test_other_agents_do_not_learn_in_c():
+    agent = SDNNQLearning(box(1.0, 2.0), gym.spaces.Discrete(2), preset="small")
+    refuses("agent", c_header, agent, "agent", learning=True, error=TypeError)
+    refuses("agent", save_image, agent, error=TypeError)
+    refuses("learning", c_header, discrete(), "agent", learning=1, error=TypeError)

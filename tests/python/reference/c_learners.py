@@ -1,0 +1,190 @@
+"""Agents that learn in C, and programs that let them live beside the library's."""
+
+import subprocess
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+
+from c_policies import STRICT, box, run
+from sdnn.agents import SarsaConfig, SDNNSarsa, Transition
+from sdnn.approximators import LinearSDNNConfig
+from sdnn.export import export_c_header, load_image, save_image
+
+SMALL = LinearSDNNConfig(n_pattern_units=24, averaging_interval=7)
+
+
+def discrete():
+    """Three inputs: groups in twos alone; defaults of learning."""
+    return SDNNSarsa(box(1.0, 2.0, 3.0), gym.spaces.Discrete(3, start=-1), seed=1, **_with(SMALL))
+
+
+def sarsa():
+    """Sarsa with replacing traces, no average, four inputs: groups in twos and left over."""
+    learning = SarsaConfig(
+        bootstrap="sarsa", traces="replacing", epsilon=0.4, tie_rule="middle", tie_tolerance=3.7,
+        n_greedy_steps=3, max_action_repeat=1,
+    )  # fmt: skip
+    config = replace(SMALL, averaging_interval=0)
+    spaces = box(1.0, 2.0, 3.0, 0.25), gym.spaces.Discrete(4)
+    return SDNNSarsa(*spaces, seed=2, learning=learning, **_with(config))
+
+
+def dutch():
+    """True-online Sarsa, windows of a box, an angle, random actions at the beginning."""
+    learning = SarsaConfig(
+        bootstrap="sarsa", trace_decay=1.0, discount=0.8, start_steps=50, max_action_repeat=9,
+        schedule_steps=100, tie_rule="lowest", epsilon=0.9, final_epsilon=0.3,
+    )  # fmt: skip
+    config = replace(SMALL, n_actions=9, action_window=4)
+    given = _with(config) | {"angle_pairs": [(0, 1)]}
+    return SDNNSarsa(box(1.0, 1.0, 8.0), box(2.0), seed=3, learning=learning, **given)
+
+
+def several():
+    """Two dimensions, two inputs: groups left over alone; rates without a schedule."""
+    learning = SarsaConfig(schedule_steps=0, learning_rate=0.3, epsilon=0.3)
+    spaces = box(1.0, 2.0), gym.spaces.MultiDiscrete([3, 5])
+    return SDNNSarsa(*spaces, seed=4, learning=learning, **_with(SMALL))
+
+
+def circular():
+    """An angle, a wide pattern and few pairs of many inputs."""
+    config = replace(SMALL, n_pattern_units=70, max_pairs=10)
+    spaces = box(np.pi, 2.0, 1.0, 1.0, 1.0), gym.spaces.Discrete(2)
+    return SDNNSarsa(*spaces, angles=[0], seed=5, **_with(config))
+
+
+LEARNERS = {
+    "discrete": discrete, "sarsa": sarsa, "dutch": dutch, "several": several, "circular": circular,
+}  # fmt: skip
+
+
+def _with(config):
+    return {"approximator": config, "inputs": "all", "angle_pairs": []}
+
+
+# A line of life: what to do (0: begin an episode, 1: act and learn, 2: act greedily), observation,
+# reward, next observation, whether it terminated.
+DRIVER = """
+#include <stdio.h>
+#include "agent.h"
+static agent_agent agent;
+static uint8_t image[AGENT_IMAGE_BYTES];
+int main(void) {
+  int32_t line[2 * AGENT_N_OBSERVED + 3];
+  uint32_t action[AGENT_N_DIMENSIONS];
+  int32_t *const next = line + 2 + AGENT_N_OBSERVED;
+  agent_begin(&agent);
+  if (fread(image, 1, sizeof image, stdin) != sizeof image) return 1;
+  if (!agent_load(&agent, image)) agent_begin(&agent);
+  while (fread(line, sizeof *line, 2 * AGENT_N_OBSERVED + 3, stdin) == 2 * AGENT_N_OBSERVED + 3) {
+    if (line[0] == 0) agent_begin_episode(&agent);
+    ACT(line[0] == 1);
+    fwrite(action, sizeof *action, AGENT_N_DIMENSIONS, stdout);
+    if (line[0] == 1) LEARN;
+  }
+  agent_begin_episode(&agent);
+  agent_save(&agent, image);
+  fwrite(image, 1, sizeof image, stdout);
+  return (int)(sizeof agent >> 30);
+}
+"""
+
+
+def lines_of(agent, n_steps, seed, fraction_bits):
+    """Lines of life with episodes that end in every way, and rewards of many sizes."""
+    random = np.random.default_rng(seed)
+    high = np.asarray(agent.observation_space.high, float)
+    scale = 2**fraction_bits
+    lines, now = [], None
+    for _ in range(n_steps):
+        if now is None:
+            now = random.uniform(-1.2, 1.2, high.size) * high
+            lines.append([0, *now, 0, *now, 0])
+        following = np.clip(now + random.normal(0, 0.1, high.size) * high, -1.2 * high, 1.2 * high)
+        if random.random() < 0.1:
+            lines.append([2, *now, 0, *now, 0])
+        reward = random.choice([0.0, 1.0, -1.0, random.normal(), 100.0 * random.normal()])
+        if random.random() < 0.002:
+            reward *= 300.0
+        ends = random.random()
+        lines.append([1, *now, reward, *following, ends < 0.03])
+        now = None if ends < 0.06 else following
+    table = np.array(lines)
+    table[:, 1:-1] = np.round(table[:, 1:-1] * scale)
+    return table.astype("<i4")
+
+
+def live(agent, lines, fraction_bits):
+    """What the library's agent does with the lines: the numbers of its actions."""
+    n, scale = (lines.shape[1] - 3) // 2, 2.0**fraction_bits
+    actions = []
+    for line in lines.tolist():
+        now, following = np.array(line[1 : n + 1]) / scale, np.array(line[n + 2 : -1]) / scale
+        if line[0] == 0:
+            agent.begin_episode()
+        action = agent.act(now, explore=line[0] == 1)
+        actions.append(
+            [np.abs(agent.actions_of(d) - one).argmin() for d, one in enumerate(np.ravel(action))]
+        )
+        if line[0] == 1:
+            agent.learn(Transition(now, action, line[n + 1] / scale, following, bool(line[-1])))
+    agent.begin_episode()
+    return actions
+
+
+def build(folder, agent, target, *options):
+    """The header and its program, as a command."""
+    header = export_c_header(agent, folder / "agent.h", learning=True)
+    one = agent.n_dimensions == 1
+    act = (
+        "action[0] = agent_act(&agent, line + 1, %s)"
+        if one
+        else "agent_act(&agent, line + 1, %s, action)"
+    )
+    learn = (
+        f"agent_learn(&agent, line + 1, {'action[0]' if one else 'action'},"
+        " line[1 + AGENT_N_OBSERVED], next, line[2 * AGENT_N_OBSERVED + 2])"
+    )
+    source = DRIVER.replace("ACT(line[0] == 1)", act % "line[0] == 1").replace("LEARN", learn)
+    (folder / "life.c").write_text(source)
+    program = folder / "life"
+    run(
+        target.compiler, *STRICT, "-O2", *target.options, *options,
+        *(("-static",) if target.runner else ()),
+        folder / "life.c", "-o", program,
+    )  # fmt: skip
+    return header, [target.runner, program] if target.runner else [program]
+
+
+def lived(command, image, lines, n_dimensions):
+    """The actions and the image that the program ends with."""
+    done = subprocess.run(
+        [str(word) for word in command],
+        input=image + np.ascontiguousarray(lines).tobytes(),
+        capture_output=True,
+        check=True,
+    ).stdout
+    n = 4 * n_dimensions * len(lines)
+    return np.frombuffer(done[:n], "<u4").reshape(-1, n_dimensions).tolist(), done[n:]
+
+
+def check_life(name, target, folder, n_steps=3000, options=()):
+    """It acts and learns as the library's agent, from nothing and from an image."""
+    agent = LEARNERS[name]()
+    header, command = build(folder, agent, target, *options)
+    lines = lines_of(agent, n_steps, 1, header.fraction_bits)
+    nothing = save_image(agent)
+    came, image = lived(command, nothing, lines, agent.n_dimensions)
+    expected = live(agent, lines, header.fraction_bits)
+    assert came == expected
+    assert image == save_image(agent)
+    # The experience comes home, and goes on in both.
+    home = LEARNERS[name]()
+    load_image(home, image)
+    assert save_image(home) == image
+    more = lines_of(agent, n_steps // 10, 2, header.fraction_bits)
+    came, image = lived(command, image, more, agent.n_dimensions)
+    assert came == live(home, more, header.fraction_bits)
+    assert image == save_image(home)
