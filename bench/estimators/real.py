@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import numpy as np
 import problems
 from measured import measure_missing, measured, options
-from page import show
+from page import markdown, show
 from real_data import CLASSIFICATION, REGRESSION, is_word, samples
 from sklearn.compose import ColumnTransformer
 from sklearn.exceptions import ConvergenceWarning
@@ -118,6 +118,21 @@ def keys():
     ]
 
 
+def probabilities_table(found):
+    """Means over the classifications; times are medians."""
+    rows = []
+    for model in CLASSIFIERS:
+        of_all = [row for problem in CLASSIFICATION for row in found[problem, model]]
+        cells = [
+            f"{np.mean([row[what] for row in of_all]):.3f}" if what in of_all[0] else ""
+            for what in ("calibration", "log_loss")
+        ]
+        seconds, us = (np.median([row[what] for row in of_all]) for what in ("fit_s", "predict_us"))
+        rows.append((model, *cells, f"{seconds:.2g}", f"{us:.0f}"))
+    header = ("model", "calibration error", "log loss", "fit, s", "prediction, us a row")
+    return markdown(header, rows)
+
+
 def main():
     given = options(__doc__, seeds=N_FOLDS).parse_args()
     measure_missing(KIND, measure, keys(), given)
@@ -130,6 +145,7 @@ def main():
         title: problems.table(found, data, models, what, np.mean)
         for title, (what, data, models) in TABLES.items()
     }
+    tables["probabilities, measured data"] = probabilities_table(found)
     show(tables, given.folder / "problems.md")
 
 

@@ -308,4 +308,6 @@ class Circular(Anchored):
         if np.isinf(values).any():
             raise ValueError("Input contains infinity, which has no place on a circle")
         turns = (values - self.origin) / self.period
-        return bins_of_positions(turns - np.floor(turns), self.size)
+        # Rounded, so that values a period apart are in the same bin also where bins meet.
+        positions = np.round((turns - np.floor(turns)) * self.size, 9)
+        return positions.astype(np.int32) % np.int32(self.size)

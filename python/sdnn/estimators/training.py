@@ -111,7 +111,7 @@ def presented(n_samples: int, weights: Floats | None, epoch: int, n_before: int 
 def presentations(weights: Floats | None) -> Floats | None:
     """Return weights scaled to a mean of 1 if none reaches 1, as where they sum to 1.
 
-    >>> presentations(np.array([0.2, 0.6])).tolist()
+    >>> presentations(np.array([0.25, 0.75])).tolist()
     [0.5, 1.5]
     """
     if weights is None or not 0 < weights.max() < 1:

@@ -100,6 +100,13 @@ def test_bins_never_leave_the_table_and_keep_the_order(values, kind):
     assert np.all(np.diff(bins) >= 0)
 
 
+@pytest.mark.parametrize("period", [24.0, 7.0, 2 * np.pi, 0.1])
+def test_a_period_away_is_the_same_bin_also_where_bins_meet(period):
+    coding, edges = Circular(period=period), np.arange(360) * period / 360
+    for turns in (-1000, -1, 1, 2, 365):
+        np.testing.assert_array_equal(coding.bins(edges + turns * period), np.arange(360))
+
+
 @settings(max_examples=100, deadline=None)
 @given(st.floats(-1e6, 1e6), st.integers(-5, 5))
 def test_a_period_away_is_the_same_angle(angle, turns):
