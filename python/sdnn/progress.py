@@ -64,7 +64,7 @@ class ProgressBars:
         """Remove a bar."""
         self._progress.remove_task(self._tasks.pop(key))
 
-    # As an observer: a bar for each trial, one for all, one for costs.
+    # As an observer: a bar for each trial, one for all, one for what else is counted.
 
     def begun(self, n_planned: int, n_reused: int, n_episodes: int) -> None:
         """Open the bar of the whole run."""
@@ -94,15 +94,11 @@ class ProgressBars:
         """Print a line above the bars, on a terminal or not."""
         self._progress.console.print(text, markup=False, highlight=False, soft_wrap=True)
 
-    def costs_begun(self, n_missing: int) -> None:
-        """Open the bar of the costs."""
-        if n_missing:
-            self.add("costs", "cost of a step", n_missing)
-
-    def cost_measured(self, description: str) -> None:
-        """Move the bar of the costs."""
-        self._done["costs"] = self._done.get("costs", 0) + 1
-        self.update("costs", self._done["costs"], description=f"cost: {description}")
+    def counted(self, title: str, done: int, total: int) -> None:
+        """Move the bar of something else, which is opened first."""
+        if "counted" not in self._tasks:
+            self.add("counted", title, total)
+        self.update("counted", done, description=title)
 
     def _title(self) -> str:
         return f"[bold]all ({self._n_open} to go)"

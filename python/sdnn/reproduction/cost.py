@@ -174,17 +174,17 @@ def measure_costs(
     """Measure what is not stored yet, one after another, and store each at once."""
     stored = {record.key for record in load_costs(store, config.config_hash)}
     missing = [key for key in keys if key not in stored]
-    observer.costs_begun(len(missing))
     by_id = {series.id: series for series in SERIES}
-    for key in missing:
+    for number, key in enumerate(missing):
         series = by_id[key.series]
+        title = f"cost: {series.title}, {key.n_inputs} inputs"
+        observer.counted(title, number, len(missing))
         measured = measure_steps(series, key.n_inputs, config)
         if measured is not None:
             names = ("microseconds", "n_steps", "table_bytes")
             made = {"machine": machine.description(), "version": _core.__version__}
             record = key._asdict() | dict(zip(names, measured, strict=True)) | made
             store.put(KIND, repr(tuple(key)), record)
-        observer.cost_measured(f"{series.title}, {key.n_inputs} inputs")
 
 
 def measure_steps(

@@ -172,11 +172,8 @@ class Observer:
     def noted(self, text: str) -> None:
         """Pass on a text for a person, such as about a worker that was refused."""
 
-    def costs_begun(self, n_missing: int) -> None:
-        """Note that the measurement of costs begins, with `n_missing` of them before it."""
-
-    def cost_measured(self, description: str) -> None:
-        """Note that a cost is measured, and of what."""
+    def counted(self, title: str, done: int, total: int) -> None:
+        """Note how much of something else than trials is done, such as of measurements."""
 
 
 def run_trials(
