@@ -163,28 +163,26 @@ class DaskExecutor:
                 client.close(timeout=CONNECT_SECONDS)
 
     def _connect(self, stop: threading.Event) -> Generator[Message, None, Client | None]:
-        """Connect, in short attempts, so that Ctrl-C ends them; the scheduler may come later."""
+        """Connect, in short attempts, so that Ctrl-C ends them."""
         from distributed import Client
 
-        begin, is_noted = time.monotonic(), False
+        begin = time.monotonic()
+        notes = [f"waiting for the scheduler at {self.scheduler}"]
         attempt = min(CONNECT_SECONDS, self.scheduler_timeout)
         while not stop.is_set():
             try:
                 return Client(self._address(), timeout=attempt, set_as_default=False)
-            except (ValueError, LookupError, TypeError, RecursionError) as error:
-                raise ClusterError(
-                    f"scheduler must be an address or a scheduler file, got {self.scheduler}"
-                    f" ({type(error).__name__}: {error})"
-                ) from error
             except OSError as error:
                 if time.monotonic() - begin > self.scheduler_timeout:
-                    waited = f"waited {self.scheduler_timeout:g} s"
-                    problem = f"no scheduler at {self.scheduler}: {error}; {waited}"
-                    raise self.failure(problem) from error
-            if not is_noted:
-                yield Noted(f"waiting for the scheduler at {self.scheduler}")
-            is_noted = True
-            stop.wait(WORKERS_SECONDS)
+                    raise self.failure(
+                        f"no scheduler at {self.scheduler}: {error}; waited"
+                        f" {self.scheduler_timeout:g} s"
+                    ) from error
+                yield from map(Noted, notes)
+                notes = []
+                stop.wait(WORKERS_SECONDS)
+            except ValueError as error:
+                raise self._refusal(error) from error
         return None
 
     def _address(self) -> str:
@@ -192,9 +190,18 @@ class DaskExecutor:
         path = Path(self.scheduler)
         if path.suffix != ".json" and not path.is_file():
             return self.scheduler
-        if path.exists() and not path.is_file():
-            raise ValueError("it must be a regular file")
-        return str(json.loads(read_bytes(path, MOST_BYTES))["address"])
+        try:
+            return str(json.loads(read_bytes(path, MOST_BYTES))["address"])
+        except FileNotFoundError:  # it may come
+            raise
+        except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
+            raise self._refusal(error) from error
+
+    def _refusal(self, error: Exception) -> ClusterError:
+        return ClusterError(
+            f"scheduler must be an address or a scheduler file, got {self.scheduler}"
+            f" ({type(error).__name__}: {error})"
+        )
 
     def failure(self, problem: str) -> ClusterError:
         """Return the error that ends the run."""
@@ -261,8 +268,8 @@ class _Run:
             if time.monotonic() - looked > WORKERS_SECONDS:
                 yield from self.look_at_workers()
                 looked = time.monotonic()
-            while self.waiting and self.has_room():
-                yield from self.submit(self.waiting.popleft(), completed)
+            for planned in self.next_trials():
+                yield from self.submit(planned, completed)
             if stop.wait(RESULTS_SECONDS):
                 return
             trials = {future.key: planned for future, (planned, _) in self.running.items()}
@@ -308,11 +315,14 @@ class _Run:
             waited = f"waited {self.executor.scheduler_timeout:g} s"
             raise self.executor.failure(f"no worker at {self.executor.scheduler}{fits}; {waited}")
 
-    def has_room(self) -> bool:
-        """Whether a thread is free for the next trial; suspects, which come last, run alone."""
-        is_alone = self.waiting[0].key in self.suspects
+    def next_trials(self) -> Iterator[PlannedTrial]:
+        """Yield a trial for each free thread; suspects, which come last, one by one."""
         n_threads = sum(self.threads.values())
-        return len(self.running) < (min(1, n_threads) if is_alone else n_threads)
+        while self.waiting:
+            is_alone = self.waiting[0].key in self.suspects
+            if len(self.running) >= (min(1, n_threads) if is_alone else n_threads):
+                return
+            yield self.waiting.popleft()
 
     def submit(self, planned: PlannedTrial, completed: Any) -> Generator[Message, None, None]:
         """Submit a trial; its identity is its key, so that drivers with the same trial share it."""
