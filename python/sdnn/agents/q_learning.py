@@ -120,6 +120,36 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         values: NDArray[np.float64] = self.core.q_values(state, self._dimension(dimension))
         return values
 
+    def learning_report(self) -> dict[str, Any]:
+        """Return statistics of learning so far, to find settings that cannot work.
+
+        Returns
+        -------
+        dict
+            ``left_out``: numbers of the observed variables that are in no input, as neither rewards
+            nor actions have to do with them; ``share_of_range``: for each observed variable the
+            part of its range that nine tenths of the last 2,048 observations or so were in (a small
+            one: ranges are too wide); ``share_beyond_range``: how often it was outside (a large
+            one: too narrow). Both are None for angles, symbols and variables that are left out, and
+            for about 160 observations.
+
+        Raises
+        ------
+        RuntimeError
+            While the agent is warming up.
+        """
+        controller = self._require_warm()
+        use = controller.range_use()
+        inside: set[int] = set()
+        for kind, variables in controller.inputs:
+            first, last = variables[0], variables[-1]
+            inside.update(range(first, first + last) if kind == "symbol" else variables)
+        return {
+            "left_out": [i for i in range(len(use)) if i not in inside],
+            "share_of_range": [one and one[0] for one in use],
+            "share_beyond_range": [one and one[1] for one in use],
+        }
+
     def _dimension(self, dimension: int) -> int:
         return whole("dimension", dimension, 0, self.n_dimensions - 1)
 
@@ -212,15 +242,13 @@ warm_up_steps
         Returns
         -------
         dict
+            Those of all agents that learn values of actions (`ValueAgent.learning_report`), and
             ``n_corrections``: transitions learned, times dimensions; ``share_changed``: those that
             changed weights; ``share_rounded_away``: those whose target was between two values of
             the network, nearer to the present one (a larger ``learning_rate``, more units or
             another ``rounding`` help); ``share_out_of_range``: those with targets outside
             ``q_range`` (a wider range, or ``value_range="adaptive"``); ``q_range``: (low, high) as
-            it is; ``share_of_range``: for each observed variable the part of its range that nine
-            tenths of the last 2,048 observations or so were in (a small one: ranges are too wide);
-            ``share_beyond_range``: how often it was outside (a large one: too narrow). Both are
-            None for angles and symbols, and for about 160 observations.
+            it is.
 
         Raises
         ------
@@ -228,18 +256,15 @@ warm_up_steps
             While the agent is warming up.
         """
         networks = [self._network(dimension) for dimension in range(self.n_dimensions)]
-        use = self._controller.range_use()
         changed, rounded_away, out_of_range, n_all = np.sum(
             [network.correction_counts for network in networks], axis=0
         ).tolist()
-        return {
+        return super().learning_report() | {
             "n_corrections": n_all,
             "share_changed": changed / max(n_all, 1),
             "share_rounded_away": rounded_away / max(n_all, 1),
             "share_out_of_range": out_of_range / max(n_all, 1),
             "q_range": networks[0].output_range,
-            "share_of_range": [one and one[0] for one in use],
-            "share_beyond_range": [one and one[1] for one in use],
         }
 
     def _network(self, dimension: int) -> Any:

@@ -23,7 +23,6 @@ from sdnn.agents import (
     CheckpointCallback,
     Evaluation,
     Scaling,
-    SDNNQLearning,
     TensorBoard,
     Training,
     UnrepeatedEpisodeError,
@@ -32,6 +31,7 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.agents.callbacks import Row
+from sdnn.agents.q_learning import ValueAgent
 from sdnn.agents.spaces import require_same_kind
 from sdnn.files import lock, open_to_append, remove_abandoned_files, write_whole
 from sdnn.interrupts import Interrupts
@@ -77,7 +77,7 @@ class Goal(BudgetSpec, frozen=True, kw_only=True):
 class RunOutcome:
     """The result of training a run.
 
-    ``learning_report``: see `sdnn.agents.SDNNQLearning`, None for other agents and while it is
+    ``learning_report``: see `sdnn.agents.SDNNQLearning`, None for fuzzy agents and while one is
     warming up; ``has_pictures``: whether `record` can render the environment.
     """
 
@@ -228,7 +228,7 @@ class Run:
             agent, env = training.agent, training.env
             agent.save(self.folder / AGENT)
         evaluations = [row for row in self.rows() if row["kind"] == "evaluation"]
-        has_report = isinstance(agent, SDNNQLearning) and not agent.is_warming_up
+        has_report = isinstance(agent, ValueAgent) and not agent.is_warming_up
         single: Any = env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env
         return RunOutcome(
             n_steps=training.n_steps,
@@ -275,7 +275,7 @@ class Run:
 
     @property
     def key(self) -> TrialKey:
-        """Key of its rows in the store."""
+        """Where its rows are stored."""
         spec = self.spec
         return TrialKey(spec.task, spec.label, 0, spec.seed, spec.config_hash)
 
@@ -286,7 +286,7 @@ class Run:
 
     @property
     def goal(self) -> Goal | BudgetSpec:
-        """Number of steps or episodes to learn in all."""
+        """How many steps or episodes it is to learn in all."""
         return self.goals[-1] if self.goals else self.spec.budget
 
     def write_config(self) -> None:
@@ -405,7 +405,7 @@ class _StoredCheckpoints(CheckpointCallback):
 
 
 def agent_of(folder: Path) -> Agent[Any, Any]:
-    """Load the agent of a run, as `Run.agent`, whatever the run's configuration has."""
+    """Load the agent of a run, as `Run.agent`, whatever the run's configuration says."""
     if not (folder / CONFIG).exists():
         raise RunError(f"{folder} holds no run: there is no {folder / CONFIG}")
     path = next((p for p in (folder / CHECKPOINT, folder / AGENT) if p.exists()), None)

@@ -226,6 +226,7 @@ def test_irrelevant_inputs_are_left_out_and_stay_so(tmp_path):
     agent.save(tmp_path / "agent.safetensors")
     loaded = load_agent(tmp_path / "agent.safetensors")
     assert loaded.inputs == agent.inputs
+    assert agent.learning_report()["left_out"] == [i for i in range(10) if i not in kept]
     observation = np.linspace(-0.1, 0.1, 10)
     np.testing.assert_array_equal(loaded.q_values(observation), agent.q_values(observation))
 

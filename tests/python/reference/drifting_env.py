@@ -92,8 +92,26 @@ class UnseenEnv(gym.Env):
         return self.np_random.uniform(-1.0, 1.0, 2), float(action[0]), False, False, {}
 
 
+class CrowdedEnv(DriftingEnv):
+    """Shows four numbers of noise, too."""
+
+    observation_space = gym.spaces.Box(-np.inf, np.inf, (6,), np.float64)
+
+    def reset(self, *, seed=None, options=None):
+        observation, info = super().reset(seed=seed)
+        return self._crowded(observation), info
+
+    def step(self, action):
+        observation, *rest = super().step(action)
+        return self._crowded(observation), *rest
+
+    def _crowded(self, observation):
+        return np.concatenate([observation, self.np_random.normal(size=4)])
+
+
 gym.register("tests/Unseen-v0", entry_point=UnseenEnv, max_episode_steps=20)
 gym.register("tests/Drifting-v0", entry_point=DriftingEnv, max_episode_steps=40)
+gym.register("tests/Crowded-v0", entry_point=CrowdedEnv, max_episode_steps=40)
 gym.register("tests/Only-v0", entry_point=OnlyEnv, max_episode_steps=40)
 gym.register("tests/Restless-v0", entry_point=RestlessEnv, max_episode_steps=40)
 gym.register("tests/Broken-v0", entry_point=BrokenEnv, max_episode_steps=40)

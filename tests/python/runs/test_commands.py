@@ -719,6 +719,19 @@ def test_ranges_that_do_not_suit_are_named(invoke):
     assert "left the range" not in lines
 
 
+def test_observations_that_are_left_out_are_named(invoke):
+    options = ["--agent", "sdnn-linear", "--steps", 1001, "--evaluate-every", 0]
+    done = invoke("train", "drifting_env:tests/Crowded-v0", *options, "--out", "one", "--json")
+    left_out = json.loads(done.stdout)["learning_report"]["left_out"]
+    assert len(left_out) >= 3
+    assert set(left_out) <= {2, 3, 4, 5}
+    listed = f"{len(left_out)} of 6 observations.*: {', '.join(map(str, left_out))}"
+    assert re.search(listed, invoke("resume", "one").stdout)
+    options[1] = "sdnn-c"  # which takes all
+    lines = invoke("train", "drifting_env:tests/Crowded-v0", *options, "--out", "two").stdout
+    assert "of 6 observations" not in lines
+
+
 def test_a_warm_up_that_is_not_over_is_told(invoke):
     told = WARMING_UP
     begun = ("--steps", 59, "--evaluate-every", 50, "--evaluation-episodes", 1, *SMALL)
