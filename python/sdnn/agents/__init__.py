@@ -9,6 +9,7 @@ from sdnn.agents.callbacks import (
     StopTrainingOnRewardThreshold,
     TensorBoard,
 )
+from sdnn.agents.datasets import learn_from
 from sdnn.agents.episode import Transition, UnrepeatedEpisodeError, UnusableStepError
 from sdnn.agents.evaluation import Evaluation, evaluate
 from sdnn.agents.fixed_rate import FixedRate
@@ -46,5 +47,6 @@ __all__ = [
     "UnrepeatedEpisodeError",
     "UnusableStepError",
     "evaluate",
+    "learn_from",
     "load_agent",
 ]

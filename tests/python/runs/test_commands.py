@@ -128,8 +128,8 @@ def test_export_writes_a_c_header_of_a_run_or_an_agents_file(invoke, tmp_path):
 
 
 def test_export_writes_an_agent_that_learns(invoke):
-    linear = ("--agent", "sdnn-linear", "--out", "one")
-    assert invoke("train", DRIFTING, *SHORT, *linear).exit_code == 0
+    linear = ("--agent", "sdnn-linear", *SHORT[:6], *SMALL[-2:], "--out", "one")
+    assert invoke("train", DRIFTING, *linear).exit_code == 0
     done = invoke("export", "one", "--c-header", "drift.h", "--learning")
     assert done.exit_code == 0, done.output
     header = c_header(Run.open("one").agent(), "drift", learning=True)
