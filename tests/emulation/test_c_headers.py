@@ -58,7 +58,7 @@ def test_learning_compiles_for_microcontrollers(name, kind, needs, tmp_path):
           agent_load(&agent, image);
         }}
     """
-    (tmp_path / "calls.c").write_text(calls)
+    (tmp_path / "calls.c").write_text(calls + "\n")
     done = tmp_path / "calls.o"
     options = (*STRICT, *ALONE, f"--target={kind}", "-Os", "-c")
     run("clang", *options, tmp_path / "calls.c", "-o", done)
