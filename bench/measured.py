@@ -63,7 +63,7 @@ def options(doc: str, *, seeds: int, jobs: int = 1) -> argparse.ArgumentParser:
 
 
 def is_wanted(key: Key, given: argparse.Namespace) -> bool:
-    """Tell whether a key has all the words of --only."""
+    """Return whether a key has all the words of --only."""
     return set(given.only) <= set(" ".join(map(str, key)).split())
 
 

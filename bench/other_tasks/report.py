@@ -94,7 +94,7 @@ def shares(
 
 
 def interval_of(draws: NDArray[np.float64]) -> Estimate:
-    """Give the first of ``draws``, with the interval that the others span."""
+    """Return the first of ``draws``, with the interval that the others span."""
     lower, upper = np.quantile(draws[1:], [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
     return Estimate(float(draws[0]), float(lower), float(upper))
 

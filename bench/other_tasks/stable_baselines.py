@@ -52,7 +52,7 @@ class StableBaselines:
         """Do nothing."""
 
     def act(self, observation, explore=False):
-        """Give the policy's action."""
+        """Return the policy's action."""
         observation = self.normalize(observation)
         return self.model.predict(observation, deterministic=not explore)[0]
 

@@ -147,7 +147,7 @@ class Softmax:
         return slopes
 
     def greedy(self, outputs):
-        """Give the likeliest action."""
+        """Return the likeliest action."""
         return int(np.argmax(outputs))
 
 
@@ -173,7 +173,7 @@ class Normal:
         return np.concatenate([ratio / self._deviation, of_deviation * sigmoid])
 
     def greedy(self, outputs):
-        """Give the mean."""
+        """Return the mean."""
         return self._of_space(outputs[: self._n])
 
     def _of_space(self, parts):

@@ -182,7 +182,7 @@ def path_of(name: str, value: Any) -> Path:
 
 
 def is_of_class(value: Any, kind: type[Any]) -> bool:
-    """Whether a value is of a class, or of one with its name and fields.
+    """Return whether a value is of a class, or of one with its name and fields.
 
     A cell of a notebook that runs again defines its classes again.
     """

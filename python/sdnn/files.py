@@ -145,7 +145,7 @@ def _open_itself(name: str, flags: int) -> int:
 
 
 def is_there(path: Path) -> bool:
-    """Whether a regular file has this name; OSError for a link, a folder, a device or a pipe."""
+    """Return whether a regular file has this name; OSError for a link, folder, device or pipe."""
     try:
         mode = path.lstat().st_mode
     except FileNotFoundError:

@@ -117,7 +117,7 @@ class StopTrainingOnRewardThreshold(Callback):
             training.stop()
 
     def is_reached(self, training: Training) -> bool:
-        """Whether the last evaluations are good enough."""
+        """Return whether the last evaluations are good enough."""
         last = [mean_return for _, mean_return in training.evaluations[-self.patience :]]
         return len(last) == self.patience and all(mean >= self.mean_return for mean in last)
 

@@ -103,7 +103,7 @@ def names_of(env: Any) -> str:
 
 
 def share_statistics(env: Any, evaluation_env: Any) -> None:
-    """Give what the wrappers of one environment have learned to those of another.
+    """Copy the statistics of one environment's wrappers to those of another.
 
     Warns where only one of the two has a wrapper that learns about observations.
     """
@@ -286,7 +286,7 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
 
 
 def _are_actions(space: Any, values: NDArray[Any]) -> bool:
-    """Whether the rows of an array are actions of a space: an environment need not check them."""
+    """Return whether the rows of an array are actions of a space; environments need not check."""
     if isinstance(space, gym.spaces.Discrete):
         low, high = space.start, space.start + space.n - 1
     else:

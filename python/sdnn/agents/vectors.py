@@ -136,7 +136,7 @@ def _autoreset_mode(env: gym.vector.VectorEnv[Any, Any, Any]) -> str:
 
 
 def _resets_each(env: gym.vector.VectorEnv[Any, Any, Any]) -> bool:
-    """Whether ``reset`` knows the option ``"reset_mask"``, and a seed for each environment."""
+    """Return whether ``reset`` takes the option ``"reset_mask"`` and a seed per environment."""
     inner = env
     while isinstance(inner, gym.vector.VectorWrapper):
         if isinstance(inner, gym.wrappers.vector.NormalizeObservation):

@@ -1,4 +1,4 @@
-"""What the commands share: options and values, errors and exit codes, and what is printed."""
+"""Parts that the commands share: options and values, errors and exit codes, and output."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sdnn.runs import ConfigError, Run, RunOutcome
     from sdnn.runs.dask_executor import DaskExecutor
     from sdnn.runs.engine import ThreadExecutor
-    from sdnn.runs.report import Finished
+    from sdnn.runs.report import WrittenReport
 
 EXIT_FAILURE = 1
 PLAIN_WIDTH = 160
@@ -171,7 +171,7 @@ def run_command(
 
 
 def _is_of_environment(error: BaseException) -> bool:
-    """Whether a method of an environment was at work when it was raised."""
+    """Return whether it was raised in a method of an environment."""
     import gymnasium as gym
 
     frames = traceback.walk_tb(error.__traceback__)
@@ -223,14 +223,14 @@ def _lines_of_ranges(report: Mapping[str, Any]) -> Iterator[str]:
     if narrow:
         yield (
             f"{_variables(narrow)} moved within {_LITTLE_OF_A_RANGE:.0%} of the range:"
-            " the network can hardly tell such values apart; --range adaptive narrows ranges"
+            " the network can hardly distinguish such values; --range adaptive narrows ranges"
         )
     shares = enumerate(report["share_beyond_range"])
     clipped = [i for i, share in shares if share is not None and share > _OFTEN_BEYOND_A_RANGE]
     if clipped:
         yield (
             f"{_variables(clipped)} left the range more than {_OFTEN_BEYOND_A_RANGE:.0%} of the"
-            " time: the network cannot tell what is beyond; --range makes it wider"
+            " time: the network cannot distinguish values beyond it; --range makes it wider"
         )
 
 
@@ -245,11 +245,8 @@ def _lines_of_scaling(run: Run, scaling: Scaling | None) -> Iterator[str]:
 
 
 def _variables(numbers: Sequence[int]) -> str:
-    return f"observed variable{'s' if len(numbers) > 1 else ''} {_listed(numbers)}"
-
-
-def _listed(numbers: Sequence[int]) -> str:
-    return ", ".join(map(str, numbers[:8])) + (", ..." if len(numbers) > 8 else "")
+    named = ", ".join(map(str, numbers[:8])) + (", ..." if len(numbers) > 8 else "")
+    return f"observed variable{'s' if len(numbers) > 1 else ''} {named}"
 
 
 def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
@@ -269,19 +266,13 @@ def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
             f" {row['mean_return']:.6g} over {len(row['returns'])} greedy episodes"
         )
     report = outcome.learning_report
-    if report is not None and report.get("n_corrections"):
+    if report is not None and report["n_corrections"]:
         yield (
             f"of {report['n_corrections']} corrections {report['share_changed']:.0%} changed the"
             f" network, {report['share_rounded_away']:.0%} were rounded away and"
             f" {report['share_out_of_range']:.0%} out of its range of values"
         )
     if report is not None:
-        if left_out := report["left_out"]:
-            n_observed = len(report["share_of_range"])
-            yield (
-                f"{len(left_out)} of {n_observed} observations carry no information about the"
-                f" return: {_listed(left_out)}"
-            )
         yield from _lines_of_ranges(report)
     yield from _lines_of_scaling(run, outcome.scaling)
     commands: list[tuple[object, ...]] = [("plot", run.folder), ("evaluate", run.folder)]
@@ -304,7 +295,7 @@ def _finite(value: Any) -> Any:
 
 
 def run_and_report(
-    context: click.Context, run: Callable[..., Finished], request: Any, *, as_json: bool
+    context: click.Context, run: Callable[..., WrittenReport], request: Any, *, as_json: bool
 ) -> None:
     """Run trials with a line of progress; print the results, what failed and how much is stored."""
     from rich.console import Console

@@ -101,5 +101,5 @@ def select_experiments(word: str) -> tuple[Experiment, ...]:
 
 
 def includes_cost(word: str) -> bool:
-    """Whether one of `WORDS` includes the measurement of costs."""
+    """Return whether one of `WORDS` includes the measurement of costs."""
     return word in (COST, "all")

@@ -213,7 +213,7 @@ _DECISIVE = (Verdict.FAILS, Verdict.NOT_RUN, Verdict.NOT_JUDGED, Verdict.UNDECID
 
 
 def is_paper_scale(measured: TrialMeasures) -> bool:
-    """Whether there are as many trials and episodes as in the paper: else nothing is judged."""
+    """Return whether there are as many trials and episodes as in the paper, to be judged."""
     return measured.n_trials >= PAPER_TRIALS and measured.last_episode >= PAPER_EPISODES
 
 

@@ -353,7 +353,7 @@ class StudyClaims:
         return tuple(found[number] for number in sorted(found))
 
     def moved(self, variant: str, outcome: ClaimOutcome) -> bool | None:
-        """Whether the verdict differs from that of the reference; None if one is missing."""
+        """Return whether the verdict differs from that of the reference; None if one is missing."""
         reference = self.comparison.study.reference
         other = self.by_variant.get(reference, {}).get(outcome.claim.number)
         if variant == reference or other is None:

@@ -109,7 +109,7 @@ class ConfigFile:
         n_left = _MOST_PARSED
 
         def begins(last: int) -> bool:
-            """Whether the first lines, with the rest of their last value, have the key."""
+            """Return whether the first lines, with the rest of their last value, have the key."""
             nonlocal n_left
             for end in range(last + 1, len(lines) + 1):
                 text = "\n".join(lines[:end])

@@ -83,7 +83,7 @@ class Measured:
         return self.combination.variant
 
     def differs(self, name: MeasureName) -> bool:
-        """Whether the interval excludes 0, over at least `MIN_TRIALS_TO_DIFFER` trials."""
+        """Return whether the interval excludes 0, over at least `MIN_TRIALS_TO_DIFFER` trials."""
         difference = self.differences.get(name)
         if difference is None or self.result.n_trials < MIN_TRIALS_TO_DIFFER:
             return False
