@@ -120,7 +120,7 @@ def _open_at_once(name: str, flags: int) -> int:
 
 
 def read_bytes(path: Path, max_bytes: int) -> bytes:
-    """Read a regular file that may have so many bytes; OSError as of `open_regular`."""
+    """Read a regular file of limited size; OSError as of `open_regular`."""
     with open_regular(path, max_bytes) as file:
         return file.read(os.fstat(file.fileno()).st_size)
 

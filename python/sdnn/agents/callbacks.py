@@ -77,7 +77,7 @@ class JSONLines(Callback):
 
 
 class CheckpointCallback(Callback):
-    """Saves agent and training every so many steps, from where `Training.load` resumes exactly.
+    """Saves agent and training at regular steps; `Training.load` resumes from there exactly.
 
     ``n_saved`` is the number of steps when it was saved last; None: not yet.
     """
@@ -103,7 +103,7 @@ class CheckpointCallback(Callback):
 
 
 class StopTrainingOnRewardThreshold(Callback):
-    """Stops when so many evaluations in a row (``patience``) reach a mean return."""
+    """Stops when ``patience`` evaluations in a row reach a mean return."""
 
     def __init__(self, mean_return: float, patience: int = 1) -> None:
         self.mean_return = real("mean_return", mean_return)

@@ -27,7 +27,7 @@ class FixedRate(_core.FixedRate):
     clock : callable
         Returns seconds since any fixed moment, and never goes back.
     sleep : callable
-        Waits for so many seconds, or less.
+        Waits for the given seconds, or less.
 
     Attributes
     ----------

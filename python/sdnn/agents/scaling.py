@@ -78,7 +78,7 @@ class Scaling:
 
     @classmethod
     def of_values(cls, values: Mapping[str, Any], n_variables: int) -> Scaling:
-        """Make it from `values`; ValueError if it does not fit so many numbers."""
+        """Make it from `values`; ValueError if it does not fit their number."""
         scaling = cls(ranges=values["ranges"], n_redundant=values["redundant"])
         n = len(scaling.ranges) + scaling.n_redundant
         if n != n_variables:

@@ -256,7 +256,7 @@ class Training:
         )
 
     def pieces(self, seconds: float) -> Generator[None, None, None]:
-        """Learn as `run` does, in pieces of about so many seconds.
+        """Learn as `run` does, in pieces of about ``seconds`` each.
 
         Closing the generator between two pieces stops the training there, like `stop`.
         """

@@ -13,7 +13,7 @@ from sdnn.cli.common import make_console
 @click.option("--quick", is_flag=True, help="Few repetitions, as a check that it works.")
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON.")
 def bench(quick: bool, as_json: bool) -> None:
-    """Measure how long the parts of a decision, decisions and trials take here.
+    """Measure the time of decisions, their parts and trials on this machine.
 
     Takes about half a minute. SDNN_INSTRUCTION_SET=portable, neon, avx2 or avx512 forces a level.
     """

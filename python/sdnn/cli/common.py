@@ -245,8 +245,11 @@ def _lines_of_scaling(run: Run, scaling: Scaling | None) -> Iterator[str]:
 
 
 def _variables(numbers: Sequence[int]) -> str:
-    named = ", ".join(map(str, numbers[:8])) + (", ..." if len(numbers) > 8 else "")
-    return f"observed variable{'s' if len(numbers) > 1 else ''} {named}"
+    return f"observed variable{'s' if len(numbers) > 1 else ''} {_listed(numbers)}"
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers[:8])) + (", ..." if len(numbers) > 8 else "")
 
 
 def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
@@ -266,13 +269,19 @@ def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
             f" {row['mean_return']:.6g} over {len(row['returns'])} greedy episodes"
         )
     report = outcome.learning_report
-    if report is not None and report["n_corrections"]:
+    if report is not None and report.get("n_corrections"):
         yield (
             f"of {report['n_corrections']} corrections {report['share_changed']:.0%} changed the"
             f" network, {report['share_rounded_away']:.0%} were rounded away and"
             f" {report['share_out_of_range']:.0%} out of its range of values"
         )
     if report is not None:
+        if left_out := report["left_out"]:
+            n_observed = len(report["share_of_range"])
+            yield (
+                f"{len(left_out)} of {n_observed} observations carry no information about the"
+                f" return: {_listed(left_out)}"
+            )
         yield from _lines_of_ranges(report)
     yield from _lines_of_scaling(run, outcome.scaling)
     commands: list[tuple[object, ...]] = [("plot", run.folder), ("evaluate", run.folder)]
@@ -374,7 +383,7 @@ _OPTIONS = (
         "--scheduler-timeout",
         type=click.FloatRange(min=0, min_open=True),
         metavar="SECONDS",
-        help="Wait so long for the scheduler and for a worker that fits.  [default: 300]",
+        help="Longest wait for the scheduler and a suitable worker.  [default: 300]",
     ),
 )
 _OF_DASK = ("scheduler", "scheduler_timeout")

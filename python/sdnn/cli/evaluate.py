@@ -20,7 +20,11 @@ from sdnn.cli.common import (
 @click.command(short_help="Evaluate the agent of a run as it is now.")
 @run_argument
 @click.option(
-    "--episodes", type=click.IntRange(1, 10**9), default=100, show_default=True, help="How many."
+    "--episodes",
+    type=click.IntRange(1, 10**9),
+    default=100,
+    show_default=True,
+    help="Greedy episodes.",
 )
 @seed_option
 @json_option

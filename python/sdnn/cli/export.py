@@ -31,7 +31,7 @@ from sdnn.cli.common import json_option, json_text, run_command, words_of_run
 @click.option(
     "--fraction-bits",
     type=click.IntRange(min=0, max=30),
-    help="Of readings, actions and rewards in fixed point."
+    help="Fraction bits of observations, actions and rewards."
     "  [default: 16, or fewer where a range needs it]",
 )
 @json_option

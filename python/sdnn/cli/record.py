@@ -22,7 +22,9 @@ from sdnn.cli.common import (
 @click.argument("out", metavar="OUT", type=click.Path(dir_okay=False, path_type=Path))
 @seed_option
 @click.option(
-    "--steps", type=click.IntRange(min=1), help="At most so many.  [default: the whole episode]"
+    "--steps",
+    type=click.IntRange(min=1),
+    help="Most steps to record.  [default: the whole episode]",
 )
 def record(folder: Path, out: Path, seed: int | None, steps: int | None) -> None:
     """Record a greedy episode of RUN's agent as OUT, a .gif or .mp4 file.

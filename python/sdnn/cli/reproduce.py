@@ -44,7 +44,7 @@ from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_
 @click.option(
     "--quick",
     is_flag=True,
-    help="A fraction of it: 2 trials x 300 episodes. Not the result.",
+    help="Run a fraction: 2 trials x 300 episodes; not the result.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
 @click.option("--dry-run", is_flag=True, help="Print what would be run and how long it takes.")

@@ -73,7 +73,7 @@ class BaseKernelRidge(CodedInputs):
         Pairs of features, by number or name; a modifier of None leaves a pattern plain. All pairs
         are as fast as one per feature.
     max_components : int, default=2000
-        Most samples that span the solution. Up to so many samples it is exact, beyond that of low
+        Most samples that span the solution. Up to this number it is exact, beyond that of low
         rank (Nystroem's method).
     random_state : int, RandomState or None, default=None
         Draws the components from more samples.

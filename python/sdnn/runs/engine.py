@@ -88,7 +88,7 @@ def plan_of(
 
 
 class Advanced(NamedTuple):
-    """A trial has done so many learning episodes: first 0, and 0 again when it begins again."""
+    """Number of learning episodes that a trial has done: 0 at first, and whenever it restarts."""
 
     planned: PlannedTrial
     episode: int

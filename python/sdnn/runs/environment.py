@@ -74,7 +74,7 @@ class EnvironmentSpec(Settings, frozen=True):
     redundant: Annotated[
         Annotated[int, Meta(ge=0, le=1000)],
         Meta(
-            description="Append so many means of neighbouring variables to the observation, before"
+            description="Means of neighbouring variables to append to the observation, before"
             " the noise: of 0 and 1, of 1 and 2, ..., of the last and 0, and so on in a circle."
         ),
     ] = 0

@@ -295,7 +295,7 @@ def decimals_of(estimate: Estimate, measure: MeasureName) -> int:
 
 
 def plain_number(value: float, decimals: int, sign: str = "") -> str:
-    """Write a number with so many decimals at most.
+    """Write a number with a given number of decimals at most.
 
     >>> plain_number(2.50, 2), plain_number(-0.01, 1), plain_number(0.25, 2, sign="+")
     ('2.5', '0', '+0.25')

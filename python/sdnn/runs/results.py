@@ -40,7 +40,7 @@ MeasureName = Literal[
 SHARE_STABLE = 0.9
 """Share of test episodes that an agent must solve at the end to be called stable."""
 GOOD_STEPS = 10.0
-"""A test episode of at most so many steps is good: the paper's "within 10 steps"."""
+"""Most steps of a good test episode: the paper's "within 10 steps"."""
 LEARNED_WINDOW, STABLE_WINDOW = 10, 50
 """Tests in a row whose median must be good for the task to count as learned, and as mastered."""
 EARLY_EPISODES = 2_500

@@ -275,7 +275,7 @@ class Run:
 
     @property
     def key(self) -> TrialKey:
-        """Where its rows are stored."""
+        """Key of its rows in the store."""
         spec = self.spec
         return TrialKey(spec.task, spec.label, 0, spec.seed, spec.config_hash)
 
@@ -286,7 +286,7 @@ class Run:
 
     @property
     def goal(self) -> Goal | BudgetSpec:
-        """How many steps or episodes it is to learn in all."""
+        """Number of steps or episodes to learn in all."""
         return self.goals[-1] if self.goals else self.spec.budget
 
     def write_config(self) -> None:
@@ -405,7 +405,7 @@ class _StoredCheckpoints(CheckpointCallback):
 
 
 def agent_of(folder: Path) -> Agent[Any, Any]:
-    """Load the agent of a run, as `Run.agent`, whatever the run's configuration says."""
+    """Load the agent of a run, as `Run.agent`, whatever the run's configuration has."""
     if not (folder / CONFIG).exists():
         raise RunError(f"{folder} holds no run: there is no {folder / CONFIG}")
     path = next((p for p in (folder / CHECKPOINT, folder / AGENT) if p.exists()), None)

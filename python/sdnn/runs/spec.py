@@ -453,7 +453,7 @@ class RunSpec(Settings, frozen=True):
 
 
 def changed_size(approximator: Any, n_inputs: int) -> Any:
-    """Return the settings of an approximator for so many inputs, if these are among them."""
+    """Return the settings of an approximator with a number of inputs, if it has that field."""
     if "n_inputs" not in names_of(type(approximator)):
         return approximator
     return replace(approximator, n_inputs=n_inputs)

@@ -260,7 +260,7 @@ class Trial(Protocol):
         """Decisions made so far, in learning and test episodes."""
 
     def advance(self, n_episodes: int, /) -> None:
-        """Run up to so many more learning episodes and the test episodes due among them."""
+        """Run ``n_episodes`` more learning episodes and the test episodes due among them."""
 
     def test_rows(self) -> dict[str, NDArray[Any]]:
         """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
@@ -334,7 +334,7 @@ class TrainingTrial:
         return self.training.n_steps + self.rows().n_evaluated
 
     def advance(self, n_episodes: int, /) -> None:
-        """Run up to so many more learning episodes and the evaluations due among them."""
+        """Run ``n_episodes`` more learning episodes and the evaluations due among them."""
         last = self.episode + whole("n_episodes", n_episodes, 0, 2**53)
         if n_episodes:
             for _ in self.training.pieces(0.0):
@@ -342,7 +342,7 @@ class TrainingTrial:
                     break
 
     def pieces(self, seconds: float) -> Generator[None, None, None]:
-        """Learn to the end, in pieces of about so many seconds."""
+        """Learn to the end, in pieces of about ``seconds`` each."""
         return self.training.pieces(seconds)
 
     def rows(self) -> TrialRows:
