@@ -174,7 +174,7 @@ void bind_online_layer(py::module_& module) {
       .def(
           "synchronize",
           [](OnlineLayer& self) {
-            // Those who read its own weights may go on meanwhile.
+            // Readers of its own weights may continue meanwhile.
             const bindings::WithoutGIL unlocked(std::as_const(self), self.layer());
             self.synchronize();
           },

@@ -22,7 +22,7 @@ inline Preset paper_preset(int n_inputs) { return {.approximator = {.n_inputs = 
 /// For any task: a full step each time, then, as progress is set, ever smaller ones, which
 /// rounding stills one by one; targets of five steps; exploration that goes somewhere; greedy
 /// actions by an average of the weights; values in steps half as large as the paper's
-/// (docs/benchmarks.md).
+/// (docs/evidence/benchmarks.md).
 inline Preset general_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs,
                            .max_pairs = 56,
@@ -41,7 +41,7 @@ inline Preset general_preset(int n_inputs) {
 }
 
 /// The general one with fewer units, so that the weights fit into the flash of a small processor
-/// (docs/small-processors.md).
+/// (docs/how-to/small-processors.md).
 inline Preset small_preset(int n_inputs) {
   Preset preset = general_preset(n_inputs);
   preset.approximator.n_hidden_units = 900;
@@ -52,7 +52,7 @@ inline Preset small_preset(int n_inputs) {
 
 /// Steady with noisy sensors in the paper's task: few actions part the best one from its neighbours
 /// by more than noise blurs, and a success that reaches the whole path at once is not forgotten
-/// (docs/collapse.md).
+/// (docs/explanation/collapse.md).
 inline Preset robust_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs, .n_actions = 61}, .learning = {.n_steps = 5}};
 }

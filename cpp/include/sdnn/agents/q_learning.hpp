@@ -333,7 +333,7 @@ class QLearning {
     }
   }
 
-  /// As values, by the average of the weights where the approximator keeps one.
+  /// Values by the average of the weights where the approximator keeps one.
   void averaged_values(std::span<const double> state, Workspace& workspace, std::size_t d) const {
     std::vector<double>& row = workspace.values[d];
     if constexpr (requires { part(d).averaged_values(state, part(workspace, d), row); }) {

@@ -1,4 +1,4 @@
-/// What an agent needs of a function Q(s, a): the concept every approximator models.
+/// The concept that every approximator models: a function Q(s, a) as an agent uses it.
 #pragma once
 
 #include <concepts>

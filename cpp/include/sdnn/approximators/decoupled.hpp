@@ -25,7 +25,7 @@ namespace sdnn::approximators {
 template <ActionValue Q>
 class Decoupled {
  public:
-  /// What one user needs: a workspace for each part.
+  /// State of one user: a workspace for each part.
   struct Workspace {
     std::vector<typename Q::Workspace> parts;
     std::vector<double> taken;  ///< Q_d of the action that was asked for last
@@ -73,7 +73,7 @@ class Decoupled {
     }
   }
 
-  /// Of every part. Throws as they do.
+  /// Applies it to every part. Throws as they do.
   void set_output_range(double q_low, double q_high)
     requires requires(Q& q) { q.set_output_range(q_low, q_high); }
   {

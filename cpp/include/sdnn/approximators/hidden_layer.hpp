@@ -247,7 +247,7 @@ class HiddenLayer {
              {input.minus.subspan(n_minus), -step}}};
   }
 
-  /// What a correction can add to the largest weight of a unit.
+  /// Largest growth of a unit's largest weight by one correction.
   std::int32_t growth(std::int32_t step) const noexcept {
     return std::abs(step) * (n_double_ > 0 ? 2 : 1);
   }

@@ -95,7 +95,7 @@ class LinearSDNN {
     std::int32_t n_active_ = 0;
   };
 
-  /// What one user needs to read the model: a state, its code, and the sums of rows over it, each
+  /// State of one user who reads the model: a state, its code, and the sums of rows over it, each
   /// computed anew when its weights have changed.
   class Workspace {
    public:
@@ -111,7 +111,7 @@ class LinearSDNN {
     std::vector<std::int64_t> sums_;       ///< of the actions of a dimension
   };
 
-  /// What one stream of experience needs: which weights had a part in the values before.
+  /// State of one stream of experience: the weights that had a part in earlier values.
   class Trace {
    public:
     void clear() noexcept {
@@ -152,7 +152,7 @@ class LinearSDNN {
     std::vector<bool> live_;  ///< rows that are not all 0
   };
 
-  /// How a step of learning moves the weights; see SarsaConfig.
+  /// Rates of a step of learning; see SarsaConfig.
   struct Step {
     std::int64_t error = 0;       ///< in units: what the trace is multiplied by
     std::int64_t correction = 0;  ///< in units: what the code is multiplied by
@@ -286,7 +286,7 @@ class LinearSDNN {
     });
     return total;
   }
-  /// What `sum` gives of the trace in the place of the weights, kTraceOne for 1.
+  /// Sum as by `sum`, of the trace instead of the weights; kTraceOne for 1.
   std::int64_t sum_of_trace(const Code& code, std::span<const std::size_t> action,
                             const Trace& trace) const noexcept {
     std::int64_t total = 0;

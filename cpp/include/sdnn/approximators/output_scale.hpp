@@ -41,7 +41,7 @@ class OutputScale {
     return (q_low_ * (u_high_ - n_firing) + q_high_ * (n_firing - u_low_)) / (u_high_ - u_low_);
   }
 
-  /// Where on the line `value`, clipped to [q_low, q_high], lies: a number of units, not rounded.
+  /// The place of `value`, clipped to [q_low, q_high], on the line: a number of units, not rounded.
   /// For every u in [u_low, u_high], exact_inverse(g(u)) is within 1e-9 of u. Requires a number.
   double exact_inverse(double value) const noexcept {
     assert(!std::isnan(value));

@@ -87,7 +87,7 @@ class RBFNetwork {
     }
   }
 
-  /// What one user owns: room to compute in, and the bases of the last state.
+  /// State of one user: buffers, and the bases of the last state.
   class Workspace {
     friend class RBFNetwork;
 

@@ -35,7 +35,7 @@
 
 namespace sdnn::approximators {
 
-/// What became of the corrections that a network was asked for.
+/// Outcomes of the corrections of a network.
 struct CorrectionCounts {
   std::uint64_t asked = 0;         ///< all of them
   std::uint64_t changed = 0;       ///< units were corrected
@@ -56,7 +56,7 @@ struct CorrectionCounts {
 /// Thread safety: const functions may be called by many threads at once, with a workspace each.
 class SDNNC {
  public:
-  /// What one user owns to read a network, or to let it learn: the potentials of recent states, and
+  /// State of one user who reads a network or lets it learn: the potentials of recent states, and
   /// room to compute in. For that network, whatever it becomes, and for its copies, which an
   /// assertion checks. Sized once, so that a step allocates nothing.
   class Workspace {
@@ -139,7 +139,7 @@ class SDNNC {
     fill_values(recall(state, workspace).potentials, workspace, out);
   }
 
-  /// As values, by the average of the weights, rounded to steps of the lattice, where there is one.
+  /// Values by the average of the weights, rounded to steps of the lattice, where there is one.
   /// The first call after the average has changed takes some milliseconds. Throws as values.
   void averaged_values(std::span<const double> state, Workspace& workspace,
                        std::span<double> out) const {
@@ -200,7 +200,7 @@ class SDNNC {
     hidden_layer_.potentials(lists.columns(), out);
   }
 
-  /// Asks for some states and forgets them, and touches the memory that learning may need: the
+  /// Evaluates some states and forgets them, and touches the memory that learning may need: the
   /// first decision then finds everything in the caches, as every later one does. Nothing that is
   /// ever returned changes.
   void warm_caches(Workspace& workspace) {
@@ -389,7 +389,7 @@ class SDNNC {
     return workspace.cache_.recall(*code_, hidden_layer_, log_, workspace.bins_);
   }
 
-  /// How many units are to fire for the value `wanted`, where `n_firing` do.
+  /// Number of units to fire for the value `wanted`, where `n_firing` do.
   int rounded_count(double wanted, int n_firing) {
     if (config_.rounding == Rounding::half_up) return scale_.inverse(wanted);
     const double exact = scale_.exact_inverse(wanted);

@@ -14,7 +14,7 @@
 
 namespace sdnn::approximators {
 
-/// How the weights start (method.md, section 1, "Start").
+/// Initial weights (method.md, section 1, "Start").
 enum class InitialWeights {
   ternary,  ///< -1, 0 or +1 lattice steps with probabilities 1/4, 1/2, 1/4
   uniform,  ///< uniform within +- initial_weight_limit, rounded to the lattice
@@ -23,7 +23,7 @@ constexpr std::array<std::string_view, 2> words_of(InitialWeights) noexcept {
   return {"ternary", "uniform"};
 }
 
-/// To which whole number of firing units a wanted value is rounded (reading: the paper is silent).
+/// Rounding of a wanted value to a whole number of firing units (an assumption).
 enum class Rounding {
   half_up,  ///< the nearest; halves up. A change of less than half a unit is lost
   random,   ///< up or down at random, in proportion: right on average, nothing is lost

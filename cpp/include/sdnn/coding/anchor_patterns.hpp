@@ -12,7 +12,7 @@
 
 namespace sdnn::coding {
 
-/// How a code by anchor interpolation is made.
+/// Parameters of a code by anchor interpolation.
 struct AnchorConfig {
   int n_units = 2000;         ///< units per pattern
   int n_anchor_patterns = 9;  ///< p_1 .. p_9; the last one ends the chain and has no bin

@@ -21,7 +21,7 @@ namespace sdnn::coding {
 
 namespace detail {
 
-/// Asks for what will soon be read, where the compiler can say so.
+/// Prefetches a value that will soon be read, where the compiler supports it.
 inline void prefetch([[maybe_unused]] const void* address) noexcept {
 #if defined(__GNUC__)
   __builtin_prefetch(address);
@@ -67,7 +67,7 @@ class CorrelationSearch {
     }
   }
 
-  /// Proposes swaps in the pattern that `draw_pattern()` says, judged by the first `n_others`.
+  /// Proposes swaps in the pattern of `draw_pattern()`, judged by the first `n_others`.
   ///
   /// They are drawn some way ahead of their trial, so that their units come from memory meanwhile.
   template <class DrawPattern>

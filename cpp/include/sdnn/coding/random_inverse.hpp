@@ -14,7 +14,7 @@
 
 namespace sdnn::coding {
 
-/// How a random-inverse code is made.
+/// Parameters of a random-inverse code.
 struct RandomInverseConfig {
   int n_units = 2000;  ///< n, units per pattern; even
   int n_bins = 1001;   ///< q, patterns

@@ -36,7 +36,7 @@ using SharedTables = std::vector<std::shared_ptr<const PatternTable>>;
 
 namespace detail {
 
-/// Where the pattern of an input begins: in a table, by the input's bin.
+/// Place of an input's pattern: in a table, by the input's bin.
 struct TableOfInput {
   const core::BitWord* words;
   std::size_t input;
@@ -180,7 +180,7 @@ class SelectiveDesensitization {
     }
   }
 
-  /// Where the code of a sample is not 0 (`active`) and where it is +1 (`positive`).
+  /// Units of a sample's code that are not 0 (`active`) and that are +1 (`positive`).
   ///
   /// Shapes: bins (n_inputs,), checked before; active and positive (n_words,).
   void encode(std::span<const Bin> bins, std::uint64_t* active,

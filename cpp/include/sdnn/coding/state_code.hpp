@@ -65,7 +65,7 @@ class StateCode {
   std::size_t n_columns() const noexcept { return n_pattern_units() * n_groups(); }
   /// Words of the paired code.
   std::size_t n_words() const noexcept { return n_groups() * code_.n_pair_words(); }
-  /// How many columns of the paired code are half a sum or difference; they come first.
+  /// Number of columns of the paired code that are half a sum or difference; they come first.
   std::size_t n_double_columns() const noexcept {
     return 2 * n_inputs() * n_pairs() * n_pattern_units();
   }
@@ -93,7 +93,7 @@ class StateCode {
     }
   }
 
-  /// Where a unit of x_SD is in the paired code: x = first + sign * second, or, unless it is
+  /// Place of a unit of x_SD in the paired code: x = first + sign * second, or, unless it is
   /// paired, first alone; and its weight is half of that sum of their weights, or the weight alone.
   struct PairedColumns {
     bool paired;
@@ -140,7 +140,7 @@ class StateCode {
   }
 
  private:
-  /// How often two of the groups that one input modifies are taken together.
+  /// Number of pairs among the groups that one input modifies.
   std::size_t n_pairs() const noexcept { return n_partners() / 2; }
 
   std::vector<std::size_t> all_strides() const {

@@ -46,7 +46,7 @@ constexpr auto state_code_fields(const char* units = "m, units per pattern (sect
                   core::within(0, 1 << 24)));
 }
 
-/// How many inputs modify each one: an even share of max_pairs, at least one.
+/// Number of inputs that modify each one: an even share of max_pairs, at least one.
 template <class Config>
 int n_partners_of(const Config& config) noexcept {
   if (config.n_inputs < 2) return 0;

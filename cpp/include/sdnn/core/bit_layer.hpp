@@ -31,13 +31,13 @@ class BitLayer {
     assert(unit < size_);
     return words_[unit / 64][unit % 64];
   }
-  /// How many units are on.
+  /// Number of units that are on.
   std::size_t count() const noexcept {
     std::size_t n = 0;
     for (const BitWord& word : words()) n += word.count();
     return n;
   }
-  /// How many units differ from those of a layer of the same size.
+  /// Number of units that differ from those of a layer of the same size.
   std::size_t distance(const BitLayer& other) const noexcept {
     assert(size_ == other.size_);
     std::size_t n = 0;

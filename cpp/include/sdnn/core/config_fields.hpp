@@ -62,7 +62,7 @@ struct NestedField {
   constexpr Value& of(Config& config) const noexcept { return config.*outer.*member; }
 };
 
-/// The field called `name`. `doc` says what it is, for readers of the documentation.
+/// The field called `name`. `doc` describes it in the documentation.
 template <class Config, class Value>
 constexpr ConfigField<Config, Value> field(const char* name, Value Config::* member,
                                            const char* doc, Bounds bounds = {}) noexcept {

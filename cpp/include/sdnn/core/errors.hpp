@@ -1,4 +1,4 @@
-/// How errors reach the caller: as exceptions, or where there are none, through a function of his.
+/// Errors reach the caller as exceptions or, where there are none, through a function of his.
 #pragma once
 
 #if defined(__cpp_exceptions) || defined(_CPPUNWIND)
@@ -21,20 +21,20 @@ class ArgumentError : public std::invalid_argument {
   ArgumentError(std::string name, const std::string& message)
       : std::invalid_argument(message), name_(std::move(name)) {}
 
-  /// Of the argument or field.
+  /// Name of the argument or field.
   const std::string& name() const noexcept { return name_; }
 
  private:
   std::string name_;
 };
 
-/// An argument, or a field of a configuration, asks for more memory than is allowed.
+/// An argument, or a field of a configuration, needs more memory than is allowed.
 class SizeError : public std::length_error {
  public:
   SizeError(std::string name, const std::string& message)
       : std::length_error(message), name_(std::move(name)) {}
 
-  /// Of the argument or field to reduce; where several would do, the first one.
+  /// Name of the argument or field to reduce; the first one, if several would do.
   const std::string& name() const noexcept { return name_; }
 
  private:

@@ -1,4 +1,4 @@
-/// Which vector instructions the kernels use: chosen once, at run time.
+/// Vector instructions of the kernels: chosen once, at run time.
 #pragma once
 
 #include <array>

@@ -106,7 +106,7 @@ class Pcg64 {
     return static_cast<std::uint32_t>(drawn);
   }
 
-  /// What a SeedSequence of these words generates.
+  /// Words that a SeedSequence of these words generates.
   static std::array<std::uint64_t, 4> drawn_from(std::span<const std::uint32_t> words) noexcept {
     std::uint32_t constant = 0x43b0d7e5;
     const auto hashed = [&constant](std::uint32_t value) {

@@ -14,7 +14,7 @@
 
 namespace sdnn::core {
 
-/// What a random number is for. Each purpose draws from a stream of its own, so that using more
+/// Purpose of a random number. Each purpose draws from a stream of its own, so that using more
 /// numbers for one never changes the others.
 enum class Stream : std::uint64_t {
   code_books = 1,

@@ -30,7 +30,7 @@ namespace sdnn::core {
 
 static_assert(std::endian::native == std::endian::little, "tensors are stored as they lie there");
 
-/// What a file holds.
+/// Content of a file.
 struct FileContent {
   std::string kind;                                       ///< "agent", "training" or "estimator"
   nlohmann::json description = nlohmann::json::object();  ///< all but the tensors
@@ -69,7 +69,7 @@ namespace detail {
 inline constexpr std::uint64_t kLongestHeader = 100'000'000;
 inline constexpr std::uint64_t kLargestFile = std::uint64_t{1} << 34;
 
-/// Where a tensor's bytes are among those of all.
+/// Place of a tensor's bytes among all bytes.
 struct TensorPlace {
   TensorType type;
   std::vector<std::size_t> shape;
@@ -115,7 +115,7 @@ inline TensorPlace tensor_place(const std::string& name, const nlohmann::json& e
   return place;
 }
 
-/// What the format of safetensors has: 8 bytes with the header's length, a header in JSON, tensors.
+/// The format of safetensors: 8 bytes with the header's length, a header in JSON, tensors.
 struct Safetensors {
   std::string about;  ///< the metadata "sdnn"
   State tensors;
@@ -166,7 +166,7 @@ Safetensors parse_safetensors(std::uint64_t size, const Read& read) {
   return content;
 }
 
-/// Where the checksum stands: a file begins with the header's length, this, and 8 digits.
+/// Place of the checksum: a file begins with the header's length, this, and 8 digits.
 inline constexpr std::string_view kBeginning = R"({"__metadata__":{"sdnn":"{\"checksum\":\")";
 inline constexpr std::size_t kChecksumBegin = sizeof(std::uint64_t) + kBeginning.size();
 inline constexpr std::size_t kChecksumEnd = kChecksumBegin + 8;

@@ -1,4 +1,4 @@
-/// What an object has to remember, by name: to be saved, and put back.
+/// State of an object, by name: to be saved and restored.
 #pragma once
 
 #include <algorithm>
@@ -111,12 +111,12 @@ class StateWriter {
   void number(std::string_view name, const std::optional<T>& value) {
     if (value) number(name, *value);
   }
-  /// As many as there are. Shape: (n,).
+  /// Array of any length. Shape: (n,).
   template <class T>
   void numbers(std::string_view name, const std::vector<T>& values) {
     add<T>(name, {values.size()}, values);
   }
-  /// Of a shape that is known beforehand: anything with data() and size().
+  /// Array of a known shape: anything with data() and size().
   template <class Values>
   void fixed(std::string_view name, std::vector<std::size_t> shape, const Values& values) {
     using T = std::remove_cvref_t<decltype(*values.data())>;
@@ -126,7 +126,7 @@ class StateWriter {
   void part(std::string_view name, const Part& part) {
     within(name, [&] { Part::serialize(part, *this); });
   }
-  /// What `list` lists, with `name` before.
+  /// The entries of `list`, prefixed by `name`.
   template <class List>
   void within(std::string_view name, const List& list) {
     const detail::Prefixed prefixed(*this, name);
@@ -186,14 +186,14 @@ class StateReader {
   void part(std::string_view name, Part& part) {
     within(name, [&] { Part::serialize(part, *this); });
   }
-  /// What `list` lists, with `name` before.
+  /// The entries of `list`, prefixed by `name`.
   template <class List>
   void within(std::string_view name, const List& list) {
     const detail::Prefixed prefixed(*this, name);
     list();
   }
 
-  /// How many parts there are called `name`.1, `name`.2 and so on.
+  /// Number of parts called `name`.1, `name`.2 and so on.
   std::size_t n_numbered(std::string_view name) const {
     std::size_t n = 0;
     for (;; ++n) {

@@ -1,4 +1,4 @@
-/// Which library this is.
+/// Version of this library.
 #pragma once
 
 namespace sdnn::core {

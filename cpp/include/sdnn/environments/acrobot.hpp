@@ -14,7 +14,7 @@
 
 namespace sdnn::environments {
 
-/// What one decision brought. `terminated`: the goal; `truncated`: the last decision was made.
+/// Result of one decision. `terminated`: the goal; `truncated`: the last decision was made.
 struct StepResult {
   double reward;
   bool terminated;
@@ -23,7 +23,7 @@ struct StepResult {
 
 /// Reward and episode end after the `decisions`-th decision of an episode led to `state`.
 ///
-/// The goal overrides the penalty, which looks at the decision instant only.
+/// The goal overrides the penalty, which is tested at the decision instant only.
 inline StepResult result_of(const AcrobotConfig& config, const AcrobotState& state, bool goal,
                             int decisions) noexcept {
   const bool penalized = std::abs(state[0]) < config.idle_angle ||
@@ -50,7 +50,7 @@ class Acrobot {
   void set_state(const AcrobotState& state) { begin_at(wrapped(state)); }
 
   /// Holds `torque` (N m) for one decision interval; `goal_tolerance`, the paper's lambda,
-  /// is the factor of the goal's speed limits. The goal overrides the penalty, which looks at the
+  /// is the factor of the goal's speed limits. The goal overrides the penalty, tested at the
   /// decision instant only. Throws std::invalid_argument unless |torque| <= max_torque and
   /// goal_tolerance >= 0, std::logic_error if the episode is over, std::overflow_error if the
   /// speeds outgrow the integration step.

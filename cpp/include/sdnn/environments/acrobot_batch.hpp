@@ -28,7 +28,7 @@ namespace sdnn::environments {
 /// The most acrobots in one batch.
 inline constexpr std::size_t kMaxAcrobots = std::size_t{1} << 24;
 
-/// What a step brings to every acrobot of a batch: StepResult's members. Shapes: all (size(),).
+/// Results of a step for every acrobot of a batch: StepResult's members. Shapes: all (size(),).
 struct AcrobotBatchResults {
   std::span<double> rewards;
   std::span<std::uint8_t> terminated;  ///< 1: the goal

@@ -1,4 +1,4 @@
-/// What an agent sees of the acrobot: normalized, redundant and noisy variables.
+/// Observations of the acrobot: normalized, redundant and noisy variables.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +22,7 @@
 
 namespace sdnn::environments {
 
-/// What noise does at the ends of a sensor's range [0, 1].
+/// Treatment of noise at the ends of a sensor's range [0, 1].
 enum class SensorEdge {
   wrap,      ///< an angle: 1 continues at 0, the result is in [0, 1)
   saturate,  ///< the result stays at the end
@@ -90,7 +90,7 @@ class SensorNoise {
   core::Random random_;
 };
 
-/// Where noise enters (reading).
+/// Place where noise enters (an assumption).
 enum class NoiseEntry {
   every_sensor,   ///< s5 and s6 are computed from the true s1..s4 and have noise of their own
   basic_sensors,  ///< on s1..s4 alone: s5 and s6 are computed from the noisy ones
@@ -99,7 +99,7 @@ constexpr std::array<std::string_view, 2> words_of(NoiseEntry) noexcept {
   return {"every_sensor", "basic_sensors"};
 }
 
-/// What the agent observes (section 4.3).
+/// Observed variables (section 4.3).
 struct SensorConfig {
   int n_sensors = 4;
   double noise = 0.0;

@@ -14,7 +14,7 @@ namespace sdnn::environments {
 
 /// The formula of lambda(k); the paper's is garbled in print.
 enum class GoalScheduleKind {
-  inverse_linear,  ///< 1 / (1 + k / scale): the default reading
+  inverse_linear,  ///< 1 / (1 + k / scale): the default assumption
   inverse_sqrt,    ///< 1 / sqrt(1 + k): continuous at k = 10000
   constant,        ///< `constant_value` for every k
 };
@@ -22,7 +22,7 @@ constexpr std::array<std::string_view, 3> words_of(GoalScheduleKind) noexcept {
   return {"inverse_linear", "inverse_sqrt", "constant"};
 }
 
-/// How the goal tolerance lambda(k) falls with the learning episode k (section 4.1).
+/// Schedule of the goal tolerance lambda(k) over learning episodes k (section 4.1).
 struct GoalScheduleConfig {
   GoalScheduleKind kind = GoalScheduleKind::inverse_linear;
   double scale = 100.0;

@@ -1,4 +1,4 @@
-/// Which units a training sample corrects: the p-delta rule and error correction.
+/// Rules for the units that a sample corrects: the p-delta rule and error correction.
 #pragma once
 
 #include <algorithm>
@@ -120,7 +120,7 @@ class PDeltaRule {
   std::vector<std::pair<std::int32_t, std::uint32_t>> ranked_;
 };
 
-/// How several classes are told apart by units that know two sides each.
+/// Scheme that separates several classes by units with two sides each.
 enum class ClassScheme {
   one_vs_rest,  ///< unit k fires for class k
   one_vs_one,   ///< units (0,1), (0,2), ..., (1,2), ...: fires for the first, silent for the second

@@ -105,7 +105,7 @@ class ParallelPerceptron {
     }
   }
 
-  /// What trainers write to; check_norms() holds them to the layer's promise.
+  /// Weights for trainers; check_norms() holds them to the layer's promise.
   WeightTiles<std::int32_t>& tiles() noexcept { return weights_; }
   const WeightTiles<std::int32_t>& tiles() const noexcept { return weights_; }
   std::span<std::int32_t> thresholds() noexcept { return thresholds_; }
@@ -175,14 +175,14 @@ class ParallelPerceptron {
     for_each_query(bins, n_threads, copy);
   }
 
-  /// How many units each of n_groups has. Throws std::invalid_argument unless it divides n_units.
+  /// Number of units in each of n_groups. Throws std::invalid_argument unless it divides n_units.
   std::size_t group_size(std::size_t n_groups) const {
     core::require(n_groups > 0 && n_units() % n_groups == 0, "n_groups",
                   "a divisor of n_units = " + std::to_string(n_units()), n_groups);
     return n_units() / n_groups;
   }
 
-  /// How many units fire in each of `n_groups` groups of equal size. Shapes: bins
+  /// Number of firing units in each of `n_groups` equal groups. Shapes: bins
   /// (n_queries, n_inputs), out (n_queries, n_groups). Throws std::invalid_argument unless n_groups
   /// divides n_units, for an out of another size, and like for_each_query.
   void counts(std::span<const std::int32_t> bins, std::size_t n_groups, int n_threads,

@@ -28,8 +28,8 @@ namespace sdnn::estimators {
 /// Presents training samples to a layer. All forms leave the same bits in it.
 ///
 /// Between synchronize() calls the layer's weights may lag behind; nobody else may change them as
-/// long as a trainer is in use. After an exception from present() the layer is good for nothing:
-/// who wants to go on trains a copy.
+/// long as a trainer is in use. After an exception from present() the layer cannot be used:
+/// train a copy to be able to continue.
 template <class Rule>
 class Trainer {
  public:
@@ -59,7 +59,7 @@ class Trainer {
     make_training(bins, n_threads, keeps_plans);
   }
 
-  /// What is trained.
+  /// The layer in training.
   ParallelPerceptron& layer() noexcept { return *layer_; }
   TrainingForm form() const noexcept { return form_; }
   /// The most bytes that the form takes beside the layer.

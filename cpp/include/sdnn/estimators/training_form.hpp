@@ -52,7 +52,7 @@ inline TrainingForm training_form_named(std::string_view name) {
       std::invalid_argument("form must be auto, dual, block or plain, got " + std::string(name)));
 }
 
-/// Bytes that training may take beside the layer, unless the caller says otherwise.
+/// Bytes that training may take beside the layer by default.
 inline constexpr std::size_t kMemoryLimit = std::size_t{1} << 30;
 
 /// Calls the template `function` with the integer type that holds all inner products of codes: 16
@@ -67,7 +67,7 @@ decltype(auto) with_product_type(const coding::SelectiveDesensitization& code,
 }
 
 /// Bytes that a form needs beside the layer and the samples' bins; at most 1 % less than it takes.
-/// Where `keeps_plans`, block training has room to keep what does not change of its blocks.
+/// If `keeps_plans`, block training keeps what does not change of its blocks.
 inline std::size_t form_memory(TrainingForm form, std::size_t n_units,
                                const coding::SelectiveDesensitization& code, std::size_t n_samples,
                                bool keeps_plans = false) {
@@ -83,7 +83,7 @@ inline std::size_t form_memory(TrainingForm form, std::size_t n_units,
   });
 }
 
-/// Epochs that are expected where nobody says how many.
+/// Expected epochs where their number is not given.
 inline constexpr std::size_t kExpectedEpochs = 30;
 
 /// The form to use. An estimate of the time per presentation decides between dual and block: the

@@ -36,7 +36,7 @@ class ActivationCache {
     std::span<const std::int32_t> potentials;
   };
 
-  /// How potentials came about, counted since construction.
+  /// Sources of the potentials, counted since construction.
   struct Counts {
     std::uint64_t exact = 0;      ///< the state was cached
     std::uint64_t neighbour = 0;  ///< derived from a cached neighbour

@@ -31,7 +31,7 @@ class ColumnPlaces {
  public:
   static constexpr std::size_t kMost = 1024;
   static constexpr std::size_t kAtOnce = 8;
-  /// How many columns ahead memory is asked for: about the latency of the last-level cache.
+  /// Columns by which prefetching is ahead: about the latency of the last-level cache.
   static constexpr std::size_t kPrefetchAhead = 16;
   static constexpr std::size_t kPlaceBytes = 8;
 
@@ -62,7 +62,7 @@ namespace detail {
 /// Groups of columns whose sum fits into 16 bits: 256 * 127 < 2^15.
 inline constexpr std::size_t kGroupsPerSum = 256;
 
-/// How far from `begin` the sum of groups of `Group` places fits into 16 bits.
+/// Places from `begin` whose sum, in groups of `Group`, fits into 16 bits.
 template <std::size_t Group>
 const std::uint32_t* end_of_part(const std::uint32_t* begin, const std::uint32_t* end) noexcept {
   return begin + std::min(Group * kGroupsPerSum, static_cast<std::size_t>(end - begin));
@@ -123,7 +123,7 @@ inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& p
 
 #if SDNN_X86_KERNELS || SDNN_NEON_KERNELS
 
-/// Asks for the columns that will be added kPrefetchAhead places later.
+/// Prefetches the columns that will be added kPrefetchAhead places later.
 [[gnu::always_inline]] inline void prefetch_ahead(const std::int8_t* block,
                                                   const std::uint32_t* places) noexcept {
   for (std::size_t k = 0; k < ColumnPlaces::kAtOnce; ++k) {

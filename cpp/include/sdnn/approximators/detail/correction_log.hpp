@@ -28,7 +28,7 @@ class CorrectionLog {
     std::int32_t step;
   };
 
-  /// Of a layer that is never corrected.
+  /// Log of a layer that is never corrected.
   CorrectionLog() = default;
   /// `max_units`: the most units that one correction may touch.
   CorrectionLog(std::size_t n_inputs, std::size_t max_units)
@@ -43,9 +43,9 @@ class CorrectionLog {
     return kSize * max_units * sizeof(std::uint32_t);
   }
 
-  /// Of the layer as it was when the log began.
+  /// Identity of the layer as it was when the log began.
   std::uint64_t identity() const noexcept { return identity_.number(); }
-  /// How many corrections there have been since.
+  /// Number of corrections since then.
   std::uint64_t size() const noexcept { return size_; }
 
   /// A correction, one of the last kSize.

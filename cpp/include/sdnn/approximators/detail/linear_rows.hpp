@@ -16,7 +16,7 @@ struct CodeMasks {
   const std::int32_t* negative;
 };
 
-/// How a row and its trace change. Numbers of fixed point; all products fit into 32 bits.
+/// Change of a row and its trace. Numbers of fixed point; all products fit into 32 bits.
 struct RowStep {
   std::int32_t decay;       ///< what remains of the trace: in [0, 2^13], 2^13 for all of it
   std::int32_t gain;        ///< the code's part of the new trace, 2^12 for 1; 0 outside the action
@@ -26,7 +26,7 @@ struct RowStep {
   std::int32_t correction;  ///< subtracted from the weight, times the code
 };
 
-/// Of a row after a step: bits that any trace has, and that any weight's size has.
+/// State of a row after a step: bits that any trace has, and that any weight's size has.
 struct RowUse {
   std::int32_t traces = 0;
   std::int32_t weights = 0;

@@ -40,7 +40,7 @@ class WeightAverage {
     return n_units * (4.0 * n_columns + 8.0);
   }
 
-  /// How many snapshots it is made of; 0: nothing is known.
+  /// Number of snapshots in the average; 0: there is none yet.
   std::uint64_t n_snapshots() const noexcept { return n_snapshots_; }
 
   /// Takes a snapshot if one is due after so many corrections in all; returns whether it was.

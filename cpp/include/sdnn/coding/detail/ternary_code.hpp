@@ -145,7 +145,7 @@ SDNN_DISPATCH(std::int32_t, inner_product,
               (const TernaryCode& one, const TernaryCode& other, std::size_t n_words),
               (one, other, n_words))
 
-/// How many entries of a code are not 0.
+/// Number of entries of a code that are not 0.
 inline std::size_t n_active(const TernaryCode& code, std::size_t n_words) noexcept {
   std::size_t n = 0;
   for (std::size_t w = 0; w < n_words; ++w) {
@@ -293,7 +293,7 @@ class ColumnLists {
     note_ends(up, down);
   }
 
-  /// What was read last; valid until more is read.
+  /// Columns that were read last; valid until the next reading.
   SignedColumns columns() const noexcept {
     return {std::span(plus_).first(n_plus_), std::span(minus_).first(n_minus_)};
   }

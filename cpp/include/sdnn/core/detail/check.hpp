@@ -1,4 +1,4 @@
-/// Argument checks for public edges: say what was expected and what came.
+/// Argument checks for public edges: messages name what was expected and what was given.
 #pragma once
 
 #include <cmath>

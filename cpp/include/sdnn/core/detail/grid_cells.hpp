@@ -1,4 +1,4 @@
-/// How many cells a grid has, and the refusal of tables that are too large.
+/// Number of cells of a grid, and the refusal of tables that are too large.
 #pragma once
 
 #include <cstddef>

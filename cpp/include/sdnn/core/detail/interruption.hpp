@@ -5,7 +5,7 @@
 
 namespace sdnn::core {
 
-/// What long work calls now and then, at least ten times a second; it throws to stop the work.
+/// Function that long work calls at least ten times a second; it throws to stop the work.
 /// None unless somebody sets it, as the Python package does for Ctrl-C. Called from any thread.
 /// With `at_once` it must look even if it just did: what follows cannot be undone.
 using InterruptionCheck = void (*)(bool at_once);

@@ -35,7 +35,7 @@ namespace sdnn::core {
 ///
 /// `write` may be called many times; `finish` makes the file be there. Without it, or after an
 /// error, what was there before stays, and nothing else is left. Throws std::runtime_error naming
-/// the file and what the system says. On POSIX systems content and name are on the disk when
+/// the file and the system's error. On POSIX systems content and name are on the disk when
 /// `finish` returns.
 class WholeFile {
  public:
@@ -152,8 +152,8 @@ class WholeFile {
 };
 
 /// A regular file, open for reading. Folders, devices and pipes are refused, without waiting for
-/// the writer of a pipe. Throws std::runtime_error that says what is wrong, but not with which
-/// file.
+/// the writer of a pipe. Throws std::runtime_error that names the fault, but not
+/// the file.
 class RegularFile {
  public:
   explicit RegularFile(const std::filesystem::path& path) {

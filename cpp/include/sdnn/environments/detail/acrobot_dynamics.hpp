@@ -144,7 +144,7 @@ class AcrobotDynamics {
     const auto slope = [this, &torque](const State& at_state) SDNN_INLINE_LAMBDA {
       return derivative<Form>(at_state, Form::angles(at_state), torque);
     };
-    // All lanes go on until the last has arrived; `state` takes the numbers of those that do.
+    // All lanes step until the last has arrived; `state` takes the numbers of those that do.
     State now = state;
     Mask under_way = moving;
     auto at = Form::angles(now);

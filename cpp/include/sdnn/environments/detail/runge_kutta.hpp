@@ -11,7 +11,7 @@ namespace sdnn::environments {
 /// The state after a time `step` of y' = derivative(y), given the slope at the start.
 ///
 /// `Real` is double or core::Lanes; the derivative has to be inlined for wide lanes. The slope at
-/// the start is asked for because a caller that looks at every state it passes through has most of
+/// the start is an argument because a caller that uses every state it passes through has most of
 /// it already. The error of one step is O(step^5). Nothing is allocated.
 /// Source: Kutta 1901; the weights are 1/6, 1/3, 1/3, 1/6.
 template <class Real, std::size_t Size, class Derivative>

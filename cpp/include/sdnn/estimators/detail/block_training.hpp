@@ -115,7 +115,7 @@ class BlockTraining {
   template <class Weight>
   using Columns = std::array<Weight, kChunkColumns * kMostUnits<Weight>>;
 
-  /// What does not change of a block.
+  /// Parts of a block that do not change.
   struct Plan {
     CodeWalk walk;
     std::size_t stride = 0;

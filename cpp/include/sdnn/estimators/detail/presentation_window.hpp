@@ -14,7 +14,7 @@
 
 namespace sdnn::estimators {
 
-/// What a stretch of training changed.
+/// Changes by a stretch of training.
 struct TrainingCount {
   std::size_t n_samples = 0;  ///< presentations that corrected something
   std::size_t n_units = 0;    ///< corrections of single units

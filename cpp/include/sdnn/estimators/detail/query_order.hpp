@@ -46,7 +46,7 @@ inline std::uint64_t hilbert_index(std::span<std::uint32_t> axes, int n_bits) no
   return index;
 }
 
-/// How far a walk through the queries goes, in bins, each input's step counted up to `cap`.
+/// Length of a walk through the queries, in bins, each input's step counted up to `cap`.
 inline std::uint64_t walk_length(std::span<const std::int32_t> bins, std::size_t n_inputs,
                                  std::span<const std::uint32_t> order, std::int32_t cap) noexcept {
   std::uint64_t length = 0;

@@ -1,4 +1,4 @@
-/// Which units fire, and which are nearest to their threshold.
+/// Units that fire, and those nearest to their threshold.
 #pragma once
 
 #include <algorithm>
@@ -94,7 +94,7 @@ SDNN_INLINE std::int32_t least_above_body(const std::int32_t* values, std::size_
 
 }  // namespace detail
 
-/// How many of the potentials are above 0.
+/// Number of potentials above 0.
 SDNN_KERNEL(std::int32_t, count_firing, (const std::int32_t* potentials, std::size_t size),
             (potentials, size))
 
