@@ -287,22 +287,40 @@ def ranks(middles):
 
 
 def table(found, problems, models, what="score", middle=np.median):
-    """Medians or means of a score, mean ranks, and the seconds of fitting."""
+    """Medians or means of a score, mean ranks, and the seconds of fitting.
+
+    Where a model was not measured on a problem, it has a rank on those where all were.
+    """
     middles = np.array(
-        [[middle(scores(found, problem, model, what)) for model in models] for problem in problems]
+        [
+            [
+                middle(scores(found, problem, model, what)) if found[problem, model] else np.nan
+                for model in models
+            ]
+            for problem in problems
+        ]
     )
     rows = []
     for problem, row in zip(problems, middles, strict=True):
-        cells = (f"**{m:.3f}**" if m == max(row) else f"{m:.3f}" for m in row)
+        told = (f"{m:.3f}" if np.isfinite(m) else "" for m in row)
+        cells = (f"**{c}**" if m == np.nanmax(row) else c for m, c in zip(row, told, strict=True))
         rows.append((problem, *cells))
-    systems = [model for model in models if model not in VARIANTS]
-    ranked = ranks(middles[:, [model not in VARIANTS for model in models]])
-    rank_of = dict(zip(systems, ranked, strict=True))
-    cells = (f"*{rank_of[model]:.1f}*" if model in rank_of else "" for model in models)
-    rows.append(("*mean rank*", *cells))
+    own = np.array([model not in VARIANTS for model in models])
+    there = np.isfinite(middles)
+    rows.append(rank_row("mean rank", middles, own & there.all(axis=0)))
+    if not there.all():
+        of_all = there.all(axis=1)
+        rows.append(rank_row(f"mean rank on {of_all.sum()}", middles[of_all], own))
     spent = ([row["fit_s"] for p in problems for row in found[p, model]] for model in models)
     rows.append(("*fit, s*", *(f"*{np.median(seconds):.2g}*" for seconds in spent)))
     return markdown(("problem", *models), rows)
+
+
+def rank_row(title, middles, is_ranked):
+    """A row of the mean ranks of some models among themselves."""
+    ranked = np.full(len(is_ranked), np.nan)
+    ranked[is_ranked] = ranks(middles[:, is_ranked])
+    return (f"*{title}*", *(f"*{rank:.1f}*" if np.isfinite(rank) else "" for rank in ranked))
 
 
 def coverages(found):

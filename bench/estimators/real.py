@@ -36,6 +36,8 @@ REGRESSORS, CLASSIFIERS = (
     {name: make for name, make in models.items() if name not in problems.VARIANTS}
     for models in (problems.REGRESSORS, problems.CLASSIFIERS)
 )
+LEFT_OUT = {("wages", "Gaussian process"), ("developers' salaries", "Gaussian process")}
+"""Fits of four minutes and more."""
 TABLES = {
     "R2, measured data": ("score", REGRESSION, REGRESSORS),
     "accuracy, measured data": ("score", CLASSIFICATION, CLASSIFIERS),
@@ -115,6 +117,7 @@ def keys():
         for models, data in ((REGRESSORS, REGRESSION), (CLASSIFIERS, CLASSIFICATION))
         for problem in data
         for model in models
+        if (problem, model) not in LEFT_OUT
     ]
 
 
