@@ -208,6 +208,8 @@ def make_agent(kind, **options):
     approximator, learning = SETTINGS[cls]
     given = {"observation_space": PLANE, "action_space": TORQUE, "seed": 3}
     given |= {"approximator": approximator, "learning": learning}
+    if cls is SDNNSarsa and "warm_up_steps" not in CASES[comma + case]:  # no warm-up by default
+        given |= {"inputs": "all", "angle_pairs": "none"}
     agent = cls(**{**given, **CASES[comma + case], **options})
     return agent
 
