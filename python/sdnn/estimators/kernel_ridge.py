@@ -17,6 +17,7 @@ from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted
 
+from sdnn.arguments import real
 from sdnn.estimators.inputs import (
     Array,
     CodedInputs,
@@ -173,7 +174,7 @@ class BaseKernelRidge(CodedInputs):
             random = check_random_state(self.random_state)
             components = np.sort(random.choice(components, self.max_components, replace=False))
         self.X_fit_ = table[components]
-        alpha = None if self.alpha == "auto" else float(self.alpha)
+        alpha = None if self.alpha == "auto" else real("alpha", self.alpha)
         base = self.kernel_(self.X_fit_)
         solutions = {}
         for degree in DEGREES if self.degree == "auto" else (int(self.degree),):

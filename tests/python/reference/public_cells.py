@@ -21,7 +21,12 @@ from sdnn.environments import (
     GoalSchedule,
     SensorConfig,
 )
-from sdnn.estimators import SDNNClassifier, SDNNRegressor
+from sdnn.estimators import (
+    SDNNClassifier,
+    SDNNKernelClassifier,
+    SDNNKernelRidge,
+    SDNNRegressor,
+)
 from sdnn.reproduction.cases import EXPERIMENTS, PAPER_CASES
 from sdnn.runs import (
     BudgetSpec,
@@ -35,8 +40,15 @@ from sdnn.runs import (
 ROOMS = ("agents", "approximators", "coding", "environments", "estimators", "reproduction", "runs")
 
 SAMPLES = np.random.default_rng(1).uniform(0, 1, (12, 2))
-TARGETS = {SDNNRegressor: SAMPLES.sum(axis=1), SDNNClassifier: np.arange(12) % 3}
-SMALL = {"n_pattern_units": 20, "max_iter": 2, "random_state": 0}
+NUMBERS, LABELS = SAMPLES.sum(axis=1), np.arange(12) % 3
+NETWORK = {"n_pattern_units": 20, "max_iter": 2, "random_state": 0}
+ESTIMATORS = {
+    SDNNRegressor: (NUMBERS, NETWORK),
+    SDNNClassifier: (LABELS, NETWORK),
+    SDNNKernelRidge: (NUMBERS, {"degree": 1}),
+    SDNNKernelClassifier: (LABELS, {"degree": 1}),
+}
+"""Targets, and parameters with which they are quick."""
 
 
 LONG_WORK = {
@@ -88,7 +100,7 @@ def _n_required(function):
 
 
 def estimator_cells():
-    for cls in (SDNNRegressor, SDNNClassifier):
+    for cls in ESTIMATORS:
         for parameter in parameters_of(cls.__init__):
             for word, value in BAD.items():
                 if (parameter, word) in LONG_WORK | IN_OTHER_WORDS:
@@ -103,7 +115,8 @@ def estimator_cells():
 
 def _estimator_cell(cls, parameter, value):
     def call():
-        model = cls(**{**SMALL, parameter: value()}).fit(SAMPLES, TARGETS[cls])
+        targets, small = ESTIMATORS[cls]
+        model = cls(**{**small, parameter: value()}).fit(SAMPLES, targets)
         return _prediction_fault(model)
 
     return lambda: _named_loosely(parameter, call, value)
@@ -111,14 +124,16 @@ def _estimator_cell(cls, parameter, value):
 
 def _data_cell(cls, parameter, value):
     def call():
-        given = {"X": SAMPLES, "y": TARGETS[cls], parameter: value()}
-        return _prediction_fault(cls(**SMALL).fit(**given))
+        targets, small = ESTIMATORS[cls]
+        given = {"X": SAMPLES, "y": targets, parameter: value()}
+        return _prediction_fault(cls(**small).fit(**given))
 
     return lambda: _without_name(call)
 
 
 def _predict_cell(cls, value):
-    model = cls(**SMALL).fit(SAMPLES, TARGETS[cls])
+    targets, small = ESTIMATORS[cls]
+    model = cls(**small).fit(SAMPLES, targets)
     return lambda: _without_name(lambda: model.predict(value()) is None)
 
 
