@@ -29,6 +29,7 @@ class SDNNSarsa(CodedAgent[LinearSDNNConfig, SarsaConfig]):
     angle_pairs, inputs
         See `Agent`; by default ``"find"`` and ``"relevant"``, with the preset ``"paper"``
         ``"none"`` and ``"all"``. So the agent begins with a warm-up, unless there is no choice.
+        Inputs that matter later are added after 2, 4, 8, ... times ``warm_up_steps``.
     approximator : LinearSDNNConfig, optional
         ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces.
     learning : SarsaConfig, optional

@@ -23,6 +23,7 @@ namespace {
 
 using approximators::Decoupled;
 using approximators::FuzzyRulesConfig;
+using approximators::LinearSDNNConfig;
 using approximators::RBFNetwork;
 using approximators::RBFNetworkConfig;
 using approximators::SDNNCConfig;
@@ -375,6 +376,63 @@ TEST(Controller, FindsImpossibleSettingsBeforeItsWarmUp) {
   config = rbf_config();
   config.learning = kTraces;
   EXPECT_THROW(Controller{config}, std::invalid_argument);
+}
+
+/// A mass that actions move on a line, a place whose value matters once `is_late`, and noise.
+class LateTask {
+ public:
+  static ControllerConfig config() {
+    return {.approximator = LinearSDNNConfig{.n_anchor_patterns = 4, .n_interpolated = 6},
+            .learning = SarsaConfig{.policy = {.epsilon = 0.3}},
+            .seed = 3,
+            .observation = {.low = std::vector<std::optional<double>>(5, 0.0),
+                            .high = std::vector<std::optional<double>>(5, 1.0),
+                            .relevant_only = true,
+                            .inputs = {1}},
+            .action = {.low = {0.0}, .high = {2.0}, .discrete = true},
+            .warm_up_steps = 400};
+  }
+
+  void step(Controller& controller, std::size_t environment, bool is_late, bool is_cut) {
+    Numbers& seen = observed_[environment];
+    const double action = controller.act(seen, true, environment)[0];
+    if (is_cut) controller = Controller::restored(controller.config(), core::state_of(controller));
+    Numbers next{std::clamp(seen[0] + 0.1 * (action - 1.0), 0.0, 1.0)};
+    for (int i = 0; i < 4; ++i) next.push_back(random_.uniform());
+    if (random_.below(8) > 0) next[4] = seen[4];
+    const double reward = -std::abs(seen[0] - 0.5) + (is_late ? 5.0 * seen[4] : 0.0);
+    controller.learn(seen, Numbers{action}, reward, next, false, environment);
+    seen = next;
+  }
+
+ private:
+  std::array<Numbers, 2> observed_{Numbers(5, 0.5), Numbers(5, 0.5)};
+  core::Random random_{5, core::Stream::weights};
+};
+
+TEST(Controller, AddsInputsThatMatterLaterAndKeepsWhatItLearned) {
+  Controller uncut(LateTask::config());
+  uncut.set_n_environments(2);
+  Controller cut = uncut;
+  LateTask task, same;
+  std::vector<std::size_t> n_inputs;
+  for (std::size_t t = 0; t < 1700; ++t) {
+    const std::size_t environment = t % 2;
+    const bool was_warm = !uncut.is_warming_up();
+    const std::uint64_t identity = uncut.identity();
+    task.step(uncut, environment, t >= 400, false);
+    same.step(cut, environment, t >= 400, t % 90 == 7);
+    if (uncut.is_warming_up()) continue;
+    const std::size_t n = uncut.observations().n_inputs();
+    if (!n_inputs.empty() && n == n_inputs.back()) continue;
+    n_inputs.push_back(n);
+    if (!was_warm) continue;
+    EXPECT_TRUE(t + 1 == 800 || t + 1 == 1600) << t;
+    EXPECT_NE(uncut.identity(), identity);
+  }
+  EXPECT_EQ(n_inputs.size(), 2U);
+  EXPECT_EQ(uncut.observations().inputs().back().first, 4U);
+  EXPECT_EQ(core::state_of(uncut), core::state_of(cut));
 }
 
 }  // namespace

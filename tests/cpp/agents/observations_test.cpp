@@ -142,6 +142,38 @@ TEST(Observations, ContinueFromTheirState) {
                           "state: angle_pairs");
 }
 
+TEST(Observations, KeepSomeInputsAndAddOthersAtTheEnd) {
+  ObservationConfig config = unbounded(5);
+  config.relevant_only = true;
+  Observations first(config, true, 1), second = first;
+  first.fit(Numbers{0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0});
+  EXPECT_EQ(first.n_first_inputs(), 5U);
+  first.keep({false, true, false, true, false});
+  EXPECT_EQ(first.n_first_inputs(), 2U);
+  first.keep({true, true, false, true, true});
+  const auto variables = [](const Observations& observations) {
+    std::vector<std::size_t> variables;
+    for (const ObservedInput& input : observations.inputs()) variables.push_back(input.first);
+    return variables;
+  };
+  EXPECT_EQ(variables(first), (std::vector<std::size_t>{1, 3, 0, 4}));
+  EXPECT_EQ(first.n_first_inputs(), 2U);
+  EXPECT_EQ(first.kept_inputs(), (std::vector<bool>{true, true, false, true, true}));
+  EXPECT_EQ(variables(first.with_all_inputs()), (std::vector<std::size_t>{0, 1, 2, 3, 4}));
+  const auto good = core::state_of(first);
+  core::restore(second, good);
+  EXPECT_EQ(variables(second), variables(first));
+  EXPECT_EQ(second.n_first_inputs(), 2U);
+  for (const std::int32_t bad : {-1, 3, 5}) {
+    testing::expect_refused(first, testing::with_number(good, "kept", bad), "state: kept");
+  }
+  for (const std::uint64_t bad : {0U, 5U}) {
+    testing::expect_refused(first, testing::with_number(good, "n_first", bad), "state: n_first");
+  }
+  testing::expect_refused(first, testing::with_number<std::int32_t>(good, "kept", 4),
+                          "state: kept");  // not in order
+}
+
 TEST(Observations, NameTheFieldThatDoesNotFit) {
   const ObservationConfig good{.low = Ends(3, 0.0), .high = Ends(3, 1.0), .symbols = {{1, 2}}};
   EXPECT_EQ(error_of(good), "no error");

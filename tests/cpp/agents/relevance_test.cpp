@@ -89,6 +89,26 @@ TEST(Relevance, KeepsWhatIsKnownToMatterAndWhatItDependsOn) {
             (std::vector<bool>{true, true, false, false, false}));
 }
 
+TEST(Relevance, FindsInputsThatMatterOnlyTogether) {
+  int n_noise_kept = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    core::Random random(seed, core::Stream::useless_inputs);
+    RandomExperience experience{.n_inputs = 6, .circular = std::vector<bool>(6)};
+    std::vector<double> state(6, 0.5);
+    for (int t = 0; t < 1000; ++t) {
+      experience.states.insert(experience.states.end(), state.begin(), state.end());
+      experience.rewards.push_back((state[1] > 0.5) == (state[4] > 0.5) ? 1.0 : 0.0);
+      experience.ends.push_back(false);
+      for (double& x : state) x = random.uniform();
+      experience.next_states.insert(experience.next_states.end(), state.begin(), state.end());
+    }
+    const std::vector<bool> kept = relevant(experience);
+    EXPECT_TRUE(kept[1] && kept[4]) << seed;
+    n_noise_kept += static_cast<int>(std::ranges::count(kept, true)) - 2;
+  }
+  EXPECT_LE(n_noise_kept, 2);  // of 40
+}
+
 TEST(Relevance, AnAngleThatPassesItsEndHasMovedLittle) {
   // The angle moves by what the second input tells, all round; the third is noise.
   core::Random random(3, core::Stream::useless_inputs);

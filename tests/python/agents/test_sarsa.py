@@ -1,5 +1,7 @@
 """Sarsa with a linear readout: equal to its transcription, and what users meet."""
 
+import copy
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 from sarsa_transcription import Sarsa
 from sdnn import _core
-from sdnn.agents import SarsaConfig, SDNNSarsa, Transition, evaluate, load_agent
+from sdnn.agents import RBFQLearning, SarsaConfig, SDNNSarsa, Transition, evaluate, load_agent
 from sdnn.approximators import LinearSDNNConfig
 
 SMALL = {
@@ -222,3 +224,55 @@ def test_angles_are_found_by_default():
     agent = SDNNSarsa(env.observation_space, env.action_space, seed=1)
     agent.train(env, steps=1001, seed=1)
     assert agent.inputs == [("angle", [0, 1]), ("variable", [2])]
+
+
+def changing_task(seed, n_steps):
+    """Transitions of a place that actions move, noise, and a number that matters from step 400."""
+    rng = np.random.default_rng(seed)
+    observation = rng.random(5)
+    for t in range(n_steps):
+        action = int(rng.integers(3))
+        place = np.clip(observation[0] + 0.1 * (action - 1), 0.0, 1.0)
+        reward = abs(observation[0] - 0.5) + (5.0 * observation[4] if t >= 400 else 0.0)
+        next_observation = np.array([place, *rng.random(4)])
+        yield Transition(observation, action, reward, next_observation, False)
+        observation = next_observation
+
+
+@pytest.mark.parametrize("inputs", [[2], [1, 3]])
+def test_inputs_that_matter_later_are_added(inputs, tmp_path):
+    unit, three = gym.spaces.Box(0.0, 1.0, (5,), np.float64), gym.spaces.Discrete(3)
+    agent = SDNNSarsa(unit, three, angle_pairs="none", inputs=inputs, warm_up_steps=400, seed=2)
+    same = copy.deepcopy(agent)
+    numbers = []
+    for t, transition in enumerate(changing_task(1, 1700)):
+        agent.learn(transition)
+        same.learn(transition)
+        if t % 170 == 20:  # while it warms up, while transitions are remembered, and not
+            same.save(tmp_path / "agent.safetensors")
+            same = load_agent(tmp_path / "agent.safetensors")
+        if not agent.is_warming_up and len(agent.inputs) not in numbers:
+            numbers.append(len(agent.inputs))
+            left_out = agent.learning_report()["left_out"]
+            assert len(left_out) + len(agent.inputs) == 5
+            assert (4 in left_out) == (t == 399)
+            assert t + 1 in (400, 800)
+    assert len(numbers) == 2
+    assert ("variable", [4]) in agent.inputs[numbers[0] :]
+    assert agent.approximator.n_inputs == numbers[1]
+    assert same.state().keys() == agent.state().keys()
+    for name, values in agent.state().items():
+        np.testing.assert_array_equal(same.state()[name], values)
+    probe = np.full(5, 0.3)
+    assert not np.array_equal(agent.q_values(probe), agent.q_values([0.3, 0.3, 0.3, 0.3, 0.9]))
+
+
+def test_a_network_keeps_the_inputs_of_its_warm_up():
+    unit, three = gym.spaces.Box(0.0, 1.0, (5,), np.float64), gym.spaces.Discrete(3)
+    agent = RBFQLearning(unit, three, inputs=[2], warm_up_steps=400)
+    for t, transition in enumerate(changing_task(1, 850)):
+        agent.learn(transition)
+        if t == 400:
+            inputs = agent.inputs
+    assert agent.inputs == inputs
+    assert 4 in agent.learning_report()["left_out"]

@@ -150,10 +150,12 @@ AnyAgent make_q_learning(Config config, const QLearningConfig& learning,
 }  // namespace detail
 
 /// Makes an agent with so many actions in each dimension, and, with SDNN-C and actions of one
-/// dimension, patterns of its own for each input. Throws as the parts do.
+/// dimension, patterns of its own for each input. With a linear readout `n_first` inputs may have
+/// come first; see LinearSDNN. Throws as the parts do.
 inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearningConfig& learning,
                            const std::vector<std::size_t>& n_actions, std::uint64_t seed,
-                           const std::vector<coding::PatternTable>& tables = {}) {
+                           const std::vector<coding::PatternTable>& tables = {},
+                           std::size_t n_first = 0) {
   using namespace approximators;
   const bool fits = is_fuzzy(config)    ? std::holds_alternative<FuzzyQLearningConfig>(learning)
                     : is_linear(config) ? std::holds_alternative<SarsaConfig>(learning)
@@ -172,7 +174,7 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
     return VectorFuzzyQLearning(of_dimension, n_actions.size(), rule, seed);
   }
   if (const auto* const linear = std::get_if<LinearSDNNConfig>(&config)) {
-    return Sarsa(tables.empty() ? LinearSDNN(*linear, n_actions, seed)
+    return Sarsa(tables.empty() ? LinearSDNN(*linear, n_actions, seed, n_first)
                                 : LinearSDNN(*linear, n_actions, tables, seed),
                  std::get<SarsaConfig>(learning), seed);
   }

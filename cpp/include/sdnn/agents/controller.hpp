@@ -20,6 +20,7 @@
 #include "sdnn/agents/detail/saved_tables.hpp"
 #include "sdnn/agents/detail/taken_actions.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/latest_transitions.hpp"
 #include "sdnn/agents/observations.hpp"
 #include "sdnn/agents/range_use.hpp"
 #include "sdnn/agents/relevance.hpp"
@@ -152,6 +153,7 @@ class Controller {
       warm_up_->set_n_environments(n);
     } else {
       std::visit([n](auto& agent) { agent.set_n_environments(n); }, *agent_);
+      if (latest_) latest_->set_n_environments(n);
     }
     taken_.forget_from(n);
   }
@@ -166,6 +168,7 @@ class Controller {
       warm_up_->begin_episode(environment);
     } else {
       std::visit([environment](auto& agent) { agent.begin_episode(environment); }, *agent_);
+      if (latest_) latest_->begin_episode(environment);
     }
   }
 
@@ -255,6 +258,9 @@ class Controller {
     observations_.scale(next_observation, next_state_, "next_observation");
     learn_states(reward, terminated, environment);
     notes_.note(observation);
+    const WarmUp::Step step{false,  environment,      observation, action,
+                            reward, next_observation, terminated};
+    if (latest_ && latest_->learn(step)) add_inputs();
   }
 
   /// The state that the agent has for an observation. Valid until the next call. Throws as act.
@@ -280,7 +286,11 @@ class Controller {
       archive.part("warm_up", *self.warm_up_);
     } else {
       archive.part("observations", self.observations_);
-      if constexpr (Archive::kReads) self.fit(&archive);
+      if constexpr (Archive::kReads) {
+        self.fit(&archive);
+        self.watch();
+      }
+      if (self.latest_) archive.part("latest", *self.latest_);
       std::visit([&archive](auto& agent) { archive.part("agent", agent); }, *self.agent_);
     }
     archive.part("taken", self.taken_);
@@ -292,6 +302,7 @@ class Controller {
 
   static constexpr double kLargestReward = 1e300;
   static constexpr std::size_t kMostTableStates = 1536;
+  static constexpr double kCaution = 1.5;  // of looking again and again
 
   Controller(ControllerConfig config, std::vector<coding::PatternTable> tables, Unborn)
       : config_(std::move(config)),
@@ -332,8 +343,8 @@ class Controller {
     if (reader != nullptr) {
       expect_sizes(*reader, approximator_, actions_.n_actions(), !tables.empty());
     }
-    agent_.emplace(
-        make_agent(approximator_, config_.learning, actions_.n_actions(), config_.seed, tables));
+    agent_.emplace(make_agent(approximator_, config_.learning, actions_.n_actions(), config_.seed,
+                              tables, n_first_inputs()));
     if (auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&approximator_)) {
       if (n_dimensions() == 1) sdnn->n_actions = static_cast<int>(actions_.n_actions().front());
     }
@@ -359,7 +370,9 @@ class Controller {
     if constexpr (requires { config.action_window; }) {
       if (config_.action.discrete) config.action_window = 1;
       if (is_table()) config.n_pattern_units = static_cast<int>(observations_.n_states());
-      config = approximators::with_pattern_units(config);
+      Config first = config;  // inputs that are added have as many units
+      first.n_inputs = static_cast<int>(observations_.n_first_inputs());
+      config.n_pattern_units = approximators::with_pattern_units(first).n_pattern_units;
     }
     check_tables(n_symbols);
   }
@@ -510,7 +523,7 @@ class Controller {
     Observations fitted = observations_;
     fitted.fit(warm_up_->seen());
     if (config_.observation.relevant_only) {
-      fitted.keep(Relevance(random_experience(fitted)).inputs(fitted.required()));
+      fitted.keep(Relevance(experience_of(fitted, *warm_up_)).inputs(fitted.required()));
     }
     observations_ = std::move(fitted);
     fit();
@@ -523,18 +536,52 @@ class Controller {
       for (std::size_t t = 0; t < warm_up.size(); ++t) relive(warm_up.step(t));
     }
     set_n_environments(warm_up.n_environments());
+    watch();
   }
 
-  /// The warm-up, one environment after the other.
-  RandomExperience random_experience(const Observations& fitted) const {
-    std::vector<std::size_t> order(warm_up_->size());
+  /// The number of inputs that came first, where others were added; else 0.
+  std::size_t n_first_inputs() const noexcept {
+    const std::size_t n = observations_.n_first_inputs();
+    return n < observations_.n_inputs() ? n : 0;
+  }
+
+  /// Looks for inputs that matter later, where some are left out and can be added.
+  void watch() {
+    latest_.reset();
+    const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&approximator_);
+    const auto kept = observations_.kept_inputs();
+    if (linear == nullptr || linear->max_pairs != 0 || !tables_.empty() ||
+        std::ranges::find(kept, false) == kept.end()) {
+      return;
+    }
+    latest_.emplace(new_warm_up(), static_cast<std::size_t>(config_.warm_up_steps));
+    latest_->set_n_environments(n_environments());
+  }
+
+  void add_inputs() {
+    const std::vector<bool> kept = observations_.kept_inputs();
+    const RandomExperience latest =
+        experience_of(observations_.with_all_inputs(), latest_->transitions());
+    const std::vector<bool> found = Relevance(latest, kCaution).inputs(kept);
+    latest_->forget();
+    if (found == kept) return;
+    observations_.keep(found);
+    auto before = std::move(std::get<Sarsa>(*agent_));
+    fit();
+    std::get<Sarsa>(*agent_).continue_from(std::move(before));
+    identity_ = core::Identity();  // readers have workspaces for fewer inputs
+  }
+
+  /// Transitions, one environment after the other.
+  RandomExperience experience_of(const Observations& fitted, const WarmUp& transitions) const {
+    std::vector<std::size_t> order(transitions.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::ranges::stable_sort(order, {}, [this](auto t) { return warm_up_->step(t).environment; });
+    std::ranges::stable_sort(order, {}, [&](auto t) { return transitions.step(t).environment; });
     RandomExperience experience{.n_inputs = fitted.n_inputs(), .circular = fitted.circular()};
     experience.actions.resize(n_dimensions());
     std::vector<double> state(fitted.n_inputs());
     for (std::size_t k = 0; k < order.size(); ++k) {
-      const WarmUp::Step step = warm_up_->step(order[k]);
+      const WarmUp::Step step = transitions.step(order[k]);
       fitted.scale(step.observation, state);
       experience.states.insert(experience.states.end(), state.begin(), state.end());
       fitted.scale(step.next_observation, state, "next_observation");
@@ -610,7 +657,8 @@ class Controller {
   Actions actions_;
   RangeNotes notes_;
   std::optional<WarmUp> warm_up_;
-  std::optional<AnyAgent> agent_;  ///< once the warm-up is over
+  std::optional<AnyAgent> agent_;            ///< once the warm-up is over
+  std::optional<LatestTransitions> latest_;  ///< where inputs that are left out can be added
   double progress_ = 0.0;
   std::optional<double> learning_rate_, epsilon_;
   std::vector<double> state_, next_state_, action_;

@@ -32,25 +32,25 @@ struct ObservationConfig {
   std::vector<int> inputs = {};
 
   static constexpr auto fields() noexcept {
-    return std::tuple(core::field("low", &ObservationConfig::low,
-                                  "Lowest value of each variable; none: not known."),
-                      core::field("high", &ObservationConfig::high,
-                                  "Highest value of each variable; none: not known."),
-                      core::field("adaptive", &ObservationConfig::adaptive,
-                                  "Whether ranges of numbers are fitted, within low and high."),
-                      core::field("angles", &ObservationConfig::angles,
-                                  "Variables that wrap around in their ranges."),
-                      core::field("angle_pairs", &ObservationConfig::angle_pairs,
-                                  "Variables that are the cosine and the sine of an angle."),
-                      core::field("find_angle_pairs", &ObservationConfig::find_angle_pairs,
-                                  "Whether angle_pairs are those that observations have."),
-                      core::field("symbols", &ObservationConfig::symbols,
-                                  "First variables, and how many there are, of which one is 1."),
-                      core::field("relevant_only", &ObservationConfig::relevant_only,
-                                  "Whether inputs that have nothing to do with rewards or actions, "
-                                  "as the warm-up finds, are left out."),
-                      core::field("inputs", &ObservationConfig::inputs,
-                                  "Variables that are never left out."));
+    return std::tuple(
+        core::field("low", &ObservationConfig::low,
+                    "Lowest value of each variable; none: not known."),
+        core::field("high", &ObservationConfig::high,
+                    "Highest value of each variable; none: not known."),
+        core::field("adaptive", &ObservationConfig::adaptive,
+                    "Whether ranges of numbers are fitted, within low and high."),
+        core::field("angles", &ObservationConfig::angles,
+                    "Variables that wrap around in their ranges."),
+        core::field("angle_pairs", &ObservationConfig::angle_pairs,
+                    "Variables that are the cosine and the sine of an angle."),
+        core::field("find_angle_pairs", &ObservationConfig::find_angle_pairs,
+                    "Whether angle_pairs are those that observations have."),
+        core::field("symbols", &ObservationConfig::symbols,
+                    "First variables, and how many there are, of which one is 1."),
+        core::field("relevant_only", &ObservationConfig::relevant_only,
+                    "Whether inputs that have nothing to do with rewards or actions, "
+                    "as the warm-up finds, are left out."),
+        core::field("inputs", &ObservationConfig::inputs, "Variables that are never left out."));
   }
   bool operator==(const ObservationConfig&) const = default;
 };
@@ -86,8 +86,8 @@ class Observations {
     }
     for (const int variable : config_.inputs) require_variable("inputs", variable);
     const Ranges fixed = fixed_ranges(config_.angle_pairs);
-    needs_fit_ = may_find_pairs() || may_leave_out_inputs() ||
-                 std::ranges::any_of(fixed.low, is_unknown);
+    needs_fit_ =
+        may_find_pairs() || may_leave_out_inputs() || std::ranges::any_of(fixed.low, is_unknown);
     if (!needs_fit_) take(fixed, config_.angle_pairs);
   }
 
@@ -159,16 +159,33 @@ class Observations {
     take(ranges, pairs);
   }
 
-  /// Leaves out some of the inputs. Shape: (n_inputs,). Requires that it is fitted, and that one is
-  /// kept.
+  /// Leaves out the other inputs, or, of those that were left out, adds some at the end. Shape: one
+  /// for each input that there is. Requires that it is fitted, and that one is kept.
   void keep(const std::vector<bool>& kept) {
-    std::vector<ObservedInput> inputs;
+    const std::vector<bool> present = kept_inputs();
+    const bool is_first = kept_.empty();
     for (std::size_t i = 0; i < kept.size(); ++i) {
-      if (!kept[i]) continue;
-      kept_.push_back(static_cast<std::int32_t>(i));
-      inputs.push_back(inputs_[i]);
+      if (kept[i] && (is_first || !present[i])) kept_.push_back(static_cast<std::int32_t>(i));
     }
+    if (is_first) n_first_ = kept_.size();
+    const std::vector<ObservedInput> all = inputs_with(pairs_);
+    std::vector<ObservedInput> inputs;
+    for (const std::int32_t i : kept_) inputs.push_back(all[static_cast<std::size_t>(i)]);
     take_inputs(std::move(inputs));
+  }
+  /// Of all inputs that there are, which are kept.
+  std::vector<bool> kept_inputs() const {
+    std::vector<bool> kept(inputs_with(pairs_).size(), kept_.empty());
+    for (const std::int32_t i : kept_) kept[static_cast<std::size_t>(i)] = true;
+    return kept;
+  }
+  /// How many inputs there were before the first one was added.
+  std::size_t n_first_inputs() const noexcept { return kept_.empty() ? n_inputs() : n_first_; }
+  /// The same with all inputs that there are.
+  Observations with_all_inputs() const {
+    Observations all = *this;
+    all.take(ranges_, pairs_);
+    return all;
   }
 
   /// Lists what was fitted; see core/state.hpp.
@@ -182,7 +199,11 @@ class Observations {
     archive.numbers("high", ranges.high);
     archive.numbers("angle_pairs", listed);
     std::vector<std::int32_t> kept = self.kept_;  // empty: all
-    if (self.config_.relevant_only) archive.numbers("kept", kept);
+    std::uint64_t n_first = self.n_first_;
+    if (self.config_.relevant_only) {
+      archive.numbers("kept", kept);
+      archive.number("n_first", n_first);
+    }
     if constexpr (Archive::kReads) {
       archive.expect(ranges.low.size() == self.n_variables(), "low", "one for each variable");
       archive.expect(listed.size() % 2 == 0, "angle_pairs", "pairs");
@@ -193,14 +214,16 @@ class Observations {
         pairs.push_back({listed[k], listed[k + 1]});
       }
       archive.taking("low", [&] { self.take(ranges, pairs); });
-      if (kept.empty()) return;
+      archive.expect(n_first <= kept.size() && (n_first > 0 || kept.empty()), "n_first",
+                     "as many as are kept, or fewer");
       std::vector<bool> is_kept(self.n_inputs());
-      for (const std::int32_t i : kept) {
-        archive.expect(i >= 0 && static_cast<std::uint32_t>(i) < is_kept.size(), "kept",
-                       "of inputs");
-        is_kept[static_cast<std::size_t>(i)] = true;
+      for (std::size_t k = 0; k < kept.size(); ++k) {
+        const auto i = static_cast<std::size_t>(kept[k]);
+        archive.expect(i < is_kept.size() && !is_kept[i], "kept", "different inputs");
+        is_kept[i] = true;
+        if (k + 1 >= n_first) self.keep(is_kept);
       }
-      self.keep(is_kept);
+      archive.expect(self.kept_ == kept, "kept", "in the order of inputs, but for those added");
     }
   }
 
@@ -358,6 +381,7 @@ class Observations {
     ranges_ = ranges;
     pairs_ = pairs;
     kept_.clear();
+    n_first_ = 0;
     take_inputs(inputs_with(pairs));
   }
 
@@ -375,6 +399,7 @@ class Observations {
   Pairs pairs_;
   std::vector<ObservedInput> inputs_;
   std::vector<std::int32_t> kept_;  ///< numbers of the inputs that were kept, if some were not
+  std::size_t n_first_ = 0;         ///< of these, how many there were at first
   std::optional<ObservationScale> scale_;
 };
 

@@ -29,19 +29,22 @@ struct RandomExperience {
 /// Finds the inputs that matter: those that the next rewards depend on, those that actions change,
 /// and all that these depend on, however far back.
 ///
-/// An input matters by itself if the sums of the next 20 rewards differ between its values, or if
-/// its change in a step differs between actions. Then every input counts on which the change of one
-/// that matters depends. So a velocity that says nothing about the reward is found by the position
-/// that it moves, also where no reward was met at all; noise, whatever its own dynamics, is not
-/// found, as it moves nothing but itself.
+/// An input matters by itself if the next reward, or the sum of the next 20, differs between its
+/// values, or if its change in a step differs between actions. Then every input counts on which the
+/// change of one that matters depends. So a velocity that says nothing about the reward is found by
+/// the position that it moves, also where no reward was met at all; noise, whatever its own
+/// dynamics, is not found, as it moves nothing but itself. Last, two inputs count together if these
+/// rewards differ between pairs of their values, beyond what either tells by itself.
 ///
 /// "Depends" compares the F statistic over eight bins of equal counts with that of the same series
 /// against each other when one is shifted in time, by 40 different lengths: 1.5 times the largest
-/// of these must be exceeded. Shifts leave each series as it is, so slow noise, which seems to
-/// depend on everything, is compared with itself.
+/// of these must be exceeded, of pairs twice. Shifts leave each series as it is, so slow noise,
+/// which seems to depend on everything, is compared with itself.
 class Relevance {
  public:
-  explicit Relevance(const RandomExperience& experience) : experience_(experience) {}
+  /// With more `caution` than 1 as many times more evidence is needed: for who looks often.
+  explicit Relevance(const RandomExperience& experience, double caution = 1.0)
+      : experience_(experience), caution_(caution) {}
 
   /// For each input whether it matters, as those that are `known` to do; all do where fewer than
   /// two are found. Shapes: (n_inputs,).
@@ -57,13 +60,14 @@ class Relevance {
       changes.push_back(changes_of(i));
     }
     for (const auto& actions : experience_.actions) bins_of_actions.push_back(binned(actions));
-    const std::vector<double> sums = sums_of_rewards();
+    const std::vector<std::vector<double>> outcomes{experience_.rewards, sums_of_rewards()};
     std::vector<std::size_t> found;
     for (std::size_t i = 0; i < n_inputs; ++i) {
       matters[i] =
-          known[i] || depends(sums, bins[i]) || std::ranges::any_of(bins_of_actions, [&](const auto& actions) {
-            return depends(changes[i], actions);
-          });
+          known[i] ||
+          std::ranges::any_of(outcomes, [&](const auto& one) { return depends(one, bins[i]); }) ||
+          std::ranges::any_of(bins_of_actions,
+                              [&](const auto& actions) { return depends(changes[i], actions); });
       if (matters[i]) found.push_back(i);
     }
     while (!found.empty()) {
@@ -76,6 +80,10 @@ class Relevance {
         found.push_back(i);
       }
     }
+    if (n_inputs <= kMostInPairs) {
+      const std::vector<bool> alone = matters;
+      for (const auto& one : outcomes) find_pairs(one, bins, alone, matters);
+    }
     if (std::ranges::count(matters, true) < 2) matters.assign(n_inputs, true);
     return matters;
   }
@@ -83,10 +91,13 @@ class Relevance {
  private:
   static constexpr std::size_t kLeast = 100;  // fewer say nothing
   static constexpr std::size_t kBins = 8;
+  static constexpr std::size_t kMostBins = 16;     // of a pair
+  static constexpr std::size_t kMostInPairs = 64;  // time grows as their square
   static constexpr std::size_t kShifts = 40;
   static constexpr std::size_t kRewards = 20;
   static constexpr double kDiscount = 0.95;
   static constexpr double kFactor = 1.5;
+  static constexpr double kFactorOfPairs = 2.0;  // there are more of them
 
   std::vector<double> column(const std::vector<double>& rows, std::size_t i) const {
     std::vector<double> values;
@@ -134,18 +145,21 @@ class Relevance {
     return bins;
   }
 
-  /// Between the bins' means and within the bins; 0 where nothing varies. Bin t + shift belongs to
-  /// value t.
-  static double f_statistic(const std::vector<double>& values,
-                            const std::vector<std::uint8_t>& bins, std::size_t shift) {
-    double sums[kBins] = {};
-    double counts[kBins] = {};
+  using Bins = std::vector<std::uint8_t>;
+
+  /// Between the bins' means and within the bins; 0 where nothing varies. Bin t + shift, with bin t
+  /// of `beside` where it is given, belongs to value t.
+  static double f_statistic(const std::vector<double>& values, const Bins& bins, std::size_t shift,
+                            const Bins* beside) {
+    double sums[kMostBins] = {};
+    double counts[kMostBins] = {};
     double total = 0.0;
     const std::size_t n = values.size();
     for (std::size_t t = 0, s = shift; t < n; ++t, ++s) {
       if (s == n) s = 0;
-      sums[bins[s]] += values[t];
-      counts[bins[s]] += 1.0;
+      const std::size_t bin = beside == nullptr ? bins[s] : kBins / 2 * (*beside)[t] + bins[s];
+      sums[bin] += values[t];
+      counts[bin] += 1.0;
       total += values[t];
     }
     const double mean = total / static_cast<double>(n);
@@ -153,7 +167,7 @@ class Relevance {
     for (const double value : values) square += (value - mean) * (value - mean);
     double between = 0.0;
     double n_bins = 0.0;
-    for (std::size_t b = 0; b < kBins; ++b) {
+    for (std::size_t b = 0; b < kMostBins; ++b) {
       if (counts[b] == 0.0) continue;
       const double difference = sums[b] / counts[b] - mean;
       between += counts[b] * difference * difference;
@@ -164,17 +178,50 @@ class Relevance {
     return between / (n_bins - 1.0) / (within / (static_cast<double>(n) - n_bins));
   }
 
-  static bool depends(const std::vector<double>& values, const std::vector<std::uint8_t>& bins) {
-    const double statistic = f_statistic(values, bins, 0);
+  /// Adds the inputs that matter together with another one.
+  void find_pairs(const std::vector<double>& outcomes, std::vector<Bins> bins,
+                  const std::vector<bool>& alone, std::vector<bool>& matters) const {
+    for (Bins& of_input : bins) {
+      for (std::uint8_t& bin : of_input) bin /= 2;
+    }
+    for (std::size_t i = 0; i < bins.size(); ++i) {
+      const std::vector<double> beyond = without_means(outcomes, bins[i]);
+      for (std::size_t j = 0; j < bins.size(); ++j) {
+        core::interruption_point();
+        if (j == i || alone[j] || (j < i && !alone[i]) || !depends(beyond, bins[j], &bins[i])) {
+          continue;
+        }
+        matters[i] = matters[j] = true;
+      }
+    }
+  }
+
+  /// What is left of the values without the means of the bins.
+  static std::vector<double> without_means(std::vector<double> values, const Bins& bins) {
+    double sums[kMostBins] = {};
+    double counts[kMostBins] = {};
+    for (std::size_t t = 0; t < values.size(); ++t) {
+      sums[bins[t]] += values[t];
+      counts[bins[t]] += 1.0;
+    }
+    for (std::size_t t = 0; t < values.size(); ++t) values[t] -= sums[bins[t]] / counts[bins[t]];
+    return values;
+  }
+
+  bool depends(const std::vector<double>& values, const Bins& bins,
+               const Bins* beside = nullptr) const {
+    const double factor = caution_ * (beside == nullptr ? kFactor : kFactorOfPairs);
+    const double statistic = f_statistic(values, bins, 0, beside);
     if (!(statistic > 0.0)) return false;
     for (std::size_t k = 1; k <= kShifts; ++k) {
       const std::size_t shift = k * values.size() / (kShifts + 1);
-      if (statistic <= kFactor * f_statistic(values, bins, shift)) return false;
+      if (statistic <= factor * f_statistic(values, bins, shift, beside)) return false;
     }
     return true;
   }
 
   const RandomExperience& experience_;
+  double caution_;
 };
 
 }  // namespace sdnn::agents

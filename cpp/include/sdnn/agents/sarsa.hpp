@@ -204,6 +204,23 @@ class Sarsa {
     }
   }
 
+  /// Takes over what an agent with fewer inputs has learned; see LinearSDNN. In each environment
+  /// the transition that waits is learned, and the trace ends.
+  void continue_from(Sarsa fewer) {
+    for (std::size_t i = 0; i < fewer.n_environments(); ++i) {
+      if (fewer.episodes_.of(i).waits) fewer.finish_at_end(fewer.episodes_.of(i));
+    }
+    action_value_.continue_from(fewer.action_value_);
+    exploration_ = std::move(fewer.exploration_);
+    rates_ = std::move(fewer.rates_);
+    n_learned_ = fewer.n_learned_;
+    episodes_.resize(fewer.n_environments(), [this] { return new_episode(); });
+    for (std::size_t i = 0; i < n_environments(); ++i) {
+      episodes_.of(i).exploration = std::move(fewer.episodes_.of(i).exploration);
+    }
+    apply_rates();
+  }
+
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {

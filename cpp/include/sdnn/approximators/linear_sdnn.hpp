@@ -164,16 +164,19 @@ class LinearSDNN {
   static constexpr std::int32_t kRateOne = 1 << 16;
 
   /// Code books by anchor interpolation, or of symbols. `n_actions` has the number of actions of
-  /// each dimension. Throws std::invalid_argument naming the field that is impossible;
-  /// std::length_error naming bytes, before much memory is asked for; std::bad_alloc.
+  /// each dimension. Of all inputs, `n_first` came first, if it is not 0; see continue_from. Throws
+  /// std::invalid_argument naming the field that is impossible; std::length_error naming bytes,
+  /// before much memory is asked for; std::bad_alloc.
   LinearSDNN(const LinearSDNNConfig& config, std::span<const std::size_t> n_actions,
-             std::uint64_t seed)
-      : LinearSDNN(config, n_actions, code_books_of(with_pattern_units(config), seed), seed) {}
+             std::uint64_t seed, std::size_t n_first = 0)
+      : LinearSDNN(config, n_actions, code_books_of(with_pattern_units(config), seed), seed,
+                   n_first) {}
 
   /// Code books of any coding, a table per input. Throws as above.
   LinearSDNN(const LinearSDNNConfig& config, std::span<const std::size_t> n_actions,
-             std::vector<coding::PatternTable> tables, std::uint64_t seed)
-      : config_(with_pattern_units(config)), code_(wiring_of(config_, std::move(tables), seed)) {
+             std::vector<coding::PatternTable> tables, std::uint64_t seed, std::size_t n_first = 0)
+      : config_(with_pattern_units(config)),
+        code_(wiring_of(config_, std::move(tables), seed, n_first)) {
     core::require(!n_actions.empty(), "n_actions", "of one dimension at least", 0);
     for (const std::size_t n : n_actions) {
       core::require_in_range("n_actions", n, std::size_t{1}, std::size_t{1} << 16);
@@ -393,6 +396,18 @@ class LinearSDNN {
     return n_doubled;
   }
 
+  /// Takes over what a readout with fewer inputs has learned: Q(s, a) is the same, whatever the
+  /// inputs that were added. Both have as many actions, units and first inputs, and all pairs.
+  void continue_from(const LinearSDNN& fewer) {
+    assert(fewer.n_rows_ == n_rows_ && fewer.n_inputs() <= n_inputs());
+    copy_weights(fewer, fewer.weights_, weights_);
+    if (config_.averaging_interval > 0) copy_weights(fewer, fewer.averaged_, averaged_);
+    exponent_ = fewer.exponent_;
+    n_steps_ = fewer.n_steps_;
+    n_snapshots_ = fewer.n_snapshots_;
+    std::ranges::fill(versions_, ++version_);
+  }
+
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
@@ -451,6 +466,34 @@ class LinearSDNN {
       }
       row_sums(rows, n, workspace.code_.masks(), n_slots(), sums);
       for (std::size_t i = 0; i < n; ++i) workspace.row_sums_[places[i]] = sums[i];
+    }
+  }
+
+  /// In the paired code the groups of one modifier are halves of sums and differences, but for the
+  /// last one where their number is odd: with one more it is a sum of two such halves.
+  void copy_weights(const LinearSDNN& fewer, const std::vector<std::int32_t>& from,
+                    std::vector<std::int32_t>& to) const {
+    const std::size_t n_columns = n_slots() / code_->n_groups();
+    const std::size_t n_before = fewer.code_->n_partners(), n_now = code_->n_partners();
+    const std::size_t paired_before = n_before / 2 * 2, paired_now = n_now / 2 * 2;
+    const auto copy = [&](std::size_t row, std::size_t group, std::size_t group_now) {
+      std::copy_n(&from[row * fewer.n_slots() + group * n_columns], n_columns,
+                  &to[row * n_slots() + group_now * n_columns]);
+    };
+    for (std::size_t row = 0; row < n_rows_; ++row) {
+      for (std::size_t nu = 0; nu < fewer.n_inputs(); ++nu) {
+        for (std::size_t k = 0; k < paired_before; ++k) {
+          copy(row, nu * paired_before + k, nu * paired_now + k);
+        }
+        if (paired_before == n_before) continue;
+        const std::size_t last = fewer.n_inputs() * paired_before + nu;
+        if (paired_now > paired_before) {
+          copy(row, last, nu * paired_now + paired_before);
+          copy(row, last, nu * paired_now + paired_before + 1);
+        } else {
+          copy(row, last, n_inputs() * paired_now + nu);
+        }
+      }
     }
   }
 

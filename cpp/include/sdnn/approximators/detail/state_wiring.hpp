@@ -79,12 +79,21 @@ std::vector<std::size_t> strides_of(const Config& config, std::uint64_t seed) {
   return strides;
 }
 
-/// The code over these tables, a permutation per pair. Throws std::invalid_argument if the tables
-/// are not of the config's inputs and units, and as require_room.
+/// The number of the random stream of a pair's permutation, where `n_first` inputs came first:
+/// theirs are numbered in the paper's order, then those of each input that was added.
+inline std::size_t stream_of_pair(std::size_t mu, std::size_t nu, std::size_t n_first) noexcept {
+  const std::size_t last = std::max(mu, nu);
+  if (last < n_first) return mu * (n_first - 1) + nu - (nu > mu ? 1 : 0);
+  return last * (last - 1) + 2 * std::min(mu, nu) + (mu > nu ? 1 : 0);
+}
+
+/// The code over these tables, a permutation per pair. Where inputs were added, the first `n_first`
+/// are wired as without the others; not 0 only with all pairs. Throws std::invalid_argument if the
+/// tables are not of the config's inputs and units, and as require_room.
 template <class Config>
 std::shared_ptr<const coding::StateCode> wiring_of(const Config& config,
                                                    std::vector<coding::PatternTable> tables,
-                                                   std::uint64_t seed) {
+                                                   std::uint64_t seed, std::size_t n_first = 0) {
   const std::size_t l = checked_inputs(config);
   core::require(tables.size() == l, "tables", "one per input", tables.size());
   std::size_t n_bins = 0;
@@ -98,7 +107,11 @@ std::shared_ptr<const coding::StateCode> wiring_of(const Config& config,
   const std::vector<std::size_t> strides = strides_of(config, seed);
   std::vector<coding::Permutation> permutations;
   for (std::size_t group = 0; group < l * strides.size(); ++group) {
-    core::Random random(seed, core::Stream::permutations, group);
+    const std::size_t mu = group / strides.size();
+    const std::size_t rank = group % strides.size();
+    const std::size_t stream =
+        n_first == 0 ? group : stream_of_pair(mu, rank + (rank >= mu ? 1 : 0), n_first);
+    core::Random random(seed, core::Stream::permutations, stream);
     permutations.push_back(
         coding::random_permutation(static_cast<std::size_t>(config.n_pattern_units), random));
   }

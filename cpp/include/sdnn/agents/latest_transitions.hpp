@@ -1,0 +1,64 @@
+/// The latest transitions at some times, to look again for inputs that matter.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+#include "sdnn/agents/warm_up.hpp"
+
+namespace sdnn::agents {
+
+/// Remembers the last n_steps of 2, 4, 8, ... times n_steps transitions; else nothing.
+class LatestTransitions {
+ public:
+  /// `empty` remembers n_steps transitions, which are the first ones of all.
+  LatestTransitions(WarmUp empty, std::size_t n_steps)
+      : empty_(std::move(empty)), latest_(empty_), n_steps_(n_steps), n_seen_(n_steps) {}
+
+  void set_n_environments(std::size_t n) {
+    empty_.set_n_environments(n);
+    latest_.set_n_environments(n);
+  }
+  void begin_episode(std::size_t environment) { latest_.begin_episode(environment); }
+
+  /// Takes a transition. Returns whether there are n_steps to look at, which `forget` ends.
+  bool learn(const WarmUp::Step& step) {
+    const bool is_noted = n_seen_ >= next_time() - n_steps_;
+    ++n_seen_;
+    if (is_noted) latest_.learn(step);
+    return latest_.size() >= n_steps_;
+  }
+  const WarmUp& transitions() const noexcept { return latest_; }
+  void forget() { latest_ = empty_; }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    archive.number("n_seen", self.n_seen_);
+    archive.part("transitions", self.latest_);
+    if constexpr (Archive::kReads) {
+      archive.expect(self.n_seen_ >= self.n_steps_ && self.n_seen_ <= kMostSeen, "n_seen",
+                     "in [warm_up_steps, 2^62]");
+      const std::uint64_t first = self.next_time() - self.n_steps_;
+      const std::uint64_t n_noted = self.n_seen_ < first ? 0 : self.n_seen_ - first;
+      archive.expect(self.latest_.size() == n_noted, "n_seen", "that of the transitions");
+      self.set_n_environments(self.latest_.n_environments());
+    }
+  }
+
+ private:
+  static constexpr std::uint64_t kMostSeen = std::uint64_t{1} << 62;
+
+  /// The first of the times that is not over.
+  std::uint64_t next_time() const noexcept {
+    std::uint64_t time = 2 * n_steps_;
+    while (time <= n_seen_) time *= 2;
+    return time;
+  }
+
+  WarmUp empty_, latest_;
+  std::uint64_t n_steps_, n_seen_;
+};
+
+}  // namespace sdnn::agents

@@ -1,0 +1,98 @@
+#include "sdnn/approximators/linear_sdnn.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::approximators {
+namespace {
+
+using Numbers = std::vector<double>;
+const std::vector<std::size_t> kThreeAndTwo{3, 2};
+
+LinearSDNNConfig small_readout(int n_inputs) {
+  return {.n_inputs = n_inputs,
+          .n_pattern_units = 70,  // no multiple of a word
+          .n_anchor_patterns = 4,
+          .n_interpolated = 6,
+          .action_window = 2,
+          .averaging_interval = 3};
+}
+
+Numbers some_state(std::size_t n, core::Random& random) {
+  Numbers state(n);
+  for (double& x : state) x = random.uniform();
+  return state;
+}
+
+void learn_at_random(LinearSDNN& readout, int n_steps, core::Random& random) {
+  auto workspace = readout.workspace();
+  auto trace = readout.trace();
+  readout.fit_unit(1.0);
+  for (int t = 0; t < n_steps; ++t) {
+    readout.read(some_state(readout.n_inputs(), random), workspace);
+    const std::vector<std::size_t> action{random.below(3), random.below(2)};
+    readout.learn(workspace.code(), action, trace,
+                  {.error = readout.units_of(random.uniform() - 0.5), .rate = 1 << 14});
+  }
+}
+
+Numbers values_of_all(const LinearSDNN& readout, const Numbers& state, bool averaged) {
+  auto workspace = readout.workspace();
+  Numbers all;
+  for (std::size_t d = 0; d < kThreeAndTwo.size(); ++d) {
+    Numbers values(kThreeAndTwo[d]);
+    readout.values(state, workspace, values, d, averaged);
+    all.insert(all.end(), values.begin(), values.end());
+  }
+  return all;
+}
+
+TEST(LinearSDNN, HasTheSameValuesWithMoreInputs) {
+  for (int n_first = 2; n_first <= 5; ++n_first) {
+    core::Random random(7, core::Stream::weights);
+    LinearSDNN readout(small_readout(n_first), kThreeAndTwo, 5);
+    const auto first = static_cast<std::size_t>(n_first);
+    for (int n = n_first + 1; n <= n_first + 4; n += 1 + n % 2) {
+      learn_at_random(readout, 30, random);
+      LinearSDNN more(small_readout(n), kThreeAndTwo, 5, first);
+      more.continue_from(readout);
+      for (int t = 0; t < 20; ++t) {
+        Numbers state = some_state(more.n_inputs(), random);
+        for (const bool averaged : {false, true}) {
+          const Numbers values = values_of_all(more, state, averaged);
+          const Numbers before = values_of_all(
+              readout, {state.begin(), state.begin() + static_cast<int>(readout.n_inputs())},
+              averaged);
+          EXPECT_EQ(values, before) << n_first << " to " << n;
+          EXPECT_NE(std::ranges::count(values, 0.0), static_cast<int>(values.size()));
+        }
+      }
+      readout = more;
+    }
+  }
+}
+
+TEST(LinearSDNN, IsWiredAsIfInputsHadBeenAddedAtOnce) {
+  core::Random random(7, core::Stream::weights);
+  LinearSDNN two(small_readout(2), kThreeAndTwo, 5);
+  learn_at_random(two, 30, random);
+  LinearSDNN five(small_readout(5), kThreeAndTwo, 5, 2), four(small_readout(4), kThreeAndTwo, 5, 2);
+  four.continue_from(two);
+  five.continue_from(four);
+  LinearSDNN at_once(small_readout(5), kThreeAndTwo, 5, 2);
+  at_once.continue_from(two);
+  EXPECT_TRUE(std::ranges::equal(five.weights(), at_once.weights()));
+  core::Random same = random;
+  learn_at_random(five, 30, random);
+  learn_at_random(at_once, 30, same);
+  EXPECT_TRUE(std::ranges::equal(five.weights(), at_once.weights()));
+}
+
+}  // namespace
+}  // namespace sdnn::approximators
