@@ -4,7 +4,8 @@ Packages, from the network up (each is imported when first used):
 
 - ``sdnn.approximators``: SDNN-C, a network that gives Q(s, a) for every action at once
 - ``sdnn.agents``: Q-learning with it, for any Gymnasium environment
-- ``sdnn.SDNNRegressor``, ``sdnn.SDNNClassifier``: the network as scikit-learn estimators
+- ``sdnn.SDNNRegressor``, ``sdnn.SDNNClassifier``: the network as scikit-learn estimators;
+  ``sdnn.SDNNKernelRidge``, ``sdnn.SDNNKernelClassifier``: ridge regression with its kernel
   (package ``sdnn.estimators``, needs ``sdnn[sklearn]``)
 - ``sdnn.coding``: how inputs become patterns; ``sdnn.kernel``: what generalizes to what
 - ``sdnn.environments``: the acrobot swing-up, redundant and noisy sensors
