@@ -309,6 +309,12 @@ void bind_approximators(py::module_& module) {
           },
           "(q_low, q_high) as they are now")
       .def_property_readonly(
+          "value_step", [](const SDNNC& net) { return net.output_scale().step(); },
+          "What one active unit more is worth")
+      .def_property_readonly(
+          "mean_error", [](const SDNNC& net) { return net.correction_counts().mean_error; },
+          "How far targets, clipped to the range, were from values: of the last thousand or so")
+      .def_property_readonly(
           "correction_counts",
           [](const SDNNC& net) {
             const auto& counts = net.correction_counts();

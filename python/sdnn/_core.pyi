@@ -321,6 +321,11 @@ class SDNNC:
         Corrections that changed units, that were rounded to no change, that wanted values outside the range, and all of them
         """
     @property
+    def mean_error(self) -> float:
+        """
+        How far targets, clipped to the range, were from values: of the last thousand or so
+        """
+    @property
     def n_actions(self) -> int:
         ...
     @property
@@ -342,6 +347,11 @@ class SDNNC:
     @property
     def u_low(self) -> int:
         ...
+    @property
+    def value_step(self) -> float:
+        """
+        What one active unit more is worth
+        """
 class FuzzyRulesConfig:
     """
     The sizes of a table of fuzzy rules; the defaults are the paper's.
@@ -1240,7 +1250,7 @@ class QLearningConfig:
     n_steps : int
         Rewards in a target before it bootstraps. Not in the paper, which has 1: with more, a transition is learned, once, when so many steps are known or the episode ends. Must be in [1, 1000].
     value_range : {'fixed', 'adaptive'}
-        Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that grows with the discounted sums of the rewards that come (`adaptive`). Not in the paper.
+        Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that follows the returns of late (`adaptive`): rare ones are clipped, and time limits end no return. Not in the paper.
     max_action_repeat : int
         Steps that a random action may last. Not in the paper, which has 1: with more, it is kept for at least k steps with probability 1 / k. Must be in [1, 1000000].
     final_learning_rate : float | None
@@ -1351,7 +1361,7 @@ class QLearningConfig:
     @property
     def value_range(self) -> typing.Literal['fixed', 'adaptive']:
         """
-        Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that grows with the discounted sums of the rewards that come (`adaptive`). Not in the paper.
+        Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that follows the returns of late (`adaptive`): rare ones are clipped, and time limits end no return. Not in the paper.
         """
 class SarsaConfig:
     """

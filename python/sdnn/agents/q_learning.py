@@ -248,7 +248,9 @@ warm_up_steps
             the network, nearer to the present one (a larger ``learning_rate``, more units or
             another ``rounding`` help); ``share_out_of_range``: those with targets outside
             ``q_range`` (a wider range, or ``value_range="adaptive"``); ``q_range``: (low, high) as
-            it is.
+            it is; ``value_step``: how far two neighbouring values of the network are apart;
+            ``mean_error``: how far the last 1,000 targets or so, clipped to the range, were from
+            their values (much less than a step: rounding hides what is left to learn).
 
         Raises
         ------
@@ -265,6 +267,8 @@ warm_up_steps
             "share_rounded_away": rounded_away / max(n_all, 1),
             "share_out_of_range": out_of_range / max(n_all, 1),
             "q_range": networks[0].output_range,
+            "value_step": networks[0].value_step,
+            "mean_error": float(np.mean([network.mean_error for network in networks])),
         }
 
     def _network(self, dimension: int) -> Any:

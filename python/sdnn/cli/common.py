@@ -212,8 +212,21 @@ def train_run(
         click.echo(line)
 
 
+_OFTEN_ROUNDED_AWAY = 0.5
 _LITTLE_OF_A_RANGE = 0.1
 _OFTEN_BEYOND_A_RANGE = 0.1
+
+
+def _lines_of_rounding(report: Mapping[str, Any]) -> Iterator[str]:
+    """Report values that are too coarse for what is left to learn."""
+    step, error, (low, high) = report["value_step"], report["mean_error"], report["q_range"]
+    if report["share_rounded_away"] > _OFTEN_ROUNDED_AWAY and error < step:
+        yield (
+            f"values come in steps of {step:.3g}, from {low:.4g} to {high:.4g}, and targets differ"
+            f" from them by {error:.3g} on average: where returns are not good yet, take more"
+            " approximator.n_hidden_units and n_active_units, or a narrower range:"
+            " learning.value_range=fixed with approximator.q_low and q_high"
+        )
 
 
 def _lines_of_ranges(report: Mapping[str, Any]) -> Iterator[str]:
@@ -275,6 +288,7 @@ def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
             f" network, {report['share_rounded_away']:.0%} were rounded away and"
             f" {report['share_out_of_range']:.0%} out of its range of values"
         )
+        yield from _lines_of_rounding(report)
     if report is not None:
         if left_out := report["left_out"]:
             n_observed = len(report["share_of_range"])

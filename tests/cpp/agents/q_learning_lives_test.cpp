@@ -129,9 +129,11 @@ TEST(QLearning, RefusesEnvironmentsThatAreNone) {
 }
 
 TEST(QLearning, RefusesAStateOfEnvironmentsThatDoesNotFit) {
-  auto agent = rbf_agent();
+  auto agent = sdnn_agent();
   agent.set_n_environments(3);
-  for (int t = 0; t < 20; ++t) (void)agent.act(std::vector{0.5, 0.5});  // until none is left
+  const std::vector<double> place = {0.5, 0.5};
+  for (int t = 0; t < 20; ++t) (void)agent.act(place);  // until none is left
+  agent.learn(place, 0, 1.0, place, false, 2);
   testing::expect_that_damage_is_refused(agent);
   const core::State good = core::state_of(agent);
   const auto refused = [&](const core::State& bad, const std::string& message) {
@@ -142,6 +144,8 @@ TEST(QLearning, RefusesAStateOfEnvironmentsThatDoesNotFit) {
           "kept_action must be an action");
   refused(testing::with_number(good, "environment.2.range.sum", testing::kNaN),
           "range.sum must be a finite sum");
+  refused(testing::with_number(good, "environment.2.range.rewards", testing::kNaN),
+          "range.rewards must be finite");
   core::State bad = good;  // a second one is missing
   std::erase_if(bad, [](const auto& item) { return item.first.starts_with("environment.1."); });
   testing::expect_refused(agent, bad, "state: environment.2.kept_action must not be there");

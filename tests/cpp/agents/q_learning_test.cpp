@@ -324,22 +324,19 @@ TEST(QLearning, WithoutRepetitionsTheirStreamIsNotTouched) {
 TEST(QLearning, TheRangeOfValuesFollowsTheRewards) {
   QLearning<SDNNC> agent(SDNNC(network(), 1),
                          {.discount = 0.5, .value_range = ValueRange::adaptive}, 1);
-  const auto expect_range = [&agent](double low, double high) {
-    EXPECT_EQ(agent.action_value().output_scale().q_low(), low);
-    EXPECT_EQ(agent.action_value().output_scale().q_high(), high);
-  };
+  const auto scale = [&agent]() -> const auto& { return agent.action_value().output_scale(); };
   const std::vector<double> state = {0.3, 0.6};
   agent.learn(state, 0, 0.0, state, false);
-  expect_range(-16.0, 16.0);  // nothing is known yet
+  EXPECT_EQ(scale().q_low(), -16.0);  // nothing is known yet
+  EXPECT_EQ(scale().q_high(), 16.0);
   agent.learn(state, 0, 8.0, state, false);
-  expect_range(0.0, 10.0);
-  agent.learn(state, 0, -20.0, state, false);  // -20 + 8 / 2 = -16, and (10 + 16) / 4
-  expect_range(-22.5, 10.0);
-  agent.begin_episode();
-  agent.learn(state, 0, 10.0, state, true);
-  expect_range(-22.5, 10.0);
-  for (int i = 0; i < 5; ++i) agent.learn(state, 0, 10.0, state, true);  // nothing followed
-  expect_range(-22.5, 10.0);
+  EXPECT_EQ(scale().q_low(), 0.0);
+  EXPECT_EQ(scale().q_high(), 10.0);
+  for (int t = 0; t < 40; ++t) agent.learn(state, 0, -20.0, state, true);
+  EXPECT_EQ(scale().q_low(), -22.5);
+  for (int t = 0; t < 400; ++t) agent.learn(state, 0, 1.0, state, t % 2 == 1);
+  EXPECT_EQ(scale().q_low(), 0.0);  // 3/2 and 1 in turn, and a quarter of 3/2 more
+  EXPECT_EQ(scale().q_high(), 1.875);
 
   QLearning<SDNNC> given(SDNNC(network(), 1), {.discount = 0.5}, 1);
   given.learn(state, 0, 1000.0, state, false);

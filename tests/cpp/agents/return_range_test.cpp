@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "sdnn/core/random.hpp"
 #include "states.hpp"
@@ -11,90 +13,161 @@
 namespace sdnn::agents {
 namespace {
 
+/// One environment that the range follows.
+struct Stream {
+  explicit Stream(double discount) : range(discount), rewards(range.no_rewards()) {}
+
+  bool note(double reward, bool terminated = false) {
+    return range.note(reward, terminated, rewards);
+  }
+  /// An episode with a reward of 1 in each step.
+  void live(int n_steps, double reward = 1.0, bool terminates = true) {
+    for (int t = 1; t <= n_steps; ++t) note(reward, terminates && t == n_steps);
+  }
+
+  ReturnRange range;
+  ReturnRange::Rewards rewards;
+};
+
 void expect_range(const ReturnRange& range, double low, double high) {
   EXPECT_EQ(range.low(), low);
   EXPECT_EQ(range.high(), high);
 }
 
-// gamma = 1/2: every number is exact.
-TEST(ReturnRange, GrowsByAQuarterMoreThanItMust) {
-  ReturnRange range(0.5);
-  double sum = 0.0;
-  EXPECT_FALSE(range.is_known());
-  EXPECT_FALSE(range.note(0.0, sum));
-  EXPECT_FALSE(range.is_known());
-  EXPECT_TRUE(range.note(8.0, sum));  // 8 + 8 / 4
-  EXPECT_TRUE(range.is_known());
-  expect_range(range, 0.0, 10.0);
-  EXPECT_FALSE(range.note(2.0, sum));  // 2 + 8 / 2 = 6
-  EXPECT_FALSE(range.note(7.0, sum));  // 7 + 6 / 2 = 10, still inside
-  EXPECT_TRUE(range.note(8.0, sum));   // 8 + 10 / 2 = 13, and 13 / 4
-  expect_range(range, 0.0, 16.25);
-  EXPECT_TRUE(range.note(-20.0, sum));  // -20 + 13 / 2 = -13.5, and (16.25 + 13.5) / 4
-  expect_range(range, -20.9375, 16.25);
+// gamma = 15/16: every number is exact.
+TEST(ReturnRange, AtFirstGrowsByAQuarterMoreThanItMust) {
+  Stream one(0.9375);  // no returns before 64 steps
+  EXPECT_FALSE(one.range.is_known());
+  EXPECT_FALSE(one.note(0.0));
+  EXPECT_FALSE(one.range.is_known());
+  EXPECT_TRUE(one.note(16.0));  // 16 + 16 / 4
+  EXPECT_TRUE(one.range.is_known());
+  expect_range(one.range, 0.0, 20.0);
+  EXPECT_FALSE(one.note(5.0));  // 5 + 15 = 20, still inside
+  EXPECT_TRUE(one.note(5.25));  // 5.25 + 18.75 = 24, and 24 / 4
+  expect_range(one.range, 0.0, 30.0);
+  EXPECT_TRUE(one.note(-42.5));  // -42.5 + 22.5 = -20, and (30 + 20) / 4
+  expect_range(one.range, -32.5, 30.0);
 }
 
 TEST(ReturnRange, OfPunishmentsBeginsWithThem) {
-  ReturnRange range(1.0);
-  double sum = 0.0;
-  EXPECT_TRUE(range.note(-4.0, sum));
-  EXPECT_TRUE(range.is_known());
-  expect_range(range, -5.0, 0.0);
+  Stream one(1.0);
+  EXPECT_TRUE(one.note(-4.0));
+  expect_range(one.range, -5.0, 0.0);
 }
 
-TEST(ReturnRange, HoldsTheSumsOfSeveralEpisodes) {
+// Episodes of one step: returns are rewards. Of 100 the lowest five and the highest two are left
+// out, and above there is room for a quarter more.
+TEST(ReturnRange, HoldsMostReturns) {
+  Stream one(0.5);
+  for (int i = 1; i <= 100; ++i) one.note(i - 21.0, true);
+  EXPECT_LE(one.range.low(), -15.0);
+  EXPECT_GE(one.range.low(), -17.0);  // that of fewer returns is kept where it fits
+  EXPECT_GE(one.range.high(), 77.0);
+  EXPECT_LE(one.range.high(), 77.0 + 92.0 / 4);
+}
+
+TEST(ReturnRange, ShrinksWhenReturnsDo) {
+  Stream one(0.99);
+  for (int i = 0; i < 200; ++i) one.live(15, -200.0);
+  EXPECT_LT(one.range.low(), -2000.0);
+  for (int i = 0; i < 400; ++i) one.live(15, -1.0);
+  EXPECT_GT(one.range.low(), -30.0);
+  EXPECT_LE(one.range.low(), (std::pow(0.99, 15) - 1.0) / 0.01 + 1.0);
+  EXPECT_EQ(one.range.high(), 0.0);
+}
+
+TEST(ReturnRange, OneOutlierChangesLittle) {
+  for (const double outlier : {1e3, 1e6, -1e3, -1e6, 1e300}) {
+    for (const bool terminates : {true, false}) {
+      Stream one(0.99);
+      for (int i = 0; i < 400; ++i) one.live(50, 1.0, terminates);
+      const double width = one.range.high() - one.range.low();
+      one.note(outlier);
+      for (int i = 0; i < 400; ++i) {
+        one.live(50, 1.0, terminates);
+        EXPECT_LE(one.range.high() - one.range.low(), 2.5 * width) << outlier;
+      }
+    }
+  }
+}
+
+// The return of a reward of 1 in each step is 100, whatever the limit; a terminated episode's less.
+TEST(ReturnRange, ATimeLimitIsNoEnd) {
+  for (const int limit : {10, 50, 200, 1000}) {
+    Stream limited(0.99), ended(0.99);
+    for (int i = 0; i < 20000 / limit; ++i) {
+      limited.live(limit, 1.0, false);
+      ended.live(limit);
+    }
+    EXPECT_GE(limited.range.high(), 100.0) << limit;
+    EXPECT_LE(limited.range.high(), 126.0) << limit;
+    const double sum = (1.0 - std::pow(0.99, limit)) / 0.01;
+    EXPECT_GE(ended.range.high(), 0.9 * sum) << limit;
+    EXPECT_LE(ended.range.high(), 1.5 * sum) << limit;
+  }
+}
+
+TEST(ReturnRange, IsKnownFromTheFirstOfRareRewards) {
+  Stream one(0.99);
+  for (int i = 0; i < 500; ++i) one.live(20, 0.0);
+  EXPECT_FALSE(one.range.is_known());
+  one.note(1.0, true);
+  expect_range(one.range, 0.0, 1.25);
+}
+
+TEST(ReturnRange, EnvironmentsHaveRewardsOfTheirOwn) {
   ReturnRange range(1.0);
-  double sum = 0.0, other = 0.0;
-  EXPECT_TRUE(range.note(8.0, sum));
-  EXPECT_FALSE(range.note(9.0, other));  // 17 if it were the same episode
+  ReturnRange::Rewards one = range.no_rewards(), other = range.no_rewards();
+  EXPECT_TRUE(range.note(8.0, false, one));
+  EXPECT_FALSE(range.note(9.0, false, other));  // 17 if it were the same episode
   expect_range(range, 0.0, 10.0);
 }
 
-TEST(ReturnRange, HoldsEverySumAndGrowsRarely) {
-  ReturnRange range(0.9);
+TEST(ReturnRange, MovesRarely) {
+  Stream one(0.9);
   core::Random random(1, core::Stream::weights);
-  double sum = 0.0, expected = 0.0;
-  int n_grown = 0;
+  int n_moves = 0;
   for (int i = 0; i < 10000; ++i) {
-    const double reward = std::exp(10.0 * random.uniform()) - 100.0;
-    expected = reward + 0.9 * expected;
-    n_grown += range.note(reward, sum);
-    ASSERT_EQ(sum, expected);
-    ASSERT_LE(range.low(), sum);
-    ASSERT_GE(range.high(), sum);
+    n_moves += one.note(std::exp(10.0 * random.uniform()) - 100.0, random.below(30) == 0);
   }
-  EXPECT_LT(n_grown, 60);
+  EXPECT_LT(n_moves, 40);
 }
 
 TEST(ReturnRange, StaysFinite) {
-  ReturnRange range(1.0);
-  double sum = 0.0;
-  for (int i = 0; i < 5000; ++i) {
-    range.note(std::numeric_limits<double>::max() * (i / 7 % 2 == 0 ? 1.0 : -1.0), sum);
-    ASSERT_TRUE(ReturnRange::is_sum(sum));
-  }
-  EXPECT_LT(range.high(), 1.7e300);
-  EXPECT_GT(range.low(), -1.7e300);
+  Stream one(1.0);
+  for (int i = 0; i < 9000; ++i) one.note(1e300 * (i / 700 % 2 == 0 ? 1.0 : -1.0), i % 2000 == 0);
+  EXPECT_LT(one.range.high(), 1.7e300);
+  EXPECT_GT(one.range.low(), -1.7e300);
   ReturnRange other(1.0);
-  core::restore(other, core::state_of(range));  // what came of it may be saved
-  EXPECT_EQ(core::state_of(other), core::state_of(range));
+  core::restore(other, core::state_of(one.range));  // what came of it may be saved
+  EXPECT_EQ(core::state_of(other), core::state_of(one.range));
 }
 
 TEST(ReturnRange, RefusesWhatIsNoRange) {
-  ReturnRange range(0.5);
-  double sum = 0.0;
-  range.note(8.0, sum);
+  Stream one(0.5);
+  for (int i = 0; i < 1000; ++i) one.note(8.0, i % 2 == 0);
+  ReturnRange& range = one.range;
   testing::expect_that_damage_is_refused(range);
   const core::State good = core::state_of(range);
+  const auto refused = [&](const core::State& bad, const std::string& name) {
+    testing::expect_refused(range, bad, "state: " + name + " must be ");
+  };
   for (const double bad : {testing::kNaN, testing::kInfinity, -testing::kInfinity}) {
-    EXPECT_FALSE(ReturnRange::is_sum(bad));
-    for (const char* name : {"low", "high"}) {
-      testing::expect_refused(range, testing::with_number(good, name, bad),
-                              std::string("state: ") + name + " must be ");
+    for (const char* name : {"low", "high", "returns"}) {
+      refused(testing::with_number(good, name, bad), name);
     }
   }
-  testing::expect_refused(range, testing::with_number(good, "low", 1.0), "state: low must be ");
-  testing::expect_refused(range, testing::with_number(good, "high", -1.0), "state: high must be ");
+  refused(testing::with_number(good, "low", 1.0), "low");
+  refused(testing::with_number(good, "high", -1.0), "high");
+  refused(testing::with_number(good, "oldest", std::uint64_t{256}), "oldest");
+  core::State bad = good;
+  bad["returns"] = testing::tensor_of(std::vector<double>(257, 0.0));
+  refused(bad, "returns");
+  bad["returns"] = testing::tensor_of(std::vector<double>(31, 0.0));
+  refused(bad, "oldest");
+  bad["oldest"] = core::state_of(ReturnRange(0.5)).at("oldest");
+  refused(bad, "returns");
 }
 
 }  // namespace

@@ -82,7 +82,10 @@ def test_a_discrete_observation_is_a_symbol():
     assert agent.approximator.n_symbols == (40, 40)
     for room, action in np.random.default_rng(2).permutation(list(np.ndindex(40, 4)) * 15):
         agent.learn(Transition(room, action, float(action == right[room]), room, True))
-    assert agent.learning_report()["q_range"] == (0.0, 1.25)
+    report = agent.learning_report()
+    assert report["q_range"] == (0.0, 1.25)
+    assert report["value_step"] == pytest.approx(1.25 / 520)  # counts from 40 to 560
+    assert 0.0 < report["mean_error"] < 0.25
     assert [agent.act(room, explore=False) for room in range(40)] == right.tolist()
 
 

@@ -140,7 +140,7 @@ def test_two_headers_share_a_program_and_cpp_takes_them(needs, tmp_path):
         #include "left.h"
         #include <stdio.h>
         int main(void) {
-          const int32_t x[LEFT_N_OBSERVED] = {65536, -65536, 20000, 3000};
+          const int32_t x[LEFT_N_OBSERVED] = {131072, -65536, 20000, 3000};
           const float y[RIGHT_2_N_OBSERVED] = {0.6f, -0.8f, 2.0f};
           uint32_t action[RIGHT_2_N_DIMENSIONS];
           right_2_act_float(y, action);
@@ -150,7 +150,7 @@ def test_two_headers_share_a_program_and_cpp_takes_them(needs, tmp_path):
           return 0;
         }
     """
-    left = agents()["discrete"].act([1.0, -1.0, 20000 / 65536, 3000 / 65536], explore=False)
+    left = agents()["discrete"].act([2.0, -1.0, 20000 / 65536, 3000 / 65536], explore=False)
     right = agents()["pairs"].act(np.float32([0.6, -0.8, 2.0]), explore=False)
     for compiler, options, ending in (
         ("gcc", STRICT, "c"),

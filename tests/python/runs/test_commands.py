@@ -719,6 +719,15 @@ def test_ranges_that_do_not_suit_are_named(invoke):
     assert "left the range" not in lines
 
 
+def test_values_that_are_too_coarse_are_named(invoke):
+    task = ("MountainCarContinuous-v0", "--steps", 800)
+    ends = ["approximator.q_low=-1e6", "approximator.q_high=1e6"]
+    options = [word for one in ["learning.value_range=fixed", *ends] for word in ("--set", one)]
+    lines = invoke("train", *task, *options, "--out", "wide").stdout
+    assert re.search(r"values come in steps of 3\.85e\+03, .*approximator\.q_low", lines)
+    assert "values come in steps" not in invoke("train", *task, "--out", "own").stdout
+
+
 def test_observations_that_are_left_out_are_named(invoke):
     options = ["--agent", "sdnn-linear", "--steps", 1001, "--evaluate-every", 0]
     done = invoke("train", "drifting_env:tests/Crowded-v0", *options, "--out", "one", "--json")

@@ -46,7 +46,7 @@ namespace sdnn::agents {
 /// Reinforcement learning, section 7.1.
 ///
 /// An agent may learn in several environments at once, numbered from 0: what belongs to an episode
-/// (the steps that wait, the kept action, the number of its steps, the sum of its rewards) is then
+/// (the steps that wait, the kept action, the number of its steps, its rewards) is then
 /// kept for each, all else is shared. Which of them acts or learns when is the caller's choice.
 template <class Q>
 class QLearning {
@@ -131,7 +131,6 @@ class QLearning {
   void begin_episode(std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
     episode.exploration.begin();
-    episode.sum = 0.0;
     NStepBuffer& buffer = episode.buffer;
     if (buffer.size() > 0) learn_all(buffer, state_value(buffer.next_state()));
   }
@@ -215,10 +214,9 @@ class QLearning {
     core::require_unit_values("next_state", next_state, n_inputs());
     Episode& episode = episodes_.of(environment);
     if constexpr (kHasRange) {
-      if (adapts_range() && range_.note(reward, episode.sum)) {
+      if (adapts_range() && range_.note(reward, terminated, episode.rewards)) {
         action_value_.set_output_range(range_.low(), range_.high());
       }
-      if (terminated) episode.sum = 0.0;  // nothing follows, whether or not an episode is begun
     }
     // The next state first: the network then remembers it, corrected, for the next decision.
     const double next_value = terminated ? 0.0 : state_value(next_state);
@@ -256,18 +254,19 @@ class QLearning {
   struct Episode {
     NStepBuffer buffer;
     Exploration::Episode exploration;
-    double sum = 0.0;  ///< of ReturnRange
+    ReturnRange::Rewards rewards = {};
   };
 
   Episode new_episode() const {
     return {NStepBuffer(static_cast<std::size_t>(config_.n_steps), n_inputs(), n_dimensions()),
-            {.kept = std::vector<std::size_t>(n_dimensions())}};
+            {.kept = std::vector<std::size_t>(n_dimensions())},
+            adapts_range() ? range_.no_rewards() : ReturnRange::Rewards{}};
   }
 
   template <class Self, class Listed, class Archive>
   static void serialize_episode(Self& self, Listed& episode, Archive& archive) {
     archive.part("n_step_buffer", episode.buffer);
-    archive.number("range.sum", episode.sum);
+    archive.within("range", [&] { self.range_.serialize_rewards(episode.rewards, archive); });
     self.exploration_.serialize_episode(episode.exploration, archive,
                                         [&self](std::size_t d) { return self.n_actions(d); });
     if constexpr (Archive::kReads) {
@@ -279,7 +278,6 @@ class QLearning {
       };
       archive.expect(episode.buffer.each_is(is_of_actions), "n_step_buffer.actions", "of actions");
       archive.expect(!episode.buffer.is_full(), "n_step_buffer.rewards", "fewer than n_steps");
-      archive.expect(ReturnRange::is_sum(episode.sum), "range.sum", "a finite sum");
     }
   }
 
@@ -288,7 +286,9 @@ class QLearning {
     exploration_.policy().set_epsilon(rates_.epsilon(config_));
   }
 
-  bool adapts_range() const noexcept { return config_.value_range == ValueRange::adaptive; }
+  bool adapts_range() const noexcept {
+    return kHasRange && config_.value_range == ValueRange::adaptive;
+  }
 
   void require_action(std::span<const std::size_t> action) const {
     if (action.size() != n_dimensions()) {  // only a bad one's text costs memory

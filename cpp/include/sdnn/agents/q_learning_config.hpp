@@ -38,15 +38,16 @@ struct QLearningConfig {
   static constexpr auto fields() noexcept {
     return std::tuple_cat(
         learning_fields<QLearningConfig>(),
-        std::tuple(core::field("n_steps", &QLearningConfig::n_steps,
-                               "Rewards in a target before it bootstraps. Not in the paper, which "
-                               "has 1: with more, a transition is learned, once, when so many "
-                               "steps are known or the episode ends.",
-                               core::within(1, 1000)),
-                   core::field("value_range", &QLearningConfig::value_range,
-                               "Whether Q has the approximator's range, q_low to q_high (`fixed`), "
-                               "or one that grows with the discounted sums of the rewards that "
-                               "come (`adaptive`). Not in the paper.")),
+        std::tuple(
+            core::field("n_steps", &QLearningConfig::n_steps,
+                        "Rewards in a target before it bootstraps. Not in the paper, which "
+                        "has 1: with more, a transition is learned, once, when so many "
+                        "steps are known or the episode ends.",
+                        core::within(1, 1000)),
+            core::field("value_range", &QLearningConfig::value_range,
+                        "Whether Q has the approximator's range, q_low to q_high (`fixed`), "
+                        "or one that follows the returns of late (`adaptive`): rare ones are "
+                        "clipped, and time limits end no return. Not in the paper.")),
         schedule_fields<QLearningConfig>());
   }
   bool operator==(const QLearningConfig&) const = default;

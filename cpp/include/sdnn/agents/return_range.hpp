@@ -1,30 +1,123 @@
-/// How large values can be: from the rewards that have come.
+/// How large values can be: from the returns of late.
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
 
 #include "sdnn/core/detail/floating_point.hpp"
 
 namespace sdnn::agents {
 
-/// A range that holds the discounted sums of rewards seen so far.
+/// A range that holds 0 and most returns of late.
 ///
-/// The sum over the rewards that came, the latest first, z = r + gamma z, is distributed as the
-/// returns that values estimate, and is known at once. The range begins with 0 and the first sum
-/// that is not 0, and grows by a quarter more than it must, so that it grows rarely.
+/// The return of a step is known when its episode terminates or, but for little, 2 / (1 - gamma)
+/// steps later; what is missing is taken to be like what is there. A time limit is no end: the next
+/// episode's rewards follow. The range is that of 256 returns, spread over the last half of all,
+/// without the lowest twentieth and the highest fiftieth, with room for better ones above. It has
+/// no room below: actions that were never tried have its lowest value, and what is worse than usual
+/// should not be better than they are. It moves when it no longer holds the returns or has become
+/// twice as wide as it need be.
+///
+/// What is rare is thus outside, and sums are clipped one width beyond the range: otherwise a
+/// single huge reward would be in many returns, one for each step before it.
+///
+/// Until 32 returns are known, and any reward other than 0, the range grows to hold the discounted
+/// sums of past rewards, z = r + gamma z: their extremes are those of returns, and known at once.
 class ReturnRange {
  public:
-  explicit ReturnRange(double discount) noexcept : discount_(discount) {}
+  /// What belongs to one environment.
+  struct Rewards {
+    std::vector<double> waiting;  ///< the first n are rewards whose returns are not known yet
+    std::size_t n = 0;
+    double sum = 0.0;  ///< z
+  };
 
-  /// Whether there was a sum other than 0: until then the range is empty.
+  explicit ReturnRange(double discount) : discount_(discount) { returns_.reserve(kMostReturns); }
+
+  Rewards no_rewards() const { return {std::vector<double>(2 * horizon()), 0, 0.0}; }
+
+  /// Whether there was a reward other than 0: until then the range is empty.
   bool is_known() const noexcept { return low_ < high_; }
   double low() const noexcept { return low_; }
   double high() const noexcept { return high_; }
 
-  /// Adds a finite reward to the sum of its episode, which begins with 0; returns whether the range
-  /// has grown.
-  bool note(double reward, double& sum) noexcept {
-    sum = std::clamp(reward + discount_ * sum, -kLargest, kLargest);
+  /// Notes an environment's next reward, a finite one; returns whether the range has moved.
+  bool note(double reward, bool terminated, Rewards& rewards) noexcept {
+    rewards.sum = clipped(reward + discount_ * rewards.sum);
+    const bool grows = (n_returns_ < kFewReturns || !is_known()) && hold(rewards.sum);
+    if (terminated) rewards.sum = 0.0;
+    rewards.waiting[rewards.n++] = reward;
+    if (!terminated && rewards.n < rewards.waiting.size()) return grows;
+    const std::size_t n_known = terminated ? rewards.n : rewards.n - horizon();
+    note_returns(std::span(rewards.waiting).first(rewards.n), n_known, terminated);
+    std::copy(rewards.waiting.begin() + static_cast<std::ptrdiff_t>(n_known),
+              rewards.waiting.begin() + static_cast<std::ptrdiff_t>(rewards.n),
+              rewards.waiting.begin());
+    rewards.n -= n_known;
+    return follow() || grows;
+  }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    archive.number("low", self.low_);
+    archive.number("high", self.high_);
+    archive.number("n_returns", self.n_returns_);
+    archive.number("due", self.due_);
+    archive.number("oldest", self.oldest_);
+    archive.numbers("returns", self.returns_);
+    if constexpr (Archive::kReads) {  // comparisons with NaN are false
+      archive.expect(self.low_ >= -kFurthest && self.low_ <= 0.0, "low", "finite and at most 0");
+      archive.expect(self.high_ >= 0.0 && self.high_ <= kFurthest, "high", "finite and at least 0");
+      archive.expect(self.returns_.size() <= kMostReturns, "returns", "256 or fewer");
+      archive.expect(std::ranges::all_of(self.returns_, is_sum), "returns", "finite sums");
+      archive.expect(self.oldest_ < kMostReturns, "oldest", "less than 256");
+      const bool is_full = self.returns_.size() == kMostReturns;
+      archive.expect(is_full || self.oldest_ == 0, "oldest", "0 before there are 256");
+      const bool has_enough = self.n_returns_ < kFewReturns || self.returns_.size() >= kFewReturns;
+      archive.expect(has_enough, "returns", "32 at least of so many");
+      self.returns_.reserve(kMostReturns);
+    }
+  }
+  template <class Listed, class Archive>
+  void serialize_rewards(Listed& rewards, Archive& archive) const {
+    const auto first = rewards.waiting.begin();
+    std::vector<double> waiting(first, first + static_cast<std::ptrdiff_t>(rewards.n));
+    archive.number("sum", rewards.sum);
+    archive.numbers("rewards", waiting);
+    if constexpr (Archive::kReads) {
+      archive.expect(is_sum(rewards.sum), "sum", "a finite sum");
+      const std::size_t most = rewards.waiting.size();
+      archive.expect(waiting.empty() || waiting.size() < most, "rewards", "as few as can wait");
+      archive.expect(std::ranges::all_of(waiting, is_sum), "rewards", "finite");
+      std::ranges::copy(waiting, rewards.waiting.begin());
+      rewards.n = waiting.size();
+    }
+  }
+
+ private:
+  static constexpr std::size_t kMostReturns = 256;
+  static constexpr std::uint64_t kFewReturns = 32;
+  static constexpr std::uint64_t kReturnsPerLife = 2 * kMostReturns;
+  static constexpr std::size_t kLow = 20,
+                               kHigh = 50;  // of so many the lowest, highest are left out
+  static constexpr double kHeadroom = 0.25;
+  static constexpr double kLargest = 1e300;            // of sums
+  static constexpr double kFurthest = 2.0 * kLargest;  // of the ends, which stay within 5/3 of it
+
+  static double clipped(double sum) noexcept { return std::clamp(sum, -kLargest, kLargest); }
+  static bool is_sum(double number) noexcept { return number >= -kLargest && number <= kLargest; }
+
+  std::size_t horizon() const noexcept {
+    return static_cast<std::size_t>(2.0 / std::max(1.0 - discount_, 0.004));
+  }
+
+  /// Grows by a quarter more than it must, so that it grows rarely.
+  bool hold(double sum) noexcept {
     if (sum >= low_ && sum <= high_) return false;
     if (sum > high_) {
       high_ = sum + kHeadroom * (sum - low_);
@@ -34,30 +127,52 @@ class ReturnRange {
     return true;
   }
 
-  /// Whether a number can be a sum: finite, and no larger than sums become.
-  static bool is_sum(double number) noexcept {  // comparisons with NaN are false
-    return number >= -kLargest && number <= kLargest;
-  }
-
-  /// Lists what is remembered; see core/state.hpp.
-  template <class Self, class Archive>
-  static void serialize(Self& self, Archive& archive) {
-    archive.number("low", self.low_);
-    archive.number("high", self.high_);
-    if constexpr (Archive::kReads) {  // comparisons with NaN are false
-      archive.expect(self.low_ >= -kFurthest && self.low_ <= 0.0, "low", "finite and at most 0");
-      archive.expect(self.high_ >= 0.0 && self.high_ <= kFurthest, "high", "finite and at least 0");
+  /// Of the first n_known rewards; `are_all` that the episode has.
+  void note_returns(std::span<const double> rewards, std::size_t n_known, bool are_all) {
+    const double width = n_returns_ < kFewReturns ? kLargest : high_ - low_;
+    const double low = clipped(low_ - width), high = clipped(high_ + width);
+    double sum = 0.0, missing = 1.0;
+    for (std::size_t i = rewards.size(); i-- > 0;) {
+      sum = std::clamp(rewards[i] + discount_ * sum, low, high);
+      missing *= discount_;
+      if (i < n_known) note_return(are_all || missing == 1.0 ? sum : sum / (1.0 - missing));
     }
   }
 
- private:
-  static constexpr double kHeadroom = 0.25;
-  static constexpr double kLargest = 1e300;            // of sums
-  static constexpr double kFurthest = 2.0 * kLargest;  // of the ends, which stay within 5/3 of it
+  void note_return(double value) {
+    if (++n_returns_ < due_) return;
+    due_ = n_returns_ + std::max<std::uint64_t>(n_returns_ / kReturnsPerLife, 1);
+    if (returns_.size() < kMostReturns) {
+      returns_.push_back(clipped(value));
+    } else {
+      returns_[oldest_] = clipped(value);
+      oldest_ = (oldest_ + 1) % kMostReturns;
+    }
+  }
+
+  bool follow() noexcept {
+    if (n_returns_ < kFewReturns) return false;
+    std::array<double, kMostReturns> sorted;
+    const auto end = std::ranges::copy(returns_, sorted.begin()).out;
+    std::sort(sorted.begin(), end);
+    const double low = std::min(sorted[returns_.size() / kLow], 0.0);
+    const double high = std::max(sorted[returns_.size() - 1 - returns_.size() / kHigh], 0.0);
+    if (low == high) return false;
+    const double most = high > 0.0 ? high + kHeadroom * (high - low) : 0.0;
+    const bool holds = low >= low_ && high <= high_;
+    if (holds && 2.0 * (most - low) >= high_ - low_) return false;
+    low_ = low;
+    high_ = most;
+    return true;
+  }
 
   double discount_;
   double low_ = 0.0;
   double high_ = 0.0;
+  std::uint64_t n_returns_ = 0;
+  std::uint64_t due_ = 1;     ///< the next return that is remembered
+  std::uint64_t oldest_ = 0;  ///< of those remembered, once they are 256
+  std::vector<double> returns_;
 };
 
 }  // namespace sdnn::agents

@@ -33,6 +33,11 @@ class OutputScale {
   double q_low() const noexcept { return q_low_; }
   double q_high() const noexcept { return q_high_; }
 
+  /// What one unit more is worth.
+  double step() const noexcept {
+    return q_high_ / (u_high_ - u_low_) - q_low_ / (u_high_ - u_low_);
+  }
+
   /// g(u), the value of `n_firing` active units.
   double operator()(int n_firing) const noexcept {
     if (n_firing > u_high_) return q_high_;

@@ -1,6 +1,7 @@
 /// SDNN-C: a network that gives Q(s, a) for every action at once.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
@@ -41,6 +42,7 @@ struct CorrectionCounts {
   std::uint64_t changed = 0;       ///< units were corrected
   std::uint64_t rounded_away = 0;  ///< another value was wanted, nearer than the next count's
   std::uint64_t out_of_range = 0;  ///< wanted were values outside [q_low, q_high]
+  double mean_error = 0.0;  ///< of the last thousand or so: how far targets, clipped, were from Q
 };
 
 /// The network of section 3: what is learned, for any number of users.
@@ -267,8 +269,11 @@ class SDNNC {
     archive.number("n_changed", self.counts_.changed);
     archive.number("n_rounded_away", self.counts_.rounded_away);
     archive.number("n_out_of_range", self.counts_.out_of_range);
+    archive.number("mean_error", self.counts_.mean_error);
     if (self.average_) archive.part("average", *self.average_);
     if constexpr (Archive::kReads) {
+      const bool is_mean = self.counts_.mean_error >= 0.0 && self.counts_.mean_error <= 1e302;
+      archive.expect(is_mean, "mean_error", "finite and at least 0");
       archive.taking("output_range", [&] { self.set_output_range(range[0], range[1]); });
       for (const std::int32_t threshold : thresholds) {
         archive.expect(HiddenLayer::is_threshold(threshold), "thresholds", "of less than 2^30");
@@ -280,6 +285,8 @@ class SDNNC {
 
  private:
   using Cached = ActivationCache::Entry;
+
+  static constexpr std::uint64_t kMostErrors = 1000;  // that a mean is of
 
   static OutputScale make_scale(const SDNNCConfig& config) {
     const int u_low = config.u_low.value_or(config.n_active_units / 15);
@@ -365,6 +372,11 @@ class SDNNC {
     if (wanted < scale_.q_low() || wanted > scale_.q_high()) ++counts_.out_of_range;
     if (deficit == 0 && wanted != scale_(n_firing)) ++counts_.rounded_away;
     if (changes) ++counts_.changed;
+    const double error =
+        std::abs(std::clamp(target, scale_.q_low(), scale_.q_high()) - scale_(n_firing));
+    const auto n_counted =
+        static_cast<double>(std::clamp<std::uint64_t>(counts_.asked, 1, kMostErrors));
+    counts_.mean_error += (error - counts_.mean_error) / n_counted;
   }
 
   /// Lets `deficit` units more of the action's window fire, or fewer if it is negative, as far as

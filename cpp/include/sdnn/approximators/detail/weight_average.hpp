@@ -14,16 +14,16 @@ namespace sdnn::approximators {
 
 /// A moving average of weights and thresholds whose window grows with what was learned.
 ///
-/// After n corrections the weights of correction t have about the weight t / n^2: what was learned
-/// first is forgotten, the swings of late learning cancel each other. A unit's sign is then that
-/// which its potential mostly had, so a value is near the median of what it was. Snapshots are
+/// After n corrections the weights of correction t have about the weight (t / n)^7: what was
+/// learned first is forgotten, the swings of late learning cancel each other. A unit's sign is then
+/// that which its potential mostly had, so a value is near the median of what it was. Snapshots are
 /// taken every `interval` corrections, later every n / 64, and move the average by a power of two
-/// of the way, about 2 / n times the corrections in between. All numbers are integers, in units of
+/// of the way, about 8 / n times the corrections in between. All numbers are integers, in units of
 /// 2^-14 steps of the lattice, so equal corrections give equal bits.
 ///
 /// Source: Polyak, B., Juditsky, A. (1992). Acceleration of stochastic approximation by averaging;
 /// Shamir, O., Zhang, T. (2013). Stochastic gradient descent for non-smooth optimization, section
-/// 4 (polynomial-decay averaging, with eta about 1).
+/// 4 (polynomial-decay averaging, with eta about 7).
 class WeightAverage {
  public:
   static constexpr int kFractionBits = 14;
@@ -105,7 +105,7 @@ class WeightAverage {
     if (n_snapshots_ == 0) return 0;
     const std::uint64_t passed = std::max(interval_, n_corrections >> kLogSnapshots);
     // A cast, since older libraries give another type.
-    return std::max(static_cast<int>(std::bit_width(n_corrections / passed)) - 2, 0);
+    return std::max(static_cast<int>(std::bit_width(n_corrections / passed)) - 4, 0);
   }
 
   void add(const HiddenLayer& layer, int shift) {
