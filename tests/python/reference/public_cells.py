@@ -12,7 +12,7 @@ import numpy as np
 import core_cells
 from bad_inputs import BAD, judged, parameters_of
 from sdnn import kernel
-from sdnn.agents import SDNNQLearning
+from sdnn.agents import SDNNSarsa
 from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
 from sdnn.environments import (
     AcrobotConfig,
@@ -27,6 +27,7 @@ from sdnn.estimators import (
     SDNNKernelRidge,
     SDNNRegressor,
 )
+from sdnn.export import save_image
 from sdnn.reproduction.cases import EXPERIMENTS, PAPER_CASES
 from sdnn.runs import (
     BudgetSpec,
@@ -230,14 +231,18 @@ GOOD = {
     "coding": lambda: "anchor",
     "costs": lambda: (),
     "data": lambda: {"coding": "anchor"},
+    "dataset": lambda: (),
     "entry": lambda: agent_entry("rbf"),
     "env": lambda: AcrobotSwingUpEnv(),
     "episodes": lambda: 1,
+    "epochs": lambda: 1,
     "executor": lambda: None,
     "experiment": lambda: EXPERIMENTS[0],
     "fraction_bits": lambda: None,
+    "image": lambda: save_image(tiny_agent()),
     "jobs": lambda: 1,
     "label": lambda: "sdnn-c",
+    "learning": lambda: True,
     "library": lambda: "msvc",
     "measured": lambda: (),
     "memory_limit": lambda: 2**20,
@@ -281,7 +286,8 @@ NAMED = {"word": "experiment", "label": "agent", "n_episodes": "episodes", "name
 
 def tiny_agent():
     spaces = gym.spaces.Box(0.0, 1.0, (2,)), gym.spaces.Discrete(2)
-    return SDNNQLearning(*spaces, approximator=core_cells.network_config())
+    config = core_cells.linear_config()
+    return SDNNSarsa(*spaces, approximator=config, angle_pairs="none", inputs="all")
 
 
 def public_functions():
