@@ -454,7 +454,7 @@ def test_the_average_agrees_with_its_formula():
         if n < due:
             continue
         passed = max(5, n // 64)
-        share = 1.0 if n_snapshots == 0 else 2.0 ** -max(int(np.log2(n // passed)) - 1, 0)
+        share = 1.0 if n_snapshots == 0 else 2.0 ** -max(int(np.log2(n // passed)) - 3, 0)
         weights = weights + share * (network.weights() - weights)
         thresholds = thresholds + share * (network.thresholds() - thresholds)
         due, n_snapshots = n + passed, n_snapshots + 1
