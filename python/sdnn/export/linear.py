@@ -324,12 +324,14 @@ class LearnerWriter(LinearWriter):
     def fingerprint(self) -> int:
         """Return a number that agents of other settings or another seed do not have."""
         learning, approximator = self.agent.learning, self.agent.approximator
+        network = self.network()
         about = [
             str(approximator),
             str(learning),
             self.agent.seed,
             self.sizes()["n_actions"],
             [(one.kind, list(one.at), one.low, one.high, one.n_bins) for one in self.inputs],
+            [zlib.crc32(network.permutation(*pair).tobytes()) for pair in network.pairs],
         ]
         return zlib.crc32(json.dumps(about).encode())
 

@@ -10,12 +10,14 @@
 #include <string>
 #include <string_view>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/pcg64.hpp"
 
 namespace sdnn::agents {
 
@@ -95,6 +97,46 @@ class Actions {
     if (config_.discrete) return static_cast<std::size_t>(place);
     const double part = place / (config_.high[d] - config_.low[d]);
     return static_cast<std::size_t>(std::nearbyint(part * static_cast<double>(n_actions_[d] - 1)));
+  }
+
+  /// Writes an agent's action, an index, or a number in [-1, 1], for each dimension, in the units
+  /// of the task, and its indices.
+  template <class Action>
+  void take(const Action& action, std::vector<double>& in_units,
+            std::vector<std::size_t>& indices) const {
+    for (std::size_t d = 0; d < in_units.size(); ++d) {
+      const auto number = [&] {
+        if constexpr (std::is_arithmetic_v<Action>)
+          return action;
+        else
+          return action[d];
+      }();
+      if (n_actions_[d] == 0) {
+        in_units[d] = of_normalized(static_cast<double>(number), d);
+      } else {
+        indices[d] = static_cast<std::size_t>(number);
+        in_units[d] = of_index(indices[d], d);
+      }
+    }
+  }
+
+  /// Draws a random action of each dimension: an index, or a number in [-1, 1].
+  void draw(core::Pcg64& random, std::vector<double>& action) const {
+    for (std::size_t d = 0; d < action.size(); ++d) {
+      const std::size_t n = n_actions_[d];
+      action[d] = n == 0 ? -1.0 + 2.0 * random.uniform()
+                         : static_cast<double>(random.below(static_cast<std::uint32_t>(n)));
+    }
+  }
+  /// Whether `draw` may give these numbers.
+  bool can_be_drawn(std::span<const double> action) const noexcept {
+    for (std::size_t d = 0; d < action.size(); ++d) {
+      const auto n = static_cast<double>(n_actions_[d]);
+      const bool fits =
+          n == 0.0 ? action[d] >= -1.0 && action[d] <= 1.0 : action[d] >= 0.0 && action[d] < n;
+      if (!fits) return false;
+    }
+    return true;
   }
 
   /// Throws std::invalid_argument unless the task has such an action. Shape: (n_dimensions,).

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -189,6 +191,50 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
                                    return tables.empty() ? SDNNC(one, seed_of_part)
                                                          : SDNNC(one, tables, seed_of_part);
                                  });
+}
+
+/// Calls what Q-learning is changed by, where there is such an agent.
+template <class Call>
+void with_q_learning(std::optional<AnyAgent>& any, const Call& call) {
+  if (!any) return;
+  std::visit(
+      [&call](auto& agent) {
+        if constexpr (!kIsFuzzy<std::remove_cvref_t<decltype(agent)>>) call(agent);
+      },
+      *any);
+}
+/// What Q-learning returns; `otherwise` where there is no such agent.
+template <class Call>
+double of_q_learning(const std::optional<AnyAgent>& any, const Call& call, double otherwise) {
+  if (!any) return otherwise;
+  return std::visit(
+      [&](const auto& agent) {
+        if constexpr (kIsFuzzy<std::remove_cvref_t<decltype(agent)>>)
+          return otherwise;
+        else
+          return call(agent);
+      },
+      *any);
+}
+
+/// Learns a transition between two states; of a fuzzy agent, its last action.
+inline void learn(AnyAgent& any, std::span<const double> state,
+                  const std::vector<std::size_t>& indices, double reward,
+                  std::span<const double> next_state, bool terminated, std::size_t environment) {
+  std::visit(
+      [&](auto& agent) {
+        using Agent = std::remove_cvref_t<decltype(agent)>;
+        const auto& action = [&] {
+          if constexpr (kIsFuzzy<Agent>)
+            return agent.last_action(environment);
+          else if constexpr (Agent::kDecoupled)
+            return indices;
+          else
+            return indices[0];
+        }();
+        agent.learn(state, action, reward, next_state, terminated, environment);
+      },
+      any);
 }
 
 }  // namespace sdnn::agents

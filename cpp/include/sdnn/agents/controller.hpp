@@ -5,11 +5,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
-#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -17,6 +15,9 @@
 
 #include "sdnn/agents/actions.hpp"
 #include "sdnn/agents/any_agent.hpp"
+#include "sdnn/agents/controller_config.hpp"
+#include "sdnn/agents/detail/approximator_of.hpp"
+#include "sdnn/agents/detail/experience_of.hpp"
 #include "sdnn/agents/detail/saved_tables.hpp"
 #include "sdnn/agents/detail/taken_actions.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
@@ -30,7 +31,6 @@
 #include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/symbol_patterns.hpp"
-#include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/identity.hpp"
@@ -39,23 +39,6 @@
 #include "sdnn/core/state.hpp"
 
 namespace sdnn::agents {
-
-/// Everything that defines a controller.
-struct ControllerConfig {
-  AnyApproximatorConfig approximator = {};  ///< sizes that follow from the task are filled in
-  AnyLearningConfig learning = {};
-  std::uint64_t seed = 0;
-  ObservationConfig observation = {};
-  ActionConfig action = {};
-  int warm_up_steps = 1000;
-
-  /// The plain values.
-  static constexpr auto fields() noexcept {
-    return std::tuple(core::field("warm_up_steps", &ControllerConfig::warm_up_steps,
-                                  "Random steps before learning, where ranges are not known.",
-                                  core::within(2, 10'000'000)));
-  }
-};
 
 /// An agent of any kind that observes variables and chooses actions in the units of its task.
 ///
@@ -116,34 +99,35 @@ class Controller {
   void set_progress(double progress) {
     core::require_in_range("progress", progress, 0.0, 1.0);
     progress_ = progress;
-    with_q_learning([progress](auto& agent) { agent.set_progress(progress); });
+    with_q_learning(agent_, [progress](auto& agent) { agent.set_progress(progress); });
   }
   double progress() const {
-    return of_q_learning([](const auto& agent) { return agent.progress(); }, progress_);
+    return of_q_learning(agent_, [](const auto& agent) { return agent.progress(); }, progress_);
   }
   /// Sets alpha or epsilon of Q-learning; see QLearning.
   void set_learning_rate(std::optional<double> rate) {
     const double tried = rate.value_or(1.0);
     core::require(tried > 0.0 && tried <= 1.0, "learning_rate", "in (0, 1], or None", tried);
     learning_rate_ = rate;
-    with_q_learning([rate](auto& agent) { agent.set_learning_rate(rate); });
+    with_q_learning(agent_, [rate](auto& agent) { agent.set_learning_rate(rate); });
   }
   void set_epsilon(std::optional<double> epsilon) {
     const double tried = epsilon.value_or(0.0);
     core::require(tried >= 0.0 && tried <= 1.0, "epsilon", "in [0, 1], or None", tried);
     epsilon_ = epsilon;
-    with_q_learning([epsilon](auto& agent) { agent.set_epsilon(epsilon); });
+    with_q_learning(agent_, [epsilon](auto& agent) { agent.set_epsilon(epsilon); });
   }
   /// As they are now. Require Q-learning.
   double learning_rate() const {
     const double otherwise = learning_rate_.value_or(
         planned([this](const auto& config) { return learning_rate_at(config, progress_); }));
-    return of_q_learning([](const auto& agent) { return agent.learning_rate(); }, otherwise);
+    return of_q_learning(
+        agent_, [](const auto& agent) { return agent.learning_rate(); }, otherwise);
   }
   double epsilon() const {
     const double otherwise = epsilon_.value_or(
         planned([this](const auto& config) { return epsilon_at(config, progress_); }));
-    return of_q_learning([](const auto& agent) { return agent.epsilon(); }, otherwise);
+    return of_q_learning(agent_, [](const auto& agent) { return agent.epsilon(); }, otherwise);
   }
 
   /// How many robots, or environments, the agent learns from at once: each has an episode of its
@@ -179,16 +163,18 @@ class Controller {
   std::span<const double> act(std::span<const double> observation, bool explore = true,
                               std::size_t environment = 0) {
     if (warm_up_) {
-      require_numbers("observation", observation);
+      observations_.require_numbers("observation", observation);
       const auto draw = [this](core::Pcg64& random, std::vector<double>& action) {
-        draw_action(random, action);
+        actions_.draw(random, action);
       };
-      take(warm_up_->act(draw, explore, environment), action_, indices_);
+      actions_.take(warm_up_->act(draw, explore, environment), action_, indices_);
       return action_;
     }
     observations_.scale(observation, state_);
     std::visit(
-        [&](auto& agent) { take(agent.act(state_, explore, environment), action_, indices_); },
+        [&](auto& agent) {
+          actions_.take(agent.act(state_, explore, environment), action_, indices_);
+        },
         *agent_);
     if (explore && !is_fuzzy(approximator_)) {
       taken_.note(environment, action_, indices_);
@@ -213,7 +199,8 @@ class Controller {
     std::visit(
         [&](const auto& agent) {
           auto& own = own_workspace(agent, workspace);
-          take(agent.best_action(workspace.state, own, ties), workspace.action, workspace.indices);
+          actions_.take(agent.best_action(workspace.state, own, ties), workspace.action,
+                        workspace.indices);
         },
         *agent_);
     return workspace.action;
@@ -230,7 +217,8 @@ class Controller {
   std::span<const double> best_of(Workspace& workspace) {
     std::visit(
         [&](auto& agent) {
-          take(agent.best_of(own_workspace(agent, workspace)), workspace.action, workspace.indices);
+          actions_.take(agent.best_of(own_workspace(agent, workspace)), workspace.action,
+                        workspace.indices);
         },
         *agent_);
     return workspace.action;
@@ -244,10 +232,10 @@ class Controller {
              std::span<const double> next_observation, bool terminated,
              std::size_t environment = 0) {
     if (warm_up_) {
-      require_numbers("observation", observation);
+      observations_.require_numbers("observation", observation);
       actions_.require_action(action);
       core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
-      require_numbers("next_observation", next_observation);
+      observations_.require_numbers("next_observation", next_observation);
       warm_up_->learn(
           {false, environment, observation, action, reward, next_observation, terminated});
       if (warm_up_->is_over()) end_warm_up();
@@ -256,7 +244,7 @@ class Controller {
     observations_.scale(observation, state_);
     find_indices(action, environment);
     observations_.scale(next_observation, next_state_, "next_observation");
-    learn_states(reward, terminated, environment);
+    agents::learn(*agent_, state_, indices_, reward, next_state_, terminated, environment);
     notes_.note(observation);
     const WarmUp::Step step{false,  environment,      observation, action,
                             reward, next_observation, terminated};
@@ -301,7 +289,6 @@ class Controller {
   struct Unborn {};
 
   static constexpr double kLargestReward = 1e300;
-  static constexpr std::size_t kMostTableStates = 1536;
   static constexpr double kCaution = 1.5;  // of looking again and again
 
   Controller(ControllerConfig config, std::vector<coding::PatternTable> tables, Unborn)
@@ -324,22 +311,10 @@ class Controller {
 
   /// Makes the agent: all ranges are known. Of a state that is read, sizes are compared first.
   void fit(const core::StateReader* reader = nullptr) {
-    approximator_ = config_.approximator;
-    std::visit(
-        [this](auto& config) {
-          config.n_inputs = static_cast<int>(observations_.n_inputs());
-          if (config_.action.discrete && n_dimensions() == 1 && !is_fuzzy(approximator_)) {
-            config.n_actions = static_cast<int>(actions_.n_actions().front());
-          }
-        },
-        approximator_);
-    std::visit(
-        [this](auto& config) {
-          if constexpr (requires { config.circular; }) fill_in_code(config);
-        },
-        approximator_);
+    approximator_ = detail::approximator_of(config_, observations_, actions_, tables_);
     std::vector<coding::PatternTable> tables = tables_;
-    if (is_table()) tables.assign(2, coding::one_hot_patterns(observations_.n_states()));
+    if (detail::is_table(config_, observations_, tables_))
+      tables.assign(2, coding::one_hot_patterns(observations_.n_states()));
     if (reader != nullptr) {
       expect_sizes(*reader, approximator_, actions_.n_actions(), !tables.empty());
     }
@@ -348,50 +323,13 @@ class Controller {
     if (auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&approximator_)) {
       if (n_dimensions() == 1) sdnn->n_actions = static_cast<int>(actions_.n_actions().front());
     }
-    with_q_learning([this](auto& agent) {
+    with_q_learning(agent_, [this](auto& agent) {
       agent.set_learning_rate(learning_rate_);
       agent.set_epsilon(epsilon_);
       agent.set_progress(progress_);
     });
     state_.resize(observations_.n_inputs());
     next_state_.resize(state_.size());
-  }
-
-  /// What the code of states, and actions of symbols, follow from.
-  template <class Config>
-  void fill_in_code(Config& config) {
-    const auto circular = observations_.circular();
-    const auto n_symbols = observations_.n_symbols();
-    const auto has = [](const auto& list) {
-      return std::ranges::any_of(list, [](auto one) { return one != 0; });
-    };
-    if (has(circular) && config.circular.empty()) config.circular = circular;
-    if (has(n_symbols) && config.n_symbols.empty()) config.n_symbols = n_symbols;
-    if constexpr (requires { config.action_window; }) {
-      if (config_.action.discrete) config.action_window = 1;
-      if (is_table()) config.n_pattern_units = static_cast<int>(observations_.n_states());
-      Config first = config;  // inputs that are added have as many units
-      first.n_inputs = static_cast<int>(observations_.n_first_inputs());
-      config.n_pattern_units = approximators::with_pattern_units(first).n_pattern_units;
-    }
-    check_tables(n_symbols);
-  }
-
-  /// Whether a linear readout has weights of their own for every state: where these are listed and
-  /// not more than other codes have columns, and neither units nor patterns are given.
-  bool is_table() const noexcept {
-    const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&config_.approximator);
-    const std::size_t n = observations_.n_states();
-    return linear != nullptr && linear->n_pattern_units == 0 && tables_.empty() && n >= 2 &&
-           n <= kMostTableStates;
-  }
-
-  void check_tables(const std::vector<int>& n_symbols) const {
-    for (std::size_t i = 0; i < std::min(tables_.size(), n_symbols.size()); ++i) {
-      const auto n = static_cast<std::size_t>(n_symbols[i]);
-      core::require(n == 0 || tables_[i].n_bins() == n, "tables[" + std::to_string(i) + "]",
-                    "of a row for each of " + std::to_string(n) + " symbols", tables_[i].n_bins());
-    }
   }
 
   /// What `call` gives of the settings of learning, but for fuzzy Q-learning.
@@ -407,72 +345,9 @@ class Controller {
         config_.learning);
   }
 
-  /// Calls what Q-learning is changed by, where there is such an agent.
-  template <class Call>
-  void with_q_learning(const Call& call) {
-    if (!agent_) return;
-    std::visit(
-        [&call](auto& agent) {
-          if constexpr (!kIsFuzzy<std::remove_cvref_t<decltype(agent)>>) call(agent);
-        },
-        *agent_);
-  }
-  /// What Q-learning returns; `otherwise` where there is no such agent.
-  template <class Call>
-  double of_q_learning(const Call& call, double otherwise) const {
-    if (!agent_) return otherwise;
-    return std::visit(
-        [&](const auto& agent) {
-          if constexpr (kIsFuzzy<std::remove_cvref_t<decltype(agent)>>)
-            return otherwise;
-          else
-            return call(agent);
-        },
-        *agent_);
-  }
-
-  void require_numbers(const char* name, std::span<const double> values) const {
-    if (values.size() != n_variables()) {
-      core::require(false, name, std::to_string(n_variables()) + " numbers", values.size());
-    }
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (!std::isnan(values[i])) continue;
-      core::require(false, name + ("[" + std::to_string(i) + "]"), "a number", values[i]);
-    }
-  }
-
-  void draw_action(core::Pcg64& random, std::vector<double>& action) const {
-    for (std::size_t d = 0; d < action.size(); ++d) {
-      const std::size_t n = actions_.n_actions()[d];
-      action[d] = n == 0 ? -1.0 + 2.0 * random.uniform()
-                         : static_cast<double>(random.below(static_cast<std::uint32_t>(n)));
-    }
-  }
-
   template <class Agent>
   static typename Agent::Workspace& own_workspace(const Agent&, Workspace& workspace) {
     return std::get<typename Agent::Workspace>(workspace.agent);
-  }
-
-  /// Writes an agent's action, an index, or a number in [-1, 1], for each dimension, in the units
-  /// of the task, and its indices.
-  template <class Action>
-  void take(const Action& action, std::vector<double>& in_units,
-            std::vector<std::size_t>& indices) const {
-    for (std::size_t d = 0; d < in_units.size(); ++d) {
-      const auto number = [&] {
-        if constexpr (std::is_arithmetic_v<Action>)
-          return action;
-        else
-          return action[d];
-      }();
-      if (actions_.n_actions()[d] == 0) {
-        in_units[d] = actions_.of_normalized(static_cast<double>(number), d);
-      } else {
-        indices[d] = static_cast<std::size_t>(number);
-        in_units[d] = actions_.of_index(indices[d], d);
-      }
-    }
   }
 
   /// Finds the indices of an action: those of the last exploring act where it is the same one. A
@@ -487,30 +362,12 @@ class Controller {
     for (std::size_t d = 0; d < action.size(); ++d) indices_[d] = actions_.index_of(action[d], d);
   }
 
-  /// Learns state_, indices_ and next_state_; of a fuzzy agent, its last action.
-  void learn_states(double reward, bool terminated, std::size_t environment) {
-    std::visit(
-        [&](auto& agent) {
-          using Agent = std::remove_cvref_t<decltype(agent)>;
-          const auto& action = [&] {
-            if constexpr (kIsFuzzy<Agent>)
-              return agent.last_action(environment);
-            else if constexpr (Agent::kDecoupled)
-              return indices_;
-            else
-              return indices_[0];
-          }();
-          agent.learn(state_, action, reward, next_state_, terminated, environment);
-        },
-        *agent_);
-  }
-
   /// Throws unless a fuzzy agent chose the action in state_ when it explored last.
   void require_last(std::span<const double> action, std::size_t environment) {
     std::visit(
         [&](auto& agent) {
           if constexpr (kIsFuzzy<std::remove_cvref_t<decltype(agent)>>) {
-            take(agent.last_action(environment), action_, indices_);
+            actions_.take(agent.last_action(environment), action_, indices_);
             core::require(
                 agent.explored_in(state_, environment) && std::ranges::equal(action, action_),
                 "observation and action", "those of the last exploring act", "others");
@@ -523,7 +380,8 @@ class Controller {
     Observations fitted = observations_;
     fitted.fit(warm_up_->seen());
     if (config_.observation.relevant_only) {
-      fitted.keep(Relevance(experience_of(fitted, *warm_up_)).inputs(fitted.required()));
+      fitted.keep(Relevance(detail::experience_of(fitted, *warm_up_, n_dimensions()))
+                      .inputs(fitted.required()));
     }
     observations_ = std::move(fitted);
     fit();
@@ -560,8 +418,8 @@ class Controller {
 
   void add_inputs() {
     const std::vector<bool> kept = observations_.kept_inputs();
-    const RandomExperience latest =
-        experience_of(observations_.with_all_inputs(), latest_->transitions());
+    const RandomExperience latest = detail::experience_of(observations_.with_all_inputs(),
+                                                          latest_->transitions(), n_dimensions());
     const std::vector<bool> found = Relevance(latest, kCaution).inputs(kept);
     latest_->forget();
     if (found == kept) return;
@@ -572,30 +430,6 @@ class Controller {
     identity_ = core::Identity();  // readers have workspaces for fewer inputs
   }
 
-  /// Transitions, one environment after the other.
-  RandomExperience experience_of(const Observations& fitted, const WarmUp& transitions) const {
-    std::vector<std::size_t> order(transitions.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::ranges::stable_sort(order, {}, [&](auto t) { return transitions.step(t).environment; });
-    RandomExperience experience{.n_inputs = fitted.n_inputs(), .circular = fitted.circular()};
-    experience.actions.resize(n_dimensions());
-    std::vector<double> state(fitted.n_inputs());
-    for (std::size_t k = 0; k < order.size(); ++k) {
-      const WarmUp::Step step = transitions.step(order[k]);
-      fitted.scale(step.observation, state);
-      experience.states.insert(experience.states.end(), state.begin(), state.end());
-      fitted.scale(step.next_observation, state, "next_observation");
-      experience.next_states.insert(experience.next_states.end(), state.begin(), state.end());
-      for (std::size_t d = 0; d < n_dimensions(); ++d) {
-        experience.actions[d].push_back(step.action[d]);
-      }
-      experience.rewards.push_back(step.reward);
-      if (k > 0 && step.begins) experience.ends.back() = true;
-      experience.ends.push_back(step.terminated);
-    }
-    return experience;
-  }
-
   void relive(const WarmUp::Step& step) {
     if (step.begins) begin_episode(step.environment);
     observations_.scale(step.observation, state_);
@@ -603,7 +437,8 @@ class Controller {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
       indices_[d] = actions_.index_of(step.action[d], d);
     }
-    learn_states(step.reward, step.terminated, step.environment);
+    agents::learn(*agent_, state_, indices_, step.reward, next_state_, step.terminated,
+                  step.environment);
   }
 
   template <class Archive>
@@ -635,15 +470,7 @@ class Controller {
              std::ranges::all_of(step.observation, is_number) &&
              std::ranges::all_of(step.next_observation, is_number);
     };
-    const auto is_action = [this](const std::vector<double>& kept) {
-      for (std::size_t d = 0; d < kept.size(); ++d) {
-        const std::size_t n = actions_.n_actions()[d];
-        const bool fits = n == 0 ? kept[d] >= -1.0 && kept[d] <= 1.0
-                                 : kept[d] >= 0.0 && kept[d] < static_cast<double>(n);
-        if (!fits) return false;
-      }
-      return true;
-    };
+    const auto is_action = [this](const auto& kept) { return actions_.can_be_drawn(kept); };
     archive.taking("warm_up.actions", [&] {
       archive.expect(warm_up_->each_is(can_be_learned, is_action), "warm_up",
                      "of transitions and actions");

@@ -146,6 +146,17 @@ class Observations {
     return required;
   }
 
+  /// Throws std::invalid_argument unless these are numbers for all variables.
+  void require_numbers(const char* name, std::span<const double> values) const {
+    if (values.size() != n_variables()) {
+      core::require(false, name, std::to_string(n_variables()) + " numbers", values.size());
+    }
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (!std::isnan(values[i])) continue;
+      core::require(false, name + ("[" + std::to_string(i) + "]"), "a number", values[i]);
+    }
+  }
+
   /// Takes unknown ranges and pairs from observations. Shape: (n, n_variables), row by row.
   /// Throws std::invalid_argument where there is no range, and then nothing has changed.
   void fit(std::span<const double> seen) {

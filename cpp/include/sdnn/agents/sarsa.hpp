@@ -248,7 +248,7 @@ class Sarsa {
     Readout::Trace trace;
     Readout::Workspace present;  ///< of state
     Readout::Workspace next;     ///< of the state after it, or another
-    bool waits = false;          ///< the episode continues; with Sarsa, this transition is to be learned:
+    bool waits = false;  ///< the episode continues; with Sarsa, this transition is to be learned:
     std::vector<double> state;
     std::vector<std::size_t> action;
     double reward = 0.0;
@@ -380,7 +380,7 @@ class Sarsa {
     for (; n_doubled > 0; --n_doubled) {
       for (std::size_t i = 0; i < episodes_.size(); ++i) {
         std::int64_t& old_value = episodes_.of(i).old_value;
-        old_value = Readout::halved(old_value);
+        old_value = approximators::halved(old_value);
       }
     }
   }
@@ -393,7 +393,7 @@ class Sarsa {
     while (Readout::is_too_large(value)) {
       action_value_.double_unit();
       halve_old_values(1);
-      if (other != nullptr) *other = Readout::halved(*other);
+      if (other != nullptr) *other = approximators::halved(*other);
       value = compute();
     }
     return value;

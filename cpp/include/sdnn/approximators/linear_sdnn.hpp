@@ -8,7 +8,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,40 +20,10 @@
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/state_code.hpp"
-#include "sdnn/coding/state_code_config.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/detail/identity.hpp"
 
 namespace sdnn::approximators {
-
-/// Weights of a readout with so many actions in each dimension, with those that are always 0. Of
-/// any fields, impossible ones too: hence a double.
-inline double n_linear_weights(const LinearSDNNConfig& config,
-                               std::span<const std::size_t> n_actions) {
-  double n_rows = 0.0;
-  for (const std::size_t n : n_actions) {
-    n_rows += static_cast<double>(n) + config.action_window - 1.0;
-  }
-  return n_rows * 64.0 * std::ceil(config.n_pattern_units / 64.0) * config.n_inputs *
-         coding::n_partners_of(config);
-}
-
-/// Throws std::length_error if so many weights, with the patterns of so many bins and one trace,
-/// have more bytes than config.max_table_bytes.
-inline void require_room(const LinearSDNNConfig& config, double n_bins, double n_weights) {
-  const double n_copies = config.averaging_interval > 0 ? 3.0 : 2.0;
-  core::require_table_bytes(
-      "max_pairs, n_pattern_units, n_inputs, n_actions, action_window or n_interpolated",
-      "weights, a trace and patterns",
-      4.0 * n_copies * n_weights + coding::pattern_bytes_of(config, n_bins),
-      config.max_table_bytes);
-}
-/// The same of one dimension: before the code is made.
-inline void require_room(const LinearSDNNConfig& config, double n_bins) {
-  const std::size_t n_actions[] = {static_cast<std::size_t>(config.n_actions)};
-  require_room(config, n_bins, n_linear_weights(config, n_actions));
-}
 
 /// Q(s, a) = sum over the dimensions d of the action, and over the units in the window of a_d, of
 /// the inner product of the unit's weights and the code x_SD(s).
@@ -329,10 +298,6 @@ class LinearSDNN {
     for (std::int32_t& weight : averaged_) weight = halved(weight);
     std::ranges::fill(versions_, ++version_);
   }
-  template <class Number>
-  static Number halved(Number units) noexcept {
-    return (units + 1) >> 1;
-  }
   /// Whether a value has more bits than it may: then double the unit.
   static bool is_too_large(std::int64_t units) noexcept {
     return units >= kLargestValue || units <= -kLargestValue;
@@ -495,12 +460,6 @@ class LinearSDNN {
         }
       }
     }
-  }
-
-  /// a * b / 2^n_bits, rounded to the nearest, halves up.
-  static std::int64_t scaled(std::int64_t a, std::int64_t b, int n_bits) noexcept {
-    if (n_bits == 0) return a * b;
-    return (a * b + (std::int64_t{1} << (n_bits - 1))) >> n_bits;
   }
 
   template <class Call>

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <tuple>
 #include <vector>
 
@@ -58,6 +61,34 @@ inline LinearSDNNConfig with_pattern_units(LinearSDNNConfig config) noexcept {
     config.n_pattern_units = std::clamp((3072 / n_groups + 32) / 64 * 64, 64, 768);
   }
   return config;
+}
+
+/// Weights of a readout with so many actions in each dimension, with those that are always 0. Of
+/// any fields, impossible ones too: hence a double.
+inline double n_linear_weights(const LinearSDNNConfig& config,
+                               std::span<const std::size_t> n_actions) {
+  double n_rows = 0.0;
+  for (const std::size_t n : n_actions) {
+    n_rows += static_cast<double>(n) + config.action_window - 1.0;
+  }
+  return n_rows * 64.0 * std::ceil(config.n_pattern_units / 64.0) * config.n_inputs *
+         coding::n_partners_of(config);
+}
+
+/// Throws std::length_error if so many weights, with the patterns of so many bins and one trace,
+/// have more bytes than config.max_table_bytes.
+inline void require_room(const LinearSDNNConfig& config, double n_bins, double n_weights) {
+  const double n_copies = config.averaging_interval > 0 ? 3.0 : 2.0;
+  core::require_table_bytes(
+      "max_pairs, n_pattern_units, n_inputs, n_actions, action_window or n_interpolated",
+      "weights, a trace and patterns",
+      4.0 * n_copies * n_weights + coding::pattern_bytes_of(config, n_bins),
+      config.max_table_bytes);
+}
+/// The same of one dimension: before the code is made.
+inline void require_room(const LinearSDNNConfig& config, double n_bins) {
+  const std::size_t n_actions[] = {static_cast<std::size_t>(config.n_actions)};
+  require_room(config, n_bins, n_linear_weights(config, n_actions));
 }
 
 }  // namespace sdnn::approximators

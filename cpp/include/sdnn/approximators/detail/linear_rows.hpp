@@ -43,6 +43,17 @@ SDNN_INLINE std::int32_t times_code(std::int32_t x, std::int32_t active,
   return ((x & active) ^ negative) - negative;
 }
 
+/// a * b / 2^n_bits, rounded to the nearest, halves up.
+constexpr std::int64_t scaled(std::int64_t a, std::int64_t b, int n_bits) noexcept {
+  if (n_bits == 0) return a * b;
+  return (a * b + (std::int64_t{1} << (n_bits - 1))) >> n_bits;
+}
+/// units / 2, halves up.
+template <class Number>
+constexpr Number halved(Number units) noexcept {
+  return (units + 1) >> 1;
+}
+
 namespace detail {
 
 /// Rows that are summed in one pass over the code.

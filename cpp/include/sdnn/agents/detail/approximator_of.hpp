@@ -1,0 +1,74 @@
+/// The settings of an approximator that follow from a task.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "sdnn/agents/actions.hpp"
+#include "sdnn/agents/any_agent.hpp"
+#include "sdnn/agents/controller_config.hpp"
+#include "sdnn/agents/observations.hpp"
+#include "sdnn/approximators/linear_sdnn_config.hpp"
+#include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/core/detail/check.hpp"
+
+namespace sdnn::agents::detail {
+
+/// Whether a linear readout has weights of their own for every state: where these are listed and
+/// not more than other codes have columns, and neither units nor patterns are given.
+inline bool is_table(const ControllerConfig& config, const Observations& observations,
+                     const std::vector<coding::PatternTable>& tables) noexcept {
+  constexpr std::size_t kMostStates = 1536;
+  const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&config.approximator);
+  const std::size_t n = observations.n_states();
+  return linear != nullptr && linear->n_pattern_units == 0 && tables.empty() && n >= 2 &&
+         n <= kMostStates;
+}
+
+/// The approximator with the sizes, circles and symbols of a task whose ranges are known. Throws
+/// std::invalid_argument for tables that do not fit its symbols.
+inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
+                                             const Observations& observations,
+                                             const Actions& actions,
+                                             const std::vector<coding::PatternTable>& tables) {
+  const auto fill_in_sizes = [&](auto& own) {
+    own.n_inputs = static_cast<int>(observations.n_inputs());
+    if (config.action.discrete && actions.n_dimensions() == 1 && !is_fuzzy(config.approximator)) {
+      own.n_actions = static_cast<int>(actions.n_actions().front());
+    }
+  };
+  const auto fill_in_code = [&](auto& own) {
+    if constexpr (requires { own.circular; }) {
+      const auto circular = observations.circular();
+      const auto n_symbols = observations.n_symbols();
+      const auto has = [](const auto& list) {
+        return std::ranges::any_of(list, [](auto one) { return one != 0; });
+      };
+      if (has(circular) && own.circular.empty()) own.circular = circular;
+      if (has(n_symbols) && own.n_symbols.empty()) own.n_symbols = n_symbols;
+      if constexpr (requires { own.action_window; }) {
+        if (config.action.discrete) own.action_window = 1;
+        if (is_table(config, observations, tables)) {
+          own.n_pattern_units = static_cast<int>(observations.n_states());
+        }
+        auto first = own;  // inputs that are added have as many units
+        first.n_inputs = static_cast<int>(observations.n_first_inputs());
+        own.n_pattern_units = approximators::with_pattern_units(first).n_pattern_units;
+      }
+      for (std::size_t i = 0; i < std::min(tables.size(), n_symbols.size()); ++i) {
+        const auto n = static_cast<std::size_t>(n_symbols[i]);
+        core::require(n == 0 || tables[i].n_bins() == n, "tables[" + std::to_string(i) + "]",
+                      "of a row for each of " + std::to_string(n) + " symbols", tables[i].n_bins());
+      }
+    }
+  };
+  AnyApproximatorConfig filled = config.approximator;
+  std::visit(fill_in_sizes, filled);
+  std::visit(fill_in_code, filled);
+  return filled;
+}
+
+}  // namespace sdnn::agents::detail
