@@ -144,8 +144,9 @@ def train(
         click.echo(json.dumps(spec_schema(), indent=2))
         return
     from sdnn.runs import Run, RunSpec
-    from sdnn.runs.config_file import ConfigFile, overridden
+    from sdnn.runs.config_file import ConfigFile
     from sdnn.runs.errors import command_line
+    from sdnn.runs.settings import overridden
 
     given = _given(env_id, options)
     with run_command(option_words):

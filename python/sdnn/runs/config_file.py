@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import bisect
-import copy
 import json
 import re
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any, TypeAlias
 
 from sdnn.files import read_bytes
 from sdnn.runs.errors import ConfigError
-from sdnn.runs.spec import SHORTHANDS, RunSpec
+from sdnn.runs.spec import RunSpec
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -32,14 +31,6 @@ MOST_LEVELS = 32
 _MOST_PARSED = 2**21
 """Bytes that are parsed to find a line; in larger files errors name no line."""
 
-_REPLACED = {
-    "budget.steps": "budget.episodes",
-    "budget.episodes": "budget.steps",
-    "protocol.evaluate_every": "protocol.evaluate_every_episodes",
-    "protocol.evaluate_every_episodes": "protocol.evaluate_every",
-    "agent.name": "agent.preset",
-}
-"""Keys of a file that an option replaces besides its own."""
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 """Keys from the top of a document to a value; elements of arrays are numbers from 0."""
@@ -195,32 +186,3 @@ def dotted(key: KeyPath) -> str:
             bare = name.replace("-", "").replace("_", "").isalnum() and name.isascii()
             text += ("." if text else "") + (name if bare else json.dumps(name))
     return text
-
-
-def overridden(values: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values of a specification with others in their place.
-
-    Parameters
-    ----------
-    values
-        As a file has them.
-    options
-        Values by their keys, with dots between tables.
-    """
-    made = copy.deepcopy(dict(values))
-    for name, key in SHORTHANDS.items():
-        if isinstance(made.get(name), str):
-            made[name] = {key: made[name]}
-    for key in options:
-        table, _, name = _REPLACED.get(key, "").partition(".")
-        if isinstance(made.get(table), dict):
-            made[table].pop(name, None)
-    for key, value in options.items():
-        *tables, last = key.split(".")
-        place = made
-        for table in tables:
-            if not isinstance(place.get(table), dict):
-                place[table] = {}
-            place = place[table]
-        place[last] = value
-    return made

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import difflib
 import functools
@@ -21,6 +22,9 @@ from sdnn.config import WARM_UP, ProtocolConfig, fields_of
 from sdnn.runs.errors import ConfigError
 
 AnySettings = TypeVar("AnySettings", bound="Settings")
+
+SHORTHANDS = {"environment": "id", "agent": "name"}
+"""Tables that may be given as the value of one of their keys."""
 
 _WORDS = {
     " | null": "",
@@ -322,3 +326,42 @@ class OutputSpec(Settings, frozen=True):
     tensorboard: Annotated[bool, Meta(description="Write the numbers for TensorBoard, too.")] = (
         False
     )
+
+
+_REPLACED = {
+    "budget.steps": "budget.episodes",
+    "budget.episodes": "budget.steps",
+    "protocol.evaluate_every": "protocol.evaluate_every_episodes",
+    "protocol.evaluate_every_episodes": "protocol.evaluate_every",
+    "agent.name": "agent.preset",
+}
+"""Keys of a file that an option replaces besides its own."""
+
+
+def overridden(values: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of a specification with others in their place.
+
+    Parameters
+    ----------
+    values
+        As a file has them.
+    options
+        Values by their keys, with dots between tables.
+    """
+    made = copy.deepcopy(dict(values))
+    for name, key in SHORTHANDS.items():
+        if isinstance(made.get(name), str):
+            made[name] = {key: made[name]}
+    for key in options:
+        table, _, name = _REPLACED.get(key, "").partition(".")
+        if isinstance(made.get(table), dict):
+            made[table].pop(name, None)
+    for key, value in options.items():
+        *tables, last = key.split(".")
+        place = made
+        for table in tables:
+            if not isinstance(place.get(table), dict):
+                place[table] = {}
+            place = place[table]
+        place[last] = value
+    return made

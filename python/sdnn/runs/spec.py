@@ -30,6 +30,7 @@ from sdnn.runs.environment import EnvironmentSpec, Stream
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.registry import AgentEntry, agent_entry, label_of, split_label
 from sdnn.runs.settings import (
+    SHORTHANDS,
     AgentSpec,
     BudgetSpec,
     OutputSpec,
@@ -47,9 +48,6 @@ HASH_DIGITS = 16
 DEFAULT_STEPS = 200_000
 PAPER_EPISODES = 15_000
 PAPER_INTERVAL = 10
-
-SHORTHANDS = {"environment": "id", "agent": "name"}
-"""Tables that may be given as the value of one of their keys."""
 
 _ALWAYS = ("id", "name", "preset", "steps", "episodes")
 """Settings that are written also where they are the default."""

@@ -14,12 +14,20 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from msgspec import Meta
 
-from sdnn.runs.config_file import ConfigFile, KeyPath, dotted, overridden
+from sdnn.runs.config_file import ConfigFile, KeyPath, dotted
 from sdnn.runs.environment import find_module, search_folder
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.registry import labels, split_label
-from sdnn.runs.settings import Settings, check_names, checked, possible_words, read
-from sdnn.runs.spec import SHORTHANDS, RunSpec
+from sdnn.runs.settings import (
+    SHORTHANDS,
+    Settings,
+    check_names,
+    checked,
+    overridden,
+    possible_words,
+    read,
+)
+from sdnn.runs.spec import RunSpec
 
 BASE = "base"
 """The variant without overrides, where axes are varied one at a time or nothing varies."""
