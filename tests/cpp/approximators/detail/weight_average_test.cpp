@@ -26,11 +26,11 @@ TEST(WeightAverage, ByHand) {
   EXPECT_EQ(average.n_snapshots(), 0U);
   EXPECT_EQ(note(2, 8), 8 * kOne);  // the first is all there is
   EXPECT_EQ(note(3, 100), 8 * kOne);
-  EXPECT_EQ(note(4, 16), 16 * kOne);  // 2 * 2 / 4 of the way
-  EXPECT_EQ(note(6, 8), 8 * kOne);    // 2 * 2 / 6: the next power of two is all of it
-  EXPECT_EQ(note(8, 0), 4 * kOne);    // half of it
+  EXPECT_EQ(note(4, 16), 16 * kOne);  // 8 * 2 / 4 of the way: all of it
+  EXPECT_EQ(note(16, 8), 8 * kOne);   // 8 * 2 / 16
+  EXPECT_EQ(note(32, 0), 4 * kOne);   // half of it
   EXPECT_EQ(average.threshold(0), -4 * kOne);
-  EXPECT_EQ(note(16, 0), 3 * kOne);  // a quarter
+  EXPECT_EQ(note(64, 0), 3 * kOne);  // a quarter
   EXPECT_EQ(average.n_snapshots(), 5U);
   EXPECT_EQ(average.weight(0, 2), 0);
 }
