@@ -95,6 +95,8 @@ def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> 
             if ends:
                 agent.begin_episode()
         agent.begin_episode()  # learns what still waits
+        if n == 0:  # nor will there be anything in the next epochs
+            break
     return n
 
 

@@ -186,6 +186,11 @@ def test_a_long_line_is_not_read_whole(tmp_path):
     refuses("line", learn_from, new_agent(), path)
 
 
+def test_a_dataset_without_transitions_ends_at_once():
+    agent = SDNNSarsa(gym.spaces.Box(0.0, 1.0, (2,)), gym.spaces.Discrete(2))
+    assert learn_from(agent, (), epochs=2**31) == 0
+
+
 def test_arguments_that_cannot_be_used():
     good = arrays()
     refuses("agent", learn_from, "agent", [], error=TypeError)
