@@ -41,11 +41,13 @@ def load_image(agent: SDNNSarsa, image: bytes) -> None:
     if whole[:8] != expected[:8]:
         raise ValueError("image is that of an agent with other settings, spaces or another seed")
     exponent = int.from_bytes(whole[8:12], "little", signed=True)
-    n_snapshots, n_left = np.frombuffer(whole, "<u4", 2, 12).tolist()
-    n_learned, n_steps = np.frombuffer(whole, "<u8", 2, 20).tolist()
+    n_snapshots, n_left = np.frombuffer(whole, "<i4", 2, 12).tolist()
+    n_learned, n_steps = np.frombuffer(whole, "<i8", 2, 20).tolist()
     words = np.frombuffer(whole, "<u8", 16, 36).reshape(4, 4)
-    agent.begin_episode()
     state = agent.core.state()
+    for name in ("waits", "reward", "old_value"):  # the episode before is not of this life
+        state[name] = np.zeros_like(state[name])
+    state["trace.values"] = state["trace.values"][:0]
     for name in ("action_value.exponent", "n_random_left"):
         state.pop(name, None)
     state["n_learned"] = np.array(n_learned, np.int64)
@@ -65,7 +67,11 @@ def load_image(agent: SDNNSarsa, image: bytes) -> None:
         rows[:, columns] = np.frombuffer(whole, "<i4", n, at).reshape(-1, columns.size)
         state[f"action_value.{name}"] = rows
         at += 4 * n
-    agent.core.restore(state)
+    try:
+        agent.core.restore(state)
+    except ValueError as error:
+        raise ValueError(f"image holds what no agent can have: {error}") from error
+    agent.begin_episode()
 
 
 def _writer(agent: SDNNSarsa) -> LearnerWriter:

@@ -3,6 +3,7 @@
 ``nox -s emulation`` has other compilers and processors.
 """
 
+import zlib
 from dataclasses import replace
 
 import gymnasium as gym
@@ -12,7 +13,7 @@ import pytest
 from c_learners import LEARNERS, SMALL, build, check_life, discrete, lines_of, live, lived, sarsa
 from c_policies import STRICT, TARGETS, box, run
 from refusals import refuses
-from sdnn.agents import SDNNQLearning, SDNNSarsa
+from sdnn.agents import SDNNQLearning, SDNNSarsa, Transition
 from sdnn.export import c_header, load_image, save_image
 
 SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all")
@@ -106,6 +107,27 @@ def test_what_is_no_image_of_the_agent_changes_nothing():
     assert save_image(other) == before
     load_image(other, image)
     assert save_image(other) == image
+
+
+def test_an_image_of_impossible_numbers_changes_nothing():
+    agent, same = discrete(), discrete()
+    lines = lines_of(agent, 300, 1, 16)
+    for one in (agent, same):
+        live(one, lines[:-1], 16)
+        one.act([0.1, 0.2, 0.3])
+        one.learn(Transition([0.1, 0.2, 0.3], 0, 1.0, [0.2, 0.2, 0.3], False))
+    forged = bytearray(save_image(agent))
+    forged[20:28] = b"\xff" * 8  # n_learned
+    forged[-4:] = zlib.crc32(forged[:-4]).to_bytes(4, "little")
+    refuses("image", load_image, agent, bytes(forged))
+    states = agent.core.state(), same.core.state()
+    assert all(np.array_equal(states[0][name], states[1][name]) for name in states[1])
+    # Another life in between leaves nothing behind.
+    new = discrete()
+    load_image(agent, save_image(new))
+    came = live(agent, lines, 16)
+    assert came == live(new, lines, 16)
+    assert save_image(agent) == save_image(new)
 
 
 def test_other_agents_do_not_learn_in_c():
