@@ -39,6 +39,7 @@ from sdnn.estimators.training import class_weights, sample_weights
 from sdnn.kernel import N_UNITS, AnalyticKernel
 
 DEGREES = (1, 2, 3)
+LARGEST_TARGET = 1e140  # so that sums of squares are finite
 LOG_STEEPNESS = (0.0, 5.0)  # bounds, for the softmax of scores
 
 Self = TypeVar("Self", bound="BaseKernelRidge")
@@ -162,6 +163,8 @@ class BaseKernelRidge(CodedInputs):
 
         Returns the outputs of samples by models without them, and which samples these are.
         """
+        if (largest := np.abs(targets).max()) > LARGEST_TARGET:
+            raise ValueError(f"y must be within +-{LARGEST_TARGET:g}, got {largest:g}: scale it")
         weights = counts if factors is None else counts * factors
         samples = Samples(targets, weights, 1 / np.maximum(counts, 1))
         codings = self._codings(X, table)

@@ -240,3 +240,11 @@ def test_a_failed_fit_leaves_the_old_model(monkeypatch):
 )
 def test_impossible_parameters_are_named(parameters, error):
     refuses(error, SDNNKernelRidge(**parameters).fit, X, Y)
+
+
+def test_targets_whose_squares_overflow_are_refused():
+    samples = np.random.default_rng(0).random((40, 3))
+    refuses("y", SDNNKernelRidge().fit, samples, 8e307 * samples[:, 0])
+    model = SDNNKernelRidge().fit(samples, 1e139 * samples[:, 0])
+    assert np.isfinite(model.predict(samples)).all()
+    assert model.score(samples, 1e139 * samples[:, 0]) > 0.9
