@@ -16,13 +16,13 @@ _NO_EXPONENT = -(2**31)
 def save_image(agent: SDNNSarsa) -> bytes:
     """Return what an agent has learned, as ``NAME_load`` of its header with ``learning`` reads it.
 
-    An episode that goes on is not part of it.
+    The present episode is not part of it: its last transition may still have to be learned.
     """
     return _writer(agent).image()
 
 
 def load_image(agent: SDNNSarsa, image: bytes) -> None:
-    """Give an agent what ``NAME_save`` of its header wrote; it is to begin an episode then.
+    """Give an agent the state that ``NAME_save`` of its header wrote; an episode begins.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def load_image(agent: SDNNSarsa, image: bytes) -> None:
     n_learned, n_steps = np.frombuffer(whole, "<i8", 2, 20).tolist()
     words = np.frombuffer(whole, "<u8", 16, 36).reshape(4, 4)
     state = agent.core.state()
-    for name in ("waits", "reward", "old_value"):  # the episode before is not of this life
+    for name in ("waits", "reward", "old_value"):  # of the episode before
         state[name] = np.zeros_like(state[name])
     state["trace.values"] = state["trace.values"][:0]
     for name in ("action_value.exponent", "n_random_left"):

@@ -192,13 +192,17 @@ class LinearWriter(Writer):
         slots = np.arange(n_groups)[:, None] * (-(-m // 64) * 64) + np.arange(m)
         return slots.reshape(-1)
 
+    def n_actions(self) -> list[int]:
+        """Return the number of actions of each dimension."""
+        return [len(self.agent.actions_of(d)) for d in range(self.n_dimensions)]
+
     def sizes(self) -> dict[str, Any]:
         """Return what the templates of a readout need, and check it."""
         config, network = self.agent.approximator, self.network()
         m, window = config.n_pattern_units, config.action_window
         groups, n_double = self.layout()
         n_columns = len(groups) * m
-        n_actions = [len(self.agent.actions_of(d)) for d in range(self.n_dimensions)]
+        n_actions = self.n_actions()
         n_rows = sum(n + window - 1 for n in n_actions)
         if n_rows * n_columns > MOST_WEIGHTS:
             raise ValueError(
@@ -329,7 +333,7 @@ class LearnerWriter(LinearWriter):
             str(approximator),
             str(learning),
             self.agent.seed,
-            self.sizes()["n_actions"],
+            self.n_actions(),
             [(one.kind, list(one.at), one.low, one.high, one.n_bins) for one in self.inputs],
             [zlib.crc32(network.permutation(*pair).tobytes()) for pair in network.pairs],
         ]

@@ -114,7 +114,7 @@ void expect_that_a_life_can_be_cut(const Make& make, std::size_t n_environments 
   });
 }
 
-/// Expects that the agent allocates nothing as it goes on from a state that it was given, where
+/// Expects that the agent allocates nothing when it continues from a restored state, where
 /// acting and learning do not.
 template <class Make>
 void expect_that_a_restored_agent_allocates_nothing(const Make& make, auto allocation_count) {

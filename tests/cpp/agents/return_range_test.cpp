@@ -140,7 +140,7 @@ TEST(ReturnRange, StaysFinite) {
   EXPECT_LT(one.range.high(), 1.7e300);
   EXPECT_GT(one.range.low(), -1.7e300);
   ReturnRange other(1.0);
-  core::restore(other, core::state_of(one.range));  // what came of it may be saved
+  core::restore(other, core::state_of(one.range));  // a range this wide can be saved
   EXPECT_EQ(core::state_of(other), core::state_of(one.range));
 }
 

@@ -55,7 +55,13 @@ def circular():
     return SDNNSarsa(*spaces, angles=[0], seed=5, **_with(config))
 
 
+def states():
+    """A table of listed states."""
+    return SDNNSarsa(gym.spaces.Discrete(9), gym.spaces.Discrete(4), seed=6)
+
+
 LEARNERS = {
+    "states": states,
     "discrete": discrete, "sarsa": sarsa, "dutch": dutch, "several": several, "circular": circular,
 }  # fmt: skip
 
@@ -95,14 +101,22 @@ int main(void) {
 def lines_of(agent, n_steps, seed, fraction_bits):
     """Lines of life with episodes that end in every way, and rewards of many sizes."""
     random = np.random.default_rng(seed)
-    high = np.asarray(agent.observation_space.high, float)
-    scale = 2**fraction_bits
+    space, scale = agent.observation_space, 2**fraction_bits
+
+    def after(now):
+        if isinstance(space, gym.spaces.Discrete):
+            return np.eye(space.n)[random.integers(space.n)]
+        high = np.asarray(space.high, float)
+        if now is None:
+            return random.uniform(-1.2, 1.2, high.size) * high
+        return np.clip(now + random.normal(0, 0.1, high.size) * high, -1.2 * high, 1.2 * high)
+
     lines, now = [], None
     for _ in range(n_steps):
         if now is None:
-            now = random.uniform(-1.2, 1.2, high.size) * high
+            now = after(None)
             lines.append([0, *now, 0, *now, 0])
-        following = np.clip(now + random.normal(0, 0.1, high.size) * high, -1.2 * high, 1.2 * high)
+        following = after(now)
         if random.random() < 0.1:
             lines.append([2, *now, 0, *now, 0])
         reward = random.choice([0.0, 1.0, -1.0, random.normal(), 100.0 * random.normal()])
@@ -117,11 +131,13 @@ def lines_of(agent, n_steps, seed, fraction_bits):
 
 
 def live(agent, lines, fraction_bits):
-    """What the library's agent does with the lines: the numbers of its actions."""
+    """The indices of the actions that the library's agent takes for the lines."""
     n, scale = (lines.shape[1] - 3) // 2, 2.0**fraction_bits
     actions = []
     for line in lines.tolist():
         now, following = np.array(line[1 : n + 1]) / scale, np.array(line[n + 2 : -1]) / scale
+        if isinstance(agent.observation_space, gym.spaces.Discrete):
+            now, following = now.argmax(), following.argmax()
         if line[0] == 0:
             agent.begin_episode()
         action = agent.act(now, explore=line[0] == 1)
@@ -180,7 +196,7 @@ def check_life(name, target, folder, n_steps=3000, options=()):
     expected = live(agent, lines, header.fraction_bits)
     assert came == expected
     assert image == save_image(agent)
-    # The experience comes home, and goes on in both.
+    # Python loads the experience, and both continue from it.
     home = LEARNERS[name]()
     load_image(home, image)
     assert save_image(home) == image

@@ -1,4 +1,4 @@
-"""Training that stops anywhere and goes on: what tests of exact resuming share."""
+"""Training that stops anywhere and resumes: shared by tests of exact resuming."""
 
 import numpy as np
 
