@@ -149,13 +149,14 @@ void bind_online_layer(py::module_& module) {
       .def(py::init<std::shared_ptr<ParallelPerceptron>>(), py::arg("layer"))
       .def(
           "learn_counts",
-          [](OnlineLayer& self, const Bins& bins, const ArrayArgument<double>& targets) {
+          [](OnlineLayer& self, const Bins& bins, const ArrayArgument<double>& targets,
+             double share) {
             return present_online(
                 self, bins,
                 estimators::PDeltaRule(self.layer().n_units(), matrix(targets, "targets"),
-                                       static_cast<std::size_t>(targets.shape(1))));
+                                       static_cast<std::size_t>(targets.shape(1)), share));
           },
-          py::arg("bins"), py::arg("targets"),
+          py::arg("bins"), py::arg("targets"), py::arg("share") = 1.0,
           "The p-delta rule; how many samples and units were corrected. What raises changes "
           "nothing.")
       .def(
@@ -240,17 +241,18 @@ void bind_estimators(py::module_& module) {
   using estimators::PDeltaTrainer;
   py::class_<PDeltaTrainer, std::shared_ptr<PDeltaTrainer>> p_delta(
       module, "PDeltaTrainer", "Trains groups of units to fire in given numbers");
-  p_delta.def(py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
-                          const ArrayArgument<double>& targets, const std::string& form,
-                          std::size_t memory_limit, int n_threads, std::size_t n_epochs) {
-                estimators::PDeltaRule rule(layer->n_units(), matrix(targets, "targets"),
-                                            static_cast<std::size_t>(targets.shape(1)));
-                return make_trainer<PDeltaTrainer>(std::move(layer), bins, std::move(rule), form,
-                                                   memory_limit, n_threads, n_epochs);
-              }),
-              py::arg("layer"), py::arg("bins"), py::arg("targets"), py::arg("form") = "auto",
-              py::arg("memory_limit") = estimators::kMemoryLimit, py::arg("n_threads") = 1,
-              py::arg("n_epochs") = estimators::kExpectedEpochs);
+  p_delta.def(
+      py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
+                  const ArrayArgument<double>& targets, double share, const std::string& form,
+                  std::size_t memory_limit, int n_threads, std::size_t n_epochs) {
+        estimators::PDeltaRule rule(layer->n_units(), matrix(targets, "targets"),
+                                    static_cast<std::size_t>(targets.shape(1)), share);
+        return make_trainer<PDeltaTrainer>(std::move(layer), bins, std::move(rule), form,
+                                           memory_limit, n_threads, n_epochs);
+      }),
+      py::arg("layer"), py::arg("bins"), py::arg("targets"), py::arg("share") = 1.0,
+      py::arg("form") = "auto", py::arg("memory_limit") = estimators::kMemoryLimit,
+      py::arg("n_threads") = 1, py::arg("n_epochs") = estimators::kExpectedEpochs);
   bind_trainer_methods(p_delta);
 
   using estimators::PerceptronTrainer;

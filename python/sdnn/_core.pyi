@@ -1103,7 +1103,7 @@ class OnlineLayer:
     """
     def __init__(self, layer: ParallelPerceptron) -> None:
         ...
-    def learn_counts(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[int, int]:
+    def learn_counts(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], share: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> tuple[int, int]:
         """
         The p-delta rule; how many samples and units were corrected. What raises changes nothing.
         """
@@ -1121,7 +1121,7 @@ class PDeltaTrainer:
     """
     Trains groups of units to fire in given numbers
     """
-    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, n_epochs: typing.SupportsInt | typing.SupportsIndex = 30) -> None:
+    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], share: typing.SupportsFloat | typing.SupportsIndex = 1.0, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, n_epochs: typing.SupportsInt | typing.SupportsIndex = 30) -> None:
         ...
     def present(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
         """

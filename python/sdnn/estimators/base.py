@@ -69,6 +69,8 @@ class BaseSDNN(Fitted, CodedInputs):
         feature. "auto" selects pairs by cross-validation, which takes some forty times as long.
     tables : {"shared", "separate"}, default="shared"
         One table of patterns per input, permuted for each pair, or two tables per pair.
+    correction_share : float, default=1
+        Share of the missing or superfluous units that a sample corrects, at least one; in (0, 1].
     shuffle : bool, default=True
         Whether each epoch has a new random order.
     early_stopping : bool, default=False
@@ -118,6 +120,7 @@ class BaseSDNN(Fitted, CodedInputs):
     tables: str = "shared"
     out_of_range: str = "clip"
     max_iter: int = 30
+    correction_share: float = 1.0
     shuffle: bool = True
     early_stopping: bool = False
     validation_fraction: float = 0.1
@@ -140,6 +143,7 @@ class BaseSDNN(Fitted, CodedInputs):
         "tables": [StrOptions({"shared", "separate"})],
         "out_of_range": [StrOptions({"clip", "error"})],
         "max_iter": [Interval(Integral, 1, 10**9, closed="both")],
+        "correction_share": [Interval(Real, 0, 1, closed="right")],
         "shuffle": ["boolean"],
         "early_stopping": ["boolean"],
         "validation_fraction": [Interval(Real, 0, 1, closed="neither")],
@@ -177,7 +181,7 @@ class BaseSDNN(Fitted, CodedInputs):
 
     @abc.abstractmethod
     def _rule_arguments(self, targets: Array) -> tuple[Any, ...]:
-        """Return (counts,) for the p-delta rule, or (labels, n_classes, scheme) for perceptrons."""
+        """Return (counts, share) of the p-delta rule, or (labels, n_classes, scheme)."""
 
     @abc.abstractmethod
     def _validation_score(self, bins: Ints, targets: Array, weights: Floats | None) -> float:
@@ -390,7 +394,7 @@ class BaseSDNN(Fitted, CodedInputs):
 
     def _trainer(self, bins: Ints, targets: Array, n_epochs: int) -> Trainer:
         rule = self._rule_arguments(targets)
-        kind: Any = _core.PDeltaTrainer if len(rule) == 1 else _core.PerceptronTrainer
+        kind: Any = _core.PDeltaTrainer if len(rule) == 2 else _core.PerceptronTrainer
         trainer: Trainer = kind(
             self.network_.layer,
             bins,

@@ -197,7 +197,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         if self._n_units_each == 1:
             return targets, n_classes, self._scheme
         own = targets[:, None] == np.arange(n_classes)
-        return (self._n_units_each * np.where(own, OWN_SHARE, 1 - OWN_SHARE),)
+        counts = self._n_units_each * np.where(own, OWN_SHARE, 1 - OWN_SHARE)
+        return counts, self.correction_share
 
     def _presentations(self, targets: Ints, weights: Floats | None) -> Floats | None:
         each = class_weights(self.class_weight, self.classes_[targets])

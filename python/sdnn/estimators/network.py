@@ -219,13 +219,13 @@ class Network:
     def learn_online(self, bins: Ints, rule: tuple[Any, ...], memory_limit: int) -> bool:
         """Learn samples in place, in order; return False without a layer for single samples.
 
-        ``rule`` is (counts,) for the p-delta rule, or (labels, n_classes, scheme). Nothing that may
-        fail may follow.
+        ``rule`` is (counts, share) for the p-delta rule, or (labels, n_classes, scheme). Nothing
+        that may fail may follow.
         """
         online = self.online(memory_limit)
         if online is None:
             return False
-        learn = online.learn_counts if len(rule) == 1 else online.learn_labels
+        learn = online.learn_counts if len(rule) == 2 else online.learn_labels
         ended = object()
         self._learned = object()  # an interrupt may come between learning and the other mark
         learn(bins, *rule)

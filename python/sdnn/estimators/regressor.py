@@ -166,7 +166,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             )
 
     def _rule_arguments(self, targets: Floats) -> tuple[Any, ...]:
-        return (targets,)
+        return targets, self.correction_share
 
     def _validation_score(self, bins: Ints, targets: Floats, weights: Floats | None) -> float:
         counts = self.network_.counts(bins, self.n_outputs_, self._n_threads())

@@ -45,6 +45,16 @@ TEST(PDeltaRule, GroupsDoNotMix) {
   EXPECT_EQ(apply(rule, 0, {1, -1, 1, -1}), (Pairs{{1, 1}, {2, -1}}));
 }
 
+TEST(PDeltaRule, CorrectsAShareOfTheDeficit) {
+  const std::vector<std::int32_t> potentials{5, -2, 0, 3, -2, -9, -4, -1, 0};
+  estimators::PDeltaRule rule(9, std::vector<double>{3.0, 4.0, 8.0, 9.0, 0.0}, 1, 0.25);
+  EXPECT_EQ(apply(rule, 0, potentials), (Pairs{{2, 1}}));          // .25 is at least one
+  EXPECT_EQ(apply(rule, 1, potentials), (Pairs{{2, 1}}));          // .5 rounds up
+  EXPECT_EQ(apply(rule, 2, potentials), (Pairs{{2, 1}, {8, 1}}));  // 1.5 rounds up
+  EXPECT_EQ(apply(rule, 3, potentials), (Pairs{{2, 1}, {8, 1}}));  // 1.75
+  EXPECT_EQ(apply(rule, 4, potentials), (Pairs{{3, -1}}));
+}
+
 TEST(PDeltaRule, TellsFarUnitsApart) {
   const std::int32_t far = 2000000000;
   estimators::PDeltaRule rule(3, std::vector<double>{1.0, 2.0}, 1);
@@ -114,6 +124,10 @@ TEST(CorrectionRules, RefuseBadArguments) {
   EXPECT_THROW(estimators::PDeltaRule(3, std::vector<double>{1, 1}, 2), std::invalid_argument);
   EXPECT_THROW(estimators::PDeltaRule(4, std::vector<double>{1}, 0), std::invalid_argument);
   EXPECT_THROW(estimators::PDeltaRule(0, std::vector<double>{1}, 1), std::invalid_argument);
+  for (const double share : {0.0, -1.0, 1.01, std::nan("")}) {
+    EXPECT_THROW(estimators::PDeltaRule(4, std::vector<double>{1}, 1, share),
+                 std::invalid_argument);
+  }
   const std::vector<std::int32_t> labels{0, 3};
   using estimators::PerceptronRule;
   EXPECT_THROW(PerceptronRule(3, labels, 3, ClassScheme::one_vs_rest), std::invalid_argument);

@@ -63,14 +63,16 @@ def agree(model, layer, X):
 
 
 @settings(max_examples=100, deadline=None)
-@given(problems(), st.integers(1, 2), st.integers(1, 30))
-def test_regression(problem, n_outputs, n_output_units):
+@given(problems(), st.integers(1, 2), st.integers(1, 30), st.sampled_from([1.0, 0.5, 0.3]))
+def test_regression(problem, n_outputs, n_output_units, share):
     X, y, options, orders = problem
     y = np.stack([y, 2 - y * y], axis=1)[:, :n_outputs]
-    model, counts = untrained(SDNNRegressor(n_output_units=n_output_units, **options), X, y)
+    model, counts = untrained(
+        SDNNRegressor(n_output_units=n_output_units, correction_share=share, **options), X, y
+    )
     layer = transcribed(model)
     bins = model.network_.input_code.bins(X)
-    slow = estimator_transcription.PDeltaTrainer(layer, bins, counts)
+    slow = estimator_transcription.PDeltaTrainer(layer, bins, counts, share)
     fast = model._trainer(bins, counts, 3)
     for order in orders:
         assert tuple(fast.present(np.array(order, dtype=np.int32))) == slow.present(order)

@@ -90,10 +90,10 @@ class Trainer:
         pass
 
 
-def p_delta(potentials, target):
+def p_delta(potentials, target, share=1.0):
     """+1, 0 or -1 per unit: the units nearest to their threshold on the wrong side."""
     error = min(max(int(target + 0.5), 0), len(potentials)) - np.count_nonzero(potentials > 0)
-    n_delta = abs(error)
+    n_delta = max(1, int(share * abs(error) + 0.5)) if error else 0
     changes = np.zeros(len(potentials), dtype=np.int32)
     if error > 0:
         off = np.flatnonzero(potentials <= 0)
@@ -109,14 +109,18 @@ def p_delta(potentials, target):
 class PDeltaTrainer(Trainer):
     """Regression: brings the number of firing units of each group to its target."""
 
-    def __init__(self, layer, bins, targets, form="auto", memory_limit=0, n_threads=1):
+    def __init__(self, layer, bins, targets, share=1.0, form="auto", memory_limit=0, n_threads=1):
         super().__init__(layer, bins)
         self.targets = np.asarray(targets, dtype=np.float64)
+        self.share = share
 
     def corrections(self, t, potentials):
         groups = np.split(potentials, self.targets.shape[1])
         return np.concatenate(
-            [p_delta(group, target) for group, target in zip(groups, self.targets[t], strict=True)]
+            [
+                p_delta(group, target, self.share)
+                for group, target in zip(groups, self.targets[t], strict=True)
+            ]
         )
 
 

@@ -31,8 +31,9 @@ struct Correction {
 /// The p-delta rule: the number of firing units of each group is brought to its target.
 ///
 /// If too few (many) units fire, that many of the silent (firing) ones that are nearest to their
-/// threshold are corrected, the lowest index first among equals. The target is
-/// int(0.5 + target), at least 0 and at most the group's size.
+/// threshold are corrected, the lowest index first among equals; with a `share` below 1 only
+/// max(1, int(0.5 + share * that many)). The target is int(0.5 + target), at least 0 and at most
+/// the group's size.
 ///
 /// Source: Auer, Burgsteiner, Maass 2008; Nonaka, Tanaka, Morita 2011.
 class PDeltaRule {
@@ -40,9 +41,11 @@ class PDeltaRule {
   /// Targets in units of the firing count, not rounded: (t - b) / a.
   ///
   /// Shapes: targets (n_samples, n_groups). Throws std::invalid_argument if a target is not finite,
-  /// if n_units is 0, or if n_groups does not divide it.
-  PDeltaRule(std::size_t n_units, std::span<const double> targets, std::size_t n_groups)
-      : n_groups_(n_groups) {
+  /// if n_units is 0, if n_groups does not divide it, or if share is not in (0, 1].
+  PDeltaRule(std::size_t n_units, std::span<const double> targets, std::size_t n_groups,
+             double share = 1.0)
+      : n_groups_(n_groups), share_(share) {
+    core::require(share > 0.0 && share <= 1.0, "share", "in (0, 1]", share);
     core::require_in_range("n_units", n_units, 1, std::size_t{1} << 20);
     core::require(n_groups > 0 && n_units % n_groups == 0, "n_groups",
                   "a divisor of n_units = " + std::to_string(n_units), n_groups);
@@ -83,7 +86,8 @@ class PDeltaRule {
   void correct_group(const std::int32_t* potentials, std::size_t first_unit, std::int32_t deficit,
                      std::vector<Correction>& corrections) {
     const std::int32_t direction = deficit > 0 ? 1 : -1;
-    const auto n_corrected = static_cast<std::size_t>(std::abs(deficit));
+    const auto n_corrected =
+        static_cast<std::size_t>(std::max(1.0, std::floor(0.5 + share_ * std::abs(deficit))));
     const auto add = [&](std::size_t i) {
       corrections.push_back({static_cast<std::uint32_t>(first_unit + i), direction});
     };
@@ -112,6 +116,7 @@ class PDeltaRule {
   static constexpr std::size_t kScans = 12;
 
   std::size_t n_groups_;
+  double share_;
   std::size_t group_size_ = 0;
   std::vector<std::int32_t> targets_;
   std::vector<std::int32_t> keys_;
