@@ -103,6 +103,13 @@ def docs(session):
     pytest(session, "tests/docs")
 
 
+@weekly(name="docs-weekly")
+def docs_weekly(session):
+    """Run the blocks of the documents that take more than a minute, an hour in all."""
+    os.environ["SDNN_WEEKLY"] = "1"
+    pytest(session, "tests/docs/test_pages.py", "-k", "long_blocks")
+
+
 @weekly()
 def cluster(session):
     """Run trials on a Dask cluster whose parts are killed and frozen."""

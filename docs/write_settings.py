@@ -15,12 +15,11 @@ HEAD = """# Settings of a run
 <!-- Written by docs/write_settings.py from the declarations of the settings. -->
 
 The keys of files for `sdnn train --config FILE`, of `--set KEY=VALUE`, and of
-[studies](../how-to/studies.md). `approximator.*` and `learning.*` are those of the agent;
-defaults are the paper's, before the agent's preset. `sdnn train --schema` prints
-the same as JSON Schema.
+[studies](../how-to/studies.md): type; default; meaning. `approximator.*` and `learning.*` are those
+of the agent, with the paper's defaults, before a preset. `sdnn train --schema` prints JSON Schema.
 
-A study without an environment is about the paper's acrobot, where some defaults differ: the preset
-is `paper`, the budget 15,000 episodes, and every 10 episodes there is an evaluation of one episode.
+A study without an environment is about the paper's acrobot: the preset is `paper`, the budget
+15,000 episodes, and every 10 episodes there is an evaluation of one episode.
 """
 
 
@@ -28,6 +27,7 @@ def page() -> str:
     """Return the page."""
     definitions = spec_schema()["$defs"]
     text = HEAD
+    described: dict[tuple[str, str], str] = {}
     for table, found in definitions["RunSpec"]["properties"].items():
         text += f"\n## {table}\n\n{found['description']}\n"
         names = [kind.__name__ for kind in CORE.get(table, ())]
@@ -35,17 +35,26 @@ def page() -> str:
             one["$ref"].rpartition("/")[2] for one in found.get("anyOf", [found]) if "$ref" in one
         ]
         for name in names:
-            text += f"\n`{name}`:\n\n| setting | type | default | meaning |\n|---|---|---|---|\n"
-            text += "".join(rows(table, definitions[name]["properties"]))
+            text += f"\n### {name}\n\n"
+            text += "".join(entries(table, name, definitions[name]["properties"], described))
     return text
 
 
-def rows(table: str, properties: dict[str, Any]) -> Iterator[str]:
-    """Write the rows of a table."""
+def entries(
+    table: str,
+    kind: str,
+    properties: dict[str, Any],
+    described: dict[tuple[str, str], str],
+) -> Iterator[str]:
+    """Write a line for each setting; what an earlier class describes alike is referred to."""
     for name, found in properties.items():
-        default = "" if found.get("default") in (None, (), {}) else f"`{found.get('default')}`"
-        text = found.get("description", "").replace("|", "\\|")
-        yield f"| `{table}.{name}` | {words(found)} | {default} | {text} |\n"
+        default = found.get("default")
+        what = words(found) + ("" if default in (None, (), {}) else f"; `{default}`")
+        text = found.get("description", "")
+        first = described.setdefault((name, text), kind)
+        if first != kind and len(text.split()) > 5:
+            text = f"As in {first}."
+        yield f"- **`{table}.{name}`** ({what}): {text}\n"
 
 
 def words(found: dict[str, Any]) -> str:

@@ -1,53 +1,25 @@
-"""What docs/how-to/agents.md shows works as it stands there."""
+"""What the pages on agents say is true."""
 
 import re
 from pathlib import Path
 
-import gymnasium as gym
-
 from sdnn.agents import PRESETS
 from sdnn.cli import main
-from sdnn.runs.config_file import read_spec
 
-TEXT = (Path(__file__).parents[2] / "docs" / "how-to" / "agents.md").read_text()
-
-
-def blocks(language):
-    return re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
+FOLDER = Path(__file__).parents[2] / "docs" / "how-to"
 
 
-def test_the_python_examples_run(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code = "\n".join(blocks("python"))
-    assert code.count("gym.register(") == 1
-    names = {"__name__": "docking"}
-    monkeypatch.delitem(gym.registry, "mine/Docking-v0", raising=False)
-    try:
-        exec(compile(code, "agents.md", "exec"), names)
-    finally:
-        gym.registry.pop("mine/Docking-v0", None)
-    assert names["result"].evaluations.shape == (2, 2)
-    assert names["training"].n_steps == 4000
-
-
-def test_the_commands_and_options_exist():
-    shell = "\n".join(blocks("sh"))
-    words = set(re.findall(r"sdnn (\w+)", shell))
-    assert words == {"train", "resume", "evaluate", "plot", "record", "export"}
+def test_the_options_exist():
     options = {o for c in main.commands.values() for p in c.params for o in p.opts}
-    assert set(re.findall(r"--[a-z][a-z-]*", TEXT)) <= options
-
-
-def test_the_configuration_file_is_one(tmp_path):
-    (text,) = blocks("toml")
-    (tmp_path / "mine.toml").write_text(text)
-    spec = read_spec(tmp_path / "mine.toml")
-    assert spec.make_agent(spec.make_env()).approximator.rounding == "random"
+    for page in ("agents", "choosing-settings", "command-line", "robots", "training"):
+        text = (FOLDER / f"{page}.md").read_text()
+        assert set(re.findall(r"--[a-z][a-z-]*", text)) <= options | {"--help"}, page
 
 
 def test_the_table_of_presets_is_right():
+    text = (FOLDER / "choosing-settings.md").read_text()
     name, cell = r"`(\w+)\.(\w+)`(?:, `q_high`)?", r"(.*?)"
-    rows = re.findall(rf"^\| {name} \| {cell} \| {cell} \| {cell} \|", TEXT, re.MULTILINE)
+    rows = re.findall(rf"^\| {name} \| {cell} \| {cell} \| {cell} \|", text, re.MULTILINE)
     assert len(rows) == 13
     for section, name, *cells in rows:
         for preset, cell in zip(("general", "robust", "paper"), cells, strict=True):

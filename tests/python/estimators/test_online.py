@@ -2,9 +2,7 @@
 
 import copy
 import pickle
-import re
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -68,18 +66,6 @@ def test_labels_one_at_a_time_have_the_bits_of_partial_fit(scheme):
         other.partial_fit(x[None], [label], classes=[0, 1, 2])
     same(one, other)
     assert [one.predict_one(x) for x in X] == one.predict(X).tolist()
-
-
-def test_the_loop_of_the_document_runs():
-    page = Path(__file__).parents[3] / "docs" / "how-to" / "regression.md"
-    document = page.read_text(encoding="utf-8")
-    (loop,) = re.findall(r"```python\n([^`]*in stream:.*?)```", document, re.S)
-    random = np.random.RandomState(0).uniform(0, 1, (30, 2))
-    stream = (({"wind": wind, "hour": hour}, 30 * wind * hour) for wind, hour in random)
-    names = {"SDNNRegressor": SDNNRegressor, "RandomInverse": RandomInverse, "stream": stream}
-    exec(loop, names)
-    assert names["model"].n_iter_ == 30
-    assert isinstance(names["guess"], float)
 
 
 def test_fit_widens_a_range_at_once_and_partial_fit_as_targets_come():

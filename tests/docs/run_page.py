@@ -1,0 +1,173 @@
+"""Run the code of a page from top to bottom, in order: ``python tests/docs/run_page.py PAGE``.
+
+Blocks in ``python`` share their names, blocks in ``sh`` their folder: a temporary one that looks
+like a clone, with a copy of ``docs``. Other blocks, and those in Python too, are written to the
+file that their first line names (``# docking.py``, ``// main.c``). A comment before a block says
+when it is not run at once::
+
+    <!-- needs: gcc -->            where something is missing that NEEDS looks for
+    <!-- weekly: 3 minutes -->     it takes more than a minute; run with --weekly
+    <!-- not run: needs SLURM -->  never
+
+``--list`` counts the blocks of all pages.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+ROOT = Path(__file__).parents[2]
+
+RUN = ("python", "sh")
+WRITTEN = ("python", "toml", "c", "cpp", "cmake")
+SHOWN = ("text", "")
+"""Languages of blocks that are run, that are written to a file, and that are neither."""
+
+_BLOCK = re.compile(r"(?:^<!-- (\w[\w ]*): ([^\n]*) -->\n)?^```(\w*)\n(.*?)^```", re.S | re.M)
+_NAME = re.compile(r"(?:#|//) ([\w/-]+\.\w+)$", re.M)
+
+
+class Block(NamedTuple):
+    """A block of a page: its line, language, text, and what a comment says of it."""
+
+    line: int
+    language: str
+    text: str
+    mark: str = ""
+    reason: str = ""
+
+
+def pages() -> list[Path]:
+    """List the pages with code, by their names."""
+    found = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+    return [page for page in found if any(b.language not in SHOWN for b in blocks(page))]
+
+
+def blocks(page: Path) -> list[Block]:
+    """List the blocks of a page; ValueError for a language or a mark that nobody knows."""
+    text = page.read_text("utf-8")
+    found = []
+    for match in _BLOCK.finditer(text):
+        mark, reason, language, content = match.groups(default="")
+        line = text.count("\n", 0, match.start(3)) + 1
+        if language not in {*RUN, *WRITTEN, *SHOWN}:
+            raise ValueError(f"{page}:{line}: a block in {language} is neither run nor written")
+        if language in WRITTEN and language not in RUN and not _NAME.match(content):
+            raise ValueError(
+                f"{page}:{line}: the first line must name a file, as # mine.{language}"
+            )
+        if mark not in ("", "needs", "weekly", "not run"):
+            raise ValueError(f"{page}:{line}: no mark is called {mark!r}")
+        found.append(Block(line, language, content, mark, reason))
+    return found
+
+
+def _command(*words: str) -> Callable[[], bool]:
+    def is_there() -> bool:
+        return subprocess.run(words, capture_output=True, check=False).returncode == 0
+
+    return is_there
+
+
+NEEDS: dict[str, Callable[[], bool]] = {
+    "gcc": lambda: shutil.which("gcc") is not None,
+    "g++": lambda: shutil.which("g++") is not None,
+    "cmake": lambda: shutil.which("cmake") is not None,
+    "libeigen3-dev": Path("/usr/include/eigen3").exists,
+    "nlohmann/json": Path("/usr/include/nlohmann/json.hpp").exists,
+    "an installed package": _command(sys.executable, "-m", "sdnn", "--cmakedir"),
+    "optuna": lambda: importlib.util.find_spec("optuna") is not None,
+}
+
+
+def missing(block: Block) -> list[str]:
+    """List what a block needs and this machine lacks."""
+    wanted = block.reason.split(", ") if block.mark == "needs" else []
+    return [name for name in wanted if not NEEDS[name]()]
+
+
+def is_due(block: Block, *, weekly: bool) -> bool:
+    """Return whether a block is to be run or written."""
+    return not block.mark or block.mark == "needs" or (weekly and block.mark == "weekly")
+
+
+def make_folder(folder: Path) -> dict[str, str]:
+    """Make a folder look like a clone; return the environment of its commands."""
+    for path in ROOT.iterdir():
+        if path.name not in (".git", "docs", "build", "results", "runs"):
+            (folder / path.name).symlink_to(path)
+    shutil.copytree(ROOT / "docs", folder / "docs")
+    commands = folder / ".commands"
+    commands.mkdir()
+    (commands / "sdnn").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m sdnn "$@"\n')
+    (commands / "sdnn").chmod(0o755)
+    beside = Path(sys.executable).parent
+    path = os.pathsep.join([str(commands), str(beside), os.environ["PATH"]])
+    return os.environ | {"PATH": path, "MPLBACKEND": "Agg", "SDL_VIDEODRIVER": "dummy"}
+
+
+def run(page: Path, *, weekly: bool) -> Iterator[tuple[Block, float, list[str]]]:
+    """Run a page in the present folder; yield blocks with their seconds, or what they lack."""
+    names: dict[str, Any] = {"__name__": "__main__"}
+    for block in blocks(page):
+        if block.language in SHOWN or not is_due(block, weekly=weekly):
+            continue
+        begin = time.perf_counter()
+        lacks = missing(block)
+        name = _NAME.match(block.text)
+        if name and block.language in WRITTEN:
+            path = Path(name[1])
+            path.parent.mkdir(exist_ok=True)
+            path.unlink(missing_ok=True)
+            path.write_text(block.text, "utf-8")
+        if block.language == "python" and not lacks:
+            where = f"{page.name} from line {block.line + 1}"
+            exec(compile(block.text, where, "exec"), names)
+        elif block.language == "sh" and not lacks:
+            subprocess.run(["bash", "-euo", "pipefail", "-c", block.text], check=True)
+        yield block, time.perf_counter() - begin, lacks
+
+
+def count() -> Counter[str]:
+    """Count the blocks of all pages by their marks."""
+    found = (b for page in pages() for b in blocks(page) if b.language not in SHOWN)
+    return Counter(block.mark or "run" for block in found)
+
+
+def main() -> None:
+    """Run a page, or count blocks."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("page", type=Path, nargs="?")
+    parser.add_argument("--weekly", action="store_true", help="blocks over a minute, too")
+    parser.add_argument("--list", action="store_true", help="count the blocks of all pages")
+    given = parser.parse_args()
+    if given.list:
+        print(*(f"{mark}: {n}" for mark, n in sorted(count().items())), sep="\n")
+        return
+    if given.page is None:
+        parser.error("name a page, or --list")
+    page = given.page.resolve()
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ.update(make_folder(Path(folder)))
+        os.chdir(folder)
+        sys.path[:0] = [folder]
+        for block, seconds, lacks in run(page, weekly=given.weekly):
+            what = f"left out, needs {', '.join(lacks)}" if lacks else f"{seconds:.1f} s"
+            print(f"{page.name}:{block.line} {block.language}: {what}", flush=True)
+        os.chdir(ROOT)
+
+
+if __name__ == "__main__":
+    main()

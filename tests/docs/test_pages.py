@@ -1,0 +1,72 @@
+"""Every block of every page runs, from top to bottom; what is marked is counted."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+import run_page
+
+PAGES = {page.relative_to(run_page.ROOT).as_posix(): page for page in run_page.pages()}
+
+
+def run(page, *options):
+    """Run a page in a process of its own; return what it prints."""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", run_page.__file__, page, *options],
+        capture_output=True,
+        text=True,
+        check=False,
+        start_new_session=True,
+    )
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-6000:]
+    return done.stdout
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("name", PAGES)
+def test_the_blocks_of_a_page_run(name, skip_unless_ci):
+    lacking = set(re.findall(r"left out, (needs .*)", run(PAGES[name])))
+    if lacking:
+        skip_unless_ci(f"all but some blocks ran: {'; '.join(sorted(lacking))}")
+
+
+@pytest.mark.skipif("SDNN_WEEKLY" not in os.environ, reason="takes an hour: nox -s docs-weekly")
+@pytest.mark.timeout(0)
+@pytest.mark.parametrize(
+    "name", [n for n, p in PAGES.items() if any(b.mark == "weekly" for b in run_page.blocks(p))]
+)
+def test_the_long_blocks_of_a_page_run(name):
+    run(PAGES[name], "--weekly")
+
+
+def test_most_blocks_run_at_every_change():
+    counts = run_page.count()
+    assert counts["run"] + counts["needs"] > 2 * (counts["weekly"] + counts["not run"])
+    assert set(counts) == {"run", "needs", "weekly", "not run"}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("```basic\n10 GOTO 10\n```\n", "a block in basic"),
+        ("```toml\nx = 1\n```\n", "must name a file"),
+        ("<!-- sometimes: rain -->\n```sh\nls\n```\n", "no mark is called 'sometimes'"),
+    ],
+)
+def test_an_unknown_block_is_an_error(text, message, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(text)
+    with pytest.raises(ValueError, match=message):
+        run_page.blocks(page)
+
+
+def test_a_block_that_fails_is_named(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("Text.\n\n```python\nx = 1\n```\n\n```python\nassert x == 2\n```\n")
+    with pytest.raises(AssertionError, match=r"page\.md from line 8"):
+        run(page)
