@@ -7,7 +7,7 @@ when it is not run at once::
 
     <!-- needs: gcc -->            where something is missing that NEEDS looks for
     <!-- weekly: 3 minutes -->     it takes more than a minute; run with --weekly
-    <!-- not run: needs SLURM -->  never
+    <!-- not run: needs SLURM -->  never, as whatever installs something
 
 ``--list`` counts the blocks of all pages.
 """
@@ -70,6 +70,8 @@ def blocks(page: Path) -> list[Block]:
             )
         if mark not in ("", "needs", "weekly", "not run"):
             raise ValueError(f"{page}:{line}: no mark is called {mark!r}")
+        if language == "sh" and mark != "not run" and re.search(r"\b(pip|apt) install\b", content):
+            raise ValueError(f"{page}:{line}: a block that installs something is marked not run")
         found.append(Block(line, language, content, mark, reason))
     return found
 

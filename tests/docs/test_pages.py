@@ -54,6 +54,7 @@ def test_most_blocks_run_at_every_change():
     ("text", "message"),
     [
         ("```basic\n10 GOTO 10\n```\n", "a block in basic"),
+        ("```sh\npip install .\n```\n", "marked not run"),
         ("```toml\nx = 1\n```\n", "must name a file"),
         ("<!-- sometimes: rain -->\n```sh\nls\n```\n", "no mark is called 'sometimes'"),
     ],

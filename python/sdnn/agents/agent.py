@@ -84,7 +84,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         ``"find"``: those that the warm-up finds on the unit circle.
     inputs : "all", "relevant" or sequence of int
         ``"relevant"``: those that rewards or actions have to do with, by the warm-up; see
-        docs/how-to/agents.md. A list: these variables in any case, and others that are relevant.
+        docs/how-to/choosing-settings.md. A list: these variables in any case, and others that are
+        relevant.
     warm_up_steps : int
         Transitions of the warm-up, where there is one.
 
