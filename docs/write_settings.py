@@ -18,8 +18,8 @@ The keys of files for `sdnn train --config FILE`, of `--set KEY=VALUE`, and of
 [studies](../how-to/studies.md): type; default; meaning. `approximator.*` and `learning.*` are those
 of the agent, with the paper's defaults, before a preset. `sdnn train --schema` prints JSON Schema.
 
-A study without an environment is about the paper's acrobot: the preset is `paper`, the budget
-15,000 episodes, and every 10 episodes there is an evaluation of one episode.
+A study without an environment is about the paper's acrobot: the agent is `sdnn-c` with the preset
+`paper`, the budget 15,000 episodes, and every 10 episodes there is an evaluation of one episode.
 """
 
 

@@ -218,12 +218,12 @@ class AgentSpec(Settings, frozen=True):
     """Agent that learns."""
 
     name: Annotated[
-        str,
+        str | None,
         Meta(
-            description="The agent: `sdnn-c`, `sdnn-linear`, `rbf`, `fuzzy`, or one that was"
-            " registered."
+            description="The agent: `sdnn-linear`, `sdnn-c`, `rbf`, `fuzzy`, or one that was"
+            " registered. By default `sdnn-linear`."
         ),
-    ] = "sdnn-c"
+    ] = None
     preset: Annotated[
         str | None,
         Meta(

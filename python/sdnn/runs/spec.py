@@ -28,7 +28,14 @@ from sdnn.environments import (
 )
 from sdnn.runs.environment import EnvironmentSpec, Stream
 from sdnn.runs.errors import ConfigError
-from sdnn.runs.registry import AgentEntry, agent_entry, label_of, split_label
+from sdnn.runs.registry import (
+    AGENTS,
+    AgentEntry,
+    agent_entry,
+    default_agent,
+    label_of,
+    split_label,
+)
 from sdnn.runs.settings import (
     SHORTHANDS,
     AgentSpec,
@@ -77,8 +84,8 @@ class RunSpec(Settings, frozen=True):
     Examples
     --------
     >>> spec = RunSpec(environment=EnvironmentSpec(id="CartPole-v1"), seed=3)
-    >>> spec.budget.steps, spec.agent.preset, spec.learning.n_steps
-    (200000, 'general', 5)
+    >>> spec.budget.steps, spec.agent.name, spec.agent.preset
+    (200000, 'sdnn-linear', 'general')
     >>> RunSpec(learning={"epsilon": 0.2}).learning.epsilon
     0.2
     """
@@ -141,8 +148,11 @@ class RunSpec(Settings, frozen=True):
             preset = "paper" if self.environment is None else "general"
         if preset is not None and preset not in entry.presets:
             words = f"one of {', '.join(map(repr, entry.presets))}" if entry.presets else "omitted"
+            others = [other.id for other in AGENTS.values() if preset in other.presets]
+            hint = f", a preset of {' and '.join(others)}" if others else ""
             raise ConfigError(
-                "agent.preset", f"must be {words} for the agent {entry.id!r}, got {shown(preset)}"
+                "agent.preset",
+                f"must be {words} for the agent {entry.id!r}, got {shown(preset)}{hint}",
             )
         defaults = entry.settings(preset)
         for name in ("approximator", "learning"):
@@ -155,6 +165,8 @@ class RunSpec(Settings, frozen=True):
     def _chosen_agent(self) -> tuple[AgentEntry, str | None]:
         """Return the agent and the preset; a name such as ``"sdnn-c-robust"`` has both."""
         word, preset = self.agent.name, self.agent.preset
+        if word is None:
+            word = default_agent(on_acrobot=self.environment is None)
         try:
             name, named = split_label(word)
         except ValueError as error:
@@ -228,14 +240,19 @@ class RunSpec(Settings, frozen=True):
     @property
     def label(self) -> str:
         """The agent for a reader: ``"sdnn-c"``, with a preset ``"sdnn-c-robust"``."""
-        return label_of(self.agent.name, self.agent.preset)
+        return label_of(self.entry.id, self.agent.preset)
+
+    @property
+    def entry(self) -> AgentEntry:
+        """The agent as it is registered."""
+        return agent_entry(self.agent.name or "")
 
     @property
     def is_compiled(self) -> bool:
         """Whether the whole run can be done in C++, by `core_trial`, without the GIL."""
         return (
             self.environment is None
-            and agent_entry(self.agent.name).core_trial is not None
+            and self.entry.core_trial is not None
             and self.protocol.evaluation_episodes == 1
             and self.protocol.evaluate_every_episodes is not None
             and self.budget.episodes is not None
@@ -250,7 +267,7 @@ class RunSpec(Settings, frozen=True):
         It releases the GIL while it advances. ValueError if a value is out of its range, or if it
         is not `is_compiled`.
         """
-        entry = agent_entry(self.agent.name)
+        entry = self.entry
         if not self.is_compiled or entry.core_trial is None:
             raise ValueError(f"{self.label} has no trial in C++ under this protocol")
         parts = {name: getattr(self, name) for name in (*ACROBOT, "approximator", "learning")}
@@ -335,7 +352,7 @@ class RunSpec(Settings, frozen=True):
         ConfigError
             If a setting is out of its range, or the agent cannot work with the spaces.
         """
-        entry = agent_entry(self.agent.name)
+        entry = self.entry
         approximator = self.approximator
         shape = env.observation_space.shape
         is_own = _is_kind_of(entry.agent, Agent)
@@ -359,7 +376,7 @@ class RunSpec(Settings, frozen=True):
     def _agent_options(self, env: gym.Env[Any, Any]) -> dict[str, Any]:
         """Return the arguments that only some agents have: those that are not the default."""
         given, environment = self._of_spaces(), self.environment
-        if _is_kind_of(agent_entry(self.agent.name).agent, CodedAgent):  # by its preset
+        if _is_kind_of(self.entry.agent, CodedAgent):  # by its preset
             given |= {"angle_pairs": self.agent.angle_pairs, "inputs": self.agent.inputs}
         if environment is None or not environment.ranges or environment.has_other_sensors:
             return given
@@ -438,7 +455,7 @@ class RunSpec(Settings, frozen=True):
         values["agent"].pop("preset")
         if values["agent"]["inputs"] == "all":  # as in trials from before there was a choice
             del values["agent"]["inputs"]
-        if version := agent_entry(self.agent.name).version:
+        if version := self.entry.version:
             values["agent"]["version"] = version
         return json.dumps(
             _canonical(values), sort_keys=True, separators=(",", ":"), allow_nan=False

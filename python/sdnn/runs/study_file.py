@@ -17,7 +17,7 @@ from msgspec import Meta
 from sdnn.runs.config_file import ConfigFile, KeyPath, dotted
 from sdnn.runs.environment import find_module, search_folder
 from sdnn.runs.errors import ConfigError
-from sdnn.runs.registry import labels, split_label
+from sdnn.runs.registry import default_agent, labels, split_label
 from sdnn.runs.settings import (
     SHORTHANDS,
     Settings,
@@ -144,7 +144,8 @@ class StudyFile:
         for layer in (self.base, *own):
             settings |= layer
         chosen = settings.get(("agent", "name"))
-        label = "sdnn-c" if chosen is None else str(chosen.value)
+        on_acrobot = not any(name[0] == "environment" for name in settings)
+        label = default_agent(on_acrobot=on_acrobot) if chosen is None else str(chosen.value)
         try:
             words = [split_label(label)[0], label]
         except ValueError:  # refused with the specification

@@ -24,7 +24,6 @@ from sdnn.agents import Callback, Evaluation, StopTrainingOnRewardThreshold, Tra
 from sdnn.agents.callbacks import Row
 from sdnn.arguments import whole
 from sdnn.runs.errors import ConfigError
-from sdnn.runs.registry import agent_entry
 
 if TYPE_CHECKING:
     from sdnn.runs.spec import RunSpec
@@ -405,7 +404,7 @@ def _training_of(
     number of the episode, for the goal that tightens. Elsewhere each episode has its own seed.
     """
     is_acrobot = spec.environment is None
-    return agent_entry(spec.agent.name).training(
+    return spec.entry.training(
         spec.make_agent(env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env),
         env,
         steps=spec.budget.steps,

@@ -10,8 +10,8 @@ _OTHERS = {"steps": "episodes", "episodes": "steps"}
 
 
 def run_spec(base=None, settings=None, environment=None, **options):
-    """A specification like another one, but for options and tables of settings."""
-    values = {} if base is None else base.values()
+    """A specification like another one, but for options and tables; of sdnn-c by default."""
+    values = {"agent": {"name": "sdnn-c"}} if base is None else base.values()
     if environment is not None:
         values["environment"] = msgspec.to_builtins(environment)
     for table, own in (settings or {}).items():

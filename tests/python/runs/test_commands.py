@@ -31,7 +31,8 @@ from sdnn.export import c_header
 from sdnn.runs import AGENTS, Run, RunSpec
 
 SMALL = (
-    "--set", "approximator.n_hidden_units=60", "--set", "approximator.n_active_units=20",
+    "--agent", "sdnn-c", "--set", "approximator.n_hidden_units=60",
+    "--set", "approximator.n_active_units=20",
     "--set", "approximator.n_pattern_units=20", "--set", "agent.warm_up_steps=60",
 )  # fmt: skip
 SHORT = ("--steps", 150, "--evaluate-every", 70, "--evaluation-episodes", 2, *SMALL)
@@ -711,7 +712,16 @@ def test_a_run_is_not_overwritten(invoke):
 
 
 def test_ranges_that_do_not_suit_are_named(invoke):
-    options = ["--steps", 400, "--range", "0=-100:100", "--range", "1=0:0.0001"]
+    options = [
+        "--agent",
+        "sdnn-c",
+        "--steps",
+        400,
+        "--range",
+        "0=-100:100",
+        "--range",
+        "1=0:0.0001",
+    ]
     lines = invoke("train", "MountainCarContinuous-v0", *options, "--out", "one").stdout
     assert "observed variable 0 moved within 10% of the range" in lines
     assert "observed variable 1 left the range more than 10% of the time" in lines
@@ -720,7 +730,7 @@ def test_ranges_that_do_not_suit_are_named(invoke):
 
 
 def test_values_that_are_too_coarse_are_named(invoke):
-    task = ("MountainCarContinuous-v0", "--steps", 800)
+    task = ("MountainCarContinuous-v0", "--agent", "sdnn-c", "--steps", 800)
     ends = ["approximator.q_low=-1e6", "approximator.q_high=1e6"]
     options = [word for one in ["learning.value_range=fixed", *ends] for word in ("--set", one)]
     lines = invoke("train", *task, *options, "--out", "wide").stdout

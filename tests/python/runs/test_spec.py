@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn.agents import PRESETS, FuzzyQLearning, RBFQLearning, SDNNQLearning, Training
+from sdnn.agents import LINEAR_PRESETS, FuzzyQLearning, RBFQLearning, SDNNQLearning, Training
 from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
 from sdnn.runs import (
     AgentSpec,
@@ -29,7 +29,7 @@ FULL = RunSpec(
         noise=0.02,
         redundant=2,
     ),
-    agent=AgentSpec(preset="robust", warm_up_steps=50),
+    agent=AgentSpec(name="sdnn-c", preset="robust", warm_up_steps=50),
     learning={"discount": 0.95, "tie_rule": "middle"},
     approximator={"circular": (True, False, False, False, False, False)},
     protocol=ProtocolSpec(evaluate_every=100, evaluation_episodes=3, n_envs=2),
@@ -52,14 +52,16 @@ def test_a_specification_survives_json_and_pickle(spec):
 def test_defaults_follow_from_the_task():
     acrobot, environment = RunSpec(), RunSpec(environment=CART_POLE)
     assert (acrobot.agent.preset, environment.agent.preset) == ("paper", "general")
-    assert (acrobot.label, environment.label) == ("sdnn-c", "sdnn-c-general")
+    assert (acrobot.label, environment.label) == ("sdnn-c", "sdnn-linear-general")
     assert (acrobot.budget.episodes, acrobot.budget.steps) == (15_000, None)
     assert (environment.budget.episodes, environment.budget.steps) == (None, 200_000)
     assert acrobot.protocol.evaluate_every_episodes == 10
     assert environment.protocol.evaluate_every == 10_000
-    assert environment.learning == PRESETS["general"].learning
+    assert environment.learning == LINEAR_PRESETS["general"].learning
     assert RunSpec(sensors={"n_sensors": 6}).approximator == SDNNCConfig(n_inputs=6)
-    assert RunSpec.from_values({"environment": "CartPole-v1", "agent": "sdnn-c"}) == environment
+    assert (
+        RunSpec.from_values({"environment": "CartPole-v1", "agent": "sdnn-linear"}) == environment
+    )
 
 
 def test_the_hash_is_that_of_what_fixes_the_rows():
@@ -132,7 +134,7 @@ def test_angle_pairs_are_not_found_in_scaled_observations():
 
 def test_pairs_are_declared_in_own_units_of_noisy_sensors():
     environment = EnvironmentSpec(id="Pendulum-v1", noise=0.02, redundant=1, own_units=True)
-    spec = RunSpec(environment=environment, agent=AgentSpec(angle_pairs=((0, 1),)))
+    spec = RunSpec(environment=environment, agent=AgentSpec(name="rbf", angle_pairs=((0, 1),)))
     assert RunSpec.from_values(spec.values()) == spec
     env = spec.make_env()
     np.testing.assert_array_equal(env.observation_space.low, [-1, -1, -8, -1])
@@ -147,14 +149,19 @@ def test_pairs_are_declared_in_own_units_of_noisy_sensors():
 
 @pytest.mark.parametrize("inputs", ["relevant", (1, 3)])
 def test_inputs_are_chosen_in_a_run(inputs):
-    spec = RunSpec(environment=CART_POLE, agent=AgentSpec(inputs=inputs, warm_up_steps=50))
+    spec = RunSpec(
+        environment=CART_POLE, agent=AgentSpec(name="sdnn-c", inputs=inputs, warm_up_steps=50)
+    )
     assert RunSpec.from_values(json.loads(json.dumps(spec.values()))) == spec
     env = spec.make_env()
     agent = spec.make_agent(env)
     assert agent.is_warming_up  # it looks for relevant inputs
     plain = spec.replace(agent=spec.agent.replace(inputs="all"))
     assert plain.config_hash != spec.config_hash
-    assert plain.replace(agent=AgentSpec(warm_up_steps=50)).config_hash == plain.config_hash
+    assert (
+        plain.replace(agent=AgentSpec(name="sdnn-c", warm_up_steps=50)).config_hash
+        == plain.config_hash
+    )
     unknown = spec.replace(agent=spec.agent.replace(inputs=(4,)))
     with pytest.raises(ConfigError) as caught:
         unknown.make_agent(env)
@@ -205,10 +212,11 @@ def test_an_agent_brings_its_own_training():
 
 
 def test_ranges_are_given_or_seen():
-    seen = AgentSpec(observation_range="adaptive", warm_up_steps=20)
+    seen = AgentSpec(name="sdnn-c", observation_range="adaptive", warm_up_steps=20)
     environment = EnvironmentSpec(id="MountainCar-v0")
     env = environment.make()
-    assert not RunSpec(environment=environment).make_agent(env).is_warming_up
+    plain = RunSpec(environment=environment, agent="sdnn-c")
+    assert not plain.make_agent(env).is_warming_up
     agent = RunSpec(environment=environment, agent=seen).make_agent(env)
     assert agent.is_warming_up
     agent.train(env, steps=20)
@@ -248,7 +256,7 @@ def test_agents_are_made_with_preset_and_settings():
         ({"learning": {"discount": 2.0}}, "learning.discount", "in [0, 1]"),
         ({"agent": {"angles": [9]}}, "agent.angles", "got 9"),
         (
-            {"approximator": {"n_hidden_units": 10}},
+            {"agent": "sdnn-c", "approximator": {"n_hidden_units": 10}},
             "approximator.n_active_units",
             "must be in [1, 10]",
         ),

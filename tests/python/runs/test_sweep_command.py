@@ -240,6 +240,7 @@ gym.register("mine/Line-v0", entry_point=Line, max_episode_steps=30)
         trials = 2
         [base]
         environment = "my_line_world:mine/Line-v0"
+        agent = "sdnn-c"
         budget.episodes = 40
         protocol.evaluate_every_episodes = 4
         [variants.exact]
