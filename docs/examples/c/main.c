@@ -1,7 +1,7 @@
 /* A trained agent balances a pole: the loop of a small processor. Cart and pole are simulated here
  * (Gymnasium's CartPole-v1); a robot has sensors and a motor in their place.
  *
- *   sdnn train CartPole-v1 --preset small --out runs/pole
+ *   sdnn train CartPole-v1 --agent sdnn-c --preset small --out runs/pole
  *   sdnn export runs/pole --c-header cartpole.h
  *   cc -O2 -I. main.c -o main -lm && ./main
  *
