@@ -43,6 +43,9 @@ run_argument = click.argument(
     "folder", metavar="RUN", type=click.Path(exists=True, file_okay=False, path_type=Path)
 )
 
+full_option = click.option(
+    "--full", is_flag=True, help="Print all tables and columns, wider than 80 characters."
+)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON.")
 
 seed_option = click.option(
@@ -318,7 +321,12 @@ def _finite(value: Any) -> Any:
 
 
 def run_and_report(
-    context: click.Context, run: Callable[..., WrittenReport], request: Any, *, as_json: bool
+    context: click.Context,
+    run: Callable[..., WrittenReport],
+    request: Any,
+    *,
+    as_json: bool,
+    full: bool,
 ) -> None:
     """Run trials with a line of progress; print the results, what failed and how much is stored."""
     from rich.console import Console
@@ -342,7 +350,7 @@ def run_and_report(
     elif as_json:
         click.echo(json.dumps(done.table, indent=2))
     else:
-        done.page.print(make_console())
+        done.page.print(make_console(), full=full)
         page = next(str(file) for file in done.files if file.suffix == ".html")
         done_now = f"{stored} ({outcome.n_run} run now); " if outcome.n_planned else ""
         click.echo(f"{done_now}wrote {len(done.files)} files: see {page}")

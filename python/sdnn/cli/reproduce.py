@@ -8,7 +8,13 @@ from typing import Any
 import click
 
 from sdnn._core import presets
-from sdnn.cli.common import errors_in_a_line, executor_options, print_forecast, run_and_report
+from sdnn.cli.common import (
+    errors_in_a_line,
+    executor_options,
+    full_option,
+    print_forecast,
+    run_and_report,
+)
 from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_experiments
 
 
@@ -47,6 +53,7 @@ from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_
     help="Run a fraction: 2 trials x 300 episodes; not the result.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
+@full_option
 @click.option("--dry-run", is_flag=True, help="Print what would be run and how long it takes.")
 @click.option(
     "--agent",
@@ -64,7 +71,13 @@ from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_
 )
 @click.pass_context
 def reproduce(
-    context: click.Context, /, experiment: str, as_json: bool, dry_run: bool, **options: Any
+    context: click.Context,
+    /,
+    experiment: str,
+    as_json: bool,
+    full: bool,
+    dry_run: bool,
+    **options: Any,
 ) -> None:
     """Run the paper's experiments and write a report with its figures and claims.
 
@@ -94,4 +107,4 @@ def reproduce(
                     f" {request.out}"
                 )
         else:
-            run_and_report(context, run, request, as_json=as_json)
+            run_and_report(context, run, request, as_json=as_json, full=full)

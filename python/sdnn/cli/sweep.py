@@ -7,7 +7,13 @@ from typing import Any
 
 import click
 
-from sdnn.cli.common import errors_in_a_line, executor_options, print_forecast, run_and_report
+from sdnn.cli.common import (
+    errors_in_a_line,
+    executor_options,
+    full_option,
+    print_forecast,
+    run_and_report,
+)
 
 
 @click.command(short_help="Run a study: variants of any setting, trial by trial.")
@@ -34,6 +40,7 @@ from sdnn.cli.common import errors_in_a_line, executor_options, print_forecast, 
     "--only", metavar="VARIANT", multiple=True, help="Run this variant only; may be repeated."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
+@full_option
 @click.option("--dry-run", is_flag=True, help="Print what would be run and how long it takes.")
 @click.pass_context
 def sweep(
@@ -44,6 +51,7 @@ def sweep(
     seed: int | None,
     only: tuple[str, ...],
     as_json: bool,
+    full: bool,
     dry_run: bool,
     **options: Any,
 ) -> None:
@@ -73,4 +81,4 @@ def sweep(
         if dry_run:
             print_forecast(request, as_json=as_json, check=request.study.check)
         else:
-            run_and_report(context, run, request, as_json=as_json)
+            run_and_report(context, run, request, as_json=as_json, full=full)

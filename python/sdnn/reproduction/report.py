@@ -21,6 +21,7 @@ from sdnn.reproduction.claims import (
     Claim,
     ClaimOutcome,
     Growth,
+    Quantity,
     ReferenceResult,
     TenTrials,
     Verdict,
@@ -31,6 +32,7 @@ from sdnn.reproduction.cost import SERIES, CostRecord
 from sdnn.runs.registry import title_of
 from sdnn.runs.report import (
     MEASURE_END,
+    PERCENT,
     Page,
     Section,
     Table,
@@ -52,6 +54,10 @@ RULE_NOTE = (
     " is undecided otherwise. Runs smaller than"
     f" {PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes are not judged. A claim of several lines"
     " holds if all of them do, and does not hold if one of them does not."
+)
+DECIDED_NOTE = (
+    f"Medians with {PERCENT} intervals over trials. A verdict is by stored reference results, too,"
+    " where there are any: the rule and every number are below."
 )
 CHANCE_NOTE = (
     "Ten trials show it: in how many draws of ten of these trials, as the paper's ten were one, the"
@@ -119,15 +125,36 @@ class Report:
             intro="Every figure of T. Kobayashi, T. Shibuya and M. Morita (JACIII 19(6), 825-832,"
             " 2015) redrawn from stored rows, and each of its claims beside what these rows say.",
             warnings=warnings,
-            sections=[*self._claim_sections(), *self._result_sections(pictures)],
+            sections=[*self._first_sections(pictures), *self._details()],
             source=f"Root seed {self.seed}; digest of the rows {self.digest[:16]}; sdnn"
             f" {_core.__version__}.",
         )
 
-    def _claim_sections(self) -> Iterator[Section]:
+    def _first_sections(self, pictures: Mapping[str, bytes]) -> Iterator[Section]:
+        """Make what the page opens with: the claims, a line each, and the figures."""
         if self.claims:
-            counts = tally(one.decided for one in self.claims)
-            yield Section(tally=counts, table=_claim_table(self.claims), notes=[RULE_NOTE])
+            counts = [one for one in tally(c.decided for c in self.claims) if one[0] != "none"]
+            notes = [DECIDED_NOTE] if counts else []
+            yield Section(tally=counts, table=_claim_table(self.claims), notes=notes)
+        for experiment, _ in self.experiments:
+            yield Section(
+                title=experiment.title,
+                picture=pictures[f"experiment-{experiment.id}"],
+                alt=f"{experiment.title}: steps per test episode against learning episodes",
+            )
+        if self.costs:
+            yield Section(
+                title="Cost of a step",
+                picture=pictures["cost"],
+                alt="Time of a step against the number of inputs, logarithmic",
+                is_narrow=True,
+            )
+
+    def _details(self) -> Iterator[Section]:
+        """Make what opens on demand: the rule, every quantity, measures and settings."""
+        folded = []
+        if self.claims:
+            folded.append(Section(table=_check_table(self.claims), notes=[RULE_NOTE]))
         more = _more_table(self.claims)
         if more.rows:
             seeds = sorted({one.root_seed for one in self.reference})
@@ -136,9 +163,7 @@ class Report:
                 f" seed{'s' if len(seeds) > 1 else ''} {' and '.join(map(str, seeds))}), whose"
                 f" measures are kept with the library. {CHANCE_NOTE}"
             )
-            yield Section(level=3, table=more, notes=[note])
-
-    def _result_sections(self, pictures: Mapping[str, bytes]) -> Iterator[Section]:
+            folded.append(Section(table=more, notes=[note]))
         words = tuple(name.replace("_", " ") for name in STEP_MEASURES)
         header = ("case", "agent", "trials", *words, *MEASURE_END)
         for experiment, results in self.experiments:
@@ -147,22 +172,12 @@ class Report:
                  *measure_cells(one, STEP_MEASURES))
                 for one in results
             ]  # fmt: skip
-            yield Section(
-                picture=pictures[f"experiment-{experiment.id}"],
-                alt=f"{experiment.title}: steps per test episode against learning episodes",
-                table=Table(experiment.title, header, rows),
-            )
+            folded.append(Section(table=Table(f"{experiment.title}: medians", header, rows)))
+        if self.costs:
+            folded.append(Section(table=cost_table(self.costs), notes=[COST_NOTE]))
+        yield Section(title="Every number", folded=folded)
         if self.experiments:
             yield measures_section(STEP_MEASURES)
-        if self.costs:
-            yield Section(
-                picture=pictures["cost"],
-                alt="Time of a step against the number of inputs, logarithmic",
-                is_narrow=True,
-                table=cost_table(self.costs),
-                notes=[COST_NOTE],
-            )
-        if self.experiments:
             yield settings_section(
                 (f"{title_of(one.agent)}, {one.title}", one) for one in self.results
             )
@@ -200,18 +215,47 @@ class Report:
 
 
 def _claim_table(claims: Iterable[ClaimOutcome]) -> Table:
-    """Return the verdicts; a claim of several checks has a row of its own before theirs."""
-    rows: list[tuple[str, ...]] = []
+    """Return a line for each claim, with its verdict by the whole rule where one is judged."""
+    claims = list(claims)
+    is_judged = any(one.decided not in (Verdict.NOT_JUDGED, Verdict.NOT_RUN) for one in claims)
+    rows = []
     for claim in claims:
-        start: tuple[str, str] = (str(claim.claim.number), claim.claim.text)
-        if len(claim.checks) > 1:
-            rows.append((*start, "", "", "", claim.verdict.value))
-            start = ("", "")
+        found: dict[str, list[str]] = {}
         for one in claim.checks:
-            words = (str(one.check.quantity), one.check.paper, format_quantity(one))
-            rows.append((*start, *words, one.verdict.value))
-    header = ("claim", "the paper says", "measured", "paper", "ours", "verdict")
-    return Table("What the paper claims, and what our data say", header, rows, VERDICT_KINDS)
+            if (text := format_quantity(one)) != "-":
+                found.setdefault(_name(one.check.quantity), []).append(text)
+        ours = "; ".join(f"{name}: {', '.join(values)}" for name, values in found.items())
+        paper = "; ".join(dict.fromkeys(one.check.paper for one in claim.checks))
+        row = (str(claim.claim.number), claim.claim.text, paper, ours or "-")
+        rows.append((*row, claim.decided.value) if is_judged else row)
+    header = ("claim", "the paper says", "paper", "ours" if is_judged else "ours, so far")
+    return Table(
+        "The paper's claims",
+        (*header, "verdict") if is_judged else header,
+        rows,
+        VERDICT_KINDS,
+        brief=("claim", "the paper says", *(("verdict",) if is_judged else ()), header[-1]),
+    )
+
+
+def _name(quantity: Quantity) -> str:
+    """Name a quantity where its claim says about whom it is."""
+    if isinstance(quantity, Growth):
+        return f"{quantity.n_inputs} inputs / {quantity.n_fewer}"
+    name = quantity.measure.replace("_", " ")
+    return name if quantity.other is None else f"{name}, difference"
+
+
+def _check_table(claims: Iterable[ClaimOutcome]) -> Table:
+    """Return the verdict on each check by these trials alone."""
+    rows = [
+        (str(claim.claim.number), str(one.check.quantity), one.check.paper,
+         format_quantity(one), one.verdict.value)
+        for claim in claims
+        for one in claim.checks
+    ]  # fmt: skip
+    header = ("claim", "measured", "paper", "ours", "verdict")
+    return Table("Each quantity of the claims, by these trials alone", header, rows, VERDICT_KINDS)
 
 
 def _more_table(claims: Iterable[ClaimOutcome]) -> Table:

@@ -55,19 +55,23 @@ class Table:
     header: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
     kinds: Mapping[str, str] = field(default_factory=dict)  # color of a text: good, bad, open, none
+    brief: Sequence[str] = ()  # columns that a terminal shows by default: all
 
-    def print(self, console: Console) -> None:
-        """Print it."""
+    def print(self, console: Console, *, full: bool = True) -> None:
+        """Print it: all columns, or the brief ones, which fit 80 characters."""
         from rich import box
         from rich.table import Table as RichTable
         from rich.text import Text
 
         title = Text(self.title)
         shown = RichTable(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-        for column in self.header:
-            shown.add_column(Text(column), overflow="fold")
+        columns = [
+            i for i, name in enumerate(self.header) if full or not self.brief or name in self.brief
+        ]
+        for i in columns:
+            shown.add_column(Text(self.header[i]), overflow="fold")
         for row in self.rows:
-            shown.add_row(*map(Text, row))
+            shown.add_row(*(Text(row[i]) for i in columns))
         console.print(shown)
 
     def to_markdown(self) -> str:
@@ -83,7 +87,7 @@ class Section:
 
     The title is that of the table by default; one of level 0 is a faint paragraph. A tally has
     counts: how one is colored, the number, and what is counted. A picture is an SVG. Folded
-    sections, of notes, text and table, open on demand.
+    sections, of notes, terms, text and table, open on demand.
     """
 
     title: str = ""
@@ -127,18 +131,18 @@ class Page:
 
     @property
     def notes(self) -> list[str]:
-        """Explanations below the tables."""
-        notes = [note for part in self.sections for note in part.notes]
-        terms = [f"{name}: {text}." for part in self.sections for name, text in part.terms.items()]
-        return notes + terms
+        """Explanations below the tables; those of files and settings are with their texts."""
+        parts = [*self.sections, *(o for part in self.sections for o in part.folded if not o.text)]
+        notes = [note for part in parts for note in part.notes]
+        return notes + [f"{name}: {text}." for part in parts for name, text in part.terms.items()]
 
-    def print(self, console: Console) -> None:
-        """Print it without figures."""
+    def print(self, console: Console, *, full: bool = False) -> None:
+        """Print it without figures: tables that fit 80 characters, or everything."""
         for line in (self.title, self.intro, *self.warnings):
             console.print(line, highlight=False, markup=False)
-        for table in self.tables:
-            table.print(console)
-        for note in self.notes:
+        for table in self.tables if full else (one.table for one in self.sections if one.table):
+            table.print(console, full=full)
+        for note in self.notes if full else (note for one in self.sections for note in one.notes):
             console.print(note, style="dim", highlight=False, markup=False)
 
     def to_markdown(self) -> str:
@@ -220,9 +224,9 @@ def describe_call(outcome: TrialsOutcome, seconds: float, shown: Iterable[TrialR
 
 
 def measures_section(names: Iterable[MeasureName], notes: Sequence[str] = ()) -> Section:
-    """Return the section that explains measures."""
+    """Return the section that explains measures, on demand."""
     terms = {name.replace("_", " "): MEASURES[name][0] for name in names}
-    return Section(title="What is measured", notes=[NOTE, *notes], terms=terms)
+    return Section(folded=[Section(title="What is measured", notes=[NOTE, *notes], terms=terms)])
 
 
 def settings_section(results: Iterable[tuple[str, CaseResult]]) -> Section:
@@ -254,7 +258,7 @@ def format_estimate(
     """Write an estimate with its interval; what is censored becomes ``>last_episode``.
 
     >>> format_estimate(Estimate(120.0, 90.0, math.inf), "episodes_to_learn", 15000)
-    '120 [90, >15000]'
+    '120 [90, >15,000]'
     >>> format_estimate(Estimate(0.9, 0.8, 1.0), "final_share_solved")
     '90 % [80, 100]'
     >>> format_estimate(Estimate(-0.5, -2.0, 1.0), "final_steps", sign="+")
@@ -265,7 +269,7 @@ def format_estimate(
 
     def number(value: float) -> str:
         if math.isinf(value):
-            return f">{last_episode}"
+            return f">{last_episode:,}"
         return plain_number(scale * value, decimals, sign)
 
     if math.isnan(estimate.value):
@@ -297,11 +301,11 @@ def decimals_of(estimate: Estimate, measure: MeasureName) -> int:
 def plain_number(value: float, decimals: int, sign: str = "") -> str:
     """Write a number with a given number of decimals at most.
 
-    >>> plain_number(2.50, 2), plain_number(-0.01, 1), plain_number(0.25, 2, sign="+")
-    ('2.5', '0', '+0.25')
+    >>> plain_number(2.50, 2), plain_number(-0.01, 1), plain_number(1234.25, 2, sign="+")
+    ('2.5', '0', '+1,234.25')
     """
     rounded = round(value, decimals) or 0.0
-    text = f"{rounded:{sign}.{decimals}f}".rstrip("0").rstrip(".")
+    text = f"{rounded:{sign},.{decimals}f}".rstrip("0").rstrip(".")
     return text if rounded else "0"
 
 

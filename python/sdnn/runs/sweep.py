@@ -194,6 +194,10 @@ def study_page(comparison: Comparison, digest: str, addition: Addition, picture:
     )
 
 
+ONLY_IN_FULL = ("early steps", "final steps")
+"""Measures that a terminal leaves out by default."""
+
+
 def _case_sections(comparison: Comparison) -> Iterator[Section]:
     """Yield for each case the table of measures, and that of differences if there are any."""
     for case in comparison.cases:
@@ -207,12 +211,13 @@ def _case_sections(comparison: Comparison) -> Iterator[Section]:
             for m in measured
         ]  # fmt: skip
         header = ("variant", "agent", "trials", *end, *words, *MEASURE_END)
-        yield Section(table=Table(case.title, header, rows))
+        brief = ("variant", *end, *(word for word in words if word not in ONLY_IN_FULL))
+        yield Section(table=Table(case.title, header, rows, brief=brief))
         title = f"{case.title}: minus {comparison.study.reference}, trial by trial"
         compared = [m for m in measured if m.differences]
         rows = [(m.variant.title, *(_difference(m, n) for n in names)) for m in compared]
         if rows:
-            yield Section(level=0, table=Table(title, ("variant", *words), rows))
+            yield Section(level=0, table=Table(title, ("variant", *words), rows, brief=brief))
 
 
 def _difference(measured: Measured, name: MeasureName) -> str:

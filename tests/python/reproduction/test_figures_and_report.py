@@ -1,4 +1,5 @@
 import base64
+import io
 import itertools
 import json
 import math
@@ -8,6 +9,7 @@ from html import escape
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import sdnn.reproduction.reproduce as reproduce_module
 from refusals import refuses
@@ -184,7 +186,7 @@ def test_estimates_as_text():
         "98 % [90, 100]"
     )
     assert format_estimate(Estimate(math.inf, 90, math.inf), "episodes_to_learn", 15000) == (
-        ">15000 [90, >15000]"
+        ">15,000 [90, >15,000]"
     )
     assert format_estimate(Estimate(4.0, math.nan, math.nan), "final_steps", 100) == "4"
 
@@ -201,13 +203,26 @@ def report(results):
 
 
 def test_tables_hold_cases_and_claims(report):
-    claims, cases = report.page(PICTURES).tables
-    assert cases.title == EXPERIMENT.title
+    claims, checks, cases = report.page(PICTURES).tables
+    assert cases.title.startswith(EXPERIMENT.title)
     assert [row[0] for row in cases.rows] == [case.title for case in EXPERIMENT.cases]
-    assert {len(row) for row in cases.rows} == {len(cases.header)}
-    assert {len(row) for row in claims.rows} == {len(claims.header)}
-    assert [row[0] for row in claims.rows if row[0]] == ["1", "2", "8"]
-    assert {row[-1] for row in claims.rows} == {"not judged", "not run"}
+    for table in (claims, checks, cases):
+        assert {len(row) for row in table.rows} == {len(table.header)}
+    assert [row[0] for row in claims.rows] == ["1", "2", "8"]
+    assert claims.header[-1] == "ours, so far"
+    assert claims.rows[0][-1] == "episodes to learn: 50 [30, 50], 60 [50, 60]"
+    assert {row[-1] for row in checks.rows} == {"not judged", "not run"}
+
+
+def test_a_terminal_shows_claims_and_all_tables_on_demand(report):
+    brief, full = (Console(width=80, file=io.StringIO()) for _ in range(2))
+    page = report.page(PICTURES)
+    page.print(brief)
+    page.print(full, full=True)
+    few, all_lines = (one.file.getvalue().splitlines() for one in (brief, full))
+    assert "episodes to learn: 50 [30," in "\n".join(few)
+    assert max(map(len, few)) <= 80
+    assert len(all_lines) > 3 * len(few)
 
 
 def test_json_is_valid_and_marks_what_is_censored(report):

@@ -230,7 +230,8 @@ def test_reports_tell_what_reference_results_say(fake_results):
         for one in (half, measured("s6", 20 * [4]))
     ]
     report = report_of(fake_results, kept)
-    tables = report.page(picture).tables
+    tables = [*report.page(picture).tables]
+    assert [row[-1] for row in tables[0].rows if row[0] == "2"] == ["inconclusive"]
     rows = next(table.rows for table in tables if table.title == "With more trials")
     ends = next(row for row in rows if row[0] == "2")
     assert ends[5] == "inconclusive"
