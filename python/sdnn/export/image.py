@@ -41,14 +41,14 @@ def load_image(agent: SDNNSarsa, image: bytes) -> None:
     if whole[:8] != expected[:8]:
         raise ValueError("image is that of an agent with other settings, spaces or another seed")
     exponent = int.from_bytes(whole[8:12], "little", signed=True)
-    n_snapshots, n_left = np.frombuffer(whole, "<i4", 2, 12).tolist()
-    n_learned, n_steps = np.frombuffer(whole, "<i8", 2, 20).tolist()
-    words = np.frombuffer(whole, "<u8", 16, 36).reshape(4, 4)
+    n_snapshots, n_left, n_ended = np.frombuffer(whole, "<i4", 3, 12).tolist()
+    n_learned, n_steps = np.frombuffer(whole, "<i8", 2, 24).tolist()
+    words = np.frombuffer(whole, "<u8", 16, 40).reshape(4, 4)
     state = agent.core.state()
     for name in ("waits", "reward", "old_value"):  # of the episode before
         state[name] = np.zeros_like(state[name])
     state["trace.values"] = state["trace.values"][:0]
-    for name in ("action_value.exponent", "n_random_left"):
+    for name in ("action_value.exponent", "n_random_left", "n_ended"):
         state.pop(name, None)
     state["n_learned"] = np.array(n_learned, np.int64)
     if exponent != _NO_EXPONENT:
@@ -58,6 +58,8 @@ def load_image(agent: SDNNSarsa, image: bytes) -> None:
         state["action_value.n_snapshots"] = np.array(n_snapshots, np.int64)
     if n_left:
         state["n_random_left"] = np.array(n_left, np.int32)
+    if n_ended:
+        state["n_ended"] = np.array(n_ended, np.int32)
     state |= {f"{name}.words": one.copy() for name, one in zip(STREAMS, words, strict=True)}
     kept = [name for name in ("weights", "averaged_weights") if f"action_value.{name}" in state]
     at, columns = IMAGE_HEAD, writer.columns()

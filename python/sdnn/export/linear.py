@@ -17,7 +17,7 @@ from sdnn.export.tables import Tables, joined
 from sdnn.export.writer import MOST_WEIGHTS, CHeader, Writer, template
 
 IMAGE_MAGIC = 0x4C4E4453  # "SDNL"
-IMAGE_HEAD = 36 + 4 * 32
+IMAGE_HEAD = 40 + 4 * 32
 """Bytes of an image before its weights."""
 STREAMS = ("policy.exploration", "policy.ties", "policy.evaluation_ties", "repetitions")
 _ONE = 1 << 16  # of rates
@@ -125,10 +125,12 @@ static inline void ${name}_note_step(${name}_agent *agent) {
 _KEEP = """\
   {
     const uint64_t whole = UINT64_C(1) << 53;
+    const uint32_t most = UINT32_C(${most_kept}) >> agent->n_ended;
+    const uint32_t longest = most > ${least_kept} ? most : ${least_kept};
     uint64_t rest;
     const uint64_t n =
         ${name}_quotient(whole, whole - (${name}_bits(&agent->repetitions) >> 11), &rest);
-    agent->n_kept = (uint32_t)(n < ${most_kept} ? n : ${most_kept}) - 1;
+    agent->n_kept = (uint32_t)(n < longest ? n : longest) - 1;
   }
 """
 _DUTCH_GAIN = """\
@@ -347,6 +349,7 @@ class LearnerWriter(LinearWriter):
             np.array([IMAGE_MAGIC, self.fingerprint()], "<u4"),
             np.array([exponent], "<i4"),
             np.array([state.get("action_value.n_snapshots", 0), _left(state)], "<u4"),
+            np.array([state.get("n_ended", 0)], "<u4"),
             np.array([state["n_learned"], state.get("action_value.n_steps", 0)], "<u8"),
             *(state[f"{stream}.words"].astype("<u8") for stream in STREAMS),
         ]
@@ -413,6 +416,7 @@ class LearnerWriter(LinearWriter):
             "is_late": f"step >= {late} && " if late else "",
             "keep": _KEEP if most_kept > 1 else "",
             "most_kept": most_kept,
+            "least_kept": min(5, most_kept),
             "give": (
                 "  for (d = 0; d < ${n_dimensions}; ++d) action[d] = chosen[d];\n"
                 if self.is_vector
@@ -444,6 +448,7 @@ class LearnerWriter(LinearWriter):
         if exponent is not None:
             lines += ["agent->has_exponent = 1;", f"agent->exponent = {int(exponent)};"]
         lines.append(f"agent->n_learned = INT64_C({int(state['n_learned'])});")
+        lines.append(f"agent->n_ended = {int(state.get('n_ended', 0))};")
         if "action_value.n_steps" in state:
             n_steps = int(state["action_value.n_steps"])
             lines.append(f"agent->n_steps = INT64_C({n_steps});")
@@ -464,7 +469,7 @@ class LearnerWriter(LinearWriter):
         """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
         n_inputs = len(self.inputs)
         code = 4 + 4 * n_inputs + sizes["bytes_of_column"] * sizes["most_columns"]
-        n_bytes: int = 8 * 3 + 32 * 4 + 4 * n_copies * sizes["n_weights"] + 4 * 9
+        n_bytes: int = 8 * 3 + 32 * 4 + 4 * n_copies * sizes["n_weights"] + 4 * 10
         n_bytes += 4 * (2 * self.n_dimensions + n_inputs) + 2 * (-(-code // 4) * 4)
         n_bytes += 3 + int(sizes["n_rows"])
         return -(-n_bytes // 8) * 8

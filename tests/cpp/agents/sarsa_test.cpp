@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <stdexcept>
@@ -11,6 +12,7 @@
 #include "sdnn/approximators/linear_sdnn.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/core/state.hpp"
+#include "states.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -127,6 +129,40 @@ TEST(Sarsa, ItsStateResumesExactly) {
     live(agent, 100, 4);
     live(other, 100, 4);
     EXPECT_EQ(core::state_of(other), core::state_of(agent));
+  }
+}
+
+/// Steps that the longest one lasted after so many ends.
+int longest_action(Sarsa agent, int n_ended) {
+  const State state{0.5, 0.5};
+  for (int i = 0; i < n_ended; ++i) agent.learn(state, {0, 0}, 0.0, state, true);
+  agent.set_epsilon(1.0);
+  Sarsa::Action last;
+  int longest = 0, n = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const Sarsa::Action action = agent.act(state);
+    n = action == last ? n + 1 : 1;  // the next one is another
+    last = action;
+    longest = std::max(longest, n);
+  }
+  return longest;
+}
+
+TEST(Sarsa, EndsMakeRandomActionsShorter) {
+  const std::vector<std::size_t> many{250, 250};
+  const auto agent = [&](int longest) { return agent_of({.max_action_repeat = longest}, many); };
+  EXPECT_EQ(longest_action(agent(100), 0), 100);
+  EXPECT_EQ(longest_action(agent(100), 1), 50);
+  EXPECT_EQ(longest_action(agent(100), 2), 25);
+  EXPECT_EQ(longest_action(agent(100), 7), 5);
+  EXPECT_EQ(longest_action(agent(100), 40), 5);
+  EXPECT_EQ(longest_action(agent(3), 7), 3);
+  Sarsa ended = agent(100);
+  for (int i = 0; i < 40; ++i) ended.learn({{0.5, 0.5}}, {0, 0}, 0.0, {{0.5, 0.5}}, true);
+  const core::State good = core::state_of(ended);
+  for (const int bad : {-1, 21}) {
+    testing::expect_refused(ended, testing::with_number(good, "n_ended", bad),
+                            "state: n_ended must be in [0, 20]");
   }
 }
 

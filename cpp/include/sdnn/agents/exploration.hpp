@@ -19,6 +19,9 @@ namespace sdnn::agents {
 /// Source: Dabney, W., Ostrovski, G., Barreto, A. (2021). Temporally-extended epsilon-greedy
 /// exploration (with this distribution in the place of the zeta one, which it resembles).
 ///
+/// Who reports ends has shorter ones: each halves m, down to five. Where no episode terminates, an
+/// end that is hard to reach may be what matters; where many do, long actions only cut them short.
+///
 /// In its first start_steps steps an agent takes random actions only: a rare success is found
 /// before the greedy ones have learned to do nothing. Source: the start_steps of Achiam, J. (2018),
 /// Spinning up in deep reinforcement learning, kept for some steps as above.
@@ -48,6 +51,9 @@ class Exploration {
   EpsilonGreedy& policy() noexcept { return policy_; }
   const EpsilonGreedy& policy() const noexcept { return policy_; }
 
+  /// An episode terminated: from now on random actions are kept for half as long at most.
+  void note_end() noexcept { n_ended_ = std::min(n_ended_ + 1, kMostEnded); }
+
   /// Whether the next step is random: then episode.kept is the action, one of n_actions(d) in each
   /// dimension d; else a best one is to be taken.
   template <class NActions>
@@ -65,7 +71,7 @@ class Exploration {
     }
     if (max_action_repeat_ > 1) {
       const double drawn = 1.0 - repetitions_.uniform();  // in (0, 1]
-      const double most = static_cast<double>(max_action_repeat_);
+      const double most = longest();
       episode.n_kept = static_cast<int>(std::min(1.0 / drawn, most)) - 1;
     }
     return true;
@@ -79,10 +85,15 @@ class Exploration {
     std::optional<int> n_random_left;  // none where there are no more
     if (self.n_random_left_ > 0) n_random_left = self.n_random_left_;
     archive.number("n_random_left", n_random_left);
+    std::optional<int> n_ended;  // none where ends are not reported
+    if (self.n_ended_ > 0) n_ended = self.n_ended_;
+    archive.number("n_ended", n_ended);
     if constexpr (Archive::kReads) {
       self.n_random_left_ = n_random_left.value_or(0);
       archive.expect(self.n_random_left_ >= 0 && self.n_random_left_ <= self.start_steps_,
                      "n_random_left", "in [0, start_steps]");
+      self.n_ended_ = n_ended.value_or(0);
+      archive.expect(self.n_ended_ >= 0 && self.n_ended_ <= kMostEnded, "n_ended", "in [0, 20]");
     }
   }
   template <class Listed, class Archive, class NActions>
@@ -105,11 +116,20 @@ class Exploration {
   }
 
  private:
+  static constexpr int kShort = 5;
+  static constexpr int kMostEnded = 20;  // beyond any max_action_repeat
+
+  /// Steps that a random action may last now.
+  int longest() const noexcept {
+    return std::max(max_action_repeat_ >> n_ended_, std::min(kShort, max_action_repeat_));
+  }
+
   EpsilonGreedy policy_;
   core::Random repetitions_;
   int max_action_repeat_;
   int start_steps_;
   int n_random_left_;  ///< steps that will still be random
+  int n_ended_ = 0;    ///< episodes that terminated, kMostEnded at most
 };
 
 }  // namespace sdnn::agents

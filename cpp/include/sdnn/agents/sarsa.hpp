@@ -199,6 +199,7 @@ class Sarsa {
     if (terminated) {
       correct(episode, 0);
       end(episode);
+      exploration_.note_end();
     } else if (config_.bootstrap == Bootstrap::q_learning) {
       correct_by_best(episode);
     }

@@ -31,16 +31,17 @@ constexpr std::array<std::string_view, 2> words_of(TraceKind) noexcept {
 }
 
 /// The agent's parameters; the defaults are those we recommend for any task. They were chosen on
-/// CartPole, Pendulum, FrozenLake and CliffWalking with seeds from 1000 on.
+/// CartPole, Pendulum, FrozenLake, CliffWalking, MountainCarContinuous and Acrobot with seeds from
+/// 1000 on.
 struct SarsaConfig {
   double learning_rate = 1.0;
   double discount = 0.99;
   EpsilonGreedyConfig policy = {.epsilon = 0.15, .n_greedy_steps = 0};
-  double trace_decay = 0.7;
+  double trace_decay = 0.9;
   Bootstrap bootstrap = Bootstrap::q_learning;
   TraceKind traces = TraceKind::dutch;
   int schedule_steps = 20000;
-  int max_action_repeat = 5;
+  int max_action_repeat = 100;
   std::optional<double> final_learning_rate = 0.03;
   std::optional<double> final_epsilon = 0.0;
   Schedule schedule = Schedule::linear;

@@ -37,10 +37,12 @@ constexpr auto learning_fields() noexcept {
 template <class Config>
 constexpr auto schedule_fields() noexcept {
   return std::tuple(
-      core::field("max_action_repeat", &Config::max_action_repeat,
-                  "Steps that a random action may last. Not in the paper, which has 1: with "
-                  "more, it is kept for at least k steps with probability 1 / k.",
-                  core::within(1, 1000000)),
+      core::field(
+          "max_action_repeat", &Config::max_action_repeat,
+          "Steps that a random action may last. Not in the paper, which has 1: with "
+          "more, it is kept for at least k steps with probability 1 / k. With a linear readout "
+          "each episode that terminates halves it, down to 5.",
+          core::within(1, 1000000)),
       core::field("final_learning_rate", &Config::final_learning_rate,
                   "What alpha becomes as the agent's progress goes from 0 to 1; by default it "
                   "stays. Not in the paper.",
