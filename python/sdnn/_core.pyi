@@ -1,19 +1,16 @@
 """
 The compiled core of sdnn; use it through the packages above it.
 """
-
 from __future__ import annotations
 import collections.abc
 import enum
 import numpy
 import numpy.typing
 import typing
-
 class Stream(enum.Enum):
     """
     What a random number is for
     """
-
     code_books = 1
     evaluation_sensor_noise = 8
     evaluation_ties = 7
@@ -22,44 +19,36 @@ class Stream(enum.Enum):
     sensor_noise = 6
     ties = 4
     weights = 3
-
 class SelectiveDesensitization:
     """
     The desensitized code of a sample, from its bins
     """
-    def __init__(
-        self,
-        modified: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]],
-        modifiers: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]],
-        pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-    ) -> None: ...
-    def gram(
-        self,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        other_bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None,
-    ) -> numpy.typing.NDArray[numpy.int32]:
+    def __init__(self, modified: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]], modifiers: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]], pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> None:
+        ...
+    def gram(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], other_bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None) -> numpy.typing.NDArray[numpy.int32]:
         """
         Inner products of codes
         """
-    def transform(
-        self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]
-    ) -> numpy.typing.NDArray[numpy.int8]:
+    def transform(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.int8]:
         """
         Entries +1, 0, -1, sample by sample
         """
     @property
-    def n_columns(self) -> int: ...
+    def n_columns(self) -> int:
+        ...
     @property
-    def n_inputs(self) -> int: ...
+    def n_inputs(self) -> int:
+        ...
     @property
-    def n_pairs(self) -> int: ...
+    def n_pairs(self) -> int:
+        ...
     @property
-    def n_units(self) -> int: ...
-
+    def n_units(self) -> int:
+        ...
 class SDNNCConfig:
     """
     Everything that defines an SDNN-C; the defaults are the paper's values.
-
+    
     Parameters
     ----------
     n_inputs : int
@@ -108,48 +97,28 @@ class SDNNCConfig:
         With more than 0 the network keeps an average of its weights, by which greedy actions are chosen; learning continues with the weights themselves. Snapshots for it are taken after so many corrections, 100 for example, or after every 64th part of all, whichever is more; what was learned last counts most. The weights take four times the memory. Not in the paper, which has 0. Must be in [0, 1000000000].
     max_table_bytes : int
         A larger network (weights, patterns, remembered potentials) is refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        n_inputs: int = ...,
-        max_pairs: int = ...,
-        n_pattern_units: int = ...,
-        n_anchor_patterns: int = ...,
-        n_interpolated: int = ...,
-        balanced_anchors: bool = ...,
-        circular: collections.abc.Sequence[bool] = ...,
-        n_symbols: collections.abc.Sequence[int] = ...,
-        n_hidden_units: int = ...,
-        n_active_units: int = ...,
-        n_actions: int = ...,
-        q_low: float = ...,
-        q_high: float = ...,
-        u_low: int | None = ...,
-        u_high: int | None = ...,
-        learning_coefficient: float = ...,
-        lattice: int = ...,
-        initial_threshold: float = ...,
-        initial_weights: typing.Literal["ternary", "uniform"] = ...,
-        initial_weight_limit: float = ...,
-        rounding: typing.Literal["half_up", "random", "away"] = ...,
-        averaging_interval: int = ...,
-        max_table_bytes: int = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> SDNNCConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_inputs: int = ..., max_pairs: int = ..., n_pattern_units: int = ..., n_anchor_patterns: int = ..., n_interpolated: int = ..., balanced_anchors: bool = ..., circular: collections.abc.Sequence[bool] = ..., n_symbols: collections.abc.Sequence[int] = ..., n_hidden_units: int = ..., n_active_units: int = ..., n_actions: int = ..., q_low: float = ..., q_high: float = ..., u_low: int | None = ..., u_high: int | None = ..., learning_coefficient: float = ..., lattice: int = ..., initial_threshold: float = ..., initial_weights: typing.Literal['ternary', 'uniform'] = ..., initial_weight_limit: float = ..., rounding: typing.Literal['half_up', 'random', 'away'] = ..., averaging_interval: int = ..., max_table_bytes: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> SDNNCConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
     def replace(self, **changes: typing.Any) -> SDNNCConfig:
         """
         Return a copy with other values of some fields.
@@ -180,7 +149,7 @@ class SDNNCConfig:
         Of `uniform` initial weights, in units of c.
         """
     @property
-    def initial_weights(self) -> typing.Literal["ternary", "uniform"]:
+    def initial_weights(self) -> typing.Literal['ternary', 'uniform']:
         """
         The "small random" initial weights: `ternary`: one lattice step down, none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within initial_weight_limit, rounded to the lattice. An assumption.
         """
@@ -265,7 +234,7 @@ class SDNNCConfig:
         Lowest value of the output range (section 4.2: -20).
         """
     @property
-    def rounding(self) -> typing.Literal["half_up", "random", "away"]:
+    def rounding(self) -> typing.Literal['half_up', 'random', 'away']:
         """
         Of the number of units that are to fire. `half_up`: to the nearest; `random`: up or down at random in proportion, so that no small change is lost on average; `away`: in the direction of the change by at least one unit. An assumption.
         """
@@ -279,22 +248,15 @@ class SDNNCConfig:
         """
         Count of active units at which the output is q_low; by default n_active_units // 15 (section 4.2: 20).
         """
-
 class SDNNC:
     """
     A network that gives Q(s, a) for every action at once
     """
     @typing.overload
-    def __init__(
-        self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex
-    ) -> None: ...
+    def __init__(self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @typing.overload
-    def __init__(
-        self,
-        config: SDNNCConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-        tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]],
-    ) -> None:
+    def __init__(self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]]) -> None:
         """
         With the patterns of each input: (n_bins, m) of -1, +1
         """
@@ -302,9 +264,7 @@ class SDNNC:
         """
         Their average, or the thresholds: (n,)
         """
-    def averaged_values(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def averaged_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         As values, by the average of the weights: (l,) -> (n_actions,)
         """
@@ -320,28 +280,17 @@ class SDNNC:
         """
         g(u) of u = 0 .. n' active units: (n' + 1,)
         """
-    def permutation(
-        self,
-        mu: typing.SupportsInt | typing.SupportsIndex,
-        nu: typing.SupportsInt | typing.SupportsIndex,
-    ) -> numpy.typing.NDArray[numpy.uint32]:
+    def permutation(self, mu: typing.SupportsInt | typing.SupportsIndex, nu: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.uint32]:
         """
         sigma_mu_nu: (m,)
         """
-    def potentials(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.int32]:
+    def potentials(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.int32]:
         """
         Inner potentials in lattice steps; shapes (l,) -> (n,)
         """
-    def set_parameters(
-        self,
-        weights: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        thresholds: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-    ) -> None: ...
-    def table(
-        self, input: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int8]:
+    def set_parameters(self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], thresholds: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> None:
+        ...
+    def table(self, input: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
         """
         Patterns of an input: (n_bins, m) of -1, +1
         """
@@ -349,24 +298,13 @@ class SDNNC:
         """
         A copy, in lattice steps: (n,)
         """
-    def update(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.SupportsInt | typing.SupportsIndex,
-        target: typing.SupportsFloat | typing.SupportsIndex,
-        rate: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-    ) -> None:
+    def update(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         """
         One correction of Q = Q(state, action) towards (1 - rate) Q + rate target
         """
-    def value(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.SupportsInt | typing.SupportsIndex,
-    ) -> float: ...
-    def values(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def value(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex) -> float:
+        ...
+    def values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Q(state, a) for every action; shapes (n_inputs,) -> (n_actions,)
         """
@@ -375,7 +313,8 @@ class SDNNC:
         A copy, in lattice steps: (n, D)
         """
     @property
-    def config(self) -> SDNNCConfig: ...
+    def config(self) -> SDNNCConfig:
+        ...
     @property
     def correction_counts(self) -> tuple[int, int, int, int]:
         """
@@ -387,9 +326,11 @@ class SDNNC:
         How far targets, clipped to the range, were from values: of the last thousand or so
         """
     @property
-    def n_actions(self) -> int: ...
+    def n_actions(self) -> int:
+        ...
     @property
-    def n_inputs(self) -> int: ...
+    def n_inputs(self) -> int:
+        ...
     @property
     def output_range(self) -> tuple[float, float]:
         """
@@ -401,19 +342,20 @@ class SDNNC:
         (mu, nu) of every group of x_SD, in its order
         """
     @property
-    def u_high(self) -> int: ...
+    def u_high(self) -> int:
+        ...
     @property
-    def u_low(self) -> int: ...
+    def u_low(self) -> int:
+        ...
     @property
     def value_step(self) -> float:
         """
         What one active unit more is worth
         """
-
 class FuzzyRulesConfig:
     """
     The sizes of a table of fuzzy rules; the defaults are the paper's.
-
+    
     Parameters
     ----------
     n_inputs : int
@@ -424,29 +366,28 @@ class FuzzyRulesConfig:
         Discrete actions that every rule has values of, evenly spaced over the action's range. Must be in [1, 1048576].
     max_table_bytes : int
         A larger table is refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        n_inputs: int = ...,
-        n_sets: int = ...,
-        n_actions: int = ...,
-        max_table_bytes: int = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> FuzzyRulesConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_inputs: int = ..., n_sets: int = ..., n_actions: int = ..., max_table_bytes: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> FuzzyRulesConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
     def replace(self, **changes: typing.Any) -> FuzzyRulesConfig:
         """
         Return a copy with other values of some fields.
@@ -471,31 +412,27 @@ class FuzzyRulesConfig:
         """
         Triangular sets per input, evenly spaced over its range. There are n_sets to the power of n_inputs rules of 4 n_actions bytes: 45 MB with 6 inputs.
         """
-
 class FuzzyRules:
     """
     Rules over a grid of triangular sets
     """
-    def __init__(self, config: FuzzyRulesConfig) -> None: ...
-    def fire(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> tuple[numpy.typing.NDArray[numpy.uint64], numpy.typing.NDArray[numpy.float64]]:
+    def __init__(self, config: FuzzyRulesConfig) -> None:
+        ...
+    def fire(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.uint64], numpy.typing.NDArray[numpy.float64]]:
         """
         The rules that fire and their truth values
         """
-    def values(
-        self, rule: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.float32]:
+    def values(self, rule: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float32]:
         """
         A copy of v(rule, a) for every action: (n_actions,)
         """
     @property
-    def n_rules(self) -> int: ...
-
+    def n_rules(self) -> int:
+        ...
 class RBFNetworkConfig:
     """
     The sizes of an RBF network: normalized Gaussians on an even grid, linear in the weights. The paper gives 4 bases per dimension and 601 actions; the rest are assumptions.
-
+    
     Parameters
     ----------
     n_inputs : int
@@ -510,31 +447,28 @@ class RBFNetworkConfig:
         Rate of a gradient step. With Q-learning's learning_rate 0.5 the default is stable whatever the sizes and the width. Must be in (0, 1000000].
     max_table_bytes : int
         More weights are refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        n_inputs: int = ...,
-        n_bases: int = ...,
-        n_actions: int = ...,
-        width: float = ...,
-        gradient_rate: float = ...,
-        max_table_bytes: int = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> RBFNetworkConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_inputs: int = ..., n_bases: int = ..., n_actions: int = ..., width: float = ..., gradient_rate: float = ..., max_table_bytes: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> RBFNetworkConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
     def replace(self, **changes: typing.Any) -> RBFNetworkConfig:
         """
         Return a copy with other values of some fields.
@@ -569,28 +503,19 @@ class RBFNetworkConfig:
         """
         Standard deviation of a Gaussian in units of the spacing of the centres.
         """
-
 class RBFNetwork:
     """
     Q(s, a) linear in normalized Gaussian bases
     """
-    def __init__(self, config: RBFNetworkConfig) -> None: ...
-    def set_weights(
-        self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> None: ...
-    def update(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.SupportsInt | typing.SupportsIndex,
-        target: typing.SupportsFloat | typing.SupportsIndex,
-        rate: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-    ) -> None:
+    def __init__(self, config: RBFNetworkConfig) -> None:
+        ...
+    def set_weights(self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def update(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         """
         One correction of Q = Q(state, action) towards (1 - rate) Q + rate target
         """
-    def values(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Q(state, a) for every action; shapes (n_inputs,) -> (n_actions,)
         """
@@ -599,16 +524,18 @@ class RBFNetwork:
         A copy, row-major over inputs and action: (n_bases^(d+1),)
         """
     @property
-    def config(self) -> RBFNetworkConfig: ...
+    def config(self) -> RBFNetworkConfig:
+        ...
     @property
-    def n_actions(self) -> int: ...
+    def n_actions(self) -> int:
+        ...
     @property
-    def n_joint_bases(self) -> int: ...
-
+    def n_joint_bases(self) -> int:
+        ...
 class LinearSDNNConfig:
     """
     Everything that defines a linear readout of the SDNN code; not in the paper.
-
+    
     Parameters
     ----------
     n_inputs : int
@@ -635,37 +562,28 @@ class LinearSDNNConfig:
         With more than 0 the readout keeps an average of its weights, by which greedy actions are chosen, and takes a snapshot for it after so many corrections. What was learned last counts most. Must be in [0, 1000000000].
     max_table_bytes : int
         A larger readout (weights, patterns, one trace) is refused before memory is allocated; 1 GiB by default.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        n_inputs: int = ...,
-        max_pairs: int = ...,
-        n_pattern_units: int = ...,
-        n_anchor_patterns: int = ...,
-        n_interpolated: int = ...,
-        balanced_anchors: bool = ...,
-        circular: collections.abc.Sequence[bool] = ...,
-        n_symbols: collections.abc.Sequence[int] = ...,
-        n_actions: int = ...,
-        action_window: int = ...,
-        averaging_interval: int = ...,
-        max_table_bytes: int = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> LinearSDNNConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_inputs: int = ..., max_pairs: int = ..., n_pattern_units: int = ..., n_anchor_patterns: int = ..., n_interpolated: int = ..., balanced_anchors: bool = ..., circular: collections.abc.Sequence[bool] = ..., n_symbols: collections.abc.Sequence[int] = ..., n_actions: int = ..., action_window: int = ..., averaging_interval: int = ..., max_table_bytes: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> LinearSDNNConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
     def replace(self, **changes: typing.Any) -> LinearSDNNConfig:
         """
         Return a copy with other values of some fields.
@@ -730,34 +648,21 @@ class LinearSDNNConfig:
         """
         Per input, how many symbols it may be, each with a random pattern of its own: symbol k of n is a value of (k + 0.5) / n. 0 for a number; empty: numbers only. Not in the paper.
         """
-
 class LinearSDNN:
     """
     Q(s, a) linear in the SDNN code, in integers
     """
-    def __init__(
-        self,
-        config: LinearSDNNConfig,
-        n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
-    def code(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.int8]:
+    def __init__(self, config: LinearSDNNConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def code(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.int8]:
         """
         The paired code of a state, -1, 0 or +1: (n_inputs,) -> (n_slots,)
         """
-    def permutation(
-        self,
-        mu: typing.SupportsInt | typing.SupportsIndex,
-        nu: typing.SupportsInt | typing.SupportsIndex,
-    ) -> numpy.typing.NDArray[numpy.uint32]:
+    def permutation(self, mu: typing.SupportsInt | typing.SupportsIndex, nu: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.uint32]:
         """
         sigma_mu_nu: (m,)
         """
-    def table(
-        self, input: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int8]:
+    def table(self, input: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
         """
         Patterns of an input: (n_bins, m) of -1, +1
         """
@@ -766,26 +671,28 @@ class LinearSDNN:
         A copy, in units: (n_rows, n_slots), the units of one dimension after the other
         """
     @property
-    def config(self) -> LinearSDNNConfig: ...
+    def config(self) -> LinearSDNNConfig:
+        ...
     @property
     def exponent(self) -> int | None:
         """
         A unit of values is 2 to this power; None before any reward
         """
     @property
-    def n_dimensions(self) -> int: ...
+    def n_dimensions(self) -> int:
+        ...
     @property
-    def n_inputs(self) -> int: ...
+    def n_inputs(self) -> int:
+        ...
     @property
     def pairs(self) -> list[tuple[int, int]]:
         """
         (mu, nu) of every group of x_SD, in its order
         """
-
 class GoalScheduleConfig:
     """
     How the goal tolerance lambda(k) falls with the learning episode k (section 4.1).
-
+    
     Parameters
     ----------
     kind : {'inverse_linear', 'inverse_sqrt', 'constant'}
@@ -798,30 +705,28 @@ class GoalScheduleConfig:
         lambda beyond last_episode. Must be finite and at least 0.
     constant_value : float
         lambda of `constant`. Must be finite and at least 0.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        kind: typing.Literal["inverse_linear", "inverse_sqrt", "constant"] = ...,
-        scale: float = ...,
-        last_episode: int = ...,
-        floor: float = ...,
-        constant_value: float = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> GoalScheduleConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, kind: typing.Literal['inverse_linear', 'inverse_sqrt', 'constant'] = ..., scale: float = ..., last_episode: int = ..., floor: float = ..., constant_value: float = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> GoalScheduleConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
     def replace(self, **changes: typing.Any) -> GoalScheduleConfig:
         """
         Return a copy with other values of some fields.
@@ -837,7 +742,7 @@ class GoalScheduleConfig:
         lambda beyond last_episode.
         """
     @property
-    def kind(self) -> typing.Literal["inverse_linear", "inverse_sqrt", "constant"]:
+    def kind(self) -> typing.Literal['inverse_linear', 'inverse_sqrt', 'constant']:
         """
         `inverse_linear`: 1 / (1 + k / scale); `inverse_sqrt`: 1 / sqrt(1 + k); or `constant`: constant_value. An assumption: the formula is garbled in print.
         """
@@ -851,18 +756,18 @@ class GoalScheduleConfig:
         """
         Episodes; of `inverse_linear`.
         """
-
 class GoalSchedule:
     """
     lambda as a function of the learning episode
     """
-    def __call__(self, episode: typing.SupportsInt | typing.SupportsIndex) -> float: ...
-    def __init__(self, config: GoalScheduleConfig) -> None: ...
-
+    def __call__(self, episode: typing.SupportsInt | typing.SupportsIndex) -> float:
+        ...
+    def __init__(self, config: GoalScheduleConfig) -> None:
+        ...
 class AcrobotConfig:
     """
     The numbers of the acrobot's task; the defaults are the paper's (section 4.1).
-
+    
     Parameters
     ----------
     link_mass_1 : float
@@ -905,45 +810,28 @@ class AcrobotConfig:
         Reward for idling or too much speed at a decision instant; it ends nothing.
     idle_angle : float
         rad: |theta1| below it is idling; 0 turns the rule off. An assumption: 5 degrees; pi / 5 is the alternative. Must be in [0, 3.14159].
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        link_mass_1: float = ...,
-        link_mass_2: float = ...,
-        link_length_1: float = ...,
-        link_length_2: float = ...,
-        center_of_mass_1: float = ...,
-        center_of_mass_2: float = ...,
-        inertia_1: float = ...,
-        inertia_2: float = ...,
-        gravity: float = ...,
-        max_torque: float = ...,
-        decision_interval: float = ...,
-        integration_step: float = ...,
-        max_decisions: int = ...,
-        goal_height: float = ...,
-        goal_velocity_1: float = ...,
-        goal_velocity_2: float = ...,
-        goal_test: typing.Literal["every_step", "decision_instant"] = ...,
-        goal_reward: float = ...,
-        penalty: float = ...,
-        idle_angle: float = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> AcrobotConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, link_mass_1: float = ..., link_mass_2: float = ..., link_length_1: float = ..., link_length_2: float = ..., center_of_mass_1: float = ..., center_of_mass_2: float = ..., inertia_1: float = ..., inertia_2: float = ..., gravity: float = ..., max_torque: float = ..., decision_interval: float = ..., integration_step: float = ..., max_decisions: int = ..., goal_height: float = ..., goal_velocity_1: float = ..., goal_velocity_2: float = ..., goal_test: typing.Literal['every_step', 'decision_instant'] = ..., goal_reward: float = ..., penalty: float = ..., idle_angle: float = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> AcrobotConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
     def replace(self, **changes: typing.Any) -> AcrobotConfig:
         """
         Return a copy with other values of some fields.
@@ -974,7 +862,7 @@ class AcrobotConfig:
         Reward at the goal.
         """
     @property
-    def goal_test(self) -> typing.Literal["every_step", "decision_instant"]:
+    def goal_test(self) -> typing.Literal['every_step', 'decision_instant']:
         """
         When the goal is tested: `every_step`: after every integration step, and the episode ends there; `decision_instant`: only when the next decision is due. An assumption.
         """
@@ -1048,83 +936,66 @@ class AcrobotConfig:
         """
         Reward for idling or too much speed at a decision instant; it ends nothing.
         """
-
 class Acrobot:
     """
     Dynamics, reward and episode end of the acrobot
     """
-    def __init__(self, config: AcrobotConfig) -> None: ...
-    def decisions(self) -> int: ...
-    def reset(self) -> None: ...
-    def set_state(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None: ...
-    def state(self) -> numpy.typing.NDArray[numpy.float64]: ...
-    def step(
-        self,
-        torque: typing.SupportsFloat | typing.SupportsIndex,
-        goal_tolerance: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> tuple[float, bool, bool]:
+    def __init__(self, config: AcrobotConfig) -> None:
+        ...
+    def decisions(self) -> int:
+        ...
+    def reset(self) -> None:
+        ...
+    def set_state(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def state(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def step(self, torque: typing.SupportsFloat | typing.SupportsIndex, goal_tolerance: typing.SupportsFloat | typing.SupportsIndex) -> tuple[float, bool, bool]:
         """
         (reward, terminated, truncated)
         """
-    def tip_height(self) -> float: ...
-
+    def tip_height(self) -> float:
+        ...
 class AcrobotBatch:
     """
     Many acrobots in step, in vector lanes
     """
-    def __init__(
-        self, config: AcrobotConfig, n_acrobots: typing.SupportsInt | typing.SupportsIndex
-    ) -> None: ...
-    def __len__(self) -> int: ...
-    def decisions(self, index: typing.SupportsInt | typing.SupportsIndex) -> int: ...
+    def __init__(self, config: AcrobotConfig, n_acrobots: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __len__(self) -> int:
+        ...
+    def decisions(self, index: typing.SupportsInt | typing.SupportsIndex) -> int:
+        ...
     def observations(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         s1..s4 of every state
         """
-    def reset(self, mask: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> None: ...
-    def set_state(
-        self,
-        index: typing.SupportsInt | typing.SupportsIndex,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> None: ...
-    def states(self) -> numpy.typing.NDArray[numpy.float64]: ...
-    def step(
-        self,
-        torques: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        goal_tolerances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        moving: typing.Annotated[numpy.typing.ArrayLike, numpy.bool],
-    ) -> tuple[
-        numpy.typing.NDArray[numpy.float64],
-        numpy.typing.NDArray[numpy.bool],
-        numpy.typing.NDArray[numpy.bool],
-    ]:
+    def reset(self, mask: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> None:
+        ...
+    def set_state(self, index: typing.SupportsInt | typing.SupportsIndex, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def states(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def step(self, torques: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], goal_tolerances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], moving: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool], numpy.typing.NDArray[numpy.bool]]:
         """
         (rewards, terminated, truncated)
         """
-    def tip_heights(self) -> numpy.typing.NDArray[numpy.float64]: ...
-
+    def tip_heights(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
 class SensorNoise:
     """
     Gaussian noise on every channel
     """
-    def __init__(
-        self,
-        sigma: typing.SupportsFloat | typing.SupportsIndex,
-        edges: collections.abc.Sequence[str],
-        seed: typing.SupportsInt | typing.SupportsIndex,
-        stream: Stream,
-    ) -> None: ...
-    def apply(
-        self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def __init__(self, sigma: typing.SupportsFloat | typing.SupportsIndex, edges: collections.abc.Sequence[str], seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream) -> None:
+        ...
+    def apply(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         A noisy copy
         """
-
 class SensorConfig:
     """
     What the agent observes (section 4.3).
-
+    
     Parameters
     ----------
     n_sensors : int
@@ -1137,30 +1008,28 @@ class SensorConfig:
         Useless inputs besides: always 1/2, with noise as on the sensors. Not in the paper. Must be in [0, 100].
     n_random : int
         Useless inputs besides: a new uniform number each time. Not in the paper. Must be in [0, 100].
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        n_sensors: int = ...,
-        noise: float = ...,
-        noise_entry: typing.Literal["every_sensor", "basic_sensors"] = ...,
-        n_constant: int = ...,
-        n_random: int = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> SensorConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_sensors: int = ..., noise: float = ..., noise_entry: typing.Literal['every_sensor', 'basic_sensors'] = ..., n_constant: int = ..., n_random: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> SensorConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
     def replace(self, **changes: typing.Any) -> SensorConfig:
         """
         Return a copy with other values of some fields.
@@ -1191,110 +1060,70 @@ class SensorConfig:
         Standard deviation of the noise on every sensor; 0.02 in the paper's noisy cases.
         """
     @property
-    def noise_entry(self) -> typing.Literal["every_sensor", "basic_sensors"]:
+    def noise_entry(self) -> typing.Literal['every_sensor', 'basic_sensors']:
         """
         Where noise enters: `every_sensor`: s5 and s6 are computed from the true s1..s4 and get noise of their own; `basic_sensors`: they are computed from the noisy ones. An assumption.
         """
-
 class AcrobotSensors:
     """
     s1..s4, s5 and s6 with their noise
     """
-    def __init__(
-        self, config: SensorConfig, seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream
-    ) -> None: ...
-    def observe(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]: ...
-
+    def __init__(self, config: SensorConfig, seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream) -> None:
+        ...
+    def observe(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        ...
 class ParallelPerceptron:
     """
     Units over a code, with integer weights
     """
-    def __init__(
-        self,
-        code: SelectiveDesensitization,
-        n_units: typing.SupportsInt | typing.SupportsIndex,
-        seed: typing.SupportsInt | typing.SupportsIndex = 0,
-        weights: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None,
-        thresholds: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None,
-        initial_range: typing.SupportsInt | typing.SupportsIndex = 5,
-    ) -> None: ...
+    def __init__(self, code: SelectiveDesensitization, n_units: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex = 0, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, thresholds: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, initial_range: typing.SupportsInt | typing.SupportsIndex = 5) -> None:
+        ...
     def copy(self) -> ParallelPerceptron:
         """
         A layer of its own with the same weights
         """
-    def counts(
-        self,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        n_groups: typing.SupportsInt | typing.SupportsIndex = 1,
-        n_threads: typing.SupportsInt | typing.SupportsIndex = 1,
-    ) -> numpy.typing.NDArray[numpy.int32]:
+    def counts(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_groups: typing.SupportsInt | typing.SupportsIndex = 1, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.int32]:
         """
         How many units of each group fire
         """
-    def potentials(
-        self,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        n_threads: typing.SupportsInt | typing.SupportsIndex = 1,
-    ) -> numpy.typing.NDArray[numpy.int32]: ...
+    def potentials(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.int32]:
+        ...
     @property
-    def n_units(self) -> int: ...
+    def n_units(self) -> int:
+        ...
     @property
-    def thresholds(self) -> numpy.typing.NDArray[numpy.int32]: ...
+    def thresholds(self) -> numpy.typing.NDArray[numpy.int32]:
+        ...
     @property
-    def weights(self) -> numpy.typing.NDArray[numpy.int32]: ...
-
+    def weights(self) -> numpy.typing.NDArray[numpy.int32]:
+        ...
 class OnlineLayer:
     """
     Weights in bytes, for samples that come one at a time; the layer lags behind
     """
-    def __init__(self, layer: ParallelPerceptron) -> None: ...
-    def learn_counts(
-        self,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        share: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-    ) -> tuple[int, int]:
+    def __init__(self, layer: ParallelPerceptron) -> None:
+        ...
+    def learn_counts(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], share: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> tuple[int, int]:
         """
         The p-delta rule; how many samples and units were corrected. What raises changes nothing.
         """
-    def learn_labels(
-        self,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        n_classes: typing.SupportsInt | typing.SupportsIndex,
-        scheme: str,
-    ) -> tuple[int, int]:
+    def learn_labels(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_classes: typing.SupportsInt | typing.SupportsIndex, scheme: str) -> tuple[int, int]:
         """
         Error correction; how many samples and units were corrected. What raises changes nothing.
         """
-    def potentials(
-        self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]
-    ) -> numpy.typing.NDArray[numpy.int32]: ...
+    def potentials(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.int32]:
+        ...
     def synchronize(self) -> None:
         """
         Brings the layer up to date
         """
-
 class PDeltaTrainer:
     """
     Trains groups of units to fire in given numbers
     """
-    def __init__(
-        self,
-        layer: ParallelPerceptron,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        share: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        form: str = "auto",
-        memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824,
-        n_threads: typing.SupportsInt | typing.SupportsIndex = 1,
-        n_epochs: typing.SupportsInt | typing.SupportsIndex = 30,
-    ) -> None: ...
-    def present(
-        self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]
-    ) -> tuple[int, int]:
+    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], share: typing.SupportsFloat | typing.SupportsIndex = 1.0, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, n_epochs: typing.SupportsInt | typing.SupportsIndex = 30) -> None:
+        ...
+    def present(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
         """
         Presents samples in that order; returns how many corrected something, and how many units were corrected
         """
@@ -1303,32 +1132,20 @@ class PDeltaTrainer:
         Brings the layer's weights to those of plain training in the same order
         """
     @property
-    def form(self) -> str: ...
+    def form(self) -> str:
+        ...
     @property
     def memory(self) -> int:
         """
         Bytes beside the layer
         """
-
 class PerceptronTrainer:
     """
     Trains units to separate classes
     """
-    def __init__(
-        self,
-        layer: ParallelPerceptron,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        n_classes: typing.SupportsInt | typing.SupportsIndex,
-        scheme: str,
-        form: str = "auto",
-        memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824,
-        n_threads: typing.SupportsInt | typing.SupportsIndex = 1,
-        n_epochs: typing.SupportsInt | typing.SupportsIndex = 30,
-    ) -> None: ...
-    def present(
-        self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]
-    ) -> tuple[int, int]:
+    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_classes: typing.SupportsInt | typing.SupportsIndex, scheme: str, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, n_epochs: typing.SupportsInt | typing.SupportsIndex = 30) -> None:
+        ...
+    def present(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
         """
         Presents samples in that order; returns how many corrected something, and how many units were corrected
         """
@@ -1337,17 +1154,17 @@ class PerceptronTrainer:
         Brings the layer's weights to those of plain training in the same order
         """
     @property
-    def form(self) -> str: ...
+    def form(self) -> str:
+        ...
     @property
     def memory(self) -> int:
         """
         Bytes beside the layer
         """
-
 class EpsilonGreedyConfig:
     """
     The parameters of the policy; the defaults are the paper's (section 4.2).
-
+    
     Parameters
     ----------
     epsilon : float
@@ -1358,29 +1175,28 @@ class EpsilonGreedyConfig:
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
     tie_tolerance : float
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        epsilon: float = ...,
-        n_greedy_steps: int = ...,
-        tie_rule: typing.Literal["uniform", "lowest", "middle"] = ...,
-        tie_tolerance: float = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> EpsilonGreedyConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> EpsilonGreedyConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
     def replace(self, **changes: typing.Any) -> EpsilonGreedyConfig:
         """
         Return a copy with other values of some fields.
@@ -1396,7 +1212,7 @@ class EpsilonGreedyConfig:
         First steps of an episode in which epsilon is 0.
         """
     @property
-    def tie_rule(self) -> typing.Literal["uniform", "lowest", "middle"]:
+    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
         """
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
         """
@@ -1405,25 +1221,18 @@ class EpsilonGreedyConfig:
         """
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau.
         """
-
 class EpsilonGreedy:
     """
     The policy, over rows of values
     """
-    def __init__(
-        self, config: EpsilonGreedyConfig, seed: typing.SupportsInt | typing.SupportsIndex
-    ) -> None: ...
-    def select(
-        self,
-        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        step: typing.SupportsInt | typing.SupportsIndex,
-        explore: bool = True,
-    ) -> int: ...
-
+    def __init__(self, config: EpsilonGreedyConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def select(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step: typing.SupportsInt | typing.SupportsIndex, explore: bool = True) -> int:
+        ...
 class QLearningConfig:
     """
     The parameters of Q-learning; the defaults are the paper's (section 4.2).
-
+    
     Parameters
     ----------
     learning_rate : float
@@ -1454,41 +1263,32 @@ class QLearningConfig:
         Part of the progress in which epsilon goes to final_epsilon, where it then stays. Not in the paper. Must be in (0, 1].
     start_steps : int
         First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing. Must be in [0, 1073741824].
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        learning_rate: float = ...,
-        discount: float = ...,
-        epsilon: float = ...,
-        n_greedy_steps: int = ...,
-        tie_rule: typing.Literal["uniform", "lowest", "middle"] = ...,
-        tie_tolerance: float = ...,
-        n_steps: int = ...,
-        value_range: typing.Literal["fixed", "adaptive"] = ...,
-        max_action_repeat: int = ...,
-        final_learning_rate: float | None = ...,
-        final_epsilon: float | None = ...,
-        schedule: typing.Literal["linear", "exponential"] = ...,
-        exploration_fraction: float = ...,
-        start_steps: int = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> QLearningConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
-    def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float: ...
-    def learning_rate_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., n_steps: int = ..., value_range: typing.Literal['fixed', 'adaptive'] = ..., max_action_repeat: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., start_steps: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> QLearningConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
+    def learning_rate_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
     def replace(self, **changes: typing.Any) -> QLearningConfig:
         """
         Return a copy with other values of some fields.
@@ -1539,7 +1339,7 @@ class QLearningConfig:
         Rewards in a target before it bootstraps. Not in the paper, which has 1: with more, a transition is learned, once, when so many steps are known or the episode ends.
         """
     @property
-    def schedule(self) -> typing.Literal["linear", "exponential"]:
+    def schedule(self) -> typing.Literal['linear', 'exponential']:
         """
         How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
         """
@@ -1549,7 +1349,7 @@ class QLearningConfig:
         First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing.
         """
     @property
-    def tie_rule(self) -> typing.Literal["uniform", "lowest", "middle"]:
+    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
         """
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
         """
@@ -1559,15 +1359,14 @@ class QLearningConfig:
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau.
         """
     @property
-    def value_range(self) -> typing.Literal["fixed", "adaptive"]:
+    def value_range(self) -> typing.Literal['fixed', 'adaptive']:
         """
         Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that follows the returns of late (`adaptive`): rare ones are clipped, and time limits end no return. Not in the paper.
         """
-
 class SarsaConfig:
     """
     The parameters of Sarsa(lambda) and Q(lambda) with a linear readout of the SDNN code.
-
+    
     Parameters
     ----------
     learning_rate : float
@@ -1602,49 +1401,38 @@ class SarsaConfig:
         Part of the progress in which epsilon goes to final_epsilon, where it then stays. Not in the paper. Must be in (0, 1].
     start_steps : int
         First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing. Must be in [0, 1073741824].
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        learning_rate: float = ...,
-        discount: float = ...,
-        epsilon: float = ...,
-        n_greedy_steps: int = ...,
-        tie_rule: typing.Literal["uniform", "lowest", "middle"] = ...,
-        tie_tolerance: float = ...,
-        trace_decay: float = ...,
-        bootstrap: typing.Literal["sarsa", "q_learning"] = ...,
-        traces: typing.Literal["dutch", "replacing"] = ...,
-        schedule_steps: int = ...,
-        max_action_repeat: int = ...,
-        final_learning_rate: float | None = ...,
-        final_epsilon: float | None = ...,
-        schedule: typing.Literal["linear", "exponential"] = ...,
-        exploration_fraction: float = ...,
-        start_steps: int = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> SarsaConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
-    def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float: ...
-    def learning_rate_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., trace_decay: float = ..., bootstrap: typing.Literal['sarsa', 'q_learning'] = ..., traces: typing.Literal['dutch', 'replacing'] = ..., schedule_steps: int = ..., max_action_repeat: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., start_steps: int = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> SarsaConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
+    def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
+    def learning_rate_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
     def replace(self, **changes: typing.Any) -> SarsaConfig:
         """
         Return a copy with other values of some fields.
         """
     @property
-    def bootstrap(self) -> typing.Literal["sarsa", "q_learning"]:
+    def bootstrap(self) -> typing.Literal['sarsa', 'q_learning']:
         """
         What targets bootstrap from: `sarsa`: the value of the next action; `q_learning`: the best value, and traces end where a worse action is taken (Watkins).
         """
@@ -1689,7 +1477,7 @@ class SarsaConfig:
         First steps of an episode in which epsilon is 0.
         """
     @property
-    def schedule(self) -> typing.Literal["linear", "exponential"]:
+    def schedule(self) -> typing.Literal['linear', 'exponential']:
         """
         How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
         """
@@ -1704,7 +1492,7 @@ class SarsaConfig:
         First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing.
         """
     @property
-    def tie_rule(self) -> typing.Literal["uniform", "lowest", "middle"]:
+    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
         """
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
         """
@@ -1719,15 +1507,14 @@ class SarsaConfig:
         lambda: what remains of a trace after a step, beside the discount. 0: one-step targets.
         """
     @property
-    def traces(self) -> typing.Literal["dutch", "replacing"]:
+    def traces(self) -> typing.Literal['dutch', 'replacing']:
         """
         What a trace becomes in a state that returns: `dutch`: such that learning equals the forward view at every step (true online); `replacing`: as if it were the first time.
         """
-
 class FuzzyQLearningConfig:
     """
     The parameters of fuzzy Q-learning; the defaults are the paper's (section 4.3).
-
+    
     Parameters
     ----------
     learning_coefficient : float
@@ -1744,32 +1531,28 @@ class FuzzyQLearningConfig:
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
     tie_tolerance : float
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        learning_coefficient: float = ...,
-        discount: float = ...,
-        trace_decay: float = ...,
-        epsilon: float = ...,
-        n_greedy_steps: int = ...,
-        tie_rule: typing.Literal["uniform", "lowest", "middle"] = ...,
-        tie_tolerance: float = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> FuzzyQLearningConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, learning_coefficient: float = ..., discount: float = ..., trace_decay: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> FuzzyQLearningConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
     def replace(self, **changes: typing.Any) -> FuzzyQLearningConfig:
         """
         Return a copy with other values of some fields.
@@ -1795,7 +1578,7 @@ class FuzzyQLearningConfig:
         First steps of an episode in which epsilon is 0.
         """
     @property
-    def tie_rule(self) -> typing.Literal["uniform", "lowest", "middle"]:
+    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
         """
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
         """
@@ -1809,75 +1592,47 @@ class FuzzyQLearningConfig:
         """
         lambda of accumulating eligibility traces; 0: none, as in the paper. At most 0.99 / discount.
         """
-
 class FixedRate:
     """
     Waits for ticks at a fixed rate
     """
-    def __init__(
-        self,
-        hz: typing.SupportsFloat | typing.SupportsIndex,
-        clock: collections.abc.Callable[[], typing.SupportsFloat | typing.SupportsIndex],
-        sleep: collections.abc.Callable[[float], None],
-    ) -> None: ...
+    def __init__(self, hz: typing.SupportsFloat | typing.SupportsIndex, clock: collections.abc.Callable[[], typing.SupportsFloat | typing.SupportsIndex], sleep: collections.abc.Callable[[float], None]) -> None:
+        ...
     def wait(self) -> int:
         """
         Waits for the next tick and returns its number
         """
     @property
-    def hz(self) -> float: ...
+    def hz(self) -> float:
+        ...
     @property
-    def n_misses(self) -> int: ...
+    def n_misses(self) -> int:
+        ...
     @property
-    def n_skipped(self) -> int: ...
+    def n_skipped(self) -> int:
+        ...
     @property
-    def worst_lateness(self) -> float: ...
-
+    def worst_lateness(self) -> float:
+        ...
 class SDNNQLearning:
     """
     Q-learning with SDNN-C
     """
     @typing.overload
-    def __init__(
-        self,
-        *,
-        approximator: SDNNCConfig,
-        learning: QLearningConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
+    def __init__(self, *, approximator: SDNNCConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @typing.overload
-    def __init__(
-        self,
-        *,
-        approximator: SDNNCConfig,
-        learning: QLearningConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-        tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]],
-    ) -> None:
+    def __init__(self, *, approximator: SDNNCConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]]) -> None:
         """
         With the patterns of each input: (n_bins, m) of -1, +1
         """
-    def act(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        explore: bool = True,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> int: ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None: ...
-    def learn(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.SupportsInt | typing.SupportsIndex,
-        reward: typing.SupportsFloat | typing.SupportsIndex,
-        next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        terminated: bool,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> None: ...
-    def q_values(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        dimension: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> int:
+        ...
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         """
         Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
         """
@@ -1885,61 +1640,48 @@ class SDNNQLearning:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
         """
-    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
-    def set_learning_rate(
-        self, rate: typing.SupportsFloat | typing.SupportsIndex | None
-    ) -> None: ...
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     def state(self) -> dict:
         """
         What it remembers: arrays by name
         """
     @property
-    def action_value(self) -> SDNNC: ...
+    def action_value(self) -> SDNNC:
+        ...
     @property
-    def epsilon(self) -> float: ...
+    def epsilon(self) -> float:
+        ...
     @property
-    def learning_rate(self) -> float: ...
+    def learning_rate(self) -> float:
+        ...
     @property
-    def n_environments(self) -> int: ...
+    def n_environments(self) -> int:
+        ...
     @property
-    def progress(self) -> float: ...
-
+    def progress(self) -> float:
+        ...
 class DecoupledSDNNQLearning:
     """
     Q-learning with an SDNN-C per dimension
     """
-    def __init__(
-        self,
-        *,
-        approximator: SDNNCConfig,
-        n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        learning: QLearningConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
-    def act(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        explore: bool = True,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> list[int]: ...
-    def action_value(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> SDNNC: ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None: ...
-    def learn(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        reward: typing.SupportsFloat | typing.SupportsIndex,
-        next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        terminated: bool,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> None: ...
-    def q_values(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        dimension: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def __init__(self, *, approximator: SDNNCConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[int]:
+        ...
+    def action_value(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> SDNNC:
+        ...
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         """
         Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
         """
@@ -1947,57 +1689,43 @@ class DecoupledSDNNQLearning:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
         """
-    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
-    def set_learning_rate(
-        self, rate: typing.SupportsFloat | typing.SupportsIndex | None
-    ) -> None: ...
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     def state(self) -> dict:
         """
         What it remembers: arrays by name
         """
     @property
-    def epsilon(self) -> float: ...
+    def epsilon(self) -> float:
+        ...
     @property
-    def learning_rate(self) -> float: ...
+    def learning_rate(self) -> float:
+        ...
     @property
-    def n_environments(self) -> int: ...
+    def n_environments(self) -> int:
+        ...
     @property
-    def progress(self) -> float: ...
-
+    def progress(self) -> float:
+        ...
 class RBFQLearning:
     """
     Q-learning with an RBF network
     """
-    def __init__(
-        self,
-        *,
-        approximator: RBFNetworkConfig,
-        learning: QLearningConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
-    def act(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        explore: bool = True,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> int: ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None: ...
-    def learn(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.SupportsInt | typing.SupportsIndex,
-        reward: typing.SupportsFloat | typing.SupportsIndex,
-        next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        terminated: bool,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> None: ...
-    def q_values(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        dimension: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> int:
+        ...
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         """
         Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
         """
@@ -2005,61 +1733,48 @@ class RBFQLearning:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
         """
-    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
-    def set_learning_rate(
-        self, rate: typing.SupportsFloat | typing.SupportsIndex | None
-    ) -> None: ...
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     def state(self) -> dict:
         """
         What it remembers: arrays by name
         """
     @property
-    def action_value(self) -> RBFNetwork: ...
+    def action_value(self) -> RBFNetwork:
+        ...
     @property
-    def epsilon(self) -> float: ...
+    def epsilon(self) -> float:
+        ...
     @property
-    def learning_rate(self) -> float: ...
+    def learning_rate(self) -> float:
+        ...
     @property
-    def n_environments(self) -> int: ...
+    def n_environments(self) -> int:
+        ...
     @property
-    def progress(self) -> float: ...
-
+    def progress(self) -> float:
+        ...
 class DecoupledRBFQLearning:
     """
     Q-learning with an RBF network per dimension
     """
-    def __init__(
-        self,
-        *,
-        approximator: RBFNetworkConfig,
-        n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        learning: QLearningConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
-    def act(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        explore: bool = True,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> list[int]: ...
-    def action_value(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> RBFNetwork: ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None: ...
-    def learn(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        reward: typing.SupportsFloat | typing.SupportsIndex,
-        next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        terminated: bool,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> None: ...
-    def q_values(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        dimension: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def __init__(self, *, approximator: RBFNetworkConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[int]:
+        ...
+    def action_value(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> RBFNetwork:
+        ...
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         """
         Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
         """
@@ -2067,58 +1782,50 @@ class DecoupledRBFQLearning:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
         """
-    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
-    def set_learning_rate(
-        self, rate: typing.SupportsFloat | typing.SupportsIndex | None
-    ) -> None: ...
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     def state(self) -> dict:
         """
         What it remembers: arrays by name
         """
     @property
-    def epsilon(self) -> float: ...
+    def epsilon(self) -> float:
+        ...
     @property
-    def learning_rate(self) -> float: ...
+    def learning_rate(self) -> float:
+        ...
     @property
-    def n_environments(self) -> int: ...
+    def n_environments(self) -> int:
+        ...
     @property
-    def progress(self) -> float: ...
-
+    def progress(self) -> float:
+        ...
 class FuzzyQLearning:
     """
     Fuzzy Q-learning; actions are numbers in [-1, 1]
     """
-    def __init__(
-        self,
-        *,
-        approximator: FuzzyRulesConfig,
-        learning: FuzzyQLearningConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
-    def act(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        explore: bool = True,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> float: ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None: ...
-    def last_action(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> float: ...
-    def learn(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.SupportsFloat | typing.SupportsIndex,
-        reward: typing.SupportsFloat | typing.SupportsIndex,
-        next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        terminated: bool,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> None: ...
+    def __init__(self, *, approximator: FuzzyRulesConfig, learning: FuzzyQLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> float:
+        ...
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def last_action(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> float:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsFloat | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
     def restore(self, state: dict) -> None:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
         """
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     def state(self) -> dict:
         """
         What it remembers: arrays by name
@@ -2128,47 +1835,33 @@ class FuzzyQLearning:
         V(state)
         """
     @property
-    def n_environments(self) -> int: ...
+    def n_environments(self) -> int:
+        ...
     @property
-    def rules(self) -> FuzzyRules: ...
-
+    def rules(self) -> FuzzyRules:
+        ...
 class VectorFuzzyQLearning:
     """
     Fuzzy Q-learning with rules for each dimension
     """
-    def __init__(
-        self,
-        *,
-        approximator: FuzzyRulesConfig,
-        n_dimensions: typing.SupportsInt | typing.SupportsIndex,
-        learning: FuzzyQLearningConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
-    def act(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        explore: bool = True,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> list[float]: ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None: ...
-    def last_action(
-        self, environment: typing.SupportsInt | typing.SupportsIndex = 0
-    ) -> list[float]: ...
-    def learn(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        reward: typing.SupportsFloat | typing.SupportsIndex,
-        next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        terminated: bool,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> None: ...
-    def part(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> FuzzyQLearning: ...
+    def __init__(self, *, approximator: FuzzyRulesConfig, n_dimensions: typing.SupportsInt | typing.SupportsIndex, learning: FuzzyQLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[float]:
+        ...
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def last_action(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[float]:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def part(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> FuzzyQLearning:
+        ...
     def restore(self, state: dict) -> None:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
         """
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     def state(self) -> dict:
         """
         What it remembers: arrays by name
@@ -2178,42 +1871,21 @@ class VectorFuzzyQLearning:
         V(state)
         """
     @property
-    def n_environments(self) -> int: ...
-
+    def n_environments(self) -> int:
+        ...
 class Sarsa:
     """
     Sarsa(lambda) with a linear readout of the SDNN code
     """
-    def __init__(
-        self,
-        *,
-        approximator: LinearSDNNConfig,
-        n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        learning: SarsaConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-        tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = [],
-    ) -> None: ...
-    def act(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        explore: bool = True,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> list[int]: ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None: ...
-    def learn(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        reward: typing.SupportsFloat | typing.SupportsIndex,
-        next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        terminated: bool,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> None: ...
-    def q_values(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        dimension: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def __init__(self, *, approximator: LinearSDNNConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: SarsaConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = []) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[int]:
+        ...
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         """
         Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
         """
@@ -2221,36 +1893,42 @@ class Sarsa:
         """
         Take what `state` of one with the same settings gave; on an error nothing changes
         """
-    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
-    def set_learning_rate(
-        self, rate: typing.SupportsFloat | typing.SupportsIndex | None
-    ) -> None: ...
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     def state(self) -> dict:
         """
         What it remembers: arrays by name
         """
     @property
-    def action_value(self) -> LinearSDNN: ...
+    def action_value(self) -> LinearSDNN:
+        ...
     @property
-    def epsilon(self) -> float: ...
+    def epsilon(self) -> float:
+        ...
     @property
-    def learning_rate(self) -> float: ...
+    def learning_rate(self) -> float:
+        ...
     @property
-    def n_environments(self) -> int: ...
+    def n_environments(self) -> int:
+        ...
     @property
     def n_learned(self) -> int:
         """
         Transitions that were learned
         """
     @property
-    def progress(self) -> float: ...
-
+    def progress(self) -> float:
+        ...
 class ObservationConfig:
     """
     The observed variables of a task.
-
+    
     Parameters
     ----------
     low : tuple[float | None, ...]
@@ -2271,34 +1949,28 @@ class ObservationConfig:
         Whether inputs that have nothing to do with rewards or actions, as the warm-up finds, are left out.
     inputs : tuple[int, ...]
         Variables that are never left out.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        low: collections.abc.Sequence[float | None] = ...,
-        high: collections.abc.Sequence[float | None] = ...,
-        adaptive: bool = ...,
-        angles: collections.abc.Sequence[int] = ...,
-        angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ...,
-        find_angle_pairs: bool = ...,
-        symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ...,
-        relevant_only: bool = ...,
-        inputs: collections.abc.Sequence[int] = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> ObservationConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., relevant_only: bool = ..., inputs: collections.abc.Sequence[int] = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> ObservationConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
     def replace(self, **changes: typing.Any) -> ObservationConfig:
         """
         Return a copy with other values of some fields.
@@ -2348,11 +2020,10 @@ class ObservationConfig:
         """
         First variables, and how many there are, of which one is 1.
         """
-
 class ActionConfig:
     """
     The actions of a task.
-
+    
     Parameters
     ----------
     low : tuple[float, ...]
@@ -2363,29 +2034,28 @@ class ActionConfig:
         Every whole number from low to high is an action of its own.
     number : {'float64', 'float32', 'float16', 'whole'}
         To what numbers actions are rounded.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        low: collections.abc.Sequence[float] = ...,
-        high: collections.abc.Sequence[float] = ...,
-        discrete: bool = ...,
-        number: typing.Literal["float64", "float32", "float16", "whole"] = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> ActionConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, low: collections.abc.Sequence[float] = ..., high: collections.abc.Sequence[float] = ..., discrete: bool = ..., number: typing.Literal['float64', 'float32', 'float16', 'whole'] = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> ActionConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
     def replace(self, **changes: typing.Any) -> ActionConfig:
         """
         Return a copy with other values of some fields.
@@ -2406,61 +2076,27 @@ class ActionConfig:
         Lowest action of each dimension.
         """
     @property
-    def number(self) -> typing.Literal["float64", "float32", "float16", "whole"]:
+    def number(self) -> typing.Literal['float64', 'float32', 'float16', 'whole']:
         """
         To what numbers actions are rounded.
         """
-
 class Controller:
     """
     An agent in the units of its task
     """
-
-    fields: typing.ClassVar[tuple] = (
-        "warm_up_steps",
-        "int",
-        1000,
-        "Random steps before learning, where ranges are not known.",
-        2.0,
-        10000000.0,
-        False,
-    )
-    def __init__(
-        self,
-        *,
-        approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig,
-        learning: QLearningConfig | FuzzyQLearningConfig | SarsaConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-        observation: ObservationConfig,
-        action: ActionConfig,
-        warm_up_steps: typing.SupportsInt | typing.SupportsIndex = 1000,
-        tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = [],
-        state: dict | None = None,
-    ) -> None:
+    fields: typing.ClassVar[tuple] = (('warm_up_steps', 'int', 1000, 'Random steps before learning, where ranges are not known.', 2.0, 10000000.0, False))
+    def __init__(self, *, approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig, learning: QLearningConfig | FuzzyQLearningConfig | SarsaConfig, seed: typing.SupportsInt | typing.SupportsIndex, observation: ObservationConfig, action: ActionConfig, warm_up_steps: typing.SupportsInt | typing.SupportsIndex = 1000, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = [], state: dict | None = None) -> None:
         """
         New, or as it was when `state` was taken
         """
-    def act(
-        self,
-        observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        explore: bool = True,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> numpy.typing.NDArray[numpy.float64]: ...
-    def action_of(
-        self,
-        index: typing.SupportsInt | typing.SupportsIndex,
-        dimension: typing.SupportsInt | typing.SupportsIndex,
-    ) -> float: ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None: ...
-    def learn(
-        self,
-        observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        reward: typing.SupportsFloat | typing.SupportsIndex,
-        next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        terminated: bool,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> None: ...
+    def act(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def action_of(self, index: typing.SupportsInt | typing.SupportsIndex, dimension: typing.SupportsInt | typing.SupportsIndex) -> float:
+        ...
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def learn(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
     def range_use(self) -> list[tuple[float, float] | None]:
         """
         Of each variable: the share of its range that it used, and how often it was beyond
@@ -2469,9 +2105,7 @@ class Controller:
         """
         What it remembers: arrays by name
         """
-    def state_of(
-        self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def state_of(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         The agent's state, shape (n_inputs,)
         """
@@ -2481,48 +2115,55 @@ class Controller:
         The agent in itself, with states in [0, 1]
         """
     @property
-    def approximator(
-        self,
-    ) -> SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig: ...
+    def approximator(self) -> SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig:
+        ...
     @property
-    def epsilon(self) -> float: ...
+    def epsilon(self) -> float:
+        ...
     @epsilon.setter
-    def epsilon(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
+    def epsilon(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
     @property
     def inputs(self) -> list[tuple[str, list[int]]]:
         """
         Of a state: kinds, and the variables that they are made of
         """
     @property
-    def is_warming_up(self) -> bool: ...
+    def is_warming_up(self) -> bool:
+        ...
     @property
-    def learning_rate(self) -> float: ...
+    def learning_rate(self) -> float:
+        ...
     @learning_rate.setter
-    def learning_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
+    def learning_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
     @property
-    def n_actions(self) -> list[int]: ...
+    def n_actions(self) -> list[int]:
+        ...
     @property
-    def n_environments(self) -> int: ...
+    def n_environments(self) -> int:
+        ...
     @n_environments.setter
-    def n_environments(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def n_environments(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
-    def n_variables(self) -> int: ...
+    def n_variables(self) -> int:
+        ...
     @property
-    def progress(self) -> float: ...
+    def progress(self) -> float:
+        ...
     @progress.setter
-    def progress(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def progress(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
-    def ranges(
-        self,
-    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    def ranges(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
         Lowest and highest values, (n_variables,) each
         """
-
 class ProtocolConfig:
     """
     Learning protocol of a trial; the defaults are the paper's (section 4.2).
-
+    
     Parameters
     ----------
     n_learning_episodes : int
@@ -2533,29 +2174,28 @@ class ProtocolConfig:
         Whether the last transition before a time limit bootstraps, as if the episode continued; else it counts as terminated.
     noisy_evaluations : bool
         Whether the sensors are as noisy in evaluations as in learning.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> dict: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        n_learning_episodes: int = ...,
-        evaluate_every_episodes: int = ...,
-        limit_bootstraps: bool = ...,
-        noisy_evaluations: bool = ...,
-    ) -> None: ...
-    def __replace__(self, **changes: typing.Any) -> ProtocolConfig: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: dict) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> dict:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_learning_episodes: int = ..., evaluate_every_episodes: int = ..., limit_bootstraps: bool = ..., noisy_evaluations: bool = ...) -> None:
+        ...
+    def __replace__(self, **changes: typing.Any) -> ProtocolConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: dict) -> None:
+        ...
     def replace(self, **changes: typing.Any) -> ProtocolConfig:
         """
         Return a copy with other values of some fields.
@@ -2580,22 +2220,12 @@ class ProtocolConfig:
         """
         Whether the sensors are as noisy in evaluations as in learning.
         """
-
 class AcrobotTrial:
     """
     SDNN-C learns the acrobot swing-up
     """
-    def __init__(
-        self,
-        *,
-        approximator: SDNNCConfig,
-        learning: QLearningConfig,
-        acrobot: AcrobotConfig,
-        goal: GoalScheduleConfig,
-        sensors: SensorConfig,
-        protocol: ProtocolConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
+    def __init__(self, *, approximator: SDNNCConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         Runs up to n more learning episodes
@@ -2614,27 +2244,20 @@ class AcrobotTrial:
         The agent at work: asking for values changes nothing that follows
         """
     @property
-    def episode(self) -> int: ...
+    def episode(self) -> int:
+        ...
     @property
-    def finished(self) -> bool: ...
+    def finished(self) -> bool:
+        ...
     @property
-    def n_decisions(self) -> int: ...
-
+    def n_decisions(self) -> int:
+        ...
 class FuzzyAcrobotTrial:
     """
     Fuzzy Q-learning learns the acrobot swing-up
     """
-    def __init__(
-        self,
-        *,
-        approximator: FuzzyRulesConfig,
-        learning: FuzzyQLearningConfig,
-        acrobot: AcrobotConfig,
-        goal: GoalScheduleConfig,
-        sensors: SensorConfig,
-        protocol: ProtocolConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
+    def __init__(self, *, approximator: FuzzyRulesConfig, learning: FuzzyQLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         Runs up to n more learning episodes
@@ -2649,27 +2272,20 @@ class FuzzyAcrobotTrial:
         The agent at work: asking for values changes nothing that follows
         """
     @property
-    def episode(self) -> int: ...
+    def episode(self) -> int:
+        ...
     @property
-    def finished(self) -> bool: ...
+    def finished(self) -> bool:
+        ...
     @property
-    def n_decisions(self) -> int: ...
-
+    def n_decisions(self) -> int:
+        ...
 class RBFAcrobotTrial:
     """
     Q-learning with an RBF network learns the acrobot swing-up
     """
-    def __init__(
-        self,
-        *,
-        approximator: RBFNetworkConfig,
-        learning: QLearningConfig,
-        acrobot: AcrobotConfig,
-        goal: GoalScheduleConfig,
-        sensors: SensorConfig,
-        protocol: ProtocolConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
+    def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         Runs up to n more learning episodes
@@ -2684,27 +2300,20 @@ class RBFAcrobotTrial:
         The agent at work: asking for values changes nothing that follows
         """
     @property
-    def episode(self) -> int: ...
+    def episode(self) -> int:
+        ...
     @property
-    def finished(self) -> bool: ...
+    def finished(self) -> bool:
+        ...
     @property
-    def n_decisions(self) -> int: ...
-
+    def n_decisions(self) -> int:
+        ...
 class LinearAcrobotTrial:
     """
     Sarsa with a linear readout of the SDNN code learns the acrobot swing-up
     """
-    def __init__(
-        self,
-        *,
-        approximator: LinearSDNNConfig,
-        learning: SarsaConfig,
-        acrobot: AcrobotConfig,
-        goal: GoalScheduleConfig,
-        sensors: SensorConfig,
-        protocol: ProtocolConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
+    def __init__(self, *, approximator: LinearSDNNConfig, learning: SarsaConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         Runs up to n more learning episodes
@@ -2719,68 +2328,54 @@ class LinearAcrobotTrial:
         The agent at work: asking for values changes nothing that follows
         """
     @property
-    def episode(self) -> int: ...
+    def episode(self) -> int:
+        ...
     @property
-    def finished(self) -> bool: ...
+    def finished(self) -> bool:
+        ...
     @property
-    def n_decisions(self) -> int: ...
-
+    def n_decisions(self) -> int:
+        ...
 class PlainRBFQLearning:
     """
     Q-learning with an RBF network evaluated without its product structure; only to be timed
     """
-    def __init__(
-        self,
-        *,
-        approximator: RBFNetworkConfig,
-        learning: QLearningConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
+    def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def action_value(self) -> RBFNetwork:
         """
         A copy of the network behind it
         """
-
 class BufferRead:
     """
     Reads a buffer from front to back
     """
-    def __init__(self, n_bytes: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-    def run(
-        self, n_repetitions: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def __init__(self, n_bytes: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def run(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         Nanoseconds per reading: (n_repetitions,)
         """
     @property
-    def n_bytes(self) -> int: ...
-
+    def n_bytes(self) -> int:
+        ...
 class DenseProduct:
     """
     A dense float32 matrix-vector product
     """
-    def __init__(
-        self,
-        n_rows: typing.SupportsInt | typing.SupportsIndex,
-        n_columns: typing.SupportsInt | typing.SupportsIndex,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
-    def run(
-        self, n_repetitions: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def __init__(self, n_rows: typing.SupportsInt | typing.SupportsIndex, n_columns: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def run(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         Nanoseconds per product: (n_repetitions,)
         """
-
 class NetworkParts:
     """
     The network's parts of a decision
     """
     @typing.overload
-    def __init__(
-        self, trial: AcrobotTrial, seed: typing.SupportsInt | typing.SupportsIndex
-    ) -> None:
+    def __init__(self, trial: AcrobotTrial, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         Times a copy of the trial's network
         """
@@ -2789,235 +2384,138 @@ class NetworkParts:
         """
         Times a copy of the network
         """
-    def mean_bytes_of_pass(self, n_states: typing.SupportsInt | typing.SupportsIndex) -> float: ...
-    def time_corrections(
-        self,
-        n_repetitions: typing.SupportsInt | typing.SupportsIndex,
-        n_corrected: typing.SupportsInt | typing.SupportsIndex,
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def mean_bytes_of_pass(self, n_states: typing.SupportsInt | typing.SupportsIndex) -> float:
+        ...
+    def time_corrections(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex, n_corrected: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         Learning steps
         """
-    def time_remembered_values(
-        self, n_repetitions: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def time_remembered_values(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         All values at the same state again
         """
-    def time_selections(
-        self,
-        n_repetitions: typing.SupportsInt | typing.SupportsIndex,
-        n_selections: typing.SupportsInt | typing.SupportsIndex,
-        n_selected: typing.SupportsInt | typing.SupportsIndex,
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def time_selections(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex, n_selections: typing.SupportsInt | typing.SupportsIndex, n_selected: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         n_selections selections of units per repetition
         """
-    def time_values(
-        self, n_repetitions: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def time_values(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         All values at a new state: nanoseconds (n_repetitions,)
         """
     @property
-    def weight_bytes(self) -> int: ...
-
+    def weight_bytes(self) -> int:
+        ...
 class AcrobotDecisions:
     """
     The acrobot under random torques
     """
-    def __init__(
-        self, config: AcrobotConfig, seed: typing.SupportsInt | typing.SupportsIndex
-    ) -> None: ...
-    def run(
-        self, n_repetitions: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def __init__(self, config: AcrobotConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def run(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         Nanoseconds per decision: (n_repetitions,)
         """
     @property
-    def n_integration_steps(self) -> int: ...
-
-def action_value(
-    action: typing.SupportsInt | typing.SupportsIndex,
-    n_actions: typing.SupportsInt | typing.SupportsIndex,
-    low: typing.SupportsFloat | typing.SupportsIndex,
-    high: typing.SupportsFloat | typing.SupportsIndex,
-) -> float:
+    def n_integration_steps(self) -> int:
+        ...
+def action_value(action: typing.SupportsInt | typing.SupportsIndex, n_actions: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsFloat | typing.SupportsIndex, high: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     The value of an action in a range cut evenly
     """
-
-def anchor_patterns(
-    n_units: typing.SupportsInt | typing.SupportsIndex,
-    n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex,
-    n_interpolated: typing.SupportsInt | typing.SupportsIndex,
-    circular: bool,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int8]: ...
-def atan2(
-    y: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> typing.Any: ...
+def anchor_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex, n_interpolated: typing.SupportsInt | typing.SupportsIndex, circular: bool, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+    ...
+def atan2(y: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    ...
 def available_instruction_sets() -> list[str]:
     """
     The instruction sets that this machine offers, in rising order
     """
-
-def basic_observation(
-    state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> numpy.typing.NDArray[numpy.float64]:
+def basic_observation(state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
     s1..s4 of a state
     """
-
-def correlation_matrix_patterns(
-    n_units: typing.SupportsInt | typing.SupportsIndex,
-    correlations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int8]: ...
-def energy_sensor(
-    s3: typing.SupportsFloat | typing.SupportsIndex, s4: typing.SupportsFloat | typing.SupportsIndex
-) -> float: ...
-def exp(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any: ...
-def height_sensor(
-    s1: typing.SupportsFloat | typing.SupportsIndex, s2: typing.SupportsFloat | typing.SupportsIndex
-) -> float: ...
+def correlation_matrix_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, correlations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+    ...
+def energy_sensor(s3: typing.SupportsFloat | typing.SupportsIndex, s4: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    ...
+def exp(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    ...
+def height_sensor(s1: typing.SupportsFloat | typing.SupportsIndex, s2: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    ...
 def instruction_set() -> str:
     """
     The instruction set in use
     """
-
-def libsdnn_tables(
-    n_units: typing.SupportsInt | typing.SupportsIndex,
-    inputs: collections.abc.Sequence[
-        tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]
-    ],
-    pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-    seed: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-    library: str = "libstdc++",
-) -> tuple:
+def libsdnn_tables(n_units: typing.SupportsInt | typing.SupportsIndex, inputs: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]], pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], seed: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], library: str = 'libstdc++') -> tuple:
     """
     LIBSDNN's code tables, (modified, modifiers); inputs are (n_bins, n_flipped)
     """
-
-def libsdnn_weights(
-    n_units: typing.SupportsInt | typing.SupportsIndex,
-    n_columns: typing.SupportsInt | typing.SupportsIndex,
-    low: typing.SupportsInt | typing.SupportsIndex,
-    high: typing.SupportsInt | typing.SupportsIndex,
-    seed: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-    library: str = "libstdc++",
-) -> tuple:
+def libsdnn_weights(n_units: typing.SupportsInt | typing.SupportsIndex, n_columns: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsInt | typing.SupportsIndex, high: typing.SupportsInt | typing.SupportsIndex, seed: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], library: str = 'libstdc++') -> tuple:
     """
     LIBSDNN's first (weights, thresholds)
     """
-
 def linear_presets() -> dict[str, tuple[str, LinearSDNNConfig, SarsaConfig]]:
     """
     The same of Sarsa with a linear readout
     """
-
-def log(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any: ...
+def log(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    ...
 def n_units_for(scheme: str, n_classes: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
     Units that separate so many classes
     """
-
-def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any: ...
+def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    ...
 def presets() -> dict[str, tuple[str, SDNNCConfig, QLearningConfig]]:
     """
     Named settings of Q-learning with SDNN-C: titles, settings of approximator and learning
     """
-
-def random_inverse_patterns(
-    n_units: typing.SupportsInt | typing.SupportsIndex,
-    n_bins: typing.SupportsInt | typing.SupportsIndex,
-    n_flipped: typing.SupportsInt | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int8]: ...
-def seed_of_dimension(
-    seed: typing.SupportsInt | typing.SupportsIndex, d: typing.SupportsInt | typing.SupportsIndex
-) -> int:
+def random_inverse_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_bins: typing.SupportsInt | typing.SupportsIndex, n_flipped: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+    ...
+def seed_of_dimension(seed: typing.SupportsInt | typing.SupportsIndex, d: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
     The seed of the network of a dimension of the action
     """
-
 def set_instruction_set(name: str) -> None:
     """
     Forces an instruction set, for the whole process
     """
-
-def sin_cos(
-    x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+def sin_cos(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     (sin x, cos x), item by item
     """
-
-def symbol_patterns(
-    n_symbols: typing.SupportsInt | typing.SupportsIndex,
-    n_units: typing.SupportsInt | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int8]: ...
+def symbol_patterns(n_symbols: typing.SupportsInt | typing.SupportsIndex, n_units: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+    ...
 @typing.overload
-def time_agent_steps(
-    agent: SDNNQLearning,
-    n_repetitions: typing.SupportsInt | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int64]:
+def time_agent_steps(agent: SDNNQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """
-
 @typing.overload
-def time_agent_steps(
-    agent: FuzzyQLearning,
-    n_repetitions: typing.SupportsInt | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int64]:
+def time_agent_steps(agent: FuzzyQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """
-
 @typing.overload
-def time_agent_steps(
-    agent: RBFQLearning,
-    n_repetitions: typing.SupportsInt | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int64]:
+def time_agent_steps(agent: RBFQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """
-
 @typing.overload
-def time_agent_steps(
-    agent: Sarsa,
-    n_repetitions: typing.SupportsInt | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int64]:
+def time_agent_steps(agent: Sarsa, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """
-
 @typing.overload
-def time_agent_steps(
-    agent: PlainRBFQLearning,
-    n_repetitions: typing.SupportsInt | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int64]:
+def time_agent_steps(agent: PlainRBFQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """
-
-def time_decisions(
-    trial: AcrobotTrial, n_episodes: typing.SupportsInt | typing.SupportsIndex
-) -> numpy.typing.NDArray[numpy.int64]:
+def time_decisions(trial: AcrobotTrial, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     Advances a trial; nanoseconds of every decision in it
     """
-
-CLASS_SCHEMES: tuple = ("one_vs_rest", "one_vs_one")
-TRAINING_FORMS: tuple = ("auto", "dual", "block", "plain")
+CLASS_SCHEMES: tuple = ('one_vs_rest', 'one_vs_one')
+TRAINING_FORMS: tuple = ('auto', 'dual', 'block', 'plain')
 __version__: str
-compiler: str = "GCC 12.2.0"
+compiler: str = 'GCC 12.2.0'
