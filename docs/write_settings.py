@@ -27,7 +27,7 @@ def page() -> str:
     """Return the page."""
     definitions = spec_schema()["$defs"]
     text = HEAD
-    described: dict[tuple[str, str], str] = {}
+    described: dict[str, str] = {}
     for table, found in definitions["RunSpec"]["properties"].items():
         text += f"\n## {table}\n\n{found['description']}\n"
         names = [kind.__name__ for kind in CORE.get(table, ())]
@@ -44,17 +44,23 @@ def entries(
     table: str,
     kind: str,
     properties: dict[str, Any],
-    described: dict[tuple[str, str], str],
+    described: dict[str, str],
 ) -> Iterator[str]:
-    """Write a line for each setting; what an earlier class describes alike is referred to."""
+    """Write a line for each setting; what an earlier class has alike is named only."""
+    same: dict[str, list[str]] = {}
     for name, found in properties.items():
         default = found.get("default")
         what = words(found) + ("" if default in (None, (), {}) else f"; `{default}`")
         text = found.get("description", "")
-        first = described.setdefault((name, text), kind)
-        if first != kind and len(text.split()) > 5:
-            text = f"As in {first}."
-        yield f"- **`{table}.{name}`** ({what}): {text}\n"
+        first = described.setdefault(f"{name} {text}", kind)
+        if described.setdefault(f"{name} {what} {text}", kind) != kind:
+            same.setdefault(first, []).append(name)
+        elif first != kind and len(text.split()) > 5:
+            yield f"- **`{table}.{name}`** ({what}): As in {first}.\n"
+        else:
+            yield f"- **`{table}.{name}`** ({what}): {text}\n"
+    for first, names in same.items():
+        yield f"- As in {first}: {', '.join(f'`{name}`' for name in names)}\n"
 
 
 def words(found: dict[str, Any]) -> str:
