@@ -8,26 +8,11 @@ import numpy as np
 
 from sdnn.agents import SDNNQLearning
 from sdnn.export.tables import Tables, bit_planes, joined, wrapped
-from sdnn.export.writer import MOST_WEIGHTS, CHeader, Writer, template
+from sdnn.export.writer import MOST_WEIGHTS, CHeader, Writer
 
 _MOST_UNITS = 65535  # whose numbers fit 16 bits
 _BYTES_OF_UNIT = 8
 _BYTES_OF_NETWORK = 28  # a struct of five pointers and two sizes, where pointers have 32 bits
-
-_TITLE = "the greedy policy of a trained agent, in C99 for small processors."
-_ABOUT = """\
- * Flash: ${flash} bytes of constants, of which ${weights} are weights, ${weight_bits} bits each;
- *        the code comes to 1 to 2 kB.
- * RAM:   ${ram} bytes of arrays on the stack, and at most 256 bytes for all else there;
- *        ${name}_act_float takes ${float_ram} more. No heap, and nothing static that changes.
- * Time:  a decision reads ${words} words of 32 bits of weights, and takes some 22 instructions
- *        of a 32-bit ARM processor for each, one of them a multiplication.
-"""
-_ACT = "  return ${name}_best(&${name}_networks[0], bins);\n"
-_ACTS = """\
-  uint32_t d;
-  for (d = 0; d < ${NAME}_N_DIMENSIONS; ++d) action[d] = ${name}_best(&${name}_networks[d], bins);
-"""
 
 
 class SDNNCWriter(Writer):
@@ -96,20 +81,15 @@ class SDNNCWriter(Writer):
         most_actions = max(network.n_actions for network in networks)
         ram_bytes = 8 * n_code_words + 4 * n_fire_words + 2 * most_actions + 8 * len(self.inputs)
         values = {
-            "title": _TITLE,
             "description": (
                 f"{len(self.inputs)} inputs, {sizes.n_pattern_units} units per pattern,"
                 f" {' + '.join(map(str, n_units))} hidden units in use,"
                 f" {' x '.join(str(network.n_actions) for network in networks)} actions"
             ),
-            "about": _ABOUT,
             "ram_bytes": ram_bytes,
-            "ram": f"{ram_bytes:,}",
             "weight_bytes": 4 * n_words,
-            "weights": f"{4 * n_words:,}",
             "weight_bits": f"{32 * n_words / (sum(n_units) * n_columns):.2f}",
             "n_words": n_words,
-            "words": f"{n_words:,}",
             "permutation_type": index_type,
             "networks": joined([*units_of, declaration, *rows, "};"]),
             "n_code_words": n_code_words,
@@ -119,13 +99,11 @@ class SDNNCWriter(Writer):
             "n_partners": sizes.n_pairs // len(self.inputs),
             "pattern_bytes": -(-sizes.n_pattern_units // 8),
             "n_active_units": sizes.n_active_units,
-            "widen": "  best = ${name}_ties[best];\n"
-            if self.agent.learning.tie_tolerance > 0.0
-            else "",
-            **self.choice("ranks[action] >= best", "network->n_actions"),
-            "act_bins": _ACTS if self.is_vector else _ACT,
+            "has_ties": self.agent.learning.tie_tolerance > 0.0,
+            "ties": self.ties(),
+            "is_linear": False,
         }
-        return self.write(template("c_sdnn_c"), template("c_greedy"), values, tables)
+        return self.write("c_sdnn_c", values, tables)
 
     def _add_ranks(self, tables: Tables) -> None:
         name, networks = self.name, self._networks()

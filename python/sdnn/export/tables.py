@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _DIRECTION_BITS = 30
-_BYTES = {"uint8_t": 1, "uint16_t": 2, "int32_t": 4, "uint32_t": 4}
+_BYTES = {"uint8_t": 1, "uint16_t": 2, "int32_t": 4, "uint32_t": 4, "uint64_t": 8}
 
 
 @dataclass
@@ -27,7 +27,9 @@ class Tables:
         self.n_bytes += _BYTES[kind] * values.size
         if comment:
             self.lines.append(f"/* {comment} */")
-        form = "UINT32_C(0x{:08x})" if kind == "uint32_t" and "weights" in name else "{}"
+        form = {"uint64_t": "UINT64_C({})"}.get(kind, "{}")
+        if kind == "uint32_t" and "weights" in name:
+            form = "UINT32_C(0x{:08x})"
         stored = values if values.size else np.zeros(1, np.int64)  # C has no empty tables
         self.lines += table_lines(f"static const {kind} {name}", stored, form)
 
@@ -114,7 +116,7 @@ class Input:
 def conversions(
     inputs: Sequence[Input], name: str, fraction_bits: int
 ) -> tuple[Tables, list[str], list[str]]:
-    """Write the lines that find the bins of observations, in fixed and in floating point.
+    """Write the calls that find the bins of observations, in fixed and in floating point.
 
     Also return the tables that they use, shared by inputs of one kind and range.
     """
@@ -150,11 +152,7 @@ def conversions(
             bounds = table((one.at[0], n_bins), "bounds", values, about)
             fixed.append(f"bin_between({bounds}, {n_bins}, {reading})")
             double.append(f"bin_of_unit({unit}, {n_bins})")
-    in_fixed, in_double = (
-        [f"  bins[{i}] = {name}_{call};" for i, call in enumerate(calls)]
-        for calls in (fixed, double)
-    )
-    return tables, in_fixed, in_double
+    return tables, fixed, double
 
 
 def _fixed_bounds(low: float, high: float, n_bins: int, fraction_bits: int) -> NDArray[Any]:

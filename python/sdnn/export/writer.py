@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib.resources import files
-from string import Template
-from textwrap import wrap
+from functools import cache
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from sdnn._core import __version__
-from sdnn.agents import Scaling
 from sdnn.agents.q_learning import CodedAgent
 from sdnn.arguments import argument_error, whole
 from sdnn.export.tables import (
@@ -133,43 +130,48 @@ class Writer:
         rows = [np.packbits(network.table(i) > 0, axis=1, bitorder="little") for i in inputs]
         return np.concatenate(rows).reshape(-1)
 
-    def write(self, policy: str, end: str, values: dict[str, Any], tables: Tables) -> CHeader:
-        """Fill the frame in: templates of the policy and of what follows the observations.
+    def write(self, name: str, values: dict[str, Any], tables: Tables) -> CHeader:
+        """Fill a template in, which also receives what all headers have.
 
         Values have the description, bytes of RAM and of weights, and words read beside what the
-        templates name.
+        template names.
         """
         fixed_tables, bins_of_fixed, bins_of_double = conversions(
             self.inputs, self.name, self.fraction_bits
         )
         flash_bytes = tables.n_bytes + fixed_tables.n_bytes
-        values = {
-            "version": __version__,
-            "kind": type(self.agent).__name__,
-            "seed": self.agent.seed,
-            "flash": f"{flash_bytes:,}",
-            "float_ram": f"{8 * self.n_observed:,}",
-            "usage": joined(f" * {line}".rstrip() for line in self._usage()),
-            "n_observed": self.n_observed,
-            "n_inputs": len(self.inputs),
-            "n_dimensions": self.n_dimensions,
-            "fraction_bits": self.fraction_bits,
-            "tables": tables.text(),
-            "fixed_tables": fixed_tables.text(),
-            "bins_of_fixed": joined(bins_of_fixed),
-            "float_tables": self._float_tables(),
-            "bins_of_double": joined(bins_of_double),
-            **(_OF_VECTORS if self.is_vector else _OF_NUMBERS),
-            **values,
-        }
-        text = template("c_header").replace("${policy}", policy).replace("${end}", end)
-        # What is filled in has names in it too.
-        for _ in range(2):
-            text = Template(text).safe_substitute(values)
-        text = Template(text).substitute(name=self.name, NAME=self.name.upper())
+        scaling = self.agent.scaling
+        text = (
+            _templates()
+            .get_template(f"{name}.h.jinja")
+            .render(
+                **values,
+                name=self.name,
+                NAME=self.name.upper(),
+                version=__version__,
+                kind=type(self.agent).__name__,
+                seed=self.agent.seed,
+                flash=f"{flash_bytes:,}",
+                float_ram=f"{8 * self.n_observed:,}",
+                scaling=None if scaling is None else list(scaling.lines()),
+                tie_rule=self.agent.learning.tie_rule,
+                inputs=[list(one.usage()) for one in self.inputs],
+                n_observed=self.n_observed,
+                n_inputs=len(self.inputs),
+                n_dimensions=self.n_dimensions,
+                is_vector=self.is_vector,
+                is_box=self.box is not None,
+                fraction_bits=self.fraction_bits,
+                tables=tables.text(),
+                fixed_tables=fixed_tables.text(),
+                bins_of_fixed=bins_of_fixed,
+                float_tables=self._float_tables(),
+                bins_of_double=bins_of_double,
+            )
+        )
         return CHeader(
             name=self.name,
-            text=_comment_on(self.agent.scaling) + text,
+            text=text,
             fraction_bits=self.fraction_bits,
             flash_bytes=flash_bytes,
             weight_bytes=values["weight_bytes"],
@@ -186,124 +188,15 @@ class Writer:
         lines = table_lines(f"static const {kind} {self.name}_action_float", actions, form)
         return joined(["/* The actions. */", *lines, ""])
 
-    def calls(self) -> Iterator[str]:
-        """Describe how to use the header: declarations and calls."""
-        name, macro = self.name, self.name.upper()
-        if self.is_vector:
-            yield f"  uint32_t action[{macro}_N_DIMENSIONS];"
-            yield f"  {name}_act_fixed(observation, action);"
-        else:
-            yield f"  uint32_t action = {name}_act_fixed(observation);"
-
-    def remarks(self) -> Iterator[str]:
-        """Describe what else there is."""
-        name = self.name
-        floats = f"{name}_act_float and {name}_act_double take observations in floating point"
-        actions = "" if self.box is None else f", and {name}_action_float has the actions"
-        yield from wrap(
-            f"With {name.upper()}_USE_FLOAT defined before the include, {floats}{actions}.", 96
-        )
-        yield f"{name}_act_bins takes the bins of all inputs:"
-
-    def _usage(self) -> Iterator[str]:
-        """Describe how to use the header."""
-        name, macro = self.name, self.name.upper()
-        dimension, number = ("[d]", "action[d]") if self.is_vector else ("", "action")
-        scale = f"2^{self.fraction_bits}"
-        yield f'  #include "{name}.h"'
-        yield f"  int32_t observation[{macro}_N_OBSERVED]; // in its own units, times {scale}"
-        yield from self.calls()
-        if self.box is None:
-            first = f"{name}_first_action[{'d' if self.is_vector else '0'}]"
-            yield f"  int32_t value = {first} + (int32_t){number}; // as the task has it"
-        else:
-            value = f"{name}_action_fixed{dimension}[{number}]"
-            yield f"  int32_t value = {value}; // times {scale}"
-        yield ""
-        yield from self.remarks()
-        for i, one in enumerate(self.inputs):
-            start, *rest = one.usage()
-            yield f"  input {i}: {start}"
-            yield from (f"  {line}" for line in rest)
-        yield from wrap(self.tie_rule(), 96)
-
-    def tie_rule(self) -> str:
-        """Describe which of several best actions is taken."""
-        return _TIE_RULES[str(self.agent.learning.tie_rule)]
-
-    def choice(self, is_best: str, n_actions: str) -> dict[str, str]:
-        """Write how ties are broken, between actions for which an expression holds."""
-        chosen = _LOWEST if self.agent.learning.tie_rule == "lowest" else _MIDDLE
-        return {
-            key: text.replace("@is_best", is_best).replace("@n_actions", n_actions)
-            for key, text in chosen.items()
-        }
+    def ties(self) -> str:
+        """Return how ties are broken where nothing is drawn."""
+        return "lowest" if self.agent.learning.tie_rule == "lowest" else "middle"
 
 
-def template(name: str) -> str:
-    """Return a template of the package."""
-    return files("sdnn.export").joinpath(f"{name}.template").read_text("utf-8")
-
-
-def _comment_on(scaling: Scaling | None) -> str:
-    """Describe at the top of the header how its observations are scaled."""
-    if scaling is None:
-        return ""
-    lines = (
-        "What this policy observes is scaled, since its run had noise or redundant variables:",
-        "each variable from its range to [0, 1], (value - low) / (high - low), and what lies",
-        "beyond the range to 0 or 1. Wherever an observation has units below, it is these.",
-        "",
-        *(f"  {line}" for line in scaling.lines()),
-    )
-    return "\n".join(["/* " + lines[0], *(f" * {one}".rstrip() for one in lines[1:]), " */\n"])
-
-
-_TIE_RULES = {
-    "uniform": "Of several best actions, of which the agent draws one, the header takes the middle"
-    " of the widest run of neighbours.",
-    "middle": "Of several best actions it takes the middle of the widest run of neighbours, as the"
-    " agent does.",
-    "lowest": "Of several best actions it takes the lowest, as the agent does.",
-}
-
-# How ties are broken.
-_LOWEST = {
-    "counters": "",
-    "choose": """\
-  for (action = 0; !(@is_best); ++action) {
-  }
-  return action;
-""",
-}
-
-_MIDDLE = {
-    "counters": ", run = 0, widest = 0, middle = 0",
-    "choose": """\
-  for (action = 0; action < @n_actions; ++action) {
-    run = @is_best ? run + 1 : 0;
-    if (run > widest) {
-      widest = run;
-      middle = action - run / 2;
-    }
-  }
-  return middle;
-""",
-}
-
-# Functions that return one number of an action, or fill in several.
-_OF_NUMBERS = {
-    "in_each": "",
-    "result": "uint32_t",
-    "parameter": "",
-    "argument": "",
-    "call": "return ",
-}
-
-_OF_VECTORS = {
-    "in_each": " in each dimension",
-    "result": "void",
-    "parameter": ", uint32_t *action",
-    "argument": ", action",
-    "call": "",
-}
+@cache
+def _templates() -> Environment:
+    return Environment(
+        loader=PackageLoader("sdnn.export", "."), undefined=StrictUndefined, autoescape=False,
+        variable_start_string="${", variable_end_string="}", line_statement_prefix="@",
+        comment_start_string="@{", keep_trailing_newline=True,
+    )  # fmt: skip

@@ -28,7 +28,7 @@ from sdnn.reproduction.report import Report
 from sdnn.runs.engine import Executor, Observer, PlannedTrial, ThreadExecutor, plan_of, run_trials
 from sdnn.runs.figures import figure_bytes
 from sdnn.runs.registry import split_label
-from sdnn.runs.report import WrittenReport, describe_call, require
+from sdnn.runs.report import WrittenReport, describe_call, require_matplotlib
 from sdnn.runs.results import CaseResult, measure
 from sdnn.runs.settings import AgentSpec, BudgetSpec
 from sdnn.runs.spec import PAPER_INTERVAL, RunSpec
@@ -79,7 +79,7 @@ class ReproduceRequest:
         return quick if self.quick else paper
 
     @cached_property
-    def n_learning_episodes(self) -> int:
+    def episodes(self) -> int:
         """Learning episodes of a trial, of which a test needs at least ten; else a ValueError."""
         n_episodes = self.n_episodes or self._defaults[1]
         return whole("episodes", n_episodes, PAPER_INTERVAL, MOST_EPISODES)
@@ -97,7 +97,7 @@ class ReproduceRequest:
             [case for experiment in known for case in experiment.cases],
             self.n_trials or self._defaults[0],
             self.seed,
-            self.n_learning_episodes,
+            self.episodes,
         )
         asked = {experiment.id for experiment in self.experiments}
         wanted = {pair for e in known if e.id in asked for pair in e.pairs}
@@ -162,11 +162,11 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
     The files cover every experiment whose trials are all stored under the request's settings, not
     only those that were asked for now. None is written unless every trial is there.
 
-    RunError before any trial if matplotlib or Jinja is not installed or the result file cannot be
+    RunError before any trial if matplotlib is not installed or the result file cannot be
     used; later if the cluster cannot run trials any more: what was finished is stored. ValueError
     if nothing can be run as requested.
     """
-    require("matplotlib", "jinja2")
+    require_matplotlib()
     begin = time.monotonic()
     watcher = Observer() if observer is None else observer
     plan = request.plan

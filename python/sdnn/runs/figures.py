@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sdnn.interrupts import stay_interrupts
 from sdnn.runs.registry import labels, title_of
-from sdnn.runs.report import require
+from sdnn.runs.report import require_matplotlib
 from sdnn.runs.results import (
     CENSORED_MEASURES,
     CaseResult,
@@ -58,7 +58,7 @@ def new_figure(width: float, height: float) -> Figure:
 
     Raises a `PlotUnavailableError` if matplotlib is not installed.
     """
-    require("matplotlib")
+    require_matplotlib()
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")

@@ -1,6 +1,6 @@
 """Pages of figures and tables: on the screen, as Markdown and as HTML; each cell is written once.
 
-Jinja and rich are imported when they are needed; Jinja is an extra.
+Jinja and rich are imported when they are needed.
 """
 
 from __future__ import annotations
@@ -157,7 +157,6 @@ class Page:
 
     def to_html(self, call: str) -> str:
         """Make it one self-contained HTML page; `call` is the command that made it."""
-        require("jinja2")
         from jinja2 import Environment, PackageLoader, StrictUndefined
 
         environment = Environment(
@@ -204,10 +203,10 @@ def markdown_text(text: str) -> str:
     return _MARKUP.sub(r"\\\g<0>", " ".join(text.split()))
 
 
-def require(*packages: str) -> None:
-    """Raise a `PlotUnavailableError` that names the packages which are not installed."""
-    if missing := " ".join(name for name in packages if find_spec(name) is None):
-        raise PlotUnavailableError(f"figures and reports need more packages: pip install {missing}")
+def require_matplotlib() -> None:
+    """Raise a `PlotUnavailableError` if it is not installed."""
+    if find_spec("matplotlib") is None:
+        raise PlotUnavailableError("figures need another package: pip install matplotlib")
 
 
 def describe_call(outcome: TrialsOutcome, seconds: float, shown: Iterable[TrialRecord]) -> str:

@@ -28,7 +28,7 @@ from sdnn.runs.report import (
     format_estimate,
     measure_cells,
     measures_section,
-    require,
+    require_matplotlib,
     settings_section,
 )
 from sdnn.runs.results import (
@@ -299,11 +299,11 @@ def sweep(request: SweepRequest, *, observer: Observer | None = None) -> Written
     trial that raises leaves its variant out of the report and nothing else. There is no report if
     nothing is complete, or the run was interrupted.
 
-    RunError before any trial if a configuration is refused, matplotlib or Jinja is not installed or
+    RunError before any trial if a configuration is refused, matplotlib is not installed or
     the result file cannot be used; later if the cluster cannot run trials any more: what was
     finished is stored. ValueError if there is no variant of that name.
     """
-    require("matplotlib", "jinja2")
+    require_matplotlib()
     begin = time.monotonic()
     study, plan = request.study, request.plan
     is_new = not (request.out / STORE_NAME).exists()
