@@ -440,7 +440,7 @@ class Episodes:
             raise ValueError(
                 "env must reset each of its environments with a seed of its own where episodes are"
                 f" repeated, got {type(self._env.unwrapped).__name__}: repeat_episodes=False begins"
-                " new ones; or take SyncVectorEnv or AsyncVectorEnv of Gymnasium 1.1 or newer, as"
+                " new ones; or take SyncVectorEnv or AsyncVectorEnv, as"
                 " gymnasium.make_vec(..., vectorization_mode='sync') makes it, with shared memory"
                 " or the autoreset mode DISABLED"
             )

@@ -409,7 +409,7 @@ def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
         )
         return gym.spaces.Box(low, high, dtype=dtype.type)
     if "discrete" in data:
-        own = {} if dtype == np.int64 else {"dtype": dtype.type}  # Gymnasium 1.0 has no dtype
+        own = {} if dtype == np.int64 else {"dtype": dtype.type}  # Gymnasium 1.1 has no dtype
         return gym.spaces.Discrete(data["discrete"], start=data["start"], **own)
     if "multi_discrete" in data:
         n, start = np.array(data["multi_discrete"]), np.array(data["start"])

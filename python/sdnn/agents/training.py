@@ -87,8 +87,8 @@ class Training:
     action for each, all step together, and it learns the outcomes, all in the environments' order:
     a vector of one gives the bits of the single environment. ``SyncVectorEnv``, ``AsyncVectorEnv``
     and all autoreset modes give the same bits. Episodes of a vector that cannot be reset one by one
-    with seeds cannot be repeated: any with Gymnasium 1.0, and any other than these two, unless its
-    autoreset mode is ``DISABLED`` or its metadata have ``"reset_mask": True``.
+    with seeds cannot be repeated: any other than these two, unless its autoreset mode is
+    ``DISABLED`` or its metadata have ``"reset_mask": True``.
 
     Parameters
     ----------

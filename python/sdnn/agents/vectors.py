@@ -128,11 +128,10 @@ class _OwnResets(_Vector):
 
 
 def _autoreset_mode(env: gym.vector.VectorEnv[Any, Any, Any]) -> str:
-    """Return the name in Gymnasium's ``AutoresetMode``, which Gymnasium 1.0 does not have."""
-    modes = getattr(gym.vector, "AutoresetMode", None)
+    """Return the name in Gymnasium's ``AutoresetMode``."""
     # Not by the metadata first: in Gymnasium 1.1 these may be another vector's.
     mode = getattr(env.unwrapped, "autoreset_mode", env.metadata.get("autoreset_mode"))
-    return "NEXT_STEP" if modes is None or mode is None else str(modes(mode).name)
+    return "NEXT_STEP" if mode is None else str(gym.vector.AutoresetMode(mode).name)
 
 
 def _resets_each(env: gym.vector.VectorEnv[Any, Any, Any]) -> bool:
@@ -144,8 +143,6 @@ def _resets_each(env: gym.vector.VectorEnv[Any, Any, Any]) -> bool:
         inner = inner.env
     if inner.metadata.get("reset_mask"):
         return True
-    if not hasattr(gym.vector, "AutoresetMode"):
-        return False  # Gymnasium 1.0
     mode = _autoreset_mode(env)
     if isinstance(inner, gym.vector.AsyncVectorEnv) and not inner.shared_memory:
         return mode != "NEXT_STEP"  # the next step would reset once more (Gymnasium 1.4)

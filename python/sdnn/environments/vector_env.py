@@ -16,9 +16,6 @@ from sdnn.config import AcrobotConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.picture import AcrobotPicture
 
-# Gymnasium 1.0 has this mode only, without a name.
-_AUTORESET = getattr(getattr(gym.vector, "AutoresetMode", None), "NEXT_STEP", "NextStep")
-
 
 class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDArray[Any]]):
     """A vector environment with the bits of N `AcrobotSwingUpEnv`, in vector registers.
@@ -56,7 +53,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
     metadata: dict[str, Any] = {  # noqa: RUF012
         "render_modes": ["rgb_array"],
         "render_fps": AcrobotSwingUpEnv.metadata["render_fps"],
-        "autoreset_mode": _AUTORESET,
+        "autoreset_mode": gym.vector.AutoresetMode.NEXT_STEP,
         "reset_mask": True,  # an option of reset: see sdnn.agents.Training
     }
 

@@ -328,21 +328,11 @@ class RunSpec(Settings, frozen=True):
         return AcrobotSensors(tightening, sensors, seed=self.seed, stream=stream)
 
     def make_training_env(self) -> gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]:
-        """Make what the agent learns in: an environment, or a vector of ``protocol.n_envs``.
-
-        Raises
-        ------
-        ConfigError
-            As `make_env`; or if Gymnasium is too old for a vector.
-        """
+        """Make what the agent learns in, as `make_env`, or a vector of ``protocol.n_envs``."""
         n_envs = self.protocol.n_envs
-        if n_envs == 1:
-            return self.make_env()
-        if not hasattr(gym.vector, "AutoresetMode"):
-            raise ConfigError(
-                "protocol.n_envs", f"needs Gymnasium 1.1 or newer, this is {gym.__version__}"
-            )
-        return gym.vector.SyncVectorEnv([self.make_env] * n_envs)
+        return (
+            self.make_env() if n_envs == 1 else gym.vector.SyncVectorEnv([self.make_env] * n_envs)
+        )
 
     def make_agent(self, env: gym.Env[Any, Any]) -> Learner:
         """Make the agent for an environment such as `make_env` makes.

@@ -24,8 +24,6 @@ from sdnn.agents.episode import episode_seed
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 from stopped_training import Stop, states_equal
 
-if not hasattr(gym.vector, "AutoresetMode"):
-    pytest.skip("needs Gymnasium 1.1", allow_module_level=True)
 AutoresetMode = gym.vector.AutoresetMode
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
