@@ -182,8 +182,8 @@ SHIPPED = (
     r"cpp/include/sdnn/([a-z_]+/){0,2}[a-z0-9_]+\.hpp",
     r"cpp/tools/[a-z_]+\.hpp|cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
     r"python/sdnn/([a-z_]+/){0,2}[a-z_]+\.pyi?|python/sdnn/py\.typed",
-    r"python/sdnn/(runs/page\.html\.jinja|reproduction/reference-results\.csv)",
-    r"python/sdnn/export/c_[a-z_]+\.template",
+    r"python/sdnn/(runs/page\.(html|md)|export/c_[a-z_]+\.h)\.jinja",
+    r"python/sdnn/runs/schema\.sql|python/sdnn/reproduction/(claims\.toml|reference-results\.csv)",
     r"(tests|bench|docs)/.*\.(py|c|cpp|hpp|txt|md|json|csv|png|gif|svg|toml|ipynb|bin|safetensors)",
 )
 """Every file of a source distribution matches one of these."""
@@ -201,8 +201,9 @@ NEEDED = (
     "cpp/bindings/*",
     "python/sdnn/**/*.csv",
     "python/sdnn/**/*.py",
+    "python/sdnn/**/*.sql",
+    "python/sdnn/**/*.toml",
     "python/sdnn/**/*.jinja",
-    "python/sdnn/**/*.template",
     "python/sdnn/_core.pyi",
     "python/sdnn/py.typed",
 )

@@ -45,11 +45,10 @@ class SpecCommand(click.Command):
 
 def _options() -> Iterator[click.Option]:
     """Make the options of `KEYS` from the schema of the specification's fields."""
-    import msgspec
-
     from sdnn.runs import RunSpec
+    from sdnn.runs.settings import schemas_of
 
-    _, schemas = msgspec.json.schema_components([RunSpec])
+    schemas = schemas_of(RunSpec)
     for key in KEYS:
         found: dict[str, Any] = {"$ref": "RunSpec"}
         for name in key.split("."):

@@ -1,7 +1,7 @@
 """The paper's claims as data, and the rule by which results speak about them.
 
-Source: method.md, section 5.4; the paper's sections 4.2.2 and 4.3.3. Ranges, margins and this rule
-were written down before the trials of Experiment B were run:
+Source: method.md, section 5.4; the paper's sections 4.2.2 and 4.3.3. Ranges with their margins
+(`claims.toml`) and this rule were written down before the trials of Experiment B were run:
 
 - a check *holds* if the whole 95 % interval of the quantity lies in the range, *does not hold* if
   the whole interval lies outside on one side, and is *undecided* otherwise;
@@ -30,6 +30,7 @@ from functools import cache, reduce
 from importlib.resources import files
 from typing import Any, TypeAlias
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,7 +39,6 @@ from sdnn.reproduction.cost import SERIES, CostConfig, CostRecord
 from sdnn.runs.registry import title_of
 from sdnn.runs.results import (
     BOOTSTRAP_SEED,
-    SHARE_STABLE,
     STEP_MEASURES,
     Estimate,
     FloatArray,
@@ -53,7 +53,7 @@ from sdnn.runs.results import (
 N_DRAWS = 10_000
 _N_RESAMPLES, _N_DRAWS_OF_EACH = 200, 250
 
-EQUAL_STEPS = 2.0  # by which two agents that do "almost the same" may differ
+_FILES = files("sdnn.reproduction")
 
 
 @dataclass(frozen=True)
@@ -143,55 +143,20 @@ class Claim:
     checks: tuple[Check, ...]
 
 
-_NOISY = ("s4-noise", "s5-noise", "s6-noise")
-_BELOW_STABLE = SHARE_STABLE - 0.02  # the step of a share of 50 tests
+def _check(paper: str, at_least: float = -math.inf, at_most: float = math.inf, **of: Any) -> Check:
+    if "series" in of:
+        return Check(Growth(**of), paper, at_least, at_most)
+    other = of.pop("minus", None)
+    measure: MeasureName = of.pop("measure")
+    subject = Subject(of.pop("case"), **of)
+    median = Median(measure, subject, None if other is None else Subject(other))
+    return Check(median, paper, at_least, at_most)
 
 
-def _medians(
-    measure: MeasureName, cases: Iterable[str], paper: str, agent: str = "sdnn-c", **limits: float
-) -> tuple[Check, ...]:
-    return tuple(Check(Median(measure, Subject(case, agent)), paper, **limits) for case in cases)
-
-
-def _difference(
-    measure: MeasureName, case: str, other: str, paper: str, **limits: float
-) -> tuple[Check, ...]:
-    return (Check(Median(measure, Subject(case), Subject(other)), paper, **limits),)
-
-
-CLAIMS = (
-    Claim(1, "SDNN-C learns the swing-up within about 150 learning episodes, with 4 and 6 inputs",
-          _medians("episodes_to_learn", ("s4", "s6"), "about 150", at_most=150)),
-    Claim(2, "At the end SDNN-C reaches the goal within 10 steps in both",
-          _medians("final_steps", ("s4", "s6"), "within 10", at_most=10)),
-    Claim(3, "FQL learns within about 100 episodes without noise",
-          _medians("episodes_to_learn", ("s4",), "about 100", "fuzzy", at_most=100)),
-    Claim(4, "FQL never learns a stable swing-up with noise",
-          _medians("final_share_solved", _NOISY, "unstable", "fuzzy", at_most=_BELOW_STABLE)),
-    Claim(5, "SDNN-C in Case II does as well as in Case I in early episodes, worsens from about"
-          " episode 7,500 and ends not stably solving",
-          (*_difference("early_steps", "s4-noise", "s4", "almost equal", at_most=EQUAL_STEPS),
-           *_medians("episode_of_collapse", ("s4-noise",), "about 7,500", at_least=5_000,
-                     at_most=10_000),
-           *_medians("final_share_solved", ("s4-noise",), "not stable", at_most=_BELOW_STABLE))),
-    Claim(6, "SDNN-C in Case III keeps solving until later than in Case II",
-          _difference("episode_of_collapse", "s5-noise", "s4-noise", "later", at_least=10)),
-    Claim(7, "SDNN-C in Case IV ends at about 4 steps, about as in Case I",
-          (*_medians("final_steps", ("s6-noise",), "about 4", at_most=4 + EQUAL_STEPS),
-           *_difference("final_steps", "s6-noise", "s4", "almost the same", at_least=-EQUAL_STEPS,
-                        at_most=EQUAL_STEPS))),
-    Claim(8, "The time SDNN-C needs to learn does not grow with redundant inputs",
-          (*_difference("episodes_to_learn", "s6", "s4", "does not grow", at_most=15),
-           *_difference("episodes_to_learn", "s5-noise", "s4-noise", "does not grow", at_most=15),
-           *_difference("episodes_to_learn", "s6-noise", "s4-noise", "does not grow", at_most=15))),
-    Claim(9, "Cost per step grows quadratically with the number of inputs for SDNN-C, exponentially"
-          " for RBFN",
-          # l (l - 1) groups of columns: 56 / 12 = 4.7 times as many; half and twice that.
-          (Check(Growth("sdnn-c", 8, 4), "4.7 times", at_least=2.3, at_most=9.4),
-           # At least twice with each input: 16 times with four more.
-           Check(Growth("rbf", 8, 4), "exponential", at_least=16),
-           Check(Growth("rbf-plain", 8, 4), "exponential", at_least=16))),
-)  # fmt: skip
+CLAIMS = tuple(
+    Claim(one["number"], one["text"], tuple(_check(**check) for check in one["checks"]))
+    for one in msgspec.toml.decode(_FILES.joinpath("claims.toml").read_bytes())["claim"]
+)
 """The paper's nine claims, by their numbers in REPRODUCTION.md."""
 
 
@@ -416,7 +381,7 @@ class ReferenceResult(TrialMeasures):
 @cache
 def reference_results() -> tuple[ReferenceResult, ...]:
     """Read the reference results, those of a case and agent together."""
-    text = files("sdnn.reproduction").joinpath(FILE_NAME).read_text("utf-8")
+    text = _FILES.joinpath(FILE_NAME).read_text("utf-8")
     groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
     for row in csv.DictReader(text.splitlines()):
         groups.setdefault(tuple(row[name] for name in HEADER[:4]), []).append(row)

@@ -43,48 +43,26 @@ class EnvironmentSpec(Settings, frozen=True):
     to [0, 1]; values outside their ranges saturate. Without, the agent gets them as they are.
     """
 
-    id: Annotated[
-        Annotated[str, Meta(min_length=1)],
-        Meta(
-            description="What `gymnasium.make` is given: `Pendulum-v1`, or"
-            " `module:namespace/Name-v0`, for which the module is imported first."
-        ),
-    ]
-    kwargs: Annotated[
-        dict[str, Any],
-        Meta(
-            description="Arguments of the environment, and of `gymnasium.make`, such as"
-            " `max_episode_steps`."
-        ),
-    ] = msgspec.field(default_factory=dict)
-    ranges: Annotated[
-        dict[str, tuple[float, float]],
-        Meta(
-            description="(low, high) of observed variables by their numbers, from 0; `all`: of all"
-            " others. By default the bounds of the observation space."
-        ),
-    ] = msgspec.field(default_factory=dict)
-    noise: Annotated[
-        Annotated[float, Meta(ge=0)],
-        Meta(
-            description="Standard deviation of Gaussian noise on every variable, in parts of its"
-            " range."
-        ),
-    ] = 0.0
-    redundant: Annotated[
-        Annotated[int, Meta(ge=0, le=1000)],
-        Meta(
-            description="Means of neighbouring variables to append to the observation, before"
-            " the noise: of 0 and 1, of 1 and 2, ..., of the last and 0, and so on in a circle."
-        ),
-    ] = 0
-    own_units: Annotated[
-        bool,
-        Meta(
-            description="Whether noisy and redundant variables are given in the variables' own"
-            " units, not scaled to [0, 1]; a redundant one is the mean of two in [-1, 1]."
-        ),
-    ] = False
+    id: Annotated[str, Meta(min_length=1)]
+    """What `gymnasium.make` is given: `Pendulum-v1`, or `module:namespace/Name-v0`, for which the
+    module is imported first.
+    """
+    kwargs: dict[str, Any] = msgspec.field(default_factory=dict)
+    """Arguments of the environment, and of `gymnasium.make`, such as `max_episode_steps`."""
+    ranges: dict[str, tuple[float, float]] = msgspec.field(default_factory=dict)
+    """(low, high) of observed variables by their numbers, from 0; `all`: of all others. By default
+    the bounds of the observation space.
+    """
+    noise: Annotated[float, Meta(ge=0)] = 0.0
+    """Standard deviation of Gaussian noise on every variable, in parts of its range."""
+    redundant: Annotated[int, Meta(ge=0, le=1000)] = 0
+    """Means of neighbouring variables to append to the observation, before the noise: of 0 and 1,
+    of 1 and 2, ..., of the last and 0, and so on in a circle.
+    """
+    own_units: bool = False
+    """Whether noisy and redundant variables are given in the variables' own units, not scaled to
+    [0, 1]; a redundant one is the mean of two in [-1, 1].
+    """
 
     def __post_init__(self) -> None:
         super().__post_init__()

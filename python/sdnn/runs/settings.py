@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 import copy
 import dataclasses
 import difflib
 import functools
+import inspect
+import itertools
 import math
+import sys
 import types
 import typing
 from collections.abc import Iterable, Iterator, Mapping
@@ -47,8 +51,8 @@ _WORDS = {
 class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A table of settings: frozen, checked when it is made.
 
-    A subclass declares each setting as a field: its type with bounds and a description, and its
-    default. Constructor, files, command-line options, JSON Schema and the documentation follow.
+    A subclass declares each setting as a field: its type with bounds, its default and a docstring.
+    Constructor, files, command-line options, JSON Schema and the documentation follow.
     Tables in it may be given as settings or as mappings. A `ConfigError`, whose ``key`` names the
     field, says that a value is of another type or out of its range.
     """
@@ -73,6 +77,31 @@ def _kinds_of(kind: type[Any]) -> Mapping[str, Any]:
     except (NameError, TypeError):  # an agent from elsewhere: its values are taken as they are
         hints = {}
     return {name: hints.get(name, Any) for name in names_of(kind)}
+
+
+@functools.cache
+def _docstrings(module: str) -> Mapping[tuple[str, str], str]:
+    """Return the docstrings of the fields in a module's classes, by the names of both."""
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    return {
+        (kind.name, field.target.id): " ".join(below.value.value.split())
+        for kind in tree.body
+        if isinstance(kind, ast.ClassDef)
+        for field, below in itertools.pairwise(kind.body)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+        if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
+        if isinstance(below.value.value, str)
+    }
+
+
+def schemas_of(*kinds: Any) -> dict[str, Any]:
+    """Return the JSON Schemas of classes and of those in them, by name, as ``#/$defs/`` refers."""
+    _, schemas = msgspec.json.schema_components(kinds, ref_template="#/$defs/{name}")
+    for kind in Settings.__subclasses__():
+        for name, found in schemas.get(kind.__name__, {}).get("properties", {}).items():
+            if text := _docstrings(kind.__module__).get((kind.__name__, name)):
+                found["description"] = text
+    return schemas
 
 
 @functools.cache
@@ -217,44 +246,28 @@ _CORE = {field.name: field for field in fields_of(ProtocolConfig)}
 class AgentSpec(Settings, frozen=True):
     """Agent that learns."""
 
-    name: Annotated[
-        str | None,
-        Meta(
-            description="The agent: `sdnn-linear`, `sdnn-c`, `rbf`, `fuzzy`, or one that was"
-            " registered. By default `sdnn-linear`."
-        ),
-    ] = None
-    preset: Annotated[
-        str | None,
-        Meta(
-            description="Named settings: `general`, the default, or `paper`; of `sdnn-c` also"
-            " `robust` or `small`. `rbf` and `fuzzy` have none."
-        ),
-    ] = None
-    observation_range: Annotated[
-        Literal["adaptive"] | None,
-        Meta(description="`adaptive`: ranges of the observed variables come from a warm-up."),
-    ] = None
-    angles: Annotated[
-        tuple[Index, ...],
-        Meta(description="Observed variables, from 0, that are angles: their ranges wrap around."),
-    ] = ()
-    angle_pairs: Annotated[
-        Literal["none", "find"] | tuple[tuple[Index, Index], ...] | None,
-        Meta(
-            description="Which cosines and sines of an angle become one input: pairs of observed"
-            " variables, from 0, or those that the warm-up finds. By default `none`;"
-            " of `sdnn-linear`, `find`, unless observations are scaled."
-        ),
-    ] = None
-    inputs: Annotated[
-        Literal["all", "relevant"] | tuple[Index, ...] | None,
-        Meta(
-            description="Which observed variables are inputs: `all`; those that the warm-up finds"
-            " `relevant`; or a list, from 0, of some that are inputs in any case, beside the"
-            " relevant ones. By default `all`; of `sdnn-linear`, `relevant`."
-        ),
-    ] = None
+    name: str | None = None
+    """The agent: `sdnn-linear`, `sdnn-c`, `rbf`, `fuzzy`, or one that was registered. By default
+    `sdnn-linear`.
+    """
+    preset: str | None = None
+    """Named settings: `general`, the default, or `paper`; of `sdnn-c` also `robust` or `small`.
+    `rbf` and `fuzzy` have none.
+    """
+    observation_range: Literal["adaptive"] | None = None
+    """`adaptive`: ranges of the observed variables come from a warm-up."""
+    angles: tuple[Index, ...] = ()
+    """Observed variables, from 0, that are angles: their ranges wrap around."""
+    angle_pairs: Literal["none", "find"] | tuple[tuple[Index, Index], ...] | None = None
+    """Which cosines and sines of an angle become one input: pairs of observed variables, from 0, or
+    those that the warm-up finds. By default `none`; of `sdnn-linear`, `find`, unless observations
+    are scaled.
+    """
+    inputs: Literal["all", "relevant"] | tuple[Index, ...] | None = None
+    """Which observed variables are inputs: `all`; those that the warm-up finds `relevant`; or a
+    list, from 0, of some that are inputs in any case, beside the relevant ones. By default `all`;
+    of `sdnn-linear`, `relevant`.
+    """
     warm_up_steps: Annotated[
         Annotated[int, Meta(ge=int(WARM_UP.low), le=int(WARM_UP.high))],
         Meta(description=WARM_UP.doc),
@@ -264,25 +277,16 @@ class AgentSpec(Settings, frozen=True):
 class ProtocolSpec(Settings, frozen=True):
     """Schedule of learning and evaluation."""
 
-    n_envs: Annotated[
-        Annotated[int, Meta(ge=1, le=4096)],
-        Meta(description="Environments to learn in, in turn; steps are counted over all."),
-    ] = 1
-    evaluate_every: Annotated[
-        Annotated[int, Meta(ge=0, le=2**53)] | None,
-        Meta(
-            description="Steps between evaluations; 0: none. By default 10,000, or none if"
-            " `evaluate_every_episodes` is given."
-        ),
-    ] = None
-    evaluate_every_episodes: Annotated[
-        Count | None,
-        Meta(description="Learning episodes between evaluations, instead of steps."),
-    ] = None
-    evaluation_episodes: Annotated[
-        Annotated[int, Meta(ge=1, le=10**9)] | None,
-        Meta(description="Greedy episodes in each evaluation. By default 10."),
-    ] = None
+    n_envs: Annotated[int, Meta(ge=1, le=4096)] = 1
+    """Environments to learn in, in turn; steps are counted over all."""
+    evaluate_every: Annotated[int, Meta(ge=0, le=2**53)] | None = None
+    """Steps between evaluations; 0: none. By default 10,000, or none if `evaluate_every_episodes`
+    is given.
+    """
+    evaluate_every_episodes: Count | None = None
+    """Learning episodes between evaluations, instead of steps."""
+    evaluation_episodes: Annotated[int, Meta(ge=1, le=10**9)] | None = None
+    """Greedy episodes in each evaluation. By default 10."""
     limit_bootstraps: Annotated[bool, Meta(description=_CORE["limit_bootstraps"].doc)] = _CORE[
         "limit_bootstraps"
     ].default
@@ -301,17 +305,12 @@ class ProtocolSpec(Settings, frozen=True):
 class BudgetSpec(Settings, frozen=True):
     """Length of the learning."""
 
-    steps: Annotated[
-        Count | None,
-        Meta(description="Steps to learn. By default 200,000, or none if `episodes` is given."),
-    ] = None
-    episodes: Annotated[
-        Annotated[int, Meta(ge=1, le=2**30)] | None,
-        Meta(description="Episodes to learn, instead of steps."),
-    ] = None
-    target_return: Annotated[
-        float | None, Meta(description="Stop when an evaluation has this mean return.")
-    ] = None
+    steps: Count | None = None
+    """Steps to learn. By default 200,000, or none if `episodes` is given."""
+    episodes: Annotated[int, Meta(ge=1, le=2**30)] | None = None
+    """Episodes to learn, instead of steps."""
+    target_return: float | None = None
+    """Stop when an evaluation has this mean return."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -322,10 +321,10 @@ class BudgetSpec(Settings, frozen=True):
 class OutputSpec(Settings, frozen=True):
     """Output besides the rows; it changes none of them."""
 
-    checkpoint_every: Annotated[Count, Meta(description="Steps between checkpoints.")] = 10_000
-    tensorboard: Annotated[bool, Meta(description="Write the numbers for TensorBoard, too.")] = (
-        False
-    )
+    checkpoint_every: Count = 10_000
+    """Steps between checkpoints."""
+    tensorboard: bool = False
+    """Write the numbers for TensorBoard, too."""
 
 
 _REPLACED = {

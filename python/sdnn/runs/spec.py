@@ -90,26 +90,28 @@ class RunSpec(Settings, frozen=True):
     0.2
     """
 
-    environment: Annotated[
-        EnvironmentSpec | None,
-        Meta(description="A Gymnasium environment; by default the task is the paper's acrobot."),
-    ] = None
-    acrobot: Annotated[Any, Meta(description="Physics, goal and reward of the acrobot.")] = None
-    goal: Annotated[Any, Meta(description="How the acrobot's goal tightens.")] = None
-    sensors: Annotated[
-        Any, Meta(description="What is observed of the acrobot, and how noisily.")
-    ] = None
-    agent: Annotated[AgentSpec, Meta(description="Who learns.")] = AgentSpec()
-    approximator: Annotated[Any, Meta(description="What the agent learns with.")] = None
-    learning: Annotated[Any, Meta(description="How the agent learns and explores.")] = None
-    protocol: Annotated[ProtocolSpec, Meta(description="How it is evaluated.")] = ProtocolSpec()
-    budget: Annotated[BudgetSpec, Meta(description="How long it learns.")] = BudgetSpec()
-    seed: Annotated[
-        Annotated[int, Meta(ge=0)], Meta(description="Root of all seeds, at most 2**64 - 1.")
-    ] = 0
-    output: Annotated[OutputSpec, Meta(description="What is written besides the rows.")] = (
-        OutputSpec()
-    )
+    environment: EnvironmentSpec | None = None
+    """A Gymnasium environment; by default the task is the paper's acrobot."""
+    acrobot: Any = None
+    """Physics, goal and reward of the acrobot."""
+    goal: Any = None
+    """How the acrobot's goal tightens."""
+    sensors: Any = None
+    """What is observed of the acrobot, and how noisily."""
+    agent: AgentSpec = AgentSpec()
+    """Who learns."""
+    approximator: Any = None
+    """What the agent learns with."""
+    learning: Any = None
+    """How the agent learns and explores."""
+    protocol: ProtocolSpec = ProtocolSpec()
+    """How it is evaluated."""
+    budget: BudgetSpec = BudgetSpec()
+    """How long it learns."""
+    seed: Annotated[int, Meta(ge=0)] = 0
+    """Root of all seeds, at most 2**64 - 1."""
+    output: OutputSpec = OutputSpec()
+    """What is written besides the rows."""
 
     def __post_init__(self) -> None:
         for name, key in SHORTHANDS.items():

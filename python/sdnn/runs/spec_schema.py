@@ -9,6 +9,7 @@ import msgspec
 
 from sdnn.config import Field, fields_of
 from sdnn.runs.registry import AGENTS
+from sdnn.runs.settings import schemas_of
 from sdnn.runs.spec import ACROBOT, RunSpec
 
 CORE: dict[str, tuple[Any, ...]] = {name: (kind,) for name, kind in ACROBOT.items()} | {
@@ -29,9 +30,7 @@ def spec_schema() -> dict[str, Any]:
     1.0
     """
     structs = [_struct(kind) for kinds in CORE.values() for kind in kinds]
-    (top, *_), components = msgspec.json.schema_components(
-        [RunSpec, *structs], ref_template="#/$defs/{name}"
-    )
+    components = schemas_of(RunSpec, *structs)
     properties = components["RunSpec"]["properties"]
     for table, core in CORE.items():
         properties[table]["anyOf"] = [{"$ref": f"#/$defs/{kind.__name__}"} for kind in core]
@@ -44,7 +43,8 @@ def spec_schema() -> dict[str, Any]:
             if name in properties[table]
         }
         properties[table]["anyOf"] = [*inner.get("anyOf", [inner]), {"type": "string"}]
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **top, "$defs": components}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema",
+            "$ref": "#/$defs/RunSpec", "$defs": components}  # fmt: skip
 
 
 def _struct(kind: Any) -> Any:
