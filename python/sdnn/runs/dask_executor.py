@@ -111,19 +111,14 @@ def run_on_worker(version: str, pickled: bytes) -> TrialRecord:
 class DaskExecutor:
     """Runs trials on the workers of a Dask scheduler.
 
+    ClusterError if Dask is not installed. ValueError if a value is out of its range.
+
     Parameters
     ----------
     scheduler
         Its address, such as ``tcp://10.0.0.1:8786``, or the path of its scheduler file.
     scheduler_timeout
         Seconds to wait for the scheduler, and for a worker that fits, before the run fails.
-
-    Raises
-    ------
-    ClusterError
-        If Dask is not installed.
-    ValueError
-        If a value is out of its range.
     """
 
     jobs = 1  # the size of the cluster is not known
@@ -145,10 +140,7 @@ class DaskExecutor:
     ) -> Generator[Message, None, None]:
         """Run the trials; see `sdnn.runs.engine.Executor`.
 
-        Raises
-        ------
-        ClusterError
-            If the scheduler is lost, or there is no fitting worker for too long.
+        ClusterError if the scheduler is lost, or there is no fitting worker for too long.
         """
         with _quiet():
             client = yield from self._connect(stop)

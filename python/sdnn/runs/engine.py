@@ -130,10 +130,7 @@ class Executor(Protocol):
         The generator runs in the calling thread. Closing it gives up what is running. Once `stop`
         is set, running trials are given up and no further one starts.
 
-        Raises
-        ------
-        RunError
-            If no trial can be run any more.
+        RunError if no trial can be run any more.
         """
 
 
@@ -188,6 +185,10 @@ def run_trials(
     Ctrl-C and SIGTERM end the run after the chunks under way; finished trials are stored before it
     returns. A trial that raises does not stop the others.
 
+    ValueError if the environment variable SDNN_INSTRUCTION_SET is wrong. StoreError if the store
+    cannot be read or written: running trials are given up. RunError if the executor can run no
+    trial any more: what was finished is stored.
+
     Parameters
     ----------
     plan
@@ -198,15 +199,6 @@ def run_trials(
         Where they run; default threads of this process, one for each core.
     observer
         Notified of what happens.
-
-    Raises
-    ------
-    ValueError
-        If the environment variable SDNN_INSTRUCTION_SET is wrong.
-    StoreError
-        If the store cannot be read or written; running trials are given up.
-    RunError
-        If the executor can run no trial any more; what was finished is stored.
     """
     instruction_set()
     executor = ThreadExecutor() if executor is None else executor
@@ -297,10 +289,7 @@ def _pieces(trial: Trial | TrainingTrial) -> Generator[None, None, None]:
 class ThreadExecutor:
     """Runs trials in threads of this process; ``jobs`` at a time, by default one for each core.
 
-    Raises
-    ------
-    ValueError
-        If `jobs` is less than 1.
+    ValueError if `jobs` is less than 1.
     """
 
     def __init__(self, jobs: int | None = None) -> None:

@@ -101,6 +101,9 @@ class EnvironmentSpec(Settings, frozen=True):
     ) -> gym.Env[Any, Any]:
         """Make the environment.
 
+        ConfigError if there is no such environment, it cannot be made, or ranges are missing or
+        wrong. RunError if it can be made, but not with this render mode.
+
         Parameters
         ----------
         stream
@@ -109,13 +112,6 @@ class EnvironmentSpec(Settings, frozen=True):
             As Gymnasium has it.
         seed
             Where the noise starts; by default every reset with a seed starts it.
-
-        Raises
-        ------
-        ConfigError
-            If there is no such environment, it cannot be made, or ranges are missing or wrong.
-        RunError
-            If it can be made, but not with this render mode.
         """
         env = self._bare(render_mode)
         try:
@@ -176,15 +172,12 @@ class EnvironmentSpec(Settings, frozen=True):
         Where the agent acts without the noisy or redundant sensors of its run, it needs
         ``UnitSensors(env, *scaling.ends)``.
 
+        ConfigError as `make`.
+
         Parameters
         ----------
         env
             An environment that `make` gave. By default one is made.
-
-        Raises
-        ------
-        ConfigError
-            As `make`.
 
         Examples
         --------
@@ -206,10 +199,8 @@ class EnvironmentSpec(Settings, frozen=True):
     def ends(self, env: gym.Env[Any, Any]) -> Ends:
         """Return the lowest and highest values of the flattened observation; infinite: not known.
 
-        Raises
-        ------
-        ConfigError
-            If a range is given of a variable that is not there, or observations are no vector.
+        ConfigError if a range is given of a variable that is not there, or observations are no
+        vector.
         """
         try:
             low, high = flat_bounds(env.observation_space)

@@ -89,10 +89,7 @@ AGENTS: dict[str, AgentEntry] = {}
 def register(entry: AgentEntry) -> None:
     """Let an agent take part.
 
-    Raises
-    ------
-    ValueError
-        If the id cannot be part of a file's name, or an agent has it already.
+    ValueError if the id cannot be part of a file's name, or an agent has it already.
     """
     if not re.fullmatch(r"\w[\w.-]*", entry.id):
         raise ValueError(f"id must be of letters, digits, '_', '.' and '-', got {shown(entry.id)}")
@@ -126,10 +123,7 @@ def default_agent(*, on_acrobot: bool) -> str:
 def split_label(label: str) -> tuple[str, str | None]:
     """Return the agent and the preset that a word stands for; None: the default.
 
-    Raises
-    ------
-    ValueError
-        If there is no such agent.
+    ValueError if there is no such agent.
 
     Examples
     --------

@@ -113,10 +113,8 @@ class Run:
     def create(cls, folder: str | Path, spec: RunSpec) -> Self:
         """Begin a run: make its folder with its configuration, once all is known to work.
 
-        Raises
-        ------
-        ConfigError, RunError, OSError
-            If it cannot be made (no folder is made then), is there already, or cannot be written.
+        ConfigError, RunError or OSError if it cannot be made (no folder is made then), is there
+        already, or cannot be written.
         """
         place = Path(folder)
         if (place / CONFIG).exists():
@@ -171,13 +169,9 @@ class Run:
         ``steps`` or ``episodes`` are a new goal, counted from the beginning of the run; a target is
         dropped with it. ``repeat_episodes``: see `sdnn.agents.Training.load`.
 
-        Raises
-        ------
-        KeyboardInterrupt, RunTerminatedError
-            For SIGINT and SIGTERM, once the present step is done and a checkpoint is written.
-        RunError
-            If a file is damaged, the run is trained elsewhere, or the environment has changed or
-            gives what cannot be learned.
+        KeyboardInterrupt or RunTerminatedError for SIGINT and SIGTERM, once the present step is
+        done and a checkpoint is written. RunError if a file is damaged, the run is trained
+        elsewhere, or the environment has changed or gives what cannot be learned.
         """
         goal = {"steps": steps, "episodes": episodes}
         BudgetSpec(**goal)  # refuses what is no goal

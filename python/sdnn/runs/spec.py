@@ -76,10 +76,7 @@ class RunSpec(Settings, frozen=True):
     settings of the agent's parts from its preset. ``approximator.n_inputs`` follows from what is
     observed.
 
-    Raises
-    ------
-    ConfigError
-        If a value cannot be used; ``key`` names it, with dots between tables.
+    ConfigError if a value cannot be used; ``key`` names it, with dots between tables.
 
     Examples
     --------
@@ -303,6 +300,8 @@ class RunSpec(Settings, frozen=True):
     ) -> gym.Env[Any, Any]:
         """Make an environment to learn in or, of the other stream, to be evaluated in.
 
+        ConfigError if it cannot be made. RunError if it can be made, but not with this render mode.
+
         Parameters
         ----------
         stream
@@ -312,13 +311,6 @@ class RunSpec(Settings, frozen=True):
         seed
             Where the noise starts in a Gymnasium environment; by default each reset with a seed
             starts it. On the paper's acrobot it starts at the run's seed and runs on over episodes.
-
-        Raises
-        ------
-        ConfigError
-            If it cannot be made.
-        RunError
-            If it can be made, but not with this render mode.
         """
         is_quiet = stream == "evaluation_sensor_noise" and not self.protocol.noisy_evaluations
         if self.environment is not None:
@@ -339,10 +331,7 @@ class RunSpec(Settings, frozen=True):
     def make_agent(self, env: gym.Env[Any, Any]) -> Learner:
         """Make the agent for an environment such as `make_env` makes.
 
-        Raises
-        ------
-        ConfigError
-            If a setting is out of its range, or the agent cannot work with the spaces.
+        ConfigError if a setting is out of its range, or the agent cannot work with the spaces.
         """
         entry = self.entry
         approximator = self.approximator
@@ -428,10 +417,7 @@ class RunSpec(Settings, frozen=True):
         ``environment`` may be the id of one, and ``agent`` the name of one, perhaps with a preset:
         ``"sdnn-c-robust"``.
 
-        Raises
-        ------
-        ConfigError
-            If a key is unknown or missing, or a value cannot be used.
+        ConfigError if a key is unknown or missing, or a value cannot be used.
         """
         return read(cls, values)
 

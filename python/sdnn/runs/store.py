@@ -15,6 +15,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from functools import cache, lru_cache
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple, get_args, get_type_hints
 
@@ -36,34 +37,7 @@ MOST_BYTES = 2**37
 MOST_BYTES_OF_VALUE = 2**24
 """Longest text in the file."""
 
-_SCHEMA = """
-CREATE TABLE runs (
-  id INTEGER PRIMARY KEY,
-  case_id TEXT NOT NULL, agent TEXT NOT NULL, trial INTEGER NOT NULL, seed INTEGER NOT NULL,
-  config_hash TEXT NOT NULL, config TEXT NOT NULL, version TEXT NOT NULL,
-  n_decisions INTEGER NOT NULL, seconds REAL NOT NULL,
-  finished_at TEXT, -- NULL while it is in progress
-  checksum TEXT NOT NULL, -- of its rows
-  crc INTEGER NOT NULL, -- of the columns before this one
-  UNIQUE (case_id, agent, trial, seed, config_hash)
-);
-CREATE TABLE rows (
-  run_id INTEGER NOT NULL REFERENCES runs (id),
-  number INTEGER NOT NULL, part INTEGER NOT NULL, kind TEXT NOT NULL, episode INTEGER NOT NULL,
-  step INTEGER, length INTEGER NOT NULL, "return" REAL NOT NULL, terminated INTEGER NOT NULL,
-  environment INTEGER,
-  PRIMARY KEY (run_id, number, part)
-) WITHOUT ROWID;
-CREATE VIEW labelled_rows AS
-  SELECT case_id, agent, trial, seed, config_hash, version, kind, episode, part, step, length,
-         "return", terminated, environment
-  FROM rows JOIN runs ON runs.id = rows.run_id;
-CREATE TABLE measurements (
-  kind TEXT NOT NULL, key TEXT NOT NULL, content TEXT NOT NULL,
-  crc INTEGER NOT NULL, -- of the columns before this one
-  PRIMARY KEY (kind, key)
-) WITHOUT ROWID;
-"""
+_SCHEMA = files("sdnn.runs").joinpath("schema.sql").read_text("utf-8")
 
 _KEY = "case_id = ? AND agent = ? AND trial = ? AND seed = ? AND config_hash = ?"
 _ROW_COLUMNS = {
@@ -107,11 +81,8 @@ class ResultStore:
     What is read is checked: the tables are those of this version, every value has its column's
     type and the checksum beside it, and a configuration has its hash.
 
-    Raises
-    ------
-    StoreError
-        If the folder is a file, or the file in it is a link, damaged, of another program or of
-        another version of this one's schema. Such a file is left as it is.
+    StoreError if the folder is a file, or the file in it is a link, damaged, of another program or
+    of another version of this one's schema. Such a file is left as it is.
     """
 
     def __init__(self, folder: str | Path, *, read_only: bool = False) -> None:
@@ -167,10 +138,7 @@ class ResultStore:
         Storing the same trial again (after another process) changes nothing. With
         ``is_exact``, as for compiled trials, it must have the same rows each time.
 
-        Raises
-        ------
-        StoreError
-            If the file cannot be written, or holds other rows of an exact trial.
+        StoreError if the file cannot be written, or holds other rows of an exact trial.
         """
         with self._writing():
             run = self._begun(record.key, record.config, record.version)
@@ -241,10 +209,7 @@ class ResultStore:
 
         Keys that are not stored are left out.
 
-        Raises
-        ------
-        StoreError
-            If the rows of a trial are not the ones that were stored.
+        StoreError if the rows of a trial are not the ones that were stored.
         """
         with _as_store_error(self.path):
             found = {run.key: run for run in self._runs() if run.finished_at is not None}

@@ -38,6 +38,9 @@ class Combination(NamedTuple):
 class Study(StudyFile):
     """A study, read from a file; modules that it imports are looked for beside it, too.
 
+    ConfigError if the file cannot be read, or has something unknown or impossible; the message
+    names file, line and key. What only agents and environments refuse is found by `check`.
+
     Parameters
     ----------
     path
@@ -57,12 +60,6 @@ class Study(StudyFile):
         In the order of the file, but for the reference, which comes first.
     combinations : dict
         Every variant in every case in which it runs, by their ids (case, variant).
-
-    Raises
-    ------
-    ConfigError
-        If the file cannot be read, or has something unknown or impossible; the message names
-        file, line and key. What only agents and environments refuse is found by `check`.
     """
 
     def __init__(
