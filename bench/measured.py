@@ -32,13 +32,13 @@ from rich.console import Console
 
 import sdnn
 from sdnn.files import write_whole
-from sdnn.progress import ProgressBars
 from sdnn.runs.engine import (
     Advanced,
     Executor,
     Failed,
     Finished,
     PlannedTrial,
+    TrialBars,
     run_trials,
 )
 from sdnn.runs.store import STORE_NAME, ResultStore
@@ -115,7 +115,7 @@ def run_missing(
     """Run what is missing in a view of the folder's store; exit if it was interrupted."""
     with (
         opened(folder) as store,
-        ProgressBars(Console(stderr=True)) as bars,
+        TrialBars(Console(stderr=True)) as bars,
     ):
         outcome = run_trials(plan, view(store), executor=executor, observer=bars)
     for failure in outcome.failures:

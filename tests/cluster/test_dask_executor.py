@@ -22,7 +22,6 @@ from sdnn.runs import (
     ClusterError,
     DaskExecutor,
     EnvironmentSpec,
-    Observer,
     PlannedTrial,
     ResultStore,
     RunSpec,
@@ -31,26 +30,26 @@ from sdnn.runs import (
     WorkerLostError,
     run_trials,
 )
-from sdnn.runs.engine import Failed
+from sdnn.runs.engine import Advanced, Failed, Finished, Noted
 from sdnn.runs.trial import records_digest
 
 
-class Recorder(Observer):
+class Recorder:
     def __init__(self, on_finished=None):
         self.notes = []
         self.events = []
         self.on_finished = on_finished
 
-    def noted(self, text):
-        self.notes.append(text)
-
-    def advanced(self, planned, episode):
-        self.events.append(("advanced", planned.key, episode))
-
-    def finished(self, planned):
-        self.events.append(("finished", planned.key))
-        if self.on_finished and self.count("finished") == 2:
-            self.on_finished()
+    def __call__(self, message):
+        match message:
+            case Noted(text):
+                self.notes.append(text)
+            case Advanced(planned, episode):
+                self.events.append(("advanced", planned.key, episode))
+            case Finished(planned, _):
+                self.events.append(("finished", planned.key))
+                if self.on_finished and self.count("finished") == 2:
+                    self.on_finished()
 
     def count(self, name):
         return sum(event[0] == name for event in self.events)

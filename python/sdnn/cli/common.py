@@ -331,9 +331,9 @@ def run_and_report(
     """Run trials with a line of progress; print the results, what failed and how much is stored."""
     from rich.console import Console
 
-    from sdnn.progress import ProgressBars
+    from sdnn.runs.engine import TrialBars
 
-    with ProgressBars(Console(stderr=True)) as observer:
+    with TrialBars(Console(stderr=True)) as observer:
         done = run(request, observer=observer)
     outcome = done.outcome
     n_stored = outcome.n_reused + outcome.n_run

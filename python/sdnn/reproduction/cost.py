@@ -17,7 +17,7 @@ import numpy as np
 
 from sdnn import _core, machine
 from sdnn.config import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.runs.engine import Observer
+from sdnn.runs.engine import Counted, Observer
 from sdnn.runs.registry import AGENTS, split_label
 from sdnn.runs.store import ResultStore
 
@@ -169,7 +169,7 @@ def cost_keys(config: CostConfig, agents: Iterable[str] | None = None) -> tuple[
 
 
 def measure_costs(
-    keys: Sequence[CostKey], config: CostConfig, store: ResultStore, observer: Observer
+    keys: Sequence[CostKey], config: CostConfig, store: ResultStore, observe: Observer
 ) -> None:
     """Measure what is not stored yet, one after another, and store each at once."""
     stored = {record.key for record in load_costs(store, config.config_hash)}
@@ -178,7 +178,7 @@ def measure_costs(
     for number, key in enumerate(missing):
         series = by_id[key.series]
         title = f"cost: {series.title}, {key.n_inputs} inputs"
-        observer.counted(title, number, len(missing))
+        observe(Counted(title, number, len(missing)))
         measured = measure_steps(series, key.n_inputs, config)
         if measured is not None:
             names = ("microseconds", "n_steps", "table_bytes")

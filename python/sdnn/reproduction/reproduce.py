@@ -168,14 +168,13 @@ def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) ->
     """
     require_matplotlib()
     begin = time.monotonic()
-    watcher = Observer() if observer is None else observer
     plan = request.plan
     with ResultStore(request.out) as store:
         remove_abandoned_files(request.out)
-        outcome = run_trials(plan.trials, store, executor=request.executor, observer=watcher)
+        outcome = run_trials(plan.trials, store, executor=request.executor, observer=observer)
         if outcome.failures or outcome.interrupted:
             return WrittenReport(outcome)
-        cost.measure_costs(plan.costs, request.cost_config, store, watcher)
+        cost.measure_costs(plan.costs, request.cost_config, store, observer or (lambda _: None))
         report, records = _read(request, store)
     drawn = {
         f"experiment-{experiment.id}": draw_experiment(experiment, results, quick=request.quick)

@@ -24,6 +24,7 @@ import numpy as np
 from sdnn.arguments import shown, whole
 from sdnn.interrupts import Interrupts
 from sdnn.machine import instruction_set, n_cores
+from sdnn.progress import ProgressBars
 from sdnn.runs.registry import title_of
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
@@ -84,7 +85,15 @@ def plan_of(
     return tuple(plan.values())
 
 
-# The reports of executors.
+# What happens, as executors report it and observers receive it.
+
+
+class Begun(NamedTuple):
+    """The run begins, with so many learning episodes before it."""
+
+    n_planned: int
+    n_reused: int
+    n_episodes: int
 
 
 class Advanced(NamedTuple):
@@ -95,7 +104,7 @@ class Advanced(NamedTuple):
 
 
 class Finished(NamedTuple):
-    """A trial is done."""
+    """A trial is done; for observers, it is stored."""
 
     planned: PlannedTrial
     record: TrialRecord
@@ -109,12 +118,58 @@ class Failed(NamedTuple):
 
 
 class Noted(NamedTuple):
-    """A text for a person."""
+    """A text for a person, such as about a worker that was refused."""
 
     text: str
 
 
-Message = Advanced | Finished | Failed | Noted
+class Counted(NamedTuple):
+    """How much of something else than trials is done, such as of measurements."""
+
+    title: str
+    done: int
+    total: int
+
+
+Message = Begun | Advanced | Finished | Failed | Noted | Counted
+
+Observer = Callable[[Message], None]
+"""Shows progress; called by the thread that runs."""
+
+
+class TrialBars(ProgressBars):
+    """An observer with a bar for each trial, one for all, and one for what else is counted."""
+
+    _n_open = 0
+
+    def __call__(self, message: Message) -> None:
+        """Show what happens."""
+        match message:
+            case Begun(n_planned, n_reused, n_episodes):
+                self._done = dict[TrialKey, int]()
+                self._n_open = n_planned - n_reused
+                self.add("all", self._title(), n_episodes)
+            case Advanced(planned, episode):
+                self._advance(planned, episode)
+            case Finished(planned, _) | Failed(planned, _):  # whose episodes count as passed
+                self._advance(planned, planned.spec.length)
+                self.remove(planned.key)
+                self._n_open -= 1
+                self.update("all", sum(self._done.values()), description=self._title())
+            case Noted(text):
+                self.print(text)
+            case Counted(title, done, total):
+                self.add("counted", title, total)
+                self.update("counted", done, description=title)
+
+    def _advance(self, planned: PlannedTrial, episode: int) -> None:
+        self.add(planned.key, planned.title, planned.spec.length)
+        self._done[planned.key] = episode
+        self.update(planned.key, episode)
+        self.update("all", sum(self._done.values()))
+
+    def _title(self) -> str:
+        return f"[bold]all ({self._n_open} to go)"
 
 
 class Executor(Protocol):
@@ -151,28 +206,6 @@ class TrialsOutcome:
     signal: int | None = None
 
 
-class Observer:
-    """The interface of what shows progress, called by the thread that runs; it ignores all."""
-
-    def begun(self, n_planned: int, n_reused: int, n_episodes: int) -> None:
-        """Note that the run begins, with `n_episodes` learning episodes before it."""
-
-    def advanced(self, planned: PlannedTrial, episode: int) -> None:
-        """Note how many learning episodes a trial has done: 0 when it begins."""
-
-    def finished(self, planned: PlannedTrial) -> None:
-        """Note that a trial is stored."""
-
-    def failed(self, planned: PlannedTrial, error: Exception) -> None:
-        """Note that a trial raised, or was lost too often."""
-
-    def noted(self, text: str) -> None:
-        """Pass on a text for a person, such as about a worker that was refused."""
-
-    def counted(self, title: str, done: int, total: int) -> None:
-        """Note how much of something else than trials is done, such as of measurements."""
-
-
 def run_trials(
     plan: Iterable[PlannedTrial],
     store: ResultStore,
@@ -202,12 +235,12 @@ def run_trials(
     """
     instruction_set()
     executor = ThreadExecutor() if executor is None else executor
-    watcher = Observer() if observer is None else observer
+    observe: Observer = observer or (lambda _: None)
     planned = tuple(plan)
     stored = store.keys()
     missing = tuple(p for p in planned if p.key not in stored)
     n_reused = len(planned) - len(missing)
-    watcher.begun(len(planned), n_reused, sum(p.spec.length for p in missing))
+    observe(Begun(len(planned), n_reused, sum(p.spec.length for p in missing)))
     stop = threading.Event()
     failures: list[Failed] = []
     n_run = 0
@@ -217,17 +250,12 @@ def run_trials(
         with signals, closing(executor.run(missing, stop)) as messages:
             for message in messages:
                 match message:
-                    case Advanced(trial, episode):
-                        watcher.advanced(trial, episode)
                     case Finished(trial, record):
                         store.add(record, is_exact=trial.spec.is_compiled)
                         n_run += 1
-                        watcher.finished(trial)
-                    case Failed(trial, error):
+                    case Failed():
                         failures.append(message)
-                        watcher.failed(trial, error)
-                    case Noted(text):
-                        watcher.noted(text)
+                observe(message)
     return TrialsOutcome(
         n_planned=len(planned),
         n_reused=n_reused,

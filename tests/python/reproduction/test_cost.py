@@ -18,7 +18,7 @@ from sdnn.reproduction.cost import (
     measure_steps,
 )
 from sdnn.reproduction.report import cost_table
-from sdnn.runs import Observer, ResultStore, StoreError
+from sdnn.runs import ResultStore, StoreError
 from sdnn.runs.trial import records_digest
 
 SMALL = CostConfig(n_inputs=(3, 2), n_rounds=3, round_seconds=0.001)
@@ -47,7 +47,7 @@ def measured(monkeypatch):
         monkeypatch.setattr("sdnn.reproduction.cost.measure_steps", measure)
         with ResultStore(folder) as store:
             keys = cost_keys(config)
-            measure_costs(keys, config, store, Observer())
+            measure_costs(keys, config, store, lambda _: None)
             return load_costs(store, config.config_hash)
 
     return _measured

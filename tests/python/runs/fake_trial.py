@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from sdnn.reproduction import EXPERIMENTS, plan_trials
-from sdnn.runs import AGENTS, Observer, ResultStore, ThreadExecutor, run_trials
+from sdnn.runs import AGENTS, ResultStore, ThreadExecutor, run_trials
+from sdnn.runs.engine import Finished
 
 CASES = EXPERIMENTS[0].cases
 
@@ -56,8 +57,8 @@ class SlowTrial(FakeTrial):
         super().advance(1)
 
 
-class _Speaker(Observer):
-    def finished(self, planned):
+def _say_stored(message):
+    if isinstance(message, Finished):
         print("stored", flush=True)
 
 
@@ -73,4 +74,4 @@ def agents_with(core_trial):
 if __name__ == "__main__":
     AGENTS.update(agents_with(SlowTrial))
     with ResultStore(Path(sys.argv[1])) as store:
-        run_trials(make_plan(6, 100), store, executor=ThreadExecutor(2), observer=_Speaker())
+        run_trials(make_plan(6, 100), store, executor=ThreadExecutor(2), observer=_say_stored)

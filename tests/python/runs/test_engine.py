@@ -7,29 +7,34 @@ import pytest
 from rich.console import Console
 
 from refusals import refuses
-from sdnn.progress import ProgressBars
-from sdnn.runs import Observer, ResultStore, StoreError, WorkerLostError
-from sdnn.runs.engine import Advanced, Failed, Finished, Noted, ThreadExecutor
+from sdnn.runs import ResultStore, StoreError, WorkerLostError
+from sdnn.runs.engine import (
+    Advanced,
+    Begun,
+    Failed,
+    Finished,
+    Noted,
+    ThreadExecutor,
+    TrialBars,
+)
 
 
-class Recorder(Observer):
+class Recorder:
     def __init__(self):
         self.events = []
 
-    def begun(self, n_planned, n_reused, n_episodes):
-        self.events.append(("begun", n_planned, n_reused, n_episodes))
-
-    def advanced(self, planned, episode):
-        self.events.append(("advanced", planned.key, episode))
-
-    def finished(self, planned):
-        self.events.append(("finished", planned.key))
-
-    def failed(self, planned, error):
-        self.events.append(("failed", planned.key))
-
-    def noted(self, text):
-        self.events.append(("noted", text))
+    def __call__(self, message):
+        match message:
+            case Begun():
+                self.events.append(("begun", *message))
+            case Advanced(planned, episode):
+                self.events.append(("advanced", planned.key, episode))
+            case Finished(planned, _):
+                self.events.append(("finished", planned.key))
+            case Failed(planned, _):
+                self.events.append(("failed", planned.key))
+            case Noted(text):
+                self.events.append(("noted", text))
 
 
 def test_jobs_do_not_change_the_content(tmp_path, run):
@@ -201,7 +206,7 @@ def test_an_executor_tells_and_the_engine_stores(tmp_path, fake, run, record):
         ("failed", second), ("finished", first),
     ]  # fmt: skip
     text = io.StringIO()
-    with ProgressBars(Console(file=text, force_terminal=True, width=80)) as observer:
+    with TrialBars(Console(file=text, force_terminal=True, width=80)) as observer:
         run(tmp_path / "shown", plan, executor=Scripted(*script), observer=observer)
     assert "hear" in text.getvalue()
     assert "all (0 to go)" in text.getvalue()
