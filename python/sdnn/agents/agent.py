@@ -27,6 +27,7 @@ from sdnn.agents.spaces import (
     require_unbatched,
     space_data,
     space_of,
+    space_of_error,
 )
 from sdnn.agents.training import Training, TrainingResult
 from sdnn.arguments import (
@@ -49,7 +50,6 @@ if TYPE_CHECKING:
     from sdnn.agents.callbacks import Callback
 
 _MOST_ENVIRONMENTS = 2**14
-_MANY_VARIABLES = 16
 
 Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
@@ -157,7 +157,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         self._warm_up_steps = whole("warm_up_steps", steps, int(WARM_UP.low), int(WARM_UP.high))
 
     def _make(self, **made_of: Any) -> None:
-        """Make the core's controller; errors about sizes name the space they follow from."""
+        """Make the core's controller."""
         approximator: Any = self._approximator
         learning: Any = self.learning
         try:
@@ -171,23 +171,11 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
                 **made_of,
             )
         except ValueError as error:
-            argument, problem = blamed(error)
-            reasons = {"n_inputs": "n_inputs follows from observation_space"}
-            if self._observations.n_variables > _MANY_VARIABLES:
-                reasons["n_inputs"] += (
-                    "; gymnasium.wrappers.TransformObservation can make fewer variables of it, such"
-                    " as features of a picture"
-                )
-            if not self._actions.is_box:
-                reasons["n_actions"] = "n_actions follows from action_space"
-            if len(self._action.low) > 1:
-                reasons["max_table_bytes"] = "for each dimension of action_space"
-            found = [reason for word, reason in reasons.items() if word in str(error)]
-            if argument.startswith("action."):
-                found = ["of action_space"]
-            if not (argument and found):
+            reason = space_of_error(error, self._observations, self._actions)
+            if not reason:
                 raise
-            raise argument_error(argument, f"{problem} ({', '.join(found)})") from error
+            argument, problem = blamed(error)
+            raise argument_error(argument, f"{problem} ({reason})") from error
 
     @property
     def approximator(self) -> Approximator:

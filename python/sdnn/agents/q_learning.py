@@ -15,7 +15,7 @@ from sdnn import _core
 from sdnn.agents.agent import Agent, Approximator, Learning
 from sdnn.agents.spaces import AnglePairs, Inputs, Ranges
 from sdnn.approximators.sdnn_c import pattern_tables
-from sdnn.arguments import choice, real, shown, whole
+from sdnn.arguments import choice, real, whole
 from sdnn.config import (
     WARM_UP,
     QLearningConfig,
@@ -59,9 +59,7 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
 
     @learning_rate.setter
     def learning_rate(self, rate: float | None) -> None:
-        if rate is not None and not 0.0 < real("learning_rate", rate) <= 1.0:
-            raise ValueError(f"learning_rate must be in (0, 1], or None, got {shown(rate)}")
-        self._controller.learning_rate = rate
+        self._controller.learning_rate = None if rate is None else real("learning_rate", rate)
 
     @property
     def epsilon(self) -> float:
@@ -70,9 +68,7 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
 
     @epsilon.setter
     def epsilon(self, epsilon: float | None) -> None:
-        if epsilon is not None and not 0.0 <= real("epsilon", epsilon) <= 1.0:
-            raise ValueError(f"epsilon must be in [0, 1], or None, got {shown(epsilon)}")
-        self._controller.epsilon = epsilon
+        self._controller.epsilon = None if epsilon is None else real("epsilon", epsilon)
 
     @property
     def core(self) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import argument_error, array_of, has_methods, shown
+from sdnn.arguments import argument_error, array_of, blamed, has_methods, shown
 from sdnn.bounds import flat_bounds, with_infinities
 
 Inputs: TypeAlias = Literal["all", "relevant"] | Sequence[int]
@@ -23,6 +23,7 @@ Ranges: TypeAlias = Literal["adaptive"] | tuple[ArrayLike, ArrayLike]
 """Lowest and highest values, a number for all variables or one for each; or adaptive ones."""
 
 _FLOAT64 = np.dtype(np.float64)
+_MANY_VARIABLES = 16
 
 
 class Observations:
@@ -234,6 +235,25 @@ class Actions:
             return array_of("action", action)
         except ValueError:
             raise ValueError(f"action must be in {self._space}, got {shown(action)}") from None
+
+
+def space_of_error(error: ValueError, observations: Observations, actions: Actions) -> str:
+    """Name the space that an agent's size follows from, if the error is about one."""
+    reasons = {"n_inputs": "n_inputs follows from observation_space"}
+    if observations.n_variables > _MANY_VARIABLES:
+        reasons["n_inputs"] += (
+            "; gymnasium.wrappers.TransformObservation can make fewer variables of it, such as"
+            " features of a picture"
+        )
+    if not actions.is_box:
+        reasons["n_actions"] = "n_actions follows from action_space"
+    if len(actions.config.low) > 1:
+        reasons["max_table_bytes"] = "for each dimension of action_space"
+    argument, _ = blamed(error)
+    if argument.startswith("action."):
+        return "of action_space"
+    found = [reason for word, reason in reasons.items() if word in str(error)]
+    return ", ".join(found if argument else ())
 
 
 def require_single(name: str, env: Any) -> None:

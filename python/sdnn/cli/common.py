@@ -43,9 +43,6 @@ run_argument = click.argument(
     "folder", metavar="RUN", type=click.Path(exists=True, file_okay=False, path_type=Path)
 )
 
-full_option = click.option(
-    "--full", is_flag=True, help="Print all tables and columns, wider than 80 characters."
-)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON.")
 
 seed_option = click.option(
@@ -407,12 +404,24 @@ _OPTIONS = (
         metavar="SECONDS",
         help="Longest wait for the scheduler and a suitable worker.  [default: 300]",
     ),
+    click.option(
+        "--out",
+        type=click.Path(file_okay=False, path_type=Path),
+        default=Path("results"),
+        show_default=True,
+        help="Folder for the result file, figures, tables and page.",
+    ),
+    click.option("--json", "as_json", is_flag=True, help="Print the table as JSON."),
+    click.option(
+        "--full", is_flag=True, help="Print all tables and columns, wider than 80 characters."
+    ),
+    click.option("--dry-run", is_flag=True, help="Print what would be run and how long it takes."),
 )
 _OF_DASK = ("scheduler", "scheduler_timeout")
 
 
-def executor_options(command: Function) -> Function:
-    """Add the options to a command, which receives an `executor`."""
+def trial_options(command: Function) -> Function:
+    """Add the options of commands that run trials; the command receives an `executor`."""
 
     @functools.wraps(command)
     def wrapped(*arguments: Any, where: str, jobs: int | None, **options: Any) -> Any:

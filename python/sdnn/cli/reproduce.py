@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
 
 from sdnn._core import presets
-from sdnn.cli.common import (
-    errors_in_a_line,
-    executor_options,
-    full_option,
-    print_forecast,
-    run_and_report,
-)
+from sdnn.cli.common import errors_in_a_line, print_forecast, run_and_report, trial_options
 from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_experiments
 
 
@@ -32,7 +25,7 @@ from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_
     type=click.IntRange(1, MOST_EPISODES),
     help="Learning episodes per trial.  [default: 15000, as in the paper]",
 )
-@executor_options
+@trial_options
 @click.option(
     "--seed",
     type=click.IntRange(min=0, max=2**64 - 1),
@@ -41,20 +34,10 @@ from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_
     help="Root of all seeds.",
 )
 @click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path("results"),
-    show_default=True,
-    help="Folder for the result file, figures, tables and report.html.",
-)
-@click.option(
     "--quick",
     is_flag=True,
     help="Run a fraction: 2 trials x 300 episodes; not the result.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
-@full_option
-@click.option("--dry-run", is_flag=True, help="Print what would be run and how long it takes.")
 @click.option(
     "--agent",
     "agents",

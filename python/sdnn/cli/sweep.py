@@ -7,13 +7,7 @@ from typing import Any
 
 import click
 
-from sdnn.cli.common import (
-    errors_in_a_line,
-    executor_options,
-    full_option,
-    print_forecast,
-    run_and_report,
-)
+from sdnn.cli.common import errors_in_a_line, print_forecast, run_and_report, trial_options
 
 
 @click.command(short_help="Run a study: variants of any setting, trial by trial.")
@@ -28,20 +22,10 @@ from sdnn.cli.common import (
     type=click.IntRange(min=0, max=2**64 - 1),
     help="Root of all seeds, instead of the file's.",
 )
-@executor_options
-@click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path("results"),
-    show_default=True,
-    help="Folder for the result file, figure, tables and page.",
-)
+@trial_options
 @click.option(
     "--only", metavar="VARIANT", multiple=True, help="Run this variant only; may be repeated."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
-@full_option
-@click.option("--dry-run", is_flag=True, help="Print what would be run and how long it takes.")
 @click.pass_context
 def sweep(
     context: click.Context,

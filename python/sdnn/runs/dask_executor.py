@@ -19,7 +19,6 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
@@ -142,7 +141,9 @@ class DaskExecutor:
 
         ClusterError if the scheduler is lost, or there is no fitting worker for too long.
         """
-        with _quiet():
+        from distributed.utils import silence_logging_cmgr
+
+        with silence_logging_cmgr(logging.CRITICAL):  # a lost connection ends with one message
             client = yield from self._connect(stop)
             if client is None:
                 return
@@ -200,22 +201,6 @@ class DaskExecutor:
         return ClusterError(
             f"{problem}; finished trials are stored, the same command continues from there"
         )
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Silence what Dask logs about lost connections: the run ends with one message about them."""
-    import distributed  # noqa: F401  (its import sets the levels)
-
-    loggers = [logging.getLogger(f"distributed.{part}") for part in ("client", "core")]
-    levels = [logger.level for logger in loggers]
-    for logger in loggers:
-        logger.setLevel(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        for logger, level in zip(loggers, levels, strict=True):
-            logger.setLevel(level)
 
 
 def _probes(planned: Iterable[PlannedTrial]) -> Iterator[tuple[bytes, str]]:
