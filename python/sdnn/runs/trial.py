@@ -362,59 +362,43 @@ def training_trial(
 ) -> TrainingTrial:
     """Make the trial of a specification in Python; ConfigError if a part cannot be made.
 
-    Its rows are those of the compiled trial, bit for bit. It resumes at the checkpoint, if there is
-    one; see `sdnn.agents.Training.load`.
+    Its rows are those of the compiled trial, bit for bit. On the paper's acrobot the sensors' noise
+    runs on over all episodes, and resets receive the number of the episode, for the goal that
+    tightens. Elsewhere each episode has its own seed. The trial resumes at the checkpoint, if there
+    is one; see `sdnn.agents.Training.load`.
     """
-    target = None
+    target, evaluation_env = None, None
     if spec.budget.target_return is not None:
         target = StopTrainingOnRewardThreshold(spec.budget.target_return)
         callbacks = (target, *callbacks)
     with ExitStack() as environments:
         env: Any = environments.enter_context(closing(spec.make_training_env()))
-        evaluation_env = _make_evaluation_env(spec)
-        if evaluation_env is not None:
+        if spec.is_evaluated:
+            try:
+                evaluation_env = spec.make_env("evaluation_sensor_noise")
+            except ConfigError as error:  # there may be one robot only
+                problem = f"needs a second environment, or must be 0: {error.problem}"
+                raise ConfigError("protocol.evaluate_every", problem) from error
             environments.callback(evaluation_env.close)
-        if checkpoint is None:
-            training = _training_of(spec, env, evaluation_env, callbacks)
-        else:
+        if checkpoint is not None:
             training = Training.load(
                 checkpoint, env, callbacks=callbacks, evaluation_env=evaluation_env,
                 repeat_episodes=repeat_episodes,
             )  # fmt: skip
+        else:
+            is_acrobot = spec.environment is None
+            training = spec.entry.training(
+                spec.make_agent(env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env),
+                env,
+                steps=spec.budget.steps,
+                episodes=spec.budget.episodes,
+                seed=None if is_acrobot else spec.seed,
+                callbacks=callbacks,
+                evaluate_every=spec.protocol.evaluate_every or None,
+                evaluate_every_episodes=spec.protocol.evaluate_every_episodes,
+                evaluation_env=evaluation_env,
+                evaluation_episodes=spec.protocol.evaluation_episodes or 1,
+                limit_bootstraps=spec.protocol.limit_bootstraps,
+                reset_options=(lambda episode: {"episode": episode}) if is_acrobot else None,
+            )
         return TrainingTrial(training, environments.pop_all(), target)
-
-
-def _make_evaluation_env(spec: RunSpec) -> gym.Env[Any, Any] | None:
-    """Make an environment for evaluations where there are any; there may be one robot only."""
-    if not spec.is_evaluated:
-        return None
-    try:
-        return spec.make_env("evaluation_sensor_noise")
-    except ConfigError as error:
-        problem = f"needs a second environment, or must be 0: {error.problem}"
-        raise ConfigError("protocol.evaluate_every", problem) from error
-
-
-def _training_of(
-    spec: RunSpec, env: Any, evaluation_env: gym.Env[Any, Any] | None, callbacks: Iterable[Callback]
-) -> Training:
-    """Make the training of a specification in environments that it has made.
-
-    On the paper's acrobot the sensors' noise runs on over all episodes, and resets receive the
-    number of the episode, for the goal that tightens. Elsewhere each episode has its own seed.
-    """
-    is_acrobot = spec.environment is None
-    return spec.entry.training(
-        spec.make_agent(env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env),
-        env,
-        steps=spec.budget.steps,
-        episodes=spec.budget.episodes,
-        seed=None if is_acrobot else spec.seed,
-        callbacks=callbacks,
-        evaluate_every=spec.protocol.evaluate_every or None,
-        evaluate_every_episodes=spec.protocol.evaluate_every_episodes,
-        evaluation_env=evaluation_env,
-        evaluation_episodes=spec.protocol.evaluation_episodes or 1,
-        limit_bootstraps=spec.protocol.limit_bootstraps,
-        reset_options=(lambda episode: {"episode": episode}) if is_acrobot else None,
-    )
