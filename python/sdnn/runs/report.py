@@ -74,12 +74,6 @@ class Table:
             shown.add_row(*(Text(row[i]) for i in columns))
         console.print(shown)
 
-    def to_markdown(self) -> str:
-        """Write header and rows as lines of Markdown."""
-        rows = [self.header, ("---",) * len(self.header), *self.rows]
-        texts = (" | ".join(map(markdown_text, row)) for row in rows)
-        return "".join(f"| {text} |\n" for text in texts)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
@@ -147,23 +141,22 @@ class Page:
 
     def to_markdown(self) -> str:
         """Write it without figures."""
-        lines = [f"# {markdown_text(self.title)}", "", markdown_text(self.intro), ""]
-        for warning in self.warnings:
-            lines += [f"**{markdown_text(warning)}**", ""]
-        for table in self.tables:
-            lines += [f"## {markdown_text(table.title)}", "", table.to_markdown()]
-        lines += [f"- {markdown_text(note)}" for note in self.notes]
-        return "\n".join([*lines, "", markdown_text(self.source), ""])
+        return self._render("page.md.jinja")
 
     def to_html(self, call: str) -> str:
         """Make it one self-contained HTML page; `call` is the command that made it."""
+        return self._render("page.html.jinja", call=call)
+
+    def _render(self, name: str, **values: str) -> str:
         from jinja2 import Environment, PackageLoader, StrictUndefined
 
         environment = Environment(
-            loader=PackageLoader("sdnn.runs", "."), autoescape=True, undefined=StrictUndefined,
-            trim_blocks=True, lstrip_blocks=True,
+            loader=PackageLoader("sdnn.runs", "."), autoescape=".html." in name,
+            undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+            keep_trailing_newline=True,
         )  # fmt: skip
-        return environment.get_template("page.html.jinja").render(page=self, call=call)
+        environment.filters["markdown"] = markdown_text
+        return environment.get_template(name).render(page=self, **values)
 
 
 @dataclass(frozen=True)
