@@ -37,7 +37,7 @@ struct SarsaConfig {
   double learning_rate = 1.0;
   double discount = 0.99;
   EpsilonGreedyConfig policy = {.epsilon = 0.15, .n_greedy_steps = 0};
-  double trace_decay = 0.9;
+  double trace_decay = 0.8;
   Bootstrap bootstrap = Bootstrap::q_learning;
   TraceKind traces = TraceKind::dutch;
   int schedule_steps = 20000;
