@@ -6,7 +6,8 @@ file that their first line names (``# docking.py``, ``// main.c``). A comment be
 when it is not run at once::
 
     <!-- needs: gcc -->            where something is missing that NEEDS looks for
-    <!-- weekly: 3 minutes -->     it takes more than a minute; run with --weekly
+    <!-- weekly: 3 minutes -->     it takes more than a minute, as python bench/... does; run with
+                                   --weekly
     <!-- not run: needs SLURM -->  never, as whatever installs something
 
 ``--list`` counts the blocks of all pages.
@@ -15,10 +16,12 @@ when it is not run at once::
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib.util
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -61,6 +64,8 @@ def blocks(page: Path) -> list[Block]:
     found = []
     for match in _BLOCK.finditer(text):
         mark, reason, language, content = match.groups(default="")
+        if not mark and language == "sh" and content.startswith("python bench/"):
+            mark, reason = "weekly", "a measurement"
         line = text.count("\n", 0, match.start(3)) + 1
         if language not in {*RUN, *WRITTEN, *SHOWN}:
             raise ValueError(f"{page}:{line}: a block in {language} is neither run nor written")
@@ -138,8 +143,20 @@ def run(page: Path, *, weekly: bool) -> Iterator[tuple[Block, float, list[str]]]
             where = f"{page.name} from line {block.line + 1}"
             exec(compile(block.text, where, "exec"), names)
         elif block.language == "sh" and not lacks:
-            subprocess.run(["bash", "-euo", "pipefail", "-c", block.text], check=True)
+            _run_shell(block.text)
         yield block, time.perf_counter() - begin, lacks
+
+
+def _run_shell(text: str) -> None:
+    """Run a block in sh; end what it leaves in the background."""
+    command = ["bash", "-euo", "pipefail", "-c", text]
+    shell = subprocess.Popen(command, start_new_session=True)
+    try:
+        if shell.wait():
+            raise subprocess.CalledProcessError(shell.returncode, command)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(shell.pid, signal.SIGTERM)
 
 
 def count() -> Counter[str]:
