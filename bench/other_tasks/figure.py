@@ -10,13 +10,13 @@ from tasks import TASKS
 
 from sdnn.files import write_whole
 from sdnn.runs.figures import figure_bytes
-from sdnn.runs.report import require
+from sdnn.runs.report import require_matplotlib
 from sdnn.runs.study import Study
 
 
 def draw(study: Study, found: Curves, path: Path) -> None:
     """Draw return against steps and against processor time, a column for each task."""
-    require("matplotlib")
+    require_matplotlib()
     from matplotlib.figure import Figure
 
     names = [name for name in TASKS if any(case == name for case, _ in found)]

@@ -18,7 +18,7 @@ from sdnn.files import write_whole
 from sdnn.reproduction.report import read_study
 from sdnn.runs.figures import figure_bytes
 from sdnn.runs.registry import title_of
-from sdnn.runs.report import require
+from sdnn.runs.report import require_matplotlib
 from sdnn.runs.results import SHARE_STABLE, final_share_solved
 from sdnn.runs.store import ResultStore
 from sdnn.runs.study import Study
@@ -44,7 +44,7 @@ def main() -> None:
     parser.add_argument("--kept", type=Path, default=Path("results"), help="folder of the store")
     parser.add_argument("--out", type=Path, default=Path("docs/explanation"), help="of the figure")
     options = parser.parse_args()
-    require("matplotlib")
+    require_matplotlib()
     from matplotlib.figure import Figure
 
     study = read_study(STUDY)

@@ -193,7 +193,7 @@ def test_what_is_written_of_trials_is_read_again(monkeypatch, tmp_path, fake_res
     content = script.reference_csv(fake_results, 7)
     (tmp_path / "kept.csv").write_bytes(content)
     assert tuple(content.decode().splitlines()[0].split(",")) == HEADER
-    monkeypatch.setattr(reference_module, "files", lambda package: tmp_path)
+    monkeypatch.setattr(reference_module, "_FILES", tmp_path)
     monkeypatch.setattr(reference_module, "FILE_NAME", "kept.csv")
     read = reference_module.reference_results.__wrapped__()
     assert [(one.case_id, one.root_seed, one.n_trials) for one in read] == [
