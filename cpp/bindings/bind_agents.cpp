@@ -3,6 +3,8 @@
 #include <pybind11/stl.h>
 #include <pybind11/typing.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -264,6 +266,49 @@ std::span<const double> best_action(agents::Controller& controller,
   return controller.best_of(workspace);  // which draws, and so needs the lock
 }
 
+/// Row i of an array with so many numbers in each. Throws std::invalid_argument if there is none.
+std::span<const double> row(const ArrayArgument<double>& rows, const char* name,
+                            std::size_t n_columns, std::size_t i) {
+  const auto numbers = bindings::flat(rows);
+  if (i >= numbers.size() / n_columns) {  // only a bad one's text costs memory
+    core::require(false, name, std::to_string(n_columns) + " numbers for each environment",
+                  numbers.size());
+  }
+  return numbers.subspan(n_columns * i, n_columns);
+}
+
+std::size_t learn_each(agents::Controller& controller, const ArrayArgument<double>& observations,
+                       const ArrayArgument<double>& actions, const py::list& rewards,
+                       const ArrayArgument<double>& next_observations, const py::list& terminated,
+                       const py::list& environments, const py::list& progress) {
+  wait_for_readers_of(controller);
+  const std::size_t n = controller.n_variables();
+  std::size_t n_learned = 0;
+  for (const py::handle environment : environments) {
+    const auto i = environment.cast<std::size_t>();
+    core::require(i < std::min(rewards.size(), terminated.size()), "environments",
+                  "those of rewards and terminated", i);
+    const auto reward = rewards[i].cast<double>();
+    const auto ends = terminated[i].cast<bool>();
+    if (n_learned > 0 && n_learned <= progress.size()) {
+      controller.set_progress(progress[n_learned - 1].cast<double>());
+    }
+    try {
+      controller.learn(row(observations, "observations", n, i),
+                       row(actions, "actions", controller.n_dimensions(), i), reward,
+                       row(next_observations, "next_observations", n, i), ends, i);
+    } catch (const std::logic_error&) {
+      if (n_learned == 0) throw;
+      break;
+    } catch (const std::overflow_error&) {
+      if (n_learned == 0) throw;
+      break;
+    }
+    ++n_learned;
+  }
+  return n_learned;
+}
+
 void bind_controller(py::module_& module) {
   using agents::Controller;
   using agents::ControllerConfig;
@@ -367,6 +412,30 @@ void bind_controller(py::module_& module) {
           },
           py::arg("observation"), py::arg("action"), py::arg("reward"), py::arg("next_observation"),
           py::arg("terminated"), py::arg("environment") = 0)
+      .def(
+          "act_each",
+          [](Controller& self, const ArrayArgument<double>& observations,
+             const py::list& environments) {
+            py::array_t<double> actions(
+                {static_cast<std::size_t>(observations.shape(0)), self.n_dimensions()});
+            std::ranges::fill_n(actions.mutable_data(), actions.size(), 0.0);
+            for (const py::handle environment : environments) {
+              const auto i = environment.cast<std::size_t>();
+              const auto action =
+                  self.act(row(observations, "observations", self.n_variables(), i), true, i);
+              std::ranges::copy(action, actions.mutable_data(static_cast<py::ssize_t>(i)));
+            }
+            return actions;
+          },
+          py::arg("observations"), py::arg("environments"),
+          "Exploring actions in some environments, in order; other rows are zeros")
+      .def(
+          "learn_each", &learn_each, py::arg("observations"), py::arg("actions"),
+          py::arg("rewards"), py::arg("next_observations"), py::arg("terminated"),
+          py::arg("environments"), py::arg("progress"),
+          "Learns in some environments, in order; `progress` is set between two, if given. Returns "
+          "how many were learned: all before the first that cannot be, whose error is raised where "
+          "it comes first")
       .def(
           "state_of",
           [array_of](Controller& self, const ArrayArgument<double>& observation) {

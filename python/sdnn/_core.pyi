@@ -2091,12 +2091,20 @@ class Controller:
         """
     def act(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         ...
+    def act_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], environments: list) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Exploring actions in some environments, in order; other rows are zeros
+        """
     def action_of(self, index: typing.SupportsInt | typing.SupportsIndex, dimension: typing.SupportsInt | typing.SupportsIndex) -> float:
         ...
     def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def learn(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
+    def learn_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], actions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rewards: list, next_observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: list, environments: list, progress: list) -> int:
+        """
+        Learns in some environments, in order; `progress` is set between two, if given. Returns how many were learned: all before the first that cannot be, whose error is raised where it comes first
+        """
     def range_use(self) -> list[tuple[float, float] | None]:
         """
         Of each variable: the share of its range that it used, and how often it was beyond

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import reprlib
 from collections.abc import Mapping
+from contextlib import suppress
 from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -152,6 +153,25 @@ def real(name: str, value: Any) -> float:
     except OverflowError:
         problem = "must be a number of less than 1.8e308, got more"
         raise argument_error(name, problem, OverflowError) from None
+
+
+def reward_of(reward: Any) -> float:
+    """Read a reward: a number of any library, an array of one or a bool; else ValueError."""
+    if isinstance(reward, float):  # NumPy's, too
+        return float(reward)
+    import numpy as np
+
+    is_numpy = isinstance(reward, np.ndarray | np.generic)
+    is_masked = isinstance(reward, np.ma.MaskedArray)
+    if is_numpy and not is_masked and reward.size == 1 and reward.dtype.kind in "fiub":
+        reward, is_numpy = reward.item(), False
+    if not is_numpy and hasattr(reward, "__float__"):
+        with suppress(OverflowError, TypeError, ValueError):
+            return float(reward)
+    try:
+        return real("reward", reward)  # for its message
+    except OverflowError as error:  # which would say of `Agent.learn` that a weight left its range
+        raise ValueError(str(error)) from None
 
 
 def flag(name: str, value: Any) -> bool:

@@ -10,13 +10,14 @@ from sdnn.agents.callbacks import (
     TensorBoard,
 )
 from sdnn.agents.datasets import learn_from
-from sdnn.agents.episode import Transition, UnrepeatedEpisodeError, UnusableStepError
+from sdnn.agents.episode import Transition, UnrepeatedEpisodeError
 from sdnn.agents.evaluation import Evaluation, evaluate
 from sdnn.agents.fixed_rate import FixedRate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.q_learning import PRESETS, Preset, RBFQLearning, SDNNQLearning
 from sdnn.agents.sarsa import LINEAR_PRESETS, SDNNSarsa
 from sdnn.agents.scaling import Scaling
+from sdnn.agents.spaces import UnusableStepError
 from sdnn.agents.training import Training, TrainingResult
 from sdnn.config import FuzzyQLearningConfig, QLearningConfig, SarsaConfig
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.agents.episode import Transition, reward_of
+from sdnn.agents.episode import Transition
 from sdnn.agents.files import Statistics, read_agent, read_statistics, register
 from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import (
@@ -37,6 +37,7 @@ from sdnn.arguments import (
     is_of_class,
     path_of,
     real,
+    reward_of,
     seed_of,
     shown,
     whole,
@@ -247,9 +248,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         self._controller.n_environments = whole("n_environments", n, 1, _MOST_ENVIRONMENTS)
 
     def _check_environment(self, environment: int) -> None:
-        if type(environment) is int and environment == 0:  # most agents have no other
-            return
-        whole("environment", environment, 0, self.n_environments - 1)
+        if type(environment) is not int or environment:  # most agents have no other than 0
+            whole("environment", environment, 0, self.n_environments - 1)
 
     def begin_episode(self, environment: int = 0) -> None:
         """Note that an episode begins: `learn` never does.
@@ -276,21 +276,20 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         TypeError, ValueError
             If an argument is not usable, such as an observation that holds NaN.
         """
-        if explore is not True and explore is not False:
-            explore = flag("explore", explore)
+        explore = flag("explore", explore)
         self._check_environment(environment)
         variables = self._observations.vector("observation", observation)
-        return self._actions.element(self._controller.act(variables, explore, environment))
+        return self._actions.elements(self._controller.act(variables, explore, environment))[0]
 
     def flat_observation(self, observation: Any) -> NDArray[np.float64]:
         """Return the observed variables as a vector, shape (n_variables,), in their own units.
 
         ValueError if the observation has another shape or holds NaN.
         """
-        vector = self._observations.vector("observation", observation)
+        vector: NDArray[np.float64] = self._observations.rows("observation", [observation])[0]
         if np.isnan(vector).any():
             raise ValueError(f"observation must not hold NaN, got {vector}")
-        return vector.astype(np.float64).reshape(-1)
+        return vector
 
     def learn(self, transition: Transition, environment: int = 0) -> None:
         """Learn one transition.
@@ -314,18 +313,20 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         if not isinstance(transition, Transition):
             raise TypeError(f"transition must be a Transition, got {shown(transition)}")
         observation, action, reward, next_observation, terminated = transition
-        if type(reward) is not float:
-            reward = reward_of(reward)
-        if terminated is not True and terminated is not False:
-            terminated = flag("terminated", terminated)
         self._controller.learn(
             self._observations.vector("observation", observation),
             self._actions.numbers(action),
-            reward,
+            reward_of(reward),
             self._observations.vector("next_observation", next_observation),
-            terminated,
+            flag("terminated", terminated),
             environment,
         )
+
+    def core_parts(self) -> tuple[Any, ...] | None:
+        """Return the core and functions around it, unless a subclass acts or learns by itself."""
+        is_plain = type(self).act is Agent.act and type(self).learn is Agent.learn
+        parts = self._controller, self._observations.rows, self._actions.elements
+        return parts if is_plain else None
 
     @property
     @abc.abstractmethod
@@ -343,8 +344,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
 
     def _state(self, observation: Any) -> NDArray[np.float64]:
         """Return the compiled agent's state for an observation."""
-        controller = self._require_warm()
-        return controller.state_of(self._observations.vector("observation", observation))
+        return self._require_warm().state_of(self._observations.vector("observation", observation))
 
     def train(
         self,

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import math
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from sdnn.arguments import path_of, real, shown, whole
+from sdnn.arguments import has_methods, path_of, real, shown, whole
 from sdnn.files import naming, open_to_append, read_bytes, write_whole
 from sdnn.progress import ProgressBars
 
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from sdnn.agents.training import Training
 
 MOST_BYTES_OF_ROWS = 2**32
-
-_STEPS_BETWEEN = 64
-"""Between two updates of a training's bar, which cost more than a step."""
 
 Row: TypeAlias = Mapping[str, Any]
 """An episode (``kind``, ``step``, ``episode``, ``return``, ``length``, ``terminated``, and with
@@ -37,17 +34,40 @@ class Callback:
     A callback stops the training by ``training.stop()``.
     """
 
+    step_interval: int = 1
+    """``on_step`` is called where the number of steps is a multiple of it."""
+
     def on_start(self, training: Training) -> None:
         """Before the first step, also of a training that is resumed."""
 
     def on_step(self, training: Training) -> None:
-        """After every learned step."""
+        """After every learned step, or every ``step_interval`` of them."""
 
     def on_row(self, training: Training, row: Row) -> None:
         """After an episode (``row["kind"] == "episode"``) and an evaluation (``"evaluation"``)."""
 
     def on_end(self, training: Training) -> None:
         """After the last step, also of a training that was interrupted."""
+
+
+def listed(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
+    """Check callbacks, of any class that has the methods; TypeError."""
+    try:
+        found = tuple(callbacks)
+    except TypeError:
+        raise TypeError(f"callbacks must be a list of callbacks, got {shown(callbacks)}") from None
+    for callback in found:
+        has_methods("callbacks", callback, "callbacks", "on_start", "on_step", "on_row", "on_end")
+    return found
+
+
+def listeners(callbacks: Iterable[Callback]) -> list[tuple[int, Callback]]:
+    """Return those that do something after steps, and after how many."""
+    return [
+        (getattr(callback, "step_interval", 1), callback)
+        for callback in callbacks
+        if getattr(callback.on_step, "__func__", None) is not Callback.on_step
+    ]
 
 
 class JSONLines(Callback):
@@ -84,13 +104,12 @@ class CheckpointCallback(Callback):
 
     def __init__(self, path: str | Path, every: int = 10_000) -> None:
         self.path = path_of("path", path)
-        self.every = whole("every", every, 1, 2**53)
+        self.every = self.step_interval = whole("every", every, 1, 2**53)
         self.n_saved: int | None = None
 
     def on_step(self, training: Training) -> None:
-        """Save where it is due."""
-        if training.n_steps % self.every == 0:
-            self._save(training)
+        """Save."""
+        self._save(training)
 
     def on_end(self, training: Training) -> None:
         """Save where the training ends, be it by an environment's error, but not within a step."""
@@ -180,6 +199,8 @@ class Schedule(Callback):
 class ProgressBarCallback(Callback):
     """Shows the bar of one training, with its last returns and evaluation."""
 
+    step_interval = 64  # an update costs more than a step
+
     def __init__(self, console: Console, title: str) -> None:
         self._bars = ProgressBars(console)
         self._title = title
@@ -201,10 +222,9 @@ class ProgressBarCallback(Callback):
             self._returns.append(row["return"])
 
     def on_step(self, training: Training) -> None:
-        """Move the bar every few steps."""
-        if training.n_steps % _STEPS_BETWEEN == 0:
-            news = f"return {median(self._returns):.4g}" if self._returns else ""
-            self._bars.update(self, _done(training), news=news + self._evaluation)
+        """Move the bar."""
+        news = f"return {median(self._returns):.4g}" if self._returns else ""
+        self._bars.update(self, _done(training), news=news + self._evaluation)
 
     def on_end(self, training: Training) -> None:
         """Remove the bar."""

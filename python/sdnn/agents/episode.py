@@ -5,17 +5,20 @@ from __future__ import annotations
 import abc
 import copy
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn.agents.files import SavedEpisode, Statistics, learning_wrappers, names_of, statistics_of
-from sdnn.arguments import flag, real, shown
+from sdnn.agents.spaces import UnusableStepError, reset_env, step_env
+from sdnn.arguments import flag, reward_of
+
+if TYPE_CHECKING:
+    from sdnn._core import Controller
 
 _LEARNING, EVALUATION = 0, 1
 """The kinds of episodes that `episode_seed` gives seeds to."""
@@ -23,21 +26,12 @@ _LEARNING, EVALUATION = 0, 1
 _PART = 1024
 """Actions in an array."""
 
-_OLD_API = (
-    "; an environment of Gym before 0.26 can be wrapped:"
-    " shimmy.GymV21CompatibilityV0(env=env), from pip install shimmy"
-)
-
 Seeds: TypeAlias = Mapping[int, int | None]
 Options: TypeAlias = dict[str, Any] | None
 
 
 class UnrepeatedEpisodeError(ValueError):
     """An environment does not repeat the episode in which a training was saved."""
-
-
-class UnusableStepError(ValueError):
-    """A step or reset of an environment cannot be used; the message names it and the reason."""
 
 
 class Transition(NamedTuple):
@@ -71,92 +65,43 @@ class Learner(Protocol):
         """Learn a step."""
 
 
-def reward_of(reward: Any) -> float:
-    """Read a reward: a number of any library, an array of one or a bool; else ValueError."""
-    if isinstance(reward, float):  # NumPy's, too
-        return float(reward)
-    is_numpy = isinstance(reward, np.ndarray | np.generic)
-    if is_numpy and reward.size == 1 and reward.dtype.kind in "fiub" and not _is_masked(reward):
-        reward, is_numpy = reward.item(), False
-    if not is_numpy and hasattr(reward, "__float__"):
-        with suppress(OverflowError, TypeError, ValueError):
-            return float(reward)
-    try:
-        return real("reward", reward)  # for its message
-    except OverflowError as error:  # which would say of `Agent.learn` that a weight left its range
-        raise ValueError(str(error)) from None
-
-
-def _is_masked(value: Any) -> bool:
-    return isinstance(value, np.ma.MaskedArray)
-
-
 def episode_seed(seed: int, kind: int, episode: int) -> int:
     """Return the seed of an episode's `reset`; learning and evaluation have their own."""
     word = np.random.SeedSequence(seed, spawn_key=(kind, episode)).generate_state(1, np.uint32)[0]
     return int(word) % 2**31  # some environments take no larger ones
 
 
-# Steps in one environment, or in several at once: a round is a step in each.
+class StepResults(NamedTuple):
+    """The results of a step in every environment, each in an array or a list of all.
 
-
-class StepResult(NamedTuple):
-    """The result of a step, unchecked; ``observation`` is the last of an episode that ended."""
-
-    observation: Any
-    reward: Any
-    terminated: Any
-    truncated: Any
-
-
-def checked(outcome: StepResult) -> StepResult:
-    """Return an outcome with a finite float as reward and with bools; ValueError if it has none."""
-    seen, reward, terminated, truncated = outcome
-    if type(reward) is not float:
-        reward = reward_of(reward)
-    if not math.isfinite(reward):
-        raise ValueError(f"reward must be finite, got {reward}")
-    if type(terminated) is bool is type(truncated):
-        return StepResult(seen, reward, terminated, truncated)
-    try:
-        ends = flag("terminated", terminated), flag("truncated", truncated)
-    except TypeError as error:
-        raise ValueError(str(error)) from None
-    return StepResult(seen, reward, *ends)
-
-
-def reset_env(env: Any, seed: Any, options: Options) -> Any:
-    """Reset an environment, or a vector; return what is observed first.
-
-    UnusableStepError if it returns something else than an observation and a dictionary.
+    ``observations`` are the last ones of episodes that ended.
     """
-    made = env.reset(seed=seed, options=options)
-    if not (isinstance(made, tuple | list) and len(made) == 2 and isinstance(made[1], Mapping)):
-        raise UnusableStepError(
-            f"env.reset must return (observation, info), info a dictionary, got {shown(made)}"
-            f"{_OLD_API}"
-        )
-    return made[0]
+
+    observations: Any
+    rewards: list[float]
+    terminated: list[bool]
+    truncated: list[bool]
 
 
-def step_env(env: Any, action: Any) -> tuple[Any, Any, Any, Any, Any]:
-    """Step an environment, or a vector; UnusableStepError if it does not return five values."""
-    made = env.step(action)
-    if not (isinstance(made, tuple | list) and len(made) == 5):
-        n = len(made) if isinstance(made, tuple | list) else 1
-        raise UnusableStepError(
-            "env.step must return five values, (observation, reward, terminated, truncated, info),"
-            f" got {n}{_OLD_API}"
-        )
-    seen, reward, terminated, truncated, info = made
-    return seen, reward, terminated, truncated, info
+def checked(reward: Any, terminated: Any, truncated: Any) -> tuple[float, bool, bool]:
+    """Return a finite float and bools; UnusableStepError for something else."""
+    try:
+        if type(reward) is not float:
+            reward = reward_of(reward)
+        if not math.isfinite(reward):
+            raise ValueError(f"reward must be finite, got {reward}")
+        if not type(terminated) is bool is type(truncated):
+            terminated, truncated = flag("terminated", terminated), flag("truncated", truncated)
+    except (TypeError, ValueError) as error:
+        raise UnusableStepError(str(error)) from error
+    return reward, terminated, truncated
 
 
 def own_copy(value: Any) -> Any:
     """Copy what others may write to: environments may keep their state, or change an action."""
     if type(value) is np.ndarray:
         return value.copy()
-    return value if isinstance(value, np.generic | int | float) else copy.deepcopy(value)
+    return value if isinstance(value, (np.generic, int, float)) else copy.deepcopy(value)
 
 
 class EnvironmentAdapter(abc.ABC):
@@ -176,8 +121,8 @@ class EnvironmentAdapter(abc.ABC):
         """
 
     @abc.abstractmethod
-    def step(self, actions: Sequence[Any]) -> list[StepResult]:
-        """Take an action in each; None in those whose episodes have not begun."""
+    def step(self, actions: Sequence[Any]) -> StepResults:
+        """Take an action in each; any one where the episode has not begun."""
 
 
 class OneEnvironment(EnvironmentAdapter):
@@ -191,18 +136,100 @@ class OneEnvironment(EnvironmentAdapter):
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
         """Begin its episode."""
-        return {i: own_copy(reset_env(self._env, seed, options)) for i, seed in seeds.items()}
+        return {i: reset_env(self._env, seed, options) for i, seed in seeds.items()}
 
-    def step(self, actions: Sequence[Any]) -> list[StepResult]:
+    def step(self, actions: Sequence[Any]) -> StepResults:
         """Take the only action."""
-        return [self.step_one(actions[0])]
+        seen, reward, terminated, truncated, _ = step_env(self._env, own_copy(actions[0]))
+        reward, terminated, truncated = checked(reward, terminated, truncated)
+        listed = seen[np.newaxis] if type(seen) is np.ndarray else [seen]
+        return StepResults(listed, [reward], [terminated], [truncated])
 
-    def step_one(self, action: Any) -> StepResult:
-        """Take an action."""
-        taken = action.copy() if type(action) is np.ndarray else own_copy(action)
-        seen, reward, terminated, truncated, _ = step_env(self._env, taken)
-        seen = seen.copy() if type(seen) is np.ndarray else own_copy(seen)
-        return StepResult(seen, reward, terminated, truncated)
+
+class Rounds:
+    """Any learner in all environments of a training: it acts and learns in one after the other."""
+
+    def __init__(self, learner: Any, n_environments: int) -> None:
+        self._learner = learner
+        self.progressing: Any = learner if hasattr(learner, "progress") else None
+        """What follows the progress of the training."""
+        self.places: list[dict[str, int]] = [{}]
+        """Which environment, where there are several: arguments of the learner, parts of rows."""
+        if n_environments > 1:
+            self.places = [{"environment": i} for i in range(n_environments)]
+
+    def begin_episode(self, environment: int) -> None:
+        """Note that an episode begins."""
+        self._learner.begin_episode(**self.places[environment])
+
+    def read(self, name: str, seen: Any) -> Any:
+        """Return observations as `act` and `learn` take them, copied; ValueError names them."""
+        return [own_copy(one) for one in seen]
+
+    def flat(self, observation: Any) -> NDArray[np.float64]:
+        """Return the numbers of an observation that was read, for a file."""
+        return np.asarray(self._learner.flat_observation(observation))
+
+    def act(self, observations: Any, actions: Sequence[Any], environments: list[int]) -> Any:
+        """Return actions in all environments: new ones in these, the others as they were."""
+        taken = list(actions)
+        for i in environments:
+            taken[i] = self._learner.act(observations[i], **self.places[i])
+        return taken
+
+    def learn(
+        self,
+        observations: Any,
+        actions: Any,
+        rewards: list[float],
+        next_observations: Any,
+        terminated: list[bool],
+        environments: list[int],
+        progress: list[float],
+    ) -> int:
+        """Learn steps in the first of these environments or more; return in how many.
+
+        ``progress`` is the learner's between two of them; it may be empty.
+        """
+        i = environments[0]
+        reward, ends, _ = checked(rewards[i], terminated[i], False)
+        step = Transition(observations[i], actions[i], reward, next_observations[i], ends)
+        self._learner.learn(step, **self.places[i])
+        return 1
+
+
+class _CoreRounds(Rounds):
+    """The same of an agent, with one call of its core for all environments; rows are read."""
+
+    def __init__(
+        self,
+        learner: Any,
+        n_environments: int,
+        core: Controller,
+        read: Callable[[str, Any], NDArray[np.float64]],
+        elements: Callable[[NDArray[np.float64]], NDArray[Any]],
+    ) -> None:
+        super().__init__(learner, n_environments)
+        self.progressing, self._act, self._elements = core, core.act_each, elements
+        self.read = read  # type: ignore[assignment, method-assign]
+        self.learn = core.learn_each  # type: ignore[method-assign]
+
+    def flat(self, observation: Any) -> NDArray[np.float64]:
+        return np.array(observation)
+
+    def act(self, observations: Any, actions: Sequence[Any], environments: list[int]) -> Any:
+        taken = self._elements(self._act(observations, environments))
+        if len(environments) < len(taken):
+            for i in set(range(len(taken))).difference(environments):
+                taken[i] = actions[i]
+        return taken
+
+
+def _rounds_of(learner: Any, n_environments: int) -> Rounds:
+    core_parts = getattr(type(learner), "core_parts", None)
+    parts = core_parts and core_parts(learner)
+    kind = _CoreRounds if parts else Rounds
+    return kind(learner, n_environments, *(parts or ()))
 
 
 class _Taken:
@@ -227,70 +254,62 @@ class _Taken:
 
 @dataclass(slots=True, eq=False)
 class Episode:
-    """The state of an episode.
-
-    ``outcome`` is that of the last action while it is still to be learned; ``observation`` is the
-    one before it then, else the last. ``actions`` are kept where the episode may be repeated.
-    """
+    """The state of an episode; ``actions`` are kept where it may be repeated."""
 
     number: int
-    observation: Any
     actions: _Taken = field(default_factory=_Taken)
     n_steps: int = 0
-    action: Any = None
     sum_of_rewards: float = 0.0
-    outcome: StepResult | None = None
-
-    @property
-    def last_observation(self) -> Any:
-        """The last observation, learned or not."""
-        return self.observation if self.outcome is None else self.outcome.observation
 
 
 class Episodes:
     """Begins episodes in all environments of a training, steps them, and can repeat them.
 
-    Parameters
-    ----------
-    env
-        An environment, or a vector of them.
-    adapter_for
-        Returns the adapter for it.
-    seed
-        Root of the episodes' seeds; None: resets have no seeds.
-    first
-        The number of the first episode.
-    options
-        Returns the options of the reset of the single environment from an episode's number.
+    ``adapter_for`` returns the adapter for an environment, ``options`` those of a single one's
+    reset from the episode's number, and ``unusable`` the error for one of a step or reset, in an
+    environment or in any (None). ``seed`` is the root of the episodes' seeds; None: resets have no
+    seeds. ``first`` is the number of the first episode.
 
     Attributes
     ----------
-    n_environments : int
     present : list of (Episode or None)
         In each environment; None: the next one has not begun.
     next_number : int
         Of the episode that begins next.
+    waiting : list of int
+        Environments whose last step is to be learned, in order.
+    results : StepResults
+        Of the last step.
     wrappers, learned : list
         Those that learn, and what they had learned when the last episode began.
     """
+
+    results: StepResults
+    _before: Any  # observations before the last step, and the latest ones
+    _latest: Any
 
     def __init__(
         self,
         env: Any,
         adapter_for: Callable[[Any], EnvironmentAdapter],
+        learner: Any,
         seed: int | None,
         first: int,
         options: Callable[[int], dict[str, Any] | None],
+        unusable: Callable[[Exception, int | None], UnusableStepError],
     ) -> None:
         self._env, self._seed, self._options = env, seed, options
-        self._adapter_for = adapter_for
+        self._has_seeds = seed is not None
+        self._adapter_for, self._unusable = adapter_for, unusable
         self._adapter = adapter_for(env)
         self.wrappers = learning_wrappers(env)
         self.learned: list[Statistics] = []
-        self.n_environments = self._adapter.n_environments
+        n = self.n_environments = self._adapter.n_environments
+        self.rounds: Rounds = _rounds_of(learner, n)
         self.next_number = first
-        self.present: list[Episode | None] = [None] * self.n_environments
-        self._first_left = 0  # the environments before it have learned this round's step
+        self.present: list[Episode | None] = [None] * n
+        self.waiting: list[int] = []
+        self._actions: Any = [None] * n
 
     @property
     def learned_before(self) -> list[Statistics]:
@@ -298,74 +317,69 @@ class Episodes:
         return self.learned if any(self.present) else statistics_of(self.wrappers)
 
     def leave(self) -> None:
-        """Begin anew in every environment with the next round, with other seeds."""
+        """Begin anew in every environment with the next step, with other seeds."""
         self._adapter = self._adapter_for(self._env)
         self.present[:] = [None] * self.n_environments
+        self.waiting = []
 
-    def outcomes(
-        self, begin: Callable[[int], None], act: Callable[[int, Episode], Any]
-    ) -> Iterator[tuple[int, Episode, StepResult]]:
-        """Yield the outcomes of steps, in the order of environments; each is to be learned.
+    def advance(self) -> None:
+        """Begin episodes where none is present, and take a step in every environment."""
+        present = self.present
+        numbers = self._begin_episodes() if None in present else {}
+        before = self._before = self._latest
+        waiting = self.waiting = [i for i, episode in enumerate(present) if episode is not None]
+        try:
+            actions = self._actions = self.rounds.act(before, self._actions, waiting)
+        except ValueError as error:
+            raise self._unusable(error, None) from error
+        for i in waiting:
+            episode: Any = present[i]
+            episode.n_steps += 1
+            if self._has_seeds:
+                episode.actions.append(actions[i])
+        try:
+            results = self.results = self._adapter.step(actions)
+        except UnusableStepError as error:
+            raise self._unusable(error, None) from error
+        self._latest = self._read("next_observation", results.observations)
+        for i, number in numbers.items():
+            if self.present[i] is None:
+                self.present[i] = Episode(number)
+                self.rounds.begin_episode(i)
 
-        When those of a round are learned, a step is taken in every environment. ``begin`` is called
-        with an environment whose episode has begun; ``act`` returns the action in an environment.
-        """
-        if isinstance(self._adapter, OneEnvironment):
-            yield from self._outcomes_of_one(self._adapter, begin, act)
-        present, has_seeds = self.present, self._seed is not None
-        while True:
-            for i in range(self._first_left, self.n_environments):
-                episode = present[i]
-                if episode is not None and episode.outcome is not None:
-                    self._first_left = i
-                    yield i, episode, episode.outcome
-            self._first_left = 0
-            numbers = self._begin_episodes(begin) if None in present else {}
-            actions = [None if one is None else act(i, one) for i, one in enumerate(present)]
-            for i, outcome in enumerate(self._adapter.step(actions)):
-                episode = present[i]
-                if episode is None:
-                    present[i] = Episode(numbers[i], outcome.observation)
-                    begin(i)
-                    continue
-                episode.outcome, episode.action = outcome, actions[i]
-                episode.n_steps += 1
-                if has_seeds:
-                    episode.actions.append(actions[i])
+    def learn_waiting(self, most: int, limit_bootstraps: bool, progress: list[float]) -> list[int]:
+        """Learn steps that wait, none after an episode's end; return in which environments."""
+        results, ends = self.results, self.results.terminated
+        environments = self.waiting[:most]
+        for k, i in enumerate(environments, 1):
+            if ends[i] or results.truncated[i]:
+                del environments[k:]
+        if not limit_bootstraps:
+            ends = [one or other for one, other in zip(ends, results.truncated, strict=True)]
+        before, after = self._before, self._latest
+        try:
+            n = self.rounds.learn(
+                before, self._actions, results.rewards, after, ends, environments, progress
+            )
+        except (ValueError, OverflowError) as error:
+            raise self._unusable(error, environments[0]) from error
+        del self.waiting[:n]
+        for i in environments[:n]:
+            self.present[i].sum_of_rewards += results.rewards[i]  # type: ignore[union-attr]
+        return environments[:n]
 
-    def _outcomes_of_one(
-        self,
-        env: OneEnvironment,
-        begin: Callable[[int], None],
-        act: Callable[[int, Episode], Any],
-    ) -> Iterator[tuple[int, Episode, StepResult]]:
-        """Yield the same of a single environment, with less work for each step."""
-        present, has_seeds, step = self.present, self._seed is not None, env.step_one
-        while True:
-            episode = present[0]
-            if episode is None:
-                self._begin_episodes(begin)
-                episode = present[0]
-                assert episode is not None
-            outcome = episode.outcome
-            if outcome is None:
-                action = act(0, episode)
-                episode.outcome = outcome = step(action)
-                episode.action = action
-                episode.n_steps += 1
-                if has_seeds:
-                    episode.actions.append(action)
-            yield 0, episode, outcome
-
-    def _begin_episodes(self, begin: Callable[[int], None]) -> dict[int, int]:
+    def _begin_episodes(self) -> dict[int, int]:
         """Begin an episode where the last one is over; return their numbers."""
         over = [i for i, episode in enumerate(self.present) if episode is None]
         numbers = {i: self.next_number + k for k, i in enumerate(over)}
         self.next_number += len(over)
         self.learned = statistics_of(self.wrappers)
-        for i, observation in self._reset(numbers).items():
-            self.present[i] = Episode(numbers[i], observation)
-            begin(i)
+        seen = self._reset(numbers)
+        for i in seen:
+            self.present[i] = Episode(numbers[i])
+        self._put(seen)
+        for i in seen:
+            self.rounds.begin_episode(i)
         return numbers
 
     def _reset(self, numbers: Mapping[int, int]) -> dict[int, Any]:
@@ -376,10 +390,22 @@ class Episodes:
         }
         return self._adapter.reset(seeds, self._options(1 + max(numbers.values())))
 
-    def saved(
-        self, shape: tuple[int, ...], flat: Callable[[Any], NDArray[np.float64]]
-    ) -> list[SavedEpisode | None]:
-        """Return the present episodes for a file; ``shape`` is an action's, ``flat`` flattens."""
+    def _put(self, seen: dict[int, Any]) -> None:
+        """Read the observations of all, or some, environments."""
+        if len(seen) == self.n_environments:
+            self._latest = self._read("observation", list(seen.values()))
+        else:
+            for i, first in seen.items():
+                self._latest[i] = self._read("observation", [first])[0]
+
+    def _read(self, name: str, seen: Any) -> Any:
+        try:
+            return self.rounds.read(name, seen)
+        except ValueError as error:
+            raise self._unusable(error, None) from error
+
+    def saved(self, shape: tuple[int, ...]) -> list[SavedEpisode | None]:
+        """Return the present episodes for a file; ``shape`` is an action's."""
         return [
             None
             if episode is None
@@ -387,15 +413,13 @@ class Episodes:
                 number=episode.number,
                 sum_of_rewards=episode.sum_of_rewards,
                 actions=episode.actions.array().reshape((-1, *shape)),
-                observation=np.asarray(flat(episode.last_observation)),
-                waits=episode.outcome is not None,
+                observation=self.rounds.flat(self._latest[i]),
+                waits=i in self.waiting,
             )
-            for episode in self.present
+            for i, episode in enumerate(self.present)
         ]
 
-    def repeat(
-        self, saved: Sequence[SavedEpisode | None], flat: Callable[[Any], NDArray[np.float64]]
-    ) -> None:
+    def repeat(self, saved: Sequence[SavedEpisode | None]) -> None:
         """Bring every environment to where its episode was saved.
 
         UnrepeatedEpisodeError if an environment does not repeat its episode; ValueError if the
@@ -409,15 +433,13 @@ class Episodes:
             )
         for i, one in enumerate(saved):
             if one is not None:
-                n = len(one.actions)
-                last = one.actions[-1] if n else None
-                self.present[i] = Episode(
-                    one.number, None, _Taken(one.actions), n, last, one.sum_of_rewards
-                )
-        self._replay({i for i, one in enumerate(saved) if one is not None and one.waits})
-        for now, then in zip(self.present, saved, strict=True):
-            if now is not None and then is not None:
-                found = flat(now.last_observation)
+                taken = _Taken(one.actions)
+                self.present[i] = Episode(one.number, taken, len(one.actions), one.sum_of_rewards)
+        self._replay()
+        self.waiting = [i for i, one in enumerate(saved) if one is not None and one.waits]
+        for i, then in enumerate(saved):
+            if then is not None:
+                found = self.rounds.flat(self._latest[i])
                 if not np.array_equal(found, then.observation):
                     raise UnrepeatedEpisodeError(
                         "env must repeat the episode in which the training was saved: the same"
@@ -445,7 +467,7 @@ class Episodes:
                 " or the autoreset mode DISABLED"
             )
 
-    def _replay(self, waiting: Iterable[int]) -> None:
+    def _replay(self) -> None:
         """Take the actions of all present episodes again, so that all end at the same time.
 
         Until its own episode begins, an environment takes any actions.
@@ -453,27 +475,22 @@ class Episodes:
         present = {i: episode for i, episode in enumerate(self.present) if episode is not None}
         taken = {i: episode.actions.array() for i, episode in present.items()}
         n_rounds = max(map(len, taken.values()), default=0)
-        longest = next((one for one in taken.values() if len(one) == n_rounds), None)
+        longest = next((one for one in taken.values() if len(one) == n_rounds), np.empty(0))
         every = range(self.n_environments)
         numbers = {i: present[i].number if i in present else 0 for i in every}
         ended = set(every)
         for t in range(n_rounds):
-            assert longest is not None
-            starts = {i for i, own in taken.items() if n_rounds - len(own) == t}
-            if starts | ended:
-                seen = self._reset({i: numbers[i] for i in sorted(starts | ended)})
-            for i in starts:
-                present[i].observation = seen[i]
-            actions = [
+            begins = ended | {i for i, own in taken.items() if n_rounds - len(own) == t}
+            if begins:
+                self._put(self._reset({i: numbers[i] for i in sorted(begins)}))
+            self._actions = [
                 taken[i][t - n_rounds]
                 if i in taken and t >= n_rounds - len(taken[i])
                 else longest[t]
                 for i in every
             ]
-            outcomes = [checked(outcome) for outcome in self._adapter.step(actions)]
-            ended = {i for i, one in enumerate(outcomes) if one.terminated or one.truncated}
-            for i, episode in present.items():
-                if t < n_rounds - 1 or i not in waiting:
-                    episode.observation = outcomes[i].observation
-                else:
-                    episode.outcome = outcomes[i]
+            self.results = self._adapter.step(self._actions)
+            self._before = self._latest
+            self._latest = self._read("observation", self.results.observations)
+            ends = zip(self.results.terminated, self.results.truncated, strict=True)
+            ended = {i for i, (terminated, truncated) in enumerate(ends) if terminated or truncated}

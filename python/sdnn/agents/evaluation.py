@@ -15,12 +15,8 @@ from numpy.typing import NDArray
 
 from sdnn.agents.episode import (
     EVALUATION,
-    StepResult,
-    UnusableStepError,
     checked,
     episode_seed,
-    reset_env,
-    step_env,
 )
 from sdnn.agents.files import (
     Statistics,
@@ -29,7 +25,13 @@ from sdnn.agents.files import (
     statistics_of,
     take_statistics,
 )
-from sdnn.agents.spaces import require_same_kind, require_single
+from sdnn.agents.spaces import (
+    UnusableStepError,
+    require_same_kind,
+    require_single,
+    reset_env,
+    step_env,
+)
 from sdnn.arguments import has_methods, seed_of, shown, whole
 
 _LONG = 100_000
@@ -178,11 +180,11 @@ def greedy_episode(
                 action = agent.act(observation, explore=False)
             except ValueError as error:
                 raise unusable(error) from error
-            *outcome, _ = step_env(env, action)
+            observation, *values, _ = step_env(env, action)
             n_steps += 1
             try:
-                observation, reward, terminated, truncated = checked(StepResult(*outcome))
-            except ValueError as error:
+                reward, terminated, truncated = checked(*values)
+            except UnusableStepError as error:
                 raise unusable(error) from error
             total += reward
             if not math.isfinite(total):

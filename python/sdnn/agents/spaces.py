@@ -1,4 +1,4 @@
-"""Gymnasium's spaces: as the vectors of numbers that the core takes, in files, and compared."""
+"""Gymnasium's interface: spaces as numbers for the core, in files, compared; steps and resets."""
 
 from __future__ import annotations
 
@@ -22,8 +22,11 @@ AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
 Ranges: TypeAlias = Literal["adaptive"] | tuple[ArrayLike, ArrayLike]
 """Lowest and highest values, a number for all variables or one for each; or adaptive ones."""
 
-_FLOAT64 = np.dtype(np.float64)
 _MANY_VARIABLES = 16
+_OLD_API = (
+    "; an environment of Gym before 0.26 can be wrapped:"
+    " shimmy.GymV21CompatibilityV0(env=env), from pip install shimmy"
+)
 
 
 class Observations:
@@ -76,7 +79,7 @@ class Observations:
             inputs=() if isinstance(inputs, str) else inputs,
         )
 
-    def vector(self, name: str, observation: Any) -> NDArray[np.float64]:
+    def vector(self, name: str, observation: Any) -> NDArray[Any]:
         """Return the variables of an observation, in any shape; ValueError if it is none."""
         if self._shape is None:
             try:
@@ -86,13 +89,19 @@ class Observations:
                 raise ValueError(
                     f"{name} must be of {self._space}, got {shown(observation)}"
                 ) from error
-        if type(observation) is np.ndarray and observation.dtype is _FLOAT64:
-            values: NDArray[np.float64] = observation
-        else:
-            values = _numbers(name, observation)
+        is_plain = type(observation) is np.ndarray and observation.dtype.kind in "fiub"
+        values = observation if is_plain else array_of(name, observation)
         if values.shape != self._shape:
             raise ValueError(f"{name} must have shape {self._shape}, got {values.shape}")
         return values
+
+    def rows(self, name: str, observations: Any) -> NDArray[np.float64]:
+        """Return a copy of several ones, shape (n, n_variables); ValueError as of `vector`."""
+        rows, is_array = observations, type(observations) is np.ndarray
+        if not (is_array and rows.dtype.kind in "fiub" and rows.shape[1:] == self._shape):
+            rows = [self.vector(name, one) for one in observations]
+        rows = np.array(rows, np.float64)
+        return rows if rows.ndim == 2 else rows.reshape(-1, self.n_variables)
 
 
 def _check_parts(space: gym.Space[Any], observation: Any) -> None:
@@ -189,7 +198,6 @@ class Actions:
     def __init__(self, space: gym.Space[Any]) -> None:
         self._space = space
         self.is_box = isinstance(space, gym.spaces.Box)
-        self._is_discrete = isinstance(space, gym.spaces.Discrete)
         wholes = _wholes(space)
         if isinstance(space, gym.spaces.Box):
             low, high = np.ravel(space.low), np.ravel(space.high)
@@ -209,9 +217,7 @@ class Actions:
             raise argument_error("action_space", f"{problem}: {remedy}")
         dtype = np.dtype(space.dtype)
         self._dtype = dtype
-        self._type: Any = dtype.type
-        self._shape = space.shape or ()
-        self._is_vector = len(self._shape) == 1
+        self._rows = (-1, *(space.shape or ()))
         number: Any = {"f2": "float16", "f4": "float32"}.get(dtype.str[1:], "float64")
         self.config = _core.ActionConfig(
             low=low.astype(np.float64).tolist(),
@@ -220,12 +226,9 @@ class Actions:
             number=number if dtype.kind == "f" else "whole",
         )
 
-    def element(self, numbers: NDArray[np.float64]) -> Any:
-        """Make the element of the space that has these numbers."""
-        if self._is_discrete:
-            return self._type(numbers[0])
-        element = numbers.astype(self._dtype)
-        return element if self._is_vector else element.reshape(self._shape)
+    def elements(self, numbers: NDArray[np.float64]) -> NDArray[Any]:
+        """Make the elements of the space that have these numbers, one of each row."""
+        return numbers.astype(self._dtype).reshape(self._rows)
 
     def numbers(self, action: Any) -> NDArray[Any]:
         """Return the numbers of an element, in any shape; ValueError if they are none."""
@@ -263,6 +266,36 @@ def require_single(name: str, env: Any) -> None:
         raise TypeError(
             f"{name} must be a single environment, got a vector of them, {type(env).__name__}"
         )
+
+
+class UnusableStepError(ValueError):
+    """A step or reset of an environment cannot be used; the message names it and the reason."""
+
+
+def reset_env(env: Any, seed: Any, options: dict[str, Any] | None) -> Any:
+    """Reset an environment, or a vector; return what is observed first.
+
+    UnusableStepError if it returns something else than an observation and a dictionary.
+    """
+    made = env.reset(seed=seed, options=options)
+    if not (isinstance(made, tuple | list) and len(made) == 2 and isinstance(made[1], Mapping)):
+        raise UnusableStepError(
+            f"env.reset must return (observation, info), info a dictionary, got {shown(made)}"
+            f"{_OLD_API}"
+        )
+    return made[0]
+
+
+def step_env(env: Any, action: Any) -> tuple[Any, Any, Any, Any, Any]:
+    """Step an environment, or a vector; UnusableStepError if it does not return five values."""
+    made = env.step(action)
+    if not (isinstance(made, (tuple, list)) and len(made) == 5):
+        n = len(made) if isinstance(made, (tuple, list)) else 1
+        raise UnusableStepError(
+            "env.step must return five values, (observation, reward, terminated, truncated, info),"
+            f" got {n}{_OLD_API}"
+        )
+    return made  # type: ignore[return-value]
 
 
 def require_unbatched(observations: gym.Space[Any], actions: gym.Space[Any]) -> None:

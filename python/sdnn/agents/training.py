@@ -14,16 +14,12 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.agents.callbacks import listed, listeners
 from sdnn.agents.episode import (
     EnvironmentAdapter,
-    Episode,
     Episodes,
     Learner,
     OneEnvironment,
-    StepResult,
-    Transition,
-    UnusableStepError,
-    checked,
 )
 from sdnn.agents.evaluation import evaluate
 from sdnn.agents.files import (
@@ -34,7 +30,7 @@ from sdnn.agents.files import (
     take_statistics,
     write_training,
 )
-from sdnn.agents.spaces import require_same_kind, require_single
+from sdnn.agents.spaces import UnusableStepError, require_same_kind, require_single
 from sdnn.arguments import flag, has_methods, path_of, shown, whole
 from sdnn.interrupts import Interrupts
 
@@ -182,7 +178,7 @@ class Training:
         self.episodes = _optional("episodes", episodes)
         self.seed = None if seed is None else whole("seed", seed, 0, 2**64 - 1)
         first = whole("first_episode", first_episode, 0, 2**53)
-        self.callbacks = _listed(callbacks)
+        self.callbacks = listed(callbacks)
         self.evaluate_every = _optional("evaluate_every", evaluate_every)
         self.evaluate_every_episodes = _optional("evaluate_every_episodes", evaluate_every_episodes)
         if evaluation_env is None and not (evaluate_every is evaluate_every_episodes is None):
@@ -198,13 +194,11 @@ class Training:
         """Steps and mean returns of all evaluations so far, also of those before it was loaded."""
         self.rows: list[Row] = []
         """Rows since it was begun, or last loaded."""
-        self._episodes = Episodes(env, _adapter_for, self.seed, first, self._options)
+        self._episodes = Episodes(
+            env, _adapter_for, agent, self.seed, first, self._options, self._unusable
+        )
         if reset_options is not None and self.n_environments > 1:
             raise ValueError("reset_options must be None for a vector environment")
-        self._place: list[dict[str, int]] = [{}]  # which environment, where there are several
-        if self.n_environments > 1:
-            self._place = [{"environment": i} for i in range(self.n_environments)]
-        self._follows_progress = hasattr(agent, "progress")
         self._stops = False
         self.is_within_step = False
         """Whether an error left a step half done, which cannot be saved."""
@@ -228,7 +222,7 @@ class Training:
         return self.n_episodes >= self.episodes
 
     def stop(self) -> None:
-        """Stop after the present step; the next `run` continues from there."""
+        """Stop after the present step, or before the first one of the next `run`."""
         self._stops = True
 
     def run(self) -> TrainingResult:
@@ -262,8 +256,8 @@ class Training:
         """
         if self.is_within_step:
             raise RuntimeError("a training that was left within a step cannot be resumed: load it")
-        self._stops = False
         with Interrupts(self.stop) as interrupts, ExitStack() as stack:
+            stack.callback(setattr, self, "_stops", False)
             stack.callback(self._keep_statistics)
             for callback in self.callbacks:
                 callback.on_start(self)
@@ -273,18 +267,18 @@ class Training:
             n_now = getattr(self.agent, "n_environments", 1)
             if n_now != self.n_environments and not self.is_finished:
                 self.agent.n_environments = self.n_environments
-            outcomes = self._episodes.outcomes(self._begin_episode, self._action)
+            self._listeners = listeners(self.callbacks)
+            self._set_next_call()
             due = time.monotonic() + seconds
             while not (self.is_finished or self._stops):
                 self.is_within_step = True
                 try:
-                    i, episode, given = next(outcomes)
-                    outcome = self._learn_step(i, episode, given)
+                    last = self._learn_steps()
                 except Exception:
                     self._episodes.leave()
                     self.is_within_step = False
                     raise
-                failure = self._note_step(i, episode, outcome)
+                failure = self._note_steps(last)
                 self.is_within_step = False
                 if failure is not None:
                     raise failure
@@ -301,9 +295,7 @@ class Training:
         saved = SavedTraining(
             **{name: getattr(self, name) for name in names},
             wrappers=self._episodes.learned_before,
-            present=self._episodes.saved(
-                self.agent.action_space.shape or (), self.agent.flat_observation
-            ),
+            present=self._episodes.saved(self.agent.action_space.shape or ()),
         )
         write_training(path_of("path", path), self.agent, saved)
 
@@ -358,7 +350,7 @@ class Training:
             if learned and not is_same:
                 raise ValueError(f"env must have the training's {learned[0].wrapper}, got {env}")
             training._episodes.learned = learned
-            training._episodes.repeat(saved.present, agent.flat_observation)
+            training._episodes.repeat(saved.present)
         return training
 
     def _keep_statistics(self) -> None:
@@ -374,73 +366,82 @@ class Training:
             raise TypeError(f"reset_options must return a mapping, got {shown(options)}")
         return dict(options)
 
-    def _begin_episode(self, environment: int) -> None:
-        self.agent.begin_episode(**self._place[environment])
-
-    def _action(self, environment: int, episode: Episode) -> Any:
-        try:
-            return self.agent.act(episode.observation, **self._place[environment])
-        except ValueError as error:
-            raise self._unusable(error, environment, episode) from error
-
-    def _unusable(self, error: Exception, environment: int, episode: Episode) -> UnusableStepError:
-        where = f"step {episode.n_steps}" if episode.n_steps else "the reset"
-        whose = f" in environment {environment}" if self.n_environments > 1 else ""
+    def _unusable(self, error: Exception, environment: int | None) -> UnusableStepError:
+        """Return the error that names step and episode, in an environment or in any."""
+        where = ""
+        if environment is not None or self.n_environments == 1:
+            episode = self._episodes.present[environment or 0]
+            assert episode is not None
+            where = f"step {episode.n_steps}" if episode.n_steps else "the reset"
+            whose = f" in environment {environment}" if self.n_environments > 1 else ""
+            where = f" ({where} of episode {episode.number}{whose})"
         return UnusableStepError(
-            f"env gave what cannot be learned, in step {self.n_steps + 1} ({where} of episode"
-            f" {episode.number}{whose}): {error}"
+            f"env gave what cannot be learned, in step {self.n_steps + 1}{where}: {error}"
         )
 
-    def _learn_step(self, i: int, episode: Episode, outcome: StepResult) -> StepResult:
-        """Learn an outcome and return it, checked."""
-        try:
-            outcome = checked(outcome)
-            next_observation, reward, terminated, truncated = outcome
-            ends = terminated or (truncated and not self.limit_bootstraps)
-            step = Transition(episode.observation, episode.action, reward, next_observation, ends)
-            self.agent.learn(step, **self._place[i])
-        except (ValueError, OverflowError) as error:
-            raise self._unusable(error, i, episode) from error
-        episode.observation, episode.outcome = next_observation, None
-        episode.sum_of_rewards += reward
-        self.n_steps += 1
-        return outcome
+    def _set_next_call(self) -> None:
+        """Find the step after which callbacks are called or an evaluation is due, or the last."""
+        n = self.n_steps
+        every = [interval for interval, _ in self._listeners]
+        every += [] if self.evaluate_every is None else [self.evaluate_every]
+        goal = 2**62 if self.steps is None else self.steps
+        self._next_call = min([goal, *(n - n % interval + interval for interval in every)])
 
-    def _note_step(self, i: int, episode: Episode, outcome: StepResult) -> Exception | None:
-        """Count what ends with the step, evaluate where it is due, and call the callbacks.
+    def _learn_steps(self) -> int:
+        """Learn as many steps as come before the next call, and return the last one's environment.
+
+        They are of one round, and end with the first that ends an episode.
+        """
+        episodes, n = self._episodes, self.n_steps
+        while not episodes.waiting:  # where all begin with the step, none waits
+            episodes.advance()
+        most, progress = min(self._next_call - n, episodes.n_environments), []
+        if most > 1 and self.steps is not None:
+            progress = [(n + k) / self.steps for k in range(1, most)]
+        learned = episodes.learn_waiting(most, self.limit_bootstraps, progress)
+        self.n_steps += len(learned)
+        return learned[-1]
+
+    def _note_steps(self, i: int) -> Exception | None:
+        """Count what ends with the last step, evaluate where it is due, and call the callbacks.
 
         Returns the error of an evaluation, without which the step is whole.
         """
-        _, _, ends, truncated = outcome
-        rows: list[Row] | None = None
+        rows: list[Row] = []
         failure: Exception | None = None
-        if ends or truncated:
-            ends = True
-            rows = [self._episode_row(i, episode, outcome.terminated)]
+        terminated = self._episodes.results.terminated[i]
+        ends = terminated or self._episodes.results.truncated[i]
+        if ends:
+            rows.append(self._episode_row(i, terminated))
             self.n_episodes += 1
             self._episodes.present[i] = None
             if self.evaluate_every_episodes is not None and self._lacks_evaluation:
-                self._begin_episode(i)  # which learns what still waits
-        if self._follows_progress:
+                self._episodes.rounds.begin_episode(i)  # which learns what still waits
+        if (learner := self._episodes.rounds.progressing) is not None:
             if self.steps is not None:
-                self.agent.progress = self.n_steps / max(self.steps, self.n_steps)
+                learner.progress = self.n_steps / self.steps
             elif ends and self.episodes is not None:
-                self.agent.progress = self.n_episodes / max(self.episodes, self.n_episodes)
-        if (ends or self.evaluate_every is not None) and self._lacks_evaluation:
-            rows = rows or []
+                learner.progress = self.n_episodes / max(self.episodes, self.n_episodes)
+        is_called = self.n_steps >= self._next_call
+        if (ends or is_called) and self._lacks_evaluation:
             try:
                 rows.append(self._evaluation())
             except Exception as error:
                 failure = error
         if rows:
             self._tell(rows)
-        for callback in self.callbacks:
-            callback.on_step(self)
+        if is_called:
+            for interval, callback in self._listeners:
+                if self.n_steps % interval == 0:
+                    callback.on_step(self)
+            self._set_next_call()
         return failure
 
-    def _episode_row(self, i: int, episode: Episode, terminated: bool) -> Row:
+    def _episode_row(self, i: int, terminated: bool) -> Row:
+        episode, place = self._episodes.present[i], self._episodes.rounds.places[i]
+        assert episode is not None
         own = {"return": episode.sum_of_rewards, "length": episode.n_steps}
-        values = {"episode": self.n_episodes, **self._place[i], **own, "terminated": terminated}
+        values = {"episode": self.n_episodes, **place, **own, "terminated": terminated}
         return self._row("episode", **values)
 
     def _tell(self, rows: list[Row]) -> None:
@@ -486,13 +487,3 @@ def _adapter_for(env: Any) -> EnvironmentAdapter:
 
 def _optional(name: str, value: int | None) -> int | None:
     return None if value is None else whole(name, value, 1, 2**53)
-
-
-def _listed(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
-    try:
-        listed = tuple(callbacks)
-    except TypeError:
-        raise TypeError(f"callbacks must be a list of callbacks, got {shown(callbacks)}") from None
-    for callback in listed:
-        has_methods("callbacks", callback, "callbacks", "on_start", "on_step", "on_row", "on_end")
-    return listed

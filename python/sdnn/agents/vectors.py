@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import abc
-import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,11 +14,9 @@ from sdnn.agents.episode import (
     EnvironmentAdapter,
     Options,
     Seeds,
-    StepResult,
-    UnusableStepError,
-    reset_env,
-    step_env,
+    StepResults,
 )
+from sdnn.agents.spaces import UnusableStepError, reset_env, step_env
 from sdnn.arguments import array_of
 
 
@@ -36,31 +33,36 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         self._mode = _autoreset_mode(env)
         self.n_environments = env.num_envs
 
-    def _step(self, actions: Sequence[Any]) -> tuple[list[StepResult], list[Any]]:
-        """Return the outcomes, and what is observed after resets in the same step."""
-        space = self._env.single_action_space
-        batch: Any = create_empty_array(space, self.n_environments)
+    def _step(self, actions: Any) -> tuple[StepResults, Any]:
+        """Return the results, and what is observed after resets in the same step."""
         observations, rewards, terminated, truncated, infos = step_env(
-            self._env, concatenate(space, actions, batch)
+            self._env, self._batch(actions)
         )
-        rewards = self._column("reward", rewards, "fiub", "numbers")
-        terminated = self._column("terminated", terminated, "b", "bools")
-        truncated = self._column("truncated", truncated, "b", "bools")
         seen = self._listed(observations)
-        last = list(seen)
-        if self._mode == "SAME_STEP":
-            for i in np.flatnonzero(np.logical_or(terminated, truncated)):
-                if "final_obs" not in infos:
-                    raise ValueError(
-                        "env must give the last observations of episodes in infos['final_obs']"
-                        f" with autoreset in the same step, got {sorted(infos)}"
-                    )
-                last[i] = copy.deepcopy(infos["final_obs"][i])
-        outcomes = [
-            StepResult(last[i], rewards[i], terminated[i], truncated[i])
-            for i in range(self.n_environments)
-        ]
-        return outcomes, seen
+        results = StepResults(
+            seen,
+            self._column("reward", rewards, "fiub", "numbers"),
+            self._column("terminated", terminated, "b", "bools"),
+            self._column("truncated", truncated, "b", "bools"),
+        )
+        ended = [a or b for a, b in zip(results.terminated, results.truncated, strict=True)]
+        if self._mode == "SAME_STEP" and any(ended):
+            if "final_obs" not in infos:
+                raise ValueError(
+                    "env must give the last observations of episodes in infos['final_obs'] with"
+                    f" autoreset in the same step, got {sorted(infos)}"
+                )
+            last = [infos["final_obs"][i] if ended[i] else one for i, one in enumerate(seen)]
+            results = results._replace(observations=last)
+        return results, seen
+
+    def _batch(self, actions: Any) -> Any:
+        """Return a copy of the actions as the environment takes them."""
+        space: Any = self._env.single_action_space
+        if type(actions) is np.ndarray:
+            return np.array(actions, space.dtype).reshape(self.n_environments, *space.shape)
+        batch: Any = create_empty_array(space, self.n_environments)
+        return concatenate(space, actions, batch)
 
     def _column(self, name: str, values: Any, kinds: str, what: str) -> list[Any]:
         """Return one value for each environment; UnusableStepError if there are others."""
@@ -75,9 +77,11 @@ class _Vector(EnvironmentAdapter, abc.ABC):
             )
         return list(column.tolist())
 
-    def _listed(self, observations: Any) -> list[Any]:
-        # A copy: some vector environments write to the same array again.
-        return list(iterate(self._env.observation_space, copy.deepcopy(observations)))
+    def _listed(self, observations: Any) -> Any:
+        """Return them one by one, not copied."""
+        if type(observations) is np.ndarray:
+            return observations
+        return list(iterate(self._env.observation_space, observations))
 
 
 class _SeparateResets(_Vector):
@@ -97,7 +101,7 @@ class _SeparateResets(_Vector):
         seen = self._listed(observations)
         return {i: seen[i] for i in seeds}
 
-    def step(self, actions: Sequence[Any]) -> list[StepResult]:
+    def step(self, actions: Sequence[Any]) -> StepResults:
         return self._step(actions)[0]
 
 
@@ -108,8 +112,7 @@ class _OwnResets(_Vector):
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]) -> None:
         super().__init__(env)
-        self._seen: list[Any] | None = None
-        self._taken: list[Any] = []
+        self._seen: Any = None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
         if self._seen is None:
@@ -119,12 +122,9 @@ class _OwnResets(_Vector):
             return {}
         return {i: self._seen[i] for i in seeds}
 
-    def step(self, actions: Sequence[Any]) -> list[StepResult]:
-        # An environment that resets ignores its action, but must be given one.
-        old = self._taken or list(actions)
-        self._taken = [old[i] if action is None else action for i, action in enumerate(actions)]
-        outcomes, self._seen = self._step(self._taken)
-        return outcomes
+    def step(self, actions: Sequence[Any]) -> StepResults:
+        results, self._seen = self._step(actions)
+        return results
 
 
 def _autoreset_mode(env: gym.vector.VectorEnv[Any, Any, Any]) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
@@ -175,7 +174,6 @@ class Run:
         """
         goal = {"steps": steps, "episodes": episodes}
         BudgetSpec(**goal)  # refuses what is no goal
-        stop = threading.Event()
         with ExitStack() as stack:
             stack.enter_context(self._locked())
             remove_abandoned_files(self.folder)
@@ -191,7 +189,7 @@ class Run:
                     f"{self.folder / CONFIG} differs from the specification in {STORE_NAME}: undo"
                     " the edit, or begin a new run with --config and another --out"
                 )
-            checkpoints = _StoredCheckpoints(self, store, stop)
+            checkpoints = _StoredCheckpoints(self, store)
             listed = [checkpoints, *callbacks]
             if self.spec.output.tensorboard:
                 listed.append(tensorboard_in(self.folder))
@@ -208,7 +206,7 @@ class Run:
                 self._set_goal(training, goal)
             began_at = training.n_steps
             try:
-                with Interrupts(stop.set, (signal.SIGINT, signal.SIGTERM)) as signals:
+                with Interrupts(training.stop, (signal.SIGINT, signal.SIGTERM)) as signals:
                     if trial.reason != "target":  # reached just before the run was killed
                         training.run()
             except UnusableStepError as error:
@@ -342,12 +340,12 @@ class Run:
 
 
 class _StoredCheckpoints(CheckpointCallback):
-    """Stores rows every few seconds and before each checkpoint; stops at an event."""
+    """Stores rows every few seconds and before each checkpoint."""
 
-    def __init__(self, run: Run, store: ResultStore, stop: threading.Event) -> None:
+    def __init__(self, run: Run, store: ResultStore) -> None:
         super().__init__(run.folder / CHECKPOINT, run.spec.output.checkpoint_every)
         self._key, self._config = run.key, run.spec.canonical_json()
-        self._results, self._stop = store, stop
+        self._results = store
         self._rows: list[Row] = []
         self._stored_at = time.monotonic()
         self._clock = time.thread_time()
@@ -356,17 +354,11 @@ class _StoredCheckpoints(CheckpointCallback):
         """Remove the rows that were stored after the checkpoint."""
         self._store(training)
 
-    def on_step(self, training: Training) -> None:
-        """Stop if the event is set; save where it is due."""
-        if self._stop.is_set():
-            training.stop()
-        if self._rows and time.monotonic() - self._stored_at > STORE_SECONDS:
-            self._store(training)
-        super().on_step(training)
-
     def on_row(self, training: Training, row: Row) -> None:
-        """Keep a row until it is stored."""
+        """Keep a row, and store those kept where some seconds have passed."""
         self._rows.append(row)
+        if time.monotonic() - self._stored_at > STORE_SECONDS:
+            self._store(training)
 
     def finish(self, training: Training) -> None:
         """Note in the store that the run is finished."""

@@ -72,7 +72,7 @@ def test_actions_have_the_type_and_shape_of_the_space(dtype):
 )
 def test_whole_numbers_keep_their_meaning(space, n_actions, numbers, element):
     actions = Actions(space)
-    made = actions.element(np.array(numbers, np.float64))
+    made = actions.elements(np.array([numbers], np.float64))[0]
     assert made in space
     assert np.array_equal(made, element)
     assert np.array_equal(np.ravel(actions.numbers(made)), numbers)

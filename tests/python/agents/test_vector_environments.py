@@ -460,3 +460,59 @@ def test_impossible_environments_are_named(agent):
     assert agent.n_environments == 2
     after = agent.state()
     assert all(np.array_equal(before[name], after[name]) for name in before)
+
+
+def test_a_callback_with_an_interval_is_called_after_its_multiples_only():
+    class Rare(Callback):
+        step_interval = 7
+
+        def __init__(self):
+            self.steps = []
+
+        def on_step(self, training):
+            self.steps.append(training.n_steps)
+
+    rare, plain, watched = Rare(), sdnn_agent(), sdnn_agent()
+    plain.train(sync(3), steps=50, seed=1)
+    watched.train(sync(3), steps=50, seed=1, callbacks=[rare])
+    assert rare.steps == [7, 14, 21, 28, 35, 42, 49]
+    assert states_equal(plain, watched)
+
+
+def test_what_a_subclass_does_when_it_learns_is_done_in_a_training():
+    class Doubled(RBFQLearning):
+        def learn(self, transition, environment=0):
+            super().learn(transition._replace(reward=2 * transition.reward), environment)
+
+    class DoubleWalk(Walk):
+        def step(self, action):
+            seen, reward, *ends = super().step(action)
+            return seen, 2 * reward, *ends
+
+    sizes = RBFNetworkConfig(n_actions=7)
+    agents = [
+        kind(Walk().observation_space, Walk.action_space, approximator=sizes, seed=1)
+        for kind in (Doubled, RBFQLearning)
+    ]
+    for agent, env in zip(agents, (Walk, DoubleWalk), strict=True):
+        agent.train(sync(2, env), steps=60, seed=1)
+    assert states_equal(*agents)
+
+
+def test_a_round_is_learned_up_to_the_first_step_that_cannot_be():
+    agent, by_hand = sdnn_agent(), sdnn_agent()
+    agent.n_environments = by_hand.n_environments = 3
+    seen = np.zeros((3, 2))
+    core = agent.core_parts()[0]
+    actions = core.act_each(seen, [0, 1, 2])
+    for i in range(3):
+        action = by_hand.act(seen[i], environment=i)
+        assert action == np.float32(actions[i])
+    by_hand.learn(Transition(seen[0], actions[0], -1.0, seen[0] + 1, False), 0)
+    step = (seen, actions, [-1.0, np.nan, -1.0], seen + 1, [False] * 3)
+    assert core.learn_each(*step, [0, 1, 2], []) == 1
+    assert states_equal(agent, by_hand)
+    refuses("reward", core.learn_each, *step, [1, 2], [])
+    refuses("environments", core.learn_each, *step, [3], [])
+    refuses("next_observations", core.learn_each, *step[:3], seen[:2], step[4], [2], [])
+    assert states_equal(agent, by_hand)
