@@ -35,12 +35,17 @@ from sdnn.estimators.network import (
 from sdnn.estimators.outliers import warn_caller
 from sdnn.estimators.pair_selection import select_pairs, with_categories
 from sdnn.estimators.training import (
+    AVERAGED_EVERY,
     History,
     Trainer,
     presented,
     run_epochs,
     sample_weights,
 )
+
+MOST_EPOCHS = 30  # by default
+FEWEST_EPOCHS = 5
+MOST_PRESENTATIONS = 100_000  # of samples in all epochs by default
 
 Self = TypeVar("Self", bound="BaseSDNN")
 
@@ -69,8 +74,15 @@ class BaseSDNN(Fitted, CodedInputs):
         feature. "auto" selects pairs by cross-validation, which takes some forty times as long.
     tables : {"shared", "separate"}, default="shared"
         One table of patterns per input, permuted for each pair, or two tables per pair.
-    correction_share : float, default=1
+    max_iter : int, optional
+        Largest number of epochs of `fit`, which stops early once nothing is corrected. None: 30,
+        or as many as present 100,000 samples, at least 5. Use more for exact targets, say 300.
+    n_averaged_epochs : int, default=4
+        Predict the mean over the networks after the last epoch of `fit` and after so many, less
+        one, of every third epoch before. `partial_fit` resumes from the last alone.
+    correction_share : float
         Share of the missing or superfluous units that a sample corrects, at least one; in (0, 1].
+        Default: 1 in regression; 1/4 in classification, where samples of classes overlap.
     shuffle : bool, default=True
         Whether each epoch has a new random order.
     early_stopping : bool, default=False
@@ -119,7 +131,8 @@ class BaseSDNN(Fitted, CodedInputs):
     pairs: Any = "budget"
     tables: str = "shared"
     out_of_range: str = "clip"
-    max_iter: int = 30
+    max_iter: int | None = None
+    n_averaged_epochs: int = 4
     correction_share: float = 1.0
     shuffle: bool = True
     early_stopping: bool = False
@@ -132,9 +145,7 @@ class BaseSDNN(Fitted, CodedInputs):
     n_jobs: int | None = None
     verbose: int = 0
 
-    # Only the regressor lets its users choose these.
-    refit = False
-    n_averaged_epochs = 1
+    refit = False  # the regressor lets its users choose it
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         **CodedInputs._parameter_constraints,
@@ -142,7 +153,8 @@ class BaseSDNN(Fitted, CodedInputs):
         "pairs": [StrOptions({"budget", "all", "auto"}), "array-like"],
         "tables": [StrOptions({"shared", "separate"})],
         "out_of_range": [StrOptions({"clip", "error"})],
-        "max_iter": [Interval(Integral, 1, 10**9, closed="both")],
+        "max_iter": [Interval(Integral, 1, 10**9, closed="both"), None],
+        "n_averaged_epochs": [Interval(Integral, 1, 1000, closed="both")],
         "correction_share": [Interval(Real, 0, 1, closed="right")],
         "shuffle": ["boolean"],
         "early_stopping": ["boolean"],
@@ -226,7 +238,7 @@ class BaseSDNN(Fitted, CodedInputs):
             random = self._resume(table, given)
         else:
             pairs = self._select_pairs(X, table, given, weights)
-            random = self._begin(X, table, given, pairs, self._n_networks())
+            random = self._begin(X, table, given, pairs, self._n_networks(len(table)))
         targets = self._targets(given, at_once=True)
         bins = self.network_.input_code.bins(table)
         held, kept = self._split(random, len(table))
@@ -247,7 +259,8 @@ class BaseSDNN(Fitted, CodedInputs):
             )
 
         is_refitted = self.refit and self.early_stopping
-        trainer, history = train(kept, self.max_iter, 1 if is_refitted else self.n_averaged_epochs)
+        n_averaged = 1 if is_refitted else self.n_averaged_epochs
+        trainer, history = train(kept, self._most_epochs(len(table)), n_averaged)
         self.n_iter_ = len(history.n_corrected)
         self.n_corrected_ = np.array(history.n_corrected, dtype=np.int64)
         self.validation_scores_ = np.array(history.scores)
@@ -257,8 +270,7 @@ class BaseSDNN(Fitted, CodedInputs):
             self.network_ = Network(first.input_code, first.n_units, seed=self._weight_seed)
             _, history = train(slice(None), history.n_epochs, self.n_averaged_epochs)
         self.network_ = history.network
-        if self._earlier or history.earlier:
-            self._earlier = history.earlier
+        self._earlier = history.earlier
 
     def _partial_fit(
         self: Self,
@@ -327,6 +339,7 @@ class BaseSDNN(Fitted, CodedInputs):
         self.network_ = Network(code, n_units, seed=weight_seed)
         self._weight_seed = weight_seed
         self.n_inputs_out_of_range_ = self._n_weighted = 0
+        self._earlier = ()
         self._note_inputs(table)
         return random
 
@@ -334,7 +347,7 @@ class BaseSDNN(Fitted, CodedInputs):
         """Continue with a copy of the network; return the generator of orders."""
         self._check_outputs(y, None)
         network = self.network_
-        n_networks, code = self._n_networks(), network.input_code
+        n_networks, code = self._n_networks(len(table)), network.input_code
         if n_networks > 1:
             self._require_memory(
                 network.n_units, n_networks, code.n_units, code.codings, code.pairs
@@ -357,9 +370,16 @@ class BaseSDNN(Fitted, CodedInputs):
             model.set_params(coding=[(coding, [index]) for index, coding in enumerate(known)])
         return select_pairs(model, X, y, weights, every, seed)
 
-    def _n_networks(self) -> int:
+    def _most_epochs(self, n_samples: int) -> int:
+        """Return the largest number of epochs of `fit`."""
+        if self.max_iter is not None:
+            return self.max_iter
+        return min(MOST_EPOCHS, max(FEWEST_EPOCHS, MOST_PRESENTATIONS // n_samples))
+
+    def _n_networks(self, n_samples: int) -> int:
         """Return the most networks that `fit` keeps, averaged ones included."""
-        n_earlier = min(self.n_averaged_epochs, self.max_iter) - 1
+        n_kept = (self._most_epochs(n_samples) - 1) // AVERAGED_EVERY
+        n_earlier = min(self.n_averaged_epochs - 1, n_kept)
         has_best = self.early_stopping and not self.refit
         return 1 + (2 if has_best else 1) * n_earlier  # the best ones beside the last ones
 
@@ -370,7 +390,9 @@ class BaseSDNN(Fitted, CodedInputs):
         n_bytes = 4 * n_networks * n_units * len(pairs) * n_pattern_units
         n_bytes += code_bytes(codings, pairs, n_pattern_units)
         if n_bytes > self.memory_limit:
-            averaged = f" in {n_networks} networks to be averaged" if n_networks > 1 else ""
+            averaged = ""
+            if n_networks > 1:
+                averaged = f" in {n_networks} networks, as n_averaged_epochs has it"
             raise ValueError(
                 f"n_pattern_units={n_pattern_units} of {len(pairs)} pairs, read by {n_units} "
                 f"units{averaged}, need {n_bytes} bytes for weights and patterns, more than "

@@ -20,6 +20,7 @@ from sklearn.utils.multiclass import (
 from sdnn import _core
 from sdnn.arguments import shown
 from sdnn.estimators.base import BaseSDNN
+from sdnn.estimators.fitted import mean_of
 from sdnn.estimators.inputs import Array, Floats, Ints, class_labels
 from sdnn.estimators.training import class_weights, sample_weights, weighted_mean
 
@@ -52,8 +53,6 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         fewer from 20 classes on (1,200 in all); 1 with "one_vs_one".
     class_weight : "balanced" or dict, optional
         Mean number of presentations per epoch of `fit` of each class's samples.
-    max_iter : int, default=100
-        Largest number of epochs of `fit`, which stops early once nothing is corrected.
 
     Attributes
     ----------
@@ -75,7 +74,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     scheme: str = "one_vs_rest"
     n_units_per_class: int | None = None
     class_weight: Any = None
-    max_iter: int = 100
+    correction_share: float = 0.25
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
         **BaseSDNN._parameter_constraints,
@@ -212,8 +211,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
 
     def _scores(self, bins: Ints, n_threads: int) -> Floats:
         """Return the share of each class's units that fire, shape (n_samples, n_classes)."""
-        counts = self.network_.counts(bins, len(self.classes_), n_threads)
-        return counts / self._n_units_each
+        return mean_of(self._counts(bins, len(self.classes_), n_threads)) / self._n_units_each
 
     def _probabilities(self, bins: Ints, n_threads: int) -> Floats:
         scores = self._scores(bins, n_threads)
@@ -226,7 +224,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         if self._n_units_each > 1:
             scores = self._scores(bins, n_threads)
         else:
-            scores = self.network_.potentials(bins, n_threads).astype(np.float64)
+            networks = (*self._earlier, self.network_)
+            each = [network.potentials(bins, n_threads) for network in networks]
+            scores = mean_of(each).astype(np.float64)
         if self._scheme == "one_vs_rest":
             return scores[:, 1] - scores[:, 0] if n_classes == 2 else scores
         # A firing unit (potential above 0) votes for the first class of its pair.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_origin, get_type_hints
 
@@ -83,6 +83,11 @@ class Fitted(Learned, BaseEstimator):
         """Integer thresholds, shape (n_units,)."""
         return self._fitted_network.thresholds
 
+    def _counts(self, bins: Ints, n_groups: int, n_threads: int) -> list[Ints]:
+        """Return the firing counts of each averaged network, shape (n_samples, n_groups)."""
+        networks = (*self._earlier, self.network_)
+        return [network.counts(bins, n_groups, n_threads) for network in networks]
+
     @property
     def pair_importances_(self) -> Floats:
         """Squared change of the weights of each pair, normalized, shape (n_pairs,)."""
@@ -158,6 +163,12 @@ class Fitted(Learned, BaseEstimator):
             ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError,
         ) as error:  # fmt: skip
             raise ValueError(f"{path} is damaged: {error or repr(error)}") from error
+
+
+def mean_of(arrays: Sequence[Array]) -> Array:
+    """Return the mean of arrays; a single one as it is."""
+    mean: Array = np.mean(arrays, axis=0) if len(arrays) > 1 else arrays[0]
+    return mean
 
 
 def plain(value: Any) -> Any:
@@ -237,8 +248,7 @@ def read_estimator(
         if name in description["names"]:
             held[name] = array_of_names(name, description["names"][name])
     estimator.network_, *earlier = read_networks(description, arrays, memory_limit)
-    if "n_outputs_" in held:
-        held["_earlier"] = tuple(earlier)
+    held["_earlier"] = tuple(earlier)
     require_consistent(estimator)
     return estimator
 

@@ -12,6 +12,7 @@ from sklearn.utils._param_validation import Interval, StrOptions
 
 from sdnn.arguments import shown
 from sdnn.estimators.base import BaseSDNN, OutOfRangeWarning
+from sdnn.estimators.fitted import mean_of
 from sdnn.estimators.inputs import Array, CodedRegressor, Floats, Ints
 from sdnn.estimators.outliers import warn_caller
 from sdnn.estimators.training import weighted_mean
@@ -42,12 +43,6 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         Treatment of targets outside the output range; "widen" stretches what was learned, for each
         sample of a stream by its width and margins at most. Inputs outside their range are clipped
         unless "error". The first causes an `OutOfRangeWarning`.
-    max_iter : int, default=30
-        Largest number of epochs of `fit`, which stops early once nothing is corrected. Use fewer
-        for noisy targets, say 5, and more for exact ones, say 300.
-    n_averaged_epochs : int, default=1
-        Predict the mean over this many last epochs of `fit`, each a network in memory; 10 is much
-        better on noisy targets. `partial_fit` resumes from the last alone.
     refit : bool, default=False
         Whether early stopping trains again on the whole sample, for the best number of epochs.
 
@@ -74,7 +69,6 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
 
     n_output_units: int = 280
     output_range: Any = None
-    n_averaged_epochs: int = 1
     refit: bool = False
 
     _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
@@ -82,7 +76,6 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         "n_output_units": [Interval(Integral, 1, 2**20, closed="both")],
         "output_range": ["array-like", None],
         "out_of_range": [StrOptions({"clip", "widen", "error"})],
-        "n_averaged_epochs": [Interval(Integral, 1, 1000, closed="both")],
         "refit": ["boolean"],
     }
 
@@ -124,8 +117,8 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
 
     def predict_one(self, x: Any) -> Any:
         """Predict a sample given as to `learn_one`: a float, or shape (n_outputs,)."""
-        counts = self._counts(self._bins_of_one(x), n_threads=1)
-        values = self._of_counts(np.mean(counts, axis=0) if self._earlier else counts[0])[0]
+        counts = self._counts(self._bins_of_one(x), self.n_outputs_, n_threads=1)
+        values = self._of_counts(mean_of(counts))[0]
         return float(values[0]) if self._flat else values
 
     def predict(self, X: ArrayLike, return_std: bool = False) -> Any:
@@ -134,8 +127,9 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         ``return_std`` adds the standard deviation over the averaged epochs, which shows how settled
         a prediction is (not the noise of the targets).
         """
-        counts = self._counts(self._bins(X), self._n_threads())
-        values = self._of_counts(np.mean(counts, axis=0) if self._earlier else counts[0])
+        bins = self._bins(X)
+        counts = self._counts(bins, self.n_outputs_, self._n_threads())
+        values = self._of_counts(mean_of(counts))
         if not return_std:
             return values[:, 0] if self._flat else values
         spread = self._step() * np.std(counts, axis=0)
@@ -154,7 +148,6 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         self.n_outputs_ = targets.shape[1]
         self.output_range_ = self._range_of(targets)
         self.n_outputs_out_of_range_ = 0
-        self._earlier = ()
         self._counts_of_range = self.n_output_units
         return self.n_outputs_ * self.n_output_units
 
@@ -198,11 +191,6 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             raise ValueError(f"y must be within {FURTHEST}, got [{low.min()}, {high.max()}]")
         margin = np.where(high > low, MARGIN * (high - low), np.maximum(1.0, np.abs(low)))
         return np.stack([low - margin, high + margin], axis=1)
-
-    def _counts(self, bins: Ints, n_threads: int) -> list[Ints]:
-        """Return the firing counts of each averaged network, shape (n_samples, n_outputs)."""
-        networks = (*self._earlier, self.network_)
-        return [network.counts(bins, self.n_outputs_, n_threads) for network in networks]
 
     def _step(self) -> Floats:
         """Return the change of an output per unit, shape (n_outputs,)."""

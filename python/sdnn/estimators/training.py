@@ -17,6 +17,7 @@ from sdnn.arguments import shown
 from sdnn.estimators.inputs import Array, Floats, Ints
 from sdnn.estimators.network import Network
 
+AVERAGED_EVERY = 3  # epochs between networks to be averaged: neighbours are too alike
 LARGEST_WEIGHT = 10**6
 MOST_PRESENTED = 2**28  # samples in an epoch: their indices take a GiB
 
@@ -141,7 +142,8 @@ def run_epochs(
     """Train until nothing is corrected, nothing improves, or ``max_iter`` epochs are over.
 
     ``random`` draws the order of every epoch, ``score`` returns the validation score (larger is
-    better), ``weights`` are mean presentations per epoch, ``n_averaged_epochs`` networks are kept.
+    better), ``weights`` are mean presentations per epoch. ``n_averaged_epochs`` networks are kept,
+    the last one and those of every third epoch before it, counted from the first.
     """
     network: Network = model.network_
     history = History(network)
@@ -157,9 +159,8 @@ def run_epochs(
             n_corrected, _ = trainer.present(order)
             history.n_corrected.append(n_corrected)
             advance(n_corrected)
-            if score is not None or n_averaged_epochs > 1:
-                trainer.synchronize()
             if score is not None:
+                trainer.synchronize()
                 history.scores.append(score())
                 if best[1] == 0 or history.scores[-1] > history.scores[best[1] - 1]:
                     best = network.copy(), epoch + 1, tuple(kept)
@@ -168,7 +169,9 @@ def run_epochs(
             quiet = quiet + 1 if n_corrected == 0 else 0
             if quiet == n_quiet:
                 break
-            if n_averaged_epochs > 1 and epoch + 1 < max_iter:
+            is_kept = (epoch + 1) % AVERAGED_EVERY == 0 and epoch + 1 < max_iter
+            if n_averaged_epochs > 1 and is_kept:
+                trainer.synchronize()
                 kept.append(network.copy())
     trainer.synchronize()
     last = network, len(history.n_corrected), tuple(kept)
