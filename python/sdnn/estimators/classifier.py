@@ -22,6 +22,7 @@ from sdnn.arguments import shown
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.fitted import mean_of
 from sdnn.estimators.inputs import Array, Floats, Ints, class_labels
+from sdnn.estimators.network import Network
 from sdnn.estimators.training import class_weights, sample_weights, weighted_mean
 
 UNITS_EACH = 60
@@ -176,8 +177,29 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         self._n_units_each = given
         return _core.n_units_for(self.scheme, n_classes) * given
 
+    def _add_class(self, label: Any) -> None:
+        """Add a class as the last one, with untrained units."""
+        classes = np.append(self.classes_, [label])
+        is_alike = classes.dtype.kind == self.classes_.dtype.kind
+        if self._scheme != "one_vs_rest" or not is_alike or label in self.classes_:
+            raise ValueError(
+                f"y must be one of {self.classes_.tolist()}, or a new label of their type with "
+                f"scheme='one_vs_rest', got {shown(label)}"
+            )
+        network = self.network_
+        n_units = _core.n_units_for(self._scheme, len(classes)) * self._n_units_each
+        begun = Network(network.input_code, n_units, seed=self._weight_seed)
+        weights, thresholds = begun.weights, begun.thresholds
+        weights[: network.n_units] = network.weights
+        thresholds[: network.n_units] = network.thresholds
+        self.network_ = Network(network.input_code, n_units, weights=weights, thresholds=thresholds)
+        self._earlier = ()
+        self.classes_ = classes
+
     def _check_outputs(self, y: Array, classes: ArrayLike | None) -> None:
-        if classes is not None and not np.array_equal(unique_labels(classes), self.classes_):
+        if classes is not None and not np.array_equal(
+            unique_labels(classes), np.sort(self.classes_)
+        ):
             raise ValueError(
                 f"classes={classes!r} are not those of the first call, {self.classes_!r}"
             )
@@ -189,7 +211,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             raise ValueError(
                 f"y has labels {unseen.tolist()} that are not in classes, {self.classes_.tolist()}"
             )
-        return np.searchsorted(self.classes_, y).astype(np.int32)
+        order = np.argsort(self.classes_)
+        return order[np.searchsorted(self.classes_, y, sorter=order)].astype(np.int32)
 
     def _rule_arguments(self, targets: Ints) -> tuple[Any, ...]:
         n_classes = len(self.classes_)

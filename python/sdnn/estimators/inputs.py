@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import datetime
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, TypeVar
@@ -28,6 +29,8 @@ Ints = NDArray[np.int32]
 Self = TypeVar("Self", bound="CodedInputs")
 PAIR_BUDGET = 500  # pairs that are formed by default
 WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
+DATES = (datetime.date, datetime.time, datetime.timedelta, np.datetime64, np.timedelta64)
+DATES_HINT = "give numbers for it, such as the hour with coding=[(Circular(period=24), columns)]"
 
 
 def one_index(column: Any, names: Sequence[str] | None, n_inputs: int) -> int:
@@ -162,6 +165,19 @@ def class_labels(y: ArrayLike) -> Array:
     return classes
 
 
+def refuse_dates(X: Any) -> None:
+    """Raise ValueError for a column of dates or times, which scikit-learn may take for numbers."""
+    if hasattr(X, "iloc") and hasattr(X, "columns"):
+        names, rows = list(X.columns), X.head(1).astype(object).to_numpy()
+    elif getattr(X, "ndim", 0) == 2 and getattr(X, "dtype", np.dtype(float)).kind in "OmM":
+        names, rows = list(range(X.shape[1])), X[:1]
+    else:
+        return
+    for name, value in zip(names, rows[0] if len(rows) else (), strict=False):
+        if isinstance(value, DATES):
+            raise ValueError(f"X has dates or times in column {name!r}: {DATES_HINT}")
+
+
 def as_it_came(X: Any) -> Any:
     """Return samples so that scikit-learn checks every value with its own type."""
     if hasattr(X, "columns") and hasattr(X, "astype"):
@@ -211,6 +227,7 @@ class CodedInputs(BaseEstimator):
 
     def _validated(self, X: Any, y: Any = "no_validation", **options: Any) -> Any:
         """Check data by scikit-learn's rules; words pass where a coding takes them."""
+        refuse_dates(X)
         numeric = all(coding.is_numeric for coding, _ in coding_entries(self.coding))
         checks: dict[str, Any] = (
             {"dtype": np.float64} if numeric else {"dtype": None, "ensure_all_finite": False}

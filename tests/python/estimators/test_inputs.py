@@ -224,3 +224,20 @@ def test_pandas_categories_stand_beside_its_own_numbers():
         missing.loc[3, name] = None
         with pytest.raises(ValueError, match=r"NaN|NA"):
             SDNNRegressor(**options).fit(missing, y)
+
+
+def test_dates_are_refused_by_name():
+    days = pd.date_range("2024-01-01", periods=10)
+    y = np.arange(10.0)
+    frames = [
+        pd.DataFrame({"wind": y, "when": days}),
+        pd.DataFrame({"wind": y, "when": days.tz_localize("UTC")}),
+        pd.DataFrame({"when": days}),
+        pd.DataFrame({"wind": y, "when": days - days[0]}),
+    ]
+    for frame in frames:
+        for coding in ("random-inverse", [("symbolic", ["when"])]):
+            refuses("'when'", SDNNRegressor(coding, **SMALL).fit, frame, y)
+    refuses("0", SDNNRegressor(**SMALL).fit, days.to_numpy()[:, None], y)
+    objects = np.array([[1.0, day] for day in days.to_pydatetime()], dtype=object)
+    refuses("1", SDNNRegressor(**SMALL).fit, objects, y)

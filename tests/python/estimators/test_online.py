@@ -345,6 +345,67 @@ def test_features_of_river_streams_may_come_and_go():
         refuses("x", use, lacking)
 
 
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+def test_ranges_of_a_river_stream_are_followed():
+    pytest.importorskip("river")
+    from sdnn.estimators.river import RiverRegressor
+
+    random = np.random.RandomState(0)
+    errors = {}
+    for follows in (True, False):
+        learner = SDNNRegressor(n_pattern_units=32, random_state=0, out_of_range="widen")
+        model = RiverRegressor(learner, follows_ranges=follows)
+        random.seed(1)
+        for number in range(1500):
+            a, b = random.uniform(size=2)
+            x = {"a": a + number / 300, "b": (b - 0.5) * (1 + number / 300), "constant": 1.0}
+            y = np.sin(3 * a) * b
+            errors.setdefault(follows, []).append(abs(model.predict_one(x) - y))
+            model.learn_one(x, y)
+    assert np.mean(errors[True][-500:]) < 0.5 * np.mean(errors[False][-500:])
+
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+def test_the_order_of_names_in_a_river_stream_does_not_matter():
+    pytest.importorskip("river")
+    from sdnn.estimators.river import RiverRegressor
+
+    one, other = (
+        RiverRegressor(SDNNRegressor("with-missing", **OPTIONS), grace_period=20) for _ in range(2)
+    )
+    for row, y in zip(ROWS[:40], Y, strict=False):
+        one.learn_one(row, y)
+        other.learn_one(dict(reversed(row.items())), y)
+    assert one.predict_one(ROWS[50]) == other.predict_one(dict(reversed(ROWS[50].items())))
+    assert one.predict_one({**ROWS[50], "a": None}) == other.predict_one({**ROWS[50], "a": None})
+    refuses("names", one.learn_one, {1: 0.5, "1": 0.5}, 0.5)
+
+
+def test_classes_of_a_river_stream_may_come_late():
+    pytest.importorskip("river")
+    from sdnn.estimators.river import RiverClassifier
+
+    model = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=20)
+    names = np.array(["middle", "low", "high"])[LABELS]
+    order = np.argsort(LABELS == 2, kind="stable")  # class "high" comes last
+    for _ in range(5):
+        for row in order.tolist():
+            model.learn_one(ROWS[row], names[row])
+        order = np.random.RandomState(0).permutation(len(order))
+    assert model.fitted.classes_.tolist()[-1] == "high"
+    hits = [model.predict_one(row) == name for row, name in zip(ROWS, names, strict=True)]
+    assert np.mean(hits) > 0.8
+    assert set(model.predict_proba_one(ROWS[0])) == {"low", "middle", "high"}
+    importances = model.fitted.pair_importances_
+    assert importances.sum() == pytest.approx(1.0)
+    for label in (3, 2.5, None):
+        refuses("y", model.learn_one, ROWS[0], label)
+    pairs = RiverClassifier(SDNNClassifier(**OPTIONS, scheme="one_vs_one"), grace_period=20)
+    for row in np.argsort(LABELS == 2, kind="stable")[:30].tolist():
+        pairs.learn_one(ROWS[row], names[row])
+    refuses("one_vs_rest", pairs.learn_one, ROWS[0], "high")
+
+
 @pytest.mark.parametrize("n_classes", [2, 3])
 def test_probabilities_of_one_have_the_bits_of_those_of_many(n_classes):
     model = classifier().fit(X, np.minimum(LABELS, n_classes - 1))
