@@ -23,6 +23,7 @@ from sdnn.runs.store import STORE_NAME
 
 RUN = RunSpec(
     environment=EnvironmentSpec(id="Pendulum-v1"),
+    agent="sdnn-c",
     approximator={"n_pattern_units": 12, "n_hidden_units": 24, "n_active_units": 8},
     budget={"steps": 20},
     protocol={"evaluate_every": 10, "evaluation_episodes": 1},

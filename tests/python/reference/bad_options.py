@@ -63,7 +63,8 @@ def run_folder():
     run = os.path.join(folder, "run")
     settings = ["n_pattern_units=20", "n_hidden_units=60", "n_active_units=20"]
     options = [word for one in settings for word in ("--set", f"approximator.{one}")]
-    arguments = ["train", "MountainCar-v0", "--steps", "60", "--evaluate-every", "60", *options]
+    arguments = ["train", "MountainCar-v0", "--agent", "sdnn-c", "--steps", "60", *options]
+    arguments += ["--evaluate-every", "60"]
     result = CliRunner().invoke(main, [*arguments, "--evaluation-episodes", "1", "--out", run])
     assert result.exit_code == 0, result.output
     return run
