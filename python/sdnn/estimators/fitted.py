@@ -100,6 +100,19 @@ class Fitted(Learned, BaseEstimator):
         shares: Floats = squares / max(squares.sum(), 1.0)
         return shares
 
+    @property
+    def feature_importances_(self) -> Floats:
+        """Mean importance of the pairs with each feature, normalized, shape (n_features,)."""
+        total = np.zeros(self.n_features_in_)
+        count = np.zeros(self.n_features_in_)
+        for pair, importance in zip(self.pairs_, self.pair_importances_.tolist(), strict=True):
+            for feature in set(pair):
+                total[feature] += importance
+                count[feature] += 1
+        means: Floats = total / np.maximum(count, 1)
+        shares: Floats = means / (means.sum() or 1.0)
+        return shares
+
     def save(self, path: str | Path) -> None:
         """Write the fitted estimator to a safetensors file with JSON metadata, without pickle.
 

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.feature_selection import RFE
 
 from refusals import refuses
 from sdnn import SDNNClassifier, SDNNRegressor, _core
@@ -84,6 +85,19 @@ def test_a_class_may_occur_once(n_rare):
     rest[0] = 2
     model = SDNNClassifier(**OPTIONS, pairs="auto", correction_share=1.0).fit(X[:40, :3], rest)
     assert model.score(X[:1, :3], [2]) == 1
+
+
+def test_features_that_do_not_matter_are_eliminated():
+    wrapped = RFE(SDNNClassifier(**OPTIONS, n_units_per_class=10), n_features_to_select=2)
+    wrapped.fit(X, XOR)
+    assert np.flatnonzero(wrapped.support_).tolist() == [2, 5]
+
+
+def test_importances_of_features_are_means_over_their_pairs():
+    model = SDNNClassifier(**OPTIONS, pairs=[(0, 1), (1, 0), (2, None)]).fit(X[:, :4], XOR)
+    one, other, plain = model.pair_importances_
+    means = np.array([(one + other) / 2, (one + other) / 2, plain, 0.0])
+    np.testing.assert_allclose(model.feature_importances_, means / means.sum())
 
 
 def test_importances_survive_files(tmp_path):
