@@ -198,6 +198,19 @@ class SelectiveDesensitization {
     }
   }
 
+  /// The words [begin, begin + n) of a pair's part of the code, from the bins of its inputs.
+  void encode_pair(std::size_t pair, Bin modified, Bin modifier, std::size_t begin, std::size_t n,
+                   std::uint64_t* active, std::uint64_t* positive) const noexcept {
+    const core::BitWord* const x =
+        modified_[pair]->words() + static_cast<std::size_t>(modified) * n_pair_words() + begin;
+    const core::BitWord* const by =
+        modifiers_[pair]->words() + static_cast<std::size_t>(modifier) * n_pair_words() + begin;
+    for (std::size_t w = 0; w < n; ++w) {
+      active[w] = by[w].to_ullong();
+      positive[w] = (by[w] & x[w]).to_ullong();
+    }
+  }
+
   /// The inner product of the codes of two samples. Shapes: (n_inputs,), checked before.
   std::int32_t inner_product(std::span<const Bin> a, std::span<const Bin> b) const {
     assert(a.size() == n_inputs() && b.size() == n_inputs());

@@ -21,6 +21,7 @@
 #include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/errors.hpp"
 #include "sdnn/core/random.hpp"
+#include "sdnn/estimators/detail/pair_walk.hpp"
 #include "sdnn/estimators/detail/query_order.hpp"
 #include "sdnn/estimators/detail/unit_ranking.hpp"
 #include "sdnn/estimators/detail/weight_tiles.hpp"
@@ -152,16 +153,16 @@ class ParallelPerceptron {
     const std::size_t n_queries = bins.size() / code_->n_inputs();
     if (n_queries == 0) return;
     const auto order = query_order(bins, code_->n_inputs());
+    if (n_queries <= kFewQueries)
+      return answer_all<Sweep>(weights_, bins, order, n_threads, consume);
     // A copy in 16 bits is half as much to read; it pays if many queries share it.
-    const std::int64_t largest = n_queries > 64 ? weights_.largest() : 0;
-    if (n_queries > 64 && largest <= std::numeric_limits<std::int16_t>::max() / 16) {
-      const WeightTiles<std::int16_t> narrow(weights_);
-      const auto n_per_sum = static_cast<std::size_t>(std::numeric_limits<std::int16_t>::max() /
-                                                      std::max<std::int64_t>(largest, 1));
-      answer_all(narrow, n_per_sum, bins, order, n_threads, consume);
-    } else {
-      answer_all(weights_, std::size_t{1} << 30, bins, order, n_threads, consume);
-    }
+    const auto answer = [&]<class Way>(Way, bool is_narrow) {
+      if (!is_narrow) return answer_all<Way>(weights_, bins, order, n_threads, consume);
+      answer_all<Way>(WeightTiles<std::int16_t>(weights_), bins, order, n_threads, consume);
+    };
+    constexpr std::int64_t kLargest = std::numeric_limits<std::int16_t>::max();
+    if (is_short_walk(bins, order)) return answer(Sweep{}, weights_.largest() <= kLargest / 16);
+    answer(Blocks{}, largest_chunk_norm() <= kLargest);
   }
 
   /// Potentials in the order of the queries. Shapes: bins (n_queries, n_inputs), out
@@ -220,24 +221,129 @@ class ParallelPerceptron {
     return slots;
   }
 
-  template <class Weight, class Consume>
-  void answer_all(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
-                  std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
-                  int n_threads, const Consume& consume) const {
+  /// From query to query, by the columns in which their codes differ.
+  struct Sweep {
+    template <class Weight, class Consume>
+    static void answer(const ParallelPerceptron& layer, const WeightTiles<Weight>& tiles,
+                       std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
+                       const Consume& consume) {
+      const Code& code = layer.code();
+      const std::size_t n_words = code.n_words();
+      const std::size_t n_per_sum = most_per_sum(tiles);
+      std::vector<std::uint64_t> words(4 * n_words);
+      std::uint64_t* now = words.data();  // active, then positive
+      std::uint64_t* before = now + 2 * n_words;
+      std::vector<std::int32_t> values(layer.n_padded_units());
+      const auto start_from_zero = [&] {  // the potentials of the code of zeros
+        for (std::size_t i = 0; i < layer.n_units(); ++i) values[i] = -layer.thresholds_[i];
+      };
+      start_from_zero();
+      coding::ColumnLists slots(n_words);
+      for (const std::uint32_t query : order) {
+        code.encode(bins.subspan(query * code.n_inputs(), code.n_inputs()), now, now + n_words);
+        const coding::TernaryCode next{now, now + n_words};
+        slots.read_changes({before, before + n_words}, next);
+        // Counting costs too, and is worth it for codes that are far apart.
+        const std::size_t n_changes = slots.columns().size();
+        if (n_changes > code.max_active() / 2 && n_changes > coding::n_active(next, n_words)) {
+          start_from_zero();
+          slots.read(next);
+        }
+        tiles.add_columns(slots.columns(), n_per_sum, values.data());
+        consume(query, values.data());
+        std::swap(now, before);
+      }
+    }
+  };
+
+  /// Many queries together, in each pair of inputs along a walk of its own.
+  struct Blocks {
+    template <class Weight, class Consume>
+    static void answer(const ParallelPerceptron& layer, const WeightTiles<Weight>& tiles,
+                       std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
+                       const Consume& consume) {
+      const std::size_t n_padded = layer.n_padded_units();
+      std::vector<std::int32_t> values(std::min(order.size(), kBlock) * n_padded);
+      const std::size_t n_blocks = (order.size() + kBlock - 1) / kBlock;
+      for (std::size_t block = 0; block < n_blocks; ++block) {
+        const std::size_t begin = block * order.size() / n_blocks;
+        const auto some = order.subspan(begin, (block + 1) * order.size() / n_blocks - begin);
+        for (std::size_t q = 0; q < some.size(); ++q) {
+          for (std::size_t i = 0; i < layer.n_units(); ++i) {
+            values[q * n_padded + i] = -layer.thresholds_[i];
+          }
+        }
+        add_codes(layer.code(), tiles, bins, some, values.data());
+        for (std::size_t q = 0; q < some.size(); ++q) consume(some[q], &values[q * n_padded]);
+      }
+    }
+    static constexpr std::size_t kBlock = 512;
+  };
+
+  /// Weights whose sum fits into their type.
+  static std::size_t most_per_sum(const WeightTiles<std::int16_t>& tiles) noexcept {
+    return static_cast<std::size_t>(std::numeric_limits<std::int16_t>::max() /
+                                    std::max<std::int64_t>(tiles.largest(), 1));
+  }
+  static std::size_t most_per_sum(const WeightTiles<std::int32_t>& /*tiles*/) noexcept {
+    return std::size_t{1} << 30;  // no potential can overflow
+  }
+
+  /// Do so few columns change from one query to the next that a sweep is best? By some of them.
+  bool is_short_walk(std::span<const std::int32_t> bins,
+                     std::span<const std::uint32_t> order) const {
+    const std::size_t n_words = code_->n_words();
+    std::vector<std::uint64_t> words(4 * n_words);
+    const auto code_at = [&](std::size_t place, std::uint64_t* to) {
+      code_->encode(bins.subspan(order[place] * code_->n_inputs(), code_->n_inputs()), to,
+                    to + n_words);
+      return coding::TernaryCode{to, to + n_words};
+    };
+    coding::ColumnLists slots(n_words);
+    std::size_t n_changes = 0;
+    std::size_t n_steps = 0;
+    const std::size_t step = order.size() / kFewQueries;
+    for (std::size_t i = 1; i < order.size(); i += step, ++n_steps) {
+      slots.read_changes(code_at(i - 1, words.data()), code_at(i, words.data() + 2 * n_words));
+      n_changes += slots.columns().size();
+    }
+    return n_changes < kChangesPerChunk * n_steps * n_chunks();
+  }
+
+  std::size_t n_chunks() const noexcept {
+    return code_->n_pairs() * ((code_->n_pair_words() + kChunkWords - 1) / kChunkWords);
+  }
+
+  /// The largest sum of a unit's |weights| in a chunk of a pair.
+  std::int64_t largest_chunk_norm() const {
+    const std::size_t n_slots = 64 * code_->n_pair_words();
+    std::int64_t largest = 0;
+    for (std::size_t pair = 0; pair < weights_.n_slots(); pair += n_slots) {
+      for (std::size_t at = 0; at < n_slots; at += kChunkColumns) {
+        const std::size_t end = std::min(n_slots, at + kChunkColumns);
+        largest = std::max(largest, weights_.largest_norm(pair + at, pair + end));
+      }
+    }
+    return largest;
+  }
+
+  template <class Way, class Weight, class Consume>
+  void answer_all(const WeightTiles<Weight>& tiles, std::span<const std::int32_t> bins,
+                  std::span<const std::uint32_t> order, int n_threads,
+                  const Consume& consume) const {
     const std::size_t n_added = code_->n_slots() * n_padded_units();
     const std::size_t most = std::clamp<std::size_t>(kAddedAtOnce / n_added, 64, 4096) *
                              static_cast<std::size_t>(n_threads);
     for (; !order.empty(); order = order.subspan(std::min(most, order.size()))) {
       core::interruption_point();
-      answer_part(tiles, n_per_sum, bins, order.first(std::min(most, order.size())), n_threads,
-                  consume);
+      answer_part<Way>(tiles, bins, order.first(std::min(most, order.size())), n_threads, consume);
     }
   }
 
-  template <class Weight, class Consume>
-  void answer_part(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
-                   std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
-                   int n_threads, const Consume& consume) const {
+  template <class Way, class Weight, class Consume>
+  void answer_part(const WeightTiles<Weight>& tiles, std::span<const std::int32_t> bins,
+                   std::span<const std::uint32_t> order, int n_threads,
+                   const Consume& consume) const {
     const std::size_t n_parts =
         std::min(static_cast<std::size_t>(n_threads), (order.size() + 255) / 256);
     std::vector<std::jthread> threads;  // joined at the end of the scope
@@ -245,41 +351,14 @@ class ParallelPerceptron {
       const std::size_t begin = part * order.size() / n_parts;
       const std::size_t end = (part + 1) * order.size() / n_parts;
       threads.emplace_back([&, begin, end] {
-        answer_some(tiles, n_per_sum, bins, order.subspan(begin, end - begin), consume);
+        Way::answer(*this, tiles, bins, order.subspan(begin, end - begin), consume);
       });
     }
-    answer_some(tiles, n_per_sum, bins, order.first(order.size() / n_parts), consume);
+    Way::answer(*this, tiles, bins, order.first(order.size() / n_parts), consume);
   }
 
-  template <class Weight, class Consume>
-  void answer_some(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
-                   std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
-                   const Consume& consume) const {
-    const std::size_t n_words = code_->n_words();
-    std::vector<std::uint64_t> words(4 * n_words);
-    std::uint64_t* now = words.data();  // active, then positive
-    std::uint64_t* before = now + 2 * n_words;
-    std::vector<std::int32_t> values(n_padded_units());
-    const auto start_from_zero = [&] {  // the potentials of the code of zeros
-      for (std::size_t i = 0; i < n_units(); ++i) values[i] = -thresholds_[i];
-    };
-    start_from_zero();
-    coding::ColumnLists slots(n_words);
-    for (const std::uint32_t query : order) {
-      code_->encode(bins.subspan(query * code_->n_inputs(), code_->n_inputs()), now, now + n_words);
-      const coding::TernaryCode code{now, now + n_words};
-      slots.read_changes({before, before + n_words}, code);
-      // Counting costs too, and is worth it for codes that are far apart.
-      const std::size_t n_changes = slots.columns().size();
-      if (n_changes > code_->max_active() / 2 && n_changes > coding::n_active(code, n_words)) {
-        start_from_zero();
-        slots.read(code);
-      }
-      tiles.add_columns(slots.columns(), n_per_sum, values.data());
-      consume(query, values.data());
-      std::swap(now, before);
-    }
-  }
+  static constexpr std::size_t kFewQueries = 64;
+  static constexpr std::size_t kChangesPerChunk = 8;  // from which blocks are quicker
 
   /// Weights that a thread adds between two checks: a tenth of a second of them.
   static constexpr std::size_t kAddedAtOnce = std::size_t{1} << 32;

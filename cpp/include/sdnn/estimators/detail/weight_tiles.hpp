@@ -6,8 +6,10 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <span>
 #include <type_traits>
+#include <vector>
 
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
@@ -173,6 +175,20 @@ class WeightTiles {
     for (std::size_t t = 0; t < n_tiles(); ++t) {
       add_rows(tile(t), width(t), slots.plus, slots.minus, n_per_sum, sums + t * kTileUnits);
     }
+  }
+
+  /// The largest sum of a unit's |weights| in the slots [begin, end).
+  std::int64_t largest_norm(std::size_t begin, std::size_t end) const {
+    std::vector<std::int64_t> norms(n_padded_units());
+    for (std::size_t t = 0; t < n_tiles(); ++t) {
+      const Weight* row = tile(t) + begin * width(t);
+      for (std::size_t slot = begin; slot < end; ++slot, row += width(t)) {
+        for (std::size_t i = 0; i < width(t); ++i) {
+          norms[t * kTileUnits + i] += std::abs(std::int64_t{row[i]});
+        }
+      }
+    }
+    return *std::max_element(norms.begin(), norms.end());
   }
 
   /// The largest |weight|.
