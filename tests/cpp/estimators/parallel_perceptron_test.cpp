@@ -2,7 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
 #include <stdexcept>
+#include <vector>
 
 #include "estimators/problems.hpp"
 
@@ -55,6 +61,46 @@ TEST(ParallelPerceptron, SweepsAndSinglesAgree) {
       ASSERT_TRUE(std::equal(alone.begin(), alone.end(),
                              together.begin() + static_cast<std::ptrdiff_t>(q * problem.n_units)))
           << seed;
+    }
+  }
+}
+
+/// Random tables of `n_units` units for a plain pair, one way of two inputs and both ways of
+/// others.
+std::shared_ptr<const ParallelPerceptron::Code> code_of_three(std::size_t n_units) {
+  core::Random random(n_units, core::Stream::code_books);
+  constexpr std::size_t kBins = 40;
+  const auto table = [&] {
+    std::vector<std::int8_t> signs(kBins * n_units);
+    for (auto& sign : signs) sign = random.below(2) == 0 ? 1 : -1;
+    return coding::PatternTable::from_signs(signs, kBins, n_units);
+  };
+  const std::vector<coding::InputPair> pairs{{0, 1}, {1, 1}, {2, 0}, {1, 0}};
+  std::vector<coding::PatternTable> modified;
+  std::vector<coding::PatternTable> modifiers;
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    modified.push_back(table());
+    modifiers.push_back(table());
+  }
+  return std::make_shared<coding::SelectiveDesensitization>(modified, modifiers, pairs);
+}
+
+TEST(ParallelPerceptron, BlocksAndSinglesAgree) {
+  for (const std::size_t n_units : {42, 130}) {
+    for (const int range : {3, 400, 100000}) {  // sums of 16 bits, and of 32
+      const ParallelPerceptron layer(code_of_three(n_units), 100, 5, range);
+      core::Random random(7, core::Stream::exploration);
+      std::vector<std::int32_t> bins(3 * 2500);
+      for (auto& bin : bins) bin = static_cast<std::int32_t>(random.below(40));
+      std::vector<std::int32_t> together(2500 * 100);
+      layer.potentials(bins, 1 + range % 2, together);
+      std::vector<std::int32_t> alone(100);
+      for (std::size_t q = 0; q < 2500; q += 7) {
+        layer.potentials(std::span(bins).subspan(3 * q, 3), 1, alone);
+        ASSERT_TRUE(std::equal(alone.begin(), alone.end(),
+                               together.begin() + static_cast<std::ptrdiff_t>(100 * q)))
+            << n_units << ' ' << range << ' ' << q;
+      }
     }
   }
 }

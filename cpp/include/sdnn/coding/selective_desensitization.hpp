@@ -198,17 +198,14 @@ class SelectiveDesensitization {
     }
   }
 
-  /// The words [begin, begin + n) of a pair's part of the code, from the bins of its inputs.
-  void encode_pair(std::size_t pair, Bin modified, Bin modifier, std::size_t begin, std::size_t n,
+  /// One word of a pair's part of the code, from the bins of its inputs.
+  void encode_word(std::size_t pair, std::size_t word, Bin modified, Bin modifier,
                    std::uint64_t* active, std::uint64_t* positive) const noexcept {
-    const core::BitWord* const x =
-        modified_[pair]->words() + static_cast<std::size_t>(modified) * n_pair_words() + begin;
-    const core::BitWord* const by =
-        modifiers_[pair]->words() + static_cast<std::size_t>(modifier) * n_pair_words() + begin;
-    for (std::size_t w = 0; w < n; ++w) {
-      active[w] = by[w].to_ullong();
-      positive[w] = (by[w] & x[w]).to_ullong();
-    }
+    const std::size_t n_words = n_pair_words();
+    const auto x = modified_[pair]->words()[static_cast<std::size_t>(modified) * n_words + word];
+    const auto by = modifiers_[pair]->words()[static_cast<std::size_t>(modifier) * n_words + word];
+    *active = by.to_ullong();
+    *positive = (by & x).to_ullong();
   }
 
   /// The inner product of the codes of two samples. Shapes: (n_inputs,), checked before.

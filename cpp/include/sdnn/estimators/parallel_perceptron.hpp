@@ -162,7 +162,7 @@ class ParallelPerceptron {
     };
     constexpr std::int64_t kLargest = std::numeric_limits<std::int16_t>::max();
     if (is_short_walk(bins, order)) return answer(Sweep{}, weights_.largest() <= kLargest / 16);
-    answer(Blocks{}, largest_chunk_norm() <= kLargest);
+    answer(Blocks{}, largest_word_norm() <= kLargest / std::int64_t{kChunkWords});
   }
 
   /// Potentials in the order of the queries. Shapes: bins (n_queries, n_inputs), out
@@ -254,6 +254,8 @@ class ParallelPerceptron {
         std::swap(now, before);
       }
     }
+    /// Weights that a thread adds between two checks: a tenth of a second of them.
+    static constexpr std::size_t kAddedAtOnce = std::size_t{1} << 32;
   };
 
   /// Many queries together, in each pair of inputs along a walk of its own.
@@ -263,6 +265,7 @@ class ParallelPerceptron {
                        std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
                        const Consume& consume) {
       const std::size_t n_padded = layer.n_padded_units();
+      const auto chunks = pair_chunks(layer.code());
       std::vector<std::int32_t> values(std::min(order.size(), kBlock) * n_padded);
       const std::size_t n_blocks = (order.size() + kBlock - 1) / kBlock;
       for (std::size_t block = 0; block < n_blocks; ++block) {
@@ -273,11 +276,12 @@ class ParallelPerceptron {
             values[q * n_padded + i] = -layer.thresholds_[i];
           }
         }
-        add_codes(layer.code(), tiles, bins, some, values.data());
+        add_codes(layer.code(), chunks, tiles, bins, some, values.data());
         for (std::size_t q = 0; q < some.size(); ++q) consume(some[q], &values[q * n_padded]);
       }
     }
-    static constexpr std::size_t kBlock = 512;
+    static constexpr std::size_t kBlock = 1024;
+    static constexpr std::size_t kAddedAtOnce = std::size_t{1} << 34;  // of which most are skipped
   };
 
   /// Weights whose sum fits into their type.
@@ -307,22 +311,14 @@ class ParallelPerceptron {
       slots.read_changes(code_at(i - 1, words.data()), code_at(i, words.data() + 2 * n_words));
       n_changes += slots.columns().size();
     }
-    return n_changes < kChangesPerChunk * n_steps * n_chunks();
+    return n_changes < kChangesPerWord * n_steps * n_words;
   }
 
-  std::size_t n_chunks() const noexcept {
-    return code_->n_pairs() * ((code_->n_pair_words() + kChunkWords - 1) / kChunkWords);
-  }
-
-  /// The largest sum of a unit's |weights| in a chunk of a pair.
-  std::int64_t largest_chunk_norm() const {
-    const std::size_t n_slots = 64 * code_->n_pair_words();
+  /// The largest sum of a unit's |weights| in a word.
+  std::int64_t largest_word_norm() const {
     std::int64_t largest = 0;
-    for (std::size_t pair = 0; pair < weights_.n_slots(); pair += n_slots) {
-      for (std::size_t at = 0; at < n_slots; at += kChunkColumns) {
-        const std::size_t end = std::min(n_slots, at + kChunkColumns);
-        largest = std::max(largest, weights_.largest_norm(pair + at, pair + end));
-      }
+    for (std::size_t slot = 0; slot < weights_.n_slots(); slot += 64) {
+      largest = std::max(largest, weights_.largest_norm(slot, slot + 64));
     }
     return largest;
   }
@@ -332,7 +328,7 @@ class ParallelPerceptron {
                   std::span<const std::uint32_t> order, int n_threads,
                   const Consume& consume) const {
     const std::size_t n_added = code_->n_slots() * n_padded_units();
-    const std::size_t most = std::clamp<std::size_t>(kAddedAtOnce / n_added, 64, 4096) *
+    const std::size_t most = std::clamp<std::size_t>(Way::kAddedAtOnce / n_added, 64, 4096) *
                              static_cast<std::size_t>(n_threads);
     for (; !order.empty(); order = order.subspan(std::min(most, order.size()))) {
       core::interruption_point();
@@ -358,10 +354,7 @@ class ParallelPerceptron {
   }
 
   static constexpr std::size_t kFewQueries = 64;
-  static constexpr std::size_t kChangesPerChunk = 8;  // from which blocks are quicker
-
-  /// Weights that a thread adds between two checks: a tenth of a second of them.
-  static constexpr std::size_t kAddedAtOnce = std::size_t{1} << 32;
+  static constexpr std::size_t kChangesPerWord = 4;  // from which blocks are quicker
 
   std::shared_ptr<const Code> code_;
   WeightTiles<std::int32_t> weights_;

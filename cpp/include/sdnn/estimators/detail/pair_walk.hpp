@@ -15,6 +15,7 @@
 
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/core/detail/lanes.hpp"
 #include "sdnn/estimators/detail/code_walk.hpp"
@@ -71,8 +72,8 @@ SDNN_KERNEL(std::uint8_t*, list_steps,
              CodeWalk::Changes::Count* counts),
             (codes, n_words, at, counts))
 
-/// Orders of a block of queries, one for each pair of inputs: in strips of equal bins of the
-/// modified input, to and fro along the modifier's.
+/// Orders of a block of queries, one for each two inputs: in strips of equal bins of one, to and
+/// fro along the other.
 class PairOrders {
  public:
   PairOrders(const coding::SelectiveDesensitization& code, std::span<const std::int32_t> bins,
@@ -108,11 +109,11 @@ class PairOrders {
   }
 
   /// Places of the queries in the block; valid until the next call.
-  std::span<const std::uint32_t> of(coding::InputPair pair) {
-    const Input& strips = inputs_[pair.modified];
+  std::span<const std::uint32_t> of(std::size_t one, std::size_t other) {
+    const Input& strips = inputs_[one];
     begins_.assign(strips.begins.begin(), strips.begins.end() - 1);
     ends_.assign(strips.begins.begin() + 1, strips.begins.end());
-    for (const std::uint32_t query : inputs_[pair.modifier].sorted) {
+    for (const std::uint32_t query : inputs_[other].sorted) {
       const std::uint32_t strip = strips.strips[query];
       order_[strip % 2 == 0 ? begins_[strip]++ : --ends_[strip]] = query;
     }
@@ -132,36 +133,72 @@ class PairOrders {
   std::vector<std::uint32_t> order_, begins_, ends_;
 };
 
+/// Up to kChunkWords words of a code that depend on the same two inputs.
+struct PairChunk {
+  std::size_t one;
+  std::size_t other;
+  std::vector<std::size_t> words;
+};
+
+/// All words of a code in chunks: both pairs of two inputs together.
+inline std::vector<PairChunk> pair_chunks(const coding::SelectiveDesensitization& code) {
+  std::vector<std::size_t> order(code.n_pairs());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto inputs_of = [&](std::size_t p) {
+    const coding::InputPair pair = code.pair(p);
+    return std::minmax({pair.modified, pair.modifier});
+  };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return inputs_of(a) < inputs_of(b); });
+  std::vector<PairChunk> chunks;
+  for (const std::size_t p : order) {
+    const auto [one, other] = inputs_of(p);
+    for (std::size_t w = 0; w < code.n_pair_words(); ++w) {
+      if (chunks.empty() || chunks.back().words.size() == kChunkWords || chunks.back().one != one ||
+          chunks.back().other != other) {
+        chunks.push_back({one, other, {}});
+      }
+      chunks.back().words.push_back(p * code.n_pair_words() + w);
+    }
+  }
+  return chunks;
+}
+
 /// Adds the weights of each query's code to its potentials, potentials[q * n_padded_units + i].
 ///
-/// The sum of a unit's |weights| in kChunkColumns slots of a pair has to fit into Weight.
+/// The sum of a unit's |weights| in the slots of kChunkWords words has to fit into Weight.
 template <class Weight>
-void add_codes(const coding::SelectiveDesensitization& code, const WeightTiles<Weight>& tiles,
-               std::span<const std::int32_t> bins, std::span<const std::uint32_t> queries,
-               std::int32_t* potentials) {
+void add_codes(const coding::SelectiveDesensitization& code, std::span<const PairChunk> chunks,
+               const WeightTiles<Weight>& tiles, std::span<const std::int32_t> bins,
+               std::span<const std::uint32_t> queries, std::int32_t* potentials) {
   PairOrders orders(code, bins, queries);
-  const std::size_t n_words = code.n_pair_words();
   std::vector<CodeWalk::Step> steps(queries.size());
   std::vector<ChunkCode> codes(queries.size());
   CodeWalk::Changes changes;
   changes.columns.resize(2 * kChunkColumns * queries.size() + 2);
   changes.counts.resize(queries.size());
-  for (std::size_t p = 0; p < code.n_pairs(); ++p) {
-    const coding::InputPair pair = code.pair(p);
-    const auto order = orders.of(pair);
+  core::AlignedBuffer<Weight> rows(kChunkColumns * kTileUnits);
+  for (const PairChunk& chunk : chunks) {
+    const auto order = orders.of(chunk.one, chunk.other);
     for (std::size_t q = 0; q < order.size(); ++q) steps[q] = {order[q], q == 0};
-    for (std::size_t w = 0; w < n_words; w += kChunkWords) {
-      const std::size_t n = std::min(kChunkWords, n_words - w);
+    for (std::size_t k = 0; k < chunk.words.size(); ++k) {
+      const std::size_t p = chunk.words[k] / code.n_pair_words();
+      const std::size_t w = chunk.words[k] % code.n_pair_words();
+      const coding::InputPair pair = code.pair(p);
       for (std::size_t q = 0; q < order.size(); ++q) {
-        code.encode_pair(p, orders.bin(pair.modified, order[q]),
-                         orders.bin(pair.modifier, order[q]), w, n, codes[q].active,
-                         codes[q].positive);
+        code.encode_word(p, w, orders.bin(pair.modified, order[q]),
+                         orders.bin(pair.modifier, order[q]), &codes[q].active[k],
+                         &codes[q].positive[k]);
       }
-      list_steps(codes, n, changes.columns.data(), changes.counts.data());
-      for (std::size_t t = 0; t < tiles.n_tiles(); ++t) {
-        walk_chunk(tiles.tile(t) + 64 * (p * n_words + w) * tiles.width(t), tiles.width(t), steps,
-                   changes, potentials + t * kTileUnits, tiles.n_padded_units());
+    }
+    list_steps(codes, chunk.words.size(), changes.columns.data(), changes.counts.data());
+    for (std::size_t t = 0; t < tiles.n_tiles(); ++t) {
+      const std::size_t size = 64 * tiles.width(t);
+      for (std::size_t k = 0; k < chunk.words.size(); ++k) {
+        std::copy_n(tiles.tile(t) + chunk.words[k] * size, size, rows.data() + k * size);
       }
+      walk_chunk(rows.data(), tiles.width(t), steps, changes, potentials + t * kTileUnits,
+                 tiles.n_padded_units());
     }
   }
 }
