@@ -177,7 +177,7 @@ void add_codes(const coding::SelectiveDesensitization& code, std::span<const Pai
   CodeWalk::Changes changes;
   changes.columns.resize(2 * kChunkColumns * queries.size() + 2);
   changes.counts.resize(queries.size());
-  core::AlignedBuffer<Weight> rows(kChunkColumns * kTileUnits);
+  core::AlignedBuffer<Weight> rows(kChunkColumns * kMostUnits<Weight>);
   for (const PairChunk& chunk : chunks) {
     const auto order = orders.of(chunk.one, chunk.other);
     for (std::size_t q = 0; q < order.size(); ++q) steps[q] = {order[q], q == 0};
@@ -193,12 +193,18 @@ void add_codes(const coding::SelectiveDesensitization& code, std::span<const Pai
     }
     list_steps(codes, chunk.words.size(), changes.columns.data(), changes.counts.data());
     for (std::size_t t = 0; t < tiles.n_tiles(); ++t) {
-      const std::size_t size = 64 * tiles.width(t);
-      for (std::size_t k = 0; k < chunk.words.size(); ++k) {
-        std::copy_n(tiles.tile(t) + chunk.words[k] * size, size, rows.data() + k * size);
+      const std::size_t width = tiles.width(t);
+      for (std::size_t first = 0; first < width; first += kMostUnits<Weight>) {
+        const std::size_t n = std::min(width - first, kMostUnits<Weight>);
+        for (std::size_t k = 0; k < chunk.words.size(); ++k) {
+          const Weight* row = tiles.tile(t) + 64 * chunk.words[k] * width + first;
+          for (std::size_t slot = 64 * k; slot < 64 * (k + 1); ++slot, row += width) {
+            std::copy_n(row, n, rows.data() + slot * n);
+          }
+        }
+        walk_chunk(rows.data(), n, steps, changes, potentials + t * kTileUnits + first,
+                   tiles.n_padded_units());
       }
-      walk_chunk(rows.data(), tiles.width(t), steps, changes, potentials + t * kTileUnits,
-                 tiles.n_padded_units());
     }
   }
 }
