@@ -90,9 +90,7 @@ def _command(*words: str) -> Callable[[], bool]:
 
 NEEDS: dict[str, Callable[[], bool]] = {
     "gcc": lambda: shutil.which("gcc") is not None,
-    "g++": lambda: shutil.which("g++") is not None,
     "cmake": lambda: shutil.which("cmake") is not None,
-    "libeigen3-dev": Path("/usr/include/eigen3").exists,
     "nlohmann/json": Path("/usr/include/nlohmann/json.hpp").exists,
     "an installed package": _command(sys.executable, "-m", "sdnn", "--cmakedir"),
     "optuna": lambda: importlib.util.find_spec("optuna") is not None,

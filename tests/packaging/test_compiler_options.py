@@ -1,4 +1,4 @@
-"""The headers without CMake: under options that change results they refuse to be compiled."""
+"""The headers without CMake: they refuse old standards and options that change results."""
 
 import shutil
 import subprocess
@@ -59,6 +59,7 @@ def compile_program(request, tmp_path, skip_unless_ci):
         (("-Ofast", *EXACT), "results would not be exact with -ffast-math, -Ofast"),
         (("-ffast-math", *EXACT), "results would not be exact with -ffast-math, -Ofast"),
         (("-ffinite-math-only", *EXACT), "results would not be exact with -ffast-math, -Ofast"),
+        (("-std=c++17", *EXACT), "sdnn needs C++20"),
         (EXACT, None),
     ],
 )

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -57,7 +58,9 @@ def rows_of_trial():
     ]
 
 
-def test_the_cpp_example_builds_against_an_installed_prefix(cmake, configure, tmp_path):
+def test_the_cpp_example_builds_against_an_installed_prefix(
+    cmake, configure, tmp_path, skip_unless_ci
+):
     prefix = tmp_path / "prefix"
     for done in (
         configure(ROOT, tmp_path / "library", f"-DCMAKE_INSTALL_PREFIX={prefix}"),
@@ -72,6 +75,20 @@ def test_the_cpp_example_builds_against_an_installed_prefix(cmake, configure, tm
     build = tmp_path / "example"
     lines = run_example(cmake, configure, build, f"-DCMAKE_PREFIX_PATH={prefix}")
     assert lines == rows_of_trial()
+    if shutil.which("pkg-config") is None:
+        skip_unless_ci("needs pkg-config")
+    assert pkg_config_flags(prefix).issuperset(
+        {f"-I{prefix}/share/pkgconfig/../../include", "-ffp-contract=off", "-DSDNN_NO_CONTRACTION"}
+    )
+
+
+def pkg_config_flags(prefix):
+    """What pkg-config returns for an installed library, with Eigen as a package or a wheel."""
+    eigen = Path(sysconfig.get_path("purelib"), "cmeel.prefix", "share", "pkgconfig")
+    path = os.pathsep.join([f"{prefix}/share/pkgconfig", str(eigen)])
+    command = ["pkg-config", "--cflags", "sdnn"]
+    env = os.environ | {"PKG_CONFIG_PATH": path}
+    return set(subprocess.check_output(command, env=env, text=True).split())
 
 
 def test_the_cpp_example_builds_against_the_installed_package(cmake, configure, tmp_path):

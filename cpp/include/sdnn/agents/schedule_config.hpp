@@ -52,13 +52,9 @@ constexpr auto schedule_fields() noexcept {
                   "stays. Not in the paper.",
                   core::within(0, 1)),
       core::field("schedule", &Config::schedule,
-                  "How alpha and epsilon go to their final values: `linear`: in a straight "
-                  "line; `exponential`: by the same factor in equal parts of the progress, "
-                  "first * (final / first) ** progress. A constant rate is the common choice "
-                  "where the task itself changes; a line is what most libraries of deep "
-                  "Q-learning take for epsilon; an exponential spends more of the training near "
-                  "a small final value, which must not be 0. Any other function of the "
-                  "progress: `sdnn.agents.Schedule`."),
+                  "How alpha and epsilon approach their final values: `linear`, or `exponential`, "
+                  "first * (final / first) ** progress, with no final value of 0. For any other "
+                  "function of the progress: `sdnn.agents.Schedule`."),
       core::field("exploration_fraction", &Config::exploration_fraction,
                   "Part of the progress in which epsilon goes to final_epsilon, where it then "
                   "stays. Not in the paper.",

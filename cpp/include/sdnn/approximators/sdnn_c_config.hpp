@@ -97,8 +97,8 @@ struct SDNNCConfig {
                         core::within(1, 64)),
             core::field(
                 "initial_threshold", &SDNNCConfig::initial_threshold,
-                "The \"large\" initial threshold, in units of c: a multiple of 1 / lattice. A "
-                "reading.",
+                "The \"large\" initial threshold, in units of c: a multiple of 1 / lattice. An "
+                "assumption.",
                 core::at_least(0)),
             core::field("initial_weights", &SDNNCConfig::initial_weights,
                         "The \"small random\" initial weights: `ternary`: one lattice step down, "
@@ -113,12 +113,9 @@ struct SDNNCConfig {
                         "unit. An assumption."),
             core::field(
                 "averaging_interval", &SDNNCConfig::averaging_interval,
-                "With more than 0 the network keeps an average of its weights, by which "
-                "greedy actions are chosen; learning continues with the weights themselves. "
-                "Snapshots for it are taken after so many corrections, 100 for example, or "
-                "after every 64th part of all, whichever is more; what was learned last "
-                "counts most. The weights take four times the memory. Not in the paper, which "
-                "has 0.",
+                "Corrections between snapshots of the weights, of which the network keeps an "
+                "average for greedy actions, or a 64th part of all if that is more. The latest "
+                "count most; weights take four times the memory. 0, as in the paper: no average.",
                 core::within(0, 1000000000)),
             core::field("max_table_bytes", &SDNNCConfig::max_table_bytes,
                         "A larger network (weights, patterns, remembered potentials) is refused "

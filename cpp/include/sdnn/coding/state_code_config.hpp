@@ -17,11 +17,9 @@ constexpr auto state_code_fields(const char* units = "m, units per pattern (sect
       core::field("n_inputs", &Config::n_inputs, "l, number of inputs (section 3.1).",
                   core::within(2, 1024)),
       core::field("max_pairs", &Config::max_pairs,
-                  "Most pairs of inputs that are formed: all l (l - 1) if there are no more or "
-                  "with 0; else an even share of them at random, each input modified by as many "
-                  "others as it modifies, and by one at least. Cost grows with pairs, so with "
-                  "many inputs it then grows as their number, not as its square. Not in the "
-                  "paper, which has all.",
+                  "Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper. Pairs "
+                  "are drawn at random so that each input is modified by as many others as it "
+                  "modifies, and by one at least.",
                   core::within(0, 1 << 20)),
       core::field("n_pattern_units", &Config::n_pattern_units, units,
                   core::within(least_units, 1 << 16)),

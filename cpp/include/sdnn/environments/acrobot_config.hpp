@@ -66,8 +66,8 @@ struct AcrobotConfig {
         core::field("decision_interval", &AcrobotConfig::decision_interval,
                     "s; the torque is held for it.", core::above(0)),
         core::field("integration_step", &AcrobotConfig::integration_step,
-                    "s, a whole fraction of decision_interval: Runge-Kutta of fourth order. A "
-                    "reading.",
+                    "s, a whole fraction of decision_interval: Runge-Kutta of fourth order. An "
+                    "assumption.",
                     core::above(0)),
         core::field("max_decisions", &AcrobotConfig::max_decisions, "Decisions in an episode.",
                     core::at_least(1)),

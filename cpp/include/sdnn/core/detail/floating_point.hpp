@@ -1,9 +1,14 @@
-/// Refuses flags under which floating-point results would depend on the compiler or the processor.
+/// Refuses older standards than C++20, and flags under which floating-point results would depend on
+/// the compiler or the processor.
 ///
 /// The CMake target sdnn::sdnn compiles with those that are needed. Without CMake: the option
 /// -ffp-contract=off of g++ and clang, which the headers know by -DSDNN_NO_CONTRACTION, since a
 /// compiler does not show it; /fp:precise of MSVC is the default.
 #pragma once
+
+#if (defined(_MSVC_LANG) ? _MSVC_LANG : __cplusplus) <= 201703L
+#error "sdnn needs C++20: compile with -std=c++20, or /std:c++20"
+#endif
 
 #include <limits>
 
