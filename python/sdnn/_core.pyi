@@ -54,7 +54,7 @@ class SDNNCConfig:
     n_inputs : int
         l, number of inputs (section 3.1). Must be in [2, 1024].
     max_pairs : int
-        Most pairs of inputs that are formed: all l (l - 1) if there are no more or with 0; else an even share of them at random, each input modified by as many others as it modifies, and by one at least. Cost grows with pairs, so with many inputs it then grows as their number, not as its square. Not in the paper, which has all. Must be in [0, 1048576].
+        Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least. Must be in [0, 1048576].
     n_pattern_units : int
         m, units per pattern (section 4.2: 200). Must be in [2, 65536].
     n_anchor_patterns : int
@@ -86,7 +86,7 @@ class SDNNCConfig:
     lattice : int
         Weights are integer multiples of learning_coefficient / lattice. Must be in [1, 64].
     initial_threshold : float
-        The "large" initial threshold, in units of c: a multiple of 1 / lattice. A reading. Must be finite and at least 0.
+        The "large" initial threshold, in units of c: a multiple of 1 / lattice. An assumption. Must be finite and at least 0.
     initial_weights : {'ternary', 'uniform'}
         The "small random" initial weights: `ternary`: one lattice step down, none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within initial_weight_limit, rounded to the lattice. An assumption.
     initial_weight_limit : float
@@ -94,7 +94,7 @@ class SDNNCConfig:
     rounding : {'half_up', 'random', 'away'}
         Of the number of units that are to fire. `half_up`: to the nearest; `random`: up or down at random in proportion, so that no small change is lost on average; `away`: in the direction of the change by at least one unit. An assumption.
     averaging_interval : int
-        With more than 0 the network keeps an average of its weights, by which greedy actions are chosen; learning continues with the weights themselves. Snapshots for it are taken after so many corrections, 100 for example, or after every 64th part of all, whichever is more; what was learned last counts most. The weights take four times the memory. Not in the paper, which has 0. Must be in [0, 1000000000].
+        Corrections between snapshots of the weights, of which the network keeps an average for greedy actions, or a 64th part of all if that is more. The latest count most; weights take four times the memory. 0, as in the paper: no average. Must be in [0, 1000000000].
     max_table_bytes : int
         A larger network (weights, patterns, remembered potentials) is refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
     
@@ -126,7 +126,7 @@ class SDNNCConfig:
     @property
     def averaging_interval(self) -> int:
         """
-        With more than 0 the network keeps an average of its weights, by which greedy actions are chosen; learning continues with the weights themselves. Snapshots for it are taken after so many corrections, 100 for example, or after every 64th part of all, whichever is more; what was learned last counts most. The weights take four times the memory. Not in the paper, which has 0.
+        Corrections between snapshots of the weights, of which the network keeps an average for greedy actions, or a 64th part of all if that is more. The latest count most; weights take four times the memory. 0, as in the paper: no average.
         """
     @property
     def balanced_anchors(self) -> bool:
@@ -141,7 +141,7 @@ class SDNNCConfig:
     @property
     def initial_threshold(self) -> float:
         """
-        The "large" initial threshold, in units of c: a multiple of 1 / lattice. A reading.
+        The "large" initial threshold, in units of c: a multiple of 1 / lattice. An assumption.
         """
     @property
     def initial_weight_limit(self) -> float:
@@ -166,7 +166,7 @@ class SDNNCConfig:
     @property
     def max_pairs(self) -> int:
         """
-        Most pairs of inputs that are formed: all l (l - 1) if there are no more or with 0; else an even share of them at random, each input modified by as many others as it modifies, and by one at least. Cost grows with pairs, so with many inputs it then grows as their number, not as its square. Not in the paper, which has all.
+        Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least.
         """
     @property
     def max_table_bytes(self) -> int:
@@ -541,7 +541,7 @@ class LinearSDNNConfig:
     n_inputs : int
         l, number of inputs (section 3.1). Must be in [2, 1024].
     max_pairs : int
-        Most pairs of inputs that are formed: all l (l - 1) if there are no more or with 0; else an even share of them at random, each input modified by as many others as it modifies, and by one at least. Cost grows with pairs, so with many inputs it then grows as their number, not as its square. Not in the paper, which has all. Must be in [0, 1048576].
+        Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least. Must be in [0, 1048576].
     n_pattern_units : int
         m, units per pattern. 0: as many as make about 3,072 columns, from 64 to 768. Must be in [0, 65536].
     n_anchor_patterns : int
@@ -611,7 +611,7 @@ class LinearSDNNConfig:
     @property
     def max_pairs(self) -> int:
         """
-        Most pairs of inputs that are formed: all l (l - 1) if there are no more or with 0; else an even share of them at random, each input modified by as many others as it modifies, and by one at least. Cost grows with pairs, so with many inputs it then grows as their number, not as its square. Not in the paper, which has all.
+        Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least.
         """
     @property
     def max_table_bytes(self) -> int:
@@ -793,7 +793,7 @@ class AcrobotConfig:
     decision_interval : float
         s; the torque is held for it. Must be a finite number greater than 0.
     integration_step : float
-        s, a whole fraction of decision_interval: Runge-Kutta of fourth order. A reading. Must be a finite number greater than 0.
+        s, a whole fraction of decision_interval: Runge-Kutta of fourth order. An assumption. Must be a finite number greater than 0.
     max_decisions : int
         Decisions in an episode. Must be at least 1.
     goal_height : float
@@ -899,7 +899,7 @@ class AcrobotConfig:
     @property
     def integration_step(self) -> float:
         """
-        s, a whole fraction of decision_interval: Runge-Kutta of fourth order. A reading.
+        s, a whole fraction of decision_interval: Runge-Kutta of fourth order. An assumption.
         """
     @property
     def link_length_1(self) -> float:
@@ -1258,7 +1258,7 @@ class QLearningConfig:
     final_epsilon : float | None
         What epsilon becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper. Must be in [0, 1].
     schedule : {'linear', 'exponential'}
-        How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
+        How alpha and epsilon approach their final values: `linear`, or `exponential`, first * (final / first) ** progress, with no final value of 0. For any other function of the progress: `sdnn.agents.Schedule`.
     exploration_fraction : float
         Part of the progress in which epsilon goes to final_epsilon, where it then stays. Not in the paper. Must be in (0, 1].
     start_steps : int
@@ -1341,7 +1341,7 @@ class QLearningConfig:
     @property
     def schedule(self) -> typing.Literal['linear', 'exponential']:
         """
-        How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
+        How alpha and epsilon approach their final values: `linear`, or `exponential`, first * (final / first) ** progress, with no final value of 0. For any other function of the progress: `sdnn.agents.Schedule`.
         """
     @property
     def start_steps(self) -> int:
@@ -1396,7 +1396,7 @@ class SarsaConfig:
     final_epsilon : float | None
         What epsilon becomes as the agent's progress goes from 0 to 1; by default it stays. Not in the paper. Must be in [0, 1].
     schedule : {'linear', 'exponential'}
-        How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
+        How alpha and epsilon approach their final values: `linear`, or `exponential`, first * (final / first) ** progress, with no final value of 0. For any other function of the progress: `sdnn.agents.Schedule`.
     exploration_fraction : float
         Part of the progress in which epsilon goes to final_epsilon, where it then stays. Not in the paper. Must be in (0, 1].
     start_steps : int
@@ -1479,7 +1479,7 @@ class SarsaConfig:
     @property
     def schedule(self) -> typing.Literal['linear', 'exponential']:
         """
-        How alpha and epsilon go to their final values: `linear`: in a straight line; `exponential`: by the same factor in equal parts of the progress, first * (final / first) ** progress. A constant rate is the common choice where the task itself changes; a line is what most libraries of deep Q-learning take for epsilon; an exponential spends more of the training near a small final value, which must not be 0. Any other function of the progress: `sdnn.agents.Schedule`.
+        How alpha and epsilon approach their final values: `linear`, or `exponential`, first * (final / first) ** progress, with no final value of 0. For any other function of the progress: `sdnn.agents.Schedule`.
         """
     @property
     def schedule_steps(self) -> int:
