@@ -29,7 +29,7 @@ class InstantTrial:
     """Done at once, with the rows of a whole trial."""
 
     def __init__(self, *, protocol, seed, **_others):
-        self._n_episodes = protocol.n_learning_episodes
+        self._n_episodes = protocol.episodes
         self._interval = protocol.evaluate_every_episodes
         self._seed = seed
         self.episode = 0

@@ -10,5 +10,6 @@ void bind_coding(pybind11::module_& module);
 void bind_approximators(pybind11::module_& module);
 void bind_estimators(pybind11::module_& module);
 void bind_agents(pybind11::module_& module);
+void bind_controller(pybind11::module_& module);  // of agents
 void bind_environments(pybind11::module_& module);
 void bind_tools(pybind11::module_& module);

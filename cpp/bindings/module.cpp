@@ -55,5 +55,6 @@ PYBIND11_MODULE(_core, module) {
   bind_environments(module);
   bind_estimators(module);
   bind_agents(module);
+  bind_controller(module);
   bind_tools(module);
 }

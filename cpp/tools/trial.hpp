@@ -28,15 +28,15 @@ namespace sdnn::tools {
 
 /// How long a trial is, and how often the agent is tested (section 4.2).
 struct ProtocolConfig {
-  int n_learning_episodes = 15000;
+  int episodes = 15000;
   int evaluate_every_episodes = 10;
   bool limit_bootstraps = true;
   bool noisy_evaluations = true;
 
   static constexpr auto fields() noexcept {
     return std::tuple(
-        core::field("n_learning_episodes", &ProtocolConfig::n_learning_episodes,
-                    "Learning episodes in a trial.", core::within(1, 1 << 30)),
+        core::field("episodes", &ProtocolConfig::episodes, "Learning episodes in a trial.",
+                    core::within(1, 1 << 30)),
         core::field("evaluate_every_episodes", &ProtocolConfig::evaluate_every_episodes,
                     "Learning episodes between evaluations of one episode.",
                     core::within(1, 1 << 30)),
@@ -87,18 +87,16 @@ class AcrobotTrial {
                   agent_.n_inputs());
     // No decision is to wait for memory it is the first to use: that of the agent, room for rows.
     if constexpr (requires { agent_.warm_caches(); }) agent_.warm_caches();
-    core::require_bytes("n_learning_episodes / evaluate_every_episodes",
-                        "the rows of the test episodes",
-                        sizeof(TestRow) * static_cast<double>(protocol.n_learning_episodes) /
-                            protocol.evaluate_every_episodes,
-                        core::kDefaultMaxTableBytes);
-    rows_.resize(
-        static_cast<std::size_t>(protocol.n_learning_episodes / protocol.evaluate_every_episodes));
+    core::require_bytes(
+        "episodes / evaluate_every_episodes", "the rows of the test episodes",
+        sizeof(TestRow) * static_cast<double>(protocol.episodes) / protocol.evaluate_every_episodes,
+        core::kDefaultMaxTableBytes);
+    rows_.resize(static_cast<std::size_t>(protocol.episodes / protocol.evaluate_every_episodes));
     rows_.clear();
   }
 
   int episode() const noexcept { return episode_; }
-  bool finished() const noexcept { return episode_ == protocol_.n_learning_episodes; }
+  bool finished() const noexcept { return episode_ == protocol_.episodes; }
   /// Decisions made so far, in learning and test episodes.
   std::int64_t n_decisions() const noexcept { return n_decisions_; }
   std::span<const TestRow> rows() const noexcept { return rows_; }
@@ -123,12 +121,12 @@ class AcrobotTrial {
     if (in_episode_) {
       core::fail(std::logic_error("the trial was ended within an episode: make a new one"));
     }
-    const int last = episode_ + std::min(n_episodes, protocol_.n_learning_episodes - episode_);
+    const int last = episode_ + std::min(n_episodes, protocol_.episodes - episode_);
     while (episode_ < last) {
       core::interruption_point();
       if constexpr (requires { agent_.set_progress(0.0); }) {
         agent_.set_progress(static_cast<double>(episode_) /
-                            static_cast<double>(protocol_.n_learning_episodes));
+                            static_cast<double>(protocol_.episodes));
       }
       ++episode_;
       run_episode(sensors_, true, after_decision);

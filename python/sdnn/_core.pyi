@@ -2174,7 +2174,7 @@ class ProtocolConfig:
     
     Parameters
     ----------
-    n_learning_episodes : int
+    episodes : int
         Learning episodes in a trial. Must be in [1, 1073741824].
     evaluate_every_episodes : int
         Learning episodes between evaluations of one episode. Must be in [1, 1073741824].
@@ -2196,7 +2196,7 @@ class ProtocolConfig:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, n_learning_episodes: int = ..., evaluate_every_episodes: int = ..., limit_bootstraps: bool = ..., noisy_evaluations: bool = ...) -> None:
+    def __init__(self, *, episodes: int = ..., evaluate_every_episodes: int = ..., limit_bootstraps: bool = ..., noisy_evaluations: bool = ...) -> None:
         ...
     def __replace__(self, **changes: typing.Any) -> ProtocolConfig:
         ...
@@ -2209,6 +2209,11 @@ class ProtocolConfig:
         Return a copy with other values of some fields.
         """
     @property
+    def episodes(self) -> int:
+        """
+        Learning episodes in a trial.
+        """
+    @property
     def evaluate_every_episodes(self) -> int:
         """
         Learning episodes between evaluations of one episode.
@@ -2217,11 +2222,6 @@ class ProtocolConfig:
     def limit_bootstraps(self) -> bool:
         """
         Whether the last transition before a time limit bootstraps, as if the episode continued; else it counts as terminated.
-        """
-    @property
-    def n_learning_episodes(self) -> int:
-        """
-        Learning episodes in a trial.
         """
     @property
     def noisy_evaluations(self) -> bool:

@@ -45,7 +45,7 @@ def rows_of_trial():
         acrobot=_core.AcrobotConfig(),
         goal=_core.GoalScheduleConfig(),
         sensors=_core.SensorConfig(),
-        protocol=_core.ProtocolConfig(n_learning_episodes=40),
+        protocol=_core.ProtocolConfig(episodes=40),
         seed=7,
     )
     trial.advance(40)

@@ -140,7 +140,7 @@ def measure_network(n_inputs: int, effort: Effort) -> dict[str, Any]:
         "n_hidden_units": config.n_hidden_units,
         "n_columns": config.n_pattern_units * n_inputs * (n_inputs - 1),
         "n_actions": config.n_hidden_units - config.n_active_units + 1,
-        "n_learning_episodes": effort.n_episodes,
+        "n_episodes": effort.n_episodes,
         "values": {level: times[level] for level in levels},
         "remembered_values": times["remembered_values"],
         "correction": spread(corrections),
@@ -239,9 +239,7 @@ def _short_trial(n_inputs: int, noise: float, n_episodes: int) -> _core.AcrobotT
         acrobot=_core.AcrobotConfig(),
         goal=_core.GoalScheduleConfig(),
         sensors=_core.SensorConfig(n_sensors=n_inputs, noise=noise),
-        protocol=_core.ProtocolConfig(
-            n_learning_episodes=n_episodes, evaluate_every_episodes=n_episodes + 1
-        ),
+        protocol=_core.ProtocolConfig(episodes=n_episodes, evaluate_every_episodes=n_episodes + 1),
         seed=SEED,
     )
 

@@ -271,7 +271,7 @@ class RunSpec(Settings, frozen=True):
             raise ValueError(f"{self.label} has no trial in C++ under this protocol")
         parts = {name: getattr(self, name) for name in (*ACROBOT, "approximator", "learning")}
         protocol = ProtocolConfig(
-            n_learning_episodes=self.budget.episodes or 0,
+            episodes=self.budget.episodes or 0,
             evaluate_every_episodes=self.protocol.evaluate_every_episodes or 0,
             limit_bootstraps=self.protocol.limit_bootstraps,
             noisy_evaluations=self.protocol.noisy_evaluations,

@@ -15,7 +15,7 @@ using Trial = tools::AcrobotTrial<agents::QLearning<Table>>;
 
 Trial table_trial() {
   return Trial(agents::QLearning<Table>(Table(4, 8, 21), {}, 1), {}, {}, {},
-               {.n_learning_episodes = 40, .evaluate_every_episodes = 10}, 1);
+               {.episodes = 40, .evaluate_every_episodes = 10}, 1);
 }
 
 TEST(TimeDecisions, OneTimePerDecisionAndTheTrialIsTheSame) {

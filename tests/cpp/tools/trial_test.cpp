@@ -29,7 +29,7 @@ using Network = approximators::SDNNC;
 struct Setting {
   environments::AcrobotConfig acrobot = {};
   environments::SensorConfig sensors = {};
-  ProtocolConfig protocol = {.n_learning_episodes = 100};
+  ProtocolConfig protocol = {.episodes = 100};
   std::uint64_t seed = 1;
 };
 
@@ -78,7 +78,7 @@ std::uint64_t digest(std::span<const TestRow> rows) {
 
 // Golden traces: they change only if what is computed changes, on any machine and compiler.
 TEST(AcrobotTrial, GoldenTraceWithoutNoise) {
-  auto run = network_trial({.protocol = {.n_learning_episodes = 200}});
+  auto run = network_trial({.protocol = {.episodes = 200}});
   run.advance(200);
   ASSERT_EQ(run.rows().size(), 20U);
   EXPECT_EQ(run.n_decisions(), 2541);
@@ -86,9 +86,8 @@ TEST(AcrobotTrial, GoldenTraceWithoutNoise) {
 }
 
 TEST(AcrobotTrial, GoldenTraceWithNoisyRedundantSensors) {
-  auto run = network_trial({.sensors = {.n_sensors = 6, .noise = 0.02},
-                            .protocol = {.n_learning_episodes = 60},
-                            .seed = 2});
+  auto run = network_trial(
+      {.sensors = {.n_sensors = 6, .noise = 0.02}, .protocol = {.episodes = 60}, .seed = 2});
   run.advance(60);
   ASSERT_EQ(run.rows().size(), 6U);
   EXPECT_EQ(run.n_decisions(), 1125);
@@ -96,7 +95,7 @@ TEST(AcrobotTrial, GoldenTraceWithNoisyRedundantSensors) {
 }
 
 TEST(AcrobotTrial, GoldenTracesOfFuzzyQLearning) {
-  auto plain = agent_trial(fuzzy_agent({}), {.protocol = {.n_learning_episodes = 200}});
+  auto plain = agent_trial(fuzzy_agent({}), {.protocol = {.episodes = 200}});
   plain.advance(200);
   EXPECT_EQ(plain.n_decisions(), 973);
   EXPECT_EQ(digest(plain.rows()), 16274018572413670715U);
@@ -108,7 +107,7 @@ TEST(AcrobotTrial, GoldenTracesOfFuzzyQLearning) {
 }
 
 TEST(AcrobotTrial, GoldenTracesOfTheRBFNetwork) {
-  auto plain = rbf_trial({.protocol = {.n_learning_episodes = 200}});
+  auto plain = rbf_trial({.protocol = {.episodes = 200}});
   plain.advance(200);
   EXPECT_EQ(plain.n_decisions(), 940);
   EXPECT_EQ(digest(plain.rows()), 6814087891175944941U);
@@ -184,7 +183,7 @@ TEST(AcrobotTrial, TestEpisodesDoNotChangeWhatIsLearned) {
 }
 
 TEST(AcrobotTrial, EpisodesAreCountedAndTestedWhenDue) {
-  auto run = table_trial({.protocol = {.n_learning_episodes = 25, .evaluate_every_episodes = 10}});
+  auto run = table_trial({.protocol = {.episodes = 25, .evaluate_every_episodes = 10}});
   EXPECT_EQ(run.episode(), 0);
   EXPECT_FALSE(run.finished());
   run.advance(9);
@@ -201,8 +200,7 @@ TEST(AcrobotTrial, EpisodesAreCountedAndTestedWhenDue) {
 }
 
 TEST(AcrobotTrial, AnUnsolvedTestEpisodeCountsAllItsDecisions) {
-  auto run =
-      table_trial({.acrobot = {.goal_height = 2.5}, .protocol = {.n_learning_episodes = 20}});
+  auto run = table_trial({.acrobot = {.goal_height = 2.5}, .protocol = {.episodes = 20}});
   run.advance(20);
   for (const TestRow& row : run.rows()) {
     EXPECT_EQ(row.steps, 50);
@@ -215,8 +213,7 @@ TEST(AcrobotTrial, AnUnsolvedTestEpisodeCountsAllItsDecisions) {
 
 TEST(AcrobotTrial, ASolvedTestEpisodeEndsAtTheGoal) {
   // At the start the tip hangs 2 m below joint 1: a goal there is reached within the first second.
-  auto run =
-      table_trial({.acrobot = {.goal_height = -2.5}, .protocol = {.n_learning_episodes = 10}});
+  auto run = table_trial({.acrobot = {.goal_height = -2.5}, .protocol = {.episodes = 10}});
   run.advance(10);
   ASSERT_EQ(run.rows().size(), 1U);
   EXPECT_EQ(run.rows()[0].steps, 1);
@@ -233,7 +230,7 @@ void expect_no_allocation(Trial run) {
 }
 
 TEST(AcrobotTrial, AnEpisodeAllocatesNothing) {
-  const Setting setting{.sensors = {.noise = 0.02}, .protocol = {.n_learning_episodes = 10}};
+  const Setting setting{.sensors = {.noise = 0.02}, .protocol = {.episodes = 10}};
   expect_no_allocation(network_trial(setting));
   expect_no_allocation(rbf_trial(setting));
   expect_no_allocation(agent_trial(fuzzy_agent(setting), setting));
@@ -258,9 +255,9 @@ struct Recorder {
 
 TEST(AcrobotTrial, TheTimeLimitIsATerminationOnlyIfAskedFor) {
   for (const bool bootstraps : {true, false}) {
-    auto run = agent_trial(
-        Recorder{}, {.acrobot = {.max_decisions = 3},
-                     .protocol = {.n_learning_episodes = 2, .limit_bootstraps = bootstraps}});
+    auto run =
+        agent_trial(Recorder{}, {.acrobot = {.max_decisions = 3},
+                                 .protocol = {.episodes = 2, .limit_bootstraps = bootstraps}});
     run.advance(2);
     const bool last = !bootstraps;
     EXPECT_EQ(run.agent().ends, (std::vector{false, false, last, false, false, last}));
@@ -269,10 +266,9 @@ TEST(AcrobotTrial, TheTimeLimitIsATerminationOnlyIfAskedFor) {
 
 TEST(AcrobotTrial, TestsAreNoisyUnlessSaidOtherwise) {
   for (const bool noisy : {true, false}) {
-    auto run = agent_trial(Recorder{},
-                           {.acrobot = {.max_decisions = 1},
-                            .sensors = {.noise = 0.02},
-                            .protocol = {.n_learning_episodes = 10, .noisy_evaluations = noisy}});
+    auto run = agent_trial(Recorder{}, {.acrobot = {.max_decisions = 1},
+                                        .sensors = {.noise = 0.02},
+                                        .protocol = {.episodes = 10, .noisy_evaluations = noisy}});
     run.advance(10);
     ASSERT_EQ(run.agent().tested.size(), 1U);
     EXPECT_EQ(run.agent().tested[0] == std::vector<double>(4, 0.5), !noisy);
@@ -292,7 +288,7 @@ long n_page_faults() {
 TEST(AcrobotTrial, AnEpisodeMeetsNoMemoryForTheFirstTime) {
   for (const int n_inputs : {4, 6}) {
     const Setting setting{.sensors = {.n_sensors = n_inputs, .noise = 0.02},
-                          .protocol = {.n_learning_episodes = 60}};
+                          .protocol = {.episodes = 60}};
     network_trial(setting).advance(2);
     auto run = network_trial(setting);
     const long before = n_page_faults();
@@ -314,8 +310,8 @@ std::string message(Make make) {
 }
 
 TEST(AcrobotTrial, NamesWhatIsImpossible) {
-  EXPECT_EQ(message([] { table_trial({.protocol = {.n_learning_episodes = 0}}); }),
-            "n_learning_episodes must be in [1, 1073741824], got 0");
+  EXPECT_EQ(message([] { table_trial({.protocol = {.episodes = 0}}); }),
+            "episodes must be in [1, 1073741824], got 0");
   EXPECT_EQ(message([] { table_trial({.protocol = {.evaluate_every_episodes = 0}}); }),
             "evaluate_every_episodes must be in [1, 1073741824], got 0");
   EXPECT_EQ(message([] { trial(LookupTable(5, 2, 3), {}); }),

@@ -194,7 +194,7 @@ def test_fuzzy_q_learning_swings_up_without_noise():
         acrobot=_core.AcrobotConfig(),
         goal=_core.GoalScheduleConfig(),
         sensors=_core.SensorConfig(),
-        protocol=_core.ProtocolConfig(n_learning_episodes=300),
+        protocol=_core.ProtocolConfig(episodes=300),
         seed=1,
     )
     trial.advance(300)

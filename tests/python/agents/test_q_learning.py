@@ -40,9 +40,7 @@ def test_a_training_of_the_page_is_a_trial_of_the_core(n_inputs, noise):
         acrobot=_core.AcrobotConfig(),
         goal=_core.GoalScheduleConfig(),
         sensors=_core.SensorConfig(n_sensors=n_inputs, noise=noise),
-        protocol=_core.ProtocolConfig(
-            n_learning_episodes=n_episodes, evaluate_every_episodes=n_episodes + 1
-        ),
+        protocol=_core.ProtocolConfig(episodes=n_episodes, evaluate_every_episodes=n_episodes + 1),
         seed=7,
     )
     steps = []

@@ -30,7 +30,7 @@ def short_trial(n_inputs, noise):
         acrobot=_core.AcrobotConfig(),
         goal=_core.GoalScheduleConfig(),
         sensors=_core.SensorConfig(n_sensors=n_inputs, noise=noise),
-        protocol=_core.ProtocolConfig(n_learning_episodes=60, evaluate_every_episodes=5),
+        protocol=_core.ProtocolConfig(episodes=60, evaluate_every_episodes=5),
         seed=3,
     )
 

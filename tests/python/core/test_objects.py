@@ -63,7 +63,7 @@ def assert_refused(use, thread):
 
 def big_trial():
     settings = core_cells.GOOD["AcrobotTrial"]()
-    settings["protocol"] = core.ProtocolConfig(n_learning_episodes=100_000)
+    settings["protocol"] = core.ProtocolConfig(episodes=100_000)
     return core.AcrobotTrial(**settings)
 
 

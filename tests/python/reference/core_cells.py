@@ -50,7 +50,7 @@ def trial_settings():
         "acrobot": core.AcrobotConfig(),
         "goal": core.GoalScheduleConfig(),
         "sensors": core.SensorConfig(),
-        "protocol": core.ProtocolConfig(n_learning_episodes=20),
+        "protocol": core.ProtocolConfig(episodes=20),
         "seed": 1,
     }
 

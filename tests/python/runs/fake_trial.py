@@ -19,7 +19,7 @@ class FakeTrial:
 
     def __init__(self, *, protocol, seed, **_others):
         self._protocol = protocol
-        n_tests = protocol.n_learning_episodes // protocol.evaluate_every_episodes
+        n_tests = protocol.episodes // protocol.evaluate_every_episodes
         generator = np.random.default_rng(seed)
         learned = generator.integers(2, 8)
         self._steps = np.where(
@@ -30,14 +30,14 @@ class FakeTrial:
 
     @property
     def finished(self):
-        return self.episode == self._protocol.n_learning_episodes
+        return self.episode == self._protocol.episodes
 
     @property
     def n_decisions(self):
         return 7 * self.episode
 
     def advance(self, n):
-        self.episode = min(self.episode + n, self._protocol.n_learning_episodes)
+        self.episode = min(self.episode + n, self._protocol.episodes)
 
     def test_rows(self):
         n_tests = self.episode // self._protocol.evaluate_every_episodes

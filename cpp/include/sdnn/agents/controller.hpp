@@ -47,7 +47,7 @@ namespace sdnn::agents {
 /// Q-learning, which can learn its own actions only, begins anew. From then on the ranges stay.
 ///
 /// Thread safety: const functions may be called by many threads at once, with a workspace each.
-class Controller {
+class Controller : public WithRates<Controller> {
  public:
   /// What one reader owns, once the warm-up is over: for that controller and what it becomes.
   struct Workspace {
@@ -95,39 +95,21 @@ class Controller {
   AnyAgent& agent() { return agent_.value(); }
   const AnyAgent& agent() const { return agent_.value(); }
 
-  /// How much of the learning is done, in [0, 1]. Throws std::invalid_argument outside.
-  void set_progress(double progress) {
-    core::require_in_range("progress", progress, 0.0, 1.0);
-    progress_ = progress;
-    with_q_learning(agent_, [progress](auto& agent) { agent.set_progress(progress); });
-  }
+  /// Of the agent, once there is one that follows it.
   double progress() const {
-    return of_q_learning(agent_, [](const auto& agent) { return agent.progress(); }, progress_);
-  }
-  /// Sets alpha or epsilon of Q-learning; see QLearning.
-  void set_learning_rate(std::optional<double> rate) {
-    const double tried = rate.value_or(1.0);
-    core::require(tried > 0.0 && tried <= 1.0, "learning_rate", "in (0, 1], or None", tried);
-    learning_rate_ = rate;
-    with_q_learning(agent_, [rate](auto& agent) { agent.set_learning_rate(rate); });
-  }
-  void set_epsilon(std::optional<double> epsilon) {
-    const double tried = epsilon.value_or(0.0);
-    core::require(tried >= 0.0 && tried <= 1.0, "epsilon", "in [0, 1], or None", tried);
-    epsilon_ = epsilon;
-    with_q_learning(agent_, [epsilon](auto& agent) { agent.set_epsilon(epsilon); });
-  }
-  /// As they are now. Require Q-learning.
-  double learning_rate() const {
-    const double otherwise = learning_rate_.value_or(
-        planned([this](const auto& config) { return learning_rate_at(config, progress_); }));
     return of_q_learning(
-        agent_, [](const auto& agent) { return agent.learning_rate(); }, otherwise);
+        agent_, [](const auto& agent) { return agent.progress(); }, rates_.progress);
+  }
+  /// Alpha and epsilon as they are now. Require Q-learning.
+  double learning_rate() const {
+    return of_q_learning(
+        agent_, [](const auto& agent) { return agent.learning_rate(); },
+        planned([this](const auto& config) { return rates_.learning_rate(config); }));
   }
   double epsilon() const {
-    const double otherwise = epsilon_.value_or(
-        planned([this](const auto& config) { return epsilon_at(config, progress_); }));
-    return of_q_learning(agent_, [](const auto& agent) { return agent.epsilon(); }, otherwise);
+    return of_q_learning(
+        agent_, [](const auto& agent) { return agent.epsilon(); },
+        planned([this](const auto& config) { return rates_.epsilon(config); }));
   }
 
   /// How many robots, or environments, the agent learns from at once: each has an episode of its
@@ -266,9 +248,7 @@ class Controller {
     detail::serialize_tables(self.tables_, archive);
     bool is_warming_up = self.is_warming_up();
     archive.number("is_warming_up", is_warming_up);
-    archive.number("progress", self.progress_);
-    archive.number("learning_rate", self.learning_rate_);
-    archive.number("epsilon", self.epsilon_);
+    serialize_rates(self, archive);
     if constexpr (Archive::kReads) self.begin_reading(is_warming_up, archive);
     if (is_warming_up) {
       archive.part("warm_up", *self.warm_up_);
@@ -286,6 +266,7 @@ class Controller {
   }
 
  private:
+  friend class WithRates<Controller>;
   struct Unborn {};
 
   static constexpr double kLargestReward = 1e300;
@@ -323,14 +304,12 @@ class Controller {
     if (auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&approximator_)) {
       if (n_dimensions() == 1) sdnn->n_actions = static_cast<int>(actions_.n_actions().front());
     }
-    with_q_learning(agent_, [this](auto& agent) {
-      agent.set_learning_rate(learning_rate_);
-      agent.set_epsilon(epsilon_);
-      agent.set_progress(progress_);
-    });
+    with_q_learning(agent_, [this](auto& agent) { agent.set_rates(rates_); });
     state_.resize(observations_.n_inputs());
     next_state_.resize(state_.size());
   }
+
+  void apply_rates(const auto& change) { with_q_learning(agent_, change); }
 
   /// What `call` gives of the settings of learning, but for fuzzy Q-learning.
   template <class Call>
@@ -445,11 +424,6 @@ class Controller {
   void begin_reading(bool is_warming_up, const Archive& archive) {
     archive.expect(!is_warming_up || observations_.needs_fit(), "is_warming_up",
                    "0, as all ranges are known");
-    archive.taking("progress", [this] {
-      set_progress(progress_);
-      set_learning_rate(learning_rate_);
-      set_epsilon(epsilon_);
-    });
     agent_.reset();
     warm_up_.reset();
     if (is_warming_up) warm_up_.emplace(new_warm_up());
@@ -460,7 +434,7 @@ class Controller {
     archive.expect(taken_.fits(n_environments(), actions_), "taken.indices",
                    "of actions and environments");
     if (agent_) {
-      progress_ = progress();
+      rates_.progress = progress();
       return;
     }
     const auto is_number = [](double x) { return !std::isnan(x); };
@@ -486,8 +460,6 @@ class Controller {
   std::optional<WarmUp> warm_up_;
   std::optional<AnyAgent> agent_;            ///< once the warm-up is over
   std::optional<LatestTransitions> latest_;  ///< where inputs that are left out can be added
-  double progress_ = 0.0;
-  std::optional<double> learning_rate_, epsilon_;
   std::vector<double> state_, next_state_, action_;
   std::vector<std::size_t> indices_;
   detail::TakenActions taken_;

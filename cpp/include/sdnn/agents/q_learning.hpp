@@ -49,7 +49,7 @@ namespace sdnn::agents {
 /// (the steps that wait, the kept action, the number of its steps, its rewards) is then
 /// kept for each, all else is shared. Which of them acts or learns when is the caller's choice.
 template <class Q>
-class QLearning {
+class QLearning : public WithRates<QLearning<Q>> {
  public:
   static constexpr bool kDecoupled = approximators::DecoupledActionValue<Q>;
   static_assert(kDecoupled || approximators::ActionValue<Q>);
@@ -93,23 +93,6 @@ class QLearning {
     }
   }
 
-  /// How much of the learning is done, in [0, 1], where alpha and epsilon go from one value to
-  /// another with it. Throws std::invalid_argument outside.
-  void set_progress(double progress) {
-    rates_.set_progress(progress);
-    apply_rates();
-  }
-  double progress() const noexcept { return rates_.progress(); }
-  /// Sets alpha or epsilon, whatever the progress, until it is set anew; none: it follows the
-  /// progress again. Throws std::invalid_argument outside (0, 1] and [0, 1].
-  void set_learning_rate(std::optional<double> rate) {
-    rates_.set_learning_rate(rate);
-    apply_rates();
-  }
-  void set_epsilon(std::optional<double> epsilon) {
-    rates_.set_epsilon(epsilon);
-    apply_rates();
-  }
   /// As they were set, or as progress has made them.
   double learning_rate() const noexcept { return learning_rate_; }
   double epsilon() const noexcept { return exploration_.policy().config().epsilon; }
@@ -236,7 +219,7 @@ class QLearning {
     archive.part("action_value", self.action_value_);
     Exploration::serialize(self.exploration_, archive);
     archive.part("range", self.range_);
-    Rates::serialize(self.rates_, archive);
+    QLearning::serialize_rates(self, archive);
     Episodes<Episode>::serialize(
         self.episodes_, archive, [&self] { return self.new_episode(); },
         [&](auto& episode) { serialize_episode(self, episode, archive); });
@@ -247,6 +230,8 @@ class QLearning {
   }
 
  private:
+  friend class WithRates<QLearning>;
+
   static constexpr double kLargestReward = 1e300;  // sums of some, and steps to them, stay finite
   static constexpr bool kHasRange = requires(Q& q) { q.set_output_range(0.0, 1.0); };
 
@@ -281,9 +266,10 @@ class QLearning {
     }
   }
 
+  void apply_rates(const auto& /*change*/) { apply_rates(); }
   void apply_rates() {
-    learning_rate_ = rates_.learning_rate(config_);
-    exploration_.policy().set_epsilon(rates_.epsilon(config_));
+    learning_rate_ = this->rates_.learning_rate(config_);
+    exploration_.policy().set_epsilon(this->rates_.epsilon(config_));
   }
 
   bool adapts_range() const noexcept {
@@ -382,7 +368,6 @@ class QLearning {
   Q action_value_;
   Exploration exploration_;
   ReturnRange range_;
-  Rates rates_;
   double learning_rate_;
   Workspace workspace_;
   Episodes<Episode> episodes_;

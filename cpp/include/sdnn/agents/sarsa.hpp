@@ -48,7 +48,7 @@ namespace sdnn::agents {
 ///
 /// An agent may learn in several environments at once, numbered from 0: each has a trace of its
 /// own.
-class Sarsa {
+class Sarsa : public WithRates<Sarsa> {
  public:
   using Readout = approximators::LinearSDNN;
   using Action = std::vector<std::size_t>;
@@ -82,23 +82,6 @@ class Sarsa {
   /// Transitions that were learned.
   std::int64_t n_learned() const noexcept { return n_learned_; }
 
-  /// How much of the learning is done, in [0, 1]: it matters where schedule_steps is 0. Throws
-  /// std::invalid_argument outside.
-  void set_progress(double progress) {
-    rates_.set_progress(progress);
-    apply_rates();
-  }
-  double progress() const noexcept { return rates_.progress(); }
-  /// Sets alpha or epsilon until it is set anew; none: it follows the schedule again. Throws
-  /// std::invalid_argument outside (0, 1] and [0, 1].
-  void set_learning_rate(std::optional<double> rate) {
-    rates_.set_learning_rate(rate);
-    apply_rates();
-  }
-  void set_epsilon(std::optional<double> epsilon) {
-    rates_.set_epsilon(epsilon);
-    apply_rates();
-  }
   /// As they are now, in steps of 2^-16.
   double learning_rate() const noexcept { return static_cast<double>(rate_) / kOne; }
   double epsilon() const noexcept { return exploration_.policy().config().epsilon; }
@@ -213,7 +196,7 @@ class Sarsa {
     }
     action_value_.continue_from(fewer.action_value_);
     exploration_ = std::move(fewer.exploration_);
-    rates_ = std::move(fewer.rates_);
+    rates_ = fewer.rates_;
     n_learned_ = fewer.n_learned_;
     episodes_.resize(fewer.n_environments(), [this] { return new_episode(); });
     for (std::size_t i = 0; i < n_environments(); ++i) {
@@ -227,7 +210,7 @@ class Sarsa {
   static void serialize(Self& self, Archive& archive) {
     archive.part("action_value", self.action_value_);
     Exploration::serialize(self.exploration_, archive);
-    Rates::serialize(self.rates_, archive);
+    Sarsa::serialize_rates(self, archive);
     archive.number("n_learned", self.n_learned_);
     Episodes<Episode>::serialize(
         self.episodes_, archive, [&self] { return self.new_episode(); },
@@ -240,6 +223,8 @@ class Sarsa {
   }
 
  private:
+  friend class WithRates<Sarsa>;
+
   static constexpr double kLargestReward = 1e300;
   static constexpr std::int64_t kMostLearned = std::int64_t{1} << 46;
   static constexpr std::int32_t kOne = Readout::kRateOne;
@@ -311,16 +296,17 @@ class Sarsa {
     return static_cast<std::int32_t>(from + quotient);
   }
 
+  void apply_rates(const auto& /*change*/) { apply_rates(); }
   void apply_rates() {
     double rate = rates_.learning_rate(config_);
     double epsilon = rates_.epsilon(config_);
     if (config_.schedule_steps > 0) {
-      if (!rates_.has_learning_rate()) {
+      if (!rates_.set_learning_rate) {
         rate = scheduled(config_.learning_rate,
                          config_.final_learning_rate.value_or(config_.learning_rate)) /
                static_cast<double>(kOne);
       }
-      if (!rates_.has_epsilon()) {
+      if (!rates_.set_epsilon) {
         epsilon = scheduled(config_.policy.epsilon,
                             config_.final_epsilon.value_or(config_.policy.epsilon)) /
                   static_cast<double>(kOne);
@@ -451,7 +437,6 @@ class Sarsa {
   SarsaConfig config_;
   Readout action_value_;
   Exploration exploration_;
-  Rates rates_;
   std::int64_t n_learned_ = 0;
   std::int32_t rate_ = 0;  ///< alpha, kOne for 1
   Workspace workspace_;

@@ -102,53 +102,75 @@ Config checked_schedule(const Config& config) {
   return config;
 }
 
-/// Alpha and epsilon as they are now: as they were set, or as the progress makes them.
-class Rates {
- public:
-  /// Throws std::invalid_argument outside [0, 1].
-  void set_progress(double progress) {
-    core::require_in_range("progress", progress, 0.0, 1.0);
-    progress_ = progress;
-  }
-  double progress() const noexcept { return progress_; }
-  /// None: as the progress makes it. Throws std::invalid_argument outside (0, 1] and [0, 1].
-  void set_learning_rate(std::optional<double> rate) {
-    if (rate) core::require(*rate > 0.0 && *rate <= 1.0, "learning_rate", "in (0, 1]", *rate);
-    learning_rate_ = rate;
-  }
-  void set_epsilon(std::optional<double> epsilon) {
-    if (epsilon) core::require_in_range("epsilon", *epsilon, 0.0, 1.0);
-    epsilon_ = epsilon;
-  }
+/// What alpha and epsilon follow: the progress, unless they were set.
+struct Rates {
+  double progress = 0.0;
+  std::optional<double> set_learning_rate, set_epsilon;
+
   template <class Config>
   double learning_rate(const Config& config) const noexcept {
-    return learning_rate_.value_or(learning_rate_at(config, progress_));
+    return set_learning_rate.value_or(learning_rate_at(config, progress));
   }
   template <class Config>
   double epsilon(const Config& config) const noexcept {
-    return epsilon_.value_or(epsilon_at(config, progress_));
+    return set_epsilon.value_or(epsilon_at(config, progress));
   }
-  bool has_learning_rate() const noexcept { return learning_rate_.has_value(); }
-  bool has_epsilon() const noexcept { return epsilon_.has_value(); }
+};
 
+/// Base of agents that follow rates. After each change `apply_rates(change)` is called, where
+/// change(agent) makes the same change of another agent.
+template <class Agent>
+class WithRates {
+ public:
+  /// How much of the learning is done, in [0, 1], where alpha and epsilon go from one value to
+  /// another with it. Throws std::invalid_argument outside.
+  void set_progress(double progress) {
+    core::require_in_range("progress", progress, 0.0, 1.0);
+    rates_.progress = progress;
+    apply([progress](auto& other) { other.set_progress(progress); });
+  }
+  double progress() const noexcept { return rates_.progress; }
+  /// Sets alpha or epsilon, whatever the progress, until it is set anew; none: it follows the
+  /// schedule again. Throws std::invalid_argument outside (0, 1] and [0, 1].
+  void set_learning_rate(std::optional<double> rate) {
+    const double tried = rate.value_or(1.0);
+    core::require(tried > 0.0 && tried <= 1.0, "learning_rate", "in (0, 1], or None", tried);
+    rates_.set_learning_rate = rate;
+    apply([rate](auto& other) { other.set_learning_rate(rate); });
+  }
+  void set_epsilon(std::optional<double> epsilon) {
+    const double tried = epsilon.value_or(0.0);
+    core::require(tried >= 0.0 && tried <= 1.0, "epsilon", "in [0, 1], or None", tried);
+    rates_.set_epsilon = epsilon;
+    apply([epsilon](auto& other) { other.set_epsilon(epsilon); });
+  }
+  /// Takes over those of another agent.
+  void set_rates(const Rates& rates) {
+    rates_ = rates;
+    apply([&rates](auto& other) { other.set_rates(rates); });
+  }
+
+ protected:
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void serialize(Self& self, Archive& archive) {
-    archive.number("progress", self.progress_);
-    archive.number("learning_rate", self.learning_rate_);
-    archive.number("epsilon", self.epsilon_);
+  static void serialize_rates(Self& self, Archive& archive) {
+    auto& rates = self.rates_;
+    archive.number("progress", rates.progress);
+    archive.number("learning_rate", rates.set_learning_rate);
+    archive.number("epsilon", rates.set_epsilon);
     if constexpr (Archive::kReads) {
-      archive.expect(self.progress_ >= 0.0 && self.progress_ <= 1.0, "progress", "in [0, 1]");
-      const double rate = self.learning_rate_.value_or(1.0);
+      archive.expect(rates.progress >= 0.0 && rates.progress <= 1.0, "progress", "in [0, 1]");
+      const double rate = rates.set_learning_rate.value_or(1.0);
       archive.expect(rate > 0.0 && rate <= 1.0, "learning_rate", "in (0, 1]");
-      const double epsilon = self.epsilon_.value_or(0.0);
+      const double epsilon = rates.set_epsilon.value_or(0.0);
       archive.expect(epsilon >= 0.0 && epsilon <= 1.0, "epsilon", "in [0, 1]");
     }
   }
 
+  Rates rates_;
+
  private:
-  double progress_ = 0.0;
-  std::optional<double> learning_rate_, epsilon_;
+  void apply(const auto& change) { static_cast<Agent&>(*this).apply_rates(change); }
 };
 
 }  // namespace sdnn::agents

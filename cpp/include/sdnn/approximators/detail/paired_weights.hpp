@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "sdnn/approximators/hidden_layer.hpp"
 #include "sdnn/coding/state_code.hpp"
@@ -35,17 +36,13 @@ template <class Weight, class Threshold>
 HiddenLayer paired_layer(const coding::StateCode& code, std::size_t n_units, const Weight& weight,
                          const Threshold& threshold) {
   HiddenLayer layer = paired_layer(code, n_units);
-  const auto add = [&layer](std::size_t unit, std::size_t column, std::int32_t change) {
-    layer.set_weight(unit, column, layer.weight(unit, column) + change);
-  };
+  std::vector<std::int32_t> weights(n_units);
   for (std::size_t j = 0; j < code.n_columns(); ++j) {
     core::interruption_point();
     const PairedColumns columns = code.columns_of(j);
-    for (std::size_t unit = 0; unit < n_units; ++unit) {
-      const std::int32_t value = weight(unit, columns, j);
-      add(unit, columns.first, value);
-      if (columns.paired) add(unit, columns.second, columns.sign * value);
-    }
+    for (std::size_t unit = 0; unit < n_units; ++unit) weights[unit] = weight(unit, columns, j);
+    layer.add_to_column(columns.first, weights, 1);
+    if (columns.paired) layer.add_to_column(columns.second, weights, columns.sign);
   }
   for (std::size_t unit = 0; unit < n_units; ++unit) layer.set_threshold(unit, threshold(unit));
   return layer;

@@ -1,0 +1,284 @@
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "arrays.hpp"
+#include "bind_config.hpp"
+#include "bindings.hpp"
+#include "sdnn/agents/any_agent.hpp"
+#include "sdnn/agents/controller.hpp"
+#include "sdnn/agents/controller_config.hpp"
+#include "sdnn/agents/observations.hpp"
+#include "states.hpp"
+#include "workspaces.hpp"
+
+namespace py = pybind11;
+using namespace sdnn;
+using agents::Controller;
+using agents::ControllerConfig;
+using bindings::ArrayArgument;
+
+namespace {
+
+/// Where an input of a state comes from: its kind, and the numbers that belong to it.
+std::pair<std::string, std::vector<std::size_t>> described(const agents::ObservedInput& input) {
+  switch (input.kind) {
+    case agents::ObservedKind::variable:
+      return {"variable", {input.first}};
+    case agents::ObservedKind::angle:
+      return {"angle", {input.first, input.second}};
+    case agents::ObservedKind::circular:
+      return {"circular", {input.first}};
+    case agents::ObservedKind::symbol:
+      return {"symbol", {input.first, input.second}};
+  }
+  return {};
+}
+
+/// Lets readers of the agent in other threads finish before it changes.
+void wait_for_readers_of(agents::Controller& controller) {
+  if (controller.is_warming_up()) return;
+  std::visit([](auto& agent) { bindings::wait_for_readers(agent); }, controller.agent());
+}
+
+/// What an agent has in each dimension.
+template <class Agent>
+auto parts_of(const Agent& agent) {
+  if constexpr (requires { agent.part(0); }) {
+    return std::span(&agent.part(0), agent.n_dimensions());
+  } else if constexpr (requires { agent.action_value().part(0); }) {
+    return std::span(&agent.action_value().part(0), agent.n_dimensions());
+  } else {
+    return std::span(&agent, 1);
+  }
+}
+
+/// Whether there are threads that could run Python while this one works without the GIL.
+bool has_other_threads() {
+  return PyThreadState_Next(PyInterpreterState_ThreadHead(PyInterpreterState_Get())) != nullptr;
+}
+
+/// The action of act without `explore`, after the warm-up. Other threads run meanwhile, and may
+/// read the same controller.
+std::span<const double> best_action(agents::Controller& controller,
+                                    std::span<const double> observation) {
+  const agents::Controller& read = controller;
+  const auto variables = bindings::copied(observation);
+  auto& workspace = bindings::workspace_of(read);
+  std::visit(
+      [&](const auto& agent) {
+        const auto parts = parts_of(agent);
+        const bindings::WithoutGIL unlocked(read, parts);
+        read.read(variables, workspace);
+      },
+      read.agent());
+  return controller.best_of(workspace);  // which draws, and so needs the lock
+}
+
+/// Row i of an array with so many numbers in each. Throws std::invalid_argument if there is none.
+std::span<const double> row(const ArrayArgument<double>& rows, const char* name,
+                            std::size_t n_columns, std::size_t i) {
+  const auto numbers = bindings::flat(rows);
+  if (i >= numbers.size() / n_columns) {  // only a bad one's text costs memory
+    core::require(false, name, std::to_string(n_columns) + " numbers for each environment",
+                  numbers.size());
+  }
+  return numbers.subspan(n_columns * i, n_columns);
+}
+
+std::size_t learn_each(agents::Controller& controller, const ArrayArgument<double>& observations,
+                       const ArrayArgument<double>& actions, const py::list& rewards,
+                       const ArrayArgument<double>& next_observations, const py::list& terminated,
+                       const py::list& environments, const py::list& progress) {
+  wait_for_readers_of(controller);
+  const std::size_t n = controller.n_variables();
+  std::size_t n_learned = 0;
+  for (const py::handle environment : environments) {
+    const auto i = environment.cast<std::size_t>();
+    core::require(i < std::min(rewards.size(), terminated.size()), "environments",
+                  "those of rewards and terminated", i);
+    const auto reward = rewards[i].cast<double>();
+    const auto ends = terminated[i].cast<bool>();
+    if (n_learned > 0 && n_learned <= progress.size()) {
+      controller.set_progress(progress[n_learned - 1].cast<double>());
+    }
+    try {
+      controller.learn(row(observations, "observations", n, i),
+                       row(actions, "actions", controller.n_dimensions(), i), reward,
+                       row(next_observations, "next_observations", n, i), ends, i);
+    } catch (const std::logic_error&) {
+      if (n_learned == 0) throw;
+      break;
+    } catch (const std::overflow_error&) {
+      if (n_learned == 0) throw;
+      break;
+    }
+    ++n_learned;
+  }
+  return n_learned;
+}
+
+}  // namespace
+
+void bind_controller(py::module_& module) {
+  bindings::bind_config<agents::ObservationConfig>(module, "ObservationConfig",
+                                                   "The observed variables of a task.");
+  bindings::bind_config<agents::ActionConfig>(module, "ActionConfig", "The actions of a task.");
+  const auto config_of = [](const agents::AnyApproximatorConfig& approximator,
+                            const agents::AnyLearningConfig& learning, std::uint64_t seed,
+                            const agents::ObservationConfig& observation,
+                            const agents::ActionConfig& action, int warm_up_steps) {
+    return ControllerConfig{approximator, learning, seed, observation, action, warm_up_steps};
+  };
+  const auto array_of = [](std::span<const double> values) {
+    return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
+  };
+  const auto ends_of = [array_of](const Controller& self) {
+    return std::pair(array_of(self.observations().low()), array_of(self.observations().high()));
+  };
+  py::class_<Controller> type(module, "Controller", "An agent in the units of its task");
+  type.attr("fields") = bindings::described_fields<ControllerConfig>();
+  type.def(py::init([config_of](const agents::AnyApproximatorConfig& approximator,
+                                const agents::AnyLearningConfig& learning, std::uint64_t seed,
+                                const agents::ObservationConfig& observation,
+                                const agents::ActionConfig& action, int warm_up_steps,
+                                const std::vector<ArrayArgument<std::int8_t>>& tables,
+                                const std::optional<py::dict>& state) {
+             auto config =
+                 config_of(approximator, learning, seed, observation, action, warm_up_steps);
+             if (state)
+               return Controller::restored(std::move(config), bindings::state_from(*state));
+             return Controller(std::move(config), bindings::tables_of(tables));
+           }),
+           py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"),
+           py::arg("observation"), py::arg("action"),
+           py::arg("warm_up_steps") = ControllerConfig{}.warm_up_steps,
+           py::arg("tables") = std::vector<ArrayArgument<std::int8_t>>(),
+           py::arg("state") = py::none(), "New, or as it was when `state` was taken")
+      .def_property_readonly("approximator", &Controller::approximator)
+      .def_property_readonly("is_warming_up", &Controller::is_warming_up)
+      .def_property_readonly("n_variables", &Controller::n_variables)
+      .def_property_readonly("n_actions",
+                             [](const Controller& self) { return self.actions().n_actions(); })
+      .def_property_readonly("ranges", ends_of, "Lowest and highest values, (n_variables,) each")
+      .def_property_readonly(
+          "inputs",
+          [](const Controller& self) {
+            std::vector<std::pair<std::string, std::vector<std::size_t>>> inputs;
+            for (const auto& input : self.observations().inputs()) {
+              inputs.push_back(described(input));
+            }
+            return inputs;
+          },
+          "Of a state: kinds, and the variables that they are made of")
+      .def_property_readonly(
+          "agent",
+          [](py::object& self) {
+            auto& controller = self.cast<Controller&>();
+            if (controller.is_warming_up()) throw std::runtime_error("agent is still warming up");
+            return std::visit(
+                [&self](auto& agent) {
+                  return py::cast(agent, py::return_value_policy::reference_internal, self);
+                },
+                controller.agent());
+          },
+          "The agent in itself, with states in [0, 1]")
+      .def_property("n_environments", &Controller::n_environments,
+                    [](Controller& self, std::size_t n) {
+                      wait_for_readers_of(self);
+                      self.set_n_environments(n);
+                    })
+      .def_property("progress", &Controller::progress, &Controller::set_progress)
+      .def_property("learning_rate", &Controller::learning_rate, &Controller::set_learning_rate)
+      .def_property("epsilon", &Controller::epsilon, &Controller::set_epsilon)
+      .def(
+          "begin_episode",
+          [](Controller& self, std::size_t environment) {
+            wait_for_readers_of(self);
+            self.begin_episode(environment);
+          },
+          py::arg("environment") = 0)
+      .def(
+          "act",
+          [array_of](Controller& self, const ArrayArgument<double>& observation, bool explore,
+                     std::size_t environment) {
+            const auto variables = bindings::flat(observation);
+            const bool is_reader = !explore && has_other_threads() && !self.is_warming_up() &&
+                                   environment < self.n_environments();
+            return array_of(is_reader ? best_action(self, variables)
+                                      : self.act(variables, explore, environment));
+          },
+          py::arg("observation"), py::arg("explore") = true, py::arg("environment") = 0)
+      .def(
+          "learn",
+          [](Controller& self, const ArrayArgument<double>& observation,
+             const ArrayArgument<double>& action, double reward,
+             const ArrayArgument<double>& next_observation, bool terminated,
+             std::size_t environment) {
+            wait_for_readers_of(self);
+            self.learn(bindings::flat(observation), bindings::flat(action), reward,
+                       bindings::flat(next_observation), terminated, environment);
+          },
+          py::arg("observation"), py::arg("action"), py::arg("reward"), py::arg("next_observation"),
+          py::arg("terminated"), py::arg("environment") = 0)
+      .def(
+          "act_each",
+          [](Controller& self, const ArrayArgument<double>& observations,
+             const py::list& environments) {
+            py::array_t<double> actions(
+                {static_cast<std::size_t>(observations.shape(0)), self.n_dimensions()});
+            std::ranges::fill_n(actions.mutable_data(), actions.size(), 0.0);
+            for (const py::handle environment : environments) {
+              const auto i = environment.cast<std::size_t>();
+              const auto action =
+                  self.act(row(observations, "observations", self.n_variables(), i), true, i);
+              std::ranges::copy(action, actions.mutable_data(static_cast<py::ssize_t>(i)));
+            }
+            return actions;
+          },
+          py::arg("observations"), py::arg("environments"),
+          "Exploring actions in some environments, in order; other rows are zeros")
+      .def(
+          "learn_each", &learn_each, py::arg("observations"), py::arg("actions"),
+          py::arg("rewards"), py::arg("next_observations"), py::arg("terminated"),
+          py::arg("environments"), py::arg("progress"),
+          "Learns in some environments, in order; `progress` is set between two, if given. Returns "
+          "how many were learned: all before the first that cannot be, whose error is raised where "
+          "it comes first")
+      .def(
+          "state_of",
+          [array_of](Controller& self, const ArrayArgument<double>& observation) {
+            return array_of(self.state_of(bindings::flat(observation)));
+          },
+          py::arg("observation"), "The agent's state, shape (n_inputs,)")
+      .def(
+          "action_of",
+          [](const Controller& self, std::size_t index, std::size_t dimension) {
+            return self.actions().of_index(index, dimension);
+          },
+          py::arg("index"), py::arg("dimension"))
+      .def(
+          "range_use",
+          [](const Controller& self) {
+            std::vector<std::optional<std::pair<double, double>>> use;
+            for (const auto& one : self.range_use()) {
+              use.push_back(one ? std::optional(std::pair(one->share_used, one->share_beyond))
+                                : std::nullopt);
+            }
+            return use;
+          },
+          "Of each variable: the share of its range that it used, and how often it was beyond")
+      .def(
+          "state", [](const Controller& self) { return bindings::arrays_of(core::state_of(self)); },
+          "What it remembers: arrays by name");
+}
