@@ -66,7 +66,10 @@ def _ends_of_parts(space: gym.Space[Any]) -> Iterator[tuple[NDArray[Any], NDArra
 
 def _n_variables(space: gym.Space[Any]) -> int:
     if not isinstance(space, gym.Space):
-        raise TypeError(f"observation_space must be a Gymnasium space, got {shown(space)}")
+        raise TypeError(
+            f"observation_space must be a Gymnasium space, such as env.observation_space, got"
+            f" {shown(space)}"
+        )
     try:
         return gym.spaces.flatdim(space)
     except (NotImplementedError, ValueError):

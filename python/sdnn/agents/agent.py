@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import secrets
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
@@ -43,6 +44,7 @@ from sdnn.arguments import (
     whole,
 )
 from sdnn.config import WARM_UP, values_of
+from sdnn.display import Displayed
 from sdnn.files import Arrays, Description, write_file
 
 if TYPE_CHECKING:
@@ -56,7 +58,7 @@ Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
 
 
-class Agent(abc.ABC, Generic[Approximator, Learning]):
+class Agent(Displayed, abc.ABC, Generic[Approximator, Learning]):
     """An agent in a Gymnasium environment that learns one transition at a time.
 
     ``train`` is a loop over environments; a robot that brings its own loop calls `begin_episode`,
@@ -71,8 +73,8 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         Box with finite bounds, Discrete, MultiDiscrete or MultiBinary.
     approximator, learning : optional
         Settings of the agent's parts; sizes are taken from the spaces.
-    seed : int
-        The root of every random stream of the agent.
+    seed : int, optional
+        The root of every random stream of the agent. None: drawn, and kept as ``agent.seed``.
     observation_range : (low, high) or "adaptive", optional
         Two numbers, or two for each observed variable; values outside are clipped. By default the
         bounds of the space, and what the warm-up sees where these are infinite. ``"adaptive"``:
@@ -117,7 +119,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         *,
         approximator: Approximator | None = None,
         learning: Learning | None = None,
-        seed: int = 0,
+        seed: int | None = 0,
         observation_range: Ranges | None = None,
         angles: Sequence[int] = (),
         angle_pairs: AnglePairs = "none",
@@ -154,7 +156,7 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             if not is_of_class(part, kind):
                 raise TypeError(f"{name} must be a {kind.__name__}, got {shown(part)}")
         self._approximator, self.learning = approximator, learning
-        self.seed = seed_of(seed)
+        self.seed = secrets.randbits(63) if seed is None else seed_of(seed)
         self._warm_up_steps = whole("warm_up_steps", steps, int(WARM_UP.low), int(WARM_UP.high))
 
     def _make(self, **made_of: Any) -> None:
@@ -183,6 +185,16 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         """Settings as used; sizes that follow from the spaces are known after the warm-up."""
         used: Any = self._controller.approximator
         return used  # type: ignore[no-any-return]
+
+    def _facts(self) -> dict[str, object]:
+        """Return what is shown of it."""
+        inputs = "found in the warm-up" if self.is_warming_up else len(self.inputs)
+        return {
+            "observation": self.observation_space,
+            "action": self.action_space,
+            "inputs": inputs,
+            "seed": self.seed,
+        }
 
     @property
     def is_warming_up(self) -> bool:
@@ -291,8 +303,43 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
             raise ValueError(f"observation must not hold NaN, got {vector}")
         return vector
 
-    def learn(self, transition: Transition, environment: int = 0) -> None:
-        """Learn one transition.
+    def predict(
+        self,
+        observation: Any,
+        state: None = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Any, None]:
+        """Choose as Stable-Baselines3's models do, for its tools such as ``evaluate_policy``.
+
+        Parameters
+        ----------
+        observation : element of the observation space, or an array of several
+            Several are those of a vector environment, along the first axis.
+        state, episode_start
+            Of recurrent models; not used.
+        deterministic : bool
+            False: explore, as `act` does, in environment 0.
+
+        Returns
+        -------
+        The action, or an array of actions along the first axis, and None.
+        """
+        explore = not flag("deterministic", deterministic)
+        space = self.observation_space
+        n_axes = None if space.shape is None else len(space.shape)
+        if n_axes is not None and np.ndim(observation) == n_axes + 1:
+            return np.stack([self.act(one, explore) for one in observation]), None
+        return self.act(observation, explore), None
+
+    def learn(
+        self,
+        transition: Transition | None = None,
+        environment: int = 0,
+        *,
+        total_timesteps: Any = None,
+    ) -> None:
+        """Learn one transition; ``total_timesteps`` is refused: `train` runs a whole training.
 
         Any action of the space can be learned, not only that of the last `act` (except by
         `FuzzyQLearning`); of a ``Box`` the nearest one is. A terminated transition begins no
@@ -311,7 +358,11 @@ class Agent(abc.ABC, Generic[Approximator, Learning]):
         """
         self._check_environment(environment)
         if not isinstance(transition, Transition):
-            raise TypeError(f"transition must be a Transition, got {shown(transition)}")
+            given = transition if total_timesteps is None else total_timesteps
+            raise TypeError(
+                f"transition must be a Transition, got {shown(given)}: to learn for so many steps,"
+                " call train(env, steps=...)"
+            )
         observation, action, reward, next_observation, terminated = transition
         self._controller.learn(
             self._observations.vector("observation", observation),

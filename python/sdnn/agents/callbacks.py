@@ -141,6 +141,36 @@ class StopTrainingOnRewardThreshold(Callback):
         return len(last) == self.patience and all(mean >= self.mean_return for mean in last)
 
 
+class SaveBestAgent(Callback):
+    """Saves the agent whenever an evaluation has a higher mean return than all before it."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = path_of("path", path)
+
+    def on_row(self, training: Training, row: Row) -> None:
+        """Save after such an evaluation."""
+        if row["kind"] == "evaluation" and n_since_best(training) == 0:
+            training.agent.save(self.path)
+
+
+class StopTrainingOnNoImprovement(Callback):
+    """Stops when so many evaluations in a row were not better than the best before them."""
+
+    def __init__(self, max_evaluations: int) -> None:
+        self.max_evaluations = whole("max_evaluations", max_evaluations, 1, 2**53)
+
+    def on_row(self, training: Training, row: Row) -> None:
+        """Count the evaluations since the best one."""
+        if row["kind"] == "evaluation" and n_since_best(training) >= self.max_evaluations:
+            training.stop()
+
+
+def n_since_best(training: Training) -> int:
+    """Return how many evaluations came after the first one with the highest mean return."""
+    means = [mean_return for _, mean_return in training.evaluations]
+    return len(means) - 1 - means.index(max(means))
+
+
 class Schedule(Callback):
     """Sets learning rate and epsilon to functions of the progress, before every step.
 

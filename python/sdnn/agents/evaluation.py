@@ -33,6 +33,7 @@ from sdnn.agents.spaces import (
     step_env,
 )
 from sdnn.arguments import has_methods, seed_of, shown, whole
+from sdnn.display import Displayed
 
 _LONG = 100_000
 """Warn after this many steps in one episode."""
@@ -45,8 +46,8 @@ class Acts(Protocol):
         """Choose an action."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Evaluation:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Evaluation(Displayed):
     """The result of greedy episodes.
 
     Undiscounted sums of rewards, numbers of steps, and whether each ended in a terminal state
@@ -66,6 +67,12 @@ class Evaluation:
     def median_return(self) -> float:
         """The median of the returns."""
         return float(np.median(self.returns))
+
+    def _facts(self) -> dict[str, object]:
+        """Return what is shown of it."""
+        low, high = self.returns.min(), self.returns.max()
+        spread = f"{self.mean_return:.5g} ({low:.5g} to {high:.5g})"
+        return {"episodes": self.returns.size, "mean return": spread}
 
     def row(self) -> dict[str, Any]:
         """Return it as values that JSON can hold."""

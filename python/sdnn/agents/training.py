@@ -32,6 +32,7 @@ from sdnn.agents.files import (
 )
 from sdnn.agents.spaces import UnusableStepError, require_same_kind, require_single
 from sdnn.arguments import flag, has_methods, path_of, shown, whole
+from sdnn.display import Displayed
 from sdnn.interrupts import Interrupts
 
 if TYPE_CHECKING:
@@ -46,8 +47,8 @@ _STATE = ("n_steps", "n_episodes", "n_rows", "evaluations")
 """Attributes that are saved as they are."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrainingResult:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class TrainingResult(Displayed):
     """The result of a training.
 
     ``rows`` are those of the episodes and evaluations since it was begun, or last loaded;
@@ -69,6 +70,16 @@ class TrainingResult:
         """Steps and mean returns of the evaluations, shape (n, 2)."""
         found = [(r["step"], r["mean_return"]) for r in self.rows if r["kind"] == "evaluation"]
         return np.array(found, np.float64).reshape(-1, 2)
+
+    def _facts(self) -> dict[str, object]:
+        """Return what is shown of it."""
+        facts: dict[str, object] = {"steps": self.n_steps, "episodes": self.n_episodes}
+        last = self.returns[-100:]
+        if last.size:
+            facts[f"mean return of the last {last.size}"] = f"{last.mean():.5g}"
+        if len(self.evaluations):
+            facts["last evaluation"] = f"{self.evaluations[-1, 1]:.5g}"
+        return facts
 
 
 class Training:
@@ -485,5 +496,7 @@ def _adapter_for(env: Any) -> EnvironmentAdapter:
     return vector_adapter(env)
 
 
-def _optional(name: str, value: int | None) -> int | None:
+def _optional(name: str, value: float | None) -> int | None:
+    if isinstance(value, float) and value.is_integer():  # such as 1e5
+        value = int(value)
     return None if value is None else whole(name, value, 1, 2**53)

@@ -21,6 +21,7 @@ from sdnn.agents import (
     Callback,
     CheckpointCallback,
     Evaluation,
+    SaveBestAgent,
     Scaling,
     TensorBoard,
     Training,
@@ -32,6 +33,7 @@ from sdnn.agents import (
 from sdnn.agents.callbacks import Row
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.agents.spaces import require_same_kind
+from sdnn.display import Displayed
 from sdnn.files import lock, open_to_append, remove_abandoned_files, write_whole
 from sdnn.interrupts import Interrupts
 from sdnn.machine import instruction_set
@@ -56,7 +58,7 @@ if TYPE_CHECKING:
 CONFIG = "config.json"
 LOCK = ".lock"
 CHECKPOINT = "checkpoint.safetensors"
-AGENT = "agent.safetensors"
+AGENT, BEST = "agent.safetensors", "best.safetensors"
 STORE_SECONDS = 5.0  # between commits of rows
 TENSORBOARD = "tensorboard"
 
@@ -97,7 +99,7 @@ class RunEvaluation(Evaluation):
     is_warming_up: bool
 
 
-class Run:
+class Run(Displayed):
     """A run in its folder, which `create` and `open` make.
 
     ``spec`` is the specification it was begun with, ``goals`` are those it was given later.
@@ -140,6 +142,15 @@ class Run:
         except (ConfigError, TypeError) as error:
             raise ConfigError("goals", f"must be a list of goals: {error}", str(path)) from error
         return cls(place, read_spec(path), made)
+
+    def _facts(self) -> dict[str, object]:
+        """Return what is shown of it."""
+        return {
+            "folder": self.folder,
+            "task": self.spec.task,
+            "agent": self.spec.label,
+            "seed": self.spec.seed,
+        }
 
     def check(self) -> None:
         """Make all that is needed once, to see that it works; ConfigError if not."""
@@ -191,6 +202,8 @@ class Run:
                 )
             checkpoints = _StoredCheckpoints(self, store)
             listed = [checkpoints, *callbacks]
+            if self.spec.output.keep_best:
+                listed.append(SaveBestAgent(self.folder / BEST))
             if self.spec.output.tensorboard:
                 listed.append(tensorboard_in(self.folder))
             has_goal = steps is not None or episodes is not None

@@ -323,6 +323,8 @@ class OutputSpec(Settings, frozen=True):
 
     checkpoint_every: Count = 10_000
     """Steps between checkpoints."""
+    keep_best: bool = False
+    """Keep the agent of the best evaluation, as ``best.safetensors``."""
     tensorboard: bool = False
     """Write the numbers for TensorBoard, too."""
 

@@ -711,6 +711,13 @@ def test_a_run_is_not_overwritten(invoke):
     assert (result.exit_code, Path("file").read_text()) == (1, "mine")
 
 
+def test_the_best_agent_is_kept_where_it_is_asked_for(invoke):
+    invoke("train", DRIFTING, *SHORT, "--out", "kept", "--keep-best")
+    invoke("train", DRIFTING, *SHORT, "--out", "plain")
+    assert load_agent("kept/best.safetensors").kind == "sdnn-c"
+    assert not Path("plain/best.safetensors").exists()
+
+
 def test_ranges_that_do_not_suit_are_named(invoke):
     options = [
         "--agent",

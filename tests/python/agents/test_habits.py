@@ -1,0 +1,131 @@
+"""Users of Stable-Baselines3 find what they look for; agents and results show what they are."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from refusals import refuses
+from sdnn.agents import (
+    Callback,
+    SaveBestAgent,
+    SDNNSarsa,
+    StopTrainingOnNoImprovement,
+    Training,
+    evaluate,
+    load_agent,
+)
+
+
+@pytest.fixture(scope="module")
+def trained():
+    env = gym.make("CartPole-v1")
+    agent = SDNNSarsa(env.observation_space, env.action_space, seed=1)
+    return agent, env, agent.train(env, steps=1.5e3)
+
+
+def test_predict_takes_one_observation_or_several(trained):
+    agent, env, _ = trained
+    several = np.stack([env.reset(seed=n)[0] for n in range(5)])
+    actions, state = agent.predict(several, None, np.ones(5, bool), deterministic=True)
+    assert state is None
+    assert actions.tolist() == [agent.act(one, explore=False) for one in several]
+    assert agent.predict(several[0])[0] == actions[0]
+    assert agent.predict(several[0], deterministic=False)[0] in env.action_space
+    refuses("deterministic", agent.predict, several[0], deterministic="yes", error=TypeError)
+
+
+def test_predict_of_listed_states_and_of_boxes():
+    lake = gym.make("FrozenLake-v1")
+    agent = SDNNSarsa(lake.observation_space, lake.action_space)
+    assert agent.predict(np.array([0, 3, 5]))[0].shape == (3,)
+    assert agent.predict(3)[0] in lake.action_space
+    swing = gym.make("Pendulum-v1")
+    agent = SDNNSarsa(swing.observation_space, swing.action_space)
+    assert agent.predict(np.zeros((4, 3), np.float32))[0].shape == (4, 1)
+    assert agent.predict(np.zeros(3, np.float32))[0].shape == (1,)
+
+
+def test_learn_for_so_many_steps_is_told_of_train(trained):
+    for given in ({"total_timesteps": 1000}, {"transition": 1000}):
+        with pytest.raises(TypeError, match=r"got 1000.*train\(env, steps"):
+            trained[0].learn(**given)
+
+
+def test_a_seed_that_is_none_is_drawn_and_kept():
+    env = gym.make("CartPole-v1")
+    first, second = (SDNNSarsa(env.observation_space, env.action_space, seed=None) for _ in "ab")
+    assert first.seed != second.seed
+
+
+def test_steps_may_be_a_whole_float(trained):
+    agent, env, result = trained
+    assert result.n_steps == 1500
+    refuses("steps", agent.train, env, steps=1500.5)
+
+
+def test_what_is_shown(trained):
+    agent, env, result = trained
+    found = evaluate(agent, env, episodes=3)
+    assert "Discrete(2)" in repr(agent)
+    assert "steps 1500" in repr(result)
+    assert f"{found.mean_return:.5g}" in repr(found)
+    for one in (agent, result, found):
+        assert one._repr_html_().count("<tr>") == len(one._facts())
+    assert (
+        "&lt;"
+        in type("Odd", (type(found),), {"_facts": lambda self: {"a": "<b>"}})(
+            **vars(found)
+        )._repr_html_()
+    )
+
+
+class Means(Callback):
+    """Gives evaluations that are known."""
+
+    def __init__(self, means):
+        self.means = iter(means)
+
+    def on_row(self, training, row):
+        if row["kind"] == "evaluation":
+            step, _ = training.evaluations[-1]
+            training.evaluations[-1] = (step, next(self.means))
+
+
+def run(tmp_path, means, *callbacks):
+    env = gym.make("CartPole-v1")
+    agent = SDNNSarsa(
+        env.observation_space, env.action_space, inputs="all", angle_pairs="none",
+        observation_range=(-3.0, 3.0), seed=2,
+    )  # fmt: skip
+    training = Training(
+        agent, env, steps=60, evaluate_every=10, evaluation_episodes=1,
+        evaluation_env=gym.make("CartPole-v1"), callbacks=[Means(means), *callbacks],
+    )  # fmt: skip
+    training.run()
+    return training
+
+
+def test_the_agent_of_the_best_evaluation_is_kept(tmp_path):
+    path = tmp_path / "best.safetensors"
+
+    class Note(Callback):
+        def __init__(self):
+            self.saved = []
+
+        def on_row(self, training, row):
+            if row["kind"] == "evaluation":
+                bytes_now = path.read_bytes()
+                if not self.saved or self.saved[-1][1] != bytes_now:
+                    self.saved.append((training.n_steps, bytes_now))
+
+    note = Note()
+    run(tmp_path, [1.0, 3.0, 2.0, 3.0, 4.0, 0.0], SaveBestAgent(path), note)
+    assert [steps for steps, _ in note.saved] == [10, 20, 50]
+    assert isinstance(load_agent(path), SDNNSarsa)
+
+
+def test_a_training_without_improvement_stops(tmp_path):
+    stop = StopTrainingOnNoImprovement(max_evaluations=2)
+    assert run(tmp_path, [1.0, 3.0, 2.0, 3.0, 9.0, 9.0], stop).n_steps == 40
+    assert run(tmp_path, [1.0, 3.0, 2.0, 4.0, 3.0, 5.0], stop).n_steps == 60
+    refuses("max_evaluations", StopTrainingOnNoImprovement, 0)
