@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.agents.episode import Transition
 from sdnn.agents.files import Statistics, read_agent, read_statistics, register
+from sdnn.agents.model import Model
 from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import (
     Actions,
@@ -44,7 +45,6 @@ from sdnn.arguments import (
     whole,
 )
 from sdnn.config import WARM_UP, values_of
-from sdnn.display import Displayed
 from sdnn.files import Arrays, Description, write_file
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
 
 
-class Agent(Displayed, abc.ABC, Generic[Approximator, Learning]):
+class Agent(Model, abc.ABC, Generic[Approximator, Learning]):
     """An agent in a Gymnasium environment that learns one transition at a time.
 
     ``train`` is a loop over environments; a robot that brings its own loop calls `begin_episode`,
@@ -186,16 +186,6 @@ class Agent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         used: Any = self._controller.approximator
         return used  # type: ignore[no-any-return]
 
-    def _facts(self) -> dict[str, object]:
-        """Return what is shown of it."""
-        inputs = "found in the warm-up" if self.is_warming_up else len(self.inputs)
-        return {
-            "observation": self.observation_space,
-            "action": self.action_space,
-            "inputs": inputs,
-            "seed": self.seed,
-        }
-
     @property
     def is_warming_up(self) -> bool:
         """Whether the agent still acts at random to see the ranges of its observations."""
@@ -303,35 +293,6 @@ class Agent(Displayed, abc.ABC, Generic[Approximator, Learning]):
             raise ValueError(f"observation must not hold NaN, got {vector}")
         return vector
 
-    def predict(
-        self,
-        observation: Any,
-        state: None = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
-    ) -> tuple[Any, None]:
-        """Choose as Stable-Baselines3's models do, for its tools such as ``evaluate_policy``.
-
-        Parameters
-        ----------
-        observation : element of the observation space, or an array of several
-            Several are those of a vector environment, along the first axis.
-        state, episode_start
-            Of recurrent models; not used.
-        deterministic : bool
-            False: explore, as `act` does, in environment 0.
-
-        Returns
-        -------
-        The action, or an array of actions along the first axis, and None.
-        """
-        explore = not flag("deterministic", deterministic)
-        space = self.observation_space
-        n_axes = None if space.shape is None else len(space.shape)
-        if n_axes is not None and np.ndim(observation) == n_axes + 1:
-            return np.stack([self.act(one, explore) for one in observation]), None
-        return self.act(observation, explore), None
-
     def learn(
         self,
         transition: Transition | None = None,
@@ -357,12 +318,13 @@ class Agent(Displayed, abc.ABC, Generic[Approximator, Learning]):
             action, may have been learned: load a checkpoint.
         """
         self._check_environment(environment)
-        if not isinstance(transition, Transition):
-            given = transition if total_timesteps is None else total_timesteps
+        if total_timesteps is not None:
+            given = shown(total_timesteps)
             raise TypeError(
-                f"transition must be a Transition, got {shown(given)}: to learn for so many steps,"
-                " call train(env, steps=...)"
+                f"total_timesteps must be None, got {given}: train(env, steps=...) learns so long"
             )
+        if not isinstance(transition, Transition):
+            raise TypeError(f"transition must be a Transition, got {shown(transition)}")
         observation, action, reward, next_observation, terminated = transition
         self._controller.learn(
             self._observations.vector("observation", observation),

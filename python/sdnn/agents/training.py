@@ -73,13 +73,9 @@ class TrainingResult(Displayed):
 
     def _facts(self) -> dict[str, object]:
         """Return what is shown of it."""
-        facts: dict[str, object] = {"steps": self.n_steps, "episodes": self.n_episodes}
-        last = self.returns[-100:]
-        if last.size:
-            facts[f"mean return of the last {last.size}"] = f"{last.mean():.5g}"
-        if len(self.evaluations):
-            facts["last evaluation"] = f"{self.evaluations[-1, 1]:.5g}"
-        return facts
+        last = [f"{mean:.5g}" for _, mean in self.evaluations[-1:]] or ["none"]
+        facts = {"steps": self.n_steps, "episodes": self.n_episodes}
+        return {**facts, "last evaluation": last[0]}
 
 
 class Training:
