@@ -24,8 +24,9 @@ from sdnn.runs.store import ResultStore
 from sdnn.runs.study import Study
 from sdnn.runs.trial import TrainingTrial, TrialKey, TrialRecord, TrialRows
 
-N_LAST_EPISODES = 100
-"""Greedy episodes of the last evaluation, whatever the others have."""
+MILESTONES = (20_000, 50_000, 60_000, 100_000, 120_000, 200_000, 300_000)
+"""Steps after which, and at the end, agents are evaluated by more greedy episodes than else."""
+N_MILESTONE_EPISODES = 100
 
 Curves = Mapping[tuple[str, str], Sequence[Mapping[str, Any]]]
 """Curves of the trials by case and variant."""
@@ -38,7 +39,8 @@ class Clock(Callback):
         self.curve: dict[str, Any] = {"steps": [], "cpu_seconds": [], "mean_return": []}
         training.callbacks = (*training.callbacks, self)
         training.evaluation_env = _Pausing(training.evaluation_env, self)
-        self._expect_last(training)
+        self._few = training.evaluation_episodes
+        self._expect_milestone(training)
         self._began, self._paused = time.process_time(), None
 
     def pause(self) -> None:
@@ -55,14 +57,14 @@ class Clock(Callback):
         self.curve["mean_return"].append(round(row["mean_return"], 2))
         if training.is_finished:
             self.curve["bytes"] = n_bytes(training.agent)
-        self._expect_last(training)
+        self._expect_milestone(training)
         self._began += time.process_time() - self._paused
         self._paused = None
 
-    @staticmethod
-    def _expect_last(training: Training) -> None:
-        if training.n_steps + training.evaluate_every >= training.steps:
-            training.evaluation_episodes = N_LAST_EPISODES
+    def _expect_milestone(self, training: Training) -> None:
+        following = min(training.n_steps + training.evaluate_every, training.steps)
+        is_one = following in (*MILESTONES, training.steps)
+        training.evaluation_episodes = max(self._few, N_MILESTONE_EPISODES * is_one)
 
 
 class _Pausing(gym.Wrapper):
@@ -125,14 +127,10 @@ def run_study(
     kind: str,
     study: Study,
     given: argparse.Namespace,
-    change: Callable[[RunSpec, str], RunSpec] = lambda spec, case: spec,
 ) -> None:
-    """Run the trials of a study that are not stored, and store their curves under a kind.
-
-    ``change`` makes another specification of that of a case.
-    """
+    """Run the trials of a study that are not stored, and store their curves under a kind."""
     specs = [
-        (case, change(one.spec, case))
+        (case, one.spec)
         for (case, variant), one in study.combinations.items()
         if is_wanted((variant, case), given)
     ]
@@ -146,7 +144,6 @@ def curves(
     kind: str,
     study: Study,
     given: argparse.Namespace,
-    change: Callable[[RunSpec, str], RunSpec] = lambda spec, case: spec,
 ) -> Curves:
     """Read the curves of a study's trials.
 
@@ -156,7 +153,7 @@ def curves(
     stored = measured(kind, given.folder)
     found = {}
     for (case, variant), one in study.combinations.items():
-        plan = plan_of([(case, change(one.spec, case))], study.n_trials, study.seed)
+        plan = plan_of([(case, one.spec)], study.n_trials, study.seed)
         own = [stored[planned.key] for planned in plan if planned.key in stored]
         old = [curve for key, curve in stored.items() if (*key[:2], key[4]) == (case, variant, "")]
         if own or old:

@@ -25,6 +25,7 @@ TASKS = {
     "MountainCar": Task(-110.0, -200.0),
     "MountainCarContinuous": Task(90.0, -33.1),
     "Acrobot": Task(-100.0, -486.5),
+    "LunarLander": Task(200.0, -181.4),
     "LunarLanderContinuous": Task(200.0, -210.4),
     # Solved is what comes near the best of some hundred proportional controllers: -13.6 and -23.6.
     "Reaching": Task(-20.0, -112.2),
@@ -40,6 +41,34 @@ TASKS = {
     "HalfCheetah": Task(4800.0, -236.6),
 }
 CLEAN = "clean"
+
+
+class Goal(NamedTuple):
+    """What the agent with defaults is to reach: a return after steps, in a share of the seeds."""
+
+    steps: int
+    at_least: float
+    share: float
+
+
+GOALS = {
+    "CartPole": Goal(50_000, 475.0, 1.0),
+    "Pendulum": Goal(60_000, -200.0, 0.9),
+    "MountainCarContinuous": Goal(60_000, 90.0, 1.0),
+    "Acrobot": Goal(100_000, -100.0, 0.9),
+    "LunarLander": Goal(300_000, 200.0, 0.6),
+    "CliffWalking": Goal(20_000, -17.0, 1.0),
+    "FrozenLake": Goal(100_000, 0.69, 0.8),
+    "Taxi": Goal(200_000, 0.0, 1.0),
+    "InvertedPendulum": Goal(100_000, 1000.0, 1.0),
+    "CartPole irrelevant-8": Goal(100_000, 475.0, 1.0),
+    "CartPole correlated-8": Goal(100_000, 475.0, 1.0),
+    "CartPole noise-05-copies": Goal(100_000, 490.0, 1.0),
+    "Pendulum irrelevant-8": Goal(120_000, -200.0, 0.9),
+    "Pendulum correlated-8": Goal(120_000, -200.0, 0.9),
+    "Pendulum noise-05-copies": Goal(100_000, -230.0, 0.9),
+}
+"""By case."""
 
 
 def parts_of(case: str) -> tuple[str, str]:

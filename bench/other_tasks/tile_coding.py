@@ -9,7 +9,6 @@ author (github.com/khurramjaved96/SwiftTD) and the settings of its example.
 from __future__ import annotations
 
 import itertools
-from collections import deque
 from dataclasses import dataclass
 
 import gymnasium as gym
@@ -17,6 +16,14 @@ import numpy as np
 
 from sdnn.bounds import flat_bounds
 from sdnn.runs.registry import AgentEntry, register
+
+try:
+    from numba import njit
+except ImportError:  # the same, but slow
+
+    def njit(function):
+        """Leave a function as it is."""
+        return function
 
 
 class TileCoding:
@@ -162,8 +169,10 @@ class TileCodingSarsa:
         self._rng = np.random.default_rng(seed)
         # Traces below a hundredth are forgotten.
         n_kept = 1 if self._fade == 0 else int(np.ceil(np.log(0.01) / np.log(self._fade)))
-        self._recent: deque[tuple[int, np.ndarray]] = deque(maxlen=n_kept)
         self._fades = self._fade ** np.arange(n_kept)
+        self._recent = np.full((n_kept, n_active), -1)  # tiles of the last steps, a ring
+        self._last = np.full(self.weights.size, -1)  # step in which a tile was active last
+        self._now = self._n_steps = 0
 
     @property
     def n_bytes(self) -> int:
@@ -185,8 +194,7 @@ class TileCodingSarsa:
 
     def begin_episode(self) -> None:
         """Forget the traces."""
-        self._recent.clear()
-        self._next = None
+        self._n_steps, self._next = 0, None
 
     def act(self, observation, explore=True):
         """Choose an action, a best one or the one that was learned with."""
@@ -210,21 +218,33 @@ class TileCodingSarsa:
         """Learn a step, with the action that follows it."""
         action, tiles, _ = self._next
         error = transition.reward - self.weights[action, tiles].sum()
-        self._recent.appendleft((action, tiles))
+        self._now, self._n_steps = self._now + 1, self._n_steps + 1
+        active = action * self.weights.shape[1] + tiles
+        remember(self._recent[self._now % len(self._recent)], self._last, active, self._now)
         if not transition.terminated:
             self._next = self._choose_at(self.tiles(transition.next_observation))
             error += self._discount * self._next[2]
-        self._correct(self._step_size * error)
+        correct(
+            self.weights.ravel(), self._recent, self._last, self._now, self._n_steps,
+            self._step_size * error * self._fades,
+        )  # fmt: skip
 
-    def _correct(self, change) -> None:
-        actions = np.concatenate([np.full(tiles.size, a) for a, tiles in self._recent])
-        tiles = np.concatenate([tiles for _, tiles in self._recent])
-        n_each = self._recent[0][1].size
-        traces = np.repeat(self._fades[: len(self._recent)], n_each)
-        # Replacing traces: of a tile that was active more than once the latest counts.
-        flat = actions * self.weights.shape[1] + tiles
-        _, latest = np.unique(flat, return_index=True)
-        self.weights.ravel()[flat[latest]] += change * traces[latest]
+
+@njit
+def remember(row, last, active, now):
+    """Put the active tiles into a row of the recent ones, each once."""
+    for n, tile in enumerate(active):
+        row[n] = -1 if last[tile] == now else tile
+        last[tile] = now
+
+
+@njit
+def correct(weights, recent, last, now, n_steps, changes):
+    """Change the tiles of an episode's last steps; of what was active twice the latest counts."""
+    for age in range(min(n_steps, len(recent))):
+        for tile in recent[(now - age) % len(recent)]:
+            if tile >= 0 and last[tile] == now - age:
+                weights[tile] += changes[age]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -248,18 +268,18 @@ class SwiftSarsa(TileCodingSarsa):
     def __init__(self, *spaces, learning, **options) -> None:
         super().__init__(*spaces, learning=learning, **options)
         self._settings, n = learning, self.weights.size
-        self._log_steps = np.full(n, np.log(learning.step_size))
-        # Traces of the weights, of their derivatives by the step sizes, and these derivatives.
-        self._z, self._z_delta, self._z_bar, self._p, self._delta_w = np.zeros((5, n))
-        self._h, self._h_old, self._h_next, self._begun = np.zeros((4, n))
-        self._eligible, self._value, self._v_delta = np.zeros(0, int), 0.0, 0.0
+        self._numbers = np.zeros((n, len(NUMBERS)))
+        self._numbers[:, LOG_STEP] = np.log(learning.step_size)
+        self.weights = self._numbers[:, W].reshape(self.weights.shape)
+        self._eligible, self._n_eligible = np.zeros(n, np.int64), 0
+        self._value, self._v_delta = 0.0, 0.0
 
     def begin_episode(self) -> None:
         """Forget the traces."""
         super().begin_episode()
-        for trace in (self._z, self._z_delta, self._z_bar, self._p, self._delta_w):
-            trace[self._eligible] = 0.0
-        self._eligible, self._value, self._v_delta = np.zeros(0, int), 0.0, 0.0
+        for trace in TRACES:
+            self._numbers[self._eligible[: self._n_eligible], trace] = 0.0
+        self._n_eligible, self._value, self._v_delta = 0, 0.0, 0.0
         self._is_first = True
 
     def learn(self, transition) -> None:
@@ -267,7 +287,7 @@ class SwiftSarsa(TileCodingSarsa):
         if self._is_first:
             self.step(self._flat(*self._next[:2]), 0.0)
             self._is_first = False
-        following = np.zeros(0, int)
+        following = np.zeros(0, np.int64)
         if not transition.terminated:
             self._next = self._choose_at(self.tiles(transition.next_observation))
             following = self._flat(*self._next[:2])
@@ -278,44 +298,79 @@ class SwiftSarsa(TileCodingSarsa):
 
     def step(self, active, reward: float) -> None:
         """Learn a reward and the value of the weights that are active after it."""
-        weights, own, e = self.weights.ravel(), self._settings, self._eligible
-        value = weights[active].sum()
+        own = self._settings
+        value = self._numbers[active, W].sum()
         error = reward + self._discount * value - self._value
-        self._delta_w[e] = error * self._z[e] - self._z_delta[e] * self._v_delta
-        weights[e] += self._delta_w[e]
-        change = own.meta_step_size * (error - self._v_delta) * self._p[e]
-        self._log_steps[e] = np.clip(
-            self._log_steps[e] + change * np.exp(-self._log_steps[e]),
-            np.log(own.smallest_step_size), np.log(own.largest_rate),
+        self._n_eligible = follow(
+            self._numbers, self._eligible, self._n_eligible, error, self._v_delta, self._fade,
+            own.meta_step_size, np.log(own.smallest_step_size), np.log(own.largest_rate),
+            own.smallest_trace,
         )  # fmt: skip
-        self._h_old[e] = self._h[e]
-        self._h[e] = self._h_next[e] + error * self._z_bar[e] - self._z_delta[e] * self._v_delta
-        self._h_next[e] = self._h[e]
-        self._z_delta[e] = 0.0
-        for trace in (self._z, self._p, self._z_bar):
-            trace[e] *= self._fade
-        lost = e[self._z[e] <= self._begun[e] * own.smallest_trace]
-        for trace in (self._z, self._p, self._z_bar, self._delta_w):
-            trace[lost] = 0.0
-        self._begin_traces(active)
-        self._eligible = np.union1d(e[self._z[e] != 0.0], active)
+        self._v_delta, self._n_eligible = begin(
+            self._numbers, self._eligible, self._n_eligible, active, own.largest_rate,
+            np.log(own.step_size_decay),
+        )  # fmt: skip
         self._value = value
 
-    def _begin_traces(self, a) -> None:
-        own, steps = self._settings, np.exp(self._log_steps[a])
-        self._v_delta = self._delta_w[a].sum()
-        overlap, rate = self._z[a].sum(), steps.sum()
-        self._z_delta[a] = self._begun[a] = steps * min(1.0, own.largest_rate / max(rate, 1e-300))
-        if rate > own.largest_rate:
-            for derivative in (self._h_next, self._h, self._h_old, self._z_bar):
-                derivative[a] = 0.0
-            self._log_steps[a] += np.log(own.step_size_decay)
-        begun = self._z_delta[a]
-        self._z[a] += begun * (1.0 - overlap)
-        self._p[a] += self._h_old[a]
-        self._z_bar[a] += begun * (1.0 - overlap - self._z_bar[a])
-        kept = self._h_old[a] * (self._z[a] - begun)
-        self._h_next[a] = self._h[a] - kept - self._h[a] * begun
+
+NUMBERS = range(11)
+# A weight; the logarithm of its step size; the traces of the weight, of the change by its step, of
+# its derivative by the step size and of the step size's gradient; the last change; the derivative
+# as it is, was and will be; and what the trace began with.
+W, LOG_STEP, Z, Z_DELTA, Z_BAR, P, DELTA_W, H, H_OLD, H_NEXT, BEGUN = NUMBERS
+TRACES = (Z, Z_DELTA, Z_BAR, P, DELTA_W)
+
+
+@njit
+def follow(
+    numbers, eligible, n_eligible, error, v_delta, fade, meta_step, low, high, smallest_trace
+):
+    """Change the eligible weights; returns how many stay eligible, at the front of the list."""
+    n_kept = 0
+    for i in eligible[:n_eligible]:
+        x = numbers[i]
+        x[DELTA_W] = error * x[Z] - x[Z_DELTA] * v_delta
+        x[W] += x[DELTA_W]
+        change = meta_step * (error - v_delta) * x[P]
+        x[LOG_STEP] = min(max(x[LOG_STEP] + change * np.exp(-x[LOG_STEP]), low), high)
+        x[H_OLD] = x[H]
+        x[H] = x[H_NEXT] + error * x[Z_BAR] - x[Z_DELTA] * v_delta
+        x[H_NEXT] = x[H]
+        x[Z_DELTA] = 0.0
+        for trace in (Z, P, Z_BAR):
+            x[trace] *= fade
+        if x[Z] > x[BEGUN] * smallest_trace:
+            eligible[n_kept] = i
+            n_kept += 1
+        else:
+            x[Z] = x[P] = x[Z_BAR] = x[DELTA_W] = 0.0
+    return n_kept
+
+
+@njit
+def begin(numbers, eligible, n_eligible, active, largest_rate, decay):
+    """Begin the traces of active weights; returns their last change and how many are eligible."""
+    v_delta = overlap = rate = 0.0
+    for i in active:
+        v_delta += numbers[i, DELTA_W]
+        overlap += numbers[i, Z]
+        rate += np.exp(numbers[i, LOG_STEP])
+    for i in active:
+        x = numbers[i]
+        if x[Z] == 0.0:
+            eligible[n_eligible] = i
+            n_eligible += 1
+        begun = np.exp(x[LOG_STEP])
+        if rate > largest_rate:
+            begun *= largest_rate / rate
+            x[H_NEXT] = x[H] = x[H_OLD] = x[Z_BAR] = 0.0
+            x[LOG_STEP] += decay
+        x[Z_DELTA] = x[BEGUN] = begun
+        x[Z] += begun * (1.0 - overlap)
+        x[P] += x[H_OLD]
+        x[Z_BAR] += begun * (1.0 - overlap - x[Z_BAR])
+        x[H_NEXT] = x[H] - x[H_OLD] * (x[Z] - begun) - x[H] * begun
+    return v_delta, n_eligible
 
 
 for name, title, learning, agent in (
