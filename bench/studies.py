@@ -24,9 +24,10 @@ from sdnn.runs.store import ResultStore
 from sdnn.runs.study import Study
 from sdnn.runs.trial import TrainingTrial, TrialKey, TrialRecord, TrialRows
 
-MILESTONES = (20_000, 50_000, 60_000, 100_000, 120_000, 200_000, 300_000)
-"""Steps after which, and at the end, agents are evaluated by more greedy episodes than else."""
 N_MILESTONE_EPISODES = 100
+"""Greedy episodes of the last evaluation, and of those at a milestone, whatever others have."""
+MILESTONES: dict[str, int] = {}
+"""Steps after which a case has such an evaluation; the modules of tasks enter them."""
 
 Curves = Mapping[tuple[str, str], Sequence[Mapping[str, Any]]]
 """Curves of the trials by case and variant."""
@@ -35,7 +36,8 @@ Curves = Mapping[tuple[str, str], Sequence[Mapping[str, Any]]]
 class Clock(Callback):
     """Notes the curve of a training; it stands still during evaluations."""
 
-    def __init__(self, training: Training) -> None:
+    def __init__(self, training: Training, milestone: int | None = None) -> None:
+        self._milestone = milestone
         self.curve: dict[str, Any] = {"steps": [], "cpu_seconds": [], "mean_return": []}
         training.callbacks = (*training.callbacks, self)
         training.evaluation_env = _Pausing(training.evaluation_env, self)
@@ -63,7 +65,7 @@ class Clock(Callback):
 
     def _expect_milestone(self, training: Training) -> None:
         following = min(training.n_steps + training.evaluate_every, training.steps)
-        is_one = following in (*MILESTONES, training.steps)
+        is_one = following in (self._milestone, training.steps)
         training.evaluation_episodes = max(self._few, N_MILESTONE_EPISODES * is_one)
 
 
@@ -89,18 +91,19 @@ def n_bytes(agent: Any) -> int:
 class _Clocked:
     """A specification whose trial is clocked."""
 
-    def __init__(self, spec: RunSpec) -> None:
+    def __init__(self, spec: RunSpec, milestone: int | None) -> None:
         self._spec, self.canonical_json = spec, spec.canonical_json
+        self._milestone = milestone
 
     def make_trial(self, seed: int) -> TrainingTrial:
         trial = self._spec.make_trial(seed)
-        self.clock = Clock(trial.training)
+        self.clock = Clock(trial.training, self._milestone)
         return trial
 
 
 def learn(planned: PlannedTrial, advanced: Callable[[int], None]) -> tuple[TrialRecord, Any]:
     """Run a trial; returns the record, of evaluations only, and the curve."""
-    spec = _Clocked(planned.spec)
+    spec = _Clocked(planned.spec, MILESTONES.get(planned.key.case_id))
     record = run_to_end(PlannedTrial(planned.key, spec), wanted=lambda: True, advanced=advanced)
     table = record.rows.table
     rows = TrialRows(table[table["kind"] == "evaluation"])

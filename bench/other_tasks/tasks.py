@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import gymnasium as gym
 import numpy as np
+from studies import MILESTONES
 
 
 class Task(NamedTuple):
@@ -69,6 +70,7 @@ GOALS = {
     "Pendulum noise-05-copies": Goal(100_000, -230.0, 0.9),
 }
 """By case."""
+MILESTONES.update({case: goal.steps for case, goal in GOALS.items()})
 
 
 def parts_of(case: str) -> tuple[str, str]:
