@@ -105,7 +105,7 @@ def test_a_trial_runs_in_a_process_of_its_own_and_once(scripts, tmp_path):
         budget.steps = 40
         protocol.evaluate_every = 20
         [cases]
-        CliffWalking = { environment.id = "CliffWalking-v1", budget.steps = 40 }
+        FrozenLake = { environment.id = "FrozenLake-v1" }
         [variants.tiles]
         agent = "tiles"
         """
@@ -114,7 +114,7 @@ def test_a_trial_runs_in_a_process_of_its_own_and_once(scripts, tmp_path):
     for _ in range(2):
         studies.run_study("x", study, given(tmp_path, "tiles"))
         found, before = studies.curves("x", study, given(tmp_path)), found
-    assert set(found) == {("CliffWalking", "tiles")}
+    assert set(found) == {("FrozenLake", "tiles")}
     assert found == before
 
 
