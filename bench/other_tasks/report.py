@@ -17,7 +17,7 @@ from sdnn.runs.study import Study
 OURS = "sdnn-linear"
 STEPS = (10_000, 20_000, 50_000, 100_000, 200_000)
 NOTABLE = 0.02
-"""A difference that is told, in parts of the way from random actions to a solved task."""
+"""A difference worth telling, in parts of the way from random actions to a solved task."""
 N_SEEDS = 10
 """Of a whole cell; where there are fewer the table says how many."""
 
