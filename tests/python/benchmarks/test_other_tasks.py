@@ -155,7 +155,7 @@ def test_evaluations_take_no_part_in_the_processor_time(scripts, monkeypatch):
                 pass
             return super().step(action)
 
-    spec = quick(scripts.study.combinations["Pendulum", "tiles"].spec, "Pendulum")
+    spec = quick(scripts.study.combinations["Pendulum", "stream-q"].spec, "Pendulum")
     trial = spec.make_trial(1)
     trial.training.evaluation_env = Slow(trial.training.evaluation_env)
     clock = scripts.studies.Clock(trial.training)
