@@ -62,9 +62,9 @@ def listed(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
 
 
 def listeners(callbacks: Iterable[Callback]) -> list[tuple[int, Callback]]:
-    """Return those that do something after steps, and after how many."""
+    """Return those that do something after steps, and after how many; ValueError."""
     return [
-        (getattr(callback, "step_interval", 1), callback)
+        (whole("step_interval", getattr(callback, "step_interval", 1), 1, 2**53), callback)
         for callback in callbacks
         if getattr(callback.on_step, "__func__", None) is not Callback.on_step
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -44,8 +45,9 @@ class Model(Displayed, abc.ABC):
 
         Parameters
         ----------
-        observation : element of the observation space, or an array of several
-            Several are those of a vector environment, along the first axis.
+        observation : element of the observation space, or a batch of several
+            A batch is what a vector environment gives: arrays with one axis more, the first one,
+            in a Dict or Tuple where the space is one.
         state, episode_start
             Of recurrent models; not used.
         deterministic : bool
@@ -56,11 +58,10 @@ class Model(Displayed, abc.ABC):
         The action, or an array of actions along the first axis, and None.
         """
         explore = not flag("deterministic", deterministic)
-        space = self.observation_space
-        is_array = isinstance(observation, np.ndarray) and space.shape is not None
-        if is_array and observation.ndim == len(space.shape or ()) + 1:
-            return np.stack([self.act(one, explore) for one in observation]), None
-        return self.act(observation, explore), None
+        several = _unbatched(self.observation_space, observation)
+        if several is None:
+            return self.act(observation, explore), None
+        return np.stack([self.act(one, explore) for one in several]), None
 
     def _facts(self) -> dict[str, object]:
         """Return what is shown of it."""
@@ -71,3 +72,30 @@ class Model(Displayed, abc.ABC):
             "inputs": inputs,
             "seed": self.seed,
         }
+
+
+def _unbatched(space: gym.Space[Any], observation: Any) -> Sequence[Any] | None:
+    """Return the elements of a batch of observations; None if it is no batch."""
+    if isinstance(space, gym.spaces.Dict):
+        if not isinstance(observation, Mapping) or set(observation) != set(space):
+            return None
+        columns = _columns((space[name], observation[name]) for name in space)
+        if columns is None:
+            return None
+        return [dict(zip(space, row, strict=True)) for row in zip(*columns, strict=True)]
+    if isinstance(space, gym.spaces.Tuple):
+        if not isinstance(observation, tuple) or len(observation) != len(space):
+            return None
+        columns = _columns(zip(space, observation, strict=True))
+        return None if columns is None else list(zip(*columns, strict=True))
+    is_array = isinstance(observation, np.ndarray) and space.shape is not None
+    is_batch = is_array and observation.ndim == len(space.shape or ()) + 1
+    return observation if is_batch else None
+
+
+def _columns(parts: Iterable[tuple[gym.Space[Any], Any]]) -> list[Sequence[Any]] | None:
+    """Return the elements of each part of a batch; None if these are not equally many."""
+    columns = [_unbatched(space, part) for space, part in parts]
+    found = [column for column in columns if column is not None]
+    is_batch = len(found) == len(columns) and len({len(column) for column in found}) == 1
+    return found if is_batch else None

@@ -58,7 +58,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     Attributes
     ----------
     classes_ : ndarray, shape (n_classes,)
-        The labels, sorted.
+        The labels, sorted; those that came late in a `RiverClassifier` follow in their order.
     validation_scores_ : ndarray, shape (n_epochs,) or (0,)
         With early stopping, the accuracy on the held-out samples.
 
@@ -180,7 +180,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def _add_class(self, label: Any) -> None:
         """Add a class as the last one, with untrained units."""
         classes = np.append(self.classes_, [label])
-        is_alike = classes.dtype.kind == self.classes_.dtype.kind
+        is_alike = classes.dtype.kind == self.classes_.dtype.kind and label == label  # no NaN
+        is_alike = is_alike and isinstance(label, str) == isinstance(self.classes_[0], str)
         if self._scheme != "one_vs_rest" or not is_alike or label in self.classes_:
             raise ValueError(
                 f"y must be one of {self.classes_.tolist()}, or a new label of their type with "

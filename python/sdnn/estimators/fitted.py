@@ -103,9 +103,10 @@ class Fitted(Learned, BaseEstimator):
     @property
     def feature_importances_(self) -> Floats:
         """Mean importance of the pairs with each feature, normalized, shape (n_features,)."""
+        importances = self.pair_importances_.tolist()  # first: it may raise NotFittedError
         total = np.zeros(self.n_features_in_)
         count = np.zeros(self.n_features_in_)
-        for pair, importance in zip(self.pairs_, self.pair_importances_.tolist(), strict=True):
+        for pair, importance in zip(self.pairs_, importances, strict=True):
             for feature in set(pair):
                 total[feature] += importance
                 count[feature] += 1

@@ -11,7 +11,7 @@ import pandas as pd
 from river import base
 from sklearn.base import clone
 
-from sdnn.arguments import shown
+from sdnn.arguments import flag, shown, whole
 from sdnn.estimators.classifier import SDNNClassifier
 from sdnn.estimators.inputs import Floats, codings_of_columns
 from sdnn.estimators.outliers import numbers_to_range
@@ -82,11 +82,9 @@ class Waiting:
     least_targets = 1  # different ones among the first samples
 
     def __init__(self, model: Any, grace_period: int = 100, follows_ranges: bool = True) -> None:
-        if grace_period < 2:
-            raise ValueError(f"grace_period must be at least 2, got {shown(grace_period)}")
         self.model = model
-        self.grace_period = grace_period
-        self.follows_ranges = follows_ranges
+        self.grace_period = whole("grace_period", grace_period, 2, 2**53)
+        self.follows_ranges = flag("follows_ranges", follows_ranges)
         self.fitted: Any = None
         self.ranges: FollowedRanges | None = None
         self.samples: list[dict[str, Any]] = []
@@ -175,6 +173,7 @@ class RiverClassifier(Waiting, base.Classifier):
 
     def _learn(self, sample: dict[str, Any], y: Any) -> None:
         if y not in self.fitted.classes_:
+            self.fitted._bins_of_one(sample)  # which raises before a class is added
             self.fitted._add_class(y)
         super()._learn(sample, y)
 

@@ -209,6 +209,8 @@ class RunSpec(Settings, frozen=True):
             raise ConfigError(
                 "budget.target_return", "needs evaluations: evaluate_every must not be 0"
             )
+        if self.output.keep_best and not self.is_evaluated:
+            raise ConfigError("output.keep_best", "needs evaluations: evaluate_every must not be 0")
         every = protocol.evaluate_every_episodes
         if every is not None and budget.episodes is not None and budget.episodes < every:
             raise ConfigError(

@@ -11,6 +11,7 @@ from sdnn.agents import (
     SDNNSarsa,
     StopTrainingOnNoImprovement,
     Training,
+    Transition,
     evaluate,
     load_agent,
 )
@@ -43,6 +44,23 @@ def test_predict_of_listed_states_and_of_boxes():
     agent = SDNNSarsa(swing.observation_space, swing.action_space)
     assert agent.predict(np.zeros((4, 3), np.float32))[0].shape == (4, 1)
     assert agent.predict(np.zeros(3, np.float32))[0].shape == (1,)
+
+
+@pytest.mark.parametrize("kind", [gym.spaces.Dict, gym.spaces.Tuple])
+def test_predict_takes_batches_of_observations_in_parts(kind):
+    parts = gym.spaces.Box(-1, 1, (2,)), gym.spaces.Discrete(3)
+    space = kind(dict(zip("ab", parts, strict=True))) if kind is gym.spaces.Dict else kind(parts)
+    agent = SDNNSarsa(space, gym.spaces.Discrete(9), inputs="all", angle_pairs="none")
+    space.seed(1)
+    several = [space.sample() for _ in range(4)]
+    for one in several:
+        agent.learn(Transition(one, 7, 1.0, one, False))  # now no action is as good as this one
+    batch = gym.vector.utils.create_empty_array(space, 4)
+    batch = gym.vector.utils.concatenate(space, several, batch)
+    assert agent.predict(batch)[0].tolist() == [7] * 4
+    assert agent.predict(several[0])[0] == 7
+    uneven = {**batch, "b": batch["b"][:3]} if kind is gym.spaces.Dict else (batch[0], batch[1][:3])
+    refuses("observation", agent.predict, uneven)
 
 
 def test_learn_for_so_many_steps_is_told_of_train(trained):
@@ -130,3 +148,15 @@ def test_a_training_without_improvement_stops(tmp_path):
     assert run(tmp_path, [1.0, 3.0, 2.0, 3.0, 9.0, 9.0], stop).n_steps == 40
     assert run(tmp_path, [1.0, 3.0, 2.0, 4.0, 3.0, 5.0], stop).n_steps == 60
     refuses("max_evaluations", StopTrainingOnNoImprovement, 0)
+
+
+@pytest.mark.parametrize("interval", [0, -1, 2.5, None])
+def test_a_step_interval_is_at_least_one(trained, interval):
+    class Odd(Callback):
+        step_interval = interval
+
+        def on_step(self, training):
+            raise AssertionError
+
+    agent, env, _ = trained
+    refuses("step_interval", agent.train, env, steps=5, callbacks=[Odd()])

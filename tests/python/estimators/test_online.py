@@ -400,6 +400,13 @@ def test_classes_of_a_river_stream_may_come_late():
     assert importances.sum() == pytest.approx(1.0)
     for label in (3, 2.5, None):
         refuses("y", model.learn_one, ROWS[0], label)
+    refuses("x", model.learn_one, {"other": 1.0}, "highest")
+    assert len(model.fitted.classes_) == 3  # none is added by an error
+    numbers = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=20)
+    for row, label in zip(ROWS[:30], LABELS, strict=False):
+        numbers.learn_one(row, float(label))
+    refuses("y", numbers.learn_one, ROWS[0], float("nan"))
+    refuses("follows_ranges", RiverClassifier, SDNNClassifier(), follows_ranges=1, error=TypeError)
     pairs = RiverClassifier(SDNNClassifier(**OPTIONS, scheme="one_vs_one"), grace_period=20)
     for row in np.argsort(LABELS == 2, kind="stable")[:30].tolist():
         pairs.learn_one(ROWS[row], names[row])

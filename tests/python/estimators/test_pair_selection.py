@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.exceptions import NotFittedError
 from sklearn.feature_selection import RFE
 
 from refusals import refuses
@@ -98,6 +99,8 @@ def test_importances_of_features_are_means_over_their_pairs():
     one, other, plain = model.pair_importances_
     means = np.array([(one + other) / 2, (one + other) / 2, plain, 0.0])
     np.testing.assert_allclose(model.feature_importances_, means / means.sum())
+    with pytest.raises(NotFittedError):
+        _ = SDNNClassifier().feature_importances_
 
 
 def test_importances_survive_files(tmp_path):

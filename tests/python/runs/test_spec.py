@@ -106,6 +106,11 @@ def test_the_hash_is_that_of_what_fixes_the_rows():
             "budget.target_return",
             "needs evaluations",
         ),
+        (
+            {"protocol": {"evaluate_every": 0}, "output": {"keep_best": True}},
+            "output.keep_best",
+            "needs evaluations",
+        ),
         ({"output": {"checkpoint_every": 0}}, "output.checkpoint_every", "at least 1, got 0"),
     ],
 )
