@@ -336,10 +336,10 @@ class Agent(Model, abc.ABC, Generic[Approximator, Learning]):
         )
 
     def core_parts(self) -> tuple[Any, ...] | None:
-        """Return the core and functions around it, unless a subclass acts or learns by itself."""
-        is_plain = type(self).act is Agent.act and type(self).learn is Agent.learn
+        """Return the core and functions around it, unless `act` or `learn` has been replaced."""
+        own = [getattr(method, "__func__", None) for method in (self.act, self.learn)]
         parts = self._controller, self._observations.rows, self._actions.elements
-        return parts if is_plain else None
+        return parts if own == [Agent.act, Agent.learn] else None
 
     @property
     @abc.abstractmethod

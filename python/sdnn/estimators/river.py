@@ -171,6 +171,10 @@ class RiverClassifier(Waiting, base.Classifier):
 
     least_targets = 2
 
+    @property
+    def _multiclass(self) -> bool:  # what River asks of classifiers
+        return True
+
     def _learn(self, sample: dict[str, Any], y: Any) -> None:
         if y not in self.fitted.classes_:
             self.fitted._bins_of_one(sample)  # which raises before a class is added

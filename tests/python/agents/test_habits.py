@@ -160,3 +160,12 @@ def test_a_step_interval_is_at_least_one(trained, interval):
 
     agent, env, _ = trained
     refuses("step_interval", agent.train, env, steps=5, callbacks=[Odd()])
+
+
+def test_methods_that_are_replaced_are_called_in_trainings():
+    env = gym.make("CartPole-v1")
+    agent = SDNNSarsa(env.observation_space, env.action_space)
+    seen, learn = [], agent.learn
+    agent.learn = lambda transition: (seen.append(transition), learn(transition))
+    agent.train(env, steps=5)
+    assert len(seen) == 5

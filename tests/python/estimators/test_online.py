@@ -425,7 +425,7 @@ def test_probabilities_of_one_have_the_bits_of_those_of_many(n_classes):
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 def test_river_measures_and_wraps_what_has_probabilities():
     pytest.importorskip("river")
-    from river import evaluate, metrics, multiclass
+    from river import ensemble, evaluate, metrics, multiclass
 
     from sdnn.estimators.river import RiverClassifier
 
@@ -434,6 +434,7 @@ def test_river_measures_and_wraps_what_has_probabilities():
     for row, label in zip(ROWS, ["red", "green", "red", "red"], strict=False):
         model.learn_one(row, label)
     assert model.predict_proba_one(ROWS[0]) == {"red": 0.75, "green": 0.25}
+    assert ensemble.VotingClassifier([model, model])._multiclass  # not for two classes alone
     single = RiverClassifier(SDNNClassifier(**OPTIONS, scheme="one_vs_one"))
     refuses("scheme", single.predict_proba_one, ROWS[0], error=NotImplementedError)
     stream = list(zip(ROWS, (Y > 0.2).tolist(), strict=True)) * 3
