@@ -72,8 +72,8 @@ SDNN_KERNEL(std::uint8_t*, list_steps,
              CodeWalk::Changes::Count* counts),
             (codes, n_words, at, counts))
 
-/// Orders of a block of queries, one for each two inputs: in strips of equal bins of one, to and
-/// fro along the other.
+/// Orders of a block of queries, one for each two inputs: in strips of equal bins of one, forth
+/// and back along the other.
 class PairOrders {
  public:
   PairOrders(const coding::SelectiveDesensitization& code, std::span<const std::int32_t> bins,
