@@ -479,10 +479,14 @@ class Episodes:
         every = range(self.n_environments)
         numbers = {i: present[i].number if i in present else 0 for i in every}
         ended = set(every)
-        for t in range(n_rounds):
-            begins = ended | {i for i, own in taken.items() if n_rounds - len(own) == t}
+        for t in range(n_rounds + bool(taken)):
+            begins = {i for i, own in taken.items() if n_rounds - len(own) == t}
+            if t < n_rounds or n_rounds == 0:
+                begins |= ended
             if begins:
                 self._put(self._reset({i: numbers[i] for i in sorted(begins)}))
+            if t == n_rounds:  # only episodes without actions begin here
+                return
             self._actions = [
                 taken[i][t - n_rounds]
                 if i in taken and t >= n_rounds - len(taken[i])

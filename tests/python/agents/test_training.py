@@ -317,6 +317,18 @@ def test_an_environment_gets_no_actions_that_it_does_not_have_from_a_file(change
     refuses(name, Training.load, path, env)
 
 
+def test_an_episode_of_a_file_may_have_no_actions(tmp_path):
+    path = tmp_path / "checkpoint"
+    env = Corridor()
+    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL, seed=3)
+    Training(agent, env, episodes=9, callbacks=[Stop(3, path)]).run()
+    description, arrays = read_file(path, "training")
+    name = "training.0.actions"
+    write_file(path, "training", arrays | {name: arrays[name][:0]}, description)
+    with pytest.raises(UnrepeatedEpisodeError):  # the first observation is not the fourth
+        Training.load(path, env)
+
+
 @pytest.mark.parametrize("has_own_resets", [False, True])
 def test_what_several_learned_before_one_failed_is_kept(has_own_resets, tmp_path):
     env = gym.vector.SyncVectorEnv([FailsOnce, functools.partial(FailsOnce, ("step", 33))])
