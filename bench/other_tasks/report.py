@@ -90,19 +90,22 @@ def _loss_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
                 losses.append((difference, case, variant))
     for difference, case, variant in sorted(losses, reverse=True):
         medians = (last_returns(found[case, who]) for who in (variant, OURS))
-        theirs, our = (f"{number(np.median(m))} ({m.size} seeds)" for m in medians)
+        theirs, our = (
+            f"{number(np.median(m))} ({m.size} seed{'s' * (m.size > 1)})" for m in medians
+        )
         yield (*parts_of(case), title_of(study, variant), theirs, our, f"{100 * difference:.0f} %")
 
 
 def _row(study: Study, case: str, variant: str, trials: Trials) -> Sequence[str]:
     medians = [np.median(returns_after(trials, steps)) for steps in STEPS]
+    last = last_returns(trials)
     spent = np.median([t["cpu_seconds"][-1] / t["steps"][-1] for t in trials])
     return (
         *parts_of(case),
         title_of(study, variant),
         str(len(trials)),
         *("" if np.isnan(median) else number(median) for median in medians),
-        interval(estimate_median(last_returns(trials)), 1),
+        interval(estimate_median(last), 1) if last.size > 1 else number(last[0]),
         f"{trials[0]['steps'][-1]:,}",
         f"{1e6 * spent:,.0f}",
         f"{np.median([t['bytes'] for t in trials]) / 1024:,.0f}",

@@ -138,7 +138,7 @@ def test_tables_by_hand(scripts):
     assert goal == "| CartPole | clean | 50,000 | 475 | 475 (470 to 480) | 1 of 2 | 2 | **no** |"
     # (490 - 475) / (475 - 22.4)
     loss = tables["losses"].splitlines()[2]
-    assert loss.endswith("| 490 (1 seeds) | 475 (2 seeds) | 3 % |")
+    assert loss.endswith("| 490 (1 seed) | 475 (2 seeds) | 3 % |")
     assert "| 475 (2) |" in tables["at the end"]
     assert "| **490** (1) |" in tables["at the end"]
     assert "| 10.5" not in tables["along the way"]
