@@ -1,50 +1,85 @@
-"""Lets an agent learn CartPole from nothing, in C and fixed point, natively and on an emulated Arm.
+"""Lets an agent learn CartPole or Pendulum from nothing, in C and fixed point, on an emulated Arm.
 
-Prints the mean return of 100 greedy episodes after training, for each seed, and the Thumb-2
-instructions of a step of acting, learning and physics. Counts are exact; of time an emulator says
+Prints the mean return of 100 greedy episodes after training, for each seed, and what a processor
+needs: memory, flash and the Thumb-2 instructions of a step of acting, learning and physics. Seeds
+are trained natively, or with --emulate in the emulator. Counts are exact; of time an emulator says
 nothing. Needs Debian's compilers and an emulator: apt install gcc gcc-arm-linux-gnueabihf
 qemu-user.
 
-usage: python bench/arm/learning.py [--seeds 10] [--steps 50000] [--units 64]
+usage: python bench/arm/learning.py [cartpole|pendulum] [--seeds 10] [--emulate]
 """
 
 import argparse
+import math
 import re
 import subprocess
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import gymnasium as gym
+import numpy as np
 
 from sdnn.agents import SDNNSarsa
 from sdnn.approximators import LinearSDNNConfig
 from sdnn.export import export_c_header
 
 HERE = Path(__file__).parent
-RANGES = ([-2.4, -3.0, -0.21, -3.5], [2.4, 3.0, 0.21, 3.5])
 EPISODES = 100
 COUNTED = (2000, 4000)
 """Steps of two runs whose instructions are compared."""
+ARM = "arm-linux-gnueabihf-gcc"
+CHIP = ("-mthumb", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 
 
-def new_agent(seed, n_units):
-    """An agent that knows its sensors' ranges, and nothing else."""
-    env = gym.make("CartPole-v1")
-    return SDNNSarsa(
-        env.observation_space,
-        env.action_space,
-        approximator=LinearSDNNConfig(n_pattern_units=n_units),
-        observation_range=RANGES,
-        inputs="all",
-        angle_pairs=[],
-        seed=seed,
-    )
+@dataclass(frozen=True)
+class Task:
+    """What the agent knows of a task: its sensors' ranges and its actions."""
+
+    high: tuple[float, ...]
+    actions: gym.Space
+    approximator: LinearSDNNConfig
+    n_steps: int
+    solved: float
+    angles: tuple[int, ...] = ()
+
+    def agent(self, seed):
+        """Make the agent, which has learned nothing."""
+        high = np.array(self.high)
+        return SDNNSarsa(
+            gym.spaces.Box(-high, high, dtype=np.float64),
+            self.actions,
+            approximator=self.approximator,
+            inputs="all",
+            angles=self.angles,
+            angle_pairs=[],
+            seed=seed,
+        )
 
 
-def program(folder, compiler, *options):
-    """Compile the header in the folder with the physics."""
-    path = folder / compiler
-    command = [compiler, "-std=c99", "-O2", *options, f"-I{folder}", HERE / "cartpole.c"]
+TASKS = {
+    "cartpole": Task(
+        (2.4, 3.0, 0.21, 3.5),
+        gym.spaces.Discrete(2),
+        LinearSDNNConfig(n_pattern_units=64),
+        50_000,
+        475.0,
+    ),
+    "pendulum": Task(
+        (math.pi, 8.0),
+        gym.spaces.Box(-2.0, 2.0, (1,)),
+        LinearSDNNConfig(n_pattern_units=256, n_actions=3),
+        100_000,
+        -200.0,
+        angles=(0,),
+    ),
+}
+
+
+def program(path, task, compiler, *options):
+    """Compile the header beside the path with the physics."""
+    folder = path.parent
+    command = [compiler, "-std=c99", "-O2", *options, f"-I{folder}", HERE / f"{task}.c"]
     subprocess.run([*command, "-o", path], check=True)
     return path
 
@@ -56,39 +91,55 @@ def output(*command):
     return done.stdout.strip(), done.stderr
 
 
+def sizes(folder, task):
+    """Bytes of flash, of static memory and of all functions' stacks, with the physics."""
+    options = ("-Os", "-fno-pie", "-fstack-usage", "-c", *CHIP)
+    path = program(folder / "chip.o", task, ARM, *options)
+    text, data, bss = map(int, output("size", path)[0].splitlines()[1].split()[:3])
+    usage = next(folder.glob("*.su")).read_text().splitlines()
+    return text + data, data + bss, sum(int(line.split("\t")[1]) for line in usage)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("task", nargs="?", choices=TASKS, default="cartpole")
     parser.add_argument("--seeds", type=int, default=10)
-    parser.add_argument("--steps", type=int, default=50_000)
-    parser.add_argument("--units", type=int, default=64, help="n_pattern_units")
+    parser.add_argument("--emulate", action="store_true", help="Train in the emulator.")
     given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        returns = []
-        for seed in range(1, given.seeds + 1):
-            header = export_c_header(new_agent(seed, given.units), folder / "pole.h", learning=True)
-            native = program(folder, "gcc")
-            returns.append(float(output(native, given.steps, EPISODES)[0]))
-            print(f"seed {seed}: {returns[-1]:.1f}", flush=True)
-        n_solved = sum(one >= 475 for one in returns)
-        print(f"{n_solved} of {given.seeds} reach 475 after {given.steps:,} steps")
-        print(f"{header.ram_bytes:,} bytes of RAM, {header.flash_bytes:,} bytes of constants")
+    name, task = given.task, TASKS[given.task]
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
         plugin = folder / "instruction_count.so"
         source = HERE / "instruction_count.c"
         subprocess.run(["gcc", "-O2", "-shared", "-fPIC", source, "-o", plugin], check=True)
-        emulated = program(folder, "arm-linux-gnueabihf-gcc", "-mthumb", "-static")
+        returns = []
+        for seed in range(1, given.seeds + 1):
+            header = export_c_header(task.agent(seed), folder / "pole.h", learning=True)
+            native = [program(folder / "native", name, "gcc")]
+            emulated = program(folder / "emulated", name, ARM, "-mthumb", "-static")
+            runner = ["qemu-arm", emulated] if given.emulate else native
+            returns.append(float(output(*runner, task.n_steps, EPISODES)[0]))
+            print(f"seed {seed}: {returns[-1]:.1f}", flush=True)
+        n_solved = sum(one >= task.solved for one in returns)
+        print(f"{n_solved} of {given.seeds} reach {task.solved:g} after {task.n_steps:,} steps")
+        print(f"{header.ram_bytes:,} bytes of memory, {header.flash_bytes:,} bytes of constants")
+        flash, static, stacks = sizes(folder, name)
+        print(
+            f"with the physics, -Os for Cortex-M4: {flash:,} bytes of flash, {static:,} bytes of"
+            f" static memory; the stacks of all functions together are {stacks:,} bytes"
+        )
         emulator = ("qemu-arm", "-plugin", plugin, emulated)
         counts = []
         for n_steps in COUNTED:
             said, counted = output(*emulator, n_steps, 3)
-            if said != output(native, n_steps, 3)[0]:
+            if said != output(*native, n_steps, 3)[0]:
                 raise SystemExit(f"after {n_steps} steps the emulated chip differs: {said}")
             _, counted = output(*emulator, n_steps, 0)
             counts.append(int(re.search(r"instructions (\d+)", counted)[1]))
         a_step = (counts[1] - counts[0]) / (COUNTED[1] - COUNTED[0])
         print(f"{a_step:,.0f} instructions a step")
         for megahertz in (48, 100, 600):
-            seconds = a_step * given.steps / megahertz / 1e6
+            seconds = a_step * task.n_steps / megahertz / 1e6
             print(f"at {megahertz} MHz and one instruction a cycle: {seconds:.0f} s in all")
 
 

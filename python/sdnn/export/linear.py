@@ -73,7 +73,7 @@ class LinearWriter(Writer):
         n_ones = [int((network.table(i) > 0).sum(axis=1).max()) for i in range(len(self.inputs))]
         most_columns = sum(n_ones[nu] for _, nu in groups[:n_double:2])
         most_columns += sum(n_ones[nu] for _, nu in groups[n_double:])
-        is_short = n_columns <= 2**15
+        is_short = n_columns <= 2**16
         is_double = {0: "0", len(groups): "1"}.get(n_double, f"group < {n_double}")
         return {
             "description": (
@@ -86,8 +86,6 @@ class LinearWriter(Writer):
             "is_double": is_double,
             "unit_type": "uint8_t" if m <= 256 else "uint16_t",
             "column_type": "uint16_t" if is_short else "uint32_t",
-            "sign_bit": 15 if is_short else 31,
-            "column_mask": "UINT32_C(0x7fff)" if is_short else "UINT32_C(0x7fffffff)",
             "bytes_of_column": 2 if is_short else 4,
             "n_columns": n_columns,
             "most_columns": most_columns,
@@ -180,8 +178,7 @@ class LearnerWriter(LinearWriter):
         about = "What the agent begins with: states of its random generators."
         tables.add("uint64_t", f"{self.name}_seeds", seeds, about)
         averages = config.averaging_interval > 0
-        n_copies = 3 if averages else 2
-        n_image_weights = (n_copies - 1) * sizes["n_weights"]
+        n_image_weights = (1 + averages) * sizes["n_weights"]
         for mine, name in _WEIGHTS.items():
             rows = state.get(f"action_value.{name}")
             if rows is not None and rows.any():
@@ -189,7 +186,7 @@ class LearnerWriter(LinearWriter):
                 tables.add("int32_t", f"{self.name}_first_{mine}", known)
         values = {
             "weight_bytes": 0,
-            "ram_bytes": self._ram_bytes(sizes, n_copies),
+            "ram_bytes": self.ram_bytes(sizes),
             "n_words": sizes["most_columns"] * sizes["n_rows"],
             "ties": "draw" if learning.tie_rule == "uniform" else self.ties(),
             "averages": averages,
@@ -229,11 +226,11 @@ class LearnerWriter(LinearWriter):
         ends = [round(one * _ONE) for one in (first, first if last is None else last)]
         return f"{self.name}_scheduled(agent, {ends[0]}, {ends[1]})"
 
-    def _ram_bytes(self, sizes: dict[str, Any], n_copies: int) -> int:
+    def ram_bytes(self, sizes: dict[str, Any]) -> int:
         """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
-        n_inputs = len(self.inputs)
-        code = 4 + 4 * n_inputs + sizes["bytes_of_column"] * sizes["most_columns"]
-        n_bytes: int = 8 * 3 + 32 * 4 + 4 * n_copies * sizes["n_weights"] + 4 * 10
+        n_inputs, averages = len(self.inputs), self.agent.approximator.averaging_interval > 0
+        code = 8 + 4 * n_inputs + sizes["bytes_of_column"] * sizes["most_columns"]
+        n_bytes: int = 8 * 3 + 32 * 4 + 4 * (2 + averages) * sizes["n_weights"] + 4 * 10
         n_bytes += 4 * (2 * self.n_dimensions + n_inputs) + 2 * (-(-code // 4) * 4)
         n_bytes += 3 + int(sizes["n_rows"])
         return -(-n_bytes // 8) * 8
