@@ -1,17 +1,39 @@
-"""The command ``sdnn export``: a trained agent in a form for other programs."""
+"""The command ``sdnn export``: an agent in a form for other programs."""
 
 from __future__ import annotations
 
 import dataclasses
+import math
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from sdnn.cli.common import json_option, json_text, run_command, words_of_run
+from sdnn.cli.common import (
+    json_option,
+    json_text,
+    named_values,
+    option_of,
+    option_words,
+    run_command,
+    value_of,
+    words_of_run,
+)
+
+if TYPE_CHECKING:
+    import gymnasium as gym
+
+    from sdnn.agents import Agent
+
+_MOST_ACTIONS = 2**16
+_LARGEST = 2**31  # of readings
 
 
-@click.command(short_help="Write a run's policy as a C header, for small processors.")
-@click.argument("source", metavar="RUN", type=click.Path(exists=True, path_type=Path))
+@click.command(short_help="Write an agent as a C header, for small processors.")
+@click.argument(
+    "source", metavar="[RUN]", required=False, type=click.Path(exists=True, path_type=Path)
+)
 @click.option(
     "--c-header",
     "path",
@@ -26,6 +48,45 @@ from sdnn.cli.common import json_option, json_text, run_command, words_of_run
     help="The header has the agent itself, which continues to learn. For the agent sdnn-linear.",
 )
 @click.option(
+    "--new",
+    is_flag=True,
+    help="Instead of RUN, an agent that has learned nothing and learns on the processor.",
+)
+@click.option(
+    "--range",
+    "ranges",
+    metavar="LOW:HIGH|angle",
+    multiple=True,
+    help="With --new: range of a sensor's values; repeat it for each sensor, in their order."
+    " angle: in radians, from -pi to pi, which are the same.",
+)
+@click.option(
+    "--actions",
+    metavar="N|LOW:HIGH",
+    multiple=True,
+    help="With --new: the number of actions, or the range of a continuous one, which is cut into"
+    " approximator.n_actions; repeat it for each motor.",
+)
+@click.option(
+    "--ram",
+    metavar="BYTES",
+    type=click.IntRange(1, 2**31),
+    help="With --new: most memory that the agent may take.  [default: 20000]",
+)
+@click.option(
+    "--set",
+    "settings",
+    metavar="TABLE.NAME=VALUE",
+    multiple=True,
+    help="With --new: a setting of approximator or learning, such as learning.discount=0.95; may"
+    " be repeated.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0, max=2**64 - 1),
+    help="With --new: root of the agent's random numbers.  [default: 0]",
+)
+@click.option(
     "--name", metavar="PREFIX", help="Prefix of its names.  [default: FILE without ending]"
 )
 @click.option(
@@ -36,28 +97,33 @@ from sdnn.cli.common import json_option, json_text, run_command, words_of_run
 )
 @json_option
 def export(
-    source: Path,
+    source: Path | None,
     path: Path,
     learning: bool,
     name: str | None,
     fraction_bits: int | None,
     as_json: bool,
+    new: bool,
+    **options: Any,
 ) -> None:
-    """Write the agent of RUN, a run's folder or an agent's file, in a form for other programs.
+    r"""Write the agent of RUN, a run's folder or an agent's file, in a form for other programs.
 
     The header observes what the agent did: with --noise or --redundant, variables scaled to [0, 1].
     Its comments name the ranges.
+
+    A new agent needs no RUN, only what it senses and does, here a cart with a pole and two actions:
+
+    \b
+    sdnn export --new --range -2.4:2.4 --range -3:3 --range -0.21:0.21
+      --range -3.5:3.5 --actions 2 --c-header pole.h
     """
-    from sdnn.agents import load_agent
     from sdnn.export import c_header
     from sdnn.files import write_whole
-    from sdnn.runs.run import agent_of
 
-    with run_command(words_of_run(source)):
-        try:
-            agent = agent_of(source) if source.is_dir() else load_agent(source)
-        except ValueError as error:
-            raise click.ClickException(str(error)) from error
+    _check_together(source, new, options)
+    learning = learning or new
+    with run_command(option_words if source is None else words_of_run(source)):
+        agent = _new_agent(**options) if source is None else _known_agent(source)
         try:
             header = c_header(
                 agent,
@@ -68,7 +134,8 @@ def export(
         except ValueError as error:
             raise _usage_error(error, is_named=name is not None) from error
         except (TypeError, RuntimeError) as error:
-            raise click.ClickException(f"{source}: {error}") from error
+            prefix = "" if source is None else f"{source}: "
+            raise click.ClickException(f"{prefix}{error}") from error
         write_whole(path, header.text.encode())
     scaling = agent.scaling
     if as_json:
@@ -85,6 +152,113 @@ def export(
         click.echo("it observes each variable scaled from its range to [0, 1], as its run did:")
         for line in scaling.lines():
             click.echo(f"  {line}")
+
+
+def _check_together(source: Path | None, new: bool, options: dict[str, Any]) -> None:
+    """Raise UsageError unless there is either a RUN or what a new agent needs."""
+    if new and source is not None:
+        raise click.UsageError(f"--new makes an agent that needs no RUN: omit {source}, or --new")
+    if not new and source is None:
+        raise click.UsageError("RUN must be given, or --new for an agent that has learned nothing")
+    for key, option in (("ranges", "--range"), ("actions", "--actions")):
+        if new and not options[key]:
+            raise click.UsageError(f"--new needs {option}, once or more: see sdnn export --help")
+    if not new:
+        for key, value in options.items():
+            if value not in ((), None):
+                option = {"ranges": "--range", "settings": "--set"}.get(key, f"--{key}")
+                raise click.UsageError(f"{option} is for --new: the agent of RUN has its own")
+
+
+def _known_agent(source: Path) -> Agent[Any, Any]:
+    from sdnn.agents import load_agent
+    from sdnn.runs.run import agent_of
+
+    try:
+        return agent_of(source) if source.is_dir() else load_agent(source)
+    except ValueError as error:
+        raise click.ClickException(str(error)) from error
+
+
+def _new_agent(
+    ranges: Sequence[str],
+    actions: Sequence[str],
+    ram: int | None,
+    settings: Sequence[str],
+    seed: int | None,
+) -> Agent[Any, Any]:
+    """Make an agent that has learned nothing, of the options that `export` has for it."""
+    import gymnasium as gym
+    import numpy as np
+
+    from sdnn.agents import LINEAR_PRESETS
+    from sdnn.arguments import blamed
+    from sdnn.export import new_agent
+    from sdnn.runs.settings import changed
+
+    ends = [(-math.pi, math.pi) if one == "angle" else _ends("--range", one) for one in ranges]
+    tables: dict[str, dict[str, Any]] = {"approximator": {}, "learning": {}}
+    for name, text in named_values("--set", settings):
+        table, _, key = name.partition(".")
+        if table not in tables or not key:
+            raise click.UsageError(
+                f"--set {name}: must be approximator.NAME or learning.NAME, such as"
+                " learning.discount"
+            )
+        tables[table][key] = value_of(text)
+    preset = LINEAR_PRESETS["general"]
+    parts = {name: changed(getattr(preset, name), given, name) for name, given in tables.items()}
+    low, high = np.array(ends).T
+    memory: dict[str, Any] = {} if ram is None else {"ram_bytes": ram}
+    try:
+        return new_agent(
+            gym.spaces.Box(low, high, dtype=np.float64),
+            _action_space(actions),
+            seed=seed or 0,
+            angles=[i for i, one in enumerate(ranges) if one == "angle"],
+            **parts,
+            **memory,
+        )
+    except (ValueError, OverflowError, MemoryError) as error:
+        name, problem = blamed(error)
+        places = {"ram_bytes": "--ram", "observation_space": "--range", "action_space": "--actions"}
+        for table, part in parts.items():
+            if hasattr(part, name):
+                places[name] = option_of(f"{table}.{name}")
+        raise click.UsageError(
+            f"{places[name]} {problem}" if name in places else str(error)
+        ) from error
+
+
+def _action_space(given: Sequence[str]) -> gym.Space[Any]:
+    import gymnasium as gym
+    import numpy as np
+
+    if all(":" in one for one in given):
+        low, high = np.array([_ends("--actions", one) for one in given]).T
+        return gym.spaces.Box(low, high, dtype=np.float64)
+    if any(not one.isdecimal() or not 2 <= float(one) <= _MOST_ACTIONS for one in given):
+        raise click.UsageError(
+            f"--actions must be numbers of actions, 2 to {_MOST_ACTIONS}, or all ranges LOW:HIGH,"
+            f" got {', '.join(given)!r}"
+        )
+    sizes = [int(one) for one in given]
+    return gym.spaces.Discrete(sizes[0]) if len(sizes) == 1 else gym.spaces.MultiDiscrete(sizes)
+
+
+def _ends(option: str, text: str) -> tuple[float, float]:
+    """Read LOW:HIGH."""
+    low, _, high = text.partition(":")
+    try:
+        ends = float(low), float(high)
+    except ValueError:
+        ends = math.nan, math.nan
+    if not -_LARGEST < ends[0] < ends[1] < _LARGEST:
+        word = " or angle" if option == "--range" else ""
+        raise click.UsageError(
+            f"{option} must be LOW:HIGH{word}, LOW below HIGH and both within 2^31, got {text!r}"
+        )
+    return ends
 
 
 def _usage_error(error: ValueError, is_named: bool) -> click.ClickException:

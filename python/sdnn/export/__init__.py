@@ -2,6 +2,7 @@
 
 from sdnn.export.header import c_header, export_c_header
 from sdnn.export.image import load_image, save_image
+from sdnn.export.new import new_agent
 from sdnn.export.writer import CHeader
 
-__all__ = ["CHeader", "c_header", "export_c_header", "load_image", "save_image"]
+__all__ = ["CHeader", "c_header", "export_c_header", "load_image", "new_agent", "save_image"]

@@ -1,0 +1,128 @@
+"""Agents that have learned nothing, for a processor, in Python and by the command."""
+
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from refusals import refuses
+from sdnn.agents import LINEAR_PRESETS, SDNNSarsa
+from sdnn.approximators import LinearSDNNConfig
+from sdnn.cli import main
+from sdnn.export import c_header, new_agent
+
+SPACE = gym.spaces.Box(np.array([-2.0, -np.pi]), np.array([1.0, np.pi]), dtype=np.float64)
+TWO = gym.spaces.Discrete(2)
+GIVEN = ("--range", "-2:1", "--range", "angle")
+
+
+@pytest.fixture
+def export(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+
+    def invoke(*arguments):
+        words = ["export", *map(str, arguments), "--c-header", "agent.h"]
+        return CliRunner().invoke(main, words)
+
+    return invoke
+
+
+@pytest.mark.parametrize("ram_bytes", [6000, 20_000, 10**6])
+@pytest.mark.parametrize("actions", [TWO, gym.spaces.MultiDiscrete([3, 4])])
+def test_an_agent_is_the_largest_that_fits(ram_bytes, actions):
+    agent = new_agent(SPACE, actions, ram_bytes=ram_bytes, seed=3)
+    n_units = agent.approximator.n_pattern_units
+    assert c_header(agent, "agent", learning=True).ram_bytes <= ram_bytes
+    larger = LinearSDNNConfig(n_pattern_units=n_units + 16)
+    header = c_header(new_agent(SPACE, actions, approximator=larger, seed=3), "a", learning=True)
+    assert header.ram_bytes > ram_bytes or n_units == 768
+
+
+def test_an_agent_keeps_what_is_given():
+    config = LinearSDNNConfig(n_pattern_units=100, averaging_interval=0)
+    agent = new_agent(SPACE, TWO, ram_bytes=10, approximator=config, angles=[1], seed=5)
+    assert (agent.approximator.n_pattern_units, agent.seed) == (100, 5)
+    assert [(kind, list(at)) for kind, at in agent.inputs] == [("variable", [0]), ("circular", [1])]
+
+
+def test_what_does_not_fit_or_has_no_range_is_refused():
+    refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=1000)
+    refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=1.5)
+    unknown = gym.spaces.Box(-np.inf, np.inf, (2,))
+    refuses("observation_range", new_agent, unknown, TWO, error=RuntimeError)
+    known = new_agent(unknown, TWO, observation_range=([-1, -1], [1, 1]))
+    assert c_header(known, "agent", learning=True).ram_bytes <= 20_000
+
+
+def test_the_command_makes_the_same_agent(export, tmp_path):
+    settings = ("--set", "learning.discount=0.9", "--set", "approximator.n_actions=5")
+    done = export("--new", *GIVEN, "--actions", "-1:1", "--ram", 9000, "--seed", 7, *settings)
+    assert done.exit_code == 0, done.output
+    preset = LINEAR_PRESETS["general"]
+    agent = new_agent(
+        SPACE, gym.spaces.Box(-1.0, 1.0, (1,), np.float64), ram_bytes=9000, seed=7, angles=[1],
+        approximator=replace(preset.approximator, n_actions=5),
+        learning=replace(preset.learning, discount=0.9),
+    )  # fmt: skip
+    expected = c_header(agent, "agent", learning=True)
+    assert (tmp_path / "agent.h").read_text() == expected.text
+    assert f"{expected.ram_bytes:,} bytes of memory" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("actions", "space"),
+    [
+        (["3"], gym.spaces.Discrete(3)),
+        (["3", "5"], gym.spaces.MultiDiscrete([3, 5])),
+        (["-1:1", "0:2"], gym.spaces.Box(np.array([-1.0, 0.0]), np.array([1.0, 2.0]), dtype=float)),
+    ],
+)
+def test_actions_are_numbers_or_ranges(actions, space, export, tmp_path):
+    words = [word for one in actions for word in ("--actions", one)]
+    done = export("--new", *GIVEN, *words)
+    assert done.exit_code == 0, done.output
+    agent = new_agent(SPACE, space, angles=[1])
+    assert (tmp_path / "agent.h").read_text() == c_header(agent, "agent", learning=True).text
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        ((), "--range"),
+        (GIVEN, "--actions"),
+        (("--actions", "2"), "--range"),
+        *((("--actions", 2, "--range", one), "--range") for one in ("1:1", "2:1", "nan:1", "0",
+          "x:y", "0:inf", "-1e300:1", "0:1:2", "")),
+        *(((*GIVEN, "--actions", one), "--actions") for one in ("1", "0", "-3", "1.5", "99999999",
+          "9" * 400, "", "x", "1:0", "0:inf", "0:1:2", "\N{SUPERSCRIPT TWO}")),
+        ((*GIVEN, "--actions", "2", "--actions", "0:1"), "--actions"),
+        ((*GIVEN, "--actions", "2", "--ram", "500"), "--ram must be at least"),
+        ((*GIVEN, "--actions", "2", "--ram", "x"), "--ram"),
+        ((*GIVEN, "--actions", "2", "--seed", "-1"), "--seed"),
+        *(((*GIVEN, "--actions", "2", "--set", one), "--set") for one in ("learning",
+          "learning.x=1", "budget.steps=3", "learning.=3", "learning.discount=2",
+          "learning.discount=x", "approximator.n_inputs=3", "approximator.n_pattern_units=-1")),
+        *(((*GIVEN, "--actions", one), "--ram") for one in ("65536",)),
+    ],
+)  # fmt: skip
+def test_bad_words_are_refused_by_their_option(words, named, export, tmp_path):
+    done = export("--new", *words)
+    assert done.exit_code == 2, done.output
+    assert named in done.stderr
+    assert not (tmp_path / "agent.h").exists()
+
+
+def test_a_run_and_a_new_agent_exclude_each_other(export):
+    SDNNSarsa(SPACE, TWO, inputs="all", angle_pairs=[]).save("one.safetensors")
+    for words, named in (
+        ((), "RUN"),
+        (("one.safetensors", "--new", *GIVEN, "--actions", 2), "omit one.safetensors"),
+        *((("one.safetensors", *more), more[0]) for more in (("--range", "0:1"), ("--actions", 2),
+          ("--ram", 9000), ("--seed", 0), ("--set", "learning.discount=0.5"))),
+    ):  # fmt: skip
+        done = export(*words)
+        assert (done.exit_code, done.stdout) == (2, ""), done.output
+        assert named in done.stderr
+    assert export("one.safetensors", "--learning").exit_code == 0
