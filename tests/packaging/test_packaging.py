@@ -201,7 +201,7 @@ SHIPPED = (
     r"python/sdnn/([a-z_]+/){0,2}[a-z_]+\.pyi?|python/sdnn/py\.typed",
     r"python/sdnn/(runs/page\.(html|md)|export/c_[a-z_]+\.h)\.jinja",
     r"python/sdnn/runs/schema\.sql|python/sdnn/reproduction/(claims\.toml|reference-results\.csv)",
-    r"(tests|bench|docs)/.*\.(py|c|cpp|hpp|txt|md|json|csv|png|gif|svg|css|toml|ipynb|bin|safetensors)",
+    r"(tests|bench|docs)/.*\.(py|c|cpp|hpp|ino|conf|txt|md|json|csv|png|gif|svg|css|toml|ipynb|bin|safetensors)",
 )
 """Every file of a source distribution matches one of these."""
 

@@ -10,7 +10,18 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from c_learners import LEARNERS, SMALL, build, check_life, discrete, lines_of, live, lived, sarsa
+from c_learners import (
+    LEARNERS,
+    SMALL,
+    build,
+    check_life,
+    discrete,
+    lines_of,
+    live,
+    lived,
+    sarsa,
+    several,
+)
 from c_policies import STRICT, TARGETS, box, run
 from refusals import refuses
 from sdnn.agents import SDNNQLearning, SDNNSarsa, Transition
@@ -62,12 +73,28 @@ def test_any_readings_and_rewards_are_defined(target, tmp_path):
 
 
 @pytest.mark.parametrize("compiler", ["g++", "clang++"])
-def test_cpp_takes_it(compiler, needs, tmp_path):
+@pytest.mark.parametrize(
+    ("make", "act"),
+    [(discrete, "const uint32_t a = one.act(x)"), (several, "uint32_t a[2]; one.act(x, a)")],
+)
+def test_cpp_takes_it_as_functions_and_as_a_class(compiler, make, act, needs, tmp_path):
     needs(compiler)
-    (tmp_path / "agent.h").write_text(c_header(discrete(), "agent", learning=True).text)
-    (tmp_path / "main.cpp").write_text(
-        '#include "agent.h"\nstatic agent_agent a;\nint main() { agent_begin(&a); return 0; }\n'
-    )
+    (tmp_path / "agent.h").write_text(c_header(make(), "agent", learning=True).text)
+    source = f"""
+        #include "agent.h"
+        static agent_learner one, same;
+        static uint8_t image[AGENT_IMAGE_BYTES];
+        int main() {{
+          int32_t x[AGENT_N_OBSERVED] = {{}};
+          one.begin_episode();
+          {act};
+          one.learn(x, a, 1 << AGENT_FRACTION_BITS, x, true);
+          one.save(image);
+          return one.q(x, a) > 0 && same.q(x, a) == 0 && same.load(image) &&
+                 same.q(x, a) == one.q(x, a) ? 0 : 1;
+        }}
+    """
+    (tmp_path / "main.cpp").write_text(source + "\n")
     options = ("-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-Werror")
     run(compiler, *options, tmp_path / "main.cpp", "-o", tmp_path / "main")
     run(tmp_path / "main")
