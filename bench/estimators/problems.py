@@ -52,6 +52,8 @@ from sklearn.neural_network import MLPClassifier, MLPRegressor
 from sklearn.svm import SVC, SVR
 
 from sdnn import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
+from sdnn.files import write_whole
+from sdnn.runs.figures import figure_bytes
 
 KIND = "problems"
 N_TRAINING = 500
@@ -362,7 +364,7 @@ def draw(found, path):
         axes.spines[["top", "right", "left"]].set_visible(False)
     handles, names = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=5, frameon=False, fontsize=8)
-    figure.savefig(path, dpi=160, metadata={"Software": None})
+    write_whole(path, figure_bytes(figure)[0])
 
 
 def main():

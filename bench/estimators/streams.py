@@ -28,6 +28,8 @@ from sklearn.neural_network import MLPRegressor
 
 from sdnn import SDNNRegressor
 from sdnn.estimators.river import RiverRegressor
+from sdnn.files import write_whole
+from sdnn.runs.figures import figure_bytes
 
 KIND = "streams"
 N_SAMPLES = 4000
@@ -202,7 +204,7 @@ def draw(found, path):
     figure.axes[3].set_ylabel("squared error / variance", fontsize=8)
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center",
                   ncols=len(shown), frameon=False, fontsize=9)  # fmt: skip
-    figure.savefig(path, dpi=160, metadata={"Software": None})
+    write_whole(path, figure_bytes(figure)[0])
 
 
 def main():

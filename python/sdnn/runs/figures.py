@@ -77,11 +77,15 @@ def agent_colors(agents: Iterable[str]) -> dict[str, str]:
 def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
     """Return a figure as PNG and as SVG; the same rows give the same bytes."""
     from matplotlib import rc_context
+    from PIL import Image  # comes with matplotlib
 
-    png, svg = BytesIO(), BytesIO()
+    drawn, png, svg = BytesIO(), BytesIO(), BytesIO()
     with stay_interrupts(), rc_context({"svg.hashsalt": "sdnn"}):
-        figure.savefig(png, format="png", dpi=200, metadata={"Software": None})
+        figure.savefig(drawn, format="png", dpi=200)
         figure.savefig(svg, format="svg", metadata={"Date": None})
+        with Image.open(drawn) as image:  # 256 colours take a third of the bytes
+            few = image.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+            few.save(png, "PNG", optimize=True, dpi=(200, 200))
     return png.getvalue(), svg.getvalue()
 
 
