@@ -171,7 +171,7 @@ def main():
     if given.number is not None:
         with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
             os.chdir(folder)
-            sys.exit(python_readers.execute(given.targets[0], given.number))
+            sys.exit(python_readers.execute(given.targets[0], given.number) or 0)
     given.out.mkdir(parents=True, exist_ok=True)
     path = given.out / "counts.json"
     counts = json.loads(path.read_text()) if path.exists() else {}

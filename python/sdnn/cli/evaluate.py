@@ -26,16 +26,17 @@ from sdnn.cli.common import (
     show_default=True,
     help="Greedy episodes.",
 )
+@click.option("--best", is_flag=True, help="The agent that --keep-best kept, not the present one.")
 @seed_option
 @json_option
-def evaluate(folder: Path, episodes: int, seed: int | None, as_json: bool) -> None:
+def evaluate(folder: Path, episodes: int, best: bool, seed: int | None, as_json: bool) -> None:
     """Evaluate the agent of RUN as it is now: greedy episodes in which nothing is learned."""
     import numpy as np
 
     from sdnn.runs import Run
 
     with run_command(words_of_run(folder)):
-        found = Run.open(folder).evaluate(episodes, seed)
+        found = Run.open(folder).evaluate(episodes, seed, best=best)
     returns = found.returns
     low, median, high = np.percentile(returns, (25, 50, 75)).tolist()
     values = {

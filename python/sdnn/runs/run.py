@@ -250,14 +250,18 @@ class Run(Displayed):
         """Load the agent of the last checkpoint; RunError if there is none or it is damaged."""
         return agent_of(self.folder)
 
-    def evaluate(self, episodes: int = 10, seed: int | None = None) -> RunEvaluation:
+    def evaluate(
+        self, episodes: int = 10, seed: int | None = None, *, best: bool = False
+    ) -> RunEvaluation:
         """Run greedy episodes; by default with other seeds than the run's own evaluations.
+
+        With `best` the agent is that of the best evaluation, which `output.keep_best` kept.
 
         RunError if there is no checkpoint yet, its file is damaged, or the environment differs or
         gives what cannot be evaluated.
         """
         root = self.fresh_seed if seed is None else seed
-        agent = self.agent()
+        agent = agent_of(self.folder, best=best)
         with closing(self.spec.make_env("evaluation_sensor_noise")) as env:
             self.check_spaces(agent, env)
             try:
@@ -403,11 +407,14 @@ class _StoredCheckpoints(CheckpointCallback):
         return self._clock - before
 
 
-def agent_of(folder: Path) -> Agent[Any, Any]:
+def agent_of(folder: Path, *, best: bool = False) -> Agent[Any, Any]:
     """Load the agent of a run, as `Run.agent`, whatever the run's configuration has."""
     if not (folder / CONFIG).exists():
         raise RunError(f"{folder} holds no run: there is no {folder / CONFIG}")
-    path = next((p for p in (folder / CHECKPOINT, folder / AGENT) if p.exists()), None)
+    names = (BEST,) if best else (CHECKPOINT, AGENT)
+    path = next((p for p in (folder / name for name in names) if p.exists()), None)
+    if path is None and best:
+        raise RunError(f"{folder} has no {BEST}: train with --keep-best")
     if path is None:
         begins = command_line("sdnn", "resume", folder)
         raise RunError(f"{folder} has no checkpoint yet: {begins} begins it")

@@ -211,6 +211,12 @@ class RunSpec(Settings, frozen=True):
             )
         if self.output.keep_best and not self.is_evaluated:
             raise ConfigError("output.keep_best", "needs evaluations: evaluate_every must not be 0")
+        if self.output.keep_best and budget.steps and budget.steps < (protocol.evaluate_every or 0):
+            raise ConfigError(
+                "output.keep_best",
+                f"needs an evaluation: budget.steps must be at least {protocol.evaluate_every}"
+                f" (evaluate_every), got {budget.steps}",
+            )
         every = protocol.evaluate_every_episodes
         if every is not None and budget.episodes is not None and budget.episodes < every:
             raise ConfigError(

@@ -714,8 +714,15 @@ def test_a_run_is_not_overwritten(invoke):
 def test_the_best_agent_is_kept_where_it_is_asked_for(invoke):
     invoke("train", DRIFTING, *SHORT, "--out", "kept", "--keep-best")
     invoke("train", DRIFTING, *SHORT, "--out", "plain")
-    assert load_agent("kept/best.safetensors").kind == "sdnn-c"
+    best = load_agent("kept/best.safetensors")
+    assert best.kind == "sdnn-c"
+    found = invoke("evaluate", "kept", "--best", "--episodes", 3, "--json").stdout
+    env = Run.open("kept").spec.make_env("evaluation_sensor_noise")
+    again = evaluate(best, env, 3, seed=Run.open("kept").fresh_seed)
+    assert json.loads(found)["returns"] == again.returns.tolist()
     assert not Path("plain/best.safetensors").exists()
+    result = invoke("evaluate", "plain", "--best")
+    assert (result.exit_code, "--keep-best" in result.stderr) == (1, True)
 
 
 def test_ranges_that_do_not_suit_are_named(invoke):

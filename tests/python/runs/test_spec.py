@@ -111,6 +111,11 @@ def test_the_hash_is_that_of_what_fixes_the_rows():
             "output.keep_best",
             "needs evaluations",
         ),
+        (
+            {"environment": "CartPole-v1", "budget": {"steps": 9}, "output": {"keep_best": True}},
+            "output.keep_best",
+            "at least 10000",
+        ),
         ({"output": {"checkpoint_every": 0}}, "output.checkpoint_every", "at least 1, got 0"),
     ],
 )
