@@ -2,14 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "sdnn/core/pcg64.hpp"
 #include "states.hpp"
 
 namespace sdnn::agents {
@@ -125,6 +128,41 @@ TEST(Observations, SymbolsAreInputsWhereTheyAreCoded) {
   const Observations lone({.low = Ends(2, 0.0), .high = Ends(2, 1.0), .symbols = {{0, 2}}}, true,
                           2);
   EXPECT_EQ(lone.n_symbols(), (std::vector<int>{2, 2}));  // repeated, as two are needed
+}
+
+/// An angle that wanders as its cosine and sine, with noise, and a radius that does or does not.
+Numbers wandering(double noise, double radius_moves) {
+  core::Pcg64 random(std::array<std::uint64_t, 1>{3});
+  const auto normal = [&random] {
+    double sum = -6.0;
+    for (int i = 0; i < 12; ++i) sum += random.uniform();
+    return sum;
+  };
+  Numbers path;
+  double angle = 0.0;
+  for (int t = 0; t <= 600; ++t) {
+    angle += 0.3 * normal();
+    const double radius = 1.0 + radius_moves * std::sin(0.05 * t);
+    path.push_back(radius * std::cos(angle) + noise * normal());
+    path.push_back(radius * std::sin(angle) + noise * normal());
+  }
+  Numbers seen(path.begin(), path.end() - 2);
+  seen.insert(seen.end(), path.begin() + 2, path.end());
+  return seen;
+}
+
+TEST(Observations, FindNoisyAnglesButNotPositions) {
+  ObservationConfig config = unbounded(2);
+  config.find_angle_pairs = true;
+  const auto n_inputs = [&config](const Numbers& seen) { return fitted(config, seen).n_inputs(); };
+  EXPECT_EQ(n_inputs(wandering(0.0, 0.0)), 1U);
+  EXPECT_EQ(n_inputs(wandering(0.1, 0.0)), 1U);
+  EXPECT_EQ(n_inputs(wandering(0.2, 0.0)), 1U);
+  EXPECT_EQ(n_inputs(wandering(0.6, 0.0)), 2U);  // too much noise to tell
+  EXPECT_EQ(n_inputs(wandering(0.1, 0.3)), 2U);  // the distance matters
+  Numbers few = wandering(0.1, 0.0);
+  few.resize(200);
+  EXPECT_EQ(n_inputs(few), 2U);
 }
 
 TEST(Observations, ContinueFromTheirState) {

@@ -60,7 +60,7 @@ struct ObservationConfig {
 /// A number's range is the fixed one, or fitted to observations: from the lowest to the highest,
 /// and a quarter more at each end. Adaptive ranges leave out one in twenty observations at each
 /// end and stay within the fixed range. Pairs of neighbouring variables that lie and move on the
-/// unit circle can be found.
+/// unit circle, or around it by what is noise, can be found.
 class Observations {
  public:
   /// Symbols are inputs of their own where the approximator codes symbols; it gets `least_inputs`
@@ -157,8 +157,9 @@ class Observations {
     }
   }
 
-  /// Takes unknown ranges and pairs from observations. Shape: (n, n_variables), row by row.
-  /// Throws std::invalid_argument where there is no range, and then nothing has changed.
+  /// Takes unknown ranges and pairs from observations. Shape: (n, n_variables), row by row: the
+  /// first half what was observed before steps, the second what was observed after them. Throws
+  /// std::invalid_argument where there is no range, and then nothing has changed.
   void fit(std::span<const double> seen) {
     const auto pairs = config_.find_angle_pairs ? pairs_in(seen) : config_.angle_pairs;
     Ranges ranges = fixed_ranges(pairs);
@@ -248,6 +249,10 @@ class Observations {
   static constexpr double kHeadroom = 0.25;
   static constexpr std::size_t kRare = 20;
   static constexpr double kNearCircle = 1e-3;  // single precision and some rounding
+  // Around the circle: with noise of a tenth of the range the correlation of squares is -0.65, and
+  // what moves smoothly is above 0.5 alike.
+  static constexpr std::size_t kFewest = 200;  // steps
+  static constexpr double kLargestBias = 0.15, kLeastOpposed = 0.5, kMostAlike = 0.2;
   static constexpr double kLargest = 1e300;
 
   static bool is_unknown(double x) noexcept { return std::isnan(x); }
@@ -345,7 +350,8 @@ class Observations {
     Pairs pairs;
     for (std::size_t i = 0; i + 1 < n_variables(); ++i) {
       if (roles_[i] != Role::number || roles_[i + 1] != Role::number) continue;
-      if (!is_on_circle(column(seen, i), column(seen, i + 1))) continue;
+      const auto cosines = column(seen, i), sines = column(seen, i + 1);
+      if (!is_on_circle(cosines, sines) && !is_around_circle(cosines, sines)) continue;
       pairs.push_back({static_cast<int>(i), static_cast<int>(i + 1)});
       ++i;
     }
@@ -362,6 +368,32 @@ class Observations {
       return most - least > kNearCircle;
     };
     return moves(cosines) && moves(sines);
+  }
+
+  /// With noise: the squares are opposed, and their sum is 1 on the average and not, as that of a
+  /// radius that moves would be, alike before and after a step.
+  static bool is_around_circle(const std::vector<double>& cosines,
+                               const std::vector<double>& sines) {
+    const std::size_t n = cosines.size() / 2;
+    if (n < kFewest) return false;
+    const auto mean_of = [](std::size_t count, const auto& term) {
+      double sum = 0.0;  // in this order on every machine
+      for (std::size_t t = 0; t < count; ++t) sum += term(t);
+      return sum / static_cast<double>(count);
+    };
+    const auto square = [](double x) { return x * x; };
+    const double x = mean_of(2 * n, [&](std::size_t t) { return square(cosines[t]); });
+    const double y = mean_of(2 * n, [&](std::size_t t) { return square(sines[t]); });
+    if (!(std::abs(x + y - 1.0) < kLargestBias)) return false;
+    const auto dx = [&](std::size_t t) { return square(cosines[t]) - x; };
+    const auto dy = [&](std::size_t t) { return square(sines[t]) - y; };
+    const auto radius = [&](std::size_t t) { return dx(t) + dy(t); };
+    const double xx = mean_of(2 * n, [&](std::size_t t) { return square(dx(t)); });
+    const double yy = mean_of(2 * n, [&](std::size_t t) { return square(dy(t)); });
+    const double xy = mean_of(2 * n, [&](std::size_t t) { return dx(t) * dy(t); });
+    const double rr = mean_of(2 * n, [&](std::size_t t) { return square(radius(t)); });
+    const double alike = mean_of(n, [&](std::size_t t) { return radius(t) * radius(n + t); });
+    return -xy > kLeastOpposed * std::sqrt(xx * yy) && std::abs(alike) < kMostAlike * rr;
   }
 
   std::vector<ObservedInput> inputs_with(const Pairs& pairs) const {
