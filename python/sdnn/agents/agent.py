@@ -84,7 +84,7 @@ class Agent(Model, abc.ABC, Generic[Approximator, Learning]):
         Variables that are angles: their ranges wrap around.
     angle_pairs : "none", "find" or sequence of (int, int)
         Pairs of variables that are the cosine and the sine of an angle, which becomes one input.
-        ``"find"``: those that the warm-up finds on the unit circle.
+        ``"find"``: those that the warm-up finds on the unit circle, but for noise.
     inputs : "all", "relevant" or sequence of int
         ``"relevant"``: those that rewards or actions have to do with, by the warm-up; see
         docs/how-to/choosing-settings.md. A list: these variables in any case, and others that are
