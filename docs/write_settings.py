@@ -64,14 +64,15 @@ def entries(
 
 
 def words(found: dict[str, Any]) -> str:
-    """Write a type with its bounds."""
+    """Write a type with its bounds, but for those that only guard against absurd numbers."""
     if "anyOf" in found:
         return ", ".join(words(one) for one in found["anyOf"] if one.get("type") != "null")
     if "enum" in found:
         return ", ".join(f"`{word}`" for word in found["enum"] if word is not None)
     text: str = found.get("type", "")
     limits = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<="}
-    return text + "".join(f" {sign} {found[key]:g}" for key, sign in limits.items() if key in found)
+    bounds = {sign: found[key] for key, sign in limits.items() if abs(found.get(key, 1e6)) < 1e6}
+    return text + "".join(f" {sign} {bound:g}" for sign, bound in bounds.items())
 
 
 if __name__ == "__main__":

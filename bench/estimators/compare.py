@@ -1,10 +1,9 @@
-"""Measures, draws and writes what docs/how-to/regression.md shows.
+"""Measure and draw what docs/evidence/problems.md shows of tuned baselines.
 
     python bench/estimators/compare.py [--seeds 5] [--only WORD] [--redraw]
 
 The demonstration problem, the same with useless inputs, and data of scikit-learn, beside baselines
-that are tuned by cross-validation; and over 20 seeds the network alone, which
-docs/how-to/coming-from-libsdnn.md quotes. Tables are printed. The picture of the demonstration
+that are tuned by cross-validation; and the network alone over 20 seeds. Tables are printed. The picture of the demonstration
 problem shows one network, trained here in a few seconds.
 """
 
