@@ -3,8 +3,8 @@
     python bench/estimators/compare.py [--seeds 5] [--only WORD] [--redraw]
 
 The demonstration problem, the same with useless inputs, and data of scikit-learn, beside baselines
-that are tuned by cross-validation; and the network alone over 20 seeds. Tables are printed. The picture of the demonstration
-problem shows one network, trained here in a few seconds.
+that are tuned by cross-validation; and the network alone over 20 seeds. Tables are printed. The
+picture of the demonstration problem shows one network, trained here in a few seconds.
 """
 
 from __future__ import annotations
