@@ -5,6 +5,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 LIST = Path(__file__).with_name("words.txt")
+NOT_PROSE = re.compile(r"^```.*?^```$|<!-- table:.*?<!-- end of table -->", re.DOTALL | re.MULTILINE)
+"""Code and generated tables, which no limit of words counts."""
 
 
 def expressions():
@@ -38,3 +40,15 @@ def test_the_list_finds_what_it_names():
     examples = ("The agent goes on learning.", "Three rivals", "as they come", "is told")
     for example in examples:
         assert any(pattern.search(example) for pattern, _ in expressions()), example
+
+
+def test_the_documents_are_short():
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
+    words = {
+        page.relative_to(ROOT).as_posix(): len(NOT_PROSE.sub("", page.read_text("utf-8")).split())
+        for page in pages
+        if page.name != "CHANGELOG.md"
+    }
+    assert sum(words.values()) <= 26_000
+    del words["docs/reference/settings.md"]  # generated
+    assert {name: n for name, n in words.items() if n > 1_500} == {}
