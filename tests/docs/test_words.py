@@ -5,7 +5,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 LIST = Path(__file__).with_name("words.txt")
-NOT_PROSE = re.compile(r"^```.*?^```$|<!-- table:.*?<!-- end of table -->", re.DOTALL | re.MULTILINE)
+NOT_PROSE = re.compile(r"^```.*?^```$|<!-- table:.*?<!-- end of table -->", re.S | re.M)
 """Code and generated tables, which no limit of words counts."""
 
 
