@@ -1,7 +1,13 @@
-"""C headers of policies with other compilers and on other processors, against their agents."""
+"""C headers of policies with other compilers and on other processors, against their agents.
+
+With SDNN_WEEKLY set agents learn for 100,000 steps.
+"""
+
+import os
 
 import pytest
 
+from bare_processors import BARE_TARGETS
 from c_learners import LEARNERS, check_life
 from c_policies import (
     AGENTS,
@@ -18,6 +24,8 @@ from c_policies import (
 )
 from sdnn.export import c_header
 
+N_STEPS = 100_000 if os.environ.get("SDNN_WEEKLY") else 1000
+
 
 @pytest.fixture(params=[name for name in TARGETS if name != "x86-64"])
 def target(request, needs):
@@ -32,8 +40,12 @@ def test_the_actions_are_the_agents(name, target, tmp_path):
 
 
 @pytest.mark.parametrize("name", LEARNERS)
-def test_it_learns_as_the_agent(name, target, tmp_path):
-    check_life(name, target, tmp_path, n_steps=1000)
+@pytest.mark.parametrize("kind", [*TARGETS, *BARE_TARGETS])
+def test_it_learns_as_the_agent(kind, name, needs, tmp_path):
+    target = (TARGETS | BARE_TARGETS)[kind]
+    linker = ["ld.lld"] if kind in BARE_TARGETS else []
+    needs(*filter(None, (target.compiler, target.runner)), *linker)
+    check_life(name, target, tmp_path, N_STEPS)
 
 
 @pytest.mark.parametrize("name", LEARNERS)

@@ -62,7 +62,7 @@ def test_any_readings_and_rewards_are_defined(target, tmp_path):
         _, command = build(folder, agent, target, *SANITIZED, "-fsanitize=address")
         random = np.random.default_rng(0)
         n = len(agent.observation_range[0])
-        lines = random.integers(-(2**31), 2**31, (5000, 2 * n + 3))
+        lines = random.integers(-(2**31), 2**31, (100_000, 2 * n + 3))
         ends = random.choice([-(2**31), 2**31 - 1, 0, 1, -1], lines.shape)
         lines = np.where(random.random(lines.shape) < 0.5, ends, lines)
         lines[:, 0] = random.integers(0, 3, len(lines))

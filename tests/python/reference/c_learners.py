@@ -1,11 +1,13 @@
 """Agents that learn in C, and programs that let them live beside the library's."""
 
+import functools
 import subprocess
 from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
 
+from bare_processors import BARE_TARGETS, STDIO
 from c_policies import STRICT, box, run
 from sdnn.agents import SarsaConfig, SDNNSarsa, Transition
 from sdnn.approximators import LinearSDNNConfig
@@ -126,7 +128,7 @@ def lines_of(agent, n_steps, seed, fraction_bits):
         lines.append([1, *now, reward, *following, ends < 0.03])
         now = None if ends < 0.06 else following
     table = np.array(lines)
-    table[:, 1:-1] = np.round(table[:, 1:-1] * scale)
+    table[:, 1:-1] = np.clip(np.round(table[:, 1:-1] * scale), -(2**31), 2**31 - 1)
     return table.astype("<i4")
 
 
@@ -163,13 +165,15 @@ def build(folder, agent, target, *options):
         f"agent_learn(&agent, line + 1, {'action[0]' if one else 'action'},"
         " line[1 + AGENT_N_OBSERVED], next, line[2 * AGENT_N_OBSERVED + 2])"
     )
+    if target in BARE_TARGETS.values():
+        (folder / "stdio.h").write_text(STDIO)
     source = DRIVER.replace("ACT(line[0] == 1)", act % "line[0] == 1").replace("LEARN", learn)
     (folder / "life.c").write_text(source)
     program = folder / "life"
     run(
         target.compiler, *STRICT, "-O2", *target.options, *options,
         *(("-static",) if target.runner else ()),
-        folder / "life.c", "-o", program,
+        "-I", folder, folder / "life.c", "-o", program,
     )  # fmt: skip
     return header, [target.runner, program] if target.runner else [program]
 
@@ -186,21 +190,27 @@ def lived(command, image, lines, n_dimensions):
     return np.frombuffer(done[:n], "<u4").reshape(-1, n_dimensions).tolist(), done[n:]
 
 
+@functools.cache
+def life(name, n_steps, fraction_bits):
+    """Lines of life, and what the library's agent begins with, does and remembers in the end."""
+    agent = LEARNERS[name]()
+    lines = lines_of(agent, n_steps, 1, fraction_bits)
+    nothing = save_image(agent)
+    return lines, nothing, live(agent, lines, fraction_bits), save_image(agent)
+
+
 def check_life(name, target, folder, n_steps=3000, options=()):
     """It acts and learns as the library's agent, from nothing and from an image."""
-    agent = LEARNERS[name]()
-    header, command = build(folder, agent, target, *options)
-    lines = lines_of(agent, n_steps, 1, header.fraction_bits)
-    nothing = save_image(agent)
-    came, image = lived(command, nothing, lines, agent.n_dimensions)
-    expected = live(agent, lines, header.fraction_bits)
-    assert came == expected
-    assert image == save_image(agent)
-    # Python loads the experience, and both continue from it.
     home = LEARNERS[name]()
+    header, command = build(folder, home, target, *options)
+    lines, nothing, expected, learned = life(name, n_steps, header.fraction_bits)
+    came, image = lived(command, nothing, lines, home.n_dimensions)
+    assert came == expected
+    assert image == learned
+    # Python loads the experience, and both continue from it.
     load_image(home, image)
     assert save_image(home) == image
-    more = lines_of(agent, n_steps // 10, 2, header.fraction_bits)
-    came, image = lived(command, image, more, agent.n_dimensions)
+    more = lines_of(home, min(n_steps, 3000) // 10, 2, header.fraction_bits)
+    came, image = lived(command, image, more, home.n_dimensions)
     assert came == live(home, more, header.fraction_bits)
     assert image == save_image(home)
