@@ -167,7 +167,7 @@ def _check_together(source: Path | None, new: bool, options: dict[str, Any]) -> 
         for key, value in options.items():
             if value not in ((), None):
                 option = {"ranges": "--range", "settings": "--set"}.get(key, f"--{key}")
-                raise click.UsageError(f"{option} is for --new: the agent of RUN has its own")
+                raise click.UsageError(f"{option} needs --new: the agent of RUN has its own")
 
 
 def _known_agent(source: Path) -> Agent[Any, Any]:

@@ -10,7 +10,7 @@ import gymnasium as gym
 
 from sdnn.agents import LINEAR_PRESETS, SDNNSarsa
 from sdnn.approximators import LinearSDNNConfig
-from sdnn.arguments import argument_error, whole
+from sdnn.arguments import argument_error, shown, whole
 from sdnn.export.linear import LearnerWriter
 
 _UNITS = range(32, 769, 16)
@@ -57,6 +57,8 @@ def new_agent(
     """
     most = whole("ram_bytes", ram_bytes, 1, 2**31)
     config = LINEAR_PRESETS["general"].approximator if approximator is None else approximator
+    if not isinstance(config, LinearSDNNConfig):
+        raise TypeError(f"approximator must be a LinearSDNNConfig, got {shown(config)}")
     options = {"inputs": "all", "angle_pairs": [], **options}
 
     def agent(n_units: int) -> SDNNSarsa:

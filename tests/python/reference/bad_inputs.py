@@ -362,7 +362,9 @@ def _shape_and_size(value):
 
 
 def parameters_of(function):
-    return [name for name in inspect.signature(function).parameters if name not in ("self", "cls")]
+    parameters = inspect.signature(function).parameters.values()
+    named = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD]
+    return [name for name in named if name not in ("self", "cls")]
 
 
 def values_for(parameter):

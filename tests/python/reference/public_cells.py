@@ -224,7 +224,9 @@ def _coding_fault(coding, bins):
 
 
 GOOD = {
+    "action_space": lambda: gym.spaces.Discrete(2),
     "agent": lambda: tiny_agent(),
+    "approximator": lambda: core_cells.linear_config(),
     "case": lambda: PAPER_CASES["s4"],
     "cases": lambda: [PAPER_CASES["s4"]],
     "case_id": lambda: "s4",
@@ -252,10 +254,12 @@ GOOD = {
     "name": lambda: "portable",
     "names": lambda: ("early_steps",),
     "observer": lambda: None,
+    "observation_space": lambda: gym.spaces.Box(0.0, 1.0, (2,)),
     "options": lambda: None,
     "path": lambda: "agent",
     "plan": lambda: (),
     "quick": lambda: True,
+    "ram_bytes": lambda: 20_000,
     "records": lambda: (),
     "reference": lambda: (),
     "results": lambda: (),
