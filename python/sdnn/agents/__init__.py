@@ -1,5 +1,6 @@
 """Agents: ``agent.train(env, steps=...)``, or ``act(observation)`` and ``learn(transition)``."""
 
+from sdnn.agents.adapters import UnusableStepError
 from sdnn.agents.agent import Agent, load_agent
 from sdnn.agents.callbacks import (
     Callback,
@@ -19,7 +20,6 @@ from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.q_learning import PRESETS, Preset, RBFQLearning, SDNNQLearning
 from sdnn.agents.sarsa import LINEAR_PRESETS, SDNNSarsa
 from sdnn.agents.scaling import Scaling
-from sdnn.agents.spaces import UnusableStepError
 from sdnn.agents.training import Training, TrainingResult
 from sdnn.config import FuzzyQLearningConfig, QLearningConfig, SarsaConfig
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import abc
-import copy
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sdnn.agents.adapters import (
+    OneEnvironment,
+    StepResults,
+    UnusableStepError,
+    adapter_for,
+    checked,
+    own_copy,
+)
 from sdnn.agents.files import SavedEpisode, Statistics, learning_wrappers, names_of, statistics_of
-from sdnn.agents.spaces import UnusableStepError, reset_env, step_env
-from sdnn.arguments import flag, reward_of
 
 if TYPE_CHECKING:
     from sdnn._core import Controller
@@ -25,9 +27,6 @@ _LEARNING, EVALUATION = 0, 1
 
 _PART = 1024
 """Actions in an array."""
-
-Seeds: TypeAlias = Mapping[int, int | None]
-Options: TypeAlias = dict[str, Any] | None
 
 
 class UnrepeatedEpisodeError(ValueError):
@@ -69,81 +68,6 @@ def episode_seed(seed: int, kind: int, episode: int) -> int:
     """Return the seed of an episode's `reset`; learning and evaluation have their own."""
     word = np.random.SeedSequence(seed, spawn_key=(kind, episode)).generate_state(1, np.uint32)[0]
     return int(word) % 2**31  # some environments take no larger ones
-
-
-class StepResults(NamedTuple):
-    """The results of a step in every environment, each in an array or a list of all.
-
-    ``observations`` are the last ones of episodes that ended.
-    """
-
-    observations: Any
-    rewards: list[float]
-    terminated: list[bool]
-    truncated: list[bool]
-
-
-def checked(reward: Any, terminated: Any, truncated: Any) -> tuple[float, bool, bool]:
-    """Return a finite float and bools; UnusableStepError for something else."""
-    try:
-        if type(reward) is not float:
-            reward = reward_of(reward)
-        if not math.isfinite(reward):
-            raise ValueError(f"reward must be finite, got {reward}")
-        if not type(terminated) is bool is type(truncated):
-            terminated, truncated = flag("terminated", terminated), flag("truncated", truncated)
-    except (TypeError, ValueError) as error:
-        raise UnusableStepError(str(error)) from error
-    return reward, terminated, truncated
-
-
-def own_copy(value: Any) -> Any:
-    """Copy what others may write to: environments may keep their state, or change an action."""
-    if type(value) is np.ndarray:
-        return value.copy()
-    return value if isinstance(value, (np.generic, int, float)) else copy.deepcopy(value)
-
-
-class EnvironmentAdapter(abc.ABC):
-    """The interface of all environments, single and vectorized.
-
-    ``can_repeat`` is whether each environment can be reset at any time, with a seed of its own.
-    """
-
-    n_environments: int
-    can_repeat: bool
-
-    @abc.abstractmethod
-    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
-        """Begin episodes in some environments, with seeds; return their first observations.
-
-        Where one is missing, the episode begins with the next `step`, which returns it.
-        """
-
-    @abc.abstractmethod
-    def step(self, actions: Sequence[Any]) -> StepResults:
-        """Take an action in each; any one where the episode has not begun."""
-
-
-class OneEnvironment(EnvironmentAdapter):
-    """A single environment."""
-
-    n_environments = 1
-    can_repeat = True
-
-    def __init__(self, env: gym.Env[Any, Any]) -> None:
-        self._env = env
-
-    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
-        """Begin its episode."""
-        return {i: reset_env(self._env, seed, options) for i, seed in seeds.items()}
-
-    def step(self, actions: Sequence[Any]) -> StepResults:
-        """Take the only action."""
-        seen, reward, terminated, truncated, _ = step_env(self._env, own_copy(actions[0]))
-        reward, terminated, truncated = checked(reward, terminated, truncated)
-        listed = seen[np.newaxis] if type(seen) is np.ndarray else [seen]
-        return StepResults(listed, [reward], [terminated], [truncated])
 
 
 class Rounds:
@@ -265,8 +189,7 @@ class Episode:
 class Episodes:
     """Begins episodes in all environments of a training, steps them, and can repeat them.
 
-    ``adapter_for`` returns the adapter for an environment, ``options`` those of a single one's
-    reset from the episode's number, and ``unusable`` the error for one of a step or reset, in an
+    ``options`` returns those of a single environment's reset from the episode's number, and ``unusable`` the error for one of a step or reset, in an
     environment or in any (None). ``seed`` is the root of the episodes' seeds; None: resets have no
     seeds. ``first`` is the number of the first episode.
 
@@ -291,7 +214,6 @@ class Episodes:
     def __init__(
         self,
         env: Any,
-        adapter_for: Callable[[Any], EnvironmentAdapter],
         learner: Any,
         seed: int | None,
         first: int,
@@ -300,7 +222,7 @@ class Episodes:
     ) -> None:
         self._env, self._seed, self._options = env, seed, options
         self._has_seeds = seed is not None
-        self._adapter_for, self._unusable = adapter_for, unusable
+        self._unusable = unusable
         self._adapter = adapter_for(env)
         self.wrappers = learning_wrappers(env)
         self.learned: list[Statistics] = []
@@ -318,7 +240,7 @@ class Episodes:
 
     def leave(self) -> None:
         """Begin anew in every environment with the next step, with other seeds."""
-        self._adapter = self._adapter_for(self._env)
+        self._adapter = adapter_for(self._env)
         self.present[:] = [None] * self.n_environments
         self.waiting = []
 

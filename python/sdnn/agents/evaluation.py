@@ -13,11 +13,14 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents.episode import (
-    EVALUATION,
+from sdnn.agents.adapters import (
+    UnusableStepError,
     checked,
-    episode_seed,
+    require_single,
+    reset_env,
+    step_env,
 )
+from sdnn.agents.episode import EVALUATION, episode_seed
 from sdnn.agents.files import (
     Statistics,
     learning_wrappers,
@@ -25,13 +28,7 @@ from sdnn.agents.files import (
     statistics_of,
     take_statistics,
 )
-from sdnn.agents.spaces import (
-    UnusableStepError,
-    require_same_kind,
-    require_single,
-    reset_env,
-    step_env,
-)
+from sdnn.agents.spaces import require_same_kind
 from sdnn.arguments import has_methods, seed_of, shown, whole
 from sdnn.display import Displayed
 

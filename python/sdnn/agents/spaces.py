@@ -1,4 +1,4 @@
-"""Gymnasium's interface: spaces as numbers for the core, in files, compared; steps and resets."""
+"""Gymnasium's interface: spaces as numbers for the core, in files, and compared."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import argument_error, array_of, blamed, has_methods, shown
+from sdnn.arguments import argument_error, array_of, blamed, shown
 from sdnn.bounds import flat_bounds, with_infinities
 
 Inputs: TypeAlias = Literal["all", "relevant"] | Sequence[int]
@@ -23,10 +23,6 @@ Ranges: TypeAlias = Literal["adaptive"] | tuple[ArrayLike, ArrayLike]
 """Lowest and highest values, a number for all variables or one for each; or adaptive ones."""
 
 _MANY_VARIABLES = 16
-_OLD_API = (
-    "; an environment of Gym before 0.26 can be wrapped:"
-    " shimmy.GymV21CompatibilityV0(env=env), from pip install shimmy"
-)
 
 
 class Observations:
@@ -257,45 +253,6 @@ def space_of_error(error: ValueError, observations: Observations, actions: Actio
         return "of action_space"
     found = [reason for word, reason in reasons.items() if word in str(error)]
     return ", ".join(found if argument else ())
-
-
-def require_single(name: str, env: Any) -> None:
-    """Check that a value is one environment; TypeError that names the argument."""
-    has_methods(name, env, "a Gymnasium environment", "reset", "step")
-    if isinstance(env, gym.vector.VectorEnv):
-        raise TypeError(
-            f"{name} must be a single environment, got a vector of them, {type(env).__name__}"
-        )
-
-
-class UnusableStepError(ValueError):
-    """A step or reset of an environment cannot be used; the message names it and the reason."""
-
-
-def reset_env(env: Any, seed: Any, options: dict[str, Any] | None) -> Any:
-    """Reset an environment, or a vector; return what is observed first.
-
-    UnusableStepError if it returns something else than an observation and a dictionary.
-    """
-    made = env.reset(seed=seed, options=options)
-    if not (isinstance(made, tuple | list) and len(made) == 2 and isinstance(made[1], Mapping)):
-        raise UnusableStepError(
-            f"env.reset must return (observation, info), info a dictionary, got {shown(made)}"
-            f"{_OLD_API}"
-        )
-    return made[0]
-
-
-def step_env(env: Any, action: Any) -> tuple[Any, Any, Any, Any, Any]:
-    """Step an environment, or a vector; UnusableStepError if it does not return five values."""
-    made = env.step(action)
-    if not (isinstance(made, (tuple, list)) and len(made) == 5):
-        n = len(made) if isinstance(made, (tuple, list)) else 1
-        raise UnusableStepError(
-            "env.step must return five values, (observation, reward, terminated, truncated, info),"
-            f" got {n}{_OLD_API}"
-        )
-    return made  # type: ignore[return-value]
 
 
 def require_unbatched(observations: gym.Space[Any], actions: gym.Space[Any]) -> None:

@@ -14,13 +14,9 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.agents.adapters import UnusableStepError, require_single
 from sdnn.agents.callbacks import listed, listeners
-from sdnn.agents.episode import (
-    EnvironmentAdapter,
-    Episodes,
-    Learner,
-    OneEnvironment,
-)
+from sdnn.agents.episode import Episodes, Learner
 from sdnn.agents.evaluation import evaluate
 from sdnn.agents.files import (
     SavedTraining,
@@ -30,7 +26,7 @@ from sdnn.agents.files import (
     take_statistics,
     write_training,
 )
-from sdnn.agents.spaces import UnusableStepError, require_same_kind, require_single
+from sdnn.agents.spaces import require_same_kind
 from sdnn.arguments import flag, has_methods, path_of, shown, whole
 from sdnn.display import Displayed
 from sdnn.interrupts import Interrupts
@@ -201,9 +197,7 @@ class Training:
         """Steps and mean returns of all evaluations so far, also of those before it was loaded."""
         self.rows: list[Row] = []
         """Rows since it was begun, or last loaded."""
-        self._episodes = Episodes(
-            env, _adapter_for, agent, self.seed, first, self._options, self._unusable
-        )
+        self._episodes = Episodes(env, agent, self.seed, first, self._options, self._unusable)
         if reset_options is not None and self.n_environments > 1:
             raise ValueError("reset_options must be None for a vector environment")
         self._stops = False
@@ -482,14 +476,6 @@ class Training:
     def _row(self, kind: str, **values: Any) -> Row:
         self.n_rows += 1
         return {"kind": kind, "step": self.n_steps, **values}
-
-
-def _adapter_for(env: Any) -> EnvironmentAdapter:
-    if not isinstance(env, gym.vector.VectorEnv):
-        return OneEnvironment(env)
-    from sdnn.agents.vectors import vector_adapter
-
-    return vector_adapter(env)
 
 
 def _optional(name: str, value: float | None) -> int | None:

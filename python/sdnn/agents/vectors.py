@@ -10,13 +10,15 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 
-from sdnn.agents.episode import (
+from sdnn.agents.adapters import (
     EnvironmentAdapter,
     Options,
     Seeds,
     StepResults,
+    UnusableStepError,
+    reset_env,
+    step_env,
 )
-from sdnn.agents.spaces import UnusableStepError, reset_env, step_env
 from sdnn.arguments import array_of
 
 

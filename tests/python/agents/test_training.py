@@ -294,6 +294,18 @@ def test_what_was_learned_before_an_environment_failed_is_kept(
     assert {row["length"] for row in told} == {20}
 
 
+def change_actions(path, change):
+    """Save a training in its third step, and change the actions of its episode in the file."""
+    env = Corridor()
+    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL, seed=3)
+    Training(agent, env, episodes=9, callbacks=[Stop(3, path)]).run()
+    description, arrays = read_file(path, "training")
+    name = "training.0.actions"
+    assert len(arrays[name]) > 0
+    write_file(path, "training", arrays | {name: change(arrays[name])}, description)
+    return name, env
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -307,24 +319,13 @@ def test_what_was_learned_before_an_environment_failed_is_kept(
 )
 def test_an_environment_gets_no_actions_that_it_does_not_have_from_a_file(change, tmp_path):
     path = tmp_path / "checkpoint"
-    env = Corridor()
-    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL, seed=3)
-    Training(agent, env, episodes=9, callbacks=[Stop(3, path)]).run()
-    description, arrays = read_file(path, "training")
-    name = "training.0.actions"
-    assert len(arrays[name]) > 0
-    write_file(path, "training", arrays | {name: change(arrays[name])}, description)
+    name, env = change_actions(path, change)
     refuses(name, Training.load, path, env)
 
 
 def test_an_episode_of_a_file_may_have_no_actions(tmp_path):
     path = tmp_path / "checkpoint"
-    env = Corridor()
-    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL, seed=3)
-    Training(agent, env, episodes=9, callbacks=[Stop(3, path)]).run()
-    description, arrays = read_file(path, "training")
-    name = "training.0.actions"
-    write_file(path, "training", arrays | {name: arrays[name][:0]}, description)
+    _, env = change_actions(path, lambda actions: actions[:0])
     with pytest.raises(UnrepeatedEpisodeError):  # the first observation is not the fourth
         Training.load(path, env)
 

@@ -13,7 +13,7 @@ from sdnn import _core
 
 
 class RoundedAway(page.SDNNC):
-    """EnvironmentAdapter counts away from the present one instead of to the nearest."""
+    """Rounds counts away from the present one instead of to the nearest."""
 
     def update(self, state: Any, action: int, q_hat: float) -> int:
         s, u = self.settings, int(self.counts(state)[action])

@@ -1,0 +1,145 @@
+"""Environments as a training steps them: one alike many, results checked, arrays copied."""
+
+from __future__ import annotations
+
+import abc
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+import gymnasium as gym
+import numpy as np
+
+from sdnn.arguments import flag, has_methods, reward_of, shown
+
+Seeds: TypeAlias = Mapping[int, int | None]
+Options: TypeAlias = dict[str, Any] | None
+
+_OLD_API = (
+    "; an environment of Gym before 0.26 can be wrapped:"
+    " shimmy.GymV21CompatibilityV0(env=env), from pip install shimmy"
+)
+
+
+def require_single(name: str, env: Any) -> None:
+    """Check that a value is one environment; TypeError that names the argument."""
+    has_methods(name, env, "a Gymnasium environment", "reset", "step")
+    if isinstance(env, gym.vector.VectorEnv):
+        raise TypeError(
+            f"{name} must be a single environment, got a vector of them, {type(env).__name__}"
+        )
+
+
+class UnusableStepError(ValueError):
+    """A step or reset of an environment cannot be used; the message names it and the reason."""
+
+
+def reset_env(env: Any, seed: Any, options: dict[str, Any] | None) -> Any:
+    """Reset an environment, or a vector; return what is observed first.
+
+    UnusableStepError if it returns something else than an observation and a dictionary.
+    """
+    made = env.reset(seed=seed, options=options)
+    if not (isinstance(made, tuple | list) and len(made) == 2 and isinstance(made[1], Mapping)):
+        raise UnusableStepError(
+            f"env.reset must return (observation, info), info a dictionary, got {shown(made)}"
+            f"{_OLD_API}"
+        )
+    return made[0]
+
+
+def step_env(env: Any, action: Any) -> tuple[Any, Any, Any, Any, Any]:
+    """Step an environment, or a vector; UnusableStepError if it does not return five values."""
+    made = env.step(action)
+    if not (isinstance(made, (tuple, list)) and len(made) == 5):
+        n = len(made) if isinstance(made, (tuple, list)) else 1
+        raise UnusableStepError(
+            "env.step must return five values, (observation, reward, terminated, truncated, info),"
+            f" got {n}{_OLD_API}"
+        )
+    return made  # type: ignore[return-value]
+
+
+class StepResults(NamedTuple):
+    """The results of a step in every environment, each in an array or a list of all.
+
+    ``observations`` are the last ones of episodes that ended.
+    """
+
+    observations: Any
+    rewards: list[float]
+    terminated: list[bool]
+    truncated: list[bool]
+
+
+def checked(reward: Any, terminated: Any, truncated: Any) -> tuple[float, bool, bool]:
+    """Return a finite float and bools; UnusableStepError for something else."""
+    try:
+        if type(reward) is not float:
+            reward = reward_of(reward)
+        if not math.isfinite(reward):
+            raise ValueError(f"reward must be finite, got {reward}")
+        if not type(terminated) is bool is type(truncated):
+            terminated, truncated = flag("terminated", terminated), flag("truncated", truncated)
+    except (TypeError, ValueError) as error:
+        raise UnusableStepError(str(error)) from error
+    return reward, terminated, truncated
+
+
+def own_copy(value: Any) -> Any:
+    """Copy what others may write to: environments may keep their state, or change an action."""
+    if type(value) is np.ndarray:
+        return value.copy()
+    return value if isinstance(value, (np.generic, int, float)) else copy.deepcopy(value)
+
+
+class EnvironmentAdapter(abc.ABC):
+    """The interface of all environments, single and vectorized.
+
+    ``can_repeat`` is whether each environment can be reset at any time, with a seed of its own.
+    """
+
+    n_environments: int
+    can_repeat: bool
+
+    @abc.abstractmethod
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+        """Begin episodes in some environments, with seeds; return their first observations.
+
+        Where one is missing, the episode begins with the next `step`, which returns it.
+        """
+
+    @abc.abstractmethod
+    def step(self, actions: Sequence[Any]) -> StepResults:
+        """Take an action in each; any one where the episode has not begun."""
+
+
+class OneEnvironment(EnvironmentAdapter):
+    """A single environment."""
+
+    n_environments = 1
+    can_repeat = True
+
+    def __init__(self, env: gym.Env[Any, Any]) -> None:
+        self._env = env
+
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+        """Begin its episode."""
+        return {i: reset_env(self._env, seed, options) for i, seed in seeds.items()}
+
+    def step(self, actions: Sequence[Any]) -> StepResults:
+        """Take the only action."""
+        seen, reward, terminated, truncated, _ = step_env(self._env, own_copy(actions[0]))
+        reward, terminated, truncated = checked(reward, terminated, truncated)
+        listed = seen[np.newaxis] if type(seen) is np.ndarray else [seen]
+        return StepResults(listed, [reward], [terminated], [truncated])
+
+
+def adapter_for(env: Any) -> EnvironmentAdapter:
+    """Return the adapter for an environment, or for a vector of them."""
+    if not isinstance(env, gym.vector.VectorEnv):
+        return OneEnvironment(env)
+    from sdnn.agents.vectors import vector_adapter
+
+    return vector_adapter(env)
