@@ -134,12 +134,3 @@ class OneEnvironment(EnvironmentAdapter):
         reward, terminated, truncated = checked(reward, terminated, truncated)
         listed = seen[np.newaxis] if type(seen) is np.ndarray else [seen]
         return StepResults(listed, [reward], [terminated], [truncated])
-
-
-def adapter_for(env: Any) -> EnvironmentAdapter:
-    """Return the adapter for an environment, or for a vector of them."""
-    if not isinstance(env, gym.vector.VectorEnv):
-        return OneEnvironment(env)
-    from sdnn.agents.vectors import vector_adapter
-
-    return vector_adapter(env)

@@ -6,14 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn.agents.adapters import (
+    EnvironmentAdapter,
     OneEnvironment,
     StepResults,
     UnusableStepError,
-    adapter_for,
     checked,
     own_copy,
 )
@@ -189,9 +190,10 @@ class Episode:
 class Episodes:
     """Begins episodes in all environments of a training, steps them, and can repeat them.
 
-    ``options`` returns those of a single environment's reset from the episode's number, and ``unusable`` the error for one of a step or reset, in an
-    environment or in any (None). ``seed`` is the root of the episodes' seeds; None: resets have no
-    seeds. ``first`` is the number of the first episode.
+    ``options`` returns those of a single environment's reset from the episode's number, and
+    ``unusable`` the error for one of a step or reset, in an environment or in any (None). ``seed``
+    is the root of the episodes' seeds; None: resets have no seeds. ``first`` is the number of the
+    first episode.
 
     Attributes
     ----------
@@ -223,7 +225,7 @@ class Episodes:
         self._env, self._seed, self._options = env, seed, options
         self._has_seeds = seed is not None
         self._unusable = unusable
-        self._adapter = adapter_for(env)
+        self._adapter = _adapter_for(env)
         self.wrappers = learning_wrappers(env)
         self.learned: list[Statistics] = []
         n = self.n_environments = self._adapter.n_environments
@@ -240,7 +242,7 @@ class Episodes:
 
     def leave(self) -> None:
         """Begin anew in every environment with the next step, with other seeds."""
-        self._adapter = adapter_for(self._env)
+        self._adapter = _adapter_for(self._env)
         self.present[:] = [None] * self.n_environments
         self.waiting = []
 
@@ -420,3 +422,12 @@ class Episodes:
             self._latest = self._read("observation", self.results.observations)
             ends = zip(self.results.terminated, self.results.truncated, strict=True)
             ended = {i for i, (terminated, truncated) in enumerate(ends) if terminated or truncated}
+
+
+def _adapter_for(env: Any) -> EnvironmentAdapter:
+    """Return the adapter for an environment, or for a vector of them."""
+    if not isinstance(env, gym.vector.VectorEnv):
+        return OneEnvironment(env)
+    from sdnn.agents.vectors import vector_adapter
+
+    return vector_adapter(env)

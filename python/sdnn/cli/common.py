@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import math
+import shlex
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -180,10 +181,9 @@ def _is_of_environment(error: BaseException) -> bool:
 
 
 def _how_to_resume(folder: Path | None) -> str:
-    from sdnn.runs.errors import command_line
 
     is_begun = folder is not None and folder.exists()
-    return f"; {command_line('sdnn', 'resume', folder)} continues it" if is_begun else ""
+    return f"; {shlex.join(['sdnn', 'resume', str(folder)])} continues it" if is_begun else ""
 
 
 def train_run(
@@ -267,14 +267,13 @@ def _listed(numbers: Sequence[int]) -> str:
 
 
 def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
-    from sdnn.runs.errors import command_line
 
     why = " (the target is reached)" if outcome.reason == "target" else ""
     yield f"{run.folder}: {outcome.n_steps} steps, {outcome.n_episodes} episodes{why}"
     if outcome.is_warming_up:
         yield (
             f"{WARMING_UP}; that takes {run.spec.agent.warm_up_steps} steps:"
-            f" {command_line('sdnn', 'resume', run.folder, '--steps', 'N')} continues it"
+            f" {shlex.join(['sdnn', 'resume', str(run.folder), '--steps', 'N'])} continues it"
         )
     row = outcome.last_evaluation
     if row is not None:
@@ -302,7 +301,7 @@ def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
     commands: list[tuple[object, ...]] = [("plot", run.folder), ("evaluate", run.folder)]
     if outcome.has_pictures:
         commands.append(("record", run.folder, "x.gif"))
-    yield "next: " + ", ".join(command_line("sdnn", *words) for words in commands)
+    yield "next: " + ", ".join(shlex.join(["sdnn", *map(str, words)]) for words in commands)
 
 
 def json_text(values: Any) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -144,7 +145,6 @@ def train(
         return
     from sdnn.runs import Run, RunSpec
     from sdnn.runs.config_file import ConfigFile
-    from sdnn.runs.errors import command_line
     from sdnn.runs.settings import overridden
 
     given = _given(env_id, options)
@@ -167,7 +167,7 @@ def train(
             return
     with run_command(words, folder=folder):
         if (folder / "config.json").exists():
-            resume = command_line("sdnn", "resume", folder)
+            resume = shlex.join(["sdnn", "resume", str(folder)])
             raise click.UsageError(f"--out: {folder} holds a run already: {resume} continues it")
         run = Run.create(folder, spec)
         train_run(run, as_json)

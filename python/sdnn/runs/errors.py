@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-
 
 class RunError(Exception):
     """Base of the errors whose message alone is enough to correct them."""
@@ -51,12 +49,3 @@ class ClusterError(RunError):
 
 class WorkerLostError(RunError):
     """A trial was given up after several workers were lost while running it."""
-
-
-def command_line(*words: object) -> str:
-    """Return a command with its words quoted for a shell.
-
-    >>> command_line("sdnn", "plot", "my runs/first")
-    "sdnn plot 'my runs/first'"
-    """
-    return shlex.join(map(str, words))

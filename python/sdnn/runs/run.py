@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import signal
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -39,7 +40,7 @@ from sdnn.interrupts import Interrupts
 from sdnn.machine import instruction_set
 from sdnn.runs.config_file import FORMAT, ConfigFile, read_spec
 from sdnn.runs.environment import render_modes
-from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, command_line
+from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
 from sdnn.runs.settings import BudgetSpec, read
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
@@ -119,7 +120,7 @@ class Run(Displayed):
         """
         place = Path(folder)
         if (place / CONFIG).exists():
-            resume = command_line("sdnn", "resume", place)
+            resume = shlex.join(["sdnn", "resume", str(place)])
             raise RunError(f"{place} holds a run already: {resume} continues it")
         if place.exists() and (not place.is_dir() or any(place.iterdir())):
             raise RunError(f"{place} is there already, and no run: take another folder")
@@ -330,7 +331,7 @@ class Run(Displayed):
                 spec, callbacks, self.folder / CHECKPOINT, repeat_episodes=repeat_episodes
             )
         except UnrepeatedEpisodeError as error:
-            begins = command_line("sdnn", "resume", self.folder, "--new-episode")
+            begins = shlex.join(["sdnn", "resume", str(self.folder), "--new-episode"])
             raise RunError(f"{error}; {begins} begins a new one") from error
         except ValueError as error:
             raise RunError(str(error)) from error
@@ -349,7 +350,7 @@ class Run(Displayed):
 
     def _explained(self, error: Exception, n_saved: int) -> RunError:
         """Return the error of a step that could not be learned, with what is saved."""
-        resume = command_line("sdnn", "resume", self.folder)
+        resume = shlex.join(["sdnn", "resume", str(self.folder)])
         saved = f"the first {n_saved} steps are saved: {resume} continues there with a new episode"
         if n_saved == 0:
             saved = f"nothing is learned yet: {resume} begins again once the environment is fixed"
@@ -416,7 +417,7 @@ def agent_of(folder: Path, *, best: bool = False) -> Agent[Any, Any]:
     if path is None and best:
         raise RunError(f"{folder} has no {BEST}: train with --keep-best")
     if path is None:
-        begins = command_line("sdnn", "resume", folder)
+        begins = shlex.join(["sdnn", "resume", str(folder)])
         raise RunError(f"{folder} has no checkpoint yet: {begins} begins it")
     try:
         return load_agent(path)
