@@ -128,13 +128,6 @@ def emulation(session):
     pytest(session, "tests/emulation")
 
 
-@weekly(name="emulation-weekly")
-def emulation_weekly(session):
-    """Let agents learn for 100,000 steps in C on every processor, against the library."""
-    os.environ["SDNN_WEEKLY"] = "1"
-    pytest(session, "tests/emulation/test_c_headers.py", "-k", "learns_as")
-
-
 @quick()
 def packaging(session):
     """Check the source distribution, the wheel and the C++ library as others use it."""

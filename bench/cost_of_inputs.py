@@ -16,7 +16,7 @@ from sdnn import _core
 from sdnn.approximators import SDNNCConfig
 from sdnn.benchmarks.measurements import Effort, in_turns, measure_decisions, spread
 from sdnn.files import write_whole
-from sdnn.runs.figures import figure_bytes
+from sdnn.runs.figures import png_bytes
 
 KIND = "cost of inputs"
 N_INPUTS = range(2, 11)
@@ -104,7 +104,7 @@ def draw(found, path):
     axes.set_title(
         "Cost against the number of inputs, 200 (l² - l) columns x 900 units", fontsize=10
     )
-    write_whole(path, figure_bytes(figure)[0])
+    write_whole(path, png_bytes(figure))
 
 
 def main():

@@ -53,7 +53,7 @@ from sklearn.svm import SVC, SVR
 
 from sdnn import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.files import write_whole
-from sdnn.runs.figures import figure_bytes
+from sdnn.runs.figures import png_bytes
 
 KIND = "problems"
 N_TRAINING = 500
@@ -364,7 +364,7 @@ def draw(found, path):
         axes.spines[["top", "right", "left"]].set_visible(False)
     handles, names = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=5, frameon=False, fontsize=8)
-    write_whole(path, figure_bytes(figure)[0])
+    write_whole(path, png_bytes(figure))
 
 
 def main():

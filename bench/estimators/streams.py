@@ -29,7 +29,7 @@ from sklearn.neural_network import MLPRegressor
 from sdnn import SDNNRegressor
 from sdnn.estimators.river import RiverRegressor
 from sdnn.files import write_whole
-from sdnn.runs.figures import figure_bytes
+from sdnn.runs.figures import png_bytes
 
 KIND = "streams"
 N_SAMPLES = 4000
@@ -204,7 +204,7 @@ def draw(found, path):
     figure.axes[3].set_ylabel("squared error / variance", fontsize=8)
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center",
                   ncols=len(shown), frameon=False, fontsize=9)  # fmt: skip
-    write_whole(path, figure_bytes(figure)[0])
+    write_whole(path, png_bytes(figure))
 
 
 def main():

@@ -9,7 +9,7 @@ from studies import Curves
 from tasks import TASKS
 
 from sdnn.files import write_whole
-from sdnn.runs.figures import figure_bytes
+from sdnn.runs.figures import png_bytes
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.study import Study
 
@@ -40,7 +40,7 @@ def draw(study: Study, found: Curves, path: Path) -> None:
     for panel in grid.ravel():
         handles.update(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5, fontsize=9)
-    write_whole(path, figure_bytes(figure)[0])
+    write_whole(path, png_bytes(figure))
 
 
 def _draw_task(panels, study: Study, found: Curves, name: str) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from sdnn.files import write_whole
 from sdnn.reproduction.report import read_study
-from sdnn.runs.figures import figure_bytes
+from sdnn.runs.figures import png_bytes
 from sdnn.runs.registry import title_of
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.results import SHARE_STABLE, final_share_solved
@@ -71,7 +71,7 @@ def main() -> None:
     panels[0].set_yticks(range(len(study.cases)), [case.title for case in study.cases])
     figure.colorbar(image, ax=panels, label="share solved at the end")
     options.out.mkdir(parents=True, exist_ok=True)
-    write_whole(options.out / "noise-surface.png", figure_bytes(figure)[0])
+    write_whole(options.out / "noise-surface.png", png_bytes(figure))
 
 
 if __name__ == "__main__":

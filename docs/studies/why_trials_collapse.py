@@ -379,7 +379,7 @@ def table(kept: Kept, n_trials: int) -> Iterator[str]:
 
 def main() -> None:
     """Measure and draw."""
-    from sdnn.runs.figures import figure_bytes
+    from sdnn.runs.figures import png_bytes
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=Path("docs/explanation"), help="of the figures")
@@ -393,7 +393,7 @@ def main() -> None:
     if not options.draw_only:
         measure(kept, options.trials)
     for name, draw in FIGURES.items():
-        write_whole(options.out / f"{name}.png", figure_bytes(draw(kept, options.trials))[0])
+        write_whole(options.out / f"{name}.png", png_bytes(draw(kept, options.trials)))
     print("\n".join(table(kept, options.trials)))
 
 

@@ -1,9 +1,4 @@
-"""C headers of policies with other compilers and on other processors, against their agents.
-
-With SDNN_WEEKLY set agents learn for 100,000 steps.
-"""
-
-import os
+"""C headers of policies with other compilers and on other processors, against their agents."""
 
 import pytest
 
@@ -24,8 +19,6 @@ from c_policies import (
 )
 from sdnn.export import c_header
 
-N_STEPS = 100_000 if os.environ.get("SDNN_WEEKLY") else 1000
-
 
 @pytest.fixture(params=[name for name in TARGETS if name != "x86-64"])
 def target(request, needs):
@@ -39,13 +32,14 @@ def test_the_actions_are_the_agents(name, target, tmp_path):
     check_all_actions(name, target, tmp_path)
 
 
+@pytest.mark.parametrize("n_steps", [1000, pytest.param(100_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", LEARNERS)
 @pytest.mark.parametrize("kind", [*TARGETS, *BARE_TARGETS])
-def test_it_learns_as_the_agent(kind, name, needs, tmp_path):
+def test_it_learns_as_the_agent(kind, name, n_steps, needs, tmp_path):
     target = (TARGETS | BARE_TARGETS)[kind]
     linker = ["ld.lld"] if kind in BARE_TARGETS else []
     needs(*filter(None, (target.compiler, target.runner)), *linker)
-    check_life(name, target, tmp_path, N_STEPS)
+    check_life(name, target, tmp_path, n_steps)
 
 
 @pytest.mark.parametrize("name", LEARNERS)

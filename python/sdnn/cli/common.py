@@ -181,9 +181,11 @@ def _is_of_environment(error: BaseException) -> bool:
 
 
 def _how_to_resume(folder: Path | None) -> str:
+    from sdnn.runs.run import resume_command
 
-    is_begun = folder is not None and folder.exists()
-    return f"; {shlex.join(['sdnn', 'resume', str(folder)])} continues it" if is_begun else ""
+    if folder is None or not folder.exists():
+        return ""
+    return f"; {resume_command(folder)} continues it"
 
 
 def train_run(
@@ -267,13 +269,14 @@ def _listed(numbers: Sequence[int]) -> str:
 
 
 def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
+    from sdnn.runs.run import resume_command
 
     why = " (the target is reached)" if outcome.reason == "target" else ""
     yield f"{run.folder}: {outcome.n_steps} steps, {outcome.n_episodes} episodes{why}"
     if outcome.is_warming_up:
         yield (
             f"{WARMING_UP}; that takes {run.spec.agent.warm_up_steps} steps:"
-            f" {shlex.join(['sdnn', 'resume', str(run.folder), '--steps', 'N'])} continues it"
+            f" {resume_command(run.folder, '--steps', 'N')} continues it"
         )
     row = outcome.last_evaluation
     if row is not None:

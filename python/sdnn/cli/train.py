@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shlex
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -145,6 +144,7 @@ def train(
         return
     from sdnn.runs import Run, RunSpec
     from sdnn.runs.config_file import ConfigFile
+    from sdnn.runs.run import resume_command
     from sdnn.runs.settings import overridden
 
     given = _given(env_id, options)
@@ -167,8 +167,9 @@ def train(
             return
     with run_command(words, folder=folder):
         if (folder / "config.json").exists():
-            resume = shlex.join(["sdnn", "resume", str(folder)])
-            raise click.UsageError(f"--out: {folder} holds a run already: {resume} continues it")
+            raise click.UsageError(
+                f"--out: {folder} holds a run already: {resume_command(folder)} continues it"
+            )
         run = Run.create(folder, spec)
         train_run(run, as_json)
 

@@ -120,8 +120,7 @@ class Run(Displayed):
         """
         place = Path(folder)
         if (place / CONFIG).exists():
-            resume = shlex.join(["sdnn", "resume", str(place)])
-            raise RunError(f"{place} holds a run already: {resume} continues it")
+            raise RunError(f"{place} holds a run already: {resume_command(place)} continues it")
         if place.exists() and (not place.is_dir() or any(place.iterdir())):
             raise RunError(f"{place} is there already, and no run: take another folder")
         cls(place, spec).check()
@@ -331,7 +330,7 @@ class Run(Displayed):
                 spec, callbacks, self.folder / CHECKPOINT, repeat_episodes=repeat_episodes
             )
         except UnrepeatedEpisodeError as error:
-            begins = shlex.join(["sdnn", "resume", str(self.folder), "--new-episode"])
+            begins = resume_command(self.folder, "--new-episode")
             raise RunError(f"{error}; {begins} begins a new one") from error
         except ValueError as error:
             raise RunError(str(error)) from error
@@ -350,7 +349,7 @@ class Run(Displayed):
 
     def _explained(self, error: Exception, n_saved: int) -> RunError:
         """Return the error of a step that could not be learned, with what is saved."""
-        resume = shlex.join(["sdnn", "resume", str(self.folder)])
+        resume = resume_command(self.folder)
         saved = f"the first {n_saved} steps are saved: {resume} continues there with a new episode"
         if n_saved == 0:
             saved = f"nothing is learned yet: {resume} begins again once the environment is fixed"
@@ -414,15 +413,20 @@ def agent_of(folder: Path, *, best: bool = False) -> Agent[Any, Any]:
         raise RunError(f"{folder} holds no run: there is no {folder / CONFIG}")
     names = (BEST,) if best else (CHECKPOINT, AGENT)
     path = next((p for p in (folder / name for name in names) if p.exists()), None)
-    if path is None and best:
-        raise RunError(f"{folder} has no {BEST}: train with --keep-best")
     if path is None:
-        begins = shlex.join(["sdnn", "resume", str(folder)])
-        raise RunError(f"{folder} has no checkpoint yet: {begins} begins it")
+        missing = f"{BEST}: train with --keep-best"
+        if not best:
+            missing = f"checkpoint yet: {resume_command(folder)} begins it"
+        raise RunError(f"{folder} has no {missing}")
     try:
         return load_agent(path)
     except ValueError as error:
         raise RunError(str(error)) from error
+
+
+def resume_command(folder: Path, *options: str) -> str:
+    """Return the command that continues a run, quoted for a shell."""
+    return shlex.join(["sdnn", "resume", str(folder), *options])
 
 
 def tensorboard_in(folder: Path) -> TensorBoard:
