@@ -29,7 +29,7 @@ class Tables:
             self.lines.append(f"/* {comment} */")
         form = {"uint64_t": "UINT64_C({})"}.get(kind, "{}")
         if kind == "uint32_t" and "weights" in name:
-            form = "UINT32_C(0x{:08x})"
+            form = "0x{:x}"
         stored = values if values.size else np.zeros(1, np.int64)  # C has no empty tables
         self.lines += table_lines(f"static const {kind} {name}", stored, form)
 
@@ -50,13 +50,13 @@ def table_lines(declaration: str, values: NDArray[Any], form: str) -> list[str]:
 
 
 def wrapped(words: Iterable[str], width: int = 98) -> list[str]:
-    """Join words with commas in lines."""
-    lines, line = [], " "
+    """Join words with commas in lines, without spaces: large tables are most of a file."""
+    lines, line = [], "  "
     for word in words:
-        if len(line) + len(word) + 2 > width:
+        if len(line) + len(word) + 1 > width:
             lines.append(line)
-            line = " "
-        line += f" {word},"
+            line = "  "
+        line += f"{word},"
     return [*lines, line]
 
 

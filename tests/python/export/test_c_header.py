@@ -260,6 +260,15 @@ def test_names_that_are_none_in_c_are_refused(name):
     refuses("name", c_header, lone_agent(), name)
 
 
+def test_the_text_is_at_most_three_times_its_bytes_of_flash():
+    agent = SDNNQLearning(box(1.0, 2.0, 3.0), Discrete(3), preset="small", seed=1)
+    agent.core.action_value.set_parameters(
+        np.random.default_rng(1).integers(-50, 50, (900, 240)), np.zeros(900, np.int32)
+    )
+    header = c_header(agent, "policy")
+    assert len(header.text) < 3 * header.flash_bytes
+
+
 def test_the_file_is_whole_or_not_there(tmp_path):
     agent = lone_agent()
     header = export_c_header(agent, tmp_path / "one.h")
