@@ -88,6 +88,17 @@ class Fitted(Learned, BaseEstimator):
         networks = (*self._earlier, self.network_)
         return [network.counts(bins, n_groups, n_threads) for network in networks]
 
+    def _names_or_numbers(self) -> list[Any]:
+        """Return the names of the features, or their numbers."""
+        names = getattr(self, "feature_names_in_", np.arange(len(self.codings_)))
+        return list(names.tolist())
+
+    @property
+    def pair_names_(self) -> list[tuple[Any, Any]]:
+        """The pairs by names of the features, as ``pairs`` takes them."""
+        names = self._names_or_numbers()
+        return [(names[mu], None if mu == nu else names[nu]) for mu, nu in self.pairs_]
+
     @property
     def pair_importances_(self) -> Floats:
         """Squared change of the weights of each pair, normalized, shape (n_pairs,)."""

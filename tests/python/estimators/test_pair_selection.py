@@ -1,4 +1,4 @@
-"""Which pairs matter, and leaving out the others."""
+"""Which features and pairs matter, and leaving out the others."""
 
 import itertools
 
@@ -11,6 +11,7 @@ from sklearn.feature_selection import RFE
 from refusals import refuses
 from sdnn import SDNNClassifier, SDNNRegressor, _core
 from sdnn.coding import CorrelationMatrix, Symbolic, WithMissing
+from sdnn.estimators import plot_importances
 
 X = np.random.RandomState(0).uniform(size=(600, 8))
 XOR = ((X[:, 2] > 0.5) ^ (X[:, 5] > 0.5)).astype(int)
@@ -37,6 +38,19 @@ def test_the_pair_that_matters_is_selected():
     assert auto.score(X[300:], XOR[300:]) > max(0.95, every.score(X[300:], XOR[300:]))
     given = SDNNClassifier(**options, pairs=[(2, 5), (5, 2)]).fit(X[:300], XOR[:300])
     np.testing.assert_array_equal(auto.weights_, given.weights_)
+
+
+def test_useless_features_are_left_out():
+    random = np.random.RandomState(1)
+    wide = random.uniform(size=(500, 40))
+    y = 10 * np.sin(np.pi * wide[:, 3] * wide[:, 17]) + 5 * wide[:, 30]
+    model = SDNNRegressor(random_state=0, pairs="auto").fit(wide[:300], y[:300])
+    kept = {feature for pair in model.pairs_ for feature in pair}
+    assert {3, 17, 30} <= kept
+    assert len(kept) <= 5
+    budget = SDNNRegressor(random_state=0).fit(wide[:300], y[:300])
+    assert model.score(wide[300:], y[300:]) > budget.score(wide[300:], y[300:]) + 0.1
+    assert np.flatnonzero(model.feature_importances_).tolist() == sorted(kept)
 
 
 def test_all_pairs_stay_where_all_matter():
@@ -101,6 +115,30 @@ def test_importances_of_features_are_means_over_their_pairs():
     np.testing.assert_allclose(model.feature_importances_, means / means.sum())
     with pytest.raises(NotFittedError):
         _ = SDNNClassifier().feature_importances_
+
+
+def test_pairs_have_the_names_that_they_are_given_by():
+    frame = pd.DataFrame(X[:, :3], columns=["a", "b", "c"])
+    pairs = [("a", "b"), ("c", None)]
+    model = SDNNClassifier(**OPTIONS, pairs=pairs).fit(frame, XOR)
+    assert model.pair_names_ == pairs
+    assert SDNNClassifier(**OPTIONS, pairs=[(0, 1), (2, None)]).fit(X, XOR).pair_names_ == [
+        (0, 1), (2, None),
+    ]  # fmt: skip
+
+
+def test_the_most_important_features_and_pairs_are_drawn():
+    frame = pd.DataFrame(X, columns=list("abcdefgh"))
+    features, pairs = plot_importances(SDNNClassifier(**OPTIONS).fit(frame, XOR), 5).axes
+    for axes, n_bars, first in ((features, 5, {"c", "f"}), (pairs, 5, {"c x f"})):
+        assert len(axes.patches) == n_bars
+        labels = [label.get_text() for label in axes.get_yticklabels()]
+        assert set(labels[: len(first)]) == first
+    refuses("n_most", plot_importances, SDNNClassifier(**OPTIONS).fit(frame, XOR), 0)
+    with pytest.raises(TypeError, match="model"):
+        plot_importances(RFE(SDNNClassifier()))
+    with pytest.raises(NotFittedError):
+        plot_importances(SDNNClassifier())
 
 
 def test_importances_survive_files(tmp_path):
