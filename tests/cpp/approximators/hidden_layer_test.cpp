@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <vector>
 
 #include "sdnn/core/random.hpp"
@@ -166,6 +167,56 @@ TEST(HiddenLayer, CorrectionsThatCancelStayInAByte) {
   for (int i = 0; i < 2000; ++i) p.update(unit, x, i % 2 == 0 ? 1 : -1);
   EXPECT_EQ(p.n_high_columns(), 0U);
   EXPECT_EQ(p.weight(69, 3), 0);
+}
+
+// Bounds of weights are looked up and lowered on the way, those of neighbours too.
+TEST(HiddenLayer, CorrectionsEqualPlainOnesHoweverFarWeightsGo) {
+  constexpr std::size_t kUnits = 130;
+  constexpr std::uint32_t kColumns = 40;
+  HiddenLayer p(kUnits, kColumns, 10);
+  std::vector<std::array<std::int32_t, kColumns>> weights(kUnits);
+  std::vector<std::int32_t> expected(kUnits);
+  core::Random random(3, core::Stream::weights);
+  for (int round = 0; round < 6000; ++round) {
+    Input x;
+    for (std::uint32_t j = 0; j < kColumns; ++j) {
+      const auto drawn = random.below(4);
+      if (drawn < 2) (drawn == 0 ? x.plus : x.minus).push_back(j);
+    }
+    std::vector<std::uint32_t> units;
+    for (std::uint32_t unit = 0; unit < kUnits; ++unit) {
+      if (random.below(20) == 0) units.push_back(unit);
+    }
+    const auto step = static_cast<std::int32_t>(random.below(13)) - 6;
+    p.update(units, x, step);
+    for (const std::uint32_t unit : units) {
+      for (const auto j : x.plus) weights[unit][j] += j < 10 ? 2 * step : step;
+      for (const auto j : x.minus) weights[unit][j] -= j < 10 ? 2 * step : step;
+    }
+    if (round % 50 != 0) continue;
+    for (std::size_t unit = 0; unit < kUnits; ++unit) {
+      expected[unit] = -p.threshold(unit);
+      for (const auto j : x.plus) expected[unit] += weights[unit][j];
+      for (const auto j : x.minus) expected[unit] -= weights[unit][j];
+    }
+    ASSERT_EQ(potentials(p, x), expected) << "round " << round;
+  }
+  EXPECT_GT(p.n_high_columns(), 0U);
+  EXPECT_LT(p.n_high_columns(), 3 * kColumns);
+}
+
+// The bound of a weight grows with every correction, and is looked up when it gets to the limit.
+TEST(HiddenLayer, AWeightThatCameBackStillHasItsHighByte) {
+  HiddenLayer p(1, 2);
+  const Input x{.plus = {0}, .minus = {}};
+  const std::vector<std::uint32_t> unit = {0};
+  for (int i = 0; i < 200; ++i) p.update(unit, x, 1);
+  for (int i = 0; i < 100; ++i) p.update(unit, x, -1);
+  for (int i = 0; i < 10000; ++i) p.update(unit, x, i % 2 == 0 ? 2 : -2);
+  for (int i = 99; i >= -100; --i) {
+    p.update(unit, x, -1);
+    ASSERT_EQ(p.weight(0, 0), i);
+  }
 }
 
 TEST(HiddenLayer, OverflowIsDetectedBeforeAnythingChanges) {

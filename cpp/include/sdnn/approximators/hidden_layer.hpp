@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/approximators/detail/column_changes.hpp"
 #include "sdnn/approximators/detail/column_set.hpp"
 #include "sdnn/approximators/detail/column_sums.hpp"
 #include "sdnn/coding/detail/ternary_code.hpp"
@@ -154,14 +155,14 @@ class HiddenLayer {
     for (const std::uint32_t unit : units) require_room(unit, parts, step);
     for (std::size_t k = 0; k < units.size();) {  // neighbours in a block share its cache lines
       const std::size_t block = units[k] / kBlockUnits;
-      alignas(core::kCacheLine) std::array<std::int8_t, kBlockUnits> mask{};
+      detail::Bytes mask{};
       std::size_t n_changed = 0;
       std::size_t changed = 0;
       for (; k < units.size() && units[k] / kBlockUnits == block; ++k) {
         const std::size_t unit = units[k];
         raise_bound(unit, growth(step));
         thresholds_[unit] -= step;
-        if (largest_weight_[unit] <= kByteLimit) {
+        if (largest_weight_[unit] <= kByteLimit && !may_have_high_[unit]) {
           mask[unit % kBlockUnits] = -1;
           changed = unit;
           ++n_changed;
@@ -171,7 +172,7 @@ class HiddenLayer {
       }
       for (const Part& part : parts) {
         if (n_changed == 1) add_to_unit(changed, part);
-        if (n_changed > 1) add_to_block(block, part, mask);
+        if (n_changed > 1) add_to_units(block, part, mask);
       }
     }
   }
@@ -260,24 +261,16 @@ class HiddenLayer {
     }
   }
 
+  /// Adds to the units of the block whose mask is -1, modulo 256: the result fits by the bounds.
+  void add_to_units(std::size_t block, const Part& part, detail::Bytes mask) noexcept {
+    for (std::int8_t& byte : mask) byte = static_cast<std::int8_t>(byte & part.change);
+    add_to_columns(bytes_.data() + block * block_bytes(), part.columns.data(), part.columns.size(),
+                   mask);
+  }
+
   void add_with_high_bytes(std::size_t unit, const Part& part) noexcept {
     for (const std::uint32_t column : part.columns) {
       store(unit, column, bytes_[byte_index(unit, column)] + part.change);
-    }
-  }
-
-  /// Adds to the units of the block whose mask is -1, modulo 256: the result fits by the bounds.
-  void add_to_block(std::size_t block, const Part& part,
-                    const std::array<std::int8_t, kBlockUnits>& mask) noexcept {
-    std::array<std::int8_t, kBlockUnits> change;
-    for (std::size_t i = 0; i < kBlockUnits; ++i) {
-      change[i] = static_cast<std::int8_t>(mask[i] & part.change);
-    }
-    for (const std::uint32_t column : part.columns) {
-      std::int8_t* const line = bytes_.data() + block * block_bytes() + column * kBlockUnits;
-      for (std::size_t i = 0; i < kBlockUnits; ++i) {
-        line[i] = static_cast<std::int8_t>(line[i] + change[i]);
-      }
     }
   }
 
@@ -355,13 +348,28 @@ class HiddenLayer {
   void raise_bound(std::size_t unit, std::int32_t growth) {
     const std::int32_t before = largest_weight_[unit];
     std::int32_t bound = before + growth;
-    for (int group = kLargestGroup; group >= 1; group /= 2) {
+    for (int group = group_of_block_[unit / kBlockUnits]; group >= 1; group /= 2) {
       const std::int32_t limit = kByteLimit / group;
       if (before > limit || bound <= limit) continue;
-      const std::int32_t looked_up = largest_weight(unit) + growth;
+      const std::int32_t looked_up = look_up(unit, growth) + growth;
       bound = looked_up <= limit - limit / 8 ? looked_up : std::max(looked_up, limit + 1);
     }
     note_largest(unit, bound);
+  }
+
+  /// The largest |weight| of a unit. Lowers the bounds of its block's other units, of which some
+  /// may be about to grow.
+  std::int32_t look_up(std::size_t unit, std::int32_t growth) {
+    if (may_have_high_[unit]) return largest_weight(unit);
+    const std::size_t block = unit / kBlockUnits;
+    detail::Bytes largest;
+    find_largest_bytes(bytes_.data() + block * block_bytes(), n_columns_, largest);
+    const std::size_t first = block * kBlockUnits;
+    for (std::size_t i = first; i < std::min(first + kBlockUnits, n_units_); ++i) {
+      if (may_have_high_[i]) continue;
+      largest_weight_[i] = std::min(largest_weight_[i], largest[i - first] + growth);
+    }
+    return largest[unit - first];
   }
 
   std::size_t n_units_;
