@@ -86,7 +86,7 @@ def c_header(
     >>> env = gym.make("MountainCar-v0")
     >>> agent = SDNNQLearning(env.observation_space, env.action_space, preset="small")
     >>> header = c_header(agent, "car")
-    >>> header.flash_bytes < 2**16
+    >>> header.flash_bytes < 2**17
     True
     >>> "static inline uint32_t car_act_fixed(const int32_t *observation)" in header.text
     True

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents import SDNNSarsa
+from sdnn.export.code import Code
 from sdnn.export.tables import Tables
 from sdnn.export.writer import MOST_WEIGHTS, CHeader, Writer
 
@@ -32,19 +33,9 @@ class LinearWriter(Writer):
         """Return the readout."""
         return self.core.action_value
 
-    def layout(self) -> tuple[list[tuple[int, int]], int]:
-        """Return the groups (mu, nu) in the order of the code, and how many are taken in twos."""
-        pairs = self.network().pairs
-        n_partners = len(pairs) // len(self.inputs)
-        ranks, n_before = [], dict[int, int]()
-        for _, nu in pairs:
-            ranks.append(n_before.get(nu, 0))
-            n_before[nu] = ranks[-1] + 1
-        n_taken = n_partners // 2 * 2
-        order = sorted(
-            range(len(pairs)), key=lambda g: (ranks[g] >= n_taken, pairs[g][1], ranks[g])
-        )
-        return [pairs[g] for g in order], n_taken * len(self.inputs)
+    def code(self) -> Code:
+        """Return the code of its states."""
+        return Code(self.network(), len(self.inputs))
 
     def columns(self) -> NDArray[np.intp]:
         """Return the places of the header's columns among those of the weights."""
@@ -59,38 +50,25 @@ class LinearWriter(Writer):
 
     def sizes(self) -> dict[str, Any]:
         """Return what the templates of a readout need, and check it."""
-        config, network = self.agent.approximator, self.network()
-        m, window = config.n_pattern_units, config.action_window
-        groups, n_double = self.layout()
-        n_columns = len(groups) * m
+        config = self.agent.approximator
+        window, code = config.action_window, self.code()
         n_actions = self.n_actions()
         n_rows = sum(n + window - 1 for n in n_actions)
-        if n_rows * n_columns > MOST_WEIGHTS:
+        n_weights = n_rows * code.n_columns
+        if n_weights > MOST_WEIGHTS:
             raise ValueError(
-                f"a C header can hold {MOST_WEIGHTS} weights, got {n_rows * n_columns}: take fewer"
+                f"a C header can hold {MOST_WEIGHTS} weights, got {n_weights}: take fewer"
                 " inputs, n_actions or n_pattern_units"
             )
-        n_ones = [int((network.table(i) > 0).sum(axis=1).max()) for i in range(len(self.inputs))]
-        most_columns = sum(n_ones[nu] for _, nu in groups[:n_double:2])
-        most_columns += sum(n_ones[nu] for _, nu in groups[n_double:])
-        is_short = n_columns <= 2**16
-        is_double = {0: "0", len(groups): "1"}.get(n_double, f"group < {n_double}")
         return {
+            **code.values(),
             "description": (
-                f"{len(self.inputs)} inputs, {m} units per pattern,"
+                f"{len(self.inputs)} inputs, {config.n_pattern_units} units per pattern,"
                 f" {' x '.join(map(str, n_actions))} actions"
             ),
-            "n_pattern_units": m,
-            "pattern_bytes": -(-m // 8),
-            "n_groups": len(groups),
-            "is_double": is_double,
-            "unit_type": "uint8_t" if m <= 256 else "uint16_t",
-            "column_type": "uint16_t" if is_short else "uint32_t",
-            "bytes_of_column": 2 if is_short else 4,
-            "n_columns": n_columns,
-            "most_columns": most_columns,
+            "coding": f"{self.name}_",
             "n_rows": n_rows,
-            "n_weights": n_rows * n_columns,
+            "n_weights": n_weights,
             "n_actions": n_actions,
             "window": window,
             "n_windows": window * self.n_dimensions,
@@ -101,14 +79,8 @@ class LinearWriter(Writer):
 
     def add_code(self, tables: Tables, sizes: dict[str, Any]) -> None:
         """Add the constants of the code and of the readout's rows."""
-        name, network = self.name, self.network()
-        groups, _ = self.layout()
-        # Unit k of a group is modified by unit sigma[k]; here they are in the order of the latter.
-        units = [np.argsort(network.permutation(*group)) for group in groups]
-        tables.add("uint8_t", f"{name}_patterns", self.patterns(network))
-        tables.add("uint16_t", f"{name}_modified", np.array([mu for mu, _ in groups]))
-        tables.add("uint16_t", f"{name}_modifiers", np.array([nu for _, nu in groups]))
-        tables.add(sizes["unit_type"], f"{name}_units", np.concatenate(units))
+        name = self.name
+        self.code().add_tables(tables, name)
         n_actions = np.array(sizes["n_actions"])
         first_rows = np.cumsum([0, *(n_actions + sizes["window"] - 1)])[:-1]
         tables.add("uint32_t", f"{name}_n_actions", n_actions, "Actions of each dimension.")

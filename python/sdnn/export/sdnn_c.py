@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from sdnn.agents import SDNNQLearning
-from sdnn.export.tables import Tables, bit_planes, joined, wrapped
+from sdnn.export.code import Code
+from sdnn.export.tables import Tables, joined, weight_words
 from sdnn.export.writer import MOST_WEIGHTS, CHeader, Writer
 
 _MOST_UNITS = 65535  # whose numbers fit 16 bits
-_BYTES_OF_UNIT = 8
-_BYTES_OF_NETWORK = 28  # a struct of five pointers and two sizes, where pointers have 32 bits
+_BYTES_OF_NETWORK = 40  # a struct of eight pointers and two sizes, where pointers have 32 bits
 
 
 class SDNNCWriter(Writer):
@@ -45,59 +45,53 @@ class SDNNCWriter(Writer):
     def header(self) -> CHeader:
         """Make the header."""
         name, sizes, networks = self.name, self.agent.approximator, self._networks()
-        n_columns = sizes.n_pairs * sizes.n_pattern_units
+        codes = [Code(network, len(self.inputs)) for network in networks]
+        n_columns = codes[0].n_columns
         self._check_sizes(n_columns)
-        index_type = "uint8_t" if sizes.n_pattern_units <= 256 else "uint16_t"
         tables = self.tables_of_spaces()
         self._add_ranks(tables)
-        units_of, rows, n_units, n_words = list[str](), list[str](), list[int](), 0
-        for d, network in enumerate(networks):
+        rows, n_units, n_rows = list[str](), list[int](), 0
+        for d, (network, code) in enumerate(zip(networks, codes, strict=True)):
             # Only the units that are in a window, and where among them the windows begin.
             first = network.first_units().astype(np.intp)
             used = np.unique(first[:, None] + np.arange(sizes.n_active_units))
-            weights, n_bits, lowest = bit_planes(network.averaged_weights()[used])
-            thresholds = network.averaged_thresholds()[used]
-            units = np.stack([thresholds, lowest, n_bits], axis=1).tolist()
-            sigma = [network.permutation(*pair) for pair in network.pairs]
-            modifiers = np.array([nu for _, nu in network.pairs])
-            tables.add("uint8_t", f"{name}_patterns_{d}", self.patterns(network))
-            tables.add("uint16_t", f"{name}_modifiers_{d}", modifiers)
-            tables.add(index_type, f"{name}_permutations_{d}", np.concatenate(sigma))
-            tables.add("uint32_t", f"{name}_weights_{d}", weights)
-            tables.add("uint16_t", f"{name}_first_units_{d}", np.searchsorted(used, first))
-            tables.n_bytes += _BYTES_OF_UNIT * used.size + _BYTES_OF_NETWORK
-            units_of += [
-                f"static const {name}_unit {name}_units_{d}[{used.size}] = {{",
-                *wrapped(f"{{{h}, {low}, {bits}}}" for h, low, bits in units),
-                "};",
-            ]
-            parts = ("patterns", "modifiers", "permutations", "weights", "units", "first_units")
-            names = ", ".join(f"{name}_{part}_{d}" for part in parts)
-            rows.append(f"  {{{names}, {used.size}, {network.n_actions}}},")
+            weights, n_bytes = weight_words(code.paired(network.averaged_weights()[used]))
+            thresholds = np.pad(network.averaged_thresholds()[used], (0, -used.size % 4))
+            parts = code.add_tables(tables, name, f"_{d}")
+            for kind, part, values in (
+                ("uint32_t", "weights", weights),
+                ("int32_t", "thresholds", thresholds),
+                ("uint8_t", "n_bytes", n_bytes),
+                ("uint16_t", "first_units", np.searchsorted(used, first)),
+            ):
+                parts.append(f"{name}_{part}_{d}")
+                tables.add(kind, parts[-1], values)
+            tables.n_bytes += _BYTES_OF_NETWORK
+            rows.append(f"  {{{', '.join(parts)}, {used.size}, {network.n_actions}}},")
             n_units.append(used.size)
-            n_words += weights.size
+            n_rows += int(n_bytes.sum())
         declaration = f"static const {name}_network {name}_networks[{len(rows)}] = {{"
-        n_code_words, n_fire_words = -(-n_columns // 32), -(-max(n_units) // 32)
+        n_fire_words = -(-max(n_units) // 32)
         most_actions = max(network.n_actions for network in networks)
-        ram_bytes = 8 * n_code_words + 4 * n_fire_words + 2 * most_actions + 8 * len(self.inputs)
+        shapes = [code.values() for code in codes]
+        most_columns = max(shape["most_columns"] for shape in shapes)
+        ram_bytes = shapes[0]["bytes_of_column"] * most_columns + 8
+        ram_bytes += 4 * n_fire_words + 2 * most_actions + 12 * len(self.inputs)
         values = {
+            **shapes[0],
             "description": (
                 f"{len(self.inputs)} inputs, {sizes.n_pattern_units} units per pattern,"
                 f" {' + '.join(map(str, n_units))} hidden units in use,"
                 f" {' x '.join(str(network.n_actions) for network in networks)} actions"
             ),
+            "coding": "network->",
+            "most_columns": most_columns,
             "ram_bytes": ram_bytes,
-            "weight_bytes": 4 * n_words,
-            "weight_bits": f"{32 * n_words / (sum(n_units) * n_columns):.2f}",
-            "n_words": n_words,
-            "permutation_type": index_type,
-            "networks": joined([*units_of, declaration, *rows, "};"]),
-            "n_code_words": n_code_words,
+            "weight_bytes": 4 * n_rows * n_columns,
+            "n_words": n_rows * most_columns,
+            "networks": joined([declaration, *rows, "};"]),
             "n_fire_words": n_fire_words,
             "most_actions": most_actions,
-            "n_pattern_units": sizes.n_pattern_units,
-            "n_partners": sizes.n_pairs // len(self.inputs),
-            "pattern_bytes": -(-sizes.n_pattern_units // 8),
             "n_active_units": sizes.n_active_units,
             "has_ties": self.agent.learning.tie_tolerance > 0.0,
             "ties": self.ties(),

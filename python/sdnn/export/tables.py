@@ -70,23 +70,20 @@ def by_dimension(actions: NDArray[Any]) -> NDArray[Any]:
     return actions[:, 0] if actions.shape[1] == 1 else actions.T
 
 
-def bit_planes(weights: NDArray[np.int32]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Pack weights (n, D) as bit planes, as many as each unit's range needs.
+def weight_words(weights: NDArray[np.int32]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Pack weights (n, D) as bytes plus 128, those of four units in a word.
 
-    Returns the words, unit by unit, and each unit's number of planes and lowest weight.
+    Returns the words (D,) of each four units, high bytes before low ones where one is needed, and
+    how many bytes that are. n is filled up with zeros.
     """
-    lowest = weights.min(axis=1)
-    above = weights - lowest[:, None]
-    n_bits = np.array([int(most).bit_length() for most in above.max(axis=1)])
-    padded = np.pad(above, ((0, 0), (0, -above.shape[1] % 32)))
-    planes = [
-        np.packbits((padded >> bit & 1).astype(np.uint8), axis=1, bitorder="little").view("<u4")
-        for bit in range(n_bits.max())
-    ]
-    if not planes:
-        return np.zeros(0, np.uint32), n_bits, lowest
-    is_needed = np.arange(len(planes)) < n_bits[:, None]
-    return np.stack(planes, axis=1)[is_needed].reshape(-1), n_bits, lowest
+    padded = np.pad(weights, ((0, -len(weights) % 4), (0, 0)))
+    low = (padded + 128) % 256 - 128
+    both = np.stack([(padded - low) // 256, low], axis=1) + 128
+    fours = both.reshape(len(padded) // 4, 4, 2, -1).transpose(0, 2, 3, 1).astype(np.uint8)
+    words = np.ascontiguousarray(fours).view("<u4")[..., 0]
+    is_high = (words[:, 0] != 0x80808080).any(axis=1)
+    is_needed = np.stack([is_high, np.ones_like(is_high)], axis=1)
+    return words[is_needed].reshape(-1), 1 + is_high
 
 
 @dataclass(frozen=True)

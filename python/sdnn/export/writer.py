@@ -124,12 +124,6 @@ class Writer:
             tables.add("int32_t", f"{name}_action_fixed", fixed_actions, about)
         return tables
 
-    def patterns(self, network: Any) -> NDArray[np.uint8]:
-        """Pack the patterns of every bin of every input, from the lowest bit on."""
-        inputs = range(len(self.inputs))
-        rows = [np.packbits(network.table(i) > 0, axis=1, bitorder="little") for i in inputs]
-        return np.concatenate(rows).reshape(-1)
-
     def write(self, name: str, values: dict[str, Any], tables: Tables) -> CHeader:
         """Fill a template in, which also receives what all headers have.
 

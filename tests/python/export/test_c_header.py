@@ -33,6 +33,7 @@ from c_policies import (
 from refusals import refuses
 from sdnn.agents import PRESETS, FuzzyQLearning, RBFQLearning, SDNNQLearning
 from sdnn.export import c_header, export_c_header
+from sdnn.export.tables import weight_words
 
 Discrete = gym.spaces.Discrete
 
@@ -222,11 +223,16 @@ def test_hidden_units_in_no_window_are_left_out():
     agent = discrete_agent()
     header = c_header(agent, "policy")
     assert "40 hidden units in use" in header.text
-    n_columns = 4 * 3 * 24
-    weights = agent.core.action_value.weights()[np.r_[:20, 40:60]]
-    n_bits = np.ceil(np.log2(np.ptp(weights, axis=1) + 1)).sum()
-    assert header.weight_bytes == n_bits * n_columns / 8
-    assert header.n_words == header.weight_bytes / 4
+    assert header.weight_bytes == 40 * 4 * 3 * 24
+
+
+def test_weights_beyond_a_byte_take_two():
+    weights = np.array([[127, -128, 5], [1, 2, 3], [0, 0, 0], [0, 0, 0], [128, -129, 16383]])
+    words, n_bytes = weight_words(weights)
+    assert n_bytes.tolist() == [1, 2]
+    lanes = words.view(np.uint8).reshape(3, 3, 4).astype(int) - 128
+    assert lanes[0].T.tolist() == weights[:4].tolist()
+    assert (256 * lanes[1, :, 0] + lanes[2, :, 0]).tolist() == weights[4].tolist()
 
 
 def test_the_same_agent_gives_the_same_header():

@@ -1,0 +1,104 @@
+"""How a header finds the columns of a state's code that are not 0."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.export.tables import Tables
+
+Pair = tuple[int, int]
+
+
+class Code:
+    """The paired code of a network: groups of columns by the input that modifies them.
+
+    Two groups that an input modifies are taken as half their sum and half their difference, of
+    which one is 0: see cpp/include/sdnn/coding/state_code.hpp.
+    """
+
+    def __init__(self, network: Any, n_inputs: int) -> None:
+        self.network = network
+        self.n_inputs = n_inputs
+        self.m = len(network.permutation(*network.pairs[0]))
+        """Units of a pattern, and columns of a group."""
+        self.groups, self.n_double = self._layout()
+
+    def _layout(self) -> tuple[list[Pair], int]:
+        """Return the groups (mu, nu) in the order of the code, and how many are taken in twos."""
+        pairs: Sequence[Pair] = self.network.pairs
+        n_partners = len(pairs) // self.n_inputs
+        ranks, n_before = [], dict[int, int]()
+        for _, nu in pairs:
+            ranks.append(n_before.get(nu, 0))
+            n_before[nu] = ranks[-1] + 1
+        n_taken = n_partners // 2 * 2
+        order = sorted(
+            range(len(pairs)), key=lambda g: (ranks[g] >= n_taken, pairs[g][1], ranks[g])
+        )
+        return [pairs[g] for g in order], n_taken * self.n_inputs
+
+    @property
+    def n_columns(self) -> int:
+        """Number of columns."""
+        return len(self.groups) * self.m
+
+    @property
+    def units(self) -> list[NDArray[np.intp]]:
+        """Of each group the modified units, in the order of those that modify them."""
+        return [np.argsort(self.network.permutation(*group)) for group in self.groups]
+
+    def values(self) -> dict[str, Any]:
+        """Return what the templates of a code need."""
+        network, inputs = self.network, range(self.n_inputs)
+        n_ones = [int((network.table(i) > 0).sum(axis=1).max()) for i in inputs]
+        most_columns = sum(n_ones[nu] for _, nu in self.groups[: self.n_double : 2])
+        most_columns += sum(n_ones[nu] for _, nu in self.groups[self.n_double :])
+        is_short = self.n_columns <= 2**16
+        return {
+            "n_pattern_units": self.m,
+            "pattern_bytes": -(-self.m // 8),
+            "n_groups": len(self.groups),
+            "is_double": {0: "0", len(self.groups): "1"}.get(
+                self.n_double, f"group < {self.n_double}"
+            ),
+            "unit_type": "uint8_t" if self.m <= 256 else "uint16_t",
+            "column_type": "uint16_t" if is_short else "uint32_t",
+            "bytes_of_column": 2 if is_short else 4,
+            "n_columns": self.n_columns,
+            "most_columns": most_columns,
+        }
+
+    def add_tables(self, tables: Tables, name: str, ending: str = "") -> list[str]:
+        """Add the constants that the code is made of; return their names."""
+        inputs = range(self.n_inputs)
+        patterns = [
+            np.packbits(self.network.table(i) > 0, axis=1, bitorder="little") for i in inputs
+        ]
+        parts = {
+            "patterns": ("uint8_t", np.concatenate(patterns).reshape(-1)),
+            "modified": ("uint16_t", np.array([mu for mu, _ in self.groups])),
+            "modifiers": ("uint16_t", np.array([nu for _, nu in self.groups])),
+            "units": (self.values()["unit_type"], np.concatenate(self.units)),
+        }
+        for part, (kind, values) in parts.items():
+            tables.add(kind, f"{name}_{part}{ending}", values)
+        return [f"{name}_{part}{ending}" for part in parts]
+
+    def paired(self, weights: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Arrange weights (n, D) of the paper's order as those of the columns."""
+        places = {pair: g for g, pair in enumerate(self.network.pairs)}
+        starts = [places[group] * self.m for group in self.groups]
+        columns = np.concatenate(
+            [start + units for start, units in zip(starts, self.units, strict=True)]
+        )
+        rows = weights[:, columns].reshape(len(weights), len(self.groups), self.m)
+        first, second = rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2]
+        rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2] = (
+            first + second,
+            first - second,
+        )
+        return rows.reshape(len(weights), -1)
