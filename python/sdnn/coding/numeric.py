@@ -93,7 +93,7 @@ class Ranged(Coding):
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
         values, (low, high) = numbers(column), self.ends()
-        if not low < high:  # of a column that had one value only
+        if not low / 2 < high / 2:  # of a column that had one value only, or all next to 0
             where = np.zeros(len(values))
         elif self.knots is not None:
             where = np.interp(values, *np.array(self.knots).T)

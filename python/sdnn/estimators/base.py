@@ -63,7 +63,8 @@ class BaseSDNN(Fitted, CodedInputs):
     coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
         How inputs become patterns: "random-inverse", "anchor", "circular", "symbolic", or an
         object of `sdnn.coding`; for all inputs, or for columns given as to scikit-learn's
-        ColumnTransformer (other inputs have "random-inverse").
+        ColumnTransformer (other inputs have "random-inverse"). Columns of a data frame of type
+        "category" are symbols, which may be missing, unless a list or an object codes them.
     ranges : {"all", "robust"}, default="all"
         Whether learned ranges reach to outliers, with an `OutlierWarning`, or leave them out.
     n_pattern_units : int, optional

@@ -13,7 +13,6 @@ from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.multiclass import (
     _ovr_decision_function,
-    check_classification_targets,
     unique_labels,
 )
 
@@ -21,7 +20,7 @@ from sdnn import _core
 from sdnn.arguments import shown
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.fitted import mean_of
-from sdnn.estimators.inputs import Array, Floats, Ints, class_labels
+from sdnn.estimators.inputs import Array, Floats, Ints, check_labels, class_labels
 from sdnn.estimators.network import Network
 from sdnn.estimators.training import class_weights, sample_weights, weighted_mean
 
@@ -160,7 +159,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         self, X: Any, y: Any, reset: bool, in_fit: bool = False
     ) -> tuple[Array, Array]:
         table, labels = self._validated(X, y, reset=reset, ensure_min_samples=2 if in_fit else 1)
-        check_classification_targets(labels)
+        check_labels(labels)
         return table, labels
 
     def _set_outputs(self, y: ArrayLike) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_origin, get_type_hints
@@ -67,6 +68,9 @@ class Fitted(Learned, BaseEstimator):
     def codings_(self) -> tuple[Coding, ...]:
         """Fitted coding of each input."""
         return self._fitted_network.input_code.codings
+
+    def _fitted_codings(self) -> tuple[Coding, ...]:
+        return self.codings_ if hasattr(self, "network_") else ()
 
     @property
     def pairs_(self) -> tuple[tuple[int, int], ...]:
@@ -151,7 +155,7 @@ class Fitted(Learned, BaseEstimator):
             "parameters": {name: plain(value) for name, value in parameters.items()},
             "attributes": attributes,
             "names": {name: named(held[name]) for name in NAMES if name in held},
-            "codings": [to_dict(coding) for coding in code.codings],
+            "codings": [described(index, coding) for index, coding in enumerate(code.codings)],
             "pairs": code.pairs,
             "n_units": self.network_.n_units,
             "n_networks": len(networks),
@@ -194,6 +198,16 @@ def mean_of(arrays: Sequence[Array]) -> Array:
     """Return the mean of arrays; a single one as it is."""
     mean: Array = np.mean(arrays, axis=0) if len(arrays) > 1 else arrays[0]
     return mean
+
+
+def described(index: int, coding: Coding) -> dict[str, Any]:
+    """Describe the coding of an input; TypeError that names it if that is impossible."""
+    try:
+        found = to_dict(coding)
+        json.dumps(found)
+    except TypeError as error:
+        raise TypeError(f"the coding of column {index} cannot be saved: {error}") from None
+    return found
 
 
 def plain(value: Any) -> Any:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import abc
 import contextlib
 import dataclasses
 import datetime
 import inspect
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from numbers import Number
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -14,11 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import assert_all_finite
 from sklearn.utils._param_validation import StrOptions
-from sklearn.utils.multiclass import unique_labels
+from sklearn.utils.multiclass import check_classification_targets, unique_labels
 from sklearn.utils.validation import validate_data
 
 from sdnn.arguments import shown
-from sdnn.coding import Coding, RandomInverse, WithMissing, coding_named
+from sdnn.coding import Coding, RandomInverse, Symbolic, WithMissing, coding_named
 from sdnn.estimators.outliers import OutlierWarning, numbers_to_range, usual_range, warn_caller
 
 Columns = int | str | slice | Sequence[int] | Sequence[str] | Sequence[bool] | Callable[[Any], Any]
@@ -90,10 +93,74 @@ def coding_entries(coding: Any) -> list[tuple[Coding, Columns]]:
     return entries
 
 
+def with_fields(coding: Any, fields: Mapping[str, Any]) -> Any:
+    """Return a coding, or a list of (coding, columns), with some fields replaced.
+
+    ``base__period`` is a field of the coding ``base``. In a list, ``0__period`` is a field of the
+    first coding and ``period`` one of every coding that has it.
+
+    >>> with_fields([("circular", ["hour"]), ("symbolic", ["day"])], {"period": 24.0})[0][0].period
+    24.0
+    """
+    if not isinstance(coding, list | tuple):
+        return with_own_fields(coding_named(coding), fields)
+    reached: set[str] = set()
+    entries = []
+    for number, (one, columns) in enumerate(coding_entries(coding)):
+        given = {name: value for name, value in fields.items() if has_field(one, name)}
+        named = {name: name.removeprefix(f"{number}__") for name in fields}
+        own = {short: fields[name] for name, short in named.items() if short != name}
+        reached |= set(given) | {name for name, short in named.items() if short != name}
+        entries.append((with_own_fields(one, {**given, **own}), columns))
+    if unknown := set(fields) - reached:
+        raise ValueError(
+            f"coding__{min(unknown)} must be a field of a coding in the list, or of the first with "
+            f"coding__0__, got the list {shown(coding)}"
+        )
+    return entries
+
+
+def has_field(coding: Coding, name: str) -> bool:
+    """Return whether a coding has a field of this name, before ``__``."""
+    return name.partition("__")[0] in field_names(coding)
+
+
+def field_names(coding: Coding) -> list[str]:
+    """Return the names of a coding's fields."""
+    of_data: Any = coding if dataclasses.is_dataclass(coding) else None
+    return [] if of_data is None else [field.name for field in dataclasses.fields(of_data)]
+
+
+def with_own_fields(coding: Coding, fields: Mapping[str, Any]) -> Coding:
+    """Return a coding with some fields, or fields of these, replaced."""
+    new: dict[str, Any] = {}
+    inner: dict[str, dict[str, Any]] = {}
+    for name, value in fields.items():
+        head, _, rest = name.partition("__")
+        if head not in field_names(coding):
+            raise ValueError(f"{coding!r} must have the fields {sorted(fields)}")
+        if rest:
+            inner.setdefault(head, {})[rest] = value
+        else:
+            new[head] = value
+    for head, given in inner.items():
+        new[head] = with_fields(new.get(head, getattr(coding, head)), given)
+    return dataclasses.replace(coding, **new) if new else coding  # type: ignore[type-var]
+
+
+def of_categories(table: Any) -> list[int]:
+    """Return the columns of a data frame whose type is "category"."""
+    kinds = table.dtypes if hasattr(table, "columns") and hasattr(table, "dtypes") else ()
+    return [index for index, kind in enumerate(kinds) if str(kind) == "category"]
+
+
 def codings_of_columns(
     coding: Any, names: Sequence[str] | None, n_inputs: int, table: Any = None
 ) -> list[Coding]:
     """Return the coding of each feature, random-inverse where a list has none.
+
+    Categories of a data frame are symbols, which may be missing, unless a list or a `Coding` has
+    another coding for them.
 
     >>> [coding.name for coding in codings_of_columns([("anchor", [1])], None, 2)]
     ['random-inverse', 'anchor']
@@ -104,6 +171,9 @@ def codings_of_columns(
             if index in found:
                 raise ValueError(f"feature {index} has more than one coding")
             found[index] = one
+    for index in of_categories(table):
+        if isinstance(coding, str) or index not in found:
+            found[index] = WithMissing(base=Symbolic())
     return [found.get(index) or RandomInverse() for index in range(n_inputs)]
 
 
@@ -157,6 +227,19 @@ def add_sections(cls: type, base: type) -> None:
     cls.__doc__ = text
 
 
+def check_labels(y: Array) -> None:
+    """Raise ValueError for what are no labels of classes."""
+    kinds: dict[type, Any] = {}
+    for label in y.ravel().tolist() if y.dtype == object else ():
+        kinds[next((kind for kind in (str, Number) if isinstance(label, kind)), type(label))] = (
+            label
+        )
+    if len(kinds) > 1:
+        mixed = shown(list(kinds.values()))
+        raise ValueError(f"y must have labels that are all words or all numbers, got {mixed}")
+    check_classification_targets(y)
+
+
 def class_labels(y: ArrayLike) -> Array:
     """Return the labels, sorted; ValueError for fewer than two."""
     classes: Array = unique_labels(y)
@@ -174,8 +257,19 @@ def refuse_dates(X: Any) -> None:
     else:
         return
     for name, value in zip(names, rows[0] if len(rows) else (), strict=False):
-        if isinstance(value, DATES):
+        if isinstance(value, DATES) or hasattr(value, "to_timestamp"):  # a period of pandas
             raise ValueError(f"X has dates or times in column {name!r}: {DATES_HINT}")
+
+
+def first_of_words(X: Any) -> Any:
+    """Return the name or number of the first column that cannot be numbers."""
+    names = list(X.columns) if hasattr(X, "columns") else itertools.count()
+    for name, column in zip(names, np.asarray(X).T, strict=False):
+        try:
+            column.astype(np.float64)
+        except (TypeError, ValueError):
+            return name
+    return None
 
 
 def as_it_came(X: Any) -> Any:
@@ -204,20 +298,31 @@ class CodedInputs(BaseEstimator):
     }
 
     def set_params(self: Self, **params: Any) -> Self:
-        """Set parameters; ``coding__length_scale`` and the like replace a field of the coding."""
+        """Set parameters; ``coding__length_scale`` and the like replace fields of codings.
+
+        In a list, ``coding__0__period`` is a field of the first coding, ``coding__period`` one of
+        every coding that has it.
+        """
         fields = {name[8:]: params.pop(name) for name in list(params) if name[:8] == "coding__"}
         super().set_params(**params)
         if fields:
-            if isinstance(self.coding, list | tuple):
-                raise ValueError(
-                    f"coding__{next(iter(fields))} needs one coding for all inputs, got a list"
-                )
-            coding = coding_named(self.coding)
-            try:
-                self.coding = dataclasses.replace(coding, **fields)  # type: ignore[type-var]
-            except TypeError:
-                raise ValueError(f"{coding!r} must have the fields {sorted(fields)}") from None
+            self.coding = with_fields(self.coding, fields)
         return self
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Return the parameters; ``deep`` adds fields of codings, as `set_params` names them."""
+        params: dict[str, Any] = super().get_params(deep)
+        if deep:
+            is_list = isinstance(self.coding, list | tuple)
+            with contextlib.suppress(ValueError):  # of a coding that `fit` will refuse
+                for number, (one, _) in enumerate(coding_entries(self.coding)):
+                    prefix = f"coding__{number}__" if is_list else "coding__"
+                    params |= {prefix + name: getattr(one, name) for name in field_names(one)}
+        return params
+
+    @abc.abstractmethod
+    def _fitted_codings(self) -> Sequence[Coding]:
+        """Return the fitted coding of each input, none before `fit`."""
 
     def _scratch(self: Self) -> Self:
         """Return a shallow copy to train, so that failures leave this one unchanged."""
@@ -229,6 +334,10 @@ class CodedInputs(BaseEstimator):
         """Check data by scikit-learn's rules; words pass where a coding takes them."""
         refuse_dates(X)
         numeric = all(coding.is_numeric for coding, _ in coding_entries(self.coding))
+        if options["reset"]:
+            numeric = numeric and not of_categories(X)
+        else:
+            numeric = numeric and all(coding.is_numeric for coding in self._fitted_codings())
         checks: dict[str, Any] = (
             {"dtype": np.float64} if numeric else {"dtype": None, "ensure_all_finite": False}
         )
@@ -236,7 +345,7 @@ class CodedInputs(BaseEstimator):
             return validate_data(self, X if numeric else as_it_came(X), y, **checks, **options)
         except ValueError as error:
             if "could not convert string" in str(error) and np.asarray(X).dtype.kind in "OSU":
-                raise ValueError(f"{error}; {WORDS_HINT}") from None
+                raise ValueError(f"{error} in column {first_of_words(X)!r}; {WORDS_HINT}") from None
             raise
 
     def _finite(self, table: Array, codings: Sequence[Coding]) -> Array:
@@ -271,7 +380,10 @@ class CodedInputs(BaseEstimator):
             if numbers is not None and np.isfinite(numbers).any():
                 low, high = self._range(f"column {index} of X", numbers[np.isfinite(numbers)])
                 column = column[~((numbers < low) | (numbers > high))]
-            fitted.append(coding.fit(column, n_units))
+            try:
+                fitted.append(coding.fit(column, n_units))
+            except ValueError as error:
+                raise ValueError(f"{error} in column {index}") from None
         return fitted
 
     def _range(self, name: str, values: Floats) -> tuple[float, float]:

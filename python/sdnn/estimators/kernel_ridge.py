@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+from collections.abc import Sequence
 from numbers import Integral, Real
 from typing import Any, ClassVar, TypeVar
 
@@ -14,16 +15,17 @@ from scipy.special import log_softmax, softmax
 from sklearn.base import ClassifierMixin
 from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
-from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted
 
 from sdnn.arguments import real
+from sdnn.coding import Coding
 from sdnn.estimators.inputs import (
     Array,
     CodedInputs,
     CodedRegressor,
     Floats,
     add_sections,
+    check_labels,
     class_labels,
     input_pairs,
 )
@@ -194,6 +196,9 @@ class BaseKernelRidge(CodedInputs):
         self.dual_coef_, self.intercept_ = solution.dual, solution.intercept
         return solution.left_out, solution.rows
 
+    def _fitted_codings(self) -> Sequence[Coding]:
+        return self.kernel_.codings if hasattr(self, "kernel_") else ()
+
     def _kernel(self, table: Array) -> Floats:
         """Return the kernel of samples and components."""
         return of_degree(self.kernel_(table, self.X_fit_), self.degree_)
@@ -272,7 +277,7 @@ class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         table, labels = self._validated(X, y, reset=True)
-        check_classification_targets(labels)
+        check_labels(labels)
         table, labels, counts = self._counted(table, labels, sample_weight)
         self.classes_: Array = class_labels(labels)
         one_hot = (labels[:, None] == self.classes_).astype(np.float64)

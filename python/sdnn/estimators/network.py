@@ -83,7 +83,7 @@ class InputCode:
     def _even(self) -> tuple[Any, ...] | None:
         """Return inputs in pairs, ranges and numbers of bins, if all bins have equal width."""
         ranges = [self.codings[index].even_range() for index in self.used]
-        if any(ends is None or not ends[0] < ends[1] for ends in ranges):
+        if any(ends is None or not ends[0] / 2 < ends[1] / 2 for ends in ranges):
             return None
         every = self.used == list(range(len(self.codings)))
         low, high = np.array(ranges, dtype=np.float64).T

@@ -3,9 +3,11 @@
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.base import clone
+from sklearn.model_selection import GridSearchCV
 
 from refusals import refuses
-from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
+from sdnn import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators import OutOfRangeWarning
 from sdnn.estimators.inputs import codings_of_columns, column_indices, input_pairs
@@ -237,7 +239,85 @@ def test_dates_are_refused_by_name():
     ]
     for frame in frames:
         for coding in ("random-inverse", [("symbolic", ["when"])]):
-            refuses("'when'", SDNNRegressor(coding, **SMALL).fit, frame, y)
+            refuses("when", SDNNRegressor(coding, **SMALL).fit, frame, y)
     refuses("0", SDNNRegressor(**SMALL).fit, days.to_numpy()[:, None], y)
     objects = np.array([[1.0, day] for day in days.to_pydatetime()], dtype=object)
     refuses("1", SDNNRegressor(**SMALL).fit, objects, y)
+
+
+def test_fields_of_codings_in_a_list_are_set_by_number_or_together():
+    model = SDNNRegressor([("anchor", [0]), (WithMissing(base=Circular()), [1]), ("circular", [2])])
+    model.set_params(coding__period=24.0, coding__1__base__period=7.0, coding__0__n_interpolated=8)
+    first, second, third = (coding for coding, _ in model.coding)
+    assert (first.n_interpolated, second.base.period, third.period) == (8, 7.0, 24.0)
+    given = model.get_params()
+    assert given["coding__2__period"] == 24.0
+    clone(model).set_params(**{name: given[name] for name in given if name.startswith("coding__")})
+    assert SDNNRegressor("circular").get_params()["coding__period"] == Circular().period
+    assert "coding__period" not in SDNNRegressor("circular").get_params(deep=False)
+    refuses("coding__rho", model.set_params, coding__rho=0.5)
+    refuses("coding__3__period", model.set_params, coding__3__period=0.5)
+    refuses("period", SDNNRegressor("anchor").set_params, coding__period=24.0)
+
+
+def test_codings_of_a_list_are_searched():
+    grid = {"coding__1__length_scale": [0.1, 1.0]}
+    model = SDNNKernelRidge([("symbolic", ["color"]), ("random-inverse", ["hour", "size"])])
+    search = GridSearchCV(model, grid, cv=2).fit(TABLE, TARGETS)
+    assert search.best_estimator_.coding[1][0].length_scale in (0.1, 1.0)
+
+
+@pytest.mark.parametrize("kind", [SDNNRegressor, SDNNKernelRidge])
+def test_categories_of_a_frame_are_symbols(kind):
+    options = SMALL if kind is SDNNRegressor else {}
+    typed = TABLE.astype({"color": "category"})
+    given = kind([(WithMissing(base=Symbolic()), ["color"])], **options).fit(TABLE, TARGETS)
+    for coding in ("random-inverse", [("random-inverse", ["hour"])]):
+        model = kind(coding, **options).fit(typed, TARGETS)
+        np.testing.assert_array_equal(model.predict(typed), given.predict(TABLE))
+        np.testing.assert_array_equal(model.predict(TABLE), given.predict(TABLE))  # plain words
+    gap = typed.assign(color=typed["color"].cat.remove_categories(["red"]))
+    assert np.isfinite(model.predict(gap)).all()
+    numbers = TABLE.assign(color=pd.Categorical(TABLE["color"].map({"red": 1, "blue": 2})))
+    assert np.isfinite(kind(**options).fit(numbers, TARGETS).predict(numbers)).all()
+    refuses("NaN", kind(RandomInverse(), **options).fit, numbers, TARGETS)  # a coding for all
+
+
+def test_categories_of_a_frame_are_kept_in_files_and_selection(tmp_path):
+    typed = TABLE.astype({"color": "category"})
+    model = SDNNRegressor(pairs="auto", **SMALL).fit(typed, TARGETS)
+    model.partial_fit(typed, TARGETS)
+    model.save(tmp_path / "model")
+    same = SDNNRegressor.load(tmp_path / "model")
+    np.testing.assert_array_equal(same.predict(typed), model.predict(TABLE))
+
+
+@pytest.mark.parametrize("kind", [SDNNClassifier, SDNNKernelClassifier])
+@pytest.mark.parametrize("labels", [[1, "a"], [None, "a"], [None, 1]])
+def test_labels_of_mixed_types_are_named(kind, labels):
+    mixed = np.array(labels * 20, dtype=object)
+    refuses("labels", kind().fit, np.arange(40.0)[:, None], mixed)
+
+
+def test_errors_name_the_column():
+    frame = TABLE.assign(when=pd.period_range("2020", periods=len(TABLE), freq="D"))
+    refuses("when", SDNNRegressor(**SMALL).fit, frame, TARGETS)
+    refuses("color", SDNNRegressor(**SMALL).fit, TABLE, TARGETS)
+    mixed = np.array([[0.0, "a"], [1.0, 2.0]] * 9, dtype=object)
+    refuses("column", SDNNRegressor([("symbolic", [1])], **SMALL).fit, mixed, np.arange(18.0))
+
+
+def test_a_coding_that_cannot_be_saved_is_named(tmp_path):
+    table = np.array([[0.0, b"a"], [1.0, b"b"]] * 9, dtype=object)
+    model = SDNNRegressor([("symbolic", [1])], **SMALL).fit(table, np.arange(18.0))
+    with pytest.raises(TypeError, match="column 1"):
+        model.save(tmp_path / "model")
+
+
+@pytest.mark.parametrize("coding", ["random-inverse", "anchor", RandomInverse(spacing="quantile")])
+@pytest.mark.parametrize("end", [1e306, 5e-324])
+def test_extreme_ranges_are_learned(coding, end):
+    X = np.random.RandomState(0).uniform(-1, 1, (40, 2)) * [1, end]
+    X[:2, 1] = -end, end
+    for model in (SDNNRegressor(coding, **SMALL), SDNNKernelRidge(coding)):
+        assert np.isfinite(model.fit(X, X[:, 0]).predict(X)).all()
