@@ -25,6 +25,7 @@ class Cluster:
     def __init__(self, folder):
         self.folder = folder
         self.file = folder / "scheduler.json"
+        self.settings = dict(SETTINGS)
         self.workers = []
         self.scheduler = None
         self._log = (folder / "cluster.log").open("ab")
@@ -72,7 +73,7 @@ class Cluster:
         return subprocess.Popen(
             [sys.executable, "-m", "dask", *command, "--scheduler-file", str(self.file),
              "--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"],
-            stdout=self._log, stderr=self._log, start_new_session=True, env=os.environ | SETTINGS,
+            stdout=self._log, stderr=self._log, start_new_session=True, env=os.environ | self.settings,
         )  # fmt: skip
 
 

@@ -230,7 +230,15 @@ AGENTS["sdnn-c"] = replace(AGENTS["sdnn-c"], core_trial=Poison)
 """
 
 
-def test_a_trial_that_kills_its_workers_fails_and_the_others_are_done(cluster, tmp_path):
+@pytest.mark.parametrize("allowed_failures", ["1", "10"])  # or till all workers were lost
+def test_a_trial_that_kills_its_workers_fails_and_the_others_are_done(
+    cluster, tmp_path, monkeypatch, allowed_failures
+):
+    cluster.kill(cluster.scheduler)
+    monkeypatch.setitem(
+        cluster.settings, "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", allowed_failures
+    )
+    cluster.start_scheduler()
     plan = make_plan(3)
     for _ in range(2):
         cluster.add_worker(POISON.format(seed=plan[1].key.seed))

@@ -2,9 +2,6 @@
 
 Dask places trials and runs them again when a worker is lost. The driver admits workers whose build
 gives the same rows, submits as many trials as those have threads, and collects results.
-
-Trials are sent as bytes: a worker that cannot unpickle a task falls silent, but a task that cannot
-unpickle its argument reports an error.
 """
 
 from __future__ import annotations
@@ -17,27 +14,18 @@ import math
 import pickle
 import threading
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sdnn import _core
 from sdnn.files import read_bytes
 from sdnn.runs.config_file import MOST_BYTES
-from sdnn.runs.engine import (
-    Advanced,
-    Failed,
-    Finished,
-    Message,
-    Noted,
-    PlannedTrial,
-    run_to_end,
-)
+from sdnn.runs.engine import Advanced, Failed, Finished, Message, Noted, PlannedTrial, run_to_end
 from sdnn.runs.errors import ClusterError, WorkerLostError
-from sdnn.runs.trial import TrialKey, TrialRecord, opened, rows_of
+from sdnn.runs.trial import TrialRecord, opened, rows_of
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -49,6 +37,7 @@ RESULTS_SECONDS = 0.02  # between checks of results
 PROGRESS_SECONDS = 2.0  # at least between two reports of a trial's progress
 PROGRESS_TOPIC = "sdnn-progress"
 PROBE_EPISODES = 10  # few, but they use every part of the agent and the task
+MOST_SUBMISSIONS = 3  # of a trial that is lost with all the workers it may run on
 
 MISMATCH = f"__import__({__name__!r}, fromlist=['mismatch']).mismatch(version, probes)"
 """An expression for `eval`, which workers without this library have, too."""
@@ -74,20 +63,15 @@ def mismatch(version: str, probes: Sequence[tuple[bytes, str]]) -> str:
     return ""
 
 
-def run_on_worker(version: str, pickled: bytes) -> TrialRecord:
+def run_on_worker(pickled: bytes) -> TrialRecord:
     """Run a trial; Dask places it again if it was cancelled and is wanted once more.
 
-    ClusterError if this worker's version, or the settings it reads, are not the driver's.
+    It comes as bytes: a worker that cannot unpickle a task falls silent, but a task that cannot
+    unpickle its argument reports an error.
     """
     from distributed import Reschedule, get_worker
 
     worker = get_worker()
-    planned: PlannedTrial = pickle.loads(pickled)
-    if (_core.__version__, planned.spec.config_hash) != (version, planned.key.config_hash):
-        raise ClusterError(
-            f"worker {worker.address} (sdnn {_core.__version__}) does not read the settings of"
-            f" this trial as the driver (sdnn {version}) does; install the same build on both"
-        )
     key = worker.get_current_task()
     reported = time.monotonic()
 
@@ -101,10 +85,22 @@ def run_on_worker(version: str, pickled: bytes) -> TrialRecord:
             reported = time.monotonic()
             worker.log_event(PROGRESS_TOPIC, (key, episode))
 
-    record = run_to_end(planned, wanted=wanted, advanced=advanced)
+    record = run_to_end(pickle.loads(pickled), wanted=wanted, advanced=advanced)
     if record is None:
         raise Reschedule
     return record
+
+
+def probes_of(planned: Iterable[PlannedTrial]) -> Iterator[tuple[bytes, str]]:
+    """Make probes of the first trial of each kind, but of those that will fail anyway."""
+    kinds: dict[tuple[str, bool], PlannedTrial] = {}
+    for one in planned:
+        kinds.setdefault((one.key.agent, one.spec.is_compiled), one)
+    for one in kinds.values():
+        try:
+            yield pickle.dumps(one), probe(one)
+        except Exception:  # reported when it is run, as with every executor
+            continue
 
 
 class DaskExecutor:
@@ -148,8 +144,7 @@ class DaskExecutor:
             if client is None:
                 return
             try:
-                run = _Run(self, client, list(_probes(planned)), deque(planned))
-                yield from run.messages(stop)
+                yield from _Run(self, client, planned).messages(stop)
             except (OSError, asyncio.TimeoutError) as error:
                 raise self.failure(f"lost the scheduler at {self.scheduler}: {error}") from error
             finally:
@@ -159,42 +154,32 @@ class DaskExecutor:
         """Connect, in short attempts, so that Ctrl-C ends them."""
         from distributed import Client
 
-        begin = time.monotonic()
-        notes = [f"waiting for the scheduler at {self.scheduler}"]
+        end = time.monotonic() + self.scheduler_timeout
         attempt = min(CONNECT_SECONDS, self.scheduler_timeout)
+        waits = False
         while not stop.is_set():
             try:
                 return Client(self._address(), timeout=attempt, set_as_default=False)
-            except OSError as error:
-                if time.monotonic() - begin > self.scheduler_timeout:
-                    raise self.failure(
-                        f"no scheduler at {self.scheduler}: {error}; waited"
-                        f" {self.scheduler_timeout:g} s"
-                    ) from error
-                yield from map(Noted, notes)
-                notes = []
-                stop.wait(WORKERS_SECONDS)
-            except ValueError as error:
-                raise self._refusal(error) from error
+            except OSError as error:  # it may come, and its file, too
+                if time.monotonic() > end:
+                    raise self.failure(f"no scheduler at {self.scheduler}: {error}") from error
+                if not waits:
+                    yield Noted(f"waiting for the scheduler at {self.scheduler}: {error}")
+                waits = True
+            except (ValueError, LookupError, TypeError, RecursionError) as error:
+                raise ClusterError(
+                    f"scheduler must be an address or a scheduler file, got {self.scheduler}"
+                    f" ({type(error).__name__}: {error})"
+                ) from error
+            stop.wait(WORKERS_SECONDS)
         return None
 
     def _address(self) -> str:
-        """Return the address, from a scheduler file if it is one; OSError if it is not there."""
+        """Return the address, from a scheduler file if it is one."""
         path = Path(self.scheduler)
         if path.suffix != ".json" and not path.is_file():
             return self.scheduler
-        try:
-            return str(json.loads(read_bytes(path, MOST_BYTES))["address"])
-        except FileNotFoundError:  # it may come
-            raise
-        except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
-            raise self._refusal(error) from error
-
-    def _refusal(self, error: Exception) -> ClusterError:
-        return ClusterError(
-            f"scheduler must be an address or a scheduler file, got {self.scheduler}"
-            f" ({type(error).__name__}: {error})"
-        )
+        return str(json.loads(read_bytes(path, MOST_BYTES))["address"])
 
     def failure(self, problem: str) -> ClusterError:
         """Return the error that ends the run."""
@@ -203,35 +188,29 @@ class DaskExecutor:
         )
 
 
-def _probes(planned: Iterable[PlannedTrial]) -> Iterator[tuple[bytes, str]]:
-    """Make probes of the first trial of each kind, but of those that will fail anyway."""
-    kinds: dict[tuple[str, bool], PlannedTrial] = {}
-    for one in planned:
-        kinds.setdefault((one.key.agent, one.spec.is_compiled), one)
-    for one in kinds.values():
-        try:
-            yield pickle.dumps(one), probe(one)
-        except Exception:  # reported when it is run, as with every executor
-            continue
+class _Placed(NamedTuple):
+    """A trial that was submitted, for the n-th time, to any of some workers."""
+
+    planned: PlannedTrial
+    n: int
+    workers: frozenset[str]
+    future: Future
 
 
-@dataclass
 class _Run:
-    """The trials of one run.
+    """The trials of one run."""
 
-    Those that were lost with worker after worker are suspects: they run after all others, alone.
-    """
-
-    executor: DaskExecutor
-    client: Client
-    probes: list[tuple[bytes, str]]
-    waiting: deque[PlannedTrial]
-    running: dict[Future, tuple[PlannedTrial, frozenset[str]]] = field(default_factory=dict)
-    suspects: set[TrialKey] = field(default_factory=set)
-    n_submitted: Counter[TrialKey] = field(default_factory=Counter)
-    threads: dict[str, int] = field(default_factory=dict)  # of the workers that fit
-    refused: dict[str, str] = field(default_factory=dict)  # why others do not
-    unserved_since: float | None = None
+    def __init__(
+        self, executor: DaskExecutor, client: Client, planned: Sequence[PlannedTrial]
+    ) -> None:
+        self.executor = executor
+        self.client = client
+        self.probes = list(probes_of(planned))
+        self.waiting = deque((one, 1) for one in planned)  # with the number of the submission
+        self.placed: dict[str, _Placed] = {}  # by key
+        self.threads: dict[str, int] = {}  # of the workers that fit
+        self.refused: dict[str, str] = {}  # why others do not
+        self.unserved_since: float | None = None
 
     def messages(self, stop: threading.Event) -> Generator[Message, None, None]:
         """Run until every trial is finished or failed, or `stop` is set."""
@@ -241,21 +220,20 @@ class _Run:
         progress: SimpleQueue[tuple[str, int]] = SimpleQueue()
         self.client.subscribe_topic(PROGRESS_TOPIC, lambda event: progress.put(event[1]))
         looked = -math.inf
-        while self.waiting or self.running:
+        while self.waiting or self.placed:
             if time.monotonic() - looked > WORKERS_SECONDS:
-                yield from self.look_at_workers()
                 looked = time.monotonic()
-            for planned in self.next_trials():
-                yield from self.submit(planned, completed)
+                yield from self.look_at_workers()
+            while self.waiting and len(self.placed) < sum(self.threads.values()):
+                yield from self.submit(*self.waiting.popleft(), completed)
             if stop.wait(RESULTS_SECONDS):
                 return
-            trials = {future.key: planned for future, (planned, _) in self.running.items()}
             while not progress.empty():
                 key, episode = progress.get()
-                if key in trials:
-                    yield Advanced(trials[key], episode)
+                if key in self.placed:
+                    yield Advanced(self.placed[key].planned, episode)
             for future, result in completed.next_batch(block=False):
-                if future in self.running:
+                if future.key in self.placed:
                     yield from self.complete(future, result)
 
     def look_at_workers(self) -> Generator[Message, None, None]:
@@ -277,64 +255,50 @@ class _Run:
                     answer = f"it cannot run these trials: {type(answer).__name__}: {answer}"
                 self.refused[worker] = f"worker {worker} was refused, {answer}"
                 yield Noted(self.refused[worker])
-        for future, (planned, workers) in list(self.running.items()):
+        for key, (trial, n, workers, future) in list(self.placed.items()):
             if workers.isdisjoint(self.threads):
-                del self.running[future]
+                del self.placed[key]
                 future.cancel()
-                self.waiting.appendleft(planned)
+                if n < MOST_SUBMISSIONS:
+                    self.waiting.appendleft((trial, n + 1))
+                else:
+                    yield Failed(trial, WorkerLostError(f"all its workers were lost, {n} times"))
+        seconds, scheduler = self.executor.scheduler_timeout, self.executor.scheduler
         if self.threads:
             self.unserved_since = None
         elif self.unserved_since is None:
             self.unserved_since = time.monotonic()
-            yield Noted(f"waiting for workers at {self.executor.scheduler}")
-        elif time.monotonic() - self.unserved_since > self.executor.scheduler_timeout:
+            yield Noted(f"waiting for workers at {scheduler}")
+        elif time.monotonic() - self.unserved_since > seconds:
             fits = f" fits: {'; '.join(self.refused.values())}" if self.refused else ""
-            waited = f"waited {self.executor.scheduler_timeout:g} s"
-            raise self.executor.failure(f"no worker at {self.executor.scheduler}{fits}; {waited}")
+            raise self.executor.failure(f"no worker at {scheduler}{fits}; waited {seconds:g} s")
 
-    def next_trials(self) -> Iterator[PlannedTrial]:
-        """Yield a trial for each free thread; suspects, which come last, one by one."""
-        n_threads = sum(self.threads.values())
-        while self.waiting:
-            is_alone = self.waiting[0].key in self.suspects
-            if len(self.running) >= (min(1, n_threads) if is_alone else n_threads):
-                return
-            yield self.waiting.popleft()
-
-    def submit(self, planned: PlannedTrial, completed: Any) -> Generator[Message, None, None]:
+    def submit(self, planned: PlannedTrial, n: int, completed: Any) -> Iterator[Message]:
         """Submit a trial; its identity is its key, so that drivers with the same trial share it."""
-        # A trial that is submitted again has a number, because Dask remembers how a key ended.
-        number = self.n_submitted[planned.key]
-        self.n_submitted[planned.key] += 1
         yield Advanced(planned, 0)
         try:
             pickled = pickle.dumps(planned)
         except Exception as error:
             yield Failed(planned, error)
             return
-        key = "-".join(map(str, ("trial", _core.__version__, *planned.key, number)))
-        future = self.client.submit(
-            run_on_worker, _core.__version__, pickled, key=key, workers=list(self.threads)
-        )
-        self.running[future] = planned, frozenset(self.threads)
+        # With the number of the submission, because Dask remembers how a key ended.
+        key = "-".join(map(str, ("trial", _core.__version__, *planned.key, n)))
+        workers = frozenset(self.threads)
+        future = self.client.submit(run_on_worker, pickled, key=key, workers=list(workers))
+        self.placed[key] = _Placed(planned, n, workers, future)
         completed.add(future)
 
-    def complete(self, future: Future, result: Any) -> Generator[Message, None, None]:
+    def complete(self, future: Future, result: Any) -> Iterator[Message]:
         """Report how a trial ended."""
-        from distributed.scheduler import KilledWorker
+        from distributed import KilledWorker
 
-        planned, _ = self.running.pop(future)
-        status = future.status
-        future.release()
-        if status == "finished":
+        planned = self.placed.pop(future.key).planned
+        if future.status == "finished":
             yield Advanced(planned, planned.spec.length)
             yield Finished(planned, result)
-        elif status != "error":
+        elif future.status != "error":
             raise OSError("it does not know the trials any more")
-        elif not isinstance(result[1], KilledWorker):
-            yield Failed(planned, result[1])
-        elif planned.key in self.suspects:
+        elif isinstance(result[1], KilledWorker):
             yield Failed(planned, WorkerLostError(f"worker after worker was lost: {result[1]}"))
         else:
-            self.suspects.add(planned.key)
-            self.waiting.append(planned)
+            yield Failed(planned, result[1])
