@@ -73,7 +73,8 @@ class Cluster:
         return subprocess.Popen(
             [sys.executable, "-m", "dask", *command, "--scheduler-file", str(self.file),
              "--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"],
-            stdout=self._log, stderr=self._log, start_new_session=True, env=os.environ | self.settings,
+            stdout=self._log, stderr=self._log, start_new_session=True,
+            env=os.environ | self.settings,
         )  # fmt: skip
 
 
