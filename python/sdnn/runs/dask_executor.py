@@ -166,11 +166,8 @@ class DaskExecutor:
                 if not waits:
                     yield Noted(f"waiting for the scheduler at {self.scheduler}: {error}")
                 waits = True
-            except (ValueError, LookupError, TypeError, RecursionError) as error:
-                raise ClusterError(
-                    f"scheduler must be an address or a scheduler file, got {self.scheduler}"
-                    f" ({type(error).__name__}: {error})"
-                ) from error
+            except ValueError as error:
+                raise self._refusal(error) from error
             stop.wait(WORKERS_SECONDS)
         return None
 
@@ -179,7 +176,16 @@ class DaskExecutor:
         path = Path(self.scheduler)
         if path.suffix != ".json" and not path.is_file():
             return self.scheduler
-        return str(json.loads(read_bytes(path, MOST_BYTES))["address"])
+        try:
+            return str(json.loads(read_bytes(path, MOST_BYTES))["address"])
+        except (ValueError, LookupError, TypeError, RecursionError) as error:
+            raise self._refusal(error) from error
+
+    def _refusal(self, error: Exception) -> ClusterError:
+        return ClusterError(
+            f"scheduler must be an address or a scheduler file, got {self.scheduler}"
+            f" ({type(error).__name__}: {error})"
+        )
 
     def failure(self, problem: str) -> ClusterError:
         """Return the error that ends the run."""
