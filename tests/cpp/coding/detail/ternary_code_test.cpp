@@ -64,6 +64,10 @@ TEST(ColumnLists, LeadFromOneCodeToAnother) {
         slots.read_changes(from.words(), to.words());
         EXPECT_EQ(entries_of(slots, n_words), differences) << level;
         EXPECT_EQ(slots.columns().size(), distance);
+        slots.read(to.words());
+        for (std::size_t slot = 0; slot < 64 * n_words; ++slot) {
+          ASSERT_EQ(entries_of(slots, n_words)[slot], to.at(slot)) << level;
+        }
       });
     }
   }
