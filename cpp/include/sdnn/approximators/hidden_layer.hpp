@@ -140,8 +140,8 @@ class HiddenLayer {
 
   /// out_i += w_i . x for the input with these columns, in which a column may come more than once.
   void add(const coding::SignedColumns& input, std::span<std::int32_t> out) const {
-    add_signed(input.plus, +1, out);
-    add_signed(input.minus, -1, out);
+    add_signed(input.plus, input.plus_bits, +1, out);
+    add_signed(input.minus, input.minus_bits, -1, out);
   }
 
   /// w_i += step * x, twice that in double columns, and w_i0 -= step for every i in `units`. No
@@ -192,14 +192,15 @@ class HiddenLayer {
   /// A block's bytes: its columns, and one more of zeros, to which lists of columns are padded.
   std::size_t block_bytes() const noexcept { return (n_columns_ + 1) * kBlockUnits; }
 
-  /// out_i += sign * the weights of the columns.
-  void add_signed(std::span<const std::uint32_t> columns, int sign,
-                  std::span<std::int32_t> out) const {
+  /// out_i += sign * the weights of the columns, of which there may be bits.
+  void add_signed(std::span<const std::uint32_t> columns, std::span<const std::uint64_t> bits,
+                  int sign, std::span<std::int32_t> out) const {
+    if (columns.size() > ColumnPlaces::kMost) bits = {};
     while (!columns.empty()) {
       const auto some = columns.first(std::min(ColumnPlaces::kMost, columns.size()));
       columns = columns.subspan(some.size());
       const ColumnPlaces places(some, n_columns_);
-      const Listed listed(n_high_columns_ > 0 ? some : some.first(0));
+      const Listed listed(n_high_columns_ > 0 && bits.empty() ? some : some.first(0));
       for (std::size_t b = 0; b < n_blocks_; ++b) {
         alignas(core::kCacheLine) std::array<std::int32_t, kBlockUnits> padded;
         const std::size_t first = b * kBlockUnits;
@@ -207,22 +208,27 @@ class HiddenLayer {
         if (!whole) padded.fill(0);
         std::int32_t* const sums = whole ? out.data() + first : padded.data();
         add_columns(bytes_.data() + b * block_bytes(), places, group_of_block_[b], sign, sums);
-        if (high_columns_[b].size() > 0) add_high_bytes(b, places, listed, sign, sums);
+        if (high_columns_[b].size() > 0) add_high_bytes(b, places, listed, bits, sign, sums);
         for (std::size_t i = first; !whole && i < n_units_; ++i) out[i] += padded[i - first];
       }
     }
   }
 
   /// The part of high bytes. Where many columns have some, telling which costs more than it saves.
-  void add_high_bytes(std::size_t block, const ColumnPlaces& all, const Listed& listed, int sign,
-                      std::int32_t* sums) const {
+  void add_high_bytes(std::size_t block, const ColumnPlaces& all, const Listed& listed,
+                      std::span<const std::uint64_t> bits, int sign, std::int32_t* sums) const {
     const int group = high_group_of_block_[block];
     const std::int8_t* const bytes = high_bytes_.data() + block * block_bytes();
     if (high_columns_[block].size() >= n_columns_ / 4) {
       return add_columns(bytes, all, group, sign * kHighByte, sums);
     }
     std::array<std::uint32_t, ColumnPlaces::kMost> own;
-    const std::size_t n = listed.in(high_columns_[block], own.data());
+    const std::size_t n =
+        bits.empty()
+            ? listed.in(high_columns_[block], own.data())
+            : static_cast<std::size_t>(intersect_bits(bits.data(), high_columns_[block].words(),
+                                                      core::n_bit_words(n_columns_), own.data()) -
+                                       own.data());
     if (n == 0) return;
     add_columns(bytes, ColumnPlaces(std::span(own).first(n), n_columns_), group, sign * kHighByte,
                 sums);

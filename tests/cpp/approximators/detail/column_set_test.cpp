@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "instruction_sets.hpp"
+#include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators {
 namespace {
@@ -45,6 +46,28 @@ TEST(ListedColumns, FindsThoseInASetAsOftenAsTheyCome) {
         << level;
   });
   EXPECT_EQ(listed.in(ColumnSet(200), out.data()), 0U);
+}
+
+TEST(IntersectBits, FindsTheColumnsOfBothInAnyNumberOfWords) {
+  core::Random random(4, core::Stream::weights);
+  for (std::size_t n_words = 1; n_words < 40; ++n_words) {
+    ColumnSet set(64 * n_words);
+    std::vector<std::uint64_t> bits(n_words);
+    std::vector<std::uint32_t> expected;
+    for (std::uint32_t j = 0; j < 64 * n_words; ++j) {
+      const bool is_listed = random.below(3) == 0;
+      const bool is_set = random.below(10) == 0;
+      if (is_listed) bits[j / 64] |= std::uint64_t{1} << j % 64;
+      if (is_set) set.add(j);
+      if (is_listed && is_set) expected.push_back(j);
+    }
+    sdnn::testing::on_every_instruction_set([&](auto level) {
+      std::vector<std::uint32_t> out(64 * n_words);
+      out.resize(static_cast<std::size_t>(
+          intersect_bits(bits.data(), set.words(), n_words, out.data()) - out.data()));
+      EXPECT_EQ(out, expected) << level;
+    });
+  }
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "estimators/codes.hpp"
@@ -87,6 +89,29 @@ TEST(ColumnLists, HoldTheLongestLists) {
     EXPECT_EQ(slots.columns().minus.size(), 64 * n_words) << level;
     EXPECT_TRUE(slots.columns().plus.empty());
   });
+}
+
+TEST(ColumnLists, HaveTheBitsOfTheirColumns) {
+  core::Random random(6, core::Stream::weights);
+  const std::size_t n_words = 12;
+  auto code = testing::random_code(n_words, random);
+  for (std::size_t w = 3; w < n_words; w += 4) {  // groups of 200 columns
+    code.active[w] &= 0xFF;
+    code.positive[w] &= 0xFF;
+  }
+  coding::ColumnLists lists(n_words, 4, 200);
+  lists.read(code.words());
+  const coding::SignedColumns columns = lists.columns_with_bits(code.words());
+  const auto listed = [](std::span<const std::uint64_t> bits) {
+    std::vector<std::uint32_t> numbers;
+    for (std::uint32_t j = 0; j < 64 * bits.size(); ++j) {
+      if (bits[j / 64] >> j % 64 & 1) numbers.push_back(j);
+    }
+    return numbers;
+  };
+  EXPECT_GT(columns.size(), 100U);
+  EXPECT_TRUE(std::ranges::equal(columns.plus, listed(columns.plus_bits)));
+  EXPECT_TRUE(std::ranges::equal(columns.minus, listed(columns.minus_bits)));
 }
 
 }  // namespace

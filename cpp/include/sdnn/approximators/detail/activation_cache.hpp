@@ -116,7 +116,10 @@ class ActivationCache {
     }
     const std::span<std::int32_t> fresh(potentials_.data() + oldest * n_units_, n_units_);
     if (nearest == kEntries) {
-      const coding::SignedColumns columns = list(code, bins);
+      coding::SignedColumns columns = list(code, bins);
+      if (hidden_layer.n_high_columns() > 0) {
+        columns = listed_[0].lists.columns_with_bits(to_.code());
+      }
       hidden_layer.potentials(columns, fresh);
       ++counts_.full;
       counts_.columns += columns.size();
@@ -157,9 +160,11 @@ class ActivationCache {
 
     coding::TernaryCode encode(const coding::StateCode& code,
                                std::span<const coding::Bin> bins) noexcept {
-      std::uint64_t* const positive = words_.data() + code.n_words();
-      code.encode(bins, words_.data(), positive);
-      return {words_.data(), positive};
+      code.encode(bins, words_.data(), words_.data() + code.n_words());
+      return this->code();
+    }
+    coding::TernaryCode code() const noexcept {
+      return {words_.data(), words_.data() + words_.size() / 2};
     }
 
    private:

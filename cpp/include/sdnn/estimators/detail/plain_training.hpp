@@ -62,9 +62,9 @@ class PlainTraining {
     auto& tiles = layer_->tiles();
     std::int32_t* const first = &tiles.at(correction.unit, 0);
     const std::size_t width = tiles.width(correction.unit / kTileUnits);
-    const auto [plus, minus] = slots_.columns();
-    for (const std::uint32_t slot : plus) first[slot * width] += correction.direction;
-    for (const std::uint32_t slot : minus) first[slot * width] -= correction.direction;
+    const coding::SignedColumns slots = slots_.columns();
+    for (const std::uint32_t slot : slots.plus) first[slot * width] += correction.direction;
+    for (const std::uint32_t slot : slots.minus) first[slot * width] -= correction.direction;
     layer_->thresholds()[correction.unit] -= correction.direction;
   }
 
