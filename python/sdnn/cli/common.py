@@ -19,7 +19,6 @@ import click
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sdnn.agents.scaling import Scaling
     from sdnn.runs import ConfigError, Run, RunOutcome
     from sdnn.runs.dask_executor import DaskExecutor
     from sdnn.runs.engine import ThreadExecutor
@@ -211,100 +210,42 @@ def train_run(
         shown = {k: v for k, v in vars(outcome).items() if k not in ("has_pictures", "scaling")}
         click.echo(json_text({"folder": str(run.folder), **shown}))
         return
-    for line in _outcome_lines(run, outcome):
-        click.echo(line)
+    click.echo(outcome_text(run, outcome))
 
 
-_OFTEN_ROUNDED_AWAY = 0.5
-_LITTLE_OF_A_RANGE = 0.1
-_OFTEN_BEYOND_A_RANGE = 0.1
+def outcome_text(run: Run, outcome: RunOutcome) -> str:
+    """Write the outcome of a training: what was learned, what did not suit, and what comes next."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
 
-
-def _lines_of_rounding(report: Mapping[str, Any]) -> Iterator[str]:
-    """Report values that are too coarse for what is left to learn."""
-    step, error, (low, high) = report["value_step"], report["mean_error"], report["q_range"]
-    if report["share_rounded_away"] > _OFTEN_ROUNDED_AWAY and error < step:
-        yield (
-            f"values come in steps of {step:.3g}, from {low:.4g} to {high:.4g}, and targets differ"
-            f" from them by {error:.3g} on average: where returns are not good yet, take more"
-            " approximator.n_hidden_units and n_active_units, or a narrower range:"
-            " learning.value_range=fixed with approximator.q_low and q_high"
-        )
-
-
-def _lines_of_ranges(report: Mapping[str, Any]) -> Iterator[str]:
-    """Name variables whose ranges do not suit what was observed."""
-    shares = enumerate(report["share_of_range"])
-    narrow = [i for i, share in shares if share is not None and 0.0 < share < _LITTLE_OF_A_RANGE]
-    if narrow:
-        yield (
-            f"{_variables(narrow)} moved within {_LITTLE_OF_A_RANGE:.0%} of the range:"
-            " the network can hardly distinguish such values; --range adaptive narrows ranges"
-        )
-    shares = enumerate(report["share_beyond_range"])
-    clipped = [i for i, share in shares if share is not None and share > _OFTEN_BEYOND_A_RANGE]
-    if clipped:
-        yield (
-            f"{_variables(clipped)} left the range more than {_OFTEN_BEYOND_A_RANGE:.0%} of the"
-            " time: the network cannot distinguish values beyond it; --range makes it wider"
-        )
-
-
-def _lines_of_scaling(run: Run, scaling: Scaling | None) -> Iterator[str]:
-    """Describe the observations that the agent needs elsewhere."""
-    if scaling is not None:
-        yield (
-            f"the agent observes variables scaled to [0, 1], {scaling.words()}: elsewhere it needs"
-            f" the same, as sdnn.runs.Run.open({str(run.folder)!r}).spec.make_env()"
-            " gives it"
-        )
-
-
-def _variables(numbers: Sequence[int]) -> str:
-    return f"observed variable{'s' if len(numbers) > 1 else ''} {_listed(numbers)}"
-
-
-def _listed(numbers: Sequence[int]) -> str:
-    return ", ".join(map(str, numbers[:8])) + (", ..." if len(numbers) > 8 else "")
-
-
-def _outcome_lines(run: Run, outcome: RunOutcome) -> Iterator[str]:
     from sdnn.runs.run import resume_command
 
-    why = " (the target is reached)" if outcome.reason == "target" else ""
-    yield f"{run.folder}: {outcome.n_steps} steps, {outcome.n_episodes} episodes{why}"
-    if outcome.is_warming_up:
-        yield (
-            f"{WARMING_UP}; that takes {run.spec.agent.warm_up_steps} steps:"
-            f" {resume_command(run.folder, '--steps', 'N')} continues it"
-        )
-    row = outcome.last_evaluation
-    if row is not None:
-        yield (
-            f"last evaluation, after {row['step']} steps: mean return"
-            f" {row['mean_return']:.6g} over {len(row['returns'])} greedy episodes"
-        )
+    environment = Environment(
+        loader=PackageLoader("sdnn.cli", "."),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     report = outcome.learning_report
-    if report is not None and report.get("n_corrections"):
-        yield (
-            f"of {report['n_corrections']} corrections {report['share_changed']:.0%} changed the"
-            f" network, {report['share_rounded_away']:.0%} were rounded away and"
-            f" {report['share_out_of_range']:.0%} out of its range of values"
-        )
-        yield from _lines_of_rounding(report)
+    beyond: list[int] = []
+    within: list[int] = []
     if report is not None:
-        if left_out := report["left_out"]:
-            n_observed = len(report["share_of_range"])
-            yield (
-                f"{len(left_out)} of {n_observed} observations carry no information about the"
-                f" return: {_listed(left_out)}"
-            )
-        yield from _lines_of_ranges(report)
-    yield from _lines_of_scaling(run, outcome.scaling)
-    commands: list[tuple[object, ...]] = [("plot", run.folder), ("evaluate", run.folder)]
-    if outcome.has_pictures:
-        commands.append(("record", run.folder, "x.gif"))
-    yield "next: " + ", ".join(shlex.join(["sdnn", *map(str, words)]) for words in commands)
+        within = _where(report["share_of_range"], lambda share: 0.0 < share < 0.1)
+        beyond = _where(report["share_beyond_range"], lambda share: share > 0.1)
+    return environment.get_template("outcome.txt.jinja").render(
+        run=run,
+        outcome=outcome,
+        report=report,
+        within=within,
+        beyond=beyond,
+        warming_up=WARMING_UP,
+        resume=resume_command(run.folder, "--steps", "N"),
+        folder=str(run.folder),
+        quoted=shlex.quote(str(run.folder)),
+    )
+
+
+def _where(shares: Sequence[float | None], is_so: Callable[[float], bool]) -> list[int]:
+    return [i for i, share in enumerate(shares) if share is not None and is_so(share)]
 
 
 def json_text(values: Any) -> str:
