@@ -15,6 +15,7 @@
 #include "arrays.hpp"
 #include "bind_config.hpp"
 #include "bindings.hpp"
+#include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller.hpp"
 #include "sdnn/agents/controller_config.hpp"
@@ -71,7 +72,7 @@ bool has_other_threads() {
 /// The action of act without `explore`, after the warm-up. Other threads run meanwhile, and may
 /// read the same controller.
 std::span<const double> best_action(agents::Controller& controller,
-                                    std::span<const double> observation) {
+                                    std::span<const double> observation, agents::ActionMask mask) {
   const agents::Controller& read = controller;
   const auto variables = bindings::copied(observation);
   auto& workspace = bindings::workspace_of(read);
@@ -82,7 +83,23 @@ std::span<const double> best_action(agents::Controller& controller,
         read.read(variables, workspace);
       },
       read.agent());
-  return controller.best_of(workspace);  // which draws, and so needs the lock
+  return controller.best_of(workspace, mask);  // which draws, and so needs the lock
+}
+
+/// Which actions are allowed; None: all.
+using MaskArgument = std::optional<ArrayArgument<std::uint8_t>>;
+
+agents::ActionMask mask_of(const MaskArgument& mask) {
+  return mask ? bindings::flat(*mask) : agents::ActionMask();
+}
+/// That of one environment, where each has a row.
+agents::ActionMask mask_of(const MaskArgument& masks, const char* name, std::size_t environment) {
+  if (!masks) return {};
+  const auto rows = bindings::matrix(*masks, name);
+  const auto n = static_cast<std::size_t>(masks->shape(1));
+  core::require(environment < static_cast<std::size_t>(masks->shape(0)), name,
+                "a row for each environment", masks->shape(0));
+  return rows.subspan(n * environment, n);
 }
 
 /// Row i of an array with so many numbers in each. Throws std::invalid_argument if there is none.
@@ -99,7 +116,8 @@ std::span<const double> row(const ArrayArgument<double>& rows, const char* name,
 std::size_t learn_each(agents::Controller& controller, const ArrayArgument<double>& observations,
                        const ArrayArgument<double>& actions, const py::list& rewards,
                        const ArrayArgument<double>& next_observations, const py::list& terminated,
-                       const py::list& environments, const py::list& progress) {
+                       const py::list& environments, const py::list& progress,
+                       const MaskArgument& next_masks) {
   wait_for_readers_of(controller);
   const std::size_t n = controller.n_variables();
   std::size_t n_learned = 0;
@@ -115,7 +133,8 @@ std::size_t learn_each(agents::Controller& controller, const ArrayArgument<doubl
     try {
       controller.learn(row(observations, "observations", n, i),
                        row(actions, "actions", controller.n_dimensions(), i), reward,
-                       row(next_observations, "next_observations", n, i), ends, i);
+                       row(next_observations, "next_observations", n, i), ends, i,
+                       mask_of(next_masks, "next_masks", i));
     } catch (const std::logic_error&) {
       if (n_learned == 0) throw;
       break;
@@ -211,47 +230,49 @@ void bind_controller(py::module_& module) {
       .def(
           "act",
           [array_of](Controller& self, const ArrayArgument<double>& observation, bool explore,
-                     std::size_t environment) {
+                     std::size_t environment, const MaskArgument& mask) {
             const auto variables = bindings::flat(observation);
             const bool is_reader = !explore && has_other_threads() && !self.is_warming_up() &&
                                    environment < self.n_environments();
-            return array_of(is_reader ? best_action(self, variables)
-                                      : self.act(variables, explore, environment));
+            return array_of(is_reader ? best_action(self, variables, mask_of(mask))
+                                      : self.act(variables, explore, environment, mask_of(mask)));
           },
-          py::arg("observation"), py::arg("explore") = true, py::arg("environment") = 0)
+          py::arg("observation"), py::arg("explore") = true, py::arg("environment") = 0,
+          py::arg("mask") = py::none())
       .def(
           "learn",
           [](Controller& self, const ArrayArgument<double>& observation,
              const ArrayArgument<double>& action, double reward,
              const ArrayArgument<double>& next_observation, bool terminated,
-             std::size_t environment) {
+             std::size_t environment, const MaskArgument& next_mask) {
             wait_for_readers_of(self);
             self.learn(bindings::flat(observation), bindings::flat(action), reward,
-                       bindings::flat(next_observation), terminated, environment);
+                       bindings::flat(next_observation), terminated, environment,
+                       mask_of(next_mask));
           },
           py::arg("observation"), py::arg("action"), py::arg("reward"), py::arg("next_observation"),
-          py::arg("terminated"), py::arg("environment") = 0)
+          py::arg("terminated"), py::arg("environment") = 0, py::arg("next_mask") = py::none())
       .def(
           "act_each",
           [](Controller& self, const ArrayArgument<double>& observations,
-             const py::list& environments) {
+             const py::list& environments, const MaskArgument& masks) {
             py::array_t<double> actions(
                 {static_cast<std::size_t>(observations.shape(0)), self.n_dimensions()});
             std::ranges::fill_n(actions.mutable_data(), actions.size(), 0.0);
             for (const py::handle environment : environments) {
               const auto i = environment.cast<std::size_t>();
-              const auto action =
-                  self.act(row(observations, "observations", self.n_variables(), i), true, i);
+              const auto action = self.act(row(observations, "observations", self.n_variables(), i),
+                                           true, i, mask_of(masks, "masks", i));
               std::ranges::copy(action, actions.mutable_data(static_cast<py::ssize_t>(i)));
             }
             return actions;
           },
-          py::arg("observations"), py::arg("environments"),
+          py::arg("observations"), py::arg("environments"), py::arg("masks") = py::none(),
           "Exploring actions in some environments, in order; other rows are zeros")
       .def(
           "learn_each", &learn_each, py::arg("observations"), py::arg("actions"),
           py::arg("rewards"), py::arg("next_observations"), py::arg("terminated"),
-          py::arg("environments"), py::arg("progress"),
+          py::arg("environments"), py::arg("progress"), py::arg("next_masks") = py::none(),
           "Learns in some environments, in order; `progress` is set between two, if given. Returns "
           "how many were learned: all before the first that cannot be, whose error is raised where "
           "it comes first")

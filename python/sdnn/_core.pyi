@@ -2089,9 +2089,9 @@ class Controller:
         """
         New, or as it was when `state` was taken
         """
-    def act(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+    def act(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0, mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def act_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], environments: list) -> numpy.typing.NDArray[numpy.float64]:
+    def act_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], environments: list, masks: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
         Exploring actions in some environments, in order; other rows are zeros
         """
@@ -2099,9 +2099,9 @@ class Controller:
         ...
     def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
-    def learn(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def learn(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0, next_mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> None:
         ...
-    def learn_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], actions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rewards: list, next_observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: list, environments: list, progress: list) -> int:
+    def learn_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], actions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rewards: list, next_observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: list, environments: list, progress: list, next_masks: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> int:
         """
         Learns in some environments, in order; `progress` is set between two, if given. Returns how many were learned: all before the first that cannot be, whose error is raised where it comes first
         """

@@ -26,8 +26,7 @@ from agent_files import SMALL
 from checksums import BEFORE, with_checksum
 from made_records import make_record
 from mutated_files import Reader, with_other_bytes, with_other_contents, written
-from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, SDNNSarsa, Training
-from sdnn.agents.agent import load_agent
+from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, SDNNSarsa, Training, load_agent
 from sdnn.agents.files import read_statistics
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig
 from sdnn.runs import ResultStore, StoreError, TrialRows

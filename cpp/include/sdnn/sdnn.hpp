@@ -1,6 +1,7 @@
 /// Everything public at once.
 #pragma once
 
+#include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/actions.hpp"
 #include "sdnn/agents/agent.hpp"
 #include "sdnn/agents/any_agent.hpp"

@@ -35,8 +35,23 @@ class UnusableStepError(ValueError):
     """A step or reset of an environment cannot be used; the message names it and the reason."""
 
 
-def reset_env(env: Any, seed: Any, options: dict[str, Any] | None) -> Any:
-    """Reset an environment, or a vector; return what is observed first.
+def has_action_masks(env: Any) -> bool:
+    """Return whether an environment, or a vector, tells which actions are allowed."""
+    return bool((getattr(env, "metadata", None) or {}).get("action_masks"))
+
+
+def mask_in(info: Mapping[str, Any]) -> Any:
+    """Return the mask in an info; UnusableStepError if there is none."""
+    if "action_mask" not in info:
+        raise UnusableStepError(
+            "info must have 'action_mask', as metadata['action_masks'] of env is True,"
+            f" got {shown(sorted(map(str, info)))}"
+        )
+    return info["action_mask"]
+
+
+def reset_env(env: Any, seed: Any, options: dict[str, Any] | None) -> tuple[Any, Any]:
+    """Reset an environment, or a vector; return what is observed first, and the info.
 
     UnusableStepError if it returns something else than an observation and a dictionary.
     """
@@ -46,7 +61,7 @@ def reset_env(env: Any, seed: Any, options: dict[str, Any] | None) -> Any:
             f"env.reset must return (observation, info), info a dictionary, got {shown(made)}"
             f"{_OLD_API}"
         )
-    return made[0]
+    return made[0], made[1]
 
 
 def step_env(env: Any, action: Any) -> tuple[Any, Any, Any, Any, Any]:
@@ -98,10 +113,13 @@ class EnvironmentAdapter(abc.ABC):
     """The interface of all environments, single and vectorized.
 
     ``can_repeat`` is whether each environment can be reset at any time, with a seed of its own.
+    ``masks`` are those of the actions allowed after the last reset or step in each, None where it
+    has none; None altogether where `has_action_masks` is False.
     """
 
     n_environments: int
     can_repeat: bool
+    masks: list[Any] | None
 
     @abc.abstractmethod
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
@@ -123,14 +141,20 @@ class OneEnvironment(EnvironmentAdapter):
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         self._env = env
+        self.masks = [None] if has_action_masks(env) else None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
         """Begin its episode."""
-        return {i: reset_env(self._env, seed, options) for i, seed in seeds.items()}
+        first, info = reset_env(self._env, seeds[0], options)
+        if self.masks is not None:
+            self.masks = [mask_in(info)]
+        return {0: first}
 
     def step(self, actions: Sequence[Any]) -> StepResults:
         """Take the only action."""
-        seen, reward, terminated, truncated, _ = step_env(self._env, own_copy(actions[0]))
+        seen, reward, terminated, truncated, info = step_env(self._env, own_copy(actions[0]))
         reward, terminated, truncated = checked(reward, terminated, truncated)
+        if self.masks is not None:
+            self.masks = [None if terminated else mask_in(info)]
         listed = seen[np.newaxis] if type(seen) is np.ndarray else [seen]
         return StepResults(listed, [reward], [terminated], [truncated])

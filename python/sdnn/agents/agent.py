@@ -4,31 +4,25 @@ from __future__ import annotations
 
 import abc
 import secrets
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import gymnasium as gym
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents.episode import Transition
-from sdnn.agents.files import Statistics, read_agent, read_statistics, register
+from sdnn.agents.files import SavedAgent
 from sdnn.agents.model import Model
-from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import (
     Actions,
     AnglePairs,
     Inputs,
     Observations,
     Ranges,
-    action_space_of,
-    observation_space_of,
     require_unbatched,
     space_data,
-    space_of,
     space_of_error,
 )
 from sdnn.agents.training import Training, TrainingResult
@@ -37,19 +31,15 @@ from sdnn.arguments import (
     blamed,
     flag,
     is_of_class,
-    path_of,
     real,
     reward_of,
     seed_of,
     shown,
     whole,
 )
-from sdnn.config import WARM_UP, values_of
-from sdnn.files import Arrays, Description, write_file
+from sdnn.config import WARM_UP
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
-
     from sdnn.agents.callbacks import Callback
 
 _MOST_ENVIRONMENTS = 2**14
@@ -58,7 +48,7 @@ Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
 
 
-class Agent(Model, abc.ABC, Generic[Approximator, Learning]):
+class Agent(SavedAgent, Model, abc.ABC, Generic[Approximator, Learning]):
     """An agent in a Gymnasium environment that learns one transition at a time.
 
     ``train`` is a loop over environments; a robot that brings its own loop calls `begin_episode`,
@@ -98,18 +88,9 @@ class Agent(Model, abc.ABC, Generic[Approximator, Learning]):
         For spaces of another kind; for spaces, ranges or settings that are impossible.
     """
 
-    kind: ClassVar[str]
-    """The word for this approximator and learning rule in files."""
-    approximator_type: ClassVar[type[Any]]
-    learning_type: ClassVar[type[Any]]
-
     learning: Learning
     _approximator: Approximator
     _controller: _core.Controller
-    _scaling: Scaling | None = None
-    wrappers: Sequence[Statistics] = ()
-    """Statistics of the wrappers of its training's environment; kept in files."""
-    _next_episode: int = 0  # of `train` without a seed
     _tables: Sequence[NDArray[np.int8]] = ()
 
     def __init__(
@@ -210,21 +191,6 @@ class Agent(Model, abc.ABC, Generic[Approximator, Learning]):
         return self._controller.inputs
 
     @property
-    def scaling(self) -> Scaling | None:
-        """Scaling of the run's observations, with ``--noise`` or ``--redundant``; None without.
-
-        May be set, and is kept in files. `train` and `evaluate` refuse environments that do not
-        scale their observations then.
-        """
-        return self._scaling
-
-    @scaling.setter
-    def scaling(self, scaling: Scaling | None) -> None:
-        if not isinstance(scaling, Scaling | None):
-            raise TypeError(f"scaling must be a Scaling or None, got {shown(scaling)}")
-        self._scaling = scaling
-
-    @property
     def progress(self) -> float:
         """The part of the learning that is done, in [0, 1]; ``train`` sets it.
 
@@ -261,7 +227,9 @@ class Agent(Model, abc.ABC, Generic[Approximator, Learning]):
         self._check_environment(environment)
         self._controller.begin_episode(environment)
 
-    def act(self, observation: Any, explore: bool = True, environment: int = 0) -> Any:
+    def act(
+        self, observation: Any, explore: bool = True, environment: int = 0, mask: Any = None
+    ) -> Any:
         """Return the action to take, an element of the action space.
 
         Parameters
@@ -272,6 +240,9 @@ class Agent(Model, abc.ABC, Generic[Approximator, Learning]):
             threads may call it so at once; `learn` waits for them.
         environment : int
             In which environment, below `n_environments`.
+        mask : array_like, optional
+            1 for the discrete actions that are allowed, 0 for others: of a Discrete space shape
+            (n,), of others a tuple with the mask of each dimension.
 
         Raises
         ------
@@ -281,7 +252,9 @@ class Agent(Model, abc.ABC, Generic[Approximator, Learning]):
         explore = flag("explore", explore)
         self._check_environment(environment)
         variables = self._observations.vector("observation", observation)
-        return self._actions.elements(self._controller.act(variables, explore, environment))[0]
+        allowed = self._actions.mask("mask", mask)
+        taken = self._controller.act(variables, explore, environment, allowed)
+        return self._actions.elements(taken)[0]
 
     def flat_observation(self, observation: Any) -> NDArray[np.float64]:
         """Return the observed variables as a vector, shape (n_variables,), in their own units.
@@ -325,7 +298,7 @@ class Agent(Model, abc.ABC, Generic[Approximator, Learning]):
             )
         if not isinstance(transition, Transition):
             raise TypeError(f"transition must be a Transition, got {shown(transition)}")
-        observation, action, reward, next_observation, terminated = transition
+        observation, action, reward, next_observation, terminated, next_mask = transition
         self._controller.learn(
             self._observations.vector("observation", observation),
             self._actions.numbers(action),
@@ -333,12 +306,14 @@ class Agent(Model, abc.ABC, Generic[Approximator, Learning]):
             self._observations.vector("next_observation", next_observation),
             flag("terminated", terminated),
             environment,
+            self._actions.mask("next_mask", next_mask),
         )
 
     def core_parts(self) -> tuple[Any, ...] | None:
         """Return the core and functions around it, unless `act` or `learn` has been replaced."""
         own = [getattr(method, "__func__", None) for method in (self.act, self.learn)]
-        parts = self._controller, self._observations.rows, self._actions.elements
+        actions = self._actions
+        parts = self._controller, self._observations.rows, actions.elements, actions.mask
         return parts if own == [Agent.act, Agent.learn] else None
 
     @property
@@ -411,90 +386,3 @@ class Agent(Model, abc.ABC, Generic[Approximator, Learning]):
         finally:
             if seed is None:
                 self._next_episode = training.next_episode
-
-    def save(self, path: str | Path) -> None:
-        """Write the whole state as one safetensors file; OSError if it cannot be written."""
-        write_file(path_of("path", path), "agent", self.state(), self.description())
-
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read an agent that `save` wrote.
-
-        OSError if the file cannot be read; ValueError if it is damaged, of another format, or holds
-        another kind of agent.
-        """
-        agent: Any = load_agent(path)
-        if not is_of_class(agent, cls):
-            raise ValueError(f"{path} holds a {type(agent).__name__}, not a {cls.__name__}")
-        return agent  # type: ignore[no-any-return]
-
-    def description(self) -> Description:
-        """Return the settings, from which `rebuild` makes an agent like this one."""
-        more: Description = {} if self.scaling is None else {"scaling": self.scaling.values()}
-        if self.wrappers:
-            more["wrappers"] = msgspec.to_builtins(self.wrappers)
-        if self._next_episode:
-            more["next_episode"] = self._next_episode
-        return {
-            "class": type(self).__name__,
-            "kind": self.kind,
-            "seed": self.seed,
-            "approximator": values_of(self._approximator),
-            "learning": values_of(self.learning),
-            "observation": values_of(self._observation),
-            "action": values_of(self._action),
-            "warm_up_steps": self._warm_up_steps,
-            "observation_space": space_data(self.observation_space),
-            "action_space": space_data(self.action_space),
-            **more,
-        }
-
-    def state(self) -> Arrays:
-        """Return all that the agent remembers, as arrays by name."""
-        return self._controller.state()
-
-    @classmethod
-    def rebuild(cls, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Self:
-        """Make an agent from its `description` and `state`; ValueError if they do not fit."""
-        agent = cls.__new__(cls)
-        agent._observation = _core.ObservationConfig(**description["observation"])
-        agent._action = _core.ActionConfig(**description["action"])
-        if "observation_space" in description:
-            observations = space_of(description["observation_space"])
-            actions = space_of(description["action_space"])
-        else:  # it was made in C++
-            observations = observation_space_of(agent._observation)
-            actions = action_space_of(agent._action)
-        agent._take_spaces(observations, actions)
-        agent._take_settings(
-            cls.approximator_type(**description["approximator"]),
-            cls.learning_type(**description["learning"]),
-            description["seed"],
-            description["warm_up_steps"],
-        )
-        agent._make(state=dict(arrays))
-        n_variables = agent._observations.n_variables
-        if agent._controller.n_variables != n_variables:
-            raise ValueError(f"observation must be of {n_variables} variables")
-        if "action_space" in description and agent._action != agent._actions.config:
-            raise ValueError(f"action must be of {agent.action_space}, got {agent._action}")
-        if "wrappers" in description:
-            agent.wrappers = read_statistics(description["wrappers"])
-        if "scaling" in description:
-            agent.scaling = Scaling.of_values(description["scaling"], n_variables)
-        agent._next_episode = whole("next_episode", description.get("next_episode", 0), 0, 2**53)
-        return agent
-
-    def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Make the class known to files, by its name."""
-        super().__init_subclass__(**kwargs)
-        register(cls)
-
-    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        return type(self).rebuild, (self.description(), self.state())
-
-
-def load_agent(path: str | Path) -> Agent[Any, Any]:
-    """Read an agent of any kind that `Agent.save` wrote; see `Agent.load`."""
-    agent: Agent[Any, Any] = read_agent(path_of("path", path), "agent", "training")[0]
-    return agent

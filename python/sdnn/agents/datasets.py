@@ -19,7 +19,7 @@ _MOST_BYTES = 2**20
 """Of a line of a file: so much memory is used, whatever the file."""
 
 _ARRAYS = ("observations", "actions", "rewards", "next_observations", "terminations")
-_KEYS = Transition._fields
+_KEYS = Transition._fields[:-1]  # the last one is optional
 
 
 class MinariDataset(Protocol):
@@ -126,15 +126,16 @@ def _lines(path: Path) -> Iterator[_Logged]:
             except (ValueError, RecursionError) as error:
                 problem = f"must be a JSON object, got {shown(line[:40])}"
                 raise ValueError(f"dataset, line {number}: {problem}") from error
-            if not isinstance(values, dict) or not _has(values, _KEYS, "truncated"):
-                problem = f"must have {', '.join(_KEYS)}, perhaps truncated, got {shown(values)}"
+            if not isinstance(values, dict) or not _has(values, _KEYS, "truncated", "next_mask"):
+                perhaps = "perhaps truncated and next_mask"
+                problem = f"must have {', '.join(_KEYS)}, {perhaps}, got {shown(values)}"
                 raise ValueError(f"dataset, line {number}: {problem}")
             truncated = values.pop("truncated", False)
             yield f"line {number}", Transition(**values), truncated
 
 
-def _has(values: Mapping[str, Any], names: tuple[str, ...], more: str) -> bool:
-    return all(name in values for name in names) and len(values) - (more in values) == len(names)
+def _has(values: Mapping[str, Any], names: tuple[str, ...], *more: str) -> bool:
+    return set(names) <= set(values) <= {*names, *more}
 
 
 def _arrays_of(values: Mapping[str, Any]) -> dict[str, NDArray[Any]]:

@@ -39,6 +39,7 @@ class Transition(NamedTuple):
 
     ``terminated`` is Gymnasium's: the episode ended in a terminal state. An episode cut off by a
     time limit (``truncated``) is not terminated; its last transition is learned like any other.
+    ``next_mask`` has 1 for the actions that are allowed in a next state, as `Agent.act` has it.
     """
 
     observation: ArrayLike
@@ -46,13 +47,15 @@ class Transition(NamedTuple):
     reward: float
     next_observation: ArrayLike
     terminated: bool
+    next_mask: Any = None
 
 
 class Learner(Protocol):
     """The interface of what is trained: every `sdnn.agents.Agent` has it.
 
     An agent that learns in one environment and is not saved needs only these methods, without the
-    argument ``environment``. Where it has an attribute ``progress``, that is kept up to date.
+    arguments ``environment`` and ``mask``. Where it has an attribute ``progress``, that is kept up
+    to date.
     """
 
     def begin_episode(self) -> None:
@@ -95,11 +98,18 @@ class Rounds:
         """Return the numbers of an observation that was read, for a file."""
         return np.asarray(self._learner.flat_observation(observation))
 
-    def act(self, observations: Any, actions: Sequence[Any], environments: list[int]) -> Any:
+    def masks(self, found: list[Any]) -> Any:
+        """Return masks of all environments as `act` and `learn` take them; ValueError names one."""
+        return found
+
+    def act(
+        self, observations: Any, actions: Sequence[Any], environments: list[int], masks: Any = None
+    ) -> Any:
         """Return actions in all environments: new ones in these, the others as they were."""
         taken = list(actions)
         for i in environments:
-            taken[i] = self._learner.act(observations[i], **self.places[i])
+            mask = {} if masks is None else {"mask": masks[i]}
+            taken[i] = self._learner.act(observations[i], **self.places[i], **mask)
         return taken
 
     def learn(
@@ -111,6 +121,7 @@ class Rounds:
         terminated: list[bool],
         environments: list[int],
         progress: list[float],
+        next_masks: Any = None,
     ) -> int:
         """Learn steps in the first of these environments or more; return in how many.
 
@@ -118,7 +129,8 @@ class Rounds:
         """
         i = environments[0]
         reward, ends, _ = checked(rewards[i], terminated[i], False)
-        step = Transition(observations[i], actions[i], reward, next_observations[i], ends)
+        mask = None if next_masks is None else next_masks[i]
+        step = Transition(observations[i], actions[i], reward, next_observations[i], ends, mask)
         self._learner.learn(step, **self.places[i])
         return 1
 
@@ -133,17 +145,32 @@ class _CoreRounds(Rounds):
         core: Controller,
         read: Callable[[str, Any], NDArray[np.float64]],
         elements: Callable[[NDArray[np.float64]], NDArray[Any]],
+        mask: Callable[[str, Any], NDArray[np.uint8] | None],
     ) -> None:
         super().__init__(learner, n_environments)
         self.progressing, self._act, self._elements = core, core.act_each, elements
+        self._mask, self._n_actions = mask, sum(core.n_actions)
         self.read = read  # type: ignore[assignment, method-assign]
         self.learn = core.learn_each  # type: ignore[method-assign]
 
     def flat(self, observation: Any) -> NDArray[np.float64]:
         return np.array(observation)
 
-    def act(self, observations: Any, actions: Sequence[Any], environments: list[int]) -> Any:
-        taken = self._elements(self._act(observations, environments))
+    def masks(self, found: list[Any]) -> Any:
+        rows = np.ones((len(found), self._n_actions), np.uint8)
+        for i, one in enumerate(found):
+            mask = self._mask("action_mask", one)
+            if mask is not None:
+                if mask.size != self._n_actions:
+                    expected = f"{self._n_actions} numbers, one per action"
+                    raise ValueError(f"action_mask must have {expected}, got {mask.size}")
+                rows[i] = mask
+        return rows
+
+    def act(
+        self, observations: Any, actions: Sequence[Any], environments: list[int], masks: Any = None
+    ) -> Any:
+        taken = self._elements(self._act(observations, environments, masks))
         if len(environments) < len(taken):
             for i in set(range(len(taken))).difference(environments):
                 taken[i] = actions[i]
@@ -212,6 +239,7 @@ class Episodes:
     results: StepResults
     _before: Any  # observations before the last step, and the latest ones
     _latest: Any
+    _masks: Any = None  # of the latest observations, where environments have them
 
     def __init__(
         self,
@@ -253,7 +281,7 @@ class Episodes:
         before = self._before = self._latest
         waiting = self.waiting = [i for i, episode in enumerate(present) if episode is not None]
         try:
-            actions = self._actions = self.rounds.act(before, self._actions, waiting)
+            actions = self._actions = self.rounds.act(before, self._actions, waiting, self._masks)
         except ValueError as error:
             raise self._unusable(error, None) from error
         for i in waiting:
@@ -266,6 +294,7 @@ class Episodes:
         except UnusableStepError as error:
             raise self._unusable(error, None) from error
         self._latest = self._read("next_observation", results.observations)
+        self._read_masks()
         for i, number in numbers.items():
             if self.present[i] is None:
                 self.present[i] = Episode(number)
@@ -283,8 +312,9 @@ class Episodes:
         before, after = self._before, self._latest
         try:
             n = self.rounds.learn(
-                before, self._actions, results.rewards, after, ends, environments, progress
-            )
+                before, self._actions, results.rewards, after, ends, environments, progress,
+                self._masks,
+            )  # fmt: skip
         except (ValueError, OverflowError) as error:
             raise self._unusable(error, environments[0]) from error
         del self.waiting[:n]
@@ -321,6 +351,14 @@ class Episodes:
         else:
             for i, first in seen.items():
                 self._latest[i] = self._read("observation", [first])[0]
+        self._read_masks()
+
+    def _read_masks(self) -> None:
+        if self._adapter.masks is not None:
+            try:
+                self._masks = self.rounds.masks(self._adapter.masks)
+            except ValueError as error:
+                raise self._unusable(error, None) from error
 
     def _read(self, name: str, seen: Any) -> Any:
         try:
@@ -420,6 +458,7 @@ class Episodes:
             self.results = self._adapter.step(self._actions)
             self._before = self._latest
             self._latest = self._read("observation", self.results.observations)
+            self._read_masks()
             ends = zip(self.results.terminated, self.results.truncated, strict=True)
             ended = {i for i, (terminated, truncated) in enumerate(ends) if terminated or truncated}
 

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from sdnn.agents.adapters import (
     UnusableStepError,
     checked,
+    has_action_masks,
+    mask_in,
     require_single,
     reset_env,
     step_env,
@@ -168,7 +170,8 @@ def greedy_episode(
     """
     own = None if seed is None else episode_seed(seed, EVALUATION, number)
     with fixed(env, getattr(agent, "wrappers", ())):
-        observation = reset_env(env, own, options)
+        observation, info = reset_env(env, own, options)
+        has_masks = has_action_masks(env)
         n_steps, total, terminated, truncated = 0, 0.0, False, False
 
         def unusable(problem: object) -> UnusableStepError:
@@ -181,10 +184,11 @@ def greedy_episode(
         yield GreedyEpisode(0, 0.0, False)
         while not (terminated or truncated):
             try:
-                action = agent.act(observation, explore=False)
+                mask = {"mask": mask_in(info)} if has_masks else {}
+                action = agent.act(observation, explore=False, **mask)
             except ValueError as error:
                 raise unusable(error) from error
-            observation, *values, _ = step_env(env, action)
+            observation, *values, info = step_env(env, action)
             n_steps += 1
             try:
                 reward, terminated, truncated = checked(*values)

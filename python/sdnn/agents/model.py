@@ -31,7 +31,9 @@ class Model(Displayed, abc.ABC):
         """Inputs of the network in order, with the observed variables that they are made of."""
 
     @abc.abstractmethod
-    def act(self, observation: Any, explore: bool = True, environment: int = 0) -> Any:
+    def act(
+        self, observation: Any, explore: bool = True, environment: int = 0, mask: Any = None
+    ) -> Any:
         """Return the action to take."""
 
     def predict(

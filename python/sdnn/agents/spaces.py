@@ -226,6 +226,20 @@ class Actions:
         """Make the elements of the space that have these numbers, one of each row."""
         return numbers.astype(self._dtype).reshape(self._rows)
 
+    def mask(self, name: str, mask: Any) -> NDArray[np.uint8] | None:
+        """Return which actions are allowed, 1 or 0 for each; ValueError if it is no mask.
+
+        One array for a Discrete space, a tuple of them for others; None: all are.
+        """
+        if mask is None:
+            return None
+        parts = [array_of(name, one, "biu") for one in (mask if type(mask) is tuple else (mask,))]
+        allowed = np.concatenate([np.ravel(part) for part in (*parts, ())])
+        is_whole = len(parts) in (1, len(self.config.low)) and allowed.size > 0
+        if not (is_whole and np.isin(allowed, (0, 1)).all()):
+            raise argument_error(name, f"must be None, or 0 or 1 per action, got {shown(mask)}")
+        return allowed.astype(np.uint8)
+
     def numbers(self, action: Any) -> NDArray[Any]:
         """Return the numbers of an element, in any shape; ValueError if they are none."""
         if type(action) is np.ndarray and action.dtype is self._dtype:

@@ -16,6 +16,8 @@ from sdnn.agents.adapters import (
     Seeds,
     StepResults,
     UnusableStepError,
+    has_action_masks,
+    mask_in,
     reset_env,
     step_env,
 )
@@ -34,6 +36,8 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         self._env = env
         self._mode = _autoreset_mode(env)
         self.n_environments = env.num_envs
+        self.masks = [None] * env.num_envs if has_action_masks(env) else None
+        self._begun: list[Any] = []  # masks after resets in the same step
 
     def _step(self, actions: Any) -> tuple[StepResults, Any]:
         """Return the results, and what is observed after resets in the same step."""
@@ -48,6 +52,7 @@ class _Vector(EnvironmentAdapter, abc.ABC):
             self._column("truncated", truncated, "b", "bools"),
         )
         ended = [a or b for a, b in zip(results.terminated, results.truncated, strict=True)]
+        self._take_masks(infos, results.terminated, ended)
         if self._mode == "SAME_STEP" and any(ended):
             if "final_obs" not in infos:
                 raise ValueError(
@@ -57,6 +62,24 @@ class _Vector(EnvironmentAdapter, abc.ABC):
             last = [infos["final_obs"][i] if ended[i] else one for i, one in enumerate(seen)]
             results = results._replace(observations=last)
         return results, seen
+
+    def _take_masks(self, infos: Any, terminated: Sequence[bool], ended: Sequence[bool]) -> None:
+        """Take the masks of what is observed: of episodes that ended, those of their ends."""
+        if self.masks is None:
+            return
+        self._note_masks(infos)
+        if self._mode == "SAME_STEP" and any(ended):
+            self._begun = list(self.masks)
+            self._note_masks(infos.get("final_info", {}))
+        self.masks = [None if t else one for t, one in zip(terminated, self.masks, strict=True)]
+
+    def _note_masks(self, infos: Any) -> None:
+        """Note the masks of the environments that have one in infos."""
+        if self.masks is not None and infos:
+            found = mask_in(infos)
+            for i in np.flatnonzero(infos.get("_action_mask", np.ones(self.n_environments))):
+                row = tuple(part[i] for part in found) if isinstance(found, tuple) else found[i]
+                self.masks[i] = row
 
     def _batch(self, actions: Any) -> Any:
         """Return a copy of the actions as the environment takes them."""
@@ -99,7 +122,8 @@ class _SeparateResets(_Vector):
         # Without the option where it is not needed: some wrappers have complete resets only.
         options = None if mask.all() else {"reset_mask": mask}
         listed: Any = [seeds.get(i) for i in range(self.n_environments)]
-        observations = reset_env(self._env, listed, options)
+        observations, infos = reset_env(self._env, listed, options)
+        self._note_masks(infos)
         seen = self._listed(observations)
         return {i: seen[i] for i in seeds}
 
@@ -118,10 +142,13 @@ class _OwnResets(_Vector):
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
         if self._seen is None:
-            observations = reset_env(self._env, seeds[0], None)
+            observations, infos = reset_env(self._env, seeds[0], None)
+            self._note_masks(infos)
             self._seen = self._listed(observations)
         elif self._mode != "SAME_STEP":
             return {}
+        elif self.masks is not None:
+            self.masks = [self._begun[i] if i in seeds else m for i, m in enumerate(self.masks)]
         return {i: self._seen[i] for i in seeds}
 
     def step(self, actions: Sequence[Any]) -> StepResults:

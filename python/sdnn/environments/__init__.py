@@ -14,6 +14,7 @@ import gymnasium as gym
 from sdnn.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.goal import GoalSchedule, TighteningGoal
+from sdnn.environments.masks import ActionMasks
 from sdnn.environments.sensors import AcrobotSensors, NoisySensors, RedundantSensors, UnitSensors
 from sdnn.environments.vector_env import AcrobotSwingUpVectorEnv
 
@@ -22,6 +23,7 @@ __all__ = [
     "AcrobotSensors",
     "AcrobotSwingUpEnv",
     "AcrobotSwingUpVectorEnv",
+    "ActionMasks",
     "GoalSchedule",
     "GoalScheduleConfig",
     "NoisySensors",

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sdnn.agents.scaling import Scaling, neighbours
 from sdnn.arguments import shown
 from sdnn.bounds import flat_bounds
-from sdnn.environments import NoisySensors, RedundantSensors, UnitSensors
+from sdnn.environments import ActionMasks, NoisySensors, RedundantSensors, UnitSensors
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.settings import Settings
 
@@ -59,6 +59,8 @@ class EnvironmentSpec(Settings, frozen=True):
     """Means of neighbouring variables to append to the observation, before the noise: of 0 and 1,
     of 1 and 2, ..., of the last and 0, and so on in a circle.
     """
+    action_masks: bool = False
+    """Whether agents take only the actions that `info["action_mask"]` allows, as Taxi's does."""
     own_units: bool = False
     """Whether noisy and redundant variables are given in the variables' own units, not scaled to
     [0, 1]; a redundant one is the mean of two in [-1, 1].
@@ -117,6 +119,8 @@ class EnvironmentSpec(Settings, frozen=True):
         try:
             if render_mode is not None and env.render_mode != render_mode:
                 raise RunError(_no_pictures(self.id, render_mode))
+            if self.action_masks:
+                env = self._masked(env)
             low, high = self.ends(env)
             if not self.has_other_sensors:
                 return env
@@ -149,6 +153,12 @@ class EnvironmentSpec(Settings, frozen=True):
         except BaseException:
             env.close()
             raise
+
+    def _masked(self, env: gym.Env[Any, Any]) -> gym.Env[Any, Any]:
+        try:
+            return ActionMasks(env)
+        except ValueError as error:
+            raise ConfigError("environment.action_masks", f"{self.id}: {error}") from error
 
     def imported(self) -> bool:
         """Import the module that ``id`` names; False if there is none, or it was imported before.

@@ -278,6 +278,35 @@ TEST(Controller, AFuzzyOneLearnsItsLastActionOnly) {
   EXPECT_NE(core::state_of(controller), before);
 }
 
+TEST(Controller, TakesAllowedActionsOnly) {
+  ControllerConfig config = with(LinearSDNNConfig{}, SarsaConfig{});
+  config.action = {.low = {-1.0, 0.0}, .high = {1.0, 3.0}, .discrete = true};
+  for (const auto& made : {config, with_warm_up(config)}) {
+    Controller controller(made);
+    core::Random random(1, core::Stream::exploration);
+    std::vector<std::uint8_t> mask(7, 1);
+    Numbers here(4, 0.5);
+    for (int t = 0; t < 100; ++t) {
+      const auto taken = controller.act(here, t % 5 != 0, 0, mask);
+      const Numbers action(taken.begin(), taken.end());
+      EXPECT_EQ(mask[static_cast<std::size_t>(action[0] + 1.0)], 1);
+      EXPECT_EQ(mask[static_cast<std::size_t>(action[1] + 3.0)], 1);
+      for (auto& one : mask) one = random.uniform() < 0.5 ? 1 : 0;
+      mask[random.below(3)] = mask[3 + random.below(4)] = 1;
+      for (double& x : here) x = random.uniform();
+      controller.learn(here, action, 1.0, here, t % 9 == 8, 0, mask);
+    }
+  }
+  Controller controller(config);
+  const Numbers here(4, 0.5);
+  for (const std::vector<std::uint8_t>& bad :
+       {std::vector<std::uint8_t>(6, 1), {0, 0, 0, 1, 1, 1, 1}, {1, 1, 2, 1, 1, 1, 1}}) {
+    EXPECT_THROW((void)controller.act(here, true, 0, bad), std::invalid_argument);
+  }
+  EXPECT_THROW((void)Controller(sdnn()).act(here, true, 0, std::vector<std::uint8_t>(5, 1)),
+               std::invalid_argument);
+}
+
 TEST(Controller, TakesRatesOverFromItsWarmUp) {
   Controller controller(with_warm_up(rbf_config()));
   controller.set_epsilon(0.75);

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <set>
 #include <stdexcept>
 #include <vector>
@@ -19,13 +21,15 @@ void draw(core::Pcg64& random, Numbers& action) {
   for (double& x : action) x = random.below(5);
 }
 
+bool always(const Numbers&) { return true; }
+
 void learn(WarmUp& warm_up, std::size_t environment, const Numbers& action) {
   const Numbers observation{0.5, 1.5}, next{1.5, 2.5};
   warm_up.learn({false, environment, observation, action, 1.0, next, false});
 }
 
 void step(WarmUp& warm_up, std::size_t environment = 0) {
-  learn(warm_up, environment, warm_up.act(draw, true, environment));
+  learn(warm_up, environment, warm_up.act(draw, always, true, environment));
 }
 
 TEST(WarmUp, KeepsActionsForSomeStepsAndReachesAll) {
@@ -34,7 +38,7 @@ TEST(WarmUp, KeepsActionsForSomeStepsAndReachesAll) {
   int n_changes = 0;
   double last = -1.0;
   for (int t = 0; t < 400; ++t) {
-    const double action = warm_up.act(draw, true, 0)[0];
+    const double action = warm_up.act(draw, always, true, 0)[0];
     taken.insert(action);
     n_changes += action != last ? 1 : 0;
     last = action;
@@ -44,11 +48,40 @@ TEST(WarmUp, KeepsActionsForSomeStepsAndReachesAll) {
   EXPECT_GT(n_changes, 20);
 }
 
+TEST(WarmUp, KeepsNoActionThatIsNotAllowed) {
+  WarmUp warm_up(2, 1, 1000, 3, true);
+  double forbidden = -1.0;
+  const auto draw_other = [&](core::Pcg64& random, Numbers& action) {
+    do draw(random, action);
+    while (action[0] == forbidden);
+  };
+  const auto is_allowed = [&](const Numbers& action) { return action[0] != forbidden; };
+  for (int t = 0; t < 400; ++t) {
+    const double action = warm_up.act(draw_other, is_allowed, true, 0)[0];
+    EXPECT_NE(action, forbidden);
+    if (t % 3 == 0) forbidden = action;
+  }
+}
+
+TEST(WarmUp, RemembersMasksWhereThereAreSome) {
+  WarmUp warm_up(1, 1, 1000, 3, true);
+  const Numbers here{0.5}, action{1.0};
+  const std::vector<std::uint8_t> mask{0, 1, 1};
+  warm_up.learn({false, 0, here, action, 1.0, here, false});
+  EXPECT_TRUE(warm_up.step(0).next_mask.empty());
+  warm_up.learn({false, 0, here, action, 1.0, here, false, mask});
+  warm_up.learn({false, 0, here, action, 1.0, here, false});
+  const std::vector<std::vector<std::uint8_t>> expected{{1, 1, 1}, mask, {1, 1, 1}};
+  for (std::size_t t = 0; t < 3; ++t) {
+    EXPECT_TRUE(std::ranges::equal(warm_up.step(t).next_mask, expected[t])) << t;
+  }
+}
+
 TEST(WarmUp, EvaluationChangesNothing) {
   WarmUp one(2, 1, 100, 3, true), other = one;
   for (int t = 0; t < 50; ++t) {
-    (void)one.act(draw, false, 0);
-    EXPECT_EQ(one.act(draw, true, 0), other.act(draw, true, 0));
+    (void)one.act(draw, always, false, 0);
+    EXPECT_EQ(one.act(draw, always, true, 0), other.act(draw, always, true, 0));
   }
 }
 
@@ -69,14 +102,14 @@ TEST(WarmUp, RemembersTransitionsInTheirOrder) {
   EXPECT_EQ(warm_up.seen().size(), 12U);
   warm_up.set_n_environments(1);
   EXPECT_EQ(warm_up.n_in_all(), 2U);
-  EXPECT_THROW((void)warm_up.act(draw, true, 1), std::invalid_argument);
+  EXPECT_THROW((void)warm_up.act(draw, always, true, 1), std::invalid_argument);
 }
 
 TEST(WarmUp, WaitsForWhatWasActedWhereOnlyOwnActionsAreLearned) {
   WarmUp warm_up(2, 1, 2, 3, false);
   warm_up.set_n_environments(2);
   step(warm_up, 0);
-  const Numbers waits = warm_up.act(draw, true, 1);
+  const Numbers waits = warm_up.act(draw, always, true, 1);
   step(warm_up, 0);
   EXPECT_FALSE(warm_up.is_over());
   learn(warm_up, 1, waits);

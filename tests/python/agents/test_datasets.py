@@ -48,7 +48,7 @@ def transitions():
 
 
 def arrays():
-    columns = zip(*(one for one, _ in transitions()), strict=True)
+    columns = zip(*(one[:5] for one, _ in transitions()), strict=True)
     names = ("observations", "actions", "rewards", "next_observations", "terminations")
     found = {name: np.array(column) for name, column in zip(names, columns, strict=True)}
     return found | {"truncations": np.array([cut for _, cut in transitions()])}

@@ -351,7 +351,7 @@ class Recorder:
         return self.plans[environment].uniform(-1, 1, 1).astype(np.float32)
 
     def learn(self, transition, environment=0):
-        observation, action, reward, next_observation, terminated = transition
+        observation, action, reward, next_observation, terminated = transition[:5]
         told = (*observation, *action, reward, *next_observation, terminated)
         self.learned[environment].append(tuple(float(x) for x in told))
 

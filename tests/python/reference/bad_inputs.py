@@ -479,6 +479,7 @@ def arguments(agent, parameters):
         "observation": HERE,
         "explore": False,
         "environment": 0,
+        "mask": None,
         "n_environments": 1,
         "learning_rate": None,
         "scaling": None,

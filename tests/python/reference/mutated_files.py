@@ -15,7 +15,7 @@ from safetensors.numpy import load, save
 from checksums import with_checksum
 from made_records import make_record
 from sdnn import SDNNClassifier, SDNNRegressor
-from sdnn.agents.agent import load_agent
+from sdnn.agents import load_agent
 from sdnn.coding import Symbolic, WithMissing
 from sdnn.estimators import libsdnn
 from sdnn.reproduction.report import read_study

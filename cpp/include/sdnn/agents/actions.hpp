@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <span>
 #include <string>
 #include <string_view>
@@ -14,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/agents/action_mask.hpp"
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
@@ -120,13 +122,24 @@ class Actions {
     }
   }
 
-  /// Draws a random action of each dimension: an index, or a number in [-1, 1].
-  void draw(core::Pcg64& random, std::vector<double>& action) const {
+  /// Draws a random action of each dimension: the index of an allowed one, or a number in [-1, 1].
+  void draw(core::Pcg64& random, std::vector<double>& action, ActionMask mask = {}) const {
+    const auto below = [&random](std::size_t n) {
+      return static_cast<std::size_t>(random.below(static_cast<std::uint32_t>(n)));
+    };
     for (std::size_t d = 0; d < action.size(); ++d) {
       const std::size_t n = n_actions_[d];
       action[d] = n == 0 ? -1.0 + 2.0 * random.uniform()
-                         : static_cast<double>(random.below(static_cast<std::uint32_t>(n)));
+                         : static_cast<double>(draw_allowed(take_part(mask, n), n, below));
     }
+  }
+  /// Whether what was drawn is allowed.
+  bool allows_drawn(std::span<const double> action, ActionMask mask) const noexcept {
+    for (std::size_t d = 0; d < action.size() && !mask.empty(); ++d) {
+      const ActionMask part = take_part(mask, n_actions_[d]);
+      if (!allows(part, static_cast<std::size_t>(action[d]))) return false;
+    }
+    return true;
   }
   /// Whether `draw` may give these numbers.
   bool can_be_drawn(std::span<const double> action) const noexcept {
@@ -137,6 +150,21 @@ class Actions {
       if (!fits) return false;
     }
     return true;
+  }
+
+  /// Throws std::invalid_argument unless a mask is empty, or has zeros and ones for all actions, in
+  /// each dimension a one.
+  void require_mask(std::string_view name, ActionMask mask) const {
+    if (mask.empty()) return;
+    core::require(config_.discrete, name, "None where actions are a box", mask.size());
+    const std::size_t n = std::accumulate(n_actions_.begin(), n_actions_.end(), std::size_t{0});
+    if (mask.size() != n) {
+      core::require(false, name, std::to_string(n) + " numbers, one per action", mask.size());
+    }
+    for (const std::size_t n_actions : n_actions_) {
+      core::require(is_mask(take_part(mask, n_actions)), name,
+                    "of 0 and 1, and 1 for an action of each dimension at least", "others");
+    }
   }
 
   /// Throws std::invalid_argument unless the task has such an action. Shape: (n_dimensions,).

@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
@@ -217,22 +218,43 @@ double of_q_learning(const std::optional<AnyAgent>& any, const Call& call, doubl
       *any);
 }
 
+/// The action to take in a state. Of a fuzzy agent, whose actions have no mask, any.
+template <class Agent>
+auto act(Agent& agent, std::span<const double> state, bool explore, std::size_t environment,
+         ActionMask mask) {
+  if constexpr (kIsFuzzy<Agent>)
+    return agent.act(state, explore, environment);
+  else
+    return agent.act(state, explore, environment, mask);
+}
+template <class Agent>
+auto best_of(Agent& agent, typename Agent::Workspace& workspace, ActionMask mask) {
+  if constexpr (kIsFuzzy<Agent>)
+    return agent.best_of(workspace);
+  else
+    return agent.best_of(workspace, mask);
+}
+
 /// Learns a transition between two states; of a fuzzy agent, its last action.
 inline void learn(AnyAgent& any, std::span<const double> state,
                   const std::vector<std::size_t>& indices, double reward,
-                  std::span<const double> next_state, bool terminated, std::size_t environment) {
+                  std::span<const double> next_state, bool terminated, std::size_t environment,
+                  ActionMask next_mask) {
   std::visit(
       [&](auto& agent) {
         using Agent = std::remove_cvref_t<decltype(agent)>;
-        const auto& action = [&] {
-          if constexpr (kIsFuzzy<Agent>)
-            return agent.last_action(environment);
-          else if constexpr (Agent::kDecoupled)
-            return indices;
-          else
-            return indices[0];
-        }();
-        agent.learn(state, action, reward, next_state, terminated, environment);
+        if constexpr (kIsFuzzy<Agent>) {
+          agent.learn(state, agent.last_action(environment), reward, next_state, terminated,
+                      environment);
+        } else {
+          const auto& action = [&]() -> const auto& {
+            if constexpr (Agent::kDecoupled)
+              return indices;
+            else
+              return indices[0];
+          }();
+          agent.learn(state, action, reward, next_state, terminated, environment, next_mask);
+        }
       },
       any);
 }

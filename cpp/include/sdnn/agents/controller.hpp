@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/actions.hpp"
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller_config.hpp"
@@ -139,23 +140,28 @@ class Controller : public WithRates<Controller> {
   }
 
   /// The action to take; without `explore` a best one. The span is valid until the next act.
-  /// Shapes: observation (n_variables,), the action (n_dimensions,). Throws std::invalid_argument
-  /// naming a number that has no state (see ObservationScale), or if there is no such environment;
-  /// then nothing has changed.
+  /// Where actions are discrete, `mask` may allow some of them only. Shapes: observation
+  /// (n_variables,), the action (n_dimensions,). Throws std::invalid_argument naming a number that
+  /// has no state (see ObservationScale) or a mask that does not fit, or if there is no such
+  /// environment; then nothing has changed.
   std::span<const double> act(std::span<const double> observation, bool explore = true,
-                              std::size_t environment = 0) {
+                              std::size_t environment = 0, ActionMask mask = {}) {
+    actions_.require_mask("mask", mask);
     if (warm_up_) {
       observations_.require_numbers("observation", observation);
-      const auto draw = [this](core::Pcg64& random, std::vector<double>& action) {
-        actions_.draw(random, action);
+      const auto draw = [&](core::Pcg64& random, std::vector<double>& action) {
+        actions_.draw(random, action, mask);
       };
-      actions_.take(warm_up_->act(draw, explore, environment), action_, indices_);
+      const auto is_allowed = [&](const std::vector<double>& action) {
+        return actions_.allows_drawn(action, mask);
+      };
+      actions_.take(warm_up_->act(draw, is_allowed, explore, environment), action_, indices_);
       return action_;
     }
     observations_.scale(observation, state_);
     std::visit(
         [&](auto& agent) {
-          actions_.take(agent.act(state_, explore, environment), action_, indices_);
+          actions_.take(agents::act(agent, state_, explore, environment, mask), action_, indices_);
         },
         *agent_);
     if (explore && !is_fuzzy(approximator_)) {
@@ -189,44 +195,50 @@ class Controller : public WithRates<Controller> {
   }
 
   /// The two steps of act without `explore`: `read` takes the time and is for many threads;
-  /// `best_of` gives the action for the observation that was read last.
+  /// `best_of` gives the action, of those that `mask` allows, for the observation that was read
+  /// last.
   void read(std::span<const double> observation, Workspace& workspace) const {
     observations_.scale(observation, workspace.state);
     std::visit(
         [&](const auto& agent) { agent.read(workspace.state, own_workspace(agent, workspace)); },
         *agent_);
   }
-  std::span<const double> best_of(Workspace& workspace) {
+  std::span<const double> best_of(Workspace& workspace, ActionMask mask = {}) {
+    actions_.require_mask("mask", mask);
     std::visit(
         [&](auto& agent) {
-          actions_.take(agent.best_of(own_workspace(agent, workspace)), workspace.action,
-                        workspace.indices);
+          actions_.take(agents::best_of(agent, own_workspace(agent, workspace), mask),
+                        workspace.action, workspace.indices);
         },
         *agent_);
     return workspace.action;
   }
 
   /// Learns a transition. The action is any of the task's, of a box the nearest one that can be
-  /// taken; of fuzzy Q-learning, that of the last act with `explore` in the environment. Shapes as
-  /// in act. Throws std::invalid_argument for others and for numbers that have no state, and then
-  /// nothing has changed; as the agent does.
+  /// taken; of fuzzy Q-learning, that of the last act with `explore` in the environment. Of a state
+  /// that is not terminal, `next_mask` may allow some actions only. Shapes as in act. Throws
+  /// std::invalid_argument for others and for numbers that have no state, and then nothing has
+  /// changed; as the agent does.
   void learn(std::span<const double> observation, std::span<const double> action, double reward,
-             std::span<const double> next_observation, bool terminated,
-             std::size_t environment = 0) {
+             std::span<const double> next_observation, bool terminated, std::size_t environment = 0,
+             ActionMask next_mask = {}) {
+    if (terminated) next_mask = {};
+    actions_.require_mask("next_mask", next_mask);
     if (warm_up_) {
       observations_.require_numbers("observation", observation);
       actions_.require_action(action);
       core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
       observations_.require_numbers("next_observation", next_observation);
-      warm_up_->learn(
-          {false, environment, observation, action, reward, next_observation, terminated});
+      warm_up_->learn({false, environment, observation, action, reward, next_observation,
+                       terminated, next_mask});
       if (warm_up_->is_over()) end_warm_up();
       return;
     }
     observations_.scale(observation, state_);
     find_indices(action, environment);
     observations_.scale(next_observation, next_state_, "next_observation");
-    agents::learn(*agent_, state_, indices_, reward, next_state_, terminated, environment);
+    agents::learn(*agent_, state_, indices_, reward, next_state_, terminated, environment,
+                  next_mask);
     notes_.note(observation);
     const WarmUp::Step step{false,  environment,      observation, action,
                             reward, next_observation, terminated};
@@ -417,7 +429,7 @@ class Controller : public WithRates<Controller> {
       indices_[d] = actions_.index_of(step.action[d], d);
     }
     agents::learn(*agent_, state_, indices_, step.reward, next_state_, step.terminated,
-                  step.environment);
+                  step.environment, step.next_mask);
   }
 
   template <class Archive>
@@ -440,6 +452,7 @@ class Controller : public WithRates<Controller> {
     const auto is_number = [](double x) { return !std::isnan(x); };
     const auto can_be_learned = [&](const WarmUp::Step& step) {
       actions_.require_action(step.action);
+      actions_.require_mask("next_masks", step.next_mask);
       return std::abs(step.reward) <= kLargestReward &&
              std::ranges::all_of(step.observation, is_number) &&
              std::ranges::all_of(step.next_observation, is_number);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/core/random.hpp"
 
@@ -54,10 +55,15 @@ class Exploration {
   /// An episode terminated: from now on random actions are kept for half as long at most.
   void note_end() noexcept { n_ended_ = std::min(n_ended_ + 1, kMostEnded); }
 
-  /// Whether the next step is random: then episode.kept is the action, one of n_actions(d) in each
-  /// dimension d; else a best one is to be taken.
+  /// Whether the next step is random: then episode.kept is the action, an allowed one of
+  /// n_actions(d) in each dimension d; else a best one is to be taken. An action that is no more
+  /// allowed is not kept.
   template <class NActions>
-  bool takes_random_action(Episode& episode, const NActions& n_actions) {
+  bool takes_random_action(Episode& episode, const NActions& n_actions, ActionMask mask = {}) {
+    ActionMask left = mask;
+    for (std::size_t d = 0; d < episode.kept.size() && !left.empty(); ++d) {
+      if (!allows(take_part(left, n_actions(d)), episode.kept[d])) episode.n_kept = 0;
+    }
     const int step = episode.step++;
     const bool at_random = n_random_left_ > 0;
     if (at_random) --n_random_left_;
@@ -67,7 +73,10 @@ class Exploration {
       return true;
     }
     for (std::size_t d = 0; d < episode.kept.size(); ++d) {
-      episode.kept[d] = policy_.random_action(n_actions(d));
+      const std::size_t n = n_actions(d);
+      episode.kept[d] = draw_allowed(take_part(mask, n), n, [this](std::size_t n_allowed) {
+        return policy_.random_action(n_allowed);
+      });
     }
     if (max_action_repeat_ > 1) {
       const double drawn = 1.0 - repetitions_.uniform();  // in (0, 1]

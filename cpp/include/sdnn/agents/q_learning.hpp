@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/exploration.hpp"
@@ -114,8 +115,7 @@ class QLearning : public WithRates<QLearning<Q>> {
   void begin_episode(std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
     episode.exploration.begin();
-    NStepBuffer& buffer = episode.buffer;
-    if (buffer.size() > 0) learn_all(buffer, state_value(buffer.next_state()));
+    if (episode.buffer.size() > 0) learn_waiting(episode);
   }
 
   /// Lets the approximator write to the memory that it will need, where it knows how.
@@ -155,25 +155,28 @@ class QLearning : public WithRates<QLearning<Q>> {
   void read(std::span<const double> state, Workspace& workspace) const {
     for (std::size_t d = 0; d < n_dimensions(); ++d) averaged_values(state, workspace, d);
   }
-  Action best_of(const Workspace& workspace) {
+  Action best_of(Workspace& workspace, ActionMask mask = {}) {
     return each_best([&](std::size_t d) {
+      exclude(take_part(mask, n_actions(d)), workspace.values[d]);
       return exploration_.policy().best_action(workspace.values[d], false);
     });
   }
 
-  /// The action to take in `state`; without `explore` a best one, by the average of the weights
-  /// where the approximator keeps one. Shape: state (l,) in [0, 1].
-  Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0) {
+  /// The action to take in `state`, an allowed one; without `explore` a best one, by the average of
+  /// the weights where the approximator keeps one. Shapes: state (l,) in [0, 1], mask as ActionMask
+  /// has it.
+  Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
+             ActionMask mask = {}) {
     Episode& episode = episodes_.of(environment);
     if (!explore) {
       read(state, workspace_);
-      return best_of(workspace_);
+      return best_of(workspace_, mask);
     }
     core::require_unit_values("state", state, n_inputs());  // before anything is drawn
     const auto n_actions_of = [this](std::size_t d) { return n_actions(d); };
-    if (!exploration_.takes_random_action(episode.exploration, n_actions_of)) {
+    if (!exploration_.takes_random_action(episode.exploration, n_actions_of, mask)) {
       return each_best([&](std::size_t d) {
-        return exploration_.policy().best_action(values(state, workspace_, d), true);
+        return exploration_.policy().best_action(allowed_values(state, d, mask), true);
       });
     }
     return as_action(episode.exploration.kept);
@@ -184,11 +187,13 @@ class QLearning : public WithRates<QLearning<Q>> {
     return coding::action_value(action, n_actions(d), -1.0, 1.0);
   }
 
-  /// Learns one transition. Throws std::invalid_argument for a reward that is not finite or beyond
+  /// Learns one transition; the best value of the next state is that of its allowed actions.
+  /// Throws std::invalid_argument for a reward that is not finite or beyond
   /// +- 1e300 or an environment that is none; then nothing has been learned. Throws
   /// std::overflow_error as the approximator does; then it may have been learned in part.
   void learn(std::span<const double> state, const Action& action, double reward,
-             std::span<const double> next_state, bool terminated, std::size_t environment = 0) {
+             std::span<const double> next_state, bool terminated, std::size_t environment = 0,
+             ActionMask next_mask = {}) {
     // Refuses at once what could not be learned: a correction may come later.
     core::require_unit_values("state", state, n_inputs());
     require_action(indices(action));
@@ -202,10 +207,11 @@ class QLearning : public WithRates<QLearning<Q>> {
       }
     }
     // The next state first: the network then remembers it, corrected, for the next decision.
-    const double next_value = terminated ? 0.0 : state_value(next_state);
+    const double next_value = terminated ? 0.0 : state_value(next_state, next_mask);
     NStepBuffer& buffer = episode.buffer;
-    if (!buffer.is_continued_by(state)) learn_all(buffer, state_value(buffer.next_state()));
+    if (!buffer.is_continued_by(state)) learn_waiting(episode);
     buffer.add(state, indices(action), reward, next_state);
+    episode.next_mask.assign(next_mask.begin(), next_mask.end());
     if (terminated) {
       learn_all(buffer, 0.0);
     } else if (buffer.is_full()) {
@@ -238,12 +244,14 @@ class QLearning : public WithRates<QLearning<Q>> {
   /// What belongs to the present episode in one environment.
   struct Episode {
     NStepBuffer buffer;
+    std::vector<std::uint8_t> next_mask;  ///< of the state where the newest step led
     Exploration::Episode exploration;
     ReturnRange::Rewards rewards = {};
   };
 
   Episode new_episode() const {
     return {NStepBuffer(static_cast<std::size_t>(config_.n_steps), n_inputs(), n_dimensions()),
+            {},
             {.kept = std::vector<std::size_t>(n_dimensions())},
             adapts_range() ? range_.no_rewards() : ReturnRange::Rewards{}};
   }
@@ -251,9 +259,10 @@ class QLearning : public WithRates<QLearning<Q>> {
   template <class Self, class Listed, class Archive>
   static void serialize_episode(Self& self, Listed& episode, Archive& archive) {
     archive.part("n_step_buffer", episode.buffer);
+    const auto n_actions_of = [&self](std::size_t d) { return self.n_actions(d); };
+    serialize_mask("next_mask", episode.next_mask, archive, self.n_dimensions(), n_actions_of);
     archive.within("range", [&] { self.range_.serialize_rewards(episode.rewards, archive); });
-    self.exploration_.serialize_episode(episode.exploration, archive,
-                                        [&self](std::size_t d) { return self.n_actions(d); });
+    self.exploration_.serialize_episode(episode.exploration, archive, n_actions_of);
     if constexpr (Archive::kReads) {
       const auto is_of_actions = [&self](const NStepBuffer::Step& step) {
         for (std::size_t d = 0; d < step.action.size(); ++d) {
@@ -341,10 +350,18 @@ class QLearning : public WithRates<QLearning<Q>> {
     }
   }
 
-  double state_value(std::span<const double> state) {
+  /// Values of dimension d, whose mask is taken from that of those left.
+  std::span<const double> allowed_values(std::span<const double> state, std::size_t d,
+                                         ActionMask& left) {
+    const std::span<const double> row = values(state, workspace_, d);
+    exclude(take_part(left, row.size()), workspace_.values[d]);
+    return row;
+  }
+
+  double state_value(std::span<const double> state, ActionMask mask) {
     double sum = 0.0;
     for (std::size_t d = 0; d < n_dimensions(); ++d)
-      sum += best_value(values(state, workspace_, d));
+      sum += best_value(allowed_values(state, d, mask));
     if constexpr (kDecoupled) sum /= static_cast<double>(n_dimensions());
     return sum;
   }
@@ -360,6 +377,10 @@ class QLearning : public WithRates<QLearning<Q>> {
     }
   }
 
+  /// Learns the steps that wait, by the best value of the state where the newest one led.
+  void learn_waiting(Episode& episode) {
+    learn_all(episode.buffer, state_value(episode.buffer.next_state(), episode.next_mask));
+  }
   void learn_all(NStepBuffer& buffer, double value) {
     while (buffer.size() > 0) learn_oldest(buffer, value);
   }

@@ -5,12 +5,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/exploration.hpp"
 #include "sdnn/agents/sarsa_config.hpp"
@@ -131,24 +133,28 @@ class Sarsa : public WithRates<Sarsa> {
   void read(std::span<const double> state, Workspace& workspace) const {
     read(state, workspace, true);
   }
-  Action best_of(const Workspace& workspace) { return best_of(workspace, false); }
+  Action best_of(Workspace& workspace, ActionMask mask = {}) {
+    return best_of(workspace, false, mask);
+  }
 
-  /// The action to take in `state`; without `explore` a best one, by the average of the weights
-  /// where there is one. Shape: state (l,) in [0, 1]. Throws std::invalid_argument.
-  Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0) {
+  /// The action to take in `state`, an allowed one; without `explore` a best one, by the average of
+  /// the weights where there is one. Shapes: state (l,) in [0, 1], mask as ActionMask has it.
+  /// Throws std::invalid_argument.
+  Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
+             ActionMask mask = {}) {
     Episode& episode = episodes_.of(environment);
     core::require_unit_values("state", state, n_inputs());  // before anything is drawn
     const auto n_actions_of = [this](std::size_t d) { return n_actions(d); };
-    if (explore && exploration_.takes_random_action(episode.exploration, n_actions_of)) {
+    if (explore && exploration_.takes_random_action(episode.exploration, n_actions_of, mask)) {
       return episode.exploration.kept;
     }
     if (!explore) {
       read(state, workspace_, true);
-      return best_of(workspace_, false);
+      return best_of(workspace_, false, mask);
     }
     action_value_.read_next(state, episode.next);
     take_values(episode.next, workspace_.values, false);
-    return best_of(workspace_, true);
+    return best_of(workspace_, true, mask);
   }
 
   /// The action of the first dimension as a number in [-1, 1]: actions cut the range evenly.
@@ -156,11 +162,13 @@ class Sarsa : public WithRates<Sarsa> {
     return coding::action_value(action.front(), n_actions(0), -1.0, 1.0);
   }
 
-  /// Learns one transition: with Sarsa when the next one is known, unless it terminated. Throws
+  /// Learns one transition: with Sarsa when the next one is known, unless it terminated. The best
+  /// value of the next state is that of its allowed actions. Throws
   /// std::invalid_argument for a reward that is not finite or beyond +- 1e300 or an environment
   /// that is none; then nothing has been learned.
   void learn(std::span<const double> state, const Action& action, double reward,
-             std::span<const double> next_state, bool terminated, std::size_t environment = 0) {
+             std::span<const double> next_state, bool terminated, std::size_t environment = 0,
+             ActionMask next_mask = {}) {
     core::require_unit_values("state", state, n_inputs());
     require_action(action);
     core::require_finite("reward", reward);
@@ -175,6 +183,7 @@ class Sarsa : public WithRates<Sarsa> {
     episode.action = action;
     episode.reward = reward;
     episode.next_state.assign(next_state.begin(), next_state.end());
+    episode.next_mask.assign(next_mask.begin(), next_mask.end());
     episode.waits = true;
     halve_old_values(action_value_.fit_unit(reward));
     ++n_learned_;
@@ -239,6 +248,7 @@ class Sarsa : public WithRates<Sarsa> {
     std::vector<std::size_t> action;
     double reward = 0.0;
     std::vector<double> next_state;
+    std::vector<std::uint8_t> next_mask;
     std::int64_t old_value = 0;  ///< Q_old, in units
     Exploration::Episode exploration;
   };
@@ -250,6 +260,7 @@ class Sarsa : public WithRates<Sarsa> {
             .state = std::vector<double>(n_inputs()),
             .action = std::vector<std::size_t>(n_dimensions()),
             .next_state = std::vector<double>(n_inputs()),
+            .next_mask = {},
             .exploration = {.kept = std::vector<std::size_t>(n_dimensions())}};
   }
 
@@ -263,6 +274,8 @@ class Sarsa : public WithRates<Sarsa> {
     archive.numbers("action", action);
     archive.number("reward", episode.reward);
     archive.numbers("next_state", episode.next_state);
+    serialize_mask("next_mask", episode.next_mask, archive, self.n_dimensions(),
+                   [&self](std::size_t d) { return self.n_actions(d); });
     self.exploration_.serialize_episode(episode.exploration, archive,
                                         [&self](std::size_t d) { return self.n_actions(d); });
     if constexpr (Archive::kReads) {
@@ -348,16 +361,27 @@ class Sarsa : public WithRates<Sarsa> {
     }
     return action;
   }
-  Action best_of(const Workspace& workspace, bool explore) {
+  Action best_of(Workspace& workspace, bool explore, ActionMask mask) {
+    for (std::vector<double>& row : workspace.values) exclude(take_part(mask, row.size()), row);
     return each_best(workspace, [&](std::span<const double> row) {
       return exploration_.policy().best_action(row, explore);
     });
   }
 
-  std::int64_t best_sum(Readout::Workspace& read) const {
+  std::int64_t best_sum(Readout::Workspace& read, ActionMask mask) const {
     std::int64_t total = 0;
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
-      total += std::ranges::max(action_value_.sums(read, d));
+      const auto sums = action_value_.sums(read, d);
+      const ActionMask part = take_part(mask, sums.size());
+      if (part.empty()) {
+        total += std::ranges::max(sums);
+        continue;
+      }
+      std::int64_t best = std::numeric_limits<std::int64_t>::min();
+      for (std::size_t a = 0; a < sums.size(); ++a) {
+        if (part[a] != 0) best = std::max(best, sums[a]);
+      }
+      total += best;
     }
     return total;
   }
@@ -389,7 +413,8 @@ class Sarsa : public WithRates<Sarsa> {
   /// Continues the episode: in the state of episode.next, `action` is taken.
   void finish(Episode& episode, const Action& action) {
     if (config_.bootstrap == Bootstrap::q_learning) {
-      if (action_value_.sum(episode.next, action) < best_sum(episode.next)) end(episode);
+      const std::int64_t best = best_sum(episode.next, episode.next_mask);
+      if (action_value_.sum(episode.next, action) < best) end(episode);
     } else {
       correct(episode, in_range([&] { return action_value_.sum(episode.next, action); }));
     }
@@ -405,7 +430,7 @@ class Sarsa : public WithRates<Sarsa> {
   /// Learns a transition by the best value of its next state.
   void correct_by_best(Episode& episode) {
     action_value_.read_next(episode.next_state, episode.next);
-    correct(episode, in_range([&] { return best_sum(episode.next); }));
+    correct(episode, in_range([&] { return best_sum(episode.next, episode.next_mask); }));
   }
 
   static void end(Episode& episode) noexcept {

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/pcg64.hpp"
@@ -31,6 +32,7 @@ class WarmUp {
     double reward;
     std::span<const double> next_observation;
     bool terminated;
+    ActionMask next_mask = {};
   };
 
   /// Where an agent cannot learn any transition, a warm-up is not over between acting and learning.
@@ -68,17 +70,19 @@ class WarmUp {
     episode.acted = false;
   }
 
-  /// A random action: what `draw(generator, action)` writes. Without `explore` from a stream of its
-  /// own. Throws std::invalid_argument if there is no such environment.
-  template <class Draw>
-  std::vector<double> act(const Draw& draw, bool explore, std::size_t environment) {
+  /// A random action: what `draw(generator, action)` writes, or one that is kept as long as it is
+  /// allowed. Without `explore` from a stream of its own. Throws std::invalid_argument if there is
+  /// no such environment.
+  template <class Draw, class IsAllowed>
+  std::vector<double> act(const Draw& draw, const IsAllowed& is_allowed, bool explore,
+                          std::size_t environment) {
     Episode& episode = episodes_.of(environment);
     if (!explore) {
       std::vector<double> action(n_dimensions_);
       draw(evaluation_, action);
       return action;
     }
-    if (episode.n_kept == 0) {
+    if (episode.n_kept == 0 || !is_allowed(episode.kept)) {
       draw(random_, episode.kept);
       episode.n_kept =
           static_cast<std::int64_t>(std::min(1.0 / (1.0 - random_.uniform()), kMostRepetitions));
@@ -94,6 +98,7 @@ class WarmUp {
     const auto append = [](auto& list, const auto& values) {
       list.insert(list.end(), values.begin(), values.end());
     };
+    note_mask(step.next_mask);
     append(observations_, step.observation);
     append(next_observations_, step.next_observation);
     append(actions_, step.action);
@@ -121,7 +126,8 @@ class WarmUp {
             row(actions_, n_dimensions_),
             rewards_[t],
             row(next_observations_, n_variables_),
-            terminated_[t] != 0};
+            terminated_[t] != 0,
+            std::span(next_masks_).subspan(t * mask_size(), mask_size())};
   }
 
   /// Lists what is remembered; see core/state.hpp.
@@ -132,6 +138,7 @@ class WarmUp {
     archive.numbers("rewards", self.rewards_);
     archive.numbers("next_observations", self.next_observations_);
     archive.numbers("terminated", self.terminated_);
+    archive.some_numbers("next_masks", self.next_masks_);
     archive.numbers("begins", self.begins_);
     archive.numbers("environments", self.environments_);
     archive.part("random", self.random_);
@@ -174,6 +181,15 @@ class WarmUp {
   static constexpr std::uint64_t kStream = std::uint64_t{1} << 32U;
   static constexpr double kMostRepetitions = 100.0;
 
+  std::size_t mask_size() const noexcept { return size() == 0 ? 0 : next_masks_.size() / size(); }
+  /// Appends the mask of the next transition. Where others have none, all actions are allowed.
+  void note_mask(ActionMask mask) {
+    const std::size_t n = std::max(mask.size(), mask_size());
+    next_masks_.resize(size() * n, 1);
+    next_masks_.insert(next_masks_.end(), mask.begin(), mask.end());
+    next_masks_.resize((size() + 1) * n, 1);
+  }
+
   template <class Archive>
   void check(Archive& archive) const {
     const std::size_t n = size();
@@ -182,6 +198,7 @@ class WarmUp {
                    "one per reward");
     archive.expect(actions_.size() == n * n_dimensions_, "actions", "one per reward");
     archive.expect(terminated_.size() == n, "terminated", "one per reward");
+    archive.expect(next_masks_.size() == n * mask_size(), "next_masks", "as many of every reward");
     archive.expect(begins_.size() == n, "begins", "one per reward");
     archive.expect(environments_.size() == n, "environments", "one per reward");
     archive.expect(!is_over(), "rewards", "fewer than the warm-up's steps");
@@ -196,7 +213,7 @@ class WarmUp {
   bool learns_any_transition_;
   core::Pcg64 random_, evaluation_;
   std::vector<double> observations_, next_observations_, actions_, rewards_;
-  std::vector<std::uint8_t> terminated_, begins_;
+  std::vector<std::uint8_t> terminated_, begins_, next_masks_;
   std::vector<std::int64_t> environments_;
   Episodes<Episode> episodes_;
 };

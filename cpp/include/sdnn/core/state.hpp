@@ -116,6 +116,11 @@ class StateWriter {
   void numbers(std::string_view name, const std::vector<T>& values) {
     add<T>(name, {values.size()}, values);
   }
+  /// One that may be empty: then there is no tensor.
+  template <class T>
+  void some_numbers(std::string_view name, const std::vector<T>& values) {
+    if (!values.empty()) numbers(name, values);
+  }
   /// Array of a known shape: anything with data() and size().
   template <class Values>
   void fixed(std::string_view name, std::vector<std::size_t> shape, const Values& values) {
@@ -176,6 +181,11 @@ class StateReader {
     expect(tensor.shape.size() == 1, name, "of one dimension");
     values.resize(tensor.size());
     copy<T>(tensor, values);
+  }
+  template <class T>
+  void some_numbers(std::string_view name, std::vector<T>& values) {
+    values.clear();
+    if (state_.contains(prefix + std::string(name))) numbers(name, values);
   }
   template <class Values>
   void fixed(std::string_view name, const std::vector<std::size_t>& shape, Values&& values) {

@@ -1,0 +1,73 @@
+/// Which actions are allowed in a state.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string_view>
+
+#include "sdnn/core/detail/floating_point.hpp"
+
+namespace sdnn::agents {
+
+/// 1 for each action that is allowed and 0 for others, one dimension after the other; empty: all
+/// are.
+using ActionMask = std::span<const std::uint8_t>;
+
+/// The part of the next dimension, of n actions, which is taken from the mask of those left.
+inline ActionMask take_part(ActionMask& left, std::size_t n) noexcept {
+  if (left.empty()) return {};
+  const ActionMask part = left.first(n);
+  left = left.subspan(n);
+  return part;
+}
+
+inline bool allows(ActionMask part, std::size_t action) noexcept {
+  return part.empty() || part[action] != 0;
+}
+
+/// Whether these are zeros and ones, and one is allowed.
+inline bool is_mask(ActionMask part) noexcept {
+  return std::ranges::all_of(part, [](auto one) { return one <= 1; }) &&
+         std::ranges::find(part, 1) != part.end();
+}
+
+/// An allowed one of n actions: that of number draw(how many are allowed) among them.
+template <class Draw>
+std::size_t draw_allowed(ActionMask part, std::size_t n, const Draw& draw) {
+  if (part.empty()) return draw(n);
+  std::size_t left = draw(
+      static_cast<std::size_t>(std::ranges::count_if(part, [](auto one) { return one != 0; })));
+  std::size_t action = 0;
+  while (part[action] == 0 || left-- > 0) ++action;
+  return action;
+}
+
+/// Makes the values of actions that are not allowed lower than all others.
+inline void exclude(ActionMask part, std::span<double> values) noexcept {
+  for (std::size_t a = 0; a < part.size(); ++a) {
+    if (part[a] == 0) values[a] = -std::numeric_limits<double>::infinity();
+  }
+}
+
+/// Lists a mask that an agent remembers, where there is one; see core/state.hpp.
+template <class Mask, class Archive, class NActions>
+void serialize_mask(std::string_view name, Mask& mask, Archive& archive, std::size_t n_dimensions,
+                    const NActions& n_actions) {
+  archive.some_numbers(name, mask);
+  if constexpr (Archive::kReads) {
+    if (mask.empty()) return;
+    std::size_t n = 0;
+    for (std::size_t d = 0; d < n_dimensions; ++d) n += n_actions(d);
+    archive.expect(mask.size() == n, name, "one per action");
+    ActionMask left = mask;
+    for (std::size_t d = 0; d < n_dimensions; ++d) {
+      const ActionMask part = take_part(left, n_actions(d));
+      archive.expect(is_mask(part), name, "0 and 1, and 1 somewhere in each dimension");
+    }
+  }
+}
+
+}  // namespace sdnn::agents

@@ -1,0 +1,62 @@
+"""Environments that tell which actions are allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium as gym
+
+from sdnn.arguments import has_methods, shown
+
+
+class ActionMasks(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):
+    """Lets agents take the allowed actions only: its ``info["action_mask"]`` has 1 for each.
+
+    `sdnn.agents.Agent.train` and `sdnn.agents.evaluate` follow the masks of environments, or
+    vectors of such, whose ``metadata["action_masks"]`` is True, as this wrapper makes it.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        With discrete actions.
+    mask : callable, optional
+        Returns the mask of the present state from the unwrapped environment: 0 or 1 for each action
+        of a Discrete space, a tuple of such for MultiDiscrete. By default the environment's info
+        has it, as Taxi's does.
+
+    Examples
+    --------
+    >>> import gymnasium as gym
+    >>> from sdnn.agents import SDNNSarsa
+    >>> env = ActionMasks(gym.make("Taxi-v4"))
+    >>> agent = SDNNSarsa(env.observation_space, env.action_space, seed=1)
+    >>> agent.train(env, steps=300).n_steps
+    300
+    """
+
+    def __init__(
+        self, env: gym.Env[Any, Any], mask: Callable[[gym.Env[Any, Any]], Any] | None = None
+    ) -> None:
+        gym.utils.RecordConstructorArgs.__init__(self, mask=mask)
+        has_methods("env", env, "a Gymnasium environment", "reset", "step")
+        super().__init__(env)
+        if isinstance(env.action_space, gym.spaces.Box):
+            raise ValueError(f"env must have discrete actions, got {env.action_space}")
+        if mask is not None and not callable(mask):
+            raise TypeError(f"mask must be a function or None, got {shown(mask)}")
+        self._mask = mask
+        self.metadata = {**env.metadata, "action_masks": True}
+
+    def reset(self, **kwargs: Any) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode."""
+        observation, info = self.env.reset(**kwargs)
+        return observation, self._with_mask(info)
+
+    def step(self, action: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Take an action."""
+        *seen, info = self.env.step(action)
+        return (*seen, self._with_mask(info))
+
+    def _with_mask(self, info: dict[str, Any]) -> dict[str, Any]:
+        return info if self._mask is None else {**info, "action_mask": self._mask(self.unwrapped)}

@@ -1,0 +1,257 @@
+"""Actions that are not allowed are neither taken nor bootstrapped from."""
+
+import json
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from sdnn.agents import (
+    Callback,
+    FuzzyQLearning,
+    QLearningConfig,
+    SarsaConfig,
+    SDNNQLearning,
+    SDNNSarsa,
+    Training,
+    Transition,
+    UnusableStepError,
+    evaluate,
+    learn_from,
+)
+from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
+from sdnn.environments import ActionMasks
+
+SMALL = SDNNCConfig(n_hidden_units=60, n_active_units=20, n_pattern_units=20)
+AGENTS = [SDNNSarsa, SDNNQLearning]
+SPACES = {
+    "discrete": gym.spaces.Discrete(5, start=-1),
+    "several": gym.spaces.MultiDiscrete([3, 4]),
+}
+
+
+class Masked(gym.Env):
+    """A walk in which a random half of the actions is allowed; it stops whoever takes another."""
+
+    def __init__(self, actions="discrete", unbounded=False):
+        bound = np.inf if unbounded else 1.0
+        self.observation_space = gym.spaces.Box(-bound, bound, (2,), np.float64)
+        self.action_space = SPACES[actions]
+
+    def parts(self):
+        if isinstance(self.action_space, gym.spaces.Discrete):
+            return [int(self.action_space.n)]
+        return self.action_space.nvec.tolist()
+
+    def mask(self):
+        masks = tuple(part.copy() for part in self.allowed)
+        return masks if len(masks) > 1 else masks[0]
+
+    def begin_state(self):
+        self.state = self.np_random.uniform(-1, 1, 2)
+        self.allowed = [self.np_random.integers(0, 2, n).astype(np.int8) for n in self.parts()]
+        for part in self.allowed:
+            part[self.np_random.integers(len(part))] = 1
+        return self.state.copy()
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.n = 0
+        return self.begin_state(), {}
+
+    def step(self, action):
+        indices = np.ravel(action) - np.ravel(getattr(self.action_space, "start", 0))
+        for index, part in zip(indices, self.allowed, strict=True):
+            assert part[index] == 1, (indices, self.allowed)
+        self.n += 1
+        reward = float(self.state[0] * indices[0])
+        return self.begin_state(), reward, self.n % 7 == 6, self.n == 11, {}
+
+
+def new_env(actions="discrete", unbounded=False):
+    return ActionMasks(Masked(actions, unbounded), Masked.mask)
+
+
+def new_agent(kind, env, **settings):
+    approximator = SMALL if kind is SDNNQLearning else LinearSDNNConfig(averaging_interval=0)
+    spaces = (
+        getattr(env, "single_observation_space", env.observation_space),
+        getattr(env, "single_action_space", env.action_space),
+    )
+    return kind(*spaces, approximator=approximator, seed=3, warm_up_steps=60, **settings)
+
+
+def same_state(one, other):
+    first, second = one.state(), other.state()
+    assert first.keys() == second.keys()
+    for name, values in first.items():
+        np.testing.assert_array_equal(values, second[name], name)
+
+
+@pytest.mark.parametrize("unbounded", [False, True], ids=["bounds", "warm-up"])
+@pytest.mark.parametrize("actions", SPACES)
+@pytest.mark.parametrize("kind", AGENTS)
+def test_only_allowed_actions_are_taken(kind, actions, unbounded):
+    env = new_env(actions, unbounded)
+    agent = new_agent(kind, env)
+    assert agent.train(env, steps=300).n_steps == 300
+    assert evaluate(agent, new_env(actions, unbounded), 5).returns.shape == (5,)
+
+
+@pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP", "DISABLED"])
+@pytest.mark.parametrize("actions", SPACES)
+def test_vectors_of_every_mode_learn_the_same(actions, mode):
+    def trained(n, mode):
+        own = gym.vector.SyncVectorEnv(
+            [lambda: new_env(actions)] * n, autoreset_mode=gym.vector.AutoresetMode[mode]
+        )
+        agent = new_agent(SDNNSarsa, own)
+        agent.train(own, steps=200)
+        return agent
+
+    same_state(trained(3, mode), trained(3, "NEXT_STEP"))
+    single = new_agent(SDNNSarsa, new_env(actions))
+    single.train(new_env(actions), steps=200)
+    same_state(trained(1, mode), single)
+
+
+def test_vectors_that_reset_themselves_take_allowed_actions(monkeypatch):
+    monkeypatch.setattr("sdnn.agents.vectors._resets_each", lambda env: False)
+
+    def own(mode):
+        return gym.vector.SyncVectorEnv(
+            [new_env] * 3, autoreset_mode=gym.vector.AutoresetMode[mode]
+        )
+
+    for mode in ("NEXT_STEP", "SAME_STEP"):
+        env = own(mode)
+        agent = new_agent(SDNNSarsa, env)
+        assert agent.train(env, steps=200).n_steps == 200
+
+
+@pytest.mark.parametrize("kind", AGENTS)
+def test_a_mask_that_allows_all_changes_nothing(kind):
+    env = Masked()
+    one, other = new_agent(kind, env), new_agent(kind, env)
+    random = np.random.default_rng(1)
+    for _ in range(100):
+        here, after = random.uniform(-1, 1, (2, 2))
+        action = one.act(here)
+        assert other.act(here, mask=np.ones(5, bool)) == action
+        assert other.act(here, False, mask=[1] * 5) == one.act(here, False)
+        one.learn(Transition(here, action, 1.0, after, False))
+        other.learn(Transition(here, action, 1.0, after, False, np.ones(5, np.int8)))
+    for here in random.uniform(-1, 1, (10, 2)):
+        np.testing.assert_array_equal(one.q_values(here), other.q_values(here))
+
+
+@pytest.mark.parametrize("kind", AGENTS)
+def test_targets_bootstrap_from_allowed_actions_only(kind):
+    here, after = np.array([-0.9, -0.9]), np.array([0.9, 0.9])
+    own = {SDNNSarsa: SarsaConfig, SDNNQLearning: QLearningConfig}[kind]
+    settings = {"value_range": "fixed"} if kind is SDNNQLearning else {"schedule_steps": 0}
+    learning = own(discount=0.5, learning_rate=1.0, final_learning_rate=None, **settings)
+    agent = new_agent(kind, Masked(), learning=learning)
+    for _ in range(30):
+        for action, value in ((-1, 0.0), (0, 8.0), (1, 2.0), (2, 0.0), (3, 0.0)):
+            agent.learn(Transition(after, action, value, after, True))
+            agent.begin_episode()
+    high, low = agent.q_values(after)[[1, 2]]
+    assert high > low > 0.5
+
+    def learned(mask):
+        other = type(agent).rebuild(agent.description(), agent.state())
+        for _ in range(30):
+            other.learn(Transition(here, 0, 0.0, after, False, mask))
+            other.begin_episode()
+        return other.q_values(here)[1], other.q_values(after)
+
+    step = 1.2 if kind is SDNNQLearning else 0.05  # of SDNN-C with few units
+    value, then = learned(None)
+    assert value == pytest.approx(0.5 * then.max(), abs=step)
+    value, then = learned([0, 0, 1, 0, 0])
+    assert value == pytest.approx(0.5 * then[2], abs=step)
+
+
+@pytest.mark.parametrize("unbounded", [False, True], ids=["bounds", "warm-up"])
+@pytest.mark.parametrize("kind", AGENTS)
+@pytest.mark.parametrize("at", [33, 100])
+def test_a_training_is_resumed_exactly(kind, unbounded, at, tmp_path):
+    settings = {"n_steps": 3} if kind is SDNNQLearning else {"bootstrap": "sarsa"}
+    learning = {SDNNSarsa: SarsaConfig, SDNNQLearning: QLearningConfig}[kind](**settings)
+
+    def training(steps, *callbacks):
+        env = new_env(unbounded=unbounded)
+        agent = new_agent(kind, env, learning=learning)
+        return Training(agent, env, steps=steps, callbacks=callbacks)
+
+    whole = training(150)
+    whole.run()
+    part = training(150, StopAt(at))
+    part.run()
+    assert part.n_steps == at
+    part.save(tmp_path / "part.safetensors")
+    rest = Training.load(tmp_path / "part.safetensors", new_env(unbounded=unbounded))
+    rest.run()
+    same_state(rest.agent, whole.agent)
+
+
+class StopAt(Callback):
+    def __init__(self, step):
+        self.every, self.step = 1, step
+
+    def on_step(self, training):
+        if training.n_steps == self.step:
+            training.stop()
+
+
+def test_logged_masks_are_learned(tmp_path):
+    agents = [new_agent(SDNNSarsa, Masked()) for _ in range(2)]
+    steps = [Transition([0.1, 0.2], 1, 1.0, [0.3, 0.4], False, [1, 0, 0, 1, 0])] * 3
+    learn_from(agents[0], steps)
+    with (tmp_path / "log.jsonl").open("w") as file:
+        for step in steps:
+            file.write(json.dumps(step._asdict()) + "\n")
+    learn_from(agents[1], tmp_path / "log.jsonl")
+    same_state(*agents)
+
+
+@pytest.mark.parametrize(
+    "mask",
+    [[1, 0], [1] * 6, [0] * 5, [2, 1, 0, 0, 0], [0.5] * 5, "ones", (), [], ([1, 0], [1, 0, 1])],
+    ids=str,
+)
+def test_masks_that_do_not_fit_are_refused(mask):
+    agent = new_agent(SDNNSarsa, Masked())
+    before = agent.state()
+    with pytest.raises(ValueError, match=r"^mask "):
+        agent.act([0.0, 0.0], mask=mask)
+    with pytest.raises(ValueError, match=r"^next_mask "):
+        agent.learn(Transition([0.0, 0.0], 1, 0.0, [0.5, 0.5], False, mask))
+    for name, values in agent.state().items():
+        np.testing.assert_array_equal(values, before[name])
+
+
+def test_boxes_have_no_masks():
+    spaces = gym.spaces.Box(-1, 1, (2,)), gym.spaces.Box(-1, 1, (1,))
+    for kind in (SDNNSarsa, FuzzyQLearning):
+        agent = kind(*spaces)
+        with pytest.raises(ValueError, match=r"^mask must be None"):
+            agent.act(np.zeros(2), mask=[1, 0, 1])
+    with pytest.raises(ValueError, match=r"^env must have discrete actions"):
+        ActionMasks(gym.make("Pendulum-v1"))
+    with pytest.raises(TypeError, match=r"^mask must be a function"):
+        ActionMasks(gym.make("Taxi-v4"), 3)
+
+
+def test_masks_of_environments_that_do_not_fit_are_named():
+    env = ActionMasks(gym.make("CartPole-v1"))  # has none
+    agent = SDNNSarsa(env.observation_space, env.action_space)
+    with pytest.raises(UnusableStepError, match="action_mask"):
+        agent.train(env, steps=3)
+    with pytest.raises(UnusableStepError, match="action_mask"):
+        evaluate(agent, env)
+    long = ActionMasks(Masked(), lambda env: [1] * 6)
+    for masked in (long, gym.vector.SyncVectorEnv([lambda: long])):
+        with pytest.raises(UnusableStepError, match="action_mask"):
+            new_agent(SDNNSarsa, masked).train(masked, steps=3)
