@@ -410,5 +410,66 @@ TEST(QLearning, OfOneDimensionDoesWhatAnAgentWithoutDimensionsDoes) {
   EXPECT_EQ(core::state_of(plain), state);
 }
 
+/// Some steps at random states, after each of which `check` is called with the state.
+template <class Check>
+void live(QLearning<SDNNC>& agent, const Check& check) {
+  core::Random random(4, core::Stream::exploration);
+  std::vector<double> state(2);
+  std::vector<double> next(2);
+  for (int step = 0; step < 300; ++step) {
+    for (double& x : next) x = random.uniform();
+    agent.learn(state, agent.act(state), random.uniform() - 0.4, next, step % 20 == 19);
+    state = next;
+    check(state);
+  }
+}
+
+// An action is found by counts of firing units, without the values that it is the best by.
+TEST(QLearning, TheBestActionByCountsIsThatByValues) {
+  for (const int n_actions : {0, 7}) {
+    for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
+      for (const double tolerance : {0.0, 1.0, 2.5}) {
+        auto config = network();
+        config.n_actions = n_actions;
+        const EpsilonGreedyConfig policy{.tie_rule = rule, .tie_tolerance = tolerance};
+        QLearning<SDNNC> agent(SDNNC(config, 3), {.policy = policy}, 3);
+        ASSERT_TRUE(agent.action_value().values_rise());
+        auto workspace = agent.workspace();
+        const EpsilonGreedy by_values(policy, 1);
+        core::Random one(9, core::Stream::ties);
+        core::Random other = one;
+        live(agent, [&](const std::vector<double>& state) {
+          const std::size_t action = agent.best_action(state, workspace, one);
+          ASSERT_EQ(action, by_values.best_action(agent.values(state, workspace), other));
+          if (rule == TieRule::uniform) return;  // drawn from the agent's own stream
+          std::vector<std::uint8_t> mask(agent.n_actions(0));
+          for (std::size_t a = 0; a < mask.size(); ++a) mask[a] = a % 5 == 2 ? 1 : 0;
+          std::vector<double> values = agent.workspace().values[0];
+          std::ranges::copy(agent.values(state, workspace), values.begin());
+          exclude(mask, values);
+          agent.read(state, workspace);
+          ASSERT_EQ(agent.best_of(workspace, mask), by_values.best_action(values, other));
+        });
+      }
+    }
+  }
+}
+
+// A step between values may be lost by rounding: then values need not rise with the counts.
+TEST(QLearning, ValuesThatDoNotRiseAreCompared) {
+  auto config = network();
+  config.q_low = -7.262490008916344e+16;
+  config.q_high = -7.26249000891634e+16;
+  QLearning<SDNNC> agent(SDNNC(config, 3), {}, 3);
+  ASSERT_FALSE(agent.action_value().values_rise());
+  auto workspace = agent.workspace();
+  core::Random ties(9, core::Stream::ties);
+  live(agent, [&](const std::vector<double>& state) {
+    const std::size_t action = agent.best_action(state, workspace, ties);
+    const auto values = agent.values(state, workspace);
+    ASSERT_EQ(values[action], *std::ranges::max_element(values));
+  });
+}
+
 }  // namespace
 }  // namespace sdnn::agents::small_q_learning

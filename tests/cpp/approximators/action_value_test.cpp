@@ -48,6 +48,8 @@ static_assert(!ActionValue<WithoutUpdate>);
 static_assert(!ActionValue<WithoutRate>);
 static_assert(!ActionValue<NotConst>);
 static_assert(!ActionValue<double>);
+static_assert(CountedActionValue<SDNNC>);
+static_assert(!CountedActionValue<RBFNetwork>);
 
 TEST(ActionValue, ALookupTableReturnsWhatItWasCorrectedTo) {
   testing::LookupTable q(2, 3, 4);

@@ -122,6 +122,14 @@ class EpsilonGreedy {
   std::size_t best_action(std::span<const float> values, core::Random& ties) const {
     return greedy(values, ties);
   }
+  /// The same where numbers that rise with the values stand for them: `least` is the least one that
+  /// ties with the best.
+  std::size_t best_action(std::span<const std::int32_t> counts, std::int32_t least,
+                          core::Random& ties) const {
+    return one_of(counts, least, ties);
+  }
+  /// The stream that breaks ties in learning, or in evaluation.
+  core::Random& ties(bool explore) noexcept { return explore ? ties_ : evaluation_ties_; }
 
   /// The action for step number `step` (from 0) of an episode; without `explore` always a best one.
   ///
@@ -145,33 +153,42 @@ class EpsilonGreedy {
   std::size_t greedy(std::span<const Value> values, core::Random& ties) const {
     const Value best = best_value(values);
     core::require(!std::isnan(best), "values", "numbers", best);
-    const Value least = static_cast<Value>(best - config_.tie_tolerance);
+    return one_of(values, static_cast<Value>(best - config_.tie_tolerance), ties);
+  }
+
+  /// One of the values that are at least `least`, by the rule.
+  template <class Value>
+  std::size_t one_of(std::span<const Value> values, Value least, core::Random& ties) const {
     switch (config_.tie_rule) {
       case TieRule::lowest:
-        return first_of(values, least);
+        return nth_of(values, least, 0);
       case TieRule::middle:
         return middle_of_widest_run(values, least);
       case TieRule::uniform:
         break;
     }
-    const auto ties_with_best = [least](Value value) { return value >= least; };
-    const auto n_tied =
-        static_cast<std::uint64_t>(std::count_if(values.begin(), values.end(), ties_with_best));
-    std::uint64_t skip = n_tied > 1 ? ties.below(n_tied) : 0;
-    std::size_t action = first_of(values, least);
-    for (; skip > 0; --skip) {
-      do {
-        ++action;
-      } while (!ties_with_best(values[action]));
-    }
-    return action;
+    const std::uint64_t n_tied = count_of(values, least);
+    return nth_of(values, least, n_tied > 1 ? ties.below(n_tied) : 0);
   }
 
   template <class Value>
-  static std::size_t first_of(std::span<const Value> values, Value least) noexcept {
-    const auto found =
-        std::find_if(values.begin(), values.end(), [least](Value value) { return value >= least; });
-    return static_cast<std::size_t>(found - values.begin());
+  static std::uint64_t count_of(std::span<const Value> values, Value least) noexcept {
+    return static_cast<std::uint64_t>(
+        std::ranges::count_if(values, [least](Value value) { return value >= least; }));
+  }
+
+  /// The index of the n-th such value, from 0; there are more than n.
+  template <class Value>
+  static std::size_t nth_of(std::span<const Value> values, Value least, std::uint64_t n) noexcept {
+    constexpr std::size_t kAtOnce = 64;
+    std::size_t i = 0;
+    for (; i + kAtOnce < values.size(); i += kAtOnce) {
+      const std::uint64_t n_here = count_of(values.subspan(i, kAtOnce), least);
+      if (n < n_here) break;
+      n -= n_here;
+    }
+    while (values[i] < least || n-- > 0) ++i;
+    return i;
   }
 
   template <class Value>

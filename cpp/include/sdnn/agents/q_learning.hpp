@@ -145,20 +145,19 @@ class QLearning : public WithRates<QLearning<Q>> {
   Action best_action(std::span<const double> state, Workspace& workspace,
                      core::Random& ties) const {
     read(state, workspace);
-    return each_best([&](std::size_t d) {
-      return exploration_.policy().best_action(workspace.values[d], ties);
-    });
+    return each_best([&](std::size_t d) { return best_of(workspace, d, ties); });
   }
 
   /// The two steps of act without `explore`: `read` takes the time and is for many threads, as
   /// values is; `best_of` gives the action in the state that was read last.
   void read(std::span<const double> state, Workspace& workspace) const {
-    for (std::size_t d = 0; d < n_dimensions(); ++d) averaged_values(state, workspace, d);
+    for (std::size_t d = 0; d < n_dimensions(); ++d) read(state, workspace, d, true);
   }
   Action best_of(Workspace& workspace, ActionMask mask = {}) {
+    core::Random& ties = exploration_.policy().ties(false);
     return each_best([&](std::size_t d) {
-      exclude(take_part(mask, n_actions(d)), workspace.values[d]);
-      return exploration_.policy().best_action(workspace.values[d], false);
+      exclude(take_part(mask, n_actions(d)), workspace, d);
+      return best_of(workspace, d, ties);
     });
   }
 
@@ -176,7 +175,9 @@ class QLearning : public WithRates<QLearning<Q>> {
     const auto n_actions_of = [this](std::size_t d) { return n_actions(d); };
     if (!exploration_.takes_random_action(episode.exploration, n_actions_of, mask)) {
       return each_best([&](std::size_t d) {
-        return exploration_.policy().best_action(allowed_values(state, d, mask), true);
+        read(state, workspace_, d, false);
+        exclude(take_part(mask, n_actions(d)), workspace_, d);
+        return best_of(workspace_, d, exploration_.policy().ties(true));
       });
     }
     return as_action(episode.exploration.kept);
@@ -239,6 +240,15 @@ class QLearning : public WithRates<QLearning<Q>> {
   friend class WithRates<QLearning>;
 
   static constexpr double kLargestReward = 1e300;  // sums of some, and steps to them, stay finite
+  /// Whether numbers that stand for values may be read in their place.
+  static constexpr bool kCounts = [] {
+    if constexpr (kDecoupled) {
+      using Part = std::remove_cvref_t<decltype(std::declval<Q&>().part(0))>;
+      return approximators::CountedActionValue<Part>;
+    } else {
+      return approximators::CountedActionValue<Q>;
+    }
+  }();
   static constexpr bool kHasRange = requires(Q& q) { q.set_output_range(0.0, 1.0); };
 
   /// What belongs to the present episode in one environment.
@@ -319,7 +329,8 @@ class QLearning : public WithRates<QLearning<Q>> {
       return action_value_;
     }
   }
-  static auto& part(Workspace& workspace, std::size_t d) {
+  template <class AWorkspace>
+  static auto& part(AWorkspace& workspace, std::size_t d) {
     if constexpr (kDecoupled) {
       return workspace.approximator.parts[d];
     } else {
@@ -328,14 +339,49 @@ class QLearning : public WithRates<QLearning<Q>> {
     }
   }
 
-  /// Values by the average of the weights where the approximator keeps one.
-  void averaged_values(std::span<const double> state, Workspace& workspace, std::size_t d) const {
-    std::vector<double>& row = workspace.values[d];
-    if constexpr (requires { part(d).averaged_values(state, part(workspace, d), row); }) {
-      part(d).averaged_values(state, part(workspace, d), row);
-    } else {
-      part(d).values(state, part(workspace, d), row);
+  /// Reads the values of a dimension; `averaged`: by the average of the weights where the
+  /// approximator keeps one.
+  void read(std::span<const double> state, Workspace& workspace, std::size_t d,
+            bool averaged) const {
+    const auto& q = part(d);
+    auto& own = part(workspace, d);
+    if constexpr (kCounts) {
+      if (q.values_rise()) return q.count(state, own, averaged);
     }
+    if constexpr (requires { q.averaged_values(state, own, workspace.values[d]); }) {
+      if (averaged) return q.averaged_values(state, own, workspace.values[d]);
+    }
+    q.values(state, own, workspace.values[d]);
+  }
+  /// Makes those of actions that are not allowed lower than all others.
+  void exclude(ActionMask mask, Workspace& workspace, std::size_t d) const {
+    if constexpr (kCounts) {
+      if (part(d).values_rise()) return part(workspace, d).counts().exclude(mask);
+    }
+    agents::exclude(mask, workspace.values[d]);
+  }
+  /// The largest of the values that were read last.
+  double best_value_of(const Workspace& workspace, std::size_t d) const {
+    if constexpr (kCounts) {
+      if (part(d).values_rise()) {
+        return part(d).value_of_count(part(workspace, d).counts().largest());
+      }
+    }
+    return best_value(std::span<const double>(workspace.values[d]));
+  }
+  /// An action that has it, or ties with those that have.
+  std::size_t best_of(const Workspace& workspace, std::size_t d, core::Random& ties) const {
+    const EpsilonGreedy& policy = exploration_.policy();
+    if constexpr (kCounts) {
+      if (part(d).values_rise()) {
+        const auto& counts = part(workspace, d).counts();
+        const double least = best_value_of(workspace, d) - policy.config().tie_tolerance;
+        std::int32_t tied = counts.largest();
+        while (tied > 0 && part(d).value_of_count(tied - 1) >= least) --tied;
+        return policy.best_action(counts.of_actions(), tied, ties);
+      }
+    }
+    return policy.best_action(workspace.values[d], ties);
   }
 
   /// The action that has best(d) in dimension d.
@@ -350,18 +396,13 @@ class QLearning : public WithRates<QLearning<Q>> {
     }
   }
 
-  /// Values of dimension d, whose mask is taken from that of those left.
-  std::span<const double> allowed_values(std::span<const double> state, std::size_t d,
-                                         ActionMask& left) {
-    const std::span<const double> row = values(state, workspace_, d);
-    exclude(take_part(left, row.size()), workspace_.values[d]);
-    return row;
-  }
-
   double state_value(std::span<const double> state, ActionMask mask) {
     double sum = 0.0;
-    for (std::size_t d = 0; d < n_dimensions(); ++d)
-      sum += best_value(allowed_values(state, d, mask));
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      read(state, workspace_, d, false);
+      exclude(take_part(mask, n_actions(d)), workspace_, d);
+      sum += best_value_of(workspace_, d);
+    }
     if constexpr (kDecoupled) sum /= static_cast<double>(n_dimensions());
     return sum;
   }

@@ -3,6 +3,7 @@
 
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include "sdnn/core/detail/floating_point.hpp"
@@ -33,6 +34,25 @@ concept ActionValue =
       const_q.values(state, workspace, out);
       { const_q.value(state, workspace, action) } -> std::convertible_to<double>;
       q.update(state, workspace, action, target, rate);
+    };
+
+/// An approximator whose values are those of whole numbers, of which the largest are found quicker.
+///
+/// - q.count(state, workspace, averaged): finds the number of every action, then in
+///   workspace.counts(), as WindowCounts has them; by the average of the weights if asked to
+/// - q.value_of_count(count): Q(state, a) where `count` is the number of a
+/// - q.values_rise(): whether no value is below that of a smaller number
+template <class Q>
+concept CountedActionValue =
+    ActionValue<Q> &&
+    requires(const Q& q, typename Q::Workspace& workspace, std::span<const double> state,
+             std::int32_t count, std::span<const std::uint8_t> mask) {
+      q.count(state, workspace, true);
+      { q.value_of_count(count) } -> std::convertible_to<double>;
+      { q.values_rise() } -> std::convertible_to<bool>;
+      { workspace.counts().largest() } -> std::convertible_to<std::int32_t>;
+      workspace.counts().exclude(mask);
+      { workspace.counts().of_actions() } -> std::convertible_to<std::span<const std::int32_t>>;
     };
 
 }  // namespace sdnn::approximators

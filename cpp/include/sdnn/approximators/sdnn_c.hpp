@@ -22,6 +22,7 @@
 #include "sdnn/approximators/detail/sdnn_c_room.hpp"
 #include "sdnn/approximators/detail/state_wiring.hpp"
 #include "sdnn/approximators/detail/weight_average.hpp"
+#include "sdnn/approximators/detail/window_counts.hpp"
 #include "sdnn/approximators/error_correction.hpp"
 #include "sdnn/approximators/hidden_layer.hpp"
 #include "sdnn/approximators/output_scale.hpp"
@@ -64,6 +65,9 @@ class SDNNC {
   class Workspace {
    public:
     const ActivationCache& cache() const noexcept { return cache_; }
+    /// Of the state that values or counts were asked for last.
+    const WindowCounts& counts() const noexcept { return counts_; }
+    WindowCounts& counts() noexcept { return counts_; }
 
    private:
     friend class SDNNC;
@@ -71,7 +75,7 @@ class SDNNC {
     explicit Workspace(const SDNNC& network)
         : cache_(network.state_code(), network.actions_.n_hidden_units()),
           bins_(network.n_inputs()),
-          moves_(network.actions_.n_hidden_units() - network.actions_.n_active_units()) {
+          counts_(network.actions_) {
       selected_.reserve(network.actions_.n_active_units());
     }
 
@@ -85,7 +89,7 @@ class SDNNC {
     ActivationCache cache_;
     std::optional<ActivationCache> averaged_cache_;  ///< made when it is needed
     std::vector<coding::Bin> bins_;
-    std::vector<std::int8_t> moves_;  ///< what the count changes by as the window moves on a unit
+    WindowCounts counts_;
     std::vector<std::uint32_t> selected_;
   };
 
@@ -137,23 +141,37 @@ class SDNNC {
   ///
   /// Throws std::invalid_argument for a state of wrong size or outside [0, 1].
   void values(std::span<const double> state, Workspace& workspace, std::span<double> out) const {
-    require_row(out);
-    fill_values(recall(state, workspace).potentials, workspace, out);
+    fill_values(state, workspace, out, false);
   }
 
   /// Values by the average of the weights, rounded to steps of the lattice, where there is one.
   /// The first call after the average has changed takes some milliseconds. Throws as values.
   void averaged_values(std::span<const double> state, Workspace& workspace,
                        std::span<double> out) const {
-    if (!has_average()) return values(state, workspace, out);
-    require_row(out);
+    fill_values(state, workspace, out, true);
+  }
+
+  /// Counts the firing units in the window of every action, of which workspace.counts() has the
+  /// numbers and value_of_count the values; by the average of the weights as averaged_values.
+  /// Throws as values.
+  void count(std::span<const double> state, Workspace& workspace, bool averaged) const {
     assert(fits(workspace));
     code_->bins_of(state, workspace.bins_);
-    const auto averaged = averaged_layer();
-    ActivationCache& cache = workspace.averaged_cache(*this);
-    fill_values(cache.recall(*code_, averaged->layer, averaged->log, workspace.bins_).potentials,
-                workspace, out);
+    if (averaged && has_average()) {
+      const auto layer = averaged_layer();
+      ActivationCache& cache = workspace.averaged_cache(*this);
+      const Cached entry = cache.recall(*code_, layer->layer, layer->log, workspace.bins_);
+      return workspace.counts_.count(entry.potentials, actions_);
+    }
+    const Cached entry = workspace.cache_.recall(*code_, hidden_layer_, log_, workspace.bins_);
+    workspace.counts_.count(entry.potentials, actions_);
   }
+  double value_of_count(std::int32_t count) const noexcept {
+    return value_of_count_[static_cast<std::size_t>(count)];
+  }
+  /// Whether no value is below that of a smaller count: unless rounding errors exceed what a unit
+  /// is worth.
+  bool values_rise() const noexcept { return values_rise_; }
 
   /// Whether there has been a snapshot for the average.
   bool has_average() const noexcept { return average_ && average_->n_snapshots() > 0; }
@@ -301,6 +319,7 @@ class SDNNC {
     for (std::size_t u = 0; u < value_of_count_.size(); ++u) {
       value_of_count_[u] = scale_(static_cast<int>(u));
     }
+    values_rise_ = std::ranges::is_sorted(value_of_count_);
   }
 
   /// Shapes: weights (n, D), in the paper's order, thresholds (n,). Throws std::invalid_argument
@@ -321,36 +340,17 @@ class SDNNC {
   bool fits(const Workspace& workspace) const noexcept {
     return workspace.bins_.size() == n_inputs() &&
            workspace.cache_.n_units() == actions_.n_hidden_units() &&
-           workspace.moves_.size() == actions_.n_hidden_units() - actions_.n_active_units();
+           workspace.counts_.of_actions().size() == n_actions();
   }
 
-  void require_row(std::span<double> out) const {
-    if (out.size() == n_actions()) return;  // only a bad one's text costs memory
-    core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
-  }
-
-  /// Q of every action, where these are the potentials.
-  void fill_values(std::span<const std::int32_t> h, Workspace& workspace,
-                   std::span<double> out) const {
-    std::vector<std::int8_t>& moves = workspace.moves_;
-    const std::int32_t* const leaving = h.data();
-    const std::int32_t* const entering = h.data() + actions_.n_active_units();
-    for (std::size_t i = 0; i < moves.size(); ++i) {
-      moves[i] = static_cast<std::int8_t>((entering[i] > 0) - (leaving[i] > 0));
+  void fill_values(std::span<const double> state, Workspace& workspace, std::span<double> out,
+                   bool averaged) const {
+    if (out.size() != n_actions()) {  // only a bad one's text costs memory
+      core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
     }
-    const double* const value = value_of_count_.data();
-    std::ptrdiff_t n_firing = count_in_window(h, 0);
-    out[0] = value[n_firing];
-    if (out.size() == moves.size() + 1) {  // every window: the usual case, in a tight loop
-      for (std::size_t i = 0; i < moves.size(); ++i) out[i + 1] = value[n_firing += moves[i]];
-      return;
-    }
-    for (std::size_t action = 1; action < out.size(); ++action) {
-      for (std::size_t i = actions_.first_unit(action - 1); i < actions_.first_unit(action); ++i) {
-        n_firing += moves[i];
-      }
-      out[action] = value[n_firing];
-    }
+    count(state, workspace, averaged);
+    std::ranges::transform(workspace.counts_.of_actions(), out.begin(),
+                           [this](std::int32_t count) { return value_of_count(count); });
   }
 
   std::shared_ptr<const AveragedLayer> averaged_layer() const {
@@ -435,6 +435,7 @@ class SDNNC {
   core::OnDemand<AveragedLayer> averaged_;
   core::Random rounding_;
   std::vector<double> value_of_count_;
+  bool values_rise_;
   CorrectionCounts counts_;
 };
 
