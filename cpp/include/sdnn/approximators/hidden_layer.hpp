@@ -222,7 +222,7 @@ class HiddenLayer {
     if (high_columns_[block].size() >= n_columns_ / 4) {
       return add_columns(bytes, all, group, sign * kHighByte, sums);
     }
-    std::array<std::uint32_t, ColumnPlaces::kMost> own;
+    std::array<std::uint32_t, ColumnPlaces::kMost + 2> own;
     const std::size_t n =
         bits.empty()
             ? listed.in(high_columns_[block], own.data())

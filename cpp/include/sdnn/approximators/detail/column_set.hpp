@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/core/bit_layer.hpp"
 #include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/core/detail/lanes.hpp"
@@ -98,7 +99,7 @@ SDNN_INLINE std::uint32_t* intersect_bits_body(const std::uint64_t* bits, const 
     _mm512_store_si512(found_words.data(), _mm512_maskz_compress_epi64(found, words));
     const auto n_found = static_cast<std::size_t>(std::popcount(found));
     for (std::size_t k = 0; k < n_found; ++k) {
-      out = append_columns(out, found_bits[k], static_cast<std::uint32_t>(found_words[k]));
+      out = coding::detail::append_few_bits<2>(out, found_bits[k], 64 * found_words[k]);
     }
     words = _mm512_add_epi64(words, eight);
   }
@@ -130,7 +131,8 @@ SDNN_KERNEL_AVX2(std::uint32_t*, intersect_bits,
                   std::uint32_t* out),
                  (bits, set, n_words, out))
 
-/// Writes the columns of words of bits that are in a set of as many; returns their end.
+/// Writes the columns of words of bits that are in a set of as many; returns their end, beyond which
+/// it may write two numbers.
 SDNN_DISPATCH(std::uint32_t*, intersect_bits,
               (const std::uint64_t* bits, const core::BitWord* set, std::size_t n_words,
                std::uint32_t* out),

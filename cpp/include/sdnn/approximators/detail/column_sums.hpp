@@ -267,6 +267,7 @@ template <std::size_t Group>
 [[SDNN_TARGET_AVX512]] void add_groups_avx512(const std::int8_t* block, const ColumnPlaces& places,
                                               int factor, std::int32_t* sums) {
   const __m512i ones = _mm512_set1_epi8(1);
+  const __m512i factors = _mm512_set1_epi32(factor);
   const std::uint32_t* const end = places.data() + places.size();
   for (const std::uint32_t* begin = places.data(); begin != end;) {
     const std::uint32_t* const part_end = end_of_part<Group>(begin, end);
@@ -283,15 +284,16 @@ template <std::size_t Group>
             _mm512_add_epi16(high, _mm512_maddubs_epi16(ones, _mm512_unpackhi_epi8(first, second)));
       }
     }
-    alignas(core::kCacheLine) std::array<std::int16_t, 32> lows;
-    alignas(core::kCacheLine) std::array<std::int16_t, 32> highs;
-    _mm512_store_si512(lows.data(), low);
-    _mm512_store_si512(highs.data(), high);
-    for (std::size_t i = 0; i < 32; ++i) {
-      const std::size_t unit = i / 8 * 16 + i % 8;
-      sums[unit] += factor * lows[i];
-      sums[unit + 8] += factor * highs[i];
-    }
+    const auto add = [&](std::int32_t* at, __m128i first,
+                         __m128i last) __attribute__((always_inline, target("avx512f,avx2"))) {
+      const __m512i sixteen = _mm512_cvtepi16_epi32(_mm256_set_m128i(last, first));
+      _mm512_storeu_si512(
+          at, _mm512_add_epi32(_mm512_loadu_si512(at), _mm512_mullo_epi32(sixteen, factors)));
+    };
+    add(sums, _mm512_extracti32x4_epi32(low, 0), _mm512_extracti32x4_epi32(high, 0));
+    add(sums + 16, _mm512_extracti32x4_epi32(low, 1), _mm512_extracti32x4_epi32(high, 1));
+    add(sums + 32, _mm512_extracti32x4_epi32(low, 2), _mm512_extracti32x4_epi32(high, 2));
+    add(sums + 48, _mm512_extracti32x4_epi32(low, 3), _mm512_extracti32x4_epi32(high, 3));
   }
 }
 
