@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import json
-import math
 import shlex
 import sys
 import traceback
@@ -85,17 +84,15 @@ def words_of_run(folder: Path) -> Callable[[ConfigError], str]:
 
 def value_of(text: str) -> Any:
     """Read a value as TOML has it, such as 0.5, true or [1, 2], or True; others are texts."""
-    if sys.version_info >= (3, 11):
-        import tomllib
-    else:
-        import tomli as tomllib
+    import msgspec
+
     if "\n" in text:
         return text
     if text in ("True", "False"):
         return text == "True"
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        return msgspec.toml.decode(f"value = {text}")["value"]
+    except msgspec.DecodeError:
         return text
 
 
@@ -250,15 +247,9 @@ def _where(shares: Sequence[float | None], is_so: Callable[[float], bool]) -> li
 
 def json_text(values: Any) -> str:
     """Write values as JSON; numbers that it does not have, NaN and infinite ones, as null."""
-    return json.dumps(_finite(values), indent=2, allow_nan=False)
+    import msgspec
 
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {name: _finite(one) for name, one in value.items()}
-    return [_finite(one) for one in value] if isinstance(value, list | tuple) else value
+    return msgspec.json.format(msgspec.json.encode(values), indent=2).decode()
 
 
 def run_and_report(

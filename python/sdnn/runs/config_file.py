@@ -5,21 +5,17 @@ from __future__ import annotations
 import bisect
 import json
 import re
-import sys
 from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
+import msgspec
+
 from sdnn.files import read_bytes
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.spec import RunSpec
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 FORMAT = "sdnn-run-2"
 """Format of the configuration in a run's folder."""
@@ -28,6 +24,7 @@ MOST_BYTES = 2**20
 """Largest file of settings."""
 MOST_LEVELS = 32
 """Most levels of tables and arrays within each other."""
+_TOO_DEEP = f"must have at most {MOST_LEVELS} tables and arrays within each other"
 _MOST_PARSED = 2**21
 """Bytes that are parsed to find a line; in larger files errors name no line."""
 
@@ -55,23 +52,19 @@ class ConfigFile:
             text = read_bytes(path, MOST_BYTES).decode()
             values = _parsed_toml(text) if is_toml else json.loads(text)
         except RecursionError:
-            problem = f"must have at most {MOST_LEVELS} tables and arrays within each other"
-            raise ConfigError("", problem, str(path)) from None
+            raise ConfigError("", _TOO_DEEP, str(path)) from None
         except OSError as error:
             raise ConfigError("", error.strerror or str(error), str(path)) from error
-        except ValueError as error:
+        except (ValueError, msgspec.DecodeError) as error:
             line = re.search(r"(?:at )?line (\d+)", str(error))
             place = f"{path}:{line[1]}" if line else str(path)
             kind = "TOML" if is_toml else "JSON"
             raise ConfigError("", f"must be {kind}: {error}", place) from error
         if not isinstance(values, dict):
             raise ConfigError("", f"must hold a table, got {values!r:.80}", str(path))
-        file = cls(path, text, values)
-        deep = _deep_key(values)
-        if deep is not None:
-            problem = f"must have at most {MOST_LEVELS} tables and arrays within each other"
-            raise ConfigError(dotted(deep[:3]), problem, str(path))
-        return file
+        if deep := _deep_key(values):
+            raise ConfigError(dotted(deep[:3]), _TOO_DEEP, str(path))
+        return cls(path, text, values)
 
     def specification(self) -> dict[str, Any]:
         """Return the values of a specification: all but what only a run's configuration has.
@@ -107,8 +100,8 @@ class ConfigFile:
                 n_left -= len(text)
                 if n_left < 0:
                     raise OverflowError
-                with suppress(tomllib.TOMLDecodeError):
-                    return _has(tomllib.loads(text), key)
+                with suppress(msgspec.DecodeError):
+                    return _has(msgspec.toml.decode(text), key)
             return True
 
         with suppress(OverflowError):
@@ -141,7 +134,8 @@ def _parsed_toml(text: str) -> dict[str, Any]:
     for part in re.split(r"[={},\n]", text):
         if part.count(".") > MOST_LEVELS:
             raise ValueError(f"a key must have at most {MOST_LEVELS} parts, got {part[:40]!r}...")
-    return tomllib.loads(text)
+    values: dict[str, Any] = msgspec.toml.decode(text)
+    return values
 
 
 def _deep_key(values: dict[str, Any]) -> KeyPath | None:

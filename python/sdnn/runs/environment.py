@@ -96,12 +96,9 @@ class EnvironmentSpec(Settings, frozen=True):
         return self.noise > 0.0 or self.redundant > 0
 
     def make(
-        self,
-        stream: Stream = "sensor_noise",
-        render_mode: str | None = None,
-        seed: int | None = None,
+        self, stream: Stream = "sensor_noise", render_mode: str | None = None
     ) -> gym.Env[Any, Any]:
-        """Make the environment.
+        """Make the environment; every reset with a seed starts its noise.
 
         ConfigError if there is no such environment, it cannot be made, or ranges are missing or
         wrong. RunError if it can be made, but not with this render mode.
@@ -112,8 +109,6 @@ class EnvironmentSpec(Settings, frozen=True):
             Where its noise comes from.
         render_mode
             As Gymnasium has it.
-        seed
-            Where the noise starts; by default every reset with a seed starts it.
         """
         env = self._bare(render_mode)
         try:
@@ -142,13 +137,7 @@ class EnvironmentSpec(Settings, frozen=True):
                 pairs = neighbours(low.size, self.redundant)
                 env = RedundantSensors(env, [partial(mean_of, *pair) for pair in pairs])
             if self.noise:
-                env = NoisySensors(
-                    env,
-                    self.noise,
-                    edge="saturate",
-                    seed=0 if seed is None else seed,
-                    stream=stream,
-                )
+                env = NoisySensors(env, self.noise, edge="saturate", stream=stream)
             return _in_own_units(env, low, high) if self.own_units else env
         except BaseException:
             env.close()

@@ -104,11 +104,6 @@ def schemas_of(*kinds: Any) -> dict[str, Any]:
     return schemas
 
 
-@functools.cache
-def _required_names(kind: type[Settings]) -> tuple[str, ...]:
-    return tuple(field.name for field in msgspec.structs.fields(kind) if field.required)
-
-
 def names_of(kind: type[Any]) -> tuple[str, ...]:
     """Return the names of the fields of a class of settings, or of another dataclass."""
     if issubclass(kind, msgspec.Struct):
@@ -196,9 +191,9 @@ def read(kind: type[AnySettings], values: Any, where: str = "") -> AnySettings:
     """
     check_names(values, kind.__struct_fields__, where)
     with within(where):
-        for name in _required_names(kind):
-            if name not in values:
-                raise ConfigError(name, "must be given")
+        for field in msgspec.structs.fields(kind):
+            if field.required and field.name not in values:
+                raise ConfigError(field.name, "must be given")
         return kind(**values)
 
 

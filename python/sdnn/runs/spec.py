@@ -300,13 +300,12 @@ class RunSpec(Settings, frozen=True):
         return spec.core_trial() if spec.is_compiled else training_trial(spec)
 
     def make_env(
-        self,
-        stream: Stream = "sensor_noise",
-        *,
-        render_mode: str | None = None,
-        seed: int | None = None,
+        self, stream: Stream = "sensor_noise", *, render_mode: str | None = None
     ) -> gym.Env[Any, Any]:
         """Make an environment to learn in or, of the other stream, to be evaluated in.
+
+        Each reset with a seed starts the sensors' noise. On the paper's acrobot it starts at the
+        run's seed and runs on over episodes.
 
         ConfigError if it cannot be made. RunError if it can be made, but not with this render mode.
 
@@ -316,14 +315,11 @@ class RunSpec(Settings, frozen=True):
             Where its sensor noise comes from.
         render_mode
             As Gymnasium has it.
-        seed
-            Where the noise starts in a Gymnasium environment; by default each reset with a seed
-            starts it. On the paper's acrobot it starts at the run's seed and runs on over episodes.
         """
         is_quiet = stream == "evaluation_sensor_noise" and not self.protocol.noisy_evaluations
         if self.environment is not None:
             environment = self.environment.replace(noise=0.0) if is_quiet else self.environment
-            return environment.make(stream, render_mode, seed)
+            return environment.make(stream, render_mode)
         sensors = replace(self.sensors, noise=0.0) if is_quiet else self.sensors
         env = AcrobotSwingUpEnv(config=self.acrobot, dtype="float64", render_mode=render_mode)
         tightening = TighteningGoal(env, GoalSchedule(self.goal))
