@@ -38,11 +38,6 @@ def numbers(column: NDArray[Any]) -> NDArray[np.float64]:
     return values
 
 
-def bins_of_positions(where: NDArray[np.float64], n_bins: int) -> NDArray[np.int32]:
-    """Return the bin among equal half-open parts of [0, 1]; 1 is in the last."""
-    return np.minimum((where * n_bins).astype(np.int32), np.int32(n_bins - 1))
-
-
 def quantile_knots(column: NDArray[np.float64]) -> Knots:
     """Return at most `MAX_KNOTS` values with their mean ranks, scaled to [0, 1].
 
@@ -99,7 +94,8 @@ class Ranged(Coding):
             where = np.interp(values, *np.array(self.knots).T)
         else:  # halves, so that the width of the widest range is still a number
             where = (np.clip(values, low, high) / 2 - low / 2) / (high / 2 - low / 2)
-        return bins_of_positions(where, self.size)
+        # Equal half-open parts of [0, 1]; 1 is in the last.
+        return np.minimum((where * self.size).astype(np.int32), np.int32(self.size - 1))
 
     def _learned_range(self, column: NDArray[np.float64]) -> tuple[float, float]:
         """Return the given ends, or the column's."""

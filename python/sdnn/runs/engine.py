@@ -300,7 +300,7 @@ def _pieces(trial: Trial | TrainingTrial) -> Generator[None, None, None]:
     """Run a trial to its end; yield about every `CHUNK_SECONDS`, and first of all."""
     yield
     if isinstance(trial, TrainingTrial):  # whose episodes may be long
-        yield from trial.pieces(CHUNK_SECONDS)
+        yield from trial.training.pieces(CHUNK_SECONDS)
         return
     chunk = 1
     while not trial.finished:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
+from dataclasses import dataclass
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
@@ -13,7 +14,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents import Agent, UnusableStepError
+from sdnn.agents import UnusableStepError
 from sdnn.agents.evaluation import greedy_episode
 from sdnn.files import whole_file, write_whole
 from sdnn.runs.environment import render_modes
@@ -32,51 +33,13 @@ _FASTEST_GIF = 50
 """Largest rate: viewers slow faster ones down."""
 
 
+@dataclass
 class Recording:
-    """A greedy episode, frame by frame, of at most ``max_steps``.
+    """A recorded episode; ``is_warming_up``: all actions of the agent are random."""
 
-    ``n_frames`` and ``total_reward`` are those so far.
-    """
-
-    def __init__(
-        self, agent: Agent[Any, Any], env: gym.Env[Any, Any], seed: int, max_steps: int | None
-    ) -> None:
-        self._agent, self._env, self._seed, self._max_steps = agent, env, seed, max_steps
-        self.n_frames = 0
-        self.total_reward = 0.0
-
-    @property
-    def is_warming_up(self) -> bool:
-        """Whether the agent has learned nothing yet: all its actions are random."""
-        return self._agent.is_warming_up
-
-    def frames(self) -> Iterator[NDArray[np.uint8]]:
-        """Run the episode and yield the frames, shape (height, width, 3).
-
-        RunError if the environment gives something else than pictures; `UnusableStepError` as of
-        `sdnn.agents.evaluate`.
-        """
-        for now in greedy_episode(self._agent, self._env, self._seed, 0):
-            self.total_reward = now.total_reward
-            yield from self._frames()
-            if now.n_steps == self._max_steps:
-                break
-        if self.n_frames == 0:
-            raise RunError("render() must give pictures, got none")
-
-    def _frames(self) -> Iterator[NDArray[np.uint8]]:
-        try:
-            rendered: Any = self._env.render()
-        except gym.error.DependencyNotInstalled as error:
-            raise RunError(f"pictures of this environment need more: {error}") from error
-        for one in rendered if isinstance(rendered, list) else [rendered]:
-            frame = np.asarray(one)
-            if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
-                raise RunError(
-                    f"render() must give a picture of red, green and blue, got {frame!r:.80}"
-                )
-            self.n_frames += 1
-            yield frame
+    is_warming_up: bool
+    n_frames: int = 0
+    total_reward: float = 0.0
 
 
 def record(
@@ -98,17 +61,44 @@ def record(
         raise RunError(f"{path} needs {package}, which is missing: pip install {package}")
     agent = run.agent()
     root = run.fresh_seed if seed is None else seed
+    recording = Recording(agent.is_warming_up)
     with closing(_filmed(run.spec)) as env:
         run.check_spaces(agent, env)
-        recording = Recording(agent, env, root, max_steps)
+
+        def frames() -> Iterator[NDArray[np.uint8]]:
+            for now in greedy_episode(agent, env, root, 0):
+                recording.total_reward = now.total_reward
+                for frame in _rendered(env):
+                    recording.n_frames += 1
+                    yield frame
+                if now.n_steps == max_steps:
+                    break
+            if recording.n_frames == 0:
+                raise RunError("render() must give pictures, got none")
+
         rate = float((env.metadata or {}).get("render_fps") or FRAMES_PER_SECOND)
         path.parent.mkdir(parents=True, exist_ok=True)
         write = _write_gif if path.suffix == ".gif" else _write_mp4
         try:
-            write(path, recording.frames(), rate)
+            write(path, frames(), rate)
         except UnusableStepError as error:
             raise RunError(f"{run.spec.task}: {error}") from error
     return recording
+
+
+def _rendered(env: gym.Env[Any, Any]) -> Iterator[NDArray[np.uint8]]:
+    """Yield the pictures of the present step, shape (height, width, 3)."""
+    try:
+        rendered: Any = env.render()
+    except gym.error.DependencyNotInstalled as error:
+        raise RunError(f"pictures of this environment need more: {error}") from error
+    for one in rendered if isinstance(rendered, list) else [rendered]:
+        frame = np.asarray(one)
+        if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
+            raise RunError(
+                f"render() must give a picture of red, green and blue, got {frame!r:.80}"
+            )
+        yield frame
 
 
 def _filmed(spec: RunSpec) -> gym.Env[Any, Any]:

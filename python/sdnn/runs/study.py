@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -27,12 +28,13 @@ DEFAULT = "default"
 
 
 class Combination(NamedTuple):
-    """A variant in a case, what is run of it but for seeds, and the settings that made it."""
+    """A variant in a case, what is run of it, and the settings that made it."""
 
     case: StudyCase
     variant: StudyVariant
     spec: RunSpec
     settings: Layer
+    trials: tuple[PlannedTrial, ...]
 
 
 class Study(StudyFile):
@@ -90,21 +92,17 @@ class Study(StudyFile):
             given = f"{self.n_trials} of {n_combinations} each"
             problem = f"must be at most {MOST_TRIALS} in all, got {given}"
             raise self.file.error(("study", "trials"), problem)
-        self.combinations = {
-            (case.id, variant.id): Combination(case, variant, *self.spec(case, variant))
-            for case in self.cases
-            for variant in self.variants
-            if case.id in (variant.only or [case.id])
-        }
-
-    def trials(self, case_id: str, variant_id: str) -> tuple[PlannedTrial, ...]:
-        """List the trials of a variant in a case."""
-        spec = self.combinations[case_id, variant_id].spec
-        return plan_of([(case_id, spec)], self.n_trials, self.seed)
+        self.combinations: dict[tuple[str, str], Combination] = {}
+        for case, variant in itertools.product(self.cases, self.variants):
+            if case.id in (variant.only or [case.id]):
+                spec, settings = self.spec(case, variant)
+                trials = plan_of([(case.id, spec)], self.n_trials, self.seed)
+                made = Combination(case, variant, spec, settings, trials)
+                self.combinations[case.id, variant.id] = made
 
     def keys(self, case_id: str, variant_id: str) -> tuple[TrialKey, ...]:
         """List where the results of the trials of a variant in a case are stored."""
-        return tuple(planned.key for planned in self.trials(case_id, variant_id))
+        return tuple(planned.key for planned in self.combinations[case_id, variant_id].trials)
 
     def chosen(self, only: Collection[str] = ()) -> tuple[tuple[str, str], ...]:
         """List the ids of case and variant of some variants (default: all); ValueError if none."""

@@ -325,12 +325,9 @@ class StudyFile:
             raise self.file.error(axis.where, f"must be an array of values, got {axis.value!r}")
         shown = name[:1] if name == ("agent", "name") else name
         word = shown[-1] if lasts[name[-1]] == 1 else ".".join(shown)
-        words = [f"{word}={_value_words(value)}" for value in axis.value]
+        texts = (v if isinstance(v, str) else json.dumps(v, default=str) for v in axis.value)
+        words = [f"{word}={text}" for text in texts]
         if len(set(words)) < len(words):
             raise self.file.error(axis.where, f"must be different values, got {axis.value!r}")
         for number, value in enumerate(axis.value):
             yield words[number], {name: Setting(value, (*axis.where, number))}
-
-
-def _value_words(value: Any) -> str:
-    return value if isinstance(value, str) else json.dumps(value, default=str)

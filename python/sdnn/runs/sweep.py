@@ -284,7 +284,8 @@ class SweepRequest:
     @property
     def groups(self) -> dict[tuple[str, str], tuple[PlannedTrial, ...]]:
         """The trials of each variant in each case, by the ids of case and variant."""
-        return {pair: self.study.trials(*pair) for pair in self.study.chosen(self.only)}
+        chosen = self.study.chosen(self.only)
+        return {pair: self.study.combinations[pair].trials for pair in chosen}
 
     @cached_property
     def plan(self) -> tuple[PlannedTrial, ...]:

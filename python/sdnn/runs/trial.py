@@ -7,7 +7,7 @@ siblings), by the same protocol, bit for bit.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
@@ -339,10 +339,6 @@ class TrainingTrial:
             for _ in self.training.pieces(0.0):
                 if self.episode >= last:
                     break
-
-    def pieces(self, seconds: float) -> Generator[None, None, None]:
-        """Learn to the end, in pieces of about ``seconds`` each."""
-        return self.training.pieces(seconds)
 
     def rows(self) -> TrialRows:
         """Return all rows so far: learning episodes and evaluations."""

@@ -211,7 +211,7 @@ def test_a_specification_that_cpp_does_not_know_is_a_training():
     ):
         spec = RunSpec(environment=environment, protocol=protocol, budget=budget)
         trial = spec.make_trial(SEED)
-        for _ in trial.pieces(0.0):
+        for _ in trial.training.pieces(0.0):
             pass
         assert (trial.finished, trial.reason, trial.done) == (True, "done", spec.length)
         assert trial.rows().episode.tolist() == expected
@@ -220,6 +220,6 @@ def test_a_specification_that_cpp_does_not_know_is_a_training():
     trial = RunSpec(
         environment=environment, protocol=ProtocolSpec(evaluate_every=40), budget=target
     ).make_trial(SEED)
-    for _ in trial.pieces(0.0):
+    for _ in trial.training.pieces(0.0):
         pass
     assert (trial.finished, trial.reason, trial.done) == (True, "target", 40)
