@@ -56,74 +56,61 @@ _N_RESAMPLES, _N_DRAWS_OF_EACH = 200, 250
 _FILES = files("sdnn.reproduction")
 
 
-@dataclass(frozen=True)
-class Subject:
-    """An agent in a case, by their ids; as text, for a reader."""
-
-    case_id: str
-    agent: str = "sdnn-c"
-
-    def __str__(self) -> str:
-        case = PAPER_CASES[self.case_id]
-        noisy = "noisy " if case.noise else ""
-        return f"{title_of(self.agent)}, {case.n_sensors} {noisy}inputs"
+Subject: TypeAlias = tuple[str, str]
+"""An agent in a case, by the ids of case and agent."""
 
 
-@dataclass(frozen=True)
-class Median:
-    """The median of a measure over the trials of a subject, minus that of another one if given.
+def subject_words(subject: Subject) -> str:
+    """Return a subject for a reader."""
+    case = PAPER_CASES[subject[0]]
+    noisy = "noisy " if case.noise else ""
+    return f"{title_of(subject[1])}, {case.n_sensors} {noisy}inputs"
+
+
+class Check(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A quantity, the paper's words, and the range in which it must lie, ends included.
+
+    The quantity is the median of a `measure` over the trials of an agent in a case, `minus` that in
+    another case if given; or the time of a step of a `series` with `n_inputs` over that with
+    `n_fewer`: a ratio of medians.
 
     Censored values in a difference count as the last episode of their trial, so a difference
     between late collapses is rather too small than too large.
     """
 
-    measure: MeasureName
-    subject: Subject
-    other: Subject | None = None
-
-    def __str__(self) -> str:
-        words = f"{self.measure.replace('_', ' ')}: {self.subject}"
-        if self.other is None:
-            return words
-        return f"{words} minus {str(self.other).removeprefix(f'{title_of(self.subject.agent)}, ')}"
-
-    @property
-    def subjects(self) -> tuple[Subject, ...]:
-        """Whose trials are compared."""
-        return (self.subject,) if self.other is None else (self.subject, self.other)
-
-    def samples(self, measured: Mapping[Subject, TrialMeasures]) -> tuple[FloatArray, ...]:
-        """Return the trials' values of each subject, (n_trials,)."""
-        found = [measured[subject] for subject in self.subjects]
-        return (
-            on_equal_terms(self.measure, *found) if self.other else (found[0].values[self.measure],)
-        )
-
-
-@dataclass(frozen=True)
-class Growth:
-    """The time of a step with `n_inputs` over that with `n_fewer`: a ratio of medians."""
-
-    series: str
-    n_inputs: int
-    n_fewer: int
-
-    def __str__(self) -> str:
-        title = next(series.title for series in SERIES if series.id == self.series)
-        return f"time per step, {self.n_inputs} inputs / {self.n_fewer} inputs: {title}"
-
-
-Quantity: TypeAlias = Median | Growth
-
-
-@dataclass(frozen=True)
-class Check:
-    """A quantity, the paper's words, and the range in which it must lie, ends included."""
-
-    quantity: Quantity
     paper: str
     at_least: float = -math.inf
     at_most: float = math.inf
+    measure: MeasureName | None = None
+    case: str = ""
+    agent: str = "sdnn-c"
+    minus: str = ""
+    series: str = ""
+    n_inputs: int = 0
+    n_fewer: int = 0
+
+    def __str__(self) -> str:
+        if self.measure is None:
+            title = next(series.title for series in SERIES if series.id == self.series)
+            return f"time per step, {self.n_inputs} inputs / {self.n_fewer} inputs: {title}"
+        first, *other = map(subject_words, self.subjects)
+        words = f"{self.measure.replace('_', ' ')}: {first}"
+        return " minus ".join(
+            [words, *(o.removeprefix(f"{title_of(self.agent)}, ") for o in other)]
+        )
+
+    @property
+    def subjects(self) -> tuple[Subject, ...]:
+        """Whose trials are compared; none for times."""
+        return tuple((case, self.agent) for case in (self.case, self.minus) if case)
+
+    def samples(self, measured: Mapping[Subject, TrialMeasures]) -> tuple[FloatArray, ...]:
+        """Return the trials' values of each subject, (n_trials,)."""
+        assert self.measure is not None
+        found = [measured[subject] for subject in self.subjects]
+        if self.minus:
+            return on_equal_terms(self.measure, *found)
+        return (found[0].values[self.measure],)
 
     def contains(self, values: FloatArray) -> NDArray[np.bool_]:
         """Return where values lie in the range."""
@@ -134,8 +121,7 @@ class Check:
         return np.asarray((upper < self.at_least) | (lower > self.at_most))
 
 
-@dataclass(frozen=True)
-class Claim:
+class Claim(msgspec.Struct, frozen=True):
     """A claim of the paper: its number in REPRODUCTION.md, its text, and what has to hold."""
 
     number: int
@@ -143,20 +129,9 @@ class Claim:
     checks: tuple[Check, ...]
 
 
-def _check(paper: str, at_least: float = -math.inf, at_most: float = math.inf, **of: Any) -> Check:
-    if "series" in of:
-        return Check(Growth(**of), paper, at_least, at_most)
-    other = of.pop("minus", None)
-    measure: MeasureName = of.pop("measure")
-    subject = Subject(of.pop("case"), **of)
-    median = Median(measure, subject, None if other is None else Subject(other))
-    return Check(median, paper, at_least, at_most)
-
-
-CLAIMS = tuple(
-    Claim(one["number"], one["text"], tuple(_check(**check) for check in one["checks"]))
-    for one in msgspec.toml.decode(_FILES.joinpath("claims.toml").read_bytes())["claim"]
-)
+CLAIMS = msgspec.toml.decode(
+    _FILES.joinpath("claims.toml").read_bytes(), type=dict[str, tuple[Claim, ...]]
+)["claim"]
 """The paper's nine claims, by their numbers in REPRODUCTION.md."""
 
 
@@ -207,7 +182,7 @@ class CheckOutcome:
     def to_json(self) -> dict[str, Any]:
         """Return it as values that JSON can hold; what is censored becomes ``">last_episode"``."""
         return {
-            "measured": str(self.check.quantity),
+            "measured": str(self.check),
             "paper": self.check.paper,
             "at_least": json_number(self.check.at_least, None),
             "at_most": json_number(self.check.at_most, None),
@@ -266,8 +241,8 @@ def judge_claims(
     A case that experiments share may come more than once. Beside each claim comes what more trials
     say, if all that it speaks of is among the reference results.
     """
-    by_subject = {Subject(one.case_id, one.agent): one for one in measured}
-    more = {Subject(one.case_id, one.agent): one for one in reference}
+    by_subject = {(one.case_id, one.agent): one for one in measured}
+    more = {(one.case_id, one.agent): one for one in reference}
     draws = TenTrials(more.values())
     outcomes = []
     for claim in CLAIMS:
@@ -282,24 +257,23 @@ def judge_claims(
 def _judge(
     check: Check, measured: Mapping[Subject, TrialMeasures], costs: Sequence[CostRecord]
 ) -> CheckOutcome:
-    quantity = check.quantity
-    if isinstance(quantity, Growth):
-        times = {c.n_inputs: c.microseconds for c in costs if c.series == quantity.series}
-        if not {quantity.n_inputs, quantity.n_fewer} <= times.keys():
+    if check.measure is None:
+        times = {c.n_inputs: c.microseconds for c in costs if c.series == check.series}
+        if not {check.n_inputs, check.n_fewer} <= times.keys():
             return CheckOutcome(check, None, Verdict.NOT_RUN)
-        estimate = estimate_contrast(times[quantity.n_inputs], times[quantity.n_fewer], np.divide)
+        estimate = estimate_contrast(times[check.n_inputs], times[check.n_fewer], np.divide)
         is_full = all(one.config_hash == CostConfig().config_hash for one in costs)
         return CheckOutcome(
             check, estimate, verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
         )
-    if not measured.keys() >= set(quantity.subjects):
+    if not measured.keys() >= set(check.subjects):
         return CheckOutcome(check, None, Verdict.NOT_RUN)
-    found = [measured[subject] for subject in quantity.subjects]
-    samples = quantity.samples(measured)
+    found = [measured[subject] for subject in check.subjects]
+    samples = check.samples(measured)
     estimate = (
         estimate_contrast(samples[0], samples[1])
-        if quantity.other
-        else found[0].medians[quantity.measure]
+        if check.minus
+        else found[0].medians[check.measure]
     )
     verdict = verdict_of(check, estimate) if all(map(is_paper_scale, found)) else Verdict.NOT_JUDGED
     return CheckOutcome(check, estimate, verdict, samples, min(one.last_episode for one in found))
@@ -314,7 +288,7 @@ class TenTrials:
     """
 
     def __init__(self, measured: Iterable[TrialMeasures]) -> None:
-        self._measured = {Subject(one.case_id, one.agent): one for one in measured}
+        self._measured = {(one.case_id, one.agent): one for one in measured}
         self._draws = cache(self._draw)
         self._met = cache(self._is_met)
 
@@ -325,8 +299,8 @@ class TenTrials:
         one that a claim speaks of are missing, or a claim is about costs.
         """
         checks = [check for claim in claims for check in claim.checks]
-        for quantity in (check.quantity for check in checks):
-            if not isinstance(quantity, Median) or set(quantity.subjects) - self._measured.keys():
+        for check in checks:
+            if check.measure is None or set(check.subjects) - self._measured.keys():
                 return None
         met = zip(*map(self._met, checks), strict=True)
         drawn, redrawn = (np.logical_and.reduce(arrays) for arrays in met)
@@ -338,7 +312,7 @@ class TenTrials:
 
         Each subject has a generator of its own.
         """
-        generator = np.random.default_rng([BOOTSTRAP_SEED, *str(subject).encode()])
+        generator = np.random.default_rng([BOOTSTRAP_SEED, *subject_words(subject).encode()])
         size = self._measured[subject].n_trials
         drawn = generator.integers(size, size=(N_DRAWS, PAPER_TRIALS))
         resampled = generator.integers(size, size=(_N_RESAMPLES, size))
@@ -348,13 +322,10 @@ class TenTrials:
 
     def _is_met(self, check: Check) -> tuple[NDArray[np.bool_], ...]:
         """Find in which draws a check is met, (N_DRAWS,), and in which of resamples."""
-        quantity = check.quantity
-        assert isinstance(quantity, Median)
+        samples = zip(check.subjects, check.samples(self._measured), strict=True)
         medians = [
             [np.median(values[drawn], axis=-1) for drawn in self._draws(subject)]
-            for subject, values in zip(
-                quantity.subjects, quantity.samples(self._measured), strict=True
-            )
+            for subject, values in samples
         ]
         return tuple(
             check.contains(reduce(np.subtract, kind)) for kind in zip(*medians, strict=True)

@@ -17,11 +17,10 @@ from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS, E
 from sdnn.reproduction.claims import (
     ALWAYS,
     NEVER,
+    Check,
     CheckOutcome,
     Claim,
     ClaimOutcome,
-    Growth,
-    Quantity,
     ReferenceResult,
     TenTrials,
     Verdict,
@@ -223,7 +222,7 @@ def _claim_table(claims: Iterable[ClaimOutcome]) -> Table:
         found: dict[str, list[str]] = {}
         for one in claim.checks:
             if (text := format_quantity(one)) != "-":
-                found.setdefault(_name(one.check.quantity), []).append(text)
+                found.setdefault(_name(one.check), []).append(text)
         ours = "; ".join(f"{name}: {', '.join(values)}" for name, values in found.items())
         paper = "; ".join(dict.fromkeys(one.check.paper for one in claim.checks))
         row = (str(claim.claim.number), claim.claim.text, paper, ours or "-")
@@ -238,18 +237,17 @@ def _claim_table(claims: Iterable[ClaimOutcome]) -> Table:
     )
 
 
-def _name(quantity: Quantity) -> str:
+def _name(check: Check) -> str:
     """Name a quantity where its claim says about whom it is."""
-    if isinstance(quantity, Growth):
-        return f"{quantity.n_inputs} inputs / {quantity.n_fewer}"
-    name = quantity.measure.replace("_", " ")
-    return name if quantity.other is None else f"{name}, difference"
+    if check.measure is None:
+        return f"{check.n_inputs} inputs / {check.n_fewer}"
+    return check.measure.replace("_", " ") + (", difference" if check.minus else "")
 
 
 def _check_table(claims: Iterable[ClaimOutcome]) -> Table:
     """Return the verdict on each check by these trials alone."""
     rows = [
-        (str(claim.claim.number), str(one.check.quantity), one.check.paper,
+        (str(claim.claim.number), str(one.check), one.check.paper,
          format_quantity(one), one.verdict.value)
         for claim in claims
         for one in claim.checks
@@ -267,7 +265,7 @@ def _more_table(claims: Iterable[ClaimOutcome]) -> Table:
         start = (str(claim.claim.number), claim.claim.text, "", "", "")
         rows.append((*start, claim.decided.value, format_share(claim.chance)))
         for one in claim.more.checks:
-            words = (str(one.check.quantity), str(min(s.size for s in one.samples)))
+            words = (str(one.check), str(min(s.size for s in one.samples)))
             rows.append(("", "", *words, format_quantity(one), one.verdict.value, ""))
     header = (
         "claim", "the paper says", "measured", "trials", "ours", "verdict", "ten trials show it"
@@ -294,11 +292,11 @@ def tally(verdicts: Iterable[Verdict]) -> list[tuple[str, int, str]]:
 
 def format_quantity(checked: CheckOutcome) -> str:
     """Write what our data give of a check's quantity, with its interval."""
-    quantity, estimate = checked.check.quantity, checked.estimate
+    measure, estimate = checked.check.measure, checked.estimate
     if estimate is None:
         return "-"
-    if not isinstance(quantity, Growth):
-        return format_estimate(estimate, quantity.measure, checked.last_episode)
+    if measure is not None:
+        return format_estimate(estimate, measure, checked.last_episode)
     value, lower, upper = map(_growth, vars(estimate).values())
     return value if math.isnan(estimate.lower) else f"{value} [{lower}, {upper}]"
 
@@ -438,7 +436,7 @@ class StudyClaims:
             if found := claims.get(claim.number):
                 cells = (f"{format_quantity(one)}: {one.verdict.value}" for one in found.checks)
                 rows.append((titles[variant], *cells, self._verdict(variant, found)))
-        measured = (f"{one.quantity} (paper: {one.paper})" for one in claim.checks)
+        measured = (f"{one} (paper: {one.paper})" for one in claim.checks)
         header = ("variant", *measured, "verdict")
         return Table(f"Claim {claim.number}: {claim.text}", header, rows)
 

@@ -24,10 +24,7 @@ from sdnn.reproduction.claims import (
     CheckOutcome,
     Claim,
     ClaimOutcome,
-    Growth,
-    Median,
     ReferenceResult,
-    Subject,
     TenTrials,
     Verdict,
     is_paper_scale,
@@ -62,7 +59,7 @@ def measured(case_id, values, agent="sdnn-c", **more):
 
 
 def final_steps(case, **limits):
-    return Check(Median("final_steps", Subject(case)), "", **limits)
+    return Check(measure="final_steps", case=case, paper="", **limits)
 
 
 @pytest.mark.parametrize("n_good", [3, 5, 8])
@@ -104,10 +101,11 @@ def test_chances_of_differences_count_censored_values_as_the_last_episode():
 
 
 def test_chances_need_trials_of_every_subject():
-    difference = Median("final_steps", Subject("s6-noise"), Subject("s4"))
-    claim = Claim(7, "", (Check(difference, "", at_most=2),))
+    difference = Check(measure="final_steps", case="s6-noise", minus="s4", paper="", at_most=2)
+    claim = Claim(7, "", (difference,))
     assert TenTrials([measured("s4", [4, 4])]).chance(claim) is None
-    growth = Claim(9, "", (Check(Growth("rbf", 8, 4), "", at_least=16),))
+    growth = Check(series="rbf", n_inputs=8, n_fewer=4, paper="", at_least=16)
+    growth = Claim(9, "", (growth,))
     assert TenTrials([measured("s4", [4, 4])]).chance(growth) is None
 
 
