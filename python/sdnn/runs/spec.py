@@ -435,8 +435,11 @@ class RunSpec(Settings, frozen=True):
         for name in ("seed", "output"):
             del values[name]
         values["agent"].pop("preset")
-        if values["agent"]["inputs"] == "all":  # as in trials from before there was a choice
+        # As in trials from before there was a choice.
+        if values["agent"]["inputs"] == "all":
             del values["agent"]["inputs"]
+        if not values.get("environment", {}).get("action_masks", True):
+            del values["environment"]["action_masks"]
         if version := self.entry.version:
             values["agent"]["version"] = version
         return json.dumps(
