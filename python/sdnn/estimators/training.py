@@ -17,7 +17,9 @@ from sdnn.arguments import shown
 from sdnn.estimators.inputs import Array, Floats, Ints
 from sdnn.estimators.network import Network
 
-AVERAGED_EVERY = 3  # epochs between networks to be averaged: neighbours are too alike
+LARGE_SAMPLE = 5000
+"""Samples above which one epoch alone changes much, and blocks are shuffled instead of samples."""
+BLOCK = 512  # the trainer keeps what does not change of blocks of so many samples
 LARGEST_WEIGHT = 10**6
 MOST_PRESENTED = 2**28  # samples in an epoch: their indices take a GiB
 
@@ -129,6 +131,23 @@ def epochs_to_present_all(weights: Floats | None) -> int:
     return int(min(np.ceil(1 / least), 2**62))
 
 
+def averaged_every(n_samples: int) -> int:
+    """Return how many epochs lie between networks to be averaged: neighbours are too alike."""
+    return 1 if n_samples > LARGE_SAMPLE else 3
+
+
+def shuffled(order: Ints, random: np.random.RandomState, in_blocks: bool) -> Ints:
+    """Return samples in random order, or blocks of them.
+
+    >>> shuffled(np.arange(1026), np.random.RandomState(0), True)[[0, 1, 2, 3, 514]].tolist()
+    [1024, 1025, 512, 513, 0]
+    """
+    if not in_blocks:
+        return random.permutation(order)
+    blocks = np.split(order, np.arange(BLOCK, len(order), BLOCK))
+    return np.concatenate([blocks[index] for index in random.permutation(len(blocks))])
+
+
 def run_epochs(
     model: Any,
     trainer: Trainer,
@@ -138,12 +157,14 @@ def run_epochs(
     score: Callable[[], float] | None,
     weights: Floats | None,
     n_averaged_epochs: int,
+    in_blocks: bool,
 ) -> History:
     """Train until nothing is corrected, nothing improves, or ``max_iter`` epochs are over.
 
     ``random`` draws the order of every epoch, ``score`` returns the validation score (larger is
     better), ``weights`` are mean presentations per epoch. ``n_averaged_epochs`` networks are kept,
-    the last one and those of every third epoch before it, counted from the first.
+    the last one and those of every third epoch before it, counted from the first, or of every one.
+    ``in_blocks`` shuffles blocks of samples instead of samples.
     """
     network: Network = model.network_
     history = History(network)
@@ -155,7 +176,7 @@ def run_epochs(
         for epoch in range(max_iter):
             order = presented(n_samples, weights, epoch)
             if model.shuffle:
-                order = random.permutation(order)
+                order = shuffled(order, random, in_blocks)
             n_corrected, _ = trainer.present(order)
             history.n_corrected.append(n_corrected)
             advance(n_corrected)
@@ -169,7 +190,7 @@ def run_epochs(
             quiet = quiet + 1 if n_corrected == 0 else 0
             if quiet == n_quiet:
                 break
-            is_kept = (epoch + 1) % AVERAGED_EVERY == 0 and epoch + 1 < max_iter
+            is_kept = (epoch + 1) % averaged_every(n_samples) == 0 and epoch + 1 < max_iter
             if n_averaged_epochs > 1 and is_kept:
                 trainer.synchronize()
                 kept.append(network.copy())

@@ -53,7 +53,8 @@ class Trainer {
     const auto memory = [&](bool keeps_plans) {
       return form_memory(form_, layer_->n_units(), layer_->code(), n_samples_, keeps_plans);
     };
-    const bool keeps_plans = form_ == TrainingForm::block && memory(true) <= memory_limit;
+    const bool keeps_plans =
+        n_epochs > 1 && form_ == TrainingForm::block && memory(true) <= memory_limit;
     memory_ = memory(keeps_plans);
     renew_headroom();
     make_training(bins, n_threads, keeps_plans);

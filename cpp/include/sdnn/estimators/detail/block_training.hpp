@@ -36,9 +36,9 @@ namespace sdnn::estimators {
 /// the weights are corrected before the next pass, all corrections of a unit together. Weights are
 /// kept in 16 bits, in 32 as soon as a sum of them could leave 16.
 ///
-/// Blocks are large where the same ones come again in every epoch, in the order of the data, and
-/// there is memory to keep what does not change of them. `Product` is an integer that holds every
-/// product.
+/// Blocks are large where the same ones come again in every epoch, each in the order of the data,
+/// and there is memory to keep what does not change of them. `Product` is an integer that holds
+/// every product.
 template <class Product>
 class BlockTraining {
  public:
@@ -50,6 +50,9 @@ class BlockTraining {
         team_(static_cast<std::size_t>(n_threads)),
         most_samples_(keeps_plans ? kLargeBlock : kSmallBlock),
         keeps_plans_(keeps_plans),
+        plans_(keeps_plans
+                   ? (bins_.size() / layer_->code().n_inputs() + kLargeBlock - 1) / kLargeBlock
+                   : 0),
         words_(2 * most_samples_ * n_words_),
         entries_(64 * most_samples_ * n_words_),
         potentials_(most_samples_ * layer_->n_padded_units()),
@@ -62,16 +65,14 @@ class BlockTraining {
 
   template <class Rule>
   TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
-    if (keeps_plans_ && is_epoch_in_data_order(order)) {
-      if (had_an_epoch_) return present_epoch(order, rule);
-      had_an_epoch_ = true;  // it may be the only one
-    }
     TrainingCount count;
     while (!order.empty()) {
       core::interruption_point();
-      const auto some = order.first(std::min(order.size(), kSmallBlock));
+      const bool is_large = begins_with_a_large_block(order);
+      const std::size_t size = is_large ? large_size(order.front()) : kSmallBlock;
+      const auto some = order.first(std::min(order.size(), size));
       Plan plan;
-      count += present_block(some, &plan, rule);
+      count += present_block(some, is_large ? &plans_[block_of(order.front())] : &plan, rule);
       order = order.subspan(some.size());
     }
     return count;
@@ -102,7 +103,7 @@ class BlockTraining {
  private:
   // Samples per pass over the weights: where plans are kept, and elsewhere.
   static constexpr std::size_t kLargeBlock = 512;
-  static constexpr std::size_t kSmallBlock = 128;
+  static constexpr std::size_t kSmallBlock = 256;
 
   /// Words of a code, filled up with zeros to whole chunks.
   static std::size_t words_for(const coding::SelectiveDesensitization& code) noexcept {
@@ -122,27 +123,24 @@ class BlockTraining {
     core::AlignedBuffer<Product> products;  // (size, stride), 1 added to each
   };
 
-  /// Every sample once, in the order of the data?
-  bool is_epoch_in_data_order(std::span<const std::int32_t> order) const noexcept {
-    if (order.size() != bins_.size() / layer_->code().n_inputs()) return false;
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      if (static_cast<std::size_t>(order[i]) != i) return false;
+  static std::size_t block_of(std::int32_t sample) noexcept {
+    return static_cast<std::size_t>(sample) / kLargeBlock;
+  }
+  /// Samples of the large block with a sample: the last one may have fewer.
+  std::size_t large_size(std::int32_t sample) const noexcept {
+    const std::size_t n_samples = bins_.size() / layer_->code().n_inputs();
+    return std::min(kLargeBlock, n_samples - block_of(sample) * kLargeBlock);
+  }
+  /// Does the order begin with all samples of a large block, in the order of the data?
+  bool begins_with_a_large_block(std::span<const std::int32_t> order) const noexcept {
+    const auto first = static_cast<std::size_t>(order.front());
+    if (!keeps_plans_ || first % kLargeBlock != 0 || order.size() < large_size(order.front())) {
+      return false;
+    }
+    for (std::size_t i = 0; i < large_size(order.front()); ++i) {
+      if (static_cast<std::size_t>(order[i]) != first + i) return false;
     }
     return true;
-  }
-
-  /// An epoch in large blocks, whose plans are kept for the next one.
-  template <class Rule>
-  TrainingCount present_epoch(std::span<const std::int32_t> order, Rule& rule) {
-    TrainingCount count;
-    plans_.resize((order.size() + kLargeBlock - 1) / kLargeBlock);
-    for (Plan& plan : plans_) {
-      core::interruption_point();
-      const auto some = order.first(std::min(order.size(), kLargeBlock));
-      count += present_block(some, &plan, rule);
-      order = order.subspan(some.size());
-    }
-    return count;
   }
 
   template <class Rule>
@@ -264,8 +262,7 @@ class BlockTraining {
   core::WorkerTeam team_;
   std::size_t most_samples_;
   bool keeps_plans_;
-  bool had_an_epoch_ = false;  // in the order of the data
-  std::vector<Plan> plans_;
+  std::vector<Plan> plans_;                   // of large blocks
   std::vector<std::uint64_t> words_;          // (most_samples, active then positive, n_words)
   core::AlignedBuffer<std::int8_t> entries_;  // (chunks, most_samples, kChunkColumns): +1, 0, -1
   core::AlignedBuffer<std::int32_t> potentials_;  // (most_samples, n_padded_units)

@@ -1,0 +1,78 @@
+"""Samples of which blocks are shuffled, not single ones."""
+
+import numpy as np
+import pytest
+
+from sdnn import SDNNClassifier, SDNNRegressor, _core
+from sdnn.coding import RandomInverse
+from sdnn.estimators import base, training
+
+X = np.random.RandomState(0).uniform(size=(1300, 3))
+Y = np.sin(5 * X[:, 0]) * X[:, 1] + X[:, 2]
+OPTIONS = {"n_pattern_units": 64, "random_state": 0, "max_iter": 6}
+
+
+@pytest.fixture
+def few_are_many(monkeypatch):
+    for module in (base, training):
+        monkeypatch.setattr(module, "LARGE_SAMPLE", 1000)
+
+
+@pytest.mark.usefixtures("few_are_many")
+@pytest.mark.parametrize("make", [SDNNRegressor, SDNNClassifier])
+def test_forms_and_threads_change_no_bit(make):
+    y = Y if make is SDNNRegressor else np.median(Y) < Y
+    models = [
+        make(training=form, n_jobs=n_jobs, **OPTIONS).fit(X, y)
+        for form, n_jobs in [("auto", 1), ("block", 2), ("dual", 1), ("plain", 1)]
+    ]
+    assert models[0].training_form_ == "block"
+    for model in models[1:]:
+        np.testing.assert_array_equal(model.weights_, models[0].weights_)
+        np.testing.assert_array_equal(model.predict(X), models[0].predict(X))
+
+
+@pytest.mark.usefixtures("few_are_many")
+def test_the_last_epochs_are_averaged_whatever_their_number():
+    model = SDNNRegressor(**OPTIONS).fit(X, Y)
+    for n_epochs, earlier in zip((3, 4, 5), model._earlier, strict=True):
+        one = SDNNRegressor(**{**OPTIONS, "max_iter": n_epochs}).fit(X, Y)
+        np.testing.assert_array_equal(earlier.weights, one.weights_)
+    assert model.score(X, Y) > 0.95
+
+
+@pytest.mark.usefixtures("few_are_many")
+def test_sorted_samples_are_mixed():
+    order = np.argsort(Y)
+    model = SDNNRegressor(**{**OPTIONS, "max_iter": 2}).fit(X[order], Y[order])
+    assert model.score(X, Y) > 0.9
+
+
+@pytest.mark.usefixtures("few_are_many")
+def test_weights_and_held_out_samples_are_kept_apart():
+    held = SDNNRegressor(early_stopping=True, refit=True, **OPTIONS).fit(X, Y)
+    assert held.score(X, Y) > 0.95
+    twice = SDNNRegressor(**OPTIONS).fit(X, Y, np.full(len(X), 2.0))  # samples are shuffled
+    assert twice.score(X, Y) > 0.95
+
+
+def test_blocks_in_any_order_are_trained_as_single_samples():
+    code = SDNNRegressor(RandomInverse(low=0, high=1), **{**OPTIONS, "max_iter": 1})
+    network = code.fit(X, Y).network_
+    bins = network.input_code.bins(X)
+    targets = code._in_counts(Y[:, None])
+    blocks = np.split(np.arange(len(X), dtype=np.int32), [512, 1024])
+    orders = [
+        np.concatenate([blocks[1], blocks[2], blocks[0]]),
+        np.concatenate([blocks[2], blocks[2], blocks[0][:-1], blocks[1], blocks[0][1:]]),
+        np.concatenate([blocks[0][5:], blocks[1], blocks[0]]),
+        np.concatenate(blocks),
+    ]
+    trained = []
+    for form in ("plain", "block"):
+        layer = network.copy().layer
+        trainer = _core.PDeltaTrainer(layer, bins, targets, 1.0, form=form, memory_limit=2**30)
+        counts = [trainer.present(order) for order in orders]
+        trainer.synchronize()
+        trained.append((counts, layer.weights.tolist(), layer.thresholds.tolist()))
+    assert trained[0] == trained[1]
