@@ -212,23 +212,16 @@ def train_run(
 
 def outcome_text(run: Run, outcome: RunOutcome) -> str:
     """Write the outcome of a training: what was learned, what did not suit, and what comes next."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
     from sdnn.runs.run import resume_command
 
-    environment = Environment(
-        loader=PackageLoader("sdnn.cli", "."),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     report = outcome.learning_report
     beyond: list[int] = []
     within: list[int] = []
     if report is not None:
         within = _where(report["share_of_range"], lambda share: 0.0 < share < 0.1)
         beyond = _where(report["share_beyond_range"], lambda share: share > 0.1)
-    return environment.get_template("outcome.txt.jinja").render(
+    return rendered(
+        "outcome.txt.jinja",
         run=run,
         outcome=outcome,
         report=report,
@@ -243,6 +236,19 @@ def outcome_text(run: Run, outcome: RunOutcome) -> str:
 
 def _where(shares: Sequence[float | None], is_so: Callable[[float], bool]) -> list[int]:
     return [i for i, share in enumerate(shares) if share is not None and is_so(share)]
+
+
+def rendered(template: str, **values: Any) -> str:
+    """Write values by a template of this package; without a line feed at the end."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("sdnn.cli", "."),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(template).render(values).rstrip("\n")
 
 
 def json_text(values: Any) -> str:
@@ -294,13 +300,16 @@ def print_forecast(
     request: Any, *, as_json: bool, more: Mapping[str, Any] | None = None, **options: Any
 ) -> None:
     """Print what is still to be run and how long that takes; as JSON with more values."""
-    from sdnn.runs.forecast import forecast, forecast_lines
+    from sdnn.runs.forecast import forecast
+    from sdnn.runs.report import duration_words
 
     found = forecast(request.out, request.groups, request.executor.jobs, **options)
     found = {**found, **(more or {})}
-    lines = [json.dumps(found, indent=2)] if as_json else forecast_lines(found, request.out)
-    for line in lines:
-        click.echo(line)
+    if as_json:
+        click.echo(json.dumps(found, indent=2))
+    else:
+        words = rendered("forecast.txt.jinja", out=request.out, duration=duration_words, **found)
+        click.echo(words, nl=bool(words))
 
 
 def make_console() -> Console:

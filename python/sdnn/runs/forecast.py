@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from sdnn.machine import n_cores
 from sdnn.runs.engine import PlannedTrial
 from sdnn.runs.errors import RunError
-from sdnn.runs.report import duration_words
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import TrialKey, TrialTime, opened
@@ -77,31 +76,6 @@ def forecast(
         "jobs": jobs,
         "seconds": {"lower": lower, "upper": upper},
     }
-
-
-def forecast_lines(found: dict[str, Any], out: Path) -> Iterator[str]:
-    """Write a forecast for a reader; `out` is the folder of the result file."""
-    for one in found["trials"]:
-        text = (
-            f"{one['case']} {one['variant']}: {one['planned']} trials x"
-            f" {one['episodes'] or one['steps']} {'episodes' if one['episodes'] else 'steps'} of"
-            f" {one['agent']}, {one['stored']} of them stored in {out}"
-        )
-        if estimate := one["seconds_of_a_trial"]:
-            text += f"; a trial takes {_words(estimate)} (by {estimate['source']})"
-        yield text
-    if not found["trials"]:
-        return
-    yield (
-        f"in all {found['planned']} trials, {found['stored']} of them stored; the rest takes"
-        f" {_words(found['seconds'])} with {found['jobs']} at the same time"
-    )
-
-
-def _words(estimate: dict[str, Any]) -> str:
-    lower = estimate["lower"]
-    text = duration_words(lower) if lower >= 10 else f"{lower:.2g} s"
-    return f"{text} or more" if estimate["upper"] is None else f"about {text}"
 
 
 def trial_seconds(key: TrialKey, spec: RunSpec, times: Times) -> dict[str, Any]:

@@ -9,6 +9,8 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import reduce
+from operator import or_
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
@@ -126,9 +128,7 @@ class StudyFile:
         ConfigError if a setting is unknown, has the wrong type or does not go with another.
         """
         own = (case.settings, variant.settings, variant.case_settings.get(case.id, {}))
-        settings: Layer = {}
-        for layer in (self.base, *own):
-            settings |= layer
+        settings = reduce(or_, (self.base, *own))
         chosen = settings.get(("agent", "name"))
         on_acrobot = not any(name[0] == "environment" for name in settings)
         label = default_agent(on_acrobot=on_acrobot) if chosen is None else str(chosen.value)
@@ -136,9 +136,8 @@ class StudyFile:
             words = [split_label(label)[0], label]
         except ValueError:  # refused with the specification
             words = []
-        settings = {}
-        for layer in (self.base, *(self.agents.get(word, {}) for word in words), *own):
-            settings |= layer
+        agents = (self.agents.get(word, {}) for word in words)
+        settings = reduce(or_, (self.base, *agents, *own))
         try:
             values = {".".join(name): setting.value for name, setting in settings.items()}
             return RunSpec.from_values(overridden({}, values)), settings
