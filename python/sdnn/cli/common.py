@@ -319,15 +319,13 @@ def make_console() -> Console:
     return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
 
 
-EXECUTORS = ("threads", "dask")
-
 Function = Callable[..., Any]
 
 _OPTIONS = (
     click.option(
         "--executor",
         "where",
-        type=click.Choice(EXECUTORS),
+        type=click.Choice(("threads", "dask")),
         default="threads",
         show_default=True,
         help="Where trials run: threads of this process, or the workers of a Dask cluster.",

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sdnn import _core, machine
-from sdnn.config import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.config import RBFNetworkConfig
 from sdnn.runs.engine import Counted, Observer
 from sdnn.runs.registry import AGENTS, split_label
 from sdnn.runs.store import ResultStore
@@ -47,23 +47,16 @@ class CostSeries:
     is_plain: bool = False  # its product structure is unused: seconds a step with many inputs
 
 
-def _sdnn_bytes(network: SDNNCConfig) -> int:
-    return network.n_pattern_units * network.n_pairs * network.n_hidden_units
-
-
-def _rules_bytes(rules: FuzzyRulesConfig) -> int:
-    return int(4 * rules.n_sets**rules.n_inputs * rules.n_actions)
-
-
 def _rbf_bytes(network: RBFNetworkConfig) -> int:
     return int(8 * network.n_bases ** (network.n_inputs + 1))
 
 
 SERIES = (
     CostSeries("sdnn-c", "SDNN-C", "sdnn-c", "$d(d-1)$ groups of columns",
-               _core.SDNNQLearning, _sdnn_bytes),
+               _core.SDNNQLearning,
+               lambda one: one.n_pattern_units * one.n_pairs * one.n_hidden_units),
     CostSeries("fuzzy", "FQL", "fuzzy", "$2^d$ fired rules of $9^d$",
-               _core.FuzzyQLearning, _rules_bytes,
+               _core.FuzzyQLearning, lambda one: 4 * one.n_sets**one.n_inputs * one.n_actions,
                {"max_table_bytes": 2**32}),  # with 8 inputs it has 3.6 GB, nearly all untouched
     CostSeries("rbf", "RBFN, factored", "rbf", "$4^{d+1}$ weights",
                _core.RBFQLearning, _rbf_bytes),

@@ -299,7 +299,11 @@ class _Run:
         from distributed import KilledWorker
 
         planned = self.placed.pop(future.key).planned
-        if future.status == "finished":
+        expected = _core.__version__, planned.spec.canonical_json()
+        if future.status == "finished" and (result.version, result.config) != expected:
+            version = f"sdnn {result.version}, not {_core.__version__}"
+            yield Failed(planned, ClusterError(f"run by other code or settings: {version}"))
+        elif future.status == "finished":
             yield Advanced(planned, planned.spec.length)
             yield Finished(planned, result)
         elif future.status != "error":

@@ -162,7 +162,7 @@ def title_of(label: str) -> str:
     return AGENTS[name].title + (f", {preset}" if preset else "")
 
 
-register(
+for _entry in (
     AgentEntry(
         id="sdnn-c",
         title="SDNN-C",
@@ -171,9 +171,7 @@ register(
         agent=SDNNQLearning,
         core_trial=_core.AcrobotTrial,
         presets=PRESETS,
-    )
-)
-register(
+    ),
     AgentEntry(
         id="fuzzy",
         title="FQL",
@@ -181,9 +179,7 @@ register(
         learning=FuzzyQLearningConfig,
         agent=FuzzyQLearning,
         core_trial=_core.FuzzyAcrobotTrial,
-    )
-)
-register(
+    ),
     AgentEntry(
         id="rbf",
         title="RBFN",
@@ -191,9 +187,7 @@ register(
         learning=QLearningConfig,
         agent=RBFQLearning,
         core_trial=_core.RBFAcrobotTrial,
-    )
-)
-register(
+    ),
     AgentEntry(
         id="sdnn-linear",
         title="SDNN, linear",
@@ -202,5 +196,6 @@ register(
         agent=SDNNSarsa,
         core_trial=_core.LinearAcrobotTrial,
         presets=LINEAR_PRESETS,
-    )
-)
+    ),
+):
+    register(_entry)
