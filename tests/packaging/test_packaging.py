@@ -195,7 +195,8 @@ def test_the_type_stub_is_up_to_date():
 SHIPPED = (
     r"PKG-INFO|CMakeLists\.txt|pyproject\.toml|LICENSE|CITATION\.cff|[A-Z_]+\.md",
     r"CMakePresets\.json|noxfile\.py|mkdocs\.yml|\.gitignore|\.clang-(format|tidy)|docs/site/Doxyfile",
-    r"cmake/((toolchains/)?[^/]+\.cmake(\.in)?|sdnn\.pc\.in)",
+    r"cmake/((toolchains/)?[^/]+\.cmake(\.in)?|sdnn\.pc\.in|vcpkg/sdnn/(portfile\.cmake|vcpkg\.json))",
+    r"conanfile\.py",
     r"cpp/include/sdnn/([a-z_]+/){0,2}[a-z0-9_]+\.hpp",
     r"cpp/tools/[a-z_]+\.hpp|cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
     r"python/sdnn/([a-z_]+/){0,2}[a-z_]+\.pyi?|python/sdnn/py\.typed",

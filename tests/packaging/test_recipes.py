@@ -1,0 +1,93 @@
+"""Recipes of package managers for C++, without a network."""
+
+import json
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "docs" / "examples" / "cpp"
+
+STAND_IN = """
+from conan import ConanFile
+class Found(ConanFile):
+    name, version, package_type = "{name}", "{version}", "header-library"
+    def package_info(self):
+        self.cpp_info.set_property("cmake_file_name", "{file}")
+        self.cpp_info.set_property("cmake_target_name", "{target}")
+        self.cpp_info.includedirs = [r"{include}"]
+        self.cpp_info.bindirs = self.cpp_info.libdirs = []
+"""
+"""A package of headers that this machine has, in the place of the one of Conan's server."""
+
+
+@pytest.fixture
+def conan(needs, tmp_path):
+    needs("conan", "g++")
+
+    def run(*arguments):
+        env = os.environ | {"CONAN_HOME": str(tmp_path / "conan")}
+        command = ["conan", *map(str, arguments)]
+        done = subprocess.run(
+            command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    run("profile", "detect")
+    return run
+
+
+def include_folder(target, configure, folder):
+    """Finds the headers of a target of CMake on this machine."""
+    folder.mkdir()
+    find_eigen = (ROOT / "cmake" / "FindEigenAnyway.cmake").as_posix()
+    (folder / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.21)\nproject(finder LANGUAGES CXX)\n"
+        f"include({find_eigen})\nfind_package(nlohmann_json REQUIRED)\n"
+        f"get_target_property(found {target} INTERFACE_INCLUDE_DIRECTORIES)\n"
+        'message(STATUS "found: ${found}")\n'
+    )
+    done = configure(folder, folder / "build")
+    assert done.returncode == 0, done.stdout + done.stderr
+    return re.search(r"found: ([^;\n]+)", done.stdout)[1]
+
+
+def test_a_program_is_built_with_conan(conan, cmake, configure, tmp_path):
+    for name, version, target in (
+        ("eigen", "3.4.0", "Eigen3::Eigen"),
+        ("nlohmann_json", "3.11.3", "nlohmann_json::nlohmann_json"),
+    ):
+        values = {"name": name, "version": version, "target": target, "file": target.split(":")[0]}
+        include = include_folder(target, configure, tmp_path / name)
+        recipe = tmp_path / f"{name}.py"
+        recipe.write_text(STAND_IN.format(**values, include=include))
+        conan("create", recipe)
+    standard = ("-s:a", "compiler.cppstd=20")
+    conan("create", ROOT, *standard)
+    version = re.search(r"project\(sdnn VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
+    build = tmp_path / "build"
+    generators = ("-g", "CMakeDeps", "-g", "CMakeToolchain", "--output-folder", build)
+    conan("install", f"--requires=sdnn/{version}", *generators, *standard)
+    quick = ("-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS=-O0")
+    toolchain = f"-DCMAKE_TOOLCHAIN_FILE={build}/conan_toolchain.cmake"
+    done = configure(EXAMPLE, build / "cmake", toolchain, *quick)
+    assert done.returncode == 0, done.stdout + done.stderr
+    done = cmake("--build", build / "cmake", "--target", "regression")
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_conan_refuses_older_standards(conan):
+    with pytest.raises(AssertionError, match="cppstd"):
+        conan("create", ROOT, "-s:a", "compiler.cppstd=17")
+
+
+def test_the_port_of_vcpkg_has_the_version_and_the_dependencies():
+    port = ROOT / "cmake" / "vcpkg" / "sdnn"
+    manifest = json.loads((port / "vcpkg.json").read_text())
+    assert f"VERSION {manifest['version']} " in (ROOT / "CMakeLists.txt").read_text()
+    assert {"eigen3", "nlohmann-json"} <= {str(one) for one in manifest["dependencies"]}
+    assert (port / "../../..").resolve() == ROOT.resolve()  # where the port looks for it
