@@ -81,13 +81,6 @@ def reproduce(
         raise click.UsageError(str(error)) from error
     with errors_in_a_line():
         if dry_run:
-            planned, stored = request.count_costs()
-            costs = {"planned": planned, "stored": stored}
-            print_forecast(request, as_json=as_json, more={"costs": costs})
-            if planned and not as_json:
-                click.echo(
-                    f"cost of a step: {planned} measurements, {stored} of them stored in"
-                    f" {request.out}"
-                )
+            print_forecast(request, as_json=as_json, more={"costs": request.count_costs()})
         else:
             run_and_report(context, run, request, as_json=as_json, full=full)

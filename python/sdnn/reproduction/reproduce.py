@@ -124,13 +124,14 @@ class ReproduceRequest:
             groups.setdefault(planned.key[:2], []).append(planned)
         return groups
 
-    def count_costs(self) -> tuple[int, int]:
+    def count_costs(self) -> dict[str, int]:
         """Count the costs that are planned, and those that are stored, without making any file."""
         measured: set[CostKey] = set()
         if (self.out / STORE_NAME).exists():
             with ResultStore(self.out, read_only=True) as store:
                 measured = {one.key for one in _costs(self, store)}
-        return len(self.plan.costs), len(measured.intersection(self.plan.costs))
+        costs = self.plan.costs
+        return {"planned": len(costs), "stored": len(measured.intersection(costs))}
 
     @property
     def cost_config(self) -> CostConfig:
