@@ -366,33 +366,31 @@ def read_study(path: Path, *, n_trials: int | None = None, seed: int | None = No
     return Study(path, n_trials=n_trials, seed=seed, known_cases=known_cases)
 
 
-@dataclass(frozen=True)
 class StudyClaims:
     """The paper's claims about the variants of a study.
 
     A case counts as the paper's by its id, an agent by its own: what a variant has changed is what
-    is judged.
+    is judged. `by_variant` has the claims of which every quantity is measured, by variant and
+    number of the claim; `shown` are the claims about any variant.
     """
 
-    comparison: Comparison
-
-    @cached_property
-    def by_variant(self) -> Mapping[str, Mapping[int, ClaimOutcome]]:
-        """Claims of which every quantity is measured, by variant and number of the claim."""
-        return {
+    def __init__(self, comparison: Comparison) -> None:
+        self.comparison = comparison
+        results: dict[str, list[CaseResult]] = {v.id: [] for v in comparison.variants}
+        for (case, variant), measured in comparison.measured.items():
+            if case in PAPER_CASES and measured.combination.spec.environment is None:
+                results[variant].append(measured.result)
+        self._ten_trials = {variant: TenTrials(own) for variant, own in results.items()}
+        self.by_variant = {
             variant: {
                 outcome.claim.number: replace(outcome, chance=self._chance(variant, outcome.claim))
-                for outcome in judge_claims(results)
+                for outcome in judge_claims(own)
                 if all(checked.estimate is not None for checked in outcome.checks)
             }
-            for variant, results in self._results.items()
+            for variant, own in results.items()
         }
-
-    @cached_property
-    def shown(self) -> tuple[Claim, ...]:
-        """The claims about any variant."""
         found = {n: one.claim for own in self.by_variant.values() for n, one in own.items()}
-        return tuple(found[number] for number in sorted(found))
+        self.shown = tuple(found[number] for number in sorted(found))
 
     def moved(self, variant: str, outcome: ClaimOutcome) -> bool | None:
         """Return whether the verdict differs from that of the reference; None if one is missing."""
@@ -444,19 +442,6 @@ class StudyClaims:
         if self.comparison.study.n_trials < MIN_TRIALS_TO_DRAW or not claims:
             return None
         return self._ten_trials[variant].chance(*claims)
-
-    @cached_property
-    def _ten_trials(self) -> dict[str, TenTrials]:
-        return {variant: TenTrials(results) for variant, results in self._results.items()}
-
-    @cached_property
-    def _results(self) -> dict[str, list[CaseResult]]:
-        """Return the measures of each variant in the paper's cases."""
-        results: dict[str, list[CaseResult]] = {v.id: [] for v in self.comparison.variants}
-        for (case, variant), measured in self.comparison.measured.items():
-            if case in PAPER_CASES and measured.combination.spec.environment is None:
-                results[variant].append(measured.result)
-        return results
 
 
 def add_claims(comparison: Comparison) -> Addition:
