@@ -209,6 +209,9 @@ REGRESSORS = {
     "SDNN, 4,000 columns": lambda seed, n_inputs: SDNNRegressor(
         n_pattern_units=short(n_inputs), random_state=seed
     ),
+    "SDNN, features selected": lambda seed, n_inputs: SDNNRegressor(
+        pairs="auto", random_state=seed
+    ),
     "gradient boosting": lambda seed, n_inputs: HistGradientBoostingRegressor(random_state=seed),
     "random forest": lambda seed, n_inputs: RandomForestRegressor(random_state=seed),
     "SVM": lambda seed, n_inputs: scaled(SVR()),
@@ -223,6 +226,9 @@ CLASSIFIERS = {
     "SDNN, 4,000 columns": lambda seed, n_inputs: SDNNClassifier(
         n_pattern_units=short(n_inputs), random_state=seed
     ),
+    "SDNN, features selected": lambda seed, n_inputs: SDNNClassifier(
+        pairs="auto", random_state=seed
+    ),
     "gradient boosting": lambda seed, n_inputs: HistGradientBoostingClassifier(random_state=seed),
     "random forest": lambda seed, n_inputs: RandomForestClassifier(random_state=seed),
     "SVM": lambda seed, n_inputs: scaled(SVC()),
@@ -230,7 +236,7 @@ CLASSIFIERS = {
     "neighbours": lambda seed, n_inputs: scaled(KNeighborsClassifier()),
     "linear": lambda seed, n_inputs: scaled(LogisticRegression(max_iter=1000)),
 }
-VARIANTS = ("SDNN, last epoch", "SDNN, 4,000 columns")
+VARIANTS = ("SDNN, last epoch", "SDNN, 4,000 columns", "SDNN, features selected")
 """Settings of a model that is there: they have no rank."""
 
 TABLES = {"R2": (REGRESSION, REGRESSORS), "accuracy": (CLASSIFICATION, CLASSIFIERS)}
@@ -339,7 +345,8 @@ def draw(found, path):
     figure = Figure(figsize=(10, 6.4), layout="constrained")
     colors = {
         "SDNN": "#1f5fa8", "SDNN kernel ridge": "#6fa8dc", "SDNN, last epoch": "#0b2f57",
-        "SDNN, 4,000 columns": "#36b0b0", "gradient boosting": "#d9822b",
+        "SDNN, 4,000 columns": "#36b0b0", "SDNN, features selected": "#7b61c4",
+        "gradient boosting": "#d9822b",
         "random forest": "#5b8c5a", "SVM": "#a05195", "Gaussian process": "#c2453a",
         "MLP": "#8a7f3d", "neighbours": "#888888", "linear": "#bbbbbb",
     }  # fmt: skip

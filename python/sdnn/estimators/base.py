@@ -74,7 +74,7 @@ class BaseSDNN(Fitted, CodedInputs):
         Pairs of features, by number or name; a modifier of None leaves a pattern plain. "budget"
         takes all pairs up to 22 features, beyond that an even random share: 500 pairs, or one per
         feature. "auto" drops features that do not matter, half of them at a time, by the score of a
-        held-out fifth, which takes some three to nine times as long.
+        held-out fifth, which takes up to five times as long.
     tables : {"shared", "separate"}, default="shared"
         One table of patterns per input, permuted for each pair, or two tables per pair.
     max_iter : int, optional
