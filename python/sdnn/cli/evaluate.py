@@ -10,7 +10,6 @@ from sdnn.cli.common import (
     WARMING_UP,
     json_option,
     json_text,
-    rendered,
     run_argument,
     run_command,
     seed_option,
@@ -55,4 +54,14 @@ def evaluate(folder: Path, episodes: int, best: bool, seed: int | None, as_json:
     if as_json:
         click.echo(json_text({**values, "returns": returns.tolist()}))
         return
-    click.echo(rendered("evaluation.txt.jinja", **values, warming_up=WARMING_UP))
+    click.echo(f"{folder}: mean return {found.mean_return:.6g} over {episodes} greedy episodes")
+    click.echo(
+        f"median {median:.6g}, quartiles {low:.6g} to {high:.6g}, all {returns.min():.6g} to"
+        f" {returns.max():.6g}"
+    )
+    click.echo(
+        f"{values['mean_length']:.6g} steps on average,"
+        f" {values['share_terminated']:.0%} of the episodes terminated"
+    )
+    if found.is_warming_up:
+        click.echo(WARMING_UP)
