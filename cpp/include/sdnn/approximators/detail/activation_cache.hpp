@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -15,8 +16,33 @@
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/state_code.hpp"
+#include "sdnn/core/detail/kernel.hpp"
+#include "sdnn/core/detail/lanes.hpp"
 
 namespace sdnn::approximators {
+
+namespace detail {
+
+inline constexpr std::size_t kCacheEntries = 64;
+using Distances = std::array<std::int32_t, kCacheEntries>;
+
+SDNN_INLINE void add_up_distances_body(const coding::Bin* cached, std::span<const coding::Bin> bins,
+                                       Distances& distances) noexcept {
+  Distances sums{};
+  for (const coding::Bin bin : bins) {
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += std::abs(cached[k] - bin);
+    cached += sums.size();
+  }
+  distances = sums;
+}
+
+}  // namespace detail
+
+/// The distances of a state from the cached ones, in bins. Shape: cached (l, kCacheEntries).
+SDNN_KERNEL(void, add_up_distances,
+            (const coding::Bin* cached, std::span<const coding::Bin> bins,
+             detail::Distances& distances),
+            (cached, bins, distances))
 
 /// The inner potentials of the last states that one user of a network asked about.
 ///
@@ -69,6 +95,8 @@ class ActivationCache {
     columns_per_bin_ = (n_partners + columns_of_modifier) * std::max(differing, 0.05);
     columns_per_correction_ = 0.15 * l * n_partners;
     columns_of_pass_ = 0.5 * l * static_cast<double>(code.n_pattern_units()) * columns_of_modifier;
+    too_far_ = static_cast<std::int32_t>(
+        std::min(std::ceil(columns_of_pass_ / columns_per_bin_), double{INT32_MAX}));
   }
 
   /// Bytes that it holds, but for what does not grow with this size.
@@ -93,22 +121,22 @@ class ActivationCache {
         return use(code, log, slot);
       }
     }
-    std::array<std::int32_t, kEntries> distance{};
-    for (std::size_t i = 0; i < n_inputs_; ++i) {
-      const coding::Bin* const cached = bins_by_input_.data() + i * kEntries;
-      for (std::size_t slot = 0; slot < kEntries; ++slot) {
-        distance[slot] += std::abs(cached[slot] - bins[i]);
-      }
-    }
+    detail::Distances distances;
+    add_up_distances(bins_by_input_.data(), bins, distances);
     std::size_t nearest = kEntries;
     std::size_t oldest = 0;
+    std::uint64_t oldest_use = last_use_[oldest];
     double least = columns_of_pass_;
     for (std::size_t slot = 0; slot < kEntries; ++slot) {
-      if (last_use_[slot] < last_use_[oldest]) oldest = slot;
+      if (last_use_[slot] < oldest_use) {
+        oldest_use = last_use_[slot];
+        oldest = slot;
+      }
+      if (distances[slot] >= too_far_) continue;
       const std::uint64_t lag = log.size() - up_to_[slot];
       if (last_use_[slot] == 0 || lag > CorrectionLog::kSize) continue;
       const double cost =
-          columns_per_bin_ * distance[slot] + columns_per_correction_ * static_cast<double>(lag);
+          columns_per_bin_ * distances[slot] + columns_per_correction_ * static_cast<double>(lag);
       if (cost < least) {
         least = cost;
         nearest = slot;
@@ -181,7 +209,7 @@ class ActivationCache {
     coding::ColumnLists lists;
   };
 
-  static constexpr std::size_t kEntries = 64;
+  static constexpr std::size_t kEntries = detail::kCacheEntries;
 
   std::span<const coding::Bin> bins_of(std::size_t slot) const noexcept {
     return {bins_.data() + slot * n_inputs_, n_inputs_};
@@ -232,6 +260,7 @@ class ActivationCache {
   double columns_per_bin_;
   double columns_per_correction_;
   double columns_of_pass_;
+  std::int32_t too_far_;  ///< bins
   Counts counts_;
 };
 
