@@ -1,6 +1,7 @@
 /// A set of input columns, and what a list of columns has in common with it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cassert>
@@ -13,11 +14,6 @@
 #include "sdnn/core/bit_layer.hpp"
 #include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/core/detail/lanes.hpp"
-#include "sdnn/core/instruction_set.hpp"
-
-#if SDNN_X86_KERNELS
-#include <immintrin.h>
-#endif
 
 namespace sdnn::approximators {
 
@@ -69,44 +65,24 @@ SDNN_INLINE std::uint32_t* intersect_body(const ListedWord* begin, const ListedW
   return out;
 }
 
+/// Words in which both have a bit are listed first, so that no branch depends on the others.
 SDNN_INLINE std::uint32_t* intersect_bits_body(const std::uint64_t* bits, const core::BitWord* set,
                                                std::size_t n_words, std::uint32_t* out) noexcept {
-  for (std::size_t w = 0; w < n_words; ++w) {
-    out = append_columns(out, bits[w] & set[w].to_ullong(), static_cast<std::uint32_t>(w));
-  }
-  return out;
-}
-
-#if SDNN_X86_KERNELS
-
-/// Eight words at a time: those in which both have a bit are moved together first.
-[[SDNN_TARGET_AVX512]] inline std::uint32_t* intersect_bits_avx512(const std::uint64_t* bits,
-                                                                   const core::BitWord* set,
-                                                                   std::size_t n_words,
-                                                                   std::uint32_t* out) noexcept {
-  static_assert(sizeof(core::BitWord) == sizeof(std::uint64_t));
-  const __m512i eight = _mm512_set1_epi64(8);
-  __m512i words = _mm512_setr_epi64(0, 1, 2, 3, 4, 5, 6, 7);
-  for (std::size_t w = 0; w < n_words; w += 8) {
-    const std::size_t n_left = n_words - w;
-    const auto some = static_cast<__mmask8>(n_left < 8 ? (1U << n_left) - 1 : 0xFF);
-    const __m512i both = _mm512_and_si512(_mm512_maskz_loadu_epi64(some, bits + w),
-                                          _mm512_maskz_loadu_epi64(some, set + w));
-    const __mmask8 found = _mm512_test_epi64_mask(both, both);
-    alignas(64) std::array<std::uint64_t, 8> found_bits;
-    alignas(64) std::array<std::uint64_t, 8> found_words;
-    _mm512_store_si512(found_bits.data(), _mm512_maskz_compress_epi64(found, both));
-    _mm512_store_si512(found_words.data(), _mm512_maskz_compress_epi64(found, words));
-    const auto n_found = static_cast<std::size_t>(std::popcount(found));
-    for (std::size_t k = 0; k < n_found; ++k) {
-      out = coding::detail::append_few_bits<2>(out, found_bits[k], 64 * found_words[k]);
+  constexpr std::size_t kAtOnce = 64;
+  std::array<ListedWord, kAtOnce + 1> found;
+  for (std::size_t first = 0; first < n_words; first += kAtOnce) {
+    std::size_t n_found = 0;
+    for (std::size_t w = first; w < std::min(first + kAtOnce, n_words); ++w) {
+      const std::uint64_t both = bits[w] & set[w].to_ullong();
+      found[n_found] = {both, static_cast<std::uint32_t>(w)};
+      n_found += both != 0 ? 1 : 0;
     }
-    words = _mm512_add_epi64(words, eight);
+    for (std::size_t k = 0; k < n_found; ++k) {
+      out = coding::detail::append_few_bits<2>(out, found[k].bits, 64 * found[k].word);
+    }
   }
   return out;
 }
-
-#endif  // SDNN_X86_KERNELS
 
 }  // namespace detail
 
@@ -116,27 +92,12 @@ SDNN_KERNEL(std::uint32_t*, intersect,
              std::uint32_t* out),
             (begin, end, set, out))
 
-SDNN_KERNEL_PORTABLE(std::uint32_t*, intersect_bits,
-                     (const std::uint64_t* bits, const core::BitWord* set, std::size_t n_words,
-                      std::uint32_t* out),
-                     (bits, set, n_words, out))
-
-SDNN_KERNEL_NEON(std::uint32_t*, intersect_bits,
-                 (const std::uint64_t* bits, const core::BitWord* set, std::size_t n_words,
-                  std::uint32_t* out),
-                 (bits, set, n_words, out))
-
-SDNN_KERNEL_AVX2(std::uint32_t*, intersect_bits,
-                 (const std::uint64_t* bits, const core::BitWord* set, std::size_t n_words,
-                  std::uint32_t* out),
-                 (bits, set, n_words, out))
-
-/// Writes the columns of words of bits that are in a set of as many; returns their end, beyond which
-/// it may write two numbers.
-SDNN_DISPATCH(std::uint32_t*, intersect_bits,
-              (const std::uint64_t* bits, const core::BitWord* set, std::size_t n_words,
-               std::uint32_t* out),
-              (bits, set, n_words, out))
+/// Writes the columns of words of bits that are in a set of as many; returns their end, beyond
+/// which it may write two numbers.
+SDNN_KERNEL(std::uint32_t*, intersect_bits,
+            (const std::uint64_t* bits, const core::BitWord* set, std::size_t n_words,
+             std::uint32_t* out),
+            (bits, set, n_words, out))
 
 /// A list of columns as bits of words, to be compared with many sets.
 template <std::size_t Most>
