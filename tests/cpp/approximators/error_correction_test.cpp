@@ -2,6 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <string>
+
+#include "instruction_sets.hpp"
+#include "sdnn/core/random.hpp"
+
 namespace sdnn::approximators {
 namespace {
 
@@ -40,6 +46,33 @@ TEST(SelectUnits, EqualDistancesGoToTheLowestIndex) {
 
 TEST(SelectUnits, OneSubsetPerUnitTakesAll) {
   EXPECT_EQ(select({-4, -40, -400}, 3), (Units{0, 1, 2}));
+}
+
+TEST(SelectUnits, InstructionSetsSelectTheNearestOfAnySubset) {
+  core::Random random(1, core::Stream::weights);
+  for (int size = 1; size < 150; ++size) {
+    std::vector<std::int32_t> potentials(static_cast<std::size_t>(size));
+    const auto largest = 1 + random.below(size % 3 == 0 ? 3 : 1000);
+    for (auto& h : potentials) {
+      h = static_cast<std::int32_t>(random.below(2 * largest)) - static_cast<std::int32_t>(largest);
+    }
+    for (const int deficit : {1, -1, (size + 1) / 2, -size}) {
+      const auto n = static_cast<std::size_t>(std::abs(deficit));
+      Units expected;
+      for (std::size_t i = 0; i < n; ++i) {
+        std::size_t best = potentials.size();
+        const std::size_t end = (i + 1) * potentials.size() / n;
+        for (std::size_t unit = i * potentials.size() / n; unit < end; ++unit) {
+          const std::int32_t h = potentials[unit];
+          if ((h > 0) != (deficit < 0)) continue;
+          if (best == potentials.size() || std::abs(h) < std::abs(potentials[best])) best = unit;
+        }
+        if (best != potentials.size()) expected.push_back(static_cast<std::uint32_t>(best));
+      }
+      testing::on_every_instruction_set(
+          [&](auto level) { ASSERT_EQ(select(potentials, deficit), expected) << level; });
+    }
+  }
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 /// The paper's learning rule: which units to correct.
 #pragma once
 
+#include <bit>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
@@ -8,7 +9,87 @@
 #include <span>
 #include <vector>
 
+#include "sdnn/core/detail/kernel.hpp"
+#include "sdnn/core/instruction_set.hpp"
+
+#if SDNN_X86_KERNELS
+#include <immintrin.h>
+#endif
+
 namespace sdnn::approximators {
+
+namespace detail {
+
+/// As h ^ flip + offset the distance of a unit from its threshold: h - 1 of active ones, -h of the
+/// others, and 2^31 or more of those that are not asked for.
+struct DistanceOf {
+  explicit DistanceOf(bool active) noexcept : flip(active ? 0 : -1), offset(active ? -1 : 1) {}
+
+  std::int32_t flip;
+  std::int32_t offset;
+};
+
+inline std::size_t nearest_unit_portable(const std::int32_t* potentials, std::size_t size,
+                                         const DistanceOf& of) noexcept {
+  std::uint32_t nearest = std::uint32_t{1} << 31;
+  std::size_t unit = size;
+  for (std::size_t k = 0; k < size; ++k) {
+    const auto distance =
+        static_cast<std::uint32_t>(potentials[k] ^ of.flip) + static_cast<std::uint32_t>(of.offset);
+    if (distance < nearest) {
+      nearest = distance;
+      unit = k;
+    }
+  }
+  return unit;
+}
+
+#if SDNN_X86_KERNELS
+
+/// Eight units at a time, the last eight once more.
+[[SDNN_TARGET_AVX2]] inline std::size_t nearest_unit_avx2(const std::int32_t* potentials,
+                                                          std::size_t size,
+                                                          const DistanceOf& of) noexcept {
+  if (size < 8) return nearest_unit_portable(potentials, size, of);
+  const __m256i flip = _mm256_set1_epi32(of.flip);
+  const __m256i offset = _mm256_set1_epi32(of.offset);
+  const auto first_of = [size](std::size_t k) { return k + 8 <= size ? k : size - 8; };
+  const auto distances = [&](std::size_t first) __attribute__((always_inline, target("avx2"))) {
+    const auto* const at = reinterpret_cast<const __m256i*>(potentials + first);
+    return _mm256_add_epi32(_mm256_xor_si256(_mm256_loadu_si256(at), flip), offset);
+  };
+  __m256i least = distances(0);
+  for (std::size_t k = 8; k < size; k += 8) least = _mm256_min_epu32(least, distances(first_of(k)));
+  least = _mm256_min_epu32(least, _mm256_permute2x128_si256(least, least, 1));
+  least = _mm256_min_epu32(least, _mm256_shuffle_epi32(least, 0b01001110));
+  least = _mm256_min_epu32(least, _mm256_shuffle_epi32(least, 0b10110001));
+  if (_mm256_cvtsi256_si32(least) < 0) return size;  // 2^31 or more
+  for (std::size_t k = 0;; k += 8) {
+    const __m256i found = _mm256_cmpeq_epi32(distances(first_of(k)), least);
+    const auto mask = static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(found)));
+    if (mask != 0) return first_of(k) + static_cast<std::size_t>(std::countr_zero(mask));
+  }
+}
+
+[[SDNN_TARGET_AVX2]] inline std::size_t nearest_unit_avx512(const std::int32_t* potentials,
+                                                            std::size_t size,
+                                                            const DistanceOf& of) noexcept {
+  return nearest_unit_avx2(potentials, size, of);
+}
+
+#endif  // SDNN_X86_KERNELS
+
+}  // namespace detail
+
+SDNN_KERNEL_NEON(std::size_t, nearest_unit,
+                 (const std::int32_t* potentials, std::size_t size, const detail::DistanceOf& of),
+                 (potentials, size, of))
+
+/// The first of the units nearest to their threshold, of those that are asked for; `size` if there
+/// is none.
+SDNN_DISPATCH(std::size_t, nearest_unit,
+              (const std::int32_t* potentials, std::size_t size, const detail::DistanceOf& of),
+              (potentials, size, of))
 
 /// Selects the units of a window whose correction moves the number of active ones by `deficit`.
 ///
@@ -25,22 +106,12 @@ inline void select_units(std::span<const std::int32_t> potentials, int deficit,
   selected.clear();
   const auto n_subsets = static_cast<std::size_t>(std::abs(deficit));
   assert(n_subsets <= potentials.size());
-  const bool want_active = deficit < 0;
-  constexpr std::uint32_t kNone = std::uint32_t{1} << 31;
+  const detail::DistanceOf of(deficit < 0);
   for (std::size_t i = 0; i < n_subsets; ++i) {
     const std::size_t begin = i * potentials.size() / n_subsets;
     const std::size_t end = (i + 1) * potentials.size() / n_subsets;
-    std::uint32_t nearest = kNone;
-    std::size_t best = end;
-    for (std::size_t unit = begin; unit < end; ++unit) {
-      const auto h = static_cast<std::uint32_t>(potentials[unit]);
-      const std::uint32_t distance = want_active ? h - 1 : 0 - h;  // kNone or more for the others
-      if (distance < nearest) {
-        nearest = distance;
-        best = unit;
-      }
-    }
-    if (best != end) selected.push_back(static_cast<std::uint32_t>(best));
+    const std::size_t unit = begin + nearest_unit(potentials.data() + begin, end - begin, of);
+    if (unit != end) selected.push_back(static_cast<std::uint32_t>(unit));
   }
 }
 
