@@ -3,8 +3,7 @@
     python bench/yardsticks.py > docs/evidence/performance.json
     python bench/performance_tables.py
 
-The profile in docs/evidence/profile.json, made by bench/profile_trial.py, becomes the last table.
-Of a run with AVX-512, docs/evidence/performance-avx512.json, the page has the passes only.
+Passes and profile in docs/evidence/ are those that bench/profile_trial.py measured.
 """
 
 from __future__ import annotations
@@ -30,49 +29,50 @@ def stored(name: str) -> dict[str, Any]:
     return found
 
 
-def to_markdown(results: dict[str, Any], *, passes_only: bool = False) -> str:
+def to_markdown(results: dict[str, Any]) -> str:
     """Return the tables of a run, after the lines that say on what was measured."""
     machine = results["machine"]
     caches = ", ".join(f"{name} {_size(size)}" for name, size in machine["caches"].items())
     lines = [*describe_run(results), f"caches: {caches}; NumPy's products by {machine['blas']}"]
     about = "".join(f"- {line}\n" for line in lines)
-    shown = [*yardstick_tables(results), *([] if passes_only else tables(results))]
-    return "\n".join([about, *map(_titled, shown)])
+    return "\n".join([about, *map(_titled, [dense_table(results), *tables(results)])])
 
 
-def yardstick_tables(results: Mapping[str, Any]) -> Iterator[Table]:
-    """Make the tables of passes beside what they are compared with."""
-    networks, best = results["networks"], results["best_instruction_set"]
-    yield Table(
+def dense_table(results: Mapping[str, Any]) -> Table:
+    """Return new states beside dense products of their size."""
+    networks = results["networks"]
+    return Table(
         f"All {networks[0]['n_actions']} action values of a new state in one hidden pass, and a"
         " dense matrix-vector product of its size (us: median, quartiles)",
-        ("inputs, weights", "computed by", "us", "against the quickest dense", "of the limit"),
+        ("inputs, weights", "computed by", "us", "against the quickest dense"),
         [row for network in networks for row in _pass_rows(network)],
     )
-    yield Table(
-        "What the machine allows: the bytes a pass has to read, at the rate at which a buffer"
-        " of the weights' size is read",
-        ("inputs, weights", "MB weights", "MB read by a pass", "GB/s", "least us", f"us ({best})"),
-        [
-            (_size_of(one), f"{one['weight_bytes'] / 1e6:.2f}",
-             f"{one['pass_bytes'] / 1e6:.2f}", f"{one['gigabytes_per_second']:.0f}",
-             f"{one['least_time']:.1f}", f"{one['values'][best]['median']:.1f}")
-            for one in networks
-        ],
-    )  # fmt: skip
+
+
+def passes_table(passes: list[dict[str, Any]]) -> Table:
+    """Return passes of networks that learned for a while beside loads of the lines they read."""
+    rows = [
+        (f"{one['inputs']}", f"{one['episodes']:,}", one["level"],
+         *(f"{one[name]:.1f}" for name in ("new_state", "pass", "plain_loads")),
+         f"{one['plain_loads'] / one['pass']:.0%}")
+        for one in passes
+    ]  # fmt: skip
+    return Table(
+        "A pass beside plain loads of the lines that it reads (us, median)",
+        ("inputs", "noisy episodes", "by", "new state", "pass", "loads", "loads / pass"),
+        rows,
+    )
 
 
 def _pass_rows(network: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
     for level, ratio in network["ratio_to_dense"].items():
         quicker = f"{1 / ratio:.1f} x quicker" if ratio < 1 else f"{ratio:.1f} x slower"
-        share = f"{network['share_of_limit'][level]:.0%}"
-        yield (_size_of(network), level, time_words(network["values"][level]), quicker, share)
+        yield (_size_of(network), level, time_words(network["values"][level]), quicker)
     for name, product in network["dense"].items():
         yield (
             _size_of(network),
             f"dense float32: {DENSE_TITLES[name]}",
             time_words(product),
-            "",
             "",
         )
 
@@ -106,10 +106,10 @@ def profile_table(profile: dict[str, dict[str, float]]) -> Table:
 
 def page_tables() -> dict[str, str]:
     """Return each table of stored runs by its name in the page."""
-    profile = _titled(profile_table(stored("profile")))
+    shown = (passes_table(stored("passes")), profile_table(stored("profile")))
     return {
-        "performance": f"{to_markdown(stored('performance'))}\n{profile}",
-        "performance-avx512": to_markdown(stored("performance-avx512"), passes_only=True),
+        "performance": to_markdown(stored("performance")),
+        "passes and profile": "\n".join(map(_titled, shown)),
     }
 
 

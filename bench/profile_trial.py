@@ -1,8 +1,9 @@
-"""Where a trial's time goes, function by function, with Linux perf.
+"""Where a trial's time goes, function by function, with Linux perf, and how quick passes are.
 
 python bench/profile_trial.py build/bench/sdnn_bench   (built with -DSDNN_BUILD_BENCH=ON)
 
-Writes docs/evidence/profile.json; bench/performance_tables.py puts it into performance.md there.
+Writes docs/evidence/profile.json and passes.json; bench/performance_tables.py puts them into
+performance.md there.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
-PROFILE = Path(__file__).parents[1] / "docs" / "evidence" / "profile.json"
+EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
 TRIALS = {
     "4 inputs": "trial/inputs:4/noise:0/episodes:2000",
     "4 inputs, noise": "trial/inputs:4/noise:2/episodes:2000",
@@ -54,9 +56,33 @@ def profile(program: str, benchmark: str) -> dict[str, float]:
     return {name: round(share, 1) for name, share in shares.items() if share >= SMALLEST_SHARE}
 
 
+def passes(program: str) -> list[dict[str, Any]]:
+    """Return the median microseconds of processor time of new states, passes and plain loads."""
+    done = subprocess.run(
+        [program, "--benchmark_filter=^(new_state|pass|plain_loads)/", "--benchmark_format=json",
+         "--benchmark_repetitions=15", "--benchmark_min_time=0.03",
+         "--benchmark_enable_random_interleaving=true"],
+        check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    rows: dict[tuple[int, int, str], dict[str, Any]] = {}
+    for one in json.loads(done.stdout)["benchmarks"]:
+        if one.get("aggregate_name") != "median":
+            continue
+        name, _, inputs, episodes = one["run_name"].split("/")
+        number = int(inputs.partition(":")[2]), int(episodes.partition(":")[2])
+        level = one["label"]
+        row = dict(zip(("inputs", "episodes"), number, strict=True), level=level)
+        rows.setdefault((*number, level), row)[name] = round(one["cpu_time"], 2)
+    return [rows[key] for key in sorted(rows)]
+
+
+def write(name: str, content: object) -> None:
+    (EVIDENCE / f"{name}.json").write_text(json.dumps(content, indent=2) + "\n")
+    print(f"wrote {name}.json")
+
+
 if __name__ == "__main__":
     if len(sys.argv) != 2:
         raise SystemExit(__doc__)
-    profiles = {title: profile(sys.argv[1], name) for title, name in TRIALS.items()}
-    PROFILE.write_text(json.dumps(profiles, indent=2) + "\n")
-    print(f"wrote {PROFILE}")
+    write("passes", passes(sys.argv[1]))
+    write("profile", {title: profile(sys.argv[1], name) for title, name in TRIALS.items()})

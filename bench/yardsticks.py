@@ -1,4 +1,4 @@
-"""Runs ``sdnn bench``, and what a pass is compared with: a dense product, and reading its bytes.
+"""Runs ``sdnn bench``, and the dense product that a pass is compared with.
 
     python bench/yardsticks.py > docs/evidence/performance.json
     python bench/performance_tables.py
@@ -38,35 +38,24 @@ MULTIPLES = {"K": 2**10, "M": 2**20, "G": 2**30}
 
 
 def of_network(network, effort):
-    """Compare passes of a network that `measure_network` has measured with its yardsticks.
+    """Compare passes of a network that `measure_network` has measured with dense products.
 
-    Spreads are those of ``dense`` (a float32 product of n_hidden_units x n_columns weights, by who
-    computes it) and ``read`` (a buffer of ``weight_bytes``), in turns with passes. ``pass_bytes``
-    are those that a pass has to read, on average, and ``least_time`` their time at the rate of
-    ``read``: no pass can be quicker. ``ratio_to_dense`` is the time of ``values`` over that of the
-    quickest dense product, ``share_of_limit`` ``least_time`` over it.
+    Spreads are those of ``dense``, a float32 product of n_hidden_units x n_columns weights by who
+    computes it, in turns with passes. ``ratio_to_dense`` is the time of ``values`` over that of the
+    quickest.
     """
     size = network["n_hidden_units"], network["n_columns"]
     parts = network_parts(network["n_inputs"], effort)
     levels = available_instruction_sets()
-    read = _core.BufferRead(parts.weight_bytes)
     dense = {"numpy": numpy_product(*size), "core": _core.DenseProduct(*size, SEED).run}
     passes = {level: at_level(level, parts.time_values) for level in levels}
-    taken = in_turns({**passes, **dense, "read": read.run}, effort)
+    taken = in_turns({**passes, **dense}, effort)
     times = {name: spread(one) for name, one in taken.items()}
-    pass_bytes = parts.mean_bytes_of_pass(effort.n_rounds)
-    least_time = times["read"]["median"] * pass_bytes / read.n_bytes
     least_dense = min(times[name]["median"] for name in dense)
     return {
         "values": {level: times[level] for level in levels},
         "dense": {name: times[name] for name in dense},
-        "read": times["read"],
-        "weight_bytes": parts.weight_bytes,
-        "pass_bytes": pass_bytes,
-        "gigabytes_per_second": read.n_bytes / times["read"]["median"] / 1000.0,
-        "least_time": least_time,
         "ratio_to_dense": {level: times[level]["median"] / least_dense for level in levels},
-        "share_of_limit": {level: least_time / times[level]["median"] for level in levels},
     }
 
 

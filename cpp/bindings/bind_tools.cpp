@@ -166,15 +166,6 @@ void bind_trials(py::module_& module) {
 }
 
 void bind_times(py::module_& module) {
-  py::class_<tools::BufferRead>(module, "BufferRead", "Reads a buffer from front to back")
-      .def(py::init<std::size_t>(), py::arg("n_bytes"))
-      .def_property_readonly("n_bytes", &tools::BufferRead::n_bytes)
-      .def(
-          "run",
-          [](const tools::BufferRead& buffer, int n) {
-            return bindings::times_of(buffer, [&] { return buffer.run(n); });
-          },
-          py::arg("n_repetitions"), "Nanoseconds per reading: (n_repetitions,)");
   py::class_<tools::DenseProduct>(module, "DenseProduct", "A dense float32 matrix-vector product")
       .def(py::init<std::size_t, std::size_t, std::uint64_t>(), py::arg("n_rows"),
            py::arg("n_columns"), py::arg("seed"))
@@ -217,9 +208,7 @@ void bind_times(py::module_& module) {
                 parts, [&] { return parts.time_selections(n, n_selections, n_selected); });
           },
           py::arg("n_repetitions"), py::arg("n_selections"), py::arg("n_selected"),
-          "n_selections selections of units per repetition")
-      .def_property_readonly("weight_bytes", &tools::NetworkParts::weight_bytes)
-      .def("mean_bytes_of_pass", &tools::NetworkParts::mean_bytes_of_pass, py::arg("n_states"));
+          "n_selections selections of units per repetition");
   py::class_<tools::AcrobotDecisions>(module, "AcrobotDecisions",
                                       "The acrobot under random torques")
       .def(py::init<const environments::AcrobotConfig&, std::uint64_t>(), py::arg("config"),

@@ -8,13 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "sdnn/approximators/detail/column_sums.hpp"
 #include "sdnn/approximators/error_correction.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
-#include "sdnn/coding/detail/ternary_code.hpp"
-#include "sdnn/coding/pattern_table.hpp"
-#include "sdnn/coding/state_code.hpp"
-#include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 #include "tools/stopwatch.hpp"
@@ -104,34 +99,7 @@ class NetworkParts {
         });
   }
 
-  /// Bytes of all weights, with the padding of the last block of units.
-  std::size_t weight_bytes() const noexcept {
-    return padded_units() * network_.state_code().n_columns();
-  }
-
-  /// Bytes of the weights that a pass has to read: those of columns that are not neutral, the mean
-  /// over `n_states` new states. Throws std::invalid_argument unless n_states is at least 1.
-  double mean_bytes_of_pass(int n_states) {
-    core::require_in_range("n_states", n_states, 1, kMaxRepetitions);
-    const auto& code = network_.state_code();
-    std::vector<coding::Bin> bins(network_.n_inputs());
-    std::vector<std::uint64_t> words(2 * code.n_words());
-    const coding::TernaryCode paired{words.data(), words.data() + code.n_words()};
-    std::size_t n_columns = 0;
-    for (int i = 0; i < n_states; ++i) {
-      draw_state();
-      code.bins_of(state_, bins);
-      code.encode(bins, words.data(), words.data() + code.n_words());
-      n_columns += coding::n_active(paired, code.n_words());
-    }
-    return static_cast<double>(n_columns * padded_units()) / n_states;
-  }
-
  private:
-  std::size_t padded_units() const noexcept {
-    return core::round_up(network_.hidden_layer().n_units(), approximators::kBlockUnits);
-  }
-
   void require_units(const char* name, int n_units) const {
     core::require_in_range(name, n_units, 1,
                            static_cast<int>(network_.action_code().n_active_units()));

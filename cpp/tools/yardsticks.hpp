@@ -1,4 +1,4 @@
-/// What the machine allows: how fast memory is read, and a good dense product, to compare with.
+/// A good dense product, to compare with.
 #pragma once
 
 #include <array>
@@ -24,20 +24,6 @@
 namespace sdnn::tools {
 
 namespace detail {
-
-inline constexpr std::size_t kWordsOfLine = core::kCacheLine / sizeof(std::uint64_t);
-
-// The words are added where they are: copied first, they are stored in halves and loaded whole, and
-// the processor waits for that, not for the memory.
-SDNN_INLINE std::uint64_t sum_of_words_body(const std::uint64_t* words, std::size_t n) noexcept {
-  std::array<std::uint64_t, kWordsOfLine> sums{};
-  for (std::size_t i = 0; i < n; i += kWordsOfLine) {
-    for (std::size_t k = 0; k < kWordsOfLine; ++k) sums[k] += words[i + k];
-  }
-  std::uint64_t total = 0;
-  for (const std::uint64_t sum : sums) total += sum;
-  return total;
-}
 
 inline void multiply_portable(const float* weights, std::size_t n_rows, std::size_t n_columns,
                               const float* input, float* out) noexcept {
@@ -151,48 +137,12 @@ inline void multiply_neon(const float* weights, std::size_t n_rows, std::size_t 
 
 }  // namespace detail
 
-/// The sum of n words, modulo 2^64; n makes whole cache lines.
-SDNN_KERNEL(std::uint64_t, sum_of_words, (const std::uint64_t* words, std::size_t n), (words, n))
-
 /// out = weights . input, in 32-bit floats; the only kernel whose bits depend on the level. Shapes:
 /// weights (n_rows, n_columns), input (n_columns,), out (n_rows,).
 SDNN_DISPATCH(void, multiply,
               (const float* weights, std::size_t n_rows, std::size_t n_columns, const float* input,
                float* out),
               (weights, n_rows, n_columns, input, out))
-
-/// Reads a buffer from front to back: the most bytes per second that a pass over weights of the
-/// same size could read with the instruction set in use.
-class BufferRead {
- public:
-  /// `n_bytes` is rounded up to whole cache lines; the buffer is written, so its pages exist.
-  /// Throws std::invalid_argument, std::bad_alloc.
-  explicit BufferRead(std::size_t n_bytes)
-      : buffer_(core::round_up((core::require_in_range("n_bytes", n_bytes, std::size_t{1},
-                                                       std::size_t{1} << 34),
-                                n_bytes),
-                               core::kCacheLine) /
-                sizeof(std::uint64_t)) {
-    for (std::size_t i = 0; i < buffer_.size(); ++i) {
-      buffer_[i] = i * kOddFactor;
-    }
-  }
-
-  std::size_t n_bytes() const noexcept { return buffer_.size() * sizeof(std::uint64_t); }
-
-  /// The sum of the buffer's 64-bit words, modulo 2^64.
-  std::uint64_t sum() const { return sum_of_words(buffer_.data(), buffer_.size()); }
-
-  /// Times of `n_repetitions` readings.
-  Times run(int n_repetitions) const {
-    return time_each(n_repetitions, [this](int) { keep(sum()); });
-  }
-
- private:
-  static constexpr std::uint64_t kOddFactor = 0x9E3779B97F4A7C15;  ///< spreads over all bits
-
-  core::AlignedBuffer<std::uint64_t> buffer_;
-};
 
 /// A dense float32 matrix-vector product, as quick as the processor makes it: what a hidden layer
 /// of this size costs in an ordinary network.

@@ -2355,19 +2355,6 @@ class PlainRBFQLearning:
         """
         A copy of the network behind it
         """
-class BufferRead:
-    """
-    Reads a buffer from front to back
-    """
-    def __init__(self, n_bytes: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def run(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
-        """
-        Nanoseconds per reading: (n_repetitions,)
-        """
-    @property
-    def n_bytes(self) -> int:
-        ...
 class DenseProduct:
     """
     A dense float32 matrix-vector product
@@ -2392,8 +2379,6 @@ class NetworkParts:
         """
         Times a copy of the network
         """
-    def mean_bytes_of_pass(self, n_states: typing.SupportsInt | typing.SupportsIndex) -> float:
-        ...
     def time_corrections(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex, n_corrected: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         Learning steps
@@ -2410,9 +2395,6 @@ class NetworkParts:
         """
         All values at a new state: nanoseconds (n_repetitions,)
         """
-    @property
-    def weight_bytes(self) -> int:
-        ...
 class AcrobotDecisions:
     """
     The acrobot under random torques

@@ -52,13 +52,6 @@ TEST(NetworkParts, NewStatesOfThePapersSizesTakeFullPasses) {
   EXPECT_GE(parts.workspace().cache().counts().full, 195U);
 }
 
-// 100 units are padded to 128; of 120 modifiers half are active, and each takes one column of two.
-TEST(NetworkParts, BytesOfThePass) {
-  NetworkParts parts(small_network(), 1);
-  EXPECT_EQ(parts.weight_bytes(), 128U * 240U);
-  EXPECT_NEAR(parts.mean_bytes_of_pass(50), 128.0 * 60.0, 128.0 * 3.0);
-}
-
 TEST(NetworkParts, RefusesImpossibleNumbers) {
   NetworkParts parts(small_network(), 1);
   EXPECT_THROW(parts.time_values(-1), std::invalid_argument);
@@ -66,7 +59,6 @@ TEST(NetworkParts, RefusesImpossibleNumbers) {
   EXPECT_THROW(parts.time_corrections(1, 31), std::invalid_argument);
   EXPECT_THROW(parts.time_selections(1, 0, 5), std::invalid_argument);
   EXPECT_THROW(parts.time_selections(1, 1, 31), std::invalid_argument);
-  EXPECT_THROW(parts.mean_bytes_of_pass(0), std::invalid_argument);
 }
 
 }  // namespace

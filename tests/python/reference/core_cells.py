@@ -130,7 +130,6 @@ GOOD = {
     "PlainRBFQLearning": lambda: {
         "approximator": core.RBFNetworkConfig(), "learning": learning(), "seed": 1
     },
-    "BufferRead": lambda: {"n_bytes": 4096},
     "DenseProduct": lambda: {"n_rows": 3, "n_columns": 4, "seed": 1},
     "NetworkParts": lambda: {"network": core.SDNNC(network_config(), 1), "seed": 1},
     "AcrobotDecisions": lambda: {"config": core.AcrobotConfig(), "seed": 1},
