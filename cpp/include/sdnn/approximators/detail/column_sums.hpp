@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "sdnn/core/detail/aligned_buffer.hpp"
@@ -25,14 +26,15 @@ namespace sdnn::approximators {
 inline constexpr std::size_t kBlockUnits = 64;
 
 /// Columns in the form that the kernels read: padded with a column of zeros to a multiple of
-/// kAtOnce, and beyond that as far as memory is asked for ahead. A place is a column's first byte
-/// in its block divided by kPlaceBytes, which a processor multiplies by within a load.
+/// kAtOnce, and followed by the first ones in the next block, of which memory is asked for ahead. A
+/// place is a column's first byte in its block divided by kPlaceBytes, which a processor multiplies
+/// by within a load.
 class ColumnPlaces {
  public:
   static constexpr std::size_t kMost = 1024;
   static constexpr std::size_t kAtOnce = 8;
-  /// Columns by which prefetching is ahead: about the latency of the last-level cache.
-  static constexpr std::size_t kPrefetchAhead = 16;
+  /// Columns by which prefetching is ahead: the latency of a last-level cache that others use too.
+  static constexpr std::size_t kPrefetchAhead = 64;
   static constexpr std::size_t kPlaceBytes = 8;
 
   /// Up to kMost columns of a block whose column `zeros` has nothing but zeros.
@@ -43,13 +45,15 @@ class ColumnPlaces {
     const auto end = std::ranges::transform(columns, places_.begin(), [](std::uint32_t column) {
                        return column * kFactor;
                      }).out;
-    std::fill(end, places_.begin() + static_cast<std::ptrdiff_t>(size_ + kPrefetchAhead),
-              static_cast<std::uint32_t>(zeros) * kFactor);
+    std::uint32_t* const all = places_.data() + size_;
+    std::fill(std::to_address(end), all, static_cast<std::uint32_t>(zeros) * kFactor);
+    const std::uint32_t block = (static_cast<std::uint32_t>(zeros) + 1) * kFactor;
+    for (std::size_t k = 0; k < kPrefetchAhead; ++k) all[k] = block + (k < size_ ? places_[k] : 0);
   }
 
   /// A multiple of kAtOnce.
   std::size_t size() const noexcept { return size_; }
-  /// size() places, and kPrefetchAhead more that are not to be added.
+  /// size() places, and kPrefetchAhead more, of the next block, that are not to be added.
   const std::uint32_t* data() const noexcept { return places_.data(); }
 
  private:
@@ -123,7 +127,8 @@ inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& p
 
 #if SDNN_X86_KERNELS || SDNN_NEON_KERNELS
 
-/// Prefetches the columns that will be added kPrefetchAhead places later.
+/// Prefetches the columns that will be added kPrefetchAhead places later. Behind the last block
+/// lies nothing, which a prefetch may ask for.
 [[gnu::always_inline]] inline void prefetch_ahead(const std::int8_t* block,
                                                   const std::uint32_t* places) noexcept {
   for (std::size_t k = 0; k < ColumnPlaces::kAtOnce; ++k) {
