@@ -94,7 +94,7 @@ def profile_table(profile: dict[str, dict[str, float]]) -> Table:
     """Return functions by their share of the time, one column for each trial."""
     functions = sorted(
         {name for shares in profile.values() for name in shares},
-        key=lambda name: -sum(shares.get(name, 0.0) for shares in profile.values()),
+        key=lambda name: (-sum(shares.get(name, 0.0) for shares in profile.values()), name),
     )
     rows = [
         (f"`{name}`", *(f"{of[name]:.1f}" if name in of else "" for of in profile.values()))

@@ -60,7 +60,7 @@ def passes(program: str) -> list[dict[str, Any]]:
     """Return the median microseconds of processor time of new states, passes and plain loads."""
     done = subprocess.run(
         [program, "--benchmark_filter=^(new_state|pass|plain_loads)/", "--benchmark_format=json",
-         "--benchmark_repetitions=15", "--benchmark_min_time=0.03",
+         "--benchmark_repetitions=9", "--benchmark_min_time=0.02",
          "--benchmark_enable_random_interleaving=true"],
         check=True, capture_output=True, text=True,
     )  # fmt: skip
