@@ -78,7 +78,12 @@ int main(int argc, char **argv) {
   const uint32_t n_steps = (uint32_t)atol(argv[1]), n_episodes = (uint32_t)atol(argv[2]);
   uint32_t step, k, total = 0;
   pole_begin(&agent);
-  for (step = 0; step < n_steps;) step += episode(1, n_steps - step < 500 ? n_steps - step : 500);
+  for (step = 0; step < n_steps;) {
+#ifdef FOLLOWS_PROGRESS
+    pole_set_progress(&agent, (uint32_t)((uint64_t)step * 65536 / n_steps));
+#endif
+    step += episode(1, n_steps - step < 500 ? n_steps - step : 500);
+  }
   noise = 12345;
   for (k = 0; k < n_episodes; ++k) total += episode(0, 500);
   if (n_episodes > 0) printf("%.1f\n", (double)total / n_episodes);

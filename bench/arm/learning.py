@@ -6,7 +6,7 @@ are trained natively, or with --emulate in the emulator. Counts are exact; of ti
 nothing. Needs Debian's compilers and an emulator: apt install gcc gcc-arm-linux-gnueabihf
 qemu-user.
 
-usage: python bench/arm/learning.py [cartpole|pendulum] [--seeds 10] [--emulate]
+usage: python bench/arm/learning.py [cartpole|pendulum] [--agent sdnn-c] [--seeds 10] [--emulate]
 """
 
 import argparse
@@ -14,13 +14,13 @@ import math
 import re
 import subprocess
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 
-from sdnn.agents import SDNNSarsa
+from sdnn.agents import PRESETS, SDNNQLearning, SDNNSarsa
 from sdnn.approximators import LinearSDNNConfig
 from sdnn.export import export_c_header
 
@@ -28,6 +28,7 @@ HERE = Path(__file__).parent
 EPISODES = 100
 COUNTED = (2000, 4000)
 """Steps of two runs whose instructions are compared."""
+AGENTS = {"sdnn-linear": SDNNSarsa, "sdnn-c": SDNNQLearning}
 ARM = "arm-linux-gnueabihf-gcc"
 CHIP = ("-mthumb", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 
@@ -43,13 +44,18 @@ class Task:
     solved: float
     angles: tuple[int, ...] = ()
 
-    def agent(self, seed):
+    def agent(self, seed, kind):
         """Make the agent, which has learned nothing."""
         high = np.array(self.high)
-        return SDNNSarsa(
+        given = {"approximator": self.approximator}
+        if kind is SDNNQLearning:
+            small = PRESETS["small"]
+            config = replace(small.approximator, averaging_interval=0, weight_limit=127)
+            given = {"approximator": config, "learning": small.learning}
+        return kind(
             gym.spaces.Box(-high, high, dtype=np.float64),
             self.actions,
-            approximator=self.approximator,
+            **given,
             inputs="all",
             angles=self.angles,
             angle_pairs=[],
@@ -91,9 +97,9 @@ def output(*command):
     return done.stdout.strip(), done.stderr
 
 
-def sizes(folder, task):
+def sizes(folder, task, *more):
     """Bytes of flash, of static memory and of all functions' stacks, with the physics."""
-    options = ("-Os", "-fno-pie", "-fstack-usage", "-c", *CHIP)
+    options = ("-Os", "-fno-pie", "-fstack-usage", "-c", *CHIP, *more)
     path = program(folder / "chip.o", task, ARM, *options)
     text, data, bss = map(int, output("size", path)[0].splitlines()[1].split()[:3])
     usage = next(folder.glob("*.su")).read_text().splitlines()
@@ -103,10 +109,12 @@ def sizes(folder, task):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("task", nargs="?", choices=TASKS, default="cartpole")
+    parser.add_argument("--agent", choices=AGENTS, default="sdnn-linear")
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--emulate", action="store_true", help="Train in the emulator.")
     given = parser.parse_args()
-    name, task = given.task, TASKS[given.task]
+    name, task, kind = given.task, TASKS[given.task], AGENTS[given.agent]
+    options = ["-DFOLLOWS_PROGRESS"] if kind is SDNNQLearning else []
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         plugin = folder / "instruction_count.so"
@@ -114,16 +122,16 @@ def main():
         subprocess.run(["gcc", "-O2", "-shared", "-fPIC", source, "-o", plugin], check=True)
         returns = []
         for seed in range(1, given.seeds + 1):
-            header = export_c_header(task.agent(seed), folder / "pole.h", learning=True)
-            native = [program(folder / "native", name, "gcc")]
-            emulated = program(folder / "emulated", name, ARM, "-mthumb", "-static")
+            header = export_c_header(task.agent(seed, kind), folder / "pole.h", learning=True)
+            native = [program(folder / "native", name, "gcc", *options)]
+            emulated = program(folder / "emulated", name, ARM, "-mthumb", "-static", *options)
             runner = ["qemu-arm", emulated] if given.emulate else native
             returns.append(float(output(*runner, task.n_steps, EPISODES)[0]))
             print(f"seed {seed}: {returns[-1]:.1f}", flush=True)
         n_solved = sum(one >= task.solved for one in returns)
         print(f"{n_solved} of {given.seeds} reach {task.solved:g} after {task.n_steps:,} steps")
         print(f"{header.ram_bytes:,} bytes of memory, {header.flash_bytes:,} bytes of constants")
-        flash, static, stacks = sizes(folder, name)
+        flash, static, stacks = sizes(folder, name, *options)
         print(
             f"with the physics, -Os for Cortex-M4: {flash:,} bytes of flash, {static:,} bytes of"
             f" static memory; the stacks of all functions together are {stacks:,} bytes"

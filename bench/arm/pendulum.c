@@ -84,7 +84,12 @@ int main(int argc, char **argv) {
   uint32_t step, k;
   int64_t total = 0;
   pole_begin(&agent);
-  for (step = 0; step < n_steps; step += EPISODE) episode(1, EPISODE);
+  for (step = 0; step < n_steps; step += EPISODE) {
+#ifdef FOLLOWS_PROGRESS
+    pole_set_progress(&agent, (uint32_t)((uint64_t)step * 65536 / n_steps));
+#endif
+    episode(1, EPISODE);
+  }
   noise = 12345;
   for (k = 0; k < n_episodes; ++k) total += episode(0, EPISODE);
   if (n_episodes > 0) printf("%.1f\n", (double)total / ONE / n_episodes);

@@ -93,6 +93,8 @@ class SDNNCConfig:
         Of `uniform` initial weights, in units of c. Must be finite and at least 0.
     rounding : {'half_up', 'random', 'away'}
         Of the number of units that are to fire. `half_up`: to the nearest; `random`: up or down at random in proportion, so that no small change is lost on average; `away`: in the direction of the change by at least one unit. An assumption.
+    weight_limit : int
+        Largest size, in steps of the lattice, of the sum or difference of two weights of a hidden unit: where a correction would exceed it, the unit is not corrected. An agent that learns in C needs 127 or less. 0: 16383, beyond which is an error. Must be in [0, 16383].
     averaging_interval : int
         Corrections between snapshots of the weights, of which the network keeps an average for greedy actions, or a 64th part of all if that is more. The latest count most; weights take four times the memory. 0, as in the paper: no average. Must be in [0, 1000000000].
     max_table_bytes : int
@@ -111,7 +113,7 @@ class SDNNCConfig:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, n_inputs: int = ..., max_pairs: int = ..., n_pattern_units: int = ..., n_anchor_patterns: int = ..., n_interpolated: int = ..., balanced_anchors: bool = ..., circular: collections.abc.Sequence[bool] = ..., n_symbols: collections.abc.Sequence[int] = ..., n_hidden_units: int = ..., n_active_units: int = ..., n_actions: int = ..., q_low: float = ..., q_high: float = ..., u_low: int | None = ..., u_high: int | None = ..., learning_coefficient: float = ..., lattice: int = ..., initial_threshold: float = ..., initial_weights: typing.Literal['ternary', 'uniform'] = ..., initial_weight_limit: float = ..., rounding: typing.Literal['half_up', 'random', 'away'] = ..., averaging_interval: int = ..., max_table_bytes: int = ...) -> None:
+    def __init__(self, *, n_inputs: int = ..., max_pairs: int = ..., n_pattern_units: int = ..., n_anchor_patterns: int = ..., n_interpolated: int = ..., balanced_anchors: bool = ..., circular: collections.abc.Sequence[bool] = ..., n_symbols: collections.abc.Sequence[int] = ..., n_hidden_units: int = ..., n_active_units: int = ..., n_actions: int = ..., q_low: float = ..., q_high: float = ..., u_low: int | None = ..., u_high: int | None = ..., learning_coefficient: float = ..., lattice: int = ..., initial_threshold: float = ..., initial_weights: typing.Literal['ternary', 'uniform'] = ..., initial_weight_limit: float = ..., rounding: typing.Literal['half_up', 'random', 'away'] = ..., weight_limit: int = ..., averaging_interval: int = ..., max_table_bytes: int = ...) -> None:
         ...
     def __replace__(self, **changes: typing.Any) -> SDNNCConfig:
         ...
@@ -247,6 +249,11 @@ class SDNNCConfig:
     def u_low(self) -> int | None:
         """
         Count of active units at which the output is q_low; by default n_active_units // 15 (section 4.2: 20).
+        """
+    @property
+    def weight_limit(self) -> int:
+        """
+        Largest size, in steps of the lattice, of the sum or difference of two weights of a hidden unit: where a correction would exceed it, the unit is not corrected. An agent that learns in C needs 127 or less. 0: 16383, beyond which is an error.
         """
 class SDNNC:
     """

@@ -45,7 +45,8 @@ _LARGEST = 2**31  # of readings
 @click.option(
     "--learning",
     is_flag=True,
-    help="The header has the agent itself, which continues to learn. For the agent sdnn-linear.",
+    help="The header has the agent itself, which continues to learn. For the agents sdnn-linear,"
+    " and sdnn-c with approximator.averaging_interval=0 and approximator.weight_limit=127.",
 )
 @click.option(
     "--new",

@@ -90,15 +90,32 @@ class Code:
 
     def paired(self, weights: NDArray[np.int32]) -> NDArray[np.int32]:
         """Arrange weights (n, D) of the paper's order as those of the columns."""
-        places = {pair: g for g, pair in enumerate(self.network.pairs)}
-        starts = [places[group] * self.m for group in self.groups]
-        columns = np.concatenate(
-            [start + units for start, units in zip(starts, self.units, strict=True)]
-        )
-        rows = weights[:, columns].reshape(len(weights), len(self.groups), self.m)
+        rows = weights[:, self._order()].reshape(len(weights), len(self.groups), self.m)
         first, second = rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2]
         rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2] = (
             first + second,
             first - second,
         )
         return rows.reshape(len(weights), -1)
+
+    def unpaired(self, columns: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Undo `paired`; ValueError for columns that are no sums and differences."""
+        rows = columns.reshape(len(columns), len(self.groups), self.m).copy()
+        first, second = rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2]
+        if ((first ^ second) & 1).any():
+            raise ValueError("weights are no sums and differences")
+        rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2] = (
+            (first + second) // 2,
+            (first - second) // 2,
+        )
+        weights = np.empty_like(columns)
+        weights[:, self._order()] = rows.reshape(len(columns), -1)
+        return weights
+
+    def _order(self) -> NDArray[np.intp]:
+        """Return the place of each column in the paper's order."""
+        places = {pair: g for g, pair in enumerate(self.network.pairs)}
+        starts = [places[group] * self.m for group in self.groups]
+        return np.concatenate(
+            [start + units for start, units in zip(starts, self.units, strict=True)]
+        )

@@ -10,7 +10,8 @@ from sdnn.agents import Agent, SDNNQLearning, SDNNSarsa
 from sdnn.arguments import argument_error, flag, path_of, shown
 from sdnn.export.linear import LearnerWriter, LinearWriter
 from sdnn.export.sdnn_c import SDNNCWriter
-from sdnn.export.writer import CHeader
+from sdnn.export.sdnn_c_learning import SDNNCLearner
+from sdnn.export.writer import CHeader, Writer
 from sdnn.files import write_whole
 
 _LARGEST_NAME = 40
@@ -65,16 +66,17 @@ def c_header(
         Of observations, actions and rewards in fixed point, 0 to 30; by default 16, or fewer if the
         observed ranges or the actions need it.
     learning : bool, optional
-        Write an agent that learns, which is an `SDNNSarsa`. It begins with what the agent has
-        learned so far, in a new episode.
+        Write an agent that learns. It begins with what the agent has learned so far, in a new
+        episode. An `SDNNQLearning` needs ``averaging_interval=0``, ``weight_limit=127`` and
+        actions of one dimension.
 
     Raises
     ------
     TypeError
         For other agents, which calculate in floating point.
     ValueError
-        If ``name`` is not a C identifier, ``fraction_bits`` is too large, or the network has more
-        than 65,535 hidden units or 2^26 weights.
+        If ``name`` is not a C identifier, ``fraction_bits`` is too large, the network has more
+        than 65,535 hidden units or 2^26 weights, or a setting does not allow ``learning``.
     RuntimeError
         If the agent is still warming up.
 
@@ -91,10 +93,9 @@ def c_header(
     >>> "static inline uint32_t car_act_fixed(const int32_t *observation)" in header.text
     True
     """
-    kinds = (SDNNSarsa,) if flag("learning", learning) else (SDNNQLearning, SDNNSarsa)
-    if not isinstance(agent, kinds):
-        names = " or ".join(kind.__name__ for kind in kinds)
-        raise TypeError(f"agent must be an {names}, got {type(agent).__name__}")
+    learns = flag("learning", learning)
+    if not isinstance(agent, (SDNNQLearning, SDNNSarsa)):
+        raise TypeError(f"agent must be an SDNNQLearning or SDNNSarsa, got {type(agent).__name__}")
     fits = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
     if not fits or len(name) > _LARGEST_NAME:
         raise argument_error(
@@ -102,7 +103,9 @@ def c_header(
             "must be a C identifier of letters, digits and single underscores between them,"
             f" at most {_LARGEST_NAME} long, got {shown(name)}",
         )
+    writer: Writer
     if isinstance(agent, SDNNQLearning):
-        return SDNNCWriter(agent, name, fraction_bits).header()
-    kind = LearnerWriter if learning else LinearWriter
-    return kind(agent, name, fraction_bits).header()
+        writer = (SDNNCLearner if learns else SDNNCWriter)(agent, name, fraction_bits)
+    else:
+        writer = (LearnerWriter if learns else LinearWriter)(agent, name, fraction_bits)
+    return writer.header()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import zlib
 from typing import Any
@@ -15,10 +14,11 @@ from sdnn.export.code import Code
 from sdnn.export.tables import Tables
 from sdnn.export.writer import MOST_WEIGHTS, CHeader, Writer
 
-IMAGE_MAGIC = 0x4C4E4453  # "SDNL"
-IMAGE_HEAD = 40 + 4 * 32
+_IMAGE_MAGIC = 0x4C4E4453  # "SDNL"
+_IMAGE_HEAD = 40 + 4 * 32
 """Bytes of an image before its weights."""
-STREAMS = ("policy.exploration", "policy.ties", "policy.evaluation_ties", "repetitions")
+_STREAMS = ("policy.exploration", "policy.ties", "policy.evaluation_ties", "repetitions")
+_NO_EXPONENT = -(2**31)
 _WEIGHTS = {"weights": "weights", "averaged": "averaged_weights"}
 _ONE = 1 << 16  # of rates
 _MOST_TOLERANCE = 2**40  # above any value
@@ -43,10 +43,6 @@ class LinearWriter(Writer):
         n_groups = len(self.network().pairs)
         slots = np.arange(n_groups)[:, None] * (-(-m // 64) * 64) + np.arange(m)
         return slots.reshape(-1)
-
-    def n_actions(self) -> list[int]:
-        """Return the number of actions of each dimension."""
-        return [len(self.agent.actions_of(d)) for d in range(self.n_dimensions)]
 
     def sizes(self) -> dict[str, Any]:
         """Return what the templates of a readout need, and check it."""
@@ -110,43 +106,62 @@ class LinearWriter(Writer):
 class LearnerWriter(LinearWriter):
     """Makes the header of an `SDNNSarsa` agent that learns."""
 
-    def fingerprint(self) -> int:
-        """Return a number that agents of other settings or another seed do not have."""
-        learning, approximator = self.agent.learning, self.agent.approximator
-        network = self.network()
-        about = [
-            str(approximator),
-            str(learning),
-            self.agent.seed,
-            self.n_actions(),
-            [(one.kind, list(one.at), one.low, one.high, one.n_bins) for one in self.inputs],
-            [zlib.crc32(network.permutation(*pair).tobytes()) for pair in network.pairs],
-        ]
-        return zlib.crc32(json.dumps(about).encode())
-
     def image(self) -> bytes:
         """Return the state as the header's bytes."""
         state, columns = self.core.state(), self.columns()
-        exponent = state.get("action_value.exponent", -(2**31))
+        exponent = state.get("action_value.exponent", _NO_EXPONENT)
         head = [
-            np.array([IMAGE_MAGIC, self.fingerprint()], "<u4"),
+            np.array([_IMAGE_MAGIC, self.fingerprint()], "<u4"),
             np.array([exponent], "<i4"),
             np.array([state.get("action_value.n_snapshots", 0), _left(state)], "<u4"),
             np.array([state.get("n_ended", 0)], "<u4"),
             np.array([state["n_learned"], state.get("action_value.n_steps", 0)], "<u8"),
-            *(state[f"{stream}.words"].astype("<u8") for stream in STREAMS),
+            *(state[f"{stream}.words"].astype("<u8") for stream in _STREAMS),
         ]
         names = ("action_value.weights", "action_value.averaged_weights")
         rows = [state[n][:, columns].astype("<i4") for n in names if n in state]
         image = b"".join(part.tobytes() for part in (*head, *rows))
         return image + zlib.crc32(image).to_bytes(4, "little")
 
+    def restore(self, image: bytes) -> None:
+        """Give the agent the state of an image, whole and of this agent."""
+        exponent = int.from_bytes(image[8:12], "little", signed=True)
+        n_snapshots, n_left, n_ended = np.frombuffer(image, "<i4", 3, 12).tolist()
+        n_learned, n_steps = np.frombuffer(image, "<i8", 2, 24).tolist()
+        words = np.frombuffer(image, "<u8", 16, 40).reshape(4, 4)
+        state = self.core.state()
+        for name in ("waits", "reward", "old_value"):  # of the episode before
+            state[name] = np.zeros_like(state[name])
+        state["trace.values"] = state["trace.values"][:0]
+        for name in ("action_value.exponent", "n_random_left", "n_ended"):
+            state.pop(name, None)
+        state["n_learned"] = np.array(n_learned, np.int64)
+        if exponent != _NO_EXPONENT:
+            state["action_value.exponent"] = np.array(exponent, np.int32)
+        if "action_value.n_steps" in state:
+            state["action_value.n_steps"] = np.array(n_steps, np.int64)
+            state["action_value.n_snapshots"] = np.array(n_snapshots, np.int64)
+        if n_left:
+            state["n_random_left"] = np.array(n_left, np.int32)
+        if n_ended:
+            state["n_ended"] = np.array(n_ended, np.int32)
+        state |= {f"{name}.words": one.copy() for name, one in zip(_STREAMS, words, strict=True)}
+        kept = [name for name in ("weights", "averaged_weights") if f"action_value.{name}" in state]
+        at, columns = _IMAGE_HEAD, self.columns()
+        for name in kept:
+            rows = np.zeros_like(state[f"action_value.{name}"])
+            n = rows.shape[0] * columns.size
+            rows[:, columns] = np.frombuffer(image, "<i4", n, at).reshape(-1, columns.size)
+            state[f"action_value.{name}"] = rows
+            at += 4 * n
+        self.core.restore(state)
+
     def header(self) -> CHeader:
         """Make the header."""
         learning, sizes, tables = self.agent.learning, self.sizes(), self.tables_of_spaces()
         config, state = self.agent.approximator, self.core.state()
         self.add_code(tables, sizes)
-        seeds = np.array([state[f"{stream}.words"] for stream in STREAMS])
+        seeds = np.array([state[f"{stream}.words"] for stream in _STREAMS])
         about = "What the agent begins with: states of its random generators."
         tables.add("uint64_t", f"{self.name}_seeds", seeds, about)
         averages = config.averaging_interval > 0
@@ -161,6 +176,7 @@ class LearnerWriter(LinearWriter):
             "ram_bytes": self.ram_bytes(sizes),
             "n_words": sizes["most_columns"] * sizes["n_rows"],
             "ties": "draw" if learning.tie_rule == "uniform" else self.ties(),
+            "has_progress": False,
             "averages": averages,
             "interval": max(1, config.averaging_interval),
             "schedule_steps": learning.schedule_steps,
@@ -181,9 +197,9 @@ class LearnerWriter(LinearWriter):
             "late": learning.n_greedy_steps,
             "most_kept": learning.max_action_repeat,
             "least_kept": min(5, learning.max_action_repeat),
-            "image_bytes": IMAGE_HEAD + 4 * n_image_weights + 4,
-            "image_head": IMAGE_HEAD,
-            "image_magic": f"0x{IMAGE_MAGIC:08x}",
+            "image_bytes": _IMAGE_HEAD + 4 * n_image_weights + 4,
+            "image_head": _IMAGE_HEAD,
+            "image_magic": f"0x{_IMAGE_MAGIC:08x}",
             "fingerprint": f"0x{self.fingerprint():08x}",
             "n_image_weights": n_image_weights,
         }

@@ -11,7 +11,7 @@ from sdnn.export.code import Code
 from sdnn.export.tables import Tables, joined, weight_words
 from sdnn.export.writer import MOST_WEIGHTS, CHeader, Writer
 
-_MOST_UNITS = 65535  # whose numbers fit 16 bits
+MOST_UNITS = 65535  # whose numbers fit 16 bits
 _BYTES_OF_NETWORK = 40  # a struct of eight pointers and two sizes, where pointers have 32 bits
 
 
@@ -31,9 +31,9 @@ class SDNNCWriter(Writer):
 
     def _check_sizes(self, n_columns: int) -> None:
         n_units = self.agent.approximator.n_hidden_units
-        if n_units > _MOST_UNITS:
+        if n_units > MOST_UNITS:
             raise ValueError(
-                f"n_hidden_units must be at most {_MOST_UNITS} in a C header, got {n_units}"
+                f"n_hidden_units must be at most {MOST_UNITS} in a C header, got {n_units}"
             )
         n_weights = self.n_dimensions * n_units * n_columns
         if n_weights > MOST_WEIGHTS:

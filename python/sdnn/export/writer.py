@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import zlib
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -123,6 +125,24 @@ class Writer:
             fixed_actions = by_dimension(fixed.astype(np.int64))
             tables.add("int32_t", f"{name}_action_fixed", fixed_actions, about)
         return tables
+
+    def n_actions(self) -> list[int]:
+        """Return the number of actions of each dimension."""
+        return [len(self.agent.actions_of(d)) for d in range(self.n_dimensions)]
+
+    def fingerprint(self) -> int:
+        """Return a number that agents of other settings or another seed do not have."""
+        learning, approximator = self.agent.learning, self.agent.approximator
+        network = self.network()
+        about = [
+            str(approximator),
+            str(learning),
+            self.agent.seed,
+            self.n_actions(),
+            [(one.kind, list(one.at), one.low, one.high, one.n_bins) for one in self.inputs],
+            [zlib.crc32(network.permutation(*pair).tobytes()) for pair in network.pairs],
+        ]
+        return zlib.crc32(json.dumps(about).encode())
 
     def write(self, name: str, values: dict[str, Any], tables: Tables) -> CHeader:
         """Fill a template in, which also receives what all headers have.

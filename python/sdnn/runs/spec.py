@@ -438,6 +438,8 @@ class RunSpec(Settings, frozen=True):
         # As in trials from before there was a choice.
         if values["agent"]["inputs"] == "all":
             del values["agent"]["inputs"]
+        if values.get("approximator", {}).get("weight_limit") == 0:
+            del values["approximator"]["weight_limit"]
         if not values.get("environment", {}).get("action_masks", True):
             del values["environment"]["action_masks"]
         if version := self.entry.version:

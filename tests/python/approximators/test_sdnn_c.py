@@ -467,3 +467,22 @@ def test_the_average_agrees_with_its_formula():
         state = rng.random(3)
         np.testing.assert_array_equal(network.averaged_values(state), other.values(state))
     assert n_snapshots > 100
+
+
+def test_a_unit_whose_weights_have_no_room_is_not_corrected():
+    sizes = {"n_inputs": 2, "n_pattern_units": 12, "n_hidden_units": 40, "n_active_units": 20}
+    free = _core.SDNNC(SDNNCConfig(**sizes), 3)
+    limited = _core.SDNNC(SDNNCConfig(**sizes, weight_limit=3), 3)
+    same = _core.SDNNC(SDNNCConfig(**sizes, weight_limit=16383), 3)
+    rng = np.random.default_rng(1)
+    for _ in range(400):
+        before = limited.weights()
+        state, action, target = rng.random(2), int(rng.integers(21)), float(rng.uniform(-20, 20))
+        n_changed = limited.correction_counts[0]
+        for network in (free, limited, same):
+            network.update(state, action, target)
+        changed = (limited.weights() != before).any(axis=1)
+        assert changed.any() == (limited.correction_counts[0] > n_changed)
+    np.testing.assert_array_equal(same.weights(), free.weights())
+    assert np.abs(free.weights()).max() > 3  # with two inputs a column is one weight
+    assert np.abs(limited.weights()).max() == 3

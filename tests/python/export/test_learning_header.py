@@ -19,12 +19,15 @@ from c_learners import (
     lines_of,
     live,
     lived,
+    network,
+    paper_rule,
     sarsa,
     several,
+    small_steps,
 )
 from c_policies import STRICT, TARGETS, box, run
 from refusals import refuses
-from sdnn.agents import SDNNQLearning, SDNNSarsa, Transition
+from sdnn.agents import RBFQLearning, SDNNQLearning, SDNNSarsa, Transition
 from sdnn.export import c_header, load_image, save_image
 
 SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all")
@@ -41,8 +44,9 @@ def test_it_acts_and_learns_as_the_agent(name, target, tmp_path):
     check_life(name, target, tmp_path, options=SANITIZED)
 
 
-def test_a_trained_agent_continues_in_c(target, tmp_path):
-    agent = discrete()
+@pytest.mark.parametrize("make", [discrete, network, small_steps])
+def test_a_trained_agent_continues_in_c(make, target, tmp_path):
+    agent = make()
     live(agent, lines_of(agent, 500, 3, 16), 16)
     header, command = build(tmp_path, agent, target)
     lines = lines_of(agent, 500, 4, header.fraction_bits)
@@ -55,7 +59,7 @@ def test_a_trained_agent_continues_in_c(target, tmp_path):
 
 def test_any_readings_and_rewards_are_defined(target, tmp_path):
     """Ends of the numbers' range, and every kind of line in any order."""
-    for make in (discrete, sarsa):
+    for make in (discrete, sarsa, network, small_steps):
         folder = tmp_path / make.__name__
         folder.mkdir()
         agent = make()
@@ -75,7 +79,11 @@ def test_any_readings_and_rewards_are_defined(target, tmp_path):
 @pytest.mark.parametrize("compiler", ["g++", "clang++"])
 @pytest.mark.parametrize(
     ("make", "act"),
-    [(discrete, "const uint32_t a = one.act(x)"), (several, "uint32_t a[2]; one.act(x, a)")],
+    [
+        (discrete, "const uint32_t a = one.act(x)"),
+        (several, "uint32_t a[2]; one.act(x, a)"),
+        (network, "one.set_progress(65536); const uint32_t a = one.act(x)"),
+    ],
 )
 def test_cpp_takes_it_as_functions_and_as_a_class(compiler, make, act, needs, tmp_path):
     needs(compiler)
@@ -90,8 +98,8 @@ def test_cpp_takes_it_as_functions_and_as_a_class(compiler, make, act, needs, tm
           {act};
           one.learn(x, a, 1 << AGENT_FRACTION_BITS, x, true);
           one.save(image);
-          return one.q(x, a) > 0 && same.q(x, a) == 0 && same.load(image) &&
-                 same.q(x, a) == one.q(x, a) ? 0 : 1;
+          return one.q(x, a) != same.q(x, a) && same.load(image) && same.q(x, a) == one.q(x, a)
+                     ? 0 : 1;
         }}
     """
     (tmp_path / "main.cpp").write_text(source + "\n")
@@ -111,12 +119,13 @@ def test_memory_is_as_the_header_says(name, target, tmp_path):
     assert int(run(tmp_path / "size")) == header.ram_bytes
 
 
-def test_what_is_no_image_of_the_agent_changes_nothing():
-    agent, other = discrete(), discrete()
+@pytest.mark.parametrize("make", [discrete, network])
+def test_what_is_no_image_of_the_agent_changes_nothing(make):
+    agent, other = make(), make()
     live(agent, lines_of(agent, 300, 1, 16), 16)
     image = save_image(agent)
     before = save_image(other)
-    for place in range(0, len(image), 97):
+    for place in range(0, len(image), len(image) // 97):
         damaged = bytearray(image)
         damaged[place] ^= 4
         with pytest.raises(ValueError, match=r"damaged|another seed"):
@@ -125,6 +134,7 @@ def test_what_is_no_image_of_the_agent_changes_nothing():
         refuses("image", load_image, other, wrong)
     refuses("image", load_image, other, 3, error=TypeError)
     refuses("image", load_image, sarsa(), image)
+    refuses("image", load_image, paper_rule(), image)
     config = replace(SMALL, averaging_interval=8)
     stranger = SDNNSarsa(
         box(1.0, 2.0, 3.0), gym.spaces.Discrete(3, start=-1), seed=1, approximator=config,
@@ -158,8 +168,87 @@ def test_an_image_of_impossible_numbers_changes_nothing():
     assert save_image(agent) == save_image(new)
 
 
+def test_an_image_of_an_impossible_network_changes_nothing():
+    agent = network()
+    before = save_image(agent)
+    first = len(before) - 4 - 4 * c_header(agent, "agent", learning=True).n_words
+    # A stream, progress, the range of values, returns, a byte of 0, sums that are odd.
+    streams = slice(16, 48)
+    for place, byte in ((streams, 0), (183, 255), (191, 255), (243, 255), (first, 0), (first, 1)):
+        forged = bytearray(before)
+        if place == streams:
+            forged[place] = bytes(32)
+        else:
+            forged[place] = before[place] ^ 1 if byte == 1 else byte
+        forged[-4:] = zlib.crc32(forged[:-4]).to_bytes(4, "little")
+        refuses("image", load_image, agent, bytes(forged))
+        assert save_image(agent) == before
+
+
+REAL_NUMBERS = """
+#include "agent.h"
+#include <stdio.h>
+int main(void) {
+  uint64_t x[2], y[4];
+  while (fread(x, sizeof *x, 2, stdin) == 2) {
+    y[0] = agent_plus(x[0], x[1]);
+    y[1] = agent_minus(x[0], x[1]);
+    y[2] = agent_times(x[0], x[1]);
+    y[3] = agent_over(x[0], x[1]);
+    fwrite(y, sizeof *y, 4, stdout);
+  }
+  return 0;
+}
+"""
+
+
+def test_real_numbers_are_ieee_754(target, tmp_path):
+    """Of all sizes, subnormal ones too, and such as are nearly equal."""
+    (tmp_path / "agent.h").write_text(c_header(network(), "agent", learning=True).text)
+    (tmp_path / "real.c").write_text(REAL_NUMBERS)
+    run(target.compiler, *STRICT, *SANITIZED, tmp_path / "real.c", "-o", tmp_path / "real")
+    random = np.random.default_rng(1)
+    bits = random.integers(0, 2**64, (50_000, 2), np.uint64)
+    near = bits[:, :1] ^ (bits[:, 1:] >> random.integers(1, 63, (50_000, 1)).astype(np.uint64))
+    numbers = np.concatenate([bits, np.hstack([bits[:, :1], near])]).view(np.float64)
+    numbers = np.concatenate([numbers, random.integers(-300, 300, (5000, 2)) / 4])
+    numbers = numbers[np.isfinite(numbers).all(axis=1) & (numbers[:, 1] != 0)]
+    with np.errstate(all="ignore"):
+        a, b = numbers.T
+        expected = np.column_stack([a + b, a - b, a * b, a / b])
+    came = np.frombuffer(run(tmp_path / "real", input=numbers.tobytes()), "<u8").reshape(-1, 4)
+    is_finite = np.isfinite(expected)
+    assert is_finite.mean() > 0.9
+    assert (came == expected.view(np.uint64))[is_finite].all()
+
+
 def test_other_agents_do_not_learn_in_c():
-    agent = SDNNQLearning(box(1.0, 2.0), gym.spaces.Discrete(2), preset="small")
-    refuses("agent", c_header, agent, "agent", learning=True, error=TypeError)
-    refuses("agent", save_image, agent, error=TypeError)
+    for learning, approximator, named in (
+        ({}, {"averaging_interval": 100}, "averaging_interval"),
+        ({}, {"weight_limit": 0}, "weight_limit"),
+        ({}, {"weight_limit": 128}, "weight_limit"),
+        ({"tie_tolerance": 0.1}, {}, "tie_tolerance"),
+        ({"schedule": "exponential"}, {}, "schedule"),
+        ({"value_range": "fixed"}, {"q_low": 1e300, "q_high": 1e301}, "q_low"),
+    ):
+        agent = network()
+        other = SDNNQLearning(
+            box(1.0, 2.0), gym.spaces.Discrete(2),
+            learning=replace(agent.learning, **learning),
+            approximator=replace(agent.approximator, n_inputs=2, **approximator),
+        )  # fmt: skip
+        refuses(named, c_header, other, "agent", learning=True)
+        refuses(named, save_image, other)
+    vector = SDNNQLearning(
+        box(1.0, 2.0), gym.spaces.MultiDiscrete([2, 3]), approximator=network().approximator
+    )
+    refuses("actions", c_header, vector, "agent", learning=True)
+    full = network()
+    weights = full.core.action_value.weights()
+    weights[3, 5] = 128
+    full.core.action_value.set_parameters(weights, full.core.action_value.thresholds())
+    refuses("127", c_header, full, "agent", learning=True)
+    radial = RBFQLearning(box(1.0, 1.0), gym.spaces.Discrete(2))
+    refuses("agent", c_header, radial, "agent", learning=True, error=TypeError)
+    refuses("agent", save_image, radial, error=TypeError)
     refuses("learning", c_header, discrete(), "agent", learning=1, error=TypeError)

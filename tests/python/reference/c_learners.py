@@ -9,11 +9,14 @@ import numpy as np
 
 from bare_processors import BARE_TARGETS, STDIO
 from c_policies import STRICT, box, run
-from sdnn.agents import SarsaConfig, SDNNSarsa, Transition
-from sdnn.approximators import LinearSDNNConfig
+from sdnn.agents import PRESETS, SarsaConfig, SDNNQLearning, SDNNSarsa, Transition
+from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.export import export_c_header, load_image, save_image
 
 SMALL = LinearSDNNConfig(n_pattern_units=24, averaging_interval=7)
+NETWORK = SDNNCConfig(
+    n_pattern_units=24, n_hidden_units=60, n_active_units=20, n_actions=5, weight_limit=127
+)
 
 
 def discrete():
@@ -62,7 +65,62 @@ def states():
     return SDNNSarsa(gym.spaces.Discrete(9), gym.spaces.Discrete(4), seed=6)
 
 
+def network():
+    """SDNN-C as recommended: five-step targets, a range that follows the returns."""
+    learning = replace(PRESETS["small"].learning, epsilon=0.1, start_steps=20)
+    config = replace(NETWORK, n_hidden_units=90)
+    return SDNNQLearning(
+        box(1.0, 2.0, 3.0, 0.25), gym.spaces.Discrete(2, start=-1), seed=7,
+        approximator=config, learning=learning,
+    )  # fmt: skip
+
+
+def paper_rule():
+    """SDNN-C as in the paper, one step and a fixed range, with three inputs and torques."""
+    learning = replace(PRESETS["paper"].learning, tie_rule="middle", epsilon=0.2)
+    config = replace(NETWORK, rounding="random", lattice=2)
+    return SDNNQLearning(
+        box(1.0, 1.0, 8.0), box(2.0), seed=8, approximator=config, learning=learning
+    )
+
+
+def small_steps():
+    """Rounding away, an angle, two inputs, a range from 0 to 1, few weights fit."""
+    learning = replace(PRESETS["paper"].learning, learning_rate=0.3, tie_rule="lowest", n_steps=3)
+    config = replace(
+        NETWORK,
+        rounding="away",
+        n_actions=7,
+        u_low=0,
+        u_high=20,
+        q_low=0.0,
+        q_high=1,
+        weight_limit=5,
+    )
+    return SDNNQLearning(
+        box(np.pi, 2.0), box(1.0), seed=9, angles=[0], approximator=config, learning=learning
+    )
+
+
+def few_pairs():
+    """Five inputs in few pairs, uniform weights, wide patterns, no termination beyond."""
+    config = replace(
+        NETWORK, max_pairs=10, initial_weights="uniform", initial_weight_limit=3.0,
+        n_pattern_units=70,
+    )  # fmt: skip
+    learning = replace(PRESETS["small"].learning, discount=0.9, max_action_repeat=1)
+    return SDNNQLearning(
+        box(1.0, 2.0, 1.0, 1.0, 1.0), gym.spaces.Discrete(4), seed=10,
+        approximator=config, learning=learning,
+    )  # fmt: skip
+
+
+NETWORKS = {
+    "network": network, "paper-rule": paper_rule, "small-steps": small_steps,
+    "few-pairs": few_pairs,
+}  # fmt: skip
 LEARNERS = {
+    **NETWORKS,
     "states": states,
     "discrete": discrete, "sarsa": sarsa, "dutch": dutch, "several": several, "circular": circular,
 }  # fmt: skip

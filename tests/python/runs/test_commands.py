@@ -139,7 +139,7 @@ def test_export_writes_an_agent_that_learns(invoke):
     assert invoke("train", DRIFTING, *SHORT, "--out", "two").exit_code == 0
     done = invoke("export", "two", "--c-header", "b.h", "--learning")
     assert done.exit_code == 1
-    assert "SDNNSarsa" in done.stderr
+    assert "approximator.weight_limit=127" in done.stderr
     assert not Path("b.h").exists()
 
 

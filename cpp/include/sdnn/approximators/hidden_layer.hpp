@@ -144,6 +144,13 @@ class HiddenLayer {
     add_signed(input.minus, input.minus_bits, -1, out);
   }
 
+  /// Whether no |weight| of the unit that update moves would exceed `limit`.
+  bool has_room(std::size_t unit, const coding::SignedColumns& input, std::int32_t step,
+                std::int32_t limit) const {
+    return largest_weight_[unit] + growth(step) <= limit ||
+           fits(unit, parts_of(input, step), limit);
+  }
+
   /// w_i += step * x, twice that in double columns, and w_i0 -= step for every i in `units`. No
   /// unit or column may come twice, and double columns come first in the input's lists.
   ///
@@ -332,7 +339,7 @@ class HiddenLayer {
   void require_room(std::size_t unit, std::span<const Part> parts, std::int32_t step) {
     const std::int32_t room = weight_limit_ - growth(step);
     if (largest_weight_[unit] > room) largest_weight_[unit] = largest_weight(unit);
-    if ((largest_weight_[unit] > room && !fits(unit, parts)) ||
+    if ((largest_weight_[unit] > room && !fits(unit, parts, weight_limit_)) ||
         std::abs(thresholds_[unit] - step) > kThresholdLimit) {
       core::fail(std::overflow_error(
           "a weight or threshold of hidden unit " + std::to_string(unit) +
@@ -340,10 +347,10 @@ class HiddenLayer {
     }
   }
 
-  bool fits(std::size_t unit, std::span<const Part> parts) const {
+  bool fits(std::size_t unit, std::span<const Part> parts, std::int32_t limit) const {
     return std::ranges::all_of(parts, [&](const Part& part) {
       return std::ranges::all_of(part.columns, [&](std::uint32_t j) {
-        return std::abs(weight(unit, j) + part.change) <= weight_limit_;
+        return std::abs(weight(unit, j) + part.change) <= limit;
       });
     });
   }

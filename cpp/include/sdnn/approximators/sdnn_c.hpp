@@ -112,6 +112,7 @@ class SDNNC {
         rounding_(seed, core::Stream::rounding) {
     core::require_positive("learning_coefficient", config.learning_coefficient);
     core::require_in_range("lattice", config.lattice, 1, 64);
+    core::require_in_range("weight_limit", config.weight_limit, 0, HiddenLayer::kWeightLimit);
     core::require_in_range("averaging_interval", config.averaging_interval, 0, 1000000000);
     if (config.averaging_interval > 0) average_.emplace(hidden_layer_, config.averaging_interval);
     tabulate_values();
@@ -390,7 +391,14 @@ class SDNNC {
     for (std::uint32_t& unit : selected) unit += static_cast<std::uint32_t>(first);
 
     const std::int32_t step = deficit > 0 ? config_.lattice : -config_.lattice;
-    hidden_layer_.update(selected, workspace.cache_.columns(*code_, entry.bins), step);
+    const coding::SignedColumns columns = workspace.cache_.columns(*code_, entry.bins);
+    if (config_.weight_limit > 0) {
+      std::erase_if(selected, [&](std::uint32_t unit) {
+        return !hidden_layer_.has_room(unit, columns, step, config_.weight_limit);
+      });
+      if (selected.empty()) return false;
+    }
+    hidden_layer_.update(selected, columns, step);
     log_.add({entry.bins, selected, step});
     return true;
   }

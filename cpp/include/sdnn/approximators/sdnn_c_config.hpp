@@ -56,6 +56,7 @@ struct SDNNCConfig {
   InitialWeights initial_weights = InitialWeights::ternary;
   double initial_weight_limit = 0.1;
   Rounding rounding = Rounding::half_up;
+  int weight_limit = 0;
   int averaging_interval = 0;
   std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;
 
@@ -111,6 +112,12 @@ struct SDNNCConfig {
                         "`random`: up or down at random in proportion, so that no small change is "
                         "lost on average; `away`: in the direction of the change by at least one "
                         "unit. An assumption."),
+            core::field(
+                "weight_limit", &SDNNCConfig::weight_limit,
+                "Largest size, in steps of the lattice, of the sum or difference of two weights "
+                "of a hidden unit: where a correction would exceed it, the unit is not corrected. "
+                "An agent that learns in C needs 127 or less. 0: 16383, beyond which is an error.",
+                core::within(0, 16383)),
             core::field(
                 "averaging_interval", &SDNNCConfig::averaging_interval,
                 "Corrections between snapshots of the weights, of which the network keeps an "
