@@ -108,7 +108,7 @@ class BaseSDNN(Fitted, CodedInputs):
     n_jobs : int, optional
         Threads; the result does not depend on it.
     verbose : int, default=0
-        Whether to show a progress bar.
+        Whether to show a progress bar, with the time left.
 
     Attributes
     ----------
