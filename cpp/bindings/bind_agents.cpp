@@ -340,6 +340,7 @@ void bind_agents(py::module_& module) {
       .def_property_readonly(
           "action_value", [](Sarsa& self) -> LinearSDNN& { return self.action_value(); },
           py::return_value_policy::reference_internal)
+      .def_property_readonly("final_epsilon", &Sarsa::final_epsilon, "Where epsilon goes")
       .def_property_readonly("n_learned", &Sarsa::n_learned, "Transitions that were learned");
   def_q_learning(sarsa, &q_values_of_readout);
 }

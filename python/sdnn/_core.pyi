@@ -1395,7 +1395,7 @@ class SarsaConfig:
     traces : {'dutch', 'replacing'}
         What a trace becomes in a state that returns: `dutch`: such that learning equals the forward view at every step (true online); `replacing`: as if it were the first time.
     schedule_steps : int
-        Steps after which alpha and epsilon have gone half of the way to their final values: after t steps they have gone t / (t + schedule_steps) of it, whatever the planned end. With 0 they follow the agent's progress. Must be in [0, 1073741824].
+        Steps after which alpha and epsilon have gone half of the way to their final values: after t steps they have gone t / (t + schedule_steps) of it, whatever the planned end; epsilon goes to 0 by default, but stays where observations are discrete alone. With 0 they follow the agent's progress. Must be in [0, 1073741824].
     max_action_repeat : int
         Steps that a random action may last. Not in the paper, which has 1: with more, it is kept for at least k steps with probability 1 / k. With a linear readout each episode that terminates halves it, down to 5. Must be in [1, 1000000].
     final_learning_rate : float | None
@@ -1491,7 +1491,7 @@ class SarsaConfig:
     @property
     def schedule_steps(self) -> int:
         """
-        Steps after which alpha and epsilon have gone half of the way to their final values: after t steps they have gone t / (t + schedule_steps) of it, whatever the planned end. With 0 they follow the agent's progress.
+        Steps after which alpha and epsilon have gone half of the way to their final values: after t steps they have gone t / (t + schedule_steps) of it, whatever the planned end; epsilon goes to 0 by default, but stays where observations are discrete alone. With 0 they follow the agent's progress.
         """
     @property
     def start_steps(self) -> int:
@@ -1918,6 +1918,11 @@ class Sarsa:
     @property
     def epsilon(self) -> float:
         ...
+    @property
+    def final_epsilon(self) -> float:
+        """
+        Where epsilon goes
+        """
     @property
     def learning_rate(self) -> float:
         ...

@@ -234,7 +234,7 @@ class Actions:
         if mask is None:
             return None
         parts = [array_of(name, one, "biu") for one in (mask if type(mask) is tuple else (mask,))]
-        allowed = np.concatenate([np.ravel(part) for part in (*parts, ())])
+        allowed = np.concatenate([np.empty(0), *(part.reshape(-1) for part in parts)])
         is_whole = len(parts) in (1, len(self.config.low)) and allowed.size > 0
         if not (is_whole and np.isin(allowed, (0, 1)).all()):
             raise argument_error(name, f"must be None, or 0 or 1 per action, got {shown(mask)}")

@@ -210,7 +210,9 @@ class LearnerWriter(LinearWriter):
         learning, state = self.agent.learning, self.core.state()
         if learning.schedule_steps == 0 or name in state:
             return str(round(getattr(self.core, name) * _ONE))
-        first, last = getattr(learning, name), getattr(learning, f"final_{name}")
+        first, last = getattr(learning, name), learning.final_learning_rate
+        if name == "epsilon":
+            last = self.core.final_epsilon
         ends = [round(one * _ONE) for one in (first, first if last is None else last)]
         return f"{self.name}_scheduled(agent, {ends[0]}, {ends[1]})"
 

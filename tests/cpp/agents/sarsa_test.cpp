@@ -106,6 +106,24 @@ TEST(Sarsa, RatesHaveGoneHalfOfTheWayAfterScheduleSteps) {
   EXPECT_EQ(agent.learning_rate(), 0.75);
 }
 
+TEST(Sarsa, EpsilonGoesToZeroButStaysWhereStatesAreSymbolsAlone) {
+  const SarsaConfig config{.policy = {.epsilon = 0.5, .n_greedy_steps = 0}, .schedule_steps = 100};
+  EXPECT_EQ(agent_of(config).final_epsilon(), 0.0);
+  const std::vector<std::size_t> n_actions{3};
+  const auto with_symbols = [&](std::vector<int> n_symbols, SarsaConfig learning) {
+    return Sarsa(LinearSDNN({.n_inputs = 2, .n_symbols = std::move(n_symbols)}, n_actions, 1),
+                 learning, 1);
+  };
+  EXPECT_EQ(with_symbols({4, 0}, config).final_epsilon(), 0.0);
+  Sarsa agent = with_symbols({4, 3}, config);
+  EXPECT_EQ(agent.final_epsilon(), 0.5);
+  live(agent, 100, 1);
+  EXPECT_EQ(agent.epsilon(), 0.5);
+  SarsaConfig given = config;
+  given.final_epsilon = 0.25;
+  EXPECT_EQ(with_symbols({4, 3}, given).final_epsilon(), 0.25);
+}
+
 TEST(Sarsa, LearnsTheSameOnEveryInstructionSet) {
   for (const auto traces : {TraceKind::dutch, TraceKind::replacing}) {
     std::vector<std::vector<std::int32_t>> learned;

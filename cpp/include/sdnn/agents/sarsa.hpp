@@ -87,6 +87,13 @@ class Sarsa : public WithRates<Sarsa> {
   /// As they are now, in steps of 2^-16.
   double learning_rate() const noexcept { return static_cast<double>(rate_) / kOne; }
   double epsilon() const noexcept { return exploration_.policy().config().epsilon; }
+  /// Where epsilon goes with schedule_steps: by default to 0. Symbols tell nothing of each other:
+  /// where states have nothing else, epsilon stays, so that all of them are tried for good.
+  double final_epsilon() const {
+    const std::vector<int>& n_symbols = action_value_.config().n_symbols;
+    const bool is_symbol = !n_symbols.empty() && std::ranges::find(n_symbols, 0) == n_symbols.end();
+    return config_.final_epsilon.value_or(is_symbol ? config_.policy.epsilon : 0.0);
+  }
 
   /// In how many environments at once the agent learns. What waits of those that are no more is
   /// learned. Throws std::invalid_argument outside [1, 2^14].
@@ -320,9 +327,7 @@ class Sarsa : public WithRates<Sarsa> {
                static_cast<double>(kOne);
       }
       if (!rates_.set_epsilon) {
-        epsilon = scheduled(config_.policy.epsilon,
-                            config_.final_epsilon.value_or(config_.policy.epsilon)) /
-                  static_cast<double>(kOne);
+        epsilon = scheduled(config_.policy.epsilon, final_epsilon()) / static_cast<double>(kOne);
       }
     }
     rate_ = std::max(1, static_cast<std::int32_t>(std::lround(rate * kOne)));

@@ -36,14 +36,14 @@ constexpr std::array<std::string_view, 2> words_of(TraceKind) noexcept {
 struct SarsaConfig {
   double learning_rate = 1.0;
   double discount = 0.99;
-  EpsilonGreedyConfig policy = {.epsilon = 0.15, .n_greedy_steps = 0};
+  EpsilonGreedyConfig policy = {.epsilon = 0.05, .n_greedy_steps = 0};
   double trace_decay = 0.8;
   Bootstrap bootstrap = Bootstrap::q_learning;
   TraceKind traces = TraceKind::dutch;
   int schedule_steps = 20000;
   int max_action_repeat = 100;
   std::optional<double> final_learning_rate = 0.03;
-  std::optional<double> final_epsilon = 0.0;
+  std::optional<double> final_epsilon = {};
   Schedule schedule = Schedule::linear;
   double exploration_fraction = 1.0;
   int start_steps = 0;
@@ -64,11 +64,13 @@ struct SarsaConfig {
                         "What a trace becomes in a state that returns: `dutch`: such that learning "
                         "equals the forward view at every step (true online); `replacing`: as if "
                         "it were the first time."),
-            core::field("schedule_steps", &SarsaConfig::schedule_steps,
-                        "Steps after which alpha and epsilon have gone half of the way to their "
-                        "final values: after t steps they have gone t / (t + schedule_steps) of "
-                        "it, whatever the planned end. With 0 they follow the agent's progress.",
-                        core::within(0, 1 << 30))),
+            core::field(
+                "schedule_steps", &SarsaConfig::schedule_steps,
+                "Steps after which alpha and epsilon have gone half of the way to their "
+                "final values: after t steps they have gone t / (t + schedule_steps) of "
+                "it, whatever the planned end; epsilon goes to 0 by default, but stays where "
+                "observations are discrete alone. With 0 they follow the agent's progress.",
+                core::within(0, 1 << 30))),
         schedule_fields<SarsaConfig>());
   }
   bool operator==(const SarsaConfig&) const = default;
