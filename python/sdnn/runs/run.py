@@ -80,7 +80,8 @@ class RunOutcome:
     """The result of training a run.
 
     ``learning_report``: see `sdnn.agents.SDNNQLearning`, None for fuzzy agents and while one is
-    warming up; ``has_pictures``: whether `record` can render the environment.
+    warming up; ``is_solved``: whether the last evaluation reached the environment's reward
+    threshold; ``has_pictures``: whether `record` can render the environment.
     """
 
     n_steps: int
@@ -89,6 +90,7 @@ class RunOutcome:
     last_evaluation: Row | None
     learning_report: Mapping[str, Any] | None
     is_warming_up: bool
+    is_solved: bool
     has_pictures: bool
     scaling: Scaling | None
 
@@ -235,13 +237,16 @@ class Run(Displayed):
         evaluations = [row for row in self.rows() if row["kind"] == "evaluation"]
         has_report = isinstance(agent, ValueAgent) and not agent.is_warming_up
         single: Any = env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env
+        threshold = single.spec.reward_threshold if single.spec else None
+        last = evaluations[-1] if evaluations else None
         return RunOutcome(
             n_steps=training.n_steps,
             n_episodes=training.n_episodes,
             reason=trial.reason,
-            last_evaluation=evaluations[-1] if evaluations else None,
+            last_evaluation=last,
             learning_report=agent.learning_report() if has_report else None,
             is_warming_up=agent.is_warming_up,
+            is_solved=bool(last and threshold is not None and last["mean_return"] >= threshold),
             has_pictures="rgb_array" in render_modes(single),
             scaling=agent.scaling,
         )

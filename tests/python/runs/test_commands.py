@@ -743,6 +743,15 @@ def test_ranges_that_do_not_suit_are_named(invoke):
     assert "left the range" not in lines
 
 
+def test_nothing_is_said_of_ranges_where_the_task_is_solved(invoke, monkeypatch):
+    monkeypatch.setattr(gym.spec("MountainCarContinuous-v0"), "reward_threshold", -1e9)
+    narrow = ["--agent", "sdnn-c", "--range", "1=0:0.0001", "--set", "protocol.evaluate_every=200"]
+    options = [*narrow, "--steps", 400, "--out", "one"]
+    lines = invoke("train", "MountainCarContinuous-v0", *options).stdout
+    assert "mean return" in lines
+    assert "left the range" not in lines
+
+
 def test_values_that_are_too_coarse_are_named(invoke):
     task = ("MountainCarContinuous-v0", "--agent", "sdnn-c", "--steps", 800)
     ends = ["approximator.q_low=-1e6", "approximator.q_high=1e6"]
