@@ -7,21 +7,23 @@ full synchronization). Runs under different settings live side by side under dif
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
 from sdnn.files import is_there, open_regular
 from sdnn.runs.errors import StoreError
+from sdnn.runs.spec import HASH_DIGITS
 from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows, TrialTime
 
 STORE_NAME = "results.sqlite"
@@ -38,10 +40,12 @@ MOST_BYTES_OF_VALUE = 2**24
 _SCHEMA = files("sdnn.runs").joinpath("schema.sql").read_text("utf-8")
 
 _KEY = "case_id = ? AND agent = ? AND trial = ? AND seed = ? AND config_hash = ?"
-_ROW_COLUMNS = (
-    'number, part, kind, episode, ifnull(step, -1), length, "return", terminated,'
-    " ifnull(environment, -1)"
-)
+_ROW_COLUMNS = {
+    "number": (int,), "part": (int,), "kind": (str,), "episode": (int,),
+    "ifnull(step, -1)": (int,), "length": (int,), '"return"': (float,), "terminated": (int,),
+    "ifnull(environment, -1)": (int,),
+}  # fmt: skip
+_MEASUREMENT_COLUMNS = {"kind": (str,), "key": (str,), "content": (str,), "crc": (int,)}
 
 
 class _Run(NamedTuple):
@@ -68,11 +72,14 @@ class _Run(NamedTuple):
         return key._replace(seed=key.seed % 2**64)
 
 
+_RUN_COLUMNS = {name: get_args(kind) or (kind,) for name, kind in get_type_hints(_Run).items()}
+
+
 class ResultStore:
     """The result file of a folder, made if it is not there; with ``read_only``, nothing is made.
 
-    What is read is checked: the tables are those of this version, and values have the checksum
-    beside them, in which 1 and 1.0 differ.
+    What is read is checked: the tables are those of this version, every value has its column's
+    type and the checksum beside it, and a configuration has its hash.
 
     StoreError if the folder is a file, or the file in it is a link, damaged, of another program or
     of another version of this one's schema. Such a file is left as it is.
@@ -187,9 +194,10 @@ class ResultStore:
 
     def times(self) -> tuple[TrialTime, ...]:
         """Return how long the finished trials took, without reading their rows."""
-        lengths = "SELECT run_id, max(episode) FROM rows GROUP BY run_id"
+        columns = {"run_id": (int,), "max(episode)": (int,)}
         with _as_store_error(self.path):
-            n_episodes = {run: int(n) for run, n in self._connection.execute(lengths)}
+            read = self._read("rows", columns, "GROUP BY run_id")
+            n_episodes = dict(zip(*read, strict=True))
             return tuple(
                 TrialTime(run.key, run.seconds, n_episodes.get(run.id, 0), run.n_decisions)
                 for run in self._runs()
@@ -225,19 +233,37 @@ class ResultStore:
             connection.execute("BEGIN IMMEDIATE")
             yield
 
+    def _read(
+        self,
+        table: str,
+        columns: Mapping[str, tuple[type[Any], ...]],
+        rest: str = "",
+        values: tuple[Any, ...] = (),
+    ) -> list[tuple[Any, ...]]:
+        """Read columns of a table; every value has a type that its column may have."""
+        found = self._connection.execute(
+            f"SELECT {', '.join(columns)} FROM {table} {rest}", values
+        ).fetchall()
+        read = list(zip(*found, strict=True)) or [()] * len(columns)
+        for (name, kinds), column in zip(columns.items(), read, strict=True):
+            wrong = set(map(type, column)).difference(kinds)
+            if wrong:
+                words = f"{kinds[0].__name__}, got {wrong.pop().__name__}"
+                raise StoreError(f"{self.path} is damaged: {table}.{name} must be {words}")
+        return read
+
     def _runs(self, key: TrialKey | None = None) -> list[_Run]:
         """Read the run of a key, if it is stored; by default all runs."""
         rest = "ORDER BY id" if key is None else f"WHERE {_KEY}"
-        values = () if key is None else _stored(key)
-        found = self._connection.execute(f"SELECT * FROM runs {rest}", values)
-        return [_Run(*self._checked("runs", row)) for row in found]
-
-    def _checked(self, table: str, row: tuple[Any, ...]) -> tuple[Any, ...]:
-        """Return a row of a table, whose last value is the checksum of the others."""
-        if row[-1] != _crc(row[:-1]):
-            problem = "a value does not fit its checksum, crc"
-            raise StoreError(f"{self.path} is damaged: {table}, {row[:2]}: {problem}")
-        return row
+        read = self._read("runs", _RUN_COLUMNS, rest, () if key is None else _stored(key))
+        runs = list(map(_Run, *read))
+        for run in runs:
+            problem = _problem_of_config(run.config, run.config_hash)
+            if run.crc != _crc(run[:-1]):
+                problem = "a value does not fit its checksum, crc"
+            if problem:
+                raise StoreError(f"{self.path} is damaged: runs, id {run.id}: {problem}")
+        return runs
 
     def _begun(self, key: TrialKey, config: str, version: str) -> _Run:
         """Return a run, which is begun if it is not there."""
@@ -270,9 +296,11 @@ class ResultStore:
         )
 
     def _rows(self, run: _Run) -> TrialRows:
-        own = "WHERE run_id = ? ORDER BY number, part"
-        read = self._connection.execute(f"SELECT {_ROW_COLUMNS} FROM rows {own}", run[:1])
-        rows = TrialRows(np.array(read.fetchall(), ROW))
+        read = self._read("rows", _ROW_COLUMNS, "WHERE run_id = ? ORDER BY number, part", run[:1])
+        table = np.zeros(len(read[0]), ROW)
+        for name, column in zip(table.dtype.names or (), read, strict=True):
+            table[name] = column
+        rows = TrialRows(table)
         if rows.checksum() != run.checksum:
             raise StoreError(f"{self.path} is damaged: the rows of {run.key} have changed")
         return rows
@@ -301,13 +329,30 @@ class ResultStore:
     def measurements(self, kind: str) -> dict[str, Any]:
         """Return the contents of all measurements of a kind, by their keys, which are sorted."""
         with _as_store_error(self.path):
-            found = self._connection.execute("SELECT * FROM measurements ORDER BY kind, key")
-            rows = [self._checked("measurements", row) for row in found]
-            return {key: json.loads(content) for of, key, content, _ in rows if of == kind}
+            read = self._read("measurements", _MEASUREMENT_COLUMNS, "ORDER BY kind, key")
+            for *values, crc in zip(*read, strict=True):
+                if crc != _crc(tuple(values)):
+                    words = f"measurements, kind {values[0]}, key {values[1]}"
+                    problem = "a value does not fit its checksum, crc"
+                    raise StoreError(f"{self.path} is damaged: {words}: {problem}")
+            rows = zip(*read[:3], strict=True)
+            return {key: json.loads(content) for of, key, content in rows if of == kind}
 
 
 def _crc(values: tuple[Any, ...]) -> int:
     return zlib.crc32(repr(values).encode("utf-8", "surrogatepass"))
+
+
+@lru_cache(maxsize=1024)
+def _problem_of_config(config: str, config_hash: str) -> str:
+    """Say what is wrong with a configuration, or nothing."""
+    if hashlib.sha256(config.encode()).hexdigest()[:HASH_DIGITS] != config_hash:
+        return "config does not have the hash beside it, config_hash"
+    try:
+        is_table = isinstance(json.loads(config), dict)
+    except (RecursionError, ValueError):
+        is_table = False
+    return "" if is_table else "config must be a table in JSON"
 
 
 def _stored(key: TrialKey) -> TrialKey:
