@@ -159,11 +159,7 @@ class _CoreRounds(Rounds):
     def masks(self, found: list[Any]) -> Any:
         rows = np.ones((len(found), self._n_actions), np.uint8)
         for i, one in enumerate(found):
-            mask = self._mask("action_mask", one)
-            if mask is not None:
-                if mask.size != self._n_actions:
-                    expected = f"{self._n_actions} numbers, one per action"
-                    raise ValueError(f"action_mask must have {expected}, got {mask.size}")
+            if (mask := self._mask("action_mask", one)) is not None:
                 rows[i] = mask
         return rows
 
@@ -437,22 +433,23 @@ class Episodes:
         present = {i: episode for i, episode in enumerate(self.present) if episode is not None}
         taken = {i: episode.actions.array() for i, episode in present.items()}
         n_rounds = max(map(len, taken.values()), default=0)
-        longest = next((one for one in taken.values() if len(one) == n_rounds), np.empty(0))
+        leader = next((i for i, one in taken.items() if len(one) == n_rounds), 0)
         every = range(self.n_environments)
-        numbers = {i: present[i].number if i in present else 0 for i in every}
         ended = set(every)
         for t in range(n_rounds + bool(taken)):
             begins = {i for i, own in taken.items() if n_rounds - len(own) == t}
             if t < n_rounds or n_rounds == 0:
                 begins |= ended
             if begins:
-                self._put(self._reset({i: numbers[i] for i in sorted(begins)}))
+                follows = {i for i in begins if i not in taken or n_rounds - len(taken[i]) != t}
+                numbers = {i: present[leader if i in follows else i].number for i in sorted(begins)}
+                self._put(self._reset(numbers))
             if t == n_rounds:  # only episodes without actions begin here
                 return
             self._actions = [
                 taken[i][t - n_rounds]
                 if i in taken and t >= n_rounds - len(taken[i])
-                else longest[t]
+                else taken[leader][t]
                 for i in every
             ]
             self.results = self._adapter.step(self._actions)

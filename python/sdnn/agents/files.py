@@ -306,8 +306,11 @@ def _are_actions(space: Any, values: NDArray[Any]) -> bool:
     """Return whether the rows of an array are actions of a space; environments need not check."""
     if isinstance(space, gym.spaces.Discrete):
         low, high = space.start, space.start + space.n - 1
-    else:
+    elif isinstance(space, gym.spaces.Box):
         low, high = space.low, space.high
+    else:
+        low = getattr(space, "start", 0)
+        high = low + getattr(space, "nvec", 2) - 1
     is_alike = values.dtype.kind == space.dtype.kind or np.can_cast(values.dtype, space.dtype)
     is_shaped = values.ndim > 0 and values.shape[1:] == space.shape
     return is_shaped and (

@@ -9,7 +9,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from sdnn.arguments import flag
+from sdnn.arguments import argument_error, blamed, flag, shown
 from sdnn.display import Displayed
 
 
@@ -42,6 +42,7 @@ class Model(Displayed, abc.ABC):
         state: None = None,
         episode_start: Any = None,
         deterministic: bool = True,
+        action_masks: Any = None,
     ) -> tuple[Any, None]:
         """Choose as Stable-Baselines3's models do, for its tools such as ``evaluate_policy``.
 
@@ -54,6 +55,8 @@ class Model(Displayed, abc.ABC):
             Of recurrent models; not used.
         deterministic : bool
             False: explore, as `act` does, in environment 0.
+        action_masks : optional
+            As the mask of `act`, of a batch one for each.
 
         Returns
         -------
@@ -62,8 +65,22 @@ class Model(Displayed, abc.ABC):
         explore = not flag("deterministic", deterministic)
         several = _unbatched(self.observation_space, observation)
         if several is None:
-            return self.act(observation, explore), None
-        return np.stack([self.act(one, explore) for one in several]), None
+            return self._masked_action(observation, explore, action_masks), None
+        masks = [None] * len(several) if action_masks is None else action_masks
+        if not hasattr(masks, "__len__") or len(masks) != len(several):
+            expected = f"one for each of {len(several)} observations"
+            raise argument_error("action_masks", f"must be {expected}, got {shown(action_masks)}")
+        pairs = zip(several, masks, strict=True)
+        return np.stack([self._masked_action(one, explore, mask) for one, mask in pairs]), None
+
+    def _masked_action(self, observation: Any, explore: bool, mask: Any) -> Any:
+        try:
+            return self.act(observation, explore, mask=mask)
+        except ValueError as error:
+            name, problem = blamed(error)
+            if name != "mask":
+                raise
+            raise argument_error("action_masks", problem) from error
 
     def _facts(self) -> dict[str, object]:
         """Return what is shown of it."""

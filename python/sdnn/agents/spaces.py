@@ -187,6 +187,8 @@ class Actions:
     Attributes
     ----------
     is_box : bool
+    n_actions : list of int
+        Of each dimension that is not a Box's.
     config : ActionConfig
         The core's settings.
     """
@@ -195,6 +197,7 @@ class Actions:
         self._space = space
         self.is_box = isinstance(space, gym.spaces.Box)
         wholes = _wholes(space)
+        self.n_actions = [last - first + 1 for first, last in wholes or ()]
         if isinstance(space, gym.spaces.Box):
             low, high = np.ravel(space.low), np.ravel(space.high)
         elif wholes is not None:
@@ -229,15 +232,24 @@ class Actions:
     def mask(self, name: str, mask: Any) -> NDArray[np.uint8] | None:
         """Return which actions are allowed, 1 or 0 for each; ValueError if it is no mask.
 
-        One array for a Discrete space, a tuple of them for others; None: all are.
+        One array of all actions, or one for each dimension; None: all actions are allowed.
         """
         if mask is None:
             return None
-        parts = [array_of(name, one, "biu") for one in (mask if type(mask) is tuple else (mask,))]
-        allowed = np.concatenate([np.empty(0), *(part.reshape(-1) for part in parts)])
-        is_whole = len(parts) in (1, len(self.config.low)) and allowed.size > 0
-        if not (is_whole and np.isin(allowed, (0, 1)).all()):
-            raise argument_error(name, f"must be None, or 0 or 1 per action, got {shown(mask)}")
+        if self.is_box:
+            raise argument_error(name, f"must be None where actions are a Box, got {shown(mask)}")
+        is_of_parts = isinstance(mask, tuple | list) and any(hasattr(x, "__len__") for x in mask)
+        parts = [
+            array_of(name, one, "fbiu", "0 or 1 per action").reshape(-1)
+            for one in (mask if is_of_parts else (mask,))
+        ]
+        sizes = self.n_actions if is_of_parts else [sum(self.n_actions)]
+        if [part.size for part in parts] != sizes:
+            wanted = " and ".join(map(str, sizes))
+            raise argument_error(name, f"must have {wanted} numbers, got {shown(mask)}")
+        allowed = np.concatenate(parts)
+        if not ((allowed == 0) | (allowed == 1)).all():
+            raise argument_error(name, f"must be 0 or 1 per action, got {shown(mask)}")
         return allowed.astype(np.uint8)
 
     def numbers(self, action: Any) -> NDArray[Any]:

@@ -370,9 +370,8 @@ class Training:
     def _unusable(self, error: Exception, environment: int | None) -> UnusableStepError:
         """Return the error that names step and episode, in an environment or in any."""
         where = ""
-        if environment is not None or self.n_environments == 1:
-            episode = self._episodes.present[environment or 0]
-            assert episode is not None
+        episode = self._episodes.present[environment or 0]
+        if episode is not None and (environment is not None or self.n_environments == 1):
             where = f"step {episode.n_steps}" if episode.n_steps else "the reset"
             whose = f" in environment {environment}" if self.n_environments > 1 else ""
             where = f" ({where} of episode {episode.number}{whose})"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -67,19 +67,32 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         """Take the masks of what is observed: of episodes that ended, those of their ends."""
         if self.masks is None:
             return
-        self._note_masks(infos)
-        if self._mode == "SAME_STEP" and any(ended):
-            self._begun = list(self.masks)
-            self._note_masks(infos.get("final_info", {}))
-        self.masks = [None if t else one for t, one in zip(terminated, self.masks, strict=True)]
+        resets = self._mode == "SAME_STEP"  # infos are then of the next episodes
+        masks = self._masks_in(infos, [resets or not one for one in terminated])
+        self._begun = list(masks)
+        if resets and any(ended):
+            cut = [end and not one for end, one in zip(ended, terminated, strict=True)]
+            last = self._masks_in(infos.get("final_info", {}), cut)
+            masks = [last[i] if end else masks[i] for i, end in enumerate(ended)]
+        self.masks = masks
 
-    def _note_masks(self, infos: Any) -> None:
-        """Note the masks of the environments that have one in infos."""
-        if self.masks is not None and infos:
-            found = mask_in(infos)
-            for i in np.flatnonzero(infos.get("_action_mask", np.ones(self.n_environments))):
-                row = tuple(part[i] for part in found) if isinstance(found, tuple) else found[i]
-                self.masks[i] = row
+    def _masks_in(self, infos: Any, needed: Sequence[bool]) -> list[Any]:
+        """Return the masks of environments in infos, where needed; UnusableStepError without."""
+        if not any(needed):
+            return [None] * self.n_environments
+        found = mask_in(infos)
+        own = infos.get("_action_mask", np.ones(self.n_environments, bool))
+        for i in np.flatnonzero(needed):
+            if not own[i]:
+                raise UnusableStepError(f"info of environment {i} must have 'action_mask'")
+        rows = list(zip(*found, strict=True)) if isinstance(found, tuple) else found
+        return [rows[i] if one else None for i, one in enumerate(needed)]
+
+    def _note_masks(self, infos: Any, begun: Collection[int]) -> None:
+        """Note the masks of the environments that were reset."""
+        if self.masks is not None:
+            rows = self._masks_in(infos, [i in begun for i in range(self.n_environments)])
+            self.masks = [rows[i] if i in begun else m for i, m in enumerate(self.masks)]
 
     def _batch(self, actions: Any) -> Any:
         """Return a copy of the actions as the environment takes them."""
@@ -123,7 +136,7 @@ class _SeparateResets(_Vector):
         options = None if mask.all() else {"reset_mask": mask}
         listed: Any = [seeds.get(i) for i in range(self.n_environments)]
         observations, infos = reset_env(self._env, listed, options)
-        self._note_masks(infos)
+        self._note_masks(infos, seeds)
         seen = self._listed(observations)
         return {i: seen[i] for i in seeds}
 
@@ -143,7 +156,7 @@ class _OwnResets(_Vector):
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
         if self._seen is None:
             observations, infos = reset_env(self._env, seeds[0], None)
-            self._note_masks(infos)
+            self._note_masks(infos, range(self.n_environments))
             self._seen = self._listed(observations)
         elif self._mode != "SAME_STEP":
             return {}

@@ -46,7 +46,7 @@ class ActionMasks(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorAr
         if mask is not None and not callable(mask):
             raise TypeError(f"mask must be a function or None, got {shown(mask)}")
         self._mask = mask
-        self.metadata = {**env.metadata, "action_masks": True}
+        self.metadata = {**(env.metadata or {}), "action_masks": True}
 
     def reset(self, **kwargs: Any) -> tuple[Any, dict[str, Any]]:
         """Begin an episode."""

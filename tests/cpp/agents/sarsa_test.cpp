@@ -106,6 +106,23 @@ TEST(Sarsa, RatesHaveGoneHalfOfTheWayAfterScheduleSteps) {
   EXPECT_EQ(agent.learning_rate(), 0.75);
 }
 
+TEST(Sarsa, RefusesMasksThatDoNotFit) {
+  Sarsa agent = agent_of({}, {3, 2});
+  auto workspace = agent.workspace();
+  core::Random ties(1, core::Stream::ties);
+  const State state{0.25, 0.75};
+  for (const std::vector<std::uint8_t>& mask :
+       {std::vector<std::uint8_t>{1, 1, 1}, {0, 0, 0, 1, 1}, {1, 2, 1, 1, 1}}) {
+    EXPECT_THROW((void)agent.act(state, true, 0, mask), std::invalid_argument);
+    EXPECT_THROW((void)agent.act(state, false, 0, mask), std::invalid_argument);
+    EXPECT_THROW((void)agent.best_action(state, workspace, ties, mask), std::invalid_argument);
+    EXPECT_THROW((void)agent.best_of(workspace, mask), std::invalid_argument);
+    EXPECT_THROW(agent.learn(state, {0, 0}, 0.0, state, false, 0, mask), std::invalid_argument);
+  }
+  const std::vector<std::uint8_t> only{0, 0, 1, 1, 0};
+  EXPECT_EQ(agent.best_action(state, workspace, ties, only), (std::vector<std::size_t>{2, 0}));
+}
+
 TEST(Sarsa, EpsilonGoesToZeroButStaysWhereStatesAreSymbolsAlone) {
   const SarsaConfig config{.policy = {.epsilon = 0.5, .n_greedy_steps = 0}, .schedule_steps = 100};
   EXPECT_EQ(agent_of(config).final_epsilon(), 0.0);

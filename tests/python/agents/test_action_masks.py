@@ -174,14 +174,20 @@ def test_targets_bootstrap_from_allowed_actions_only(kind):
 
 
 @pytest.mark.parametrize("unbounded", [False, True], ids=["bounds", "warm-up"])
+@pytest.mark.parametrize("actions", SPACES)
 @pytest.mark.parametrize("kind", AGENTS)
-@pytest.mark.parametrize("at", [33, 100])
-def test_a_training_is_resumed_exactly(kind, unbounded, at, tmp_path):
-    settings = {"n_steps": 3} if kind is SDNNQLearning else {"bootstrap": "sarsa"}
-    learning = {SDNNSarsa: SarsaConfig, SDNNQLearning: QLearningConfig}[kind](**settings)
+@pytest.mark.parametrize(("at", "n"), [(33, None), (100, None), (20, 3)])
+def test_a_training_is_resumed_exactly(kind, actions, unbounded, at, n, tmp_path):
+    more = {"n_steps": 3} if kind is SDNNQLearning else {"bootstrap": "sarsa"}
+    learning = {SDNNSarsa: SarsaConfig, SDNNQLearning: QLearningConfig}[kind](**more)
+
+    def own_env():
+        if n is None:
+            return new_env(actions, unbounded)
+        return gym.vector.SyncVectorEnv([lambda: new_env(actions, unbounded)] * n)
 
     def training(steps, *callbacks):
-        env = new_env(unbounded=unbounded)
+        env = own_env()
         agent = new_agent(kind, env, learning=learning)
         return Training(agent, env, steps=steps, callbacks=callbacks)
 
@@ -191,7 +197,7 @@ def test_a_training_is_resumed_exactly(kind, unbounded, at, tmp_path):
     part.run()
     assert part.n_steps == at
     part.save(tmp_path / "part.safetensors")
-    rest = Training.load(tmp_path / "part.safetensors", new_env(unbounded=unbounded))
+    rest = Training.load(tmp_path / "part.safetensors", own_env())
     rest.run()
     same_state(rest.agent, whole.agent)
 
@@ -232,6 +238,30 @@ def test_masks_that_do_not_fit_are_refused(mask):
         np.testing.assert_array_equal(values, before[name])
 
 
+@pytest.mark.parametrize("mask", [([1, 0, 0, 0], [0, 0, 1]), [[1, 0, 0]], ([1, 0, 0], 1), [1] * 6])
+def test_masks_of_several_dimensions_that_do_not_fit_are_refused(mask):
+    agent = new_agent(SDNNSarsa, Masked("several"))
+    with pytest.raises(ValueError, match=r"^mask "):
+        agent.act([0.0, 0.0], mask=mask)
+
+
+def test_forms_of_a_mask():
+    agent = new_agent(SDNNSarsa, Masked("several"))
+    parts = [0, 1, 0], [0, 0, 0, 1]
+    for mask in (
+        parts,
+        list(parts),
+        [*parts[0], *parts[1]],
+        np.array([*parts[0], *parts[1]], float),
+    ):
+        np.testing.assert_array_equal(agent.act([0.0, 0.0], mask=mask), [1, 3])
+        np.testing.assert_array_equal(agent.predict([0.0, 0.0], action_masks=mask)[0], [1, 3])
+    found = agent.predict(np.zeros((2, 2)), action_masks=[parts, ([1, 0, 0], [1, 0, 0, 0])])[0]
+    np.testing.assert_array_equal(found, [[1, 3], [0, 0]])
+    with pytest.raises(ValueError, match=r"^action_masks "):
+        agent.predict(np.zeros((2, 2)), action_masks=[parts])
+
+
 def test_boxes_have_no_masks():
     spaces = gym.spaces.Box(-1, 1, (2,)), gym.spaces.Box(-1, 1, (1,))
     for kind in (SDNNSarsa, FuzzyQLearning):
@@ -241,7 +271,24 @@ def test_boxes_have_no_masks():
     with pytest.raises(ValueError, match=r"^env must have discrete actions"):
         ActionMasks(gym.make("Pendulum-v1"))
     with pytest.raises(TypeError, match=r"^mask must be a function"):
-        ActionMasks(gym.make("Taxi-v4"), 3)
+        ActionMasks(Masked(), 3)
+
+
+class Forgetful(gym.Wrapper):
+    """Loses the mask in some steps."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.n = 0
+
+    def step(self, action):
+        *seen, info = self.env.step(action)
+        self.n += 1
+        return (*seen, {} if self.n % 5 == 4 else info)
+
+
+def forgetful():
+    return Forgetful(new_env())
 
 
 def test_masks_of_environments_that_do_not_fit_are_named():
@@ -251,6 +298,10 @@ def test_masks_of_environments_that_do_not_fit_are_named():
         agent.train(env, steps=3)
     with pytest.raises(UnusableStepError, match="action_mask"):
         evaluate(agent, env)
+    for masked in (forgetful, gym.vector.SyncVectorEnv([forgetful, forgetful])):
+        env = masked if masked is not forgetful else forgetful()
+        with pytest.raises(UnusableStepError, match="action_mask"):
+            new_agent(SDNNSarsa, env).train(env, steps=40)
     long = ActionMasks(Masked(), lambda env: [1] * 6)
     for masked in (long, gym.vector.SyncVectorEnv([lambda: long])):
         with pytest.raises(UnusableStepError, match="action_mask"):

@@ -480,6 +480,7 @@ def arguments(agent, parameters):
         "explore": False,
         "environment": 0,
         "mask": None,
+        "action_masks": None,
         "n_environments": 1,
         "learning_rate": None,
         "scaling": None,

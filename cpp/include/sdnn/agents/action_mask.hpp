@@ -6,8 +6,10 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <string>
 #include <string_view>
 
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/floating_point.hpp"
 
 namespace sdnn::agents {
@@ -52,21 +54,30 @@ inline void exclude(ActionMask part, std::span<double> values) noexcept {
   }
 }
 
+/// Throws std::invalid_argument unless a mask is empty, or has zeros and ones for all actions, in
+/// each dimension a one. `n_actions(d)` are those of dimension d.
+template <class NActions>
+void require_mask(std::string_view name, ActionMask mask, std::size_t n_dimensions,
+                  const NActions& n_actions) {
+  if (mask.empty()) return;
+  std::size_t n = 0;
+  for (std::size_t d = 0; d < n_dimensions; ++d) n += n_actions(d);
+  if (mask.size() != n) {
+    core::require(false, name, std::to_string(n) + " numbers, one per action", mask.size());
+  }
+  for (std::size_t d = 0; d < n_dimensions; ++d) {
+    core::require(is_mask(take_part(mask, n_actions(d))), name,
+                  "of 0 and 1, and 1 for an action of each dimension at least", "others");
+  }
+}
+
 /// Lists a mask that an agent remembers, where there is one; see core/state.hpp.
 template <class Mask, class Archive, class NActions>
 void serialize_mask(std::string_view name, Mask& mask, Archive& archive, std::size_t n_dimensions,
                     const NActions& n_actions) {
   archive.some_numbers(name, mask);
   if constexpr (Archive::kReads) {
-    if (mask.empty()) return;
-    std::size_t n = 0;
-    for (std::size_t d = 0; d < n_dimensions; ++d) n += n_actions(d);
-    archive.expect(mask.size() == n, name, "one per action");
-    ActionMask left = mask;
-    for (std::size_t d = 0; d < n_dimensions; ++d) {
-      const ActionMask part = take_part(left, n_actions(d));
-      archive.expect(is_mask(part), name, "0 and 1, and 1 somewhere in each dimension");
-    }
+    archive.taking(name, [&] { require_mask("mask", mask, n_dimensions, n_actions); });
   }
 }
 

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <numeric>
 #include <span>
 #include <string>
 #include <string_view>
@@ -152,19 +151,12 @@ class Actions {
     return true;
   }
 
-  /// Throws std::invalid_argument unless a mask is empty, or has zeros and ones for all actions, in
-  /// each dimension a one.
+  /// Throws as agents::require_mask, and for a mask of a box.
   void require_mask(std::string_view name, ActionMask mask) const {
     if (mask.empty()) return;
     core::require(config_.discrete, name, "None where actions are a box", mask.size());
-    const std::size_t n = std::accumulate(n_actions_.begin(), n_actions_.end(), std::size_t{0});
-    if (mask.size() != n) {
-      core::require(false, name, std::to_string(n) + " numbers, one per action", mask.size());
-    }
-    for (const std::size_t n_actions : n_actions_) {
-      core::require(is_mask(take_part(mask, n_actions)), name,
-                    "of 0 and 1, and 1 for an action of each dimension at least", "others");
-    }
+    agents::require_mask(name, mask, n_dimensions(),
+                         [this](std::size_t d) { return n_actions_[d]; });
   }
 
   /// Throws std::invalid_argument unless the task has such an action. Shape: (n_dimensions,).

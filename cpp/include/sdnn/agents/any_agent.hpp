@@ -228,6 +228,14 @@ auto act(Agent& agent, std::span<const double> state, bool explore, std::size_t 
     return agent.act(state, explore, environment, mask);
 }
 template <class Agent>
+auto best_action(const Agent& agent, std::span<const double> state,
+                 typename Agent::Workspace& workspace, core::Random& ties, ActionMask mask) {
+  if constexpr (kIsFuzzy<Agent>)
+    return agent.best_action(state, workspace, ties);
+  else
+    return agent.best_action(state, workspace, ties, mask);
+}
+template <class Agent>
 auto best_of(Agent& agent, typename Agent::Workspace& workspace, ActionMask mask) {
   if constexpr (kIsFuzzy<Agent>)
     return agent.best_of(workspace);

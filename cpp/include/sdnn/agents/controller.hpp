@@ -182,13 +182,14 @@ class Controller : public WithRates<Controller> {
   /// The action of act without `explore`; `ties` decides between several best ones. Valid until
   /// the workspace is used again. Requires that the warm-up is over. Throws as act.
   std::span<const double> best_action(std::span<const double> observation, Workspace& workspace,
-                                      core::Random& ties) const {
+                                      core::Random& ties, ActionMask mask = {}) const {
+    actions_.require_mask("mask", mask);
     observations_.scale(observation, workspace.state);
     std::visit(
         [&](const auto& agent) {
           auto& own = own_workspace(agent, workspace);
-          actions_.take(agent.best_action(workspace.state, own, ties), workspace.action,
-                        workspace.indices);
+          actions_.take(agents::best_action(agent, workspace.state, own, ties, mask),
+                        workspace.action, workspace.indices);
         },
         *agent_);
     return workspace.action;

@@ -142,10 +142,14 @@ class QLearning : public WithRates<QLearning<Q>> {
   }
 
   /// A best action, as act without `explore` gives it; `ties` decides between several.
-  Action best_action(std::span<const double> state, Workspace& workspace,
-                     core::Random& ties) const {
+  Action best_action(std::span<const double> state, Workspace& workspace, core::Random& ties,
+                     ActionMask mask = {}) const {
+    require_mask("mask", mask);
     read(state, workspace);
-    return each_best([&](std::size_t d) { return best_of(workspace, d, ties); });
+    return each_best([&](std::size_t d) {
+      exclude(take_part(mask, n_actions(d)), workspace, d);
+      return best_of(workspace, d, ties);
+    });
   }
 
   /// The two steps of act without `explore`: `read` takes the time and is for many threads, as
@@ -154,6 +158,7 @@ class QLearning : public WithRates<QLearning<Q>> {
     for (std::size_t d = 0; d < n_dimensions(); ++d) read(state, workspace, d, true);
   }
   Action best_of(Workspace& workspace, ActionMask mask = {}) {
+    require_mask("mask", mask);
     core::Random& ties = exploration_.policy().ties(false);
     return each_best([&](std::size_t d) {
       exclude(take_part(mask, n_actions(d)), workspace, d);
@@ -172,6 +177,7 @@ class QLearning : public WithRates<QLearning<Q>> {
       return best_of(workspace_, mask);
     }
     core::require_unit_values("state", state, n_inputs());  // before anything is drawn
+    require_mask("mask", mask);
     const auto n_actions_of = [this](std::size_t d) { return n_actions(d); };
     if (!exploration_.takes_random_action(episode.exploration, n_actions_of, mask)) {
       return each_best([&](std::size_t d) {
@@ -201,6 +207,7 @@ class QLearning : public WithRates<QLearning<Q>> {
     core::require_finite("reward", reward);
     core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
     core::require_unit_values("next_state", next_state, n_inputs());
+    require_mask("next_mask", next_mask);
     Episode& episode = episodes_.of(environment);
     if constexpr (kHasRange) {
       if (adapts_range() && range_.note(reward, terminated, episode.rewards)) {
@@ -295,6 +302,9 @@ class QLearning : public WithRates<QLearning<Q>> {
     return kHasRange && config_.value_range == ValueRange::adaptive;
   }
 
+  void require_mask(const char* name, ActionMask mask) const {
+    agents::require_mask(name, mask, n_dimensions(), [this](auto d) { return n_actions(d); });
+  }
   void require_action(std::span<const std::size_t> action) const {
     if (action.size() != n_dimensions()) {  // only a bad one's text costs memory
       core::require(false, "action", std::to_string(n_dimensions()) + " numbers", action.size());

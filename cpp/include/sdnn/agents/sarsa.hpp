@@ -127,9 +127,11 @@ class Sarsa : public WithRates<Sarsa> {
   }
 
   /// A best action, as act without `explore` gives it; `ties` decides between several.
-  Action best_action(std::span<const double> state, Workspace& workspace,
-                     core::Random& ties) const {
+  Action best_action(std::span<const double> state, Workspace& workspace, core::Random& ties,
+                     ActionMask mask = {}) const {
+    require_mask("mask", mask);
     read(state, workspace);
+    exclude_from(workspace, mask);
     return each_best(workspace, [&](std::span<const double> row) {
       return exploration_.policy().best_action(row, ties);
     });
@@ -141,6 +143,7 @@ class Sarsa : public WithRates<Sarsa> {
     read(state, workspace, true);
   }
   Action best_of(Workspace& workspace, ActionMask mask = {}) {
+    require_mask("mask", mask);
     return best_of(workspace, false, mask);
   }
 
@@ -151,6 +154,7 @@ class Sarsa : public WithRates<Sarsa> {
              ActionMask mask = {}) {
     Episode& episode = episodes_.of(environment);
     core::require_unit_values("state", state, n_inputs());  // before anything is drawn
+    require_mask("mask", mask);
     const auto n_actions_of = [this](std::size_t d) { return n_actions(d); };
     if (explore && exploration_.takes_random_action(episode.exploration, n_actions_of, mask)) {
       return episode.exploration.kept;
@@ -181,6 +185,7 @@ class Sarsa : public WithRates<Sarsa> {
     core::require_finite("reward", reward);
     core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
     core::require_unit_values("next_state", next_state, n_inputs());
+    require_mask("next_mask", next_mask);
     Episode& episode = episodes_.of(environment);
     if (episode.waits && !std::ranges::equal(episode.next_state, state)) finish_at_end(episode);
     action_value_.read_next(state, episode.next);
@@ -335,6 +340,12 @@ class Sarsa : public WithRates<Sarsa> {
                                       static_cast<double>(kOne));
   }
 
+  void require_mask(const char* name, ActionMask mask) const {
+    agents::require_mask(name, mask, n_dimensions(), [this](auto d) { return n_actions(d); });
+  }
+  static void exclude_from(Workspace& workspace, ActionMask mask) {
+    for (std::vector<double>& row : workspace.values) exclude(take_part(mask, row.size()), row);
+  }
   void require_action(const Action& action) const {
     if (action.size() != n_dimensions()) {  // only a bad one's text costs memory
       core::require(false, "action", std::to_string(n_dimensions()) + " numbers", action.size());
@@ -367,7 +378,7 @@ class Sarsa : public WithRates<Sarsa> {
     return action;
   }
   Action best_of(Workspace& workspace, bool explore, ActionMask mask) {
-    for (std::vector<double>& row : workspace.values) exclude(take_part(mask, row.size()), row);
+    exclude_from(workspace, mask);
     return each_best(workspace, [&](std::span<const double> row) {
       return exploration_.policy().best_action(row, explore);
     });
