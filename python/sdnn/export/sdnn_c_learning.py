@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn import _core
 from sdnn.agents import SDNNQLearning
 from sdnn.arguments import argument_error
 from sdnn.export.code import Code
@@ -184,23 +184,14 @@ class SDNNCLearner(Writer):
         sizes, network = self.agent.approximator, self.network()
         if sizes.initial_weights != "ternary":
             return False
-        signs = np.where(np.arange(sizes.n_hidden_units) % 2 == 0, -1, 1)
-        if (network.thresholds() != signs * self._threshold()).any():
-            return False
-        weights = network.weights()
-        if np.abs(weights).max() > 1:
-            return False
-        random = _xoshiro(_seeded(self.agent.seed, _WEIGHTS_STREAM))
-        n_draws = -(-sizes.n_hidden_units // 32)
-        for j in range(weights.shape[1]):
-            words = np.array([next(random) for _ in range(n_draws)], np.uint64)
-            pairs = (words[:, None] >> np.arange(0, 64, 2, dtype=np.uint64) & np.uint64(3)).reshape(
-                -1
+        new = _core.SDNNC(sizes, self.agent.seed)
+        return all(
+            np.array_equal(ours, others)
+            for ours, others in (
+                (network.weights(), new.weights()),
+                (network.thresholds(), new.thresholds()),
             )
-            drawn = np.array([0, 1, -1, 0])[pairs[: sizes.n_hidden_units]]
-            if (drawn != weights[:, j]).any():
-                return False
-        return True
+        )
 
     def _threshold(self) -> int:
         sizes = self.agent.approximator
@@ -361,18 +352,3 @@ def _seeded(seed: int, stream: int) -> list[int]:
     mixed = split_mix() ^ stream
     mixed = split_mix()
     return [split_mix() for _ in range(4)]
-
-
-def _xoshiro(words: list[int]) -> Iterator[int]:
-    """Draw 64 random bits at a time."""
-    rotated: Callable[[int, int], int] = lambda x, k: (x << k | x >> 64 - k) & _WORD  # noqa: E731
-    a, b, c, d = words
-    while True:
-        yield rotated(b * 5 & _WORD, 7) * 9 & _WORD
-        shifted = b << 17 & _WORD
-        c ^= a
-        d ^= b
-        b ^= c
-        a ^= d
-        c ^= shifted
-        d = rotated(d, 45)
