@@ -72,8 +72,8 @@ class Code:
             "most_columns": most_columns,
         }
 
-    def add_tables(self, tables: Tables, name: str, ending: str = "") -> list[str]:
-        """Add the constants that the code is made of; return their names."""
+    def add_tables(self, tables: Tables, ending: str = "") -> list[str]:
+        """Add the constants that the code is made of; return their names without the prefix."""
         inputs = range(self.n_inputs)
         patterns = [
             np.packbits(self.network.table(i) > 0, axis=1, bitorder="little") for i in inputs
@@ -85,8 +85,8 @@ class Code:
             "units": (self.values()["unit_type"], np.concatenate(self.units)),
         }
         for part, (kind, values) in parts.items():
-            tables.add(kind, f"{name}_{part}{ending}", values)
-        return [f"{name}_{part}{ending}" for part in parts]
+            tables.add(kind, f"{part}{ending}", values)
+        return [f"{part}{ending}" for part in parts]
 
     def paired(self, weights: NDArray[np.int32]) -> NDArray[np.int32]:
         """Arrange weights (n, D) of the paper's order as those of the columns."""

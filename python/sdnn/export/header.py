@@ -11,7 +11,7 @@ from sdnn.arguments import argument_error, flag, path_of, shown
 from sdnn.export.linear import LearnerWriter, LinearWriter
 from sdnn.export.sdnn_c import SDNNCWriter
 from sdnn.export.sdnn_c_learning import SDNNCLearner
-from sdnn.export.writer import CHeader, Writer
+from sdnn.export.writer import CHeader
 from sdnn.files import write_whole
 
 _LARGEST_NAME = 40
@@ -94,8 +94,6 @@ def c_header(
     True
     """
     learns = flag("learning", learning)
-    if not isinstance(agent, (SDNNQLearning, SDNNSarsa)):
-        raise TypeError(f"agent must be an SDNNQLearning or SDNNSarsa, got {type(agent).__name__}")
     fits = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
     if not fits or len(name) > _LARGEST_NAME:
         raise argument_error(
@@ -103,9 +101,14 @@ def c_header(
             "must be a C identifier of letters, digits and single underscores between them,"
             f" at most {_LARGEST_NAME} long, got {shown(name)}",
         )
-    writer: Writer
+    header: CHeader = writer_of(agent, name, fraction_bits, learns=learns).header()
+    return header
+
+
+def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool) -> Any:
+    """Return the writer of an agent's header, a `Learner` if it learns; TypeError for others."""
     if isinstance(agent, SDNNQLearning):
-        writer = (SDNNCLearner if learns else SDNNCWriter)(agent, name, fraction_bits)
-    else:
-        writer = (LearnerWriter if learns else LinearWriter)(agent, name, fraction_bits)
-    return writer.header()
+        return (SDNNCLearner if learns else SDNNCWriter)(agent, name, fraction_bits)
+    if isinstance(agent, SDNNSarsa):
+        return (LearnerWriter if learns else LinearWriter)(agent, name, fraction_bits)
+    raise TypeError(f"agent must be an SDNNQLearning or SDNNSarsa, got {shown(agent)}")

@@ -6,8 +6,7 @@ import zlib
 
 from sdnn.agents import SDNNQLearning, SDNNSarsa
 from sdnn.arguments import shown
-from sdnn.export.linear import LearnerWriter
-from sdnn.export.sdnn_c_learning import SDNNCLearner
+from sdnn.export.header import writer_of
 
 
 def save_image(agent: SDNNQLearning | SDNNSarsa) -> bytes:
@@ -15,7 +14,8 @@ def save_image(agent: SDNNQLearning | SDNNSarsa) -> bytes:
 
     The present episode is not part of it: its last transition may still have to be learned.
     """
-    return _writer(agent).image()
+    image: bytes = writer_of(agent, "agent", None, learns=True).image()
+    return image
 
 
 def load_image(agent: SDNNQLearning | SDNNSarsa, image: bytes) -> None:
@@ -27,7 +27,7 @@ def load_image(agent: SDNNQLearning | SDNNSarsa, image: bytes) -> None:
         If the bytes are damaged, or those of an agent with other settings, spaces or another seed;
         the agent stays as it is.
     """
-    writer = _writer(agent)
+    writer = writer_of(agent, "agent", None, learns=True)
     if not isinstance(image, (bytes, bytearray, memoryview)):
         raise TypeError(f"image must be bytes, got {shown(image)}")
     whole, expected = bytes(image), writer.image()
@@ -42,11 +42,3 @@ def load_image(agent: SDNNQLearning | SDNNSarsa, image: bytes) -> None:
     except ValueError as error:
         raise ValueError(f"image holds what no agent can have: {error}") from error
     agent.begin_episode()
-
-
-def _writer(agent: SDNNQLearning | SDNNSarsa) -> SDNNCLearner | LearnerWriter:
-    if isinstance(agent, SDNNQLearning):
-        return SDNNCLearner(agent, "agent", None)
-    if isinstance(agent, SDNNSarsa):
-        return LearnerWriter(agent, "agent", None)
-    raise TypeError(f"agent must be an SDNNQLearning or SDNNSarsa, got {shown(agent)}")

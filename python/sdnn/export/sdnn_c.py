@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sdnn.agents import SDNNQLearning
+from sdnn.arguments import argument_error
 from sdnn.export.code import Code
 from sdnn.export.tables import Tables, joined, weight_words
-from sdnn.export.writer import MOST_WEIGHTS, CHeader, Writer
+from sdnn.export.writer import CHeader, Writer, require_few_weights
 
 MOST_UNITS = 65535  # whose numbers fit 16 bits
 _BYTES_OF_NETWORK = 40  # a struct of eight pointers and two sizes, where pointers have 32 bits
@@ -29,61 +31,67 @@ class SDNNCWriter(Writer):
             return [self.core.action_value]
         return [self.core.action_value(dimension) for dimension in range(self.n_dimensions)]
 
-    def _check_sizes(self, n_columns: int) -> None:
-        n_units = self.agent.approximator.n_hidden_units
-        if n_units > MOST_UNITS:
-            raise ValueError(
-                f"n_hidden_units must be at most {MOST_UNITS} in a C header, got {n_units}"
-            )
-        n_weights = self.n_dimensions * n_units * n_columns
-        if n_weights > MOST_WEIGHTS:
-            raise ValueError(
-                f"a C header can hold {MOST_WEIGHTS} weights, got {n_weights}: take fewer inputs,"
-                " n_hidden_units or n_pattern_units"
-            )
+    def require_small(self, n_units: int, n_columns: int) -> None:
+        """Raise ValueError for more units or weights than a header can hold."""
+        n_hidden_units = self.agent.approximator.n_hidden_units
+        if n_hidden_units > MOST_UNITS:
+            problem = f"must be at most {MOST_UNITS} in a C header, got {n_hidden_units}"
+            raise argument_error("n_hidden_units", problem)
+        require_few_weights(self.n_dimensions * n_units * n_columns, "n_hidden_units")
+
+    def units(self, network: Any) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return the hidden units that are in a window, and where among them the windows begin."""
+        first = network.first_units().astype(np.intp)
+        used = np.unique(first[:, None] + np.arange(self.agent.approximator.n_active_units))
+        return used, np.searchsorted(used, first)
+
+    def describe(self, n_units: str) -> str:
+        """Return what the header is of; ``n_units`` are the hidden units in use."""
+        return (
+            f"{self.n_inputs} inputs, {self.agent.approximator.n_pattern_units} units per"
+            f" pattern, {n_units} hidden units in use, {' x '.join(map(str, self.n_actions()))}"
+            " actions"
+        )
 
     def header(self) -> CHeader:
         """Make the header."""
-        name, sizes, networks = self.name, self.agent.approximator, self._networks()
-        codes = [Code(network, len(self.inputs)) for network in networks]
+        name, networks, tables = self.name, self._networks(), self.tables_of_spaces()
+        codes = [Code(network, self.n_inputs) for network in networks]
         n_columns = codes[0].n_columns
-        self._check_sizes(n_columns)
-        tables = self.tables_of_spaces()
+        self.require_small(self.agent.approximator.n_hidden_units, n_columns)
         self._add_ranks(tables)
         rows, n_units, n_rows = list[str](), list[int](), 0
         for d, (network, code) in enumerate(zip(networks, codes, strict=True)):
-            # Only the units that are in a window, and where among them the windows begin.
-            first = network.first_units().astype(np.intp)
-            used = np.unique(first[:, None] + np.arange(sizes.n_active_units))
+            used, first_units = self.units(network)
             weights, n_bytes = weight_words(code.paired(network.averaged_weights()[used]))
             thresholds = np.pad(network.averaged_thresholds()[used], (0, -used.size % 4))
-            parts = code.add_tables(tables, name, f"_{d}")
-            for kind, part, values in (
+            parts = code.add_tables(tables, f"_{d}")
+            for kind, part, constants in (
                 ("uint32_t", "weights", weights),
                 ("int32_t", "thresholds", thresholds),
                 ("uint8_t", "n_bytes", n_bytes),
-                ("uint16_t", "first_units", np.searchsorted(used, first)),
+                ("uint16_t", "first_units", first_units),
             ):
-                parts.append(f"{name}_{part}_{d}")
-                tables.add(kind, parts[-1], values)
+                parts.append(f"{part}_{d}")
+                tables.add(kind, parts[-1], constants)
             tables.n_bytes += _BYTES_OF_NETWORK
-            rows.append(f"  {{{', '.join(parts)}, {used.size}, {network.n_actions}}},")
+            members = [
+                *(f"{name}_{part}" for part in parts),
+                str(used.size),
+                str(network.n_actions),
+            ]
+            rows.append(f"  {{{', '.join(members)}}},")
             n_units.append(used.size)
             n_rows += int(n_bytes.sum())
         declaration = f"static const {name}_network {name}_networks[{len(rows)}] = {{"
-        n_fire_words = -(-max(n_units) // 32)
-        most_actions = max(network.n_actions for network in networks)
+        n_fire_words, most_actions = -(-max(n_units) // 32), max(self.n_actions())
         shapes = [code.values() for code in codes]
         most_columns = max(shape["most_columns"] for shape in shapes)
         ram_bytes = shapes[0]["bytes_of_column"] * most_columns + 8
-        ram_bytes += 4 * n_fire_words + 2 * most_actions + 12 * len(self.inputs)
+        ram_bytes += 4 * n_fire_words + 2 * most_actions + 12 * self.n_inputs
         values = {
             **shapes[0],
-            "description": (
-                f"{len(self.inputs)} inputs, {sizes.n_pattern_units} units per pattern,"
-                f" {' + '.join(map(str, n_units))} hidden units in use,"
-                f" {' x '.join(str(network.n_actions) for network in networks)} actions"
-            ),
+            "description": self.describe(" + ".join(map(str, n_units))),
             "coding": "network->",
             "most_columns": most_columns,
             "ram_bytes": ram_bytes,
@@ -92,22 +100,20 @@ class SDNNCWriter(Writer):
             "networks": joined([declaration, *rows, "};"]),
             "n_fire_words": n_fire_words,
             "most_actions": most_actions,
-            "n_active_units": sizes.n_active_units,
-            "has_ties": self.agent.learning.tie_tolerance > 0.0,
             "ties": self.ties(),
             "is_linear": False,
         }
         return self.write("c_sdnn_c", values, tables)
 
     def _add_ranks(self, tables: Tables) -> None:
-        name, networks = self.name, self._networks()
+        networks = self._networks()
         values = networks[0].output_values()
         if any((network.output_values() != values).any() for network in networks):
             raise ValueError("networks of one agent must have one range of values")
         distinct = np.unique(values)
         about = "Ranks of the values that counts of active units stand for."
-        tables.add("uint16_t", f"{name}_ranks", np.searchsorted(distinct, values), about)
+        tables.add("uint16_t", "ranks", np.searchsorted(distinct, values), about)
         if self.agent.learning.tie_tolerance > 0.0:
             ties = np.searchsorted(distinct, distinct - self.agent.learning.tie_tolerance)
             about = "Of each rank, the lowest that ties with it."
-            tables.add("uint16_t", f"{name}_ties", ties, about)
+            tables.add("uint16_t", "ties", ties, about)

@@ -17,13 +17,14 @@ _BYTES = {"uint8_t": 1, "uint16_t": 2, "int32_t": 4, "uint32_t": 4, "uint64_t": 
 
 @dataclass
 class Tables:
-    """Constants in C, and their bytes."""
+    """Constants in C, whose names begin with ``prefix``, and their bytes."""
 
+    prefix: str
     n_bytes: int = 0
     lines: list[str] = field(default_factory=list)
 
     def add(self, kind: str, name: str, values: NDArray[Any], comment: str = "") -> None:
-        """Add a table of one or two dimensions of a C type."""
+        """Add a table of one or two dimensions of a C type; ``name`` comes after the prefix."""
         self.n_bytes += _BYTES[kind] * values.size
         if comment:
             self.lines.append(f"/* {comment} */")
@@ -31,7 +32,7 @@ class Tables:
         if kind == "uint32_t" and "weights" in name:
             form = "0x{:x}"
         stored = values if values.size else np.zeros(1, np.int64)  # C has no empty tables
-        self.lines += table_lines(f"static const {kind} {name}", stored, form)
+        self.lines += table_lines(f"static const {kind} {self.prefix}_{name}", stored, form)
 
     def text(self) -> str:
         """Return all tables."""
@@ -117,12 +118,12 @@ def conversions(
 
     Also return the tables that they use, shared by inputs of one kind and range.
     """
-    tables, names = Tables(), dict[Any, str]()
+    tables, names = Tables(name), dict[Any, str]()
 
     def table(key: Any, word: str, values: NDArray[Any], comment: str) -> str:
         if key not in names:
             names[key] = f"{name}_{word}_{len(names)}"
-            tables.add("int32_t", names[key], values, comment)
+            tables.add("int32_t", f"{word}_{len(names) - 1}", values, comment)
         return names[key]
 
     fixed, double = [], []

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import math
 import zlib
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -50,7 +51,7 @@ class CHeader:
     n_words: int
 
 
-class Writer:
+class Writer(ABC):
     """Makes the header of one agent; subclasses have its kind of network."""
 
     def __init__(self, agent: CodedAgent[Any, Any], name: str, fraction_bits: int | None) -> None:
@@ -64,16 +65,17 @@ class Writer:
         if any(not -(2**31) <= start < 2**31 for start in self.start):
             raise ValueError(f"actions must begin within 32 bits, got {self.start}")
         self.inputs = self._inputs()
+        self.n_inputs = len(self.inputs)
         self.n_observed = len(agent.observation_range[0])
         self.fraction_bits = self._checked_fraction_bits(fraction_bits)
 
+    @abstractmethod
     def network(self) -> Any:
         """Return a network of the agent, which has the patterns of its inputs."""
-        raise NotImplementedError
 
+    @abstractmethod
     def header(self) -> CHeader:
         """Make the header."""
-        raise NotImplementedError
 
     def _inputs(self) -> list[Input]:
         inputs = []
@@ -113,17 +115,16 @@ class Writer:
 
     def tables_of_spaces(self) -> Tables:
         """Write the constants of observations and actions."""
-        tables, name = Tables(), self.name
+        tables = Tables(self.name)
         n_bins = np.array([one.n_bins for one in self.inputs])
-        tables.add("uint32_t", f"{name}_n_bins", n_bins, "Bins of each input.")
+        tables.add("uint32_t", "n_bins", n_bins, "Bins of each input.")
         if self.box is None:
             about = "The action that has the number 0."
-            tables.add("int32_t", f"{name}_first_action", np.array(self.start), about)
+            tables.add("int32_t", "first_action", np.array(self.start), about)
         else:
             fixed = np.round(self.box.astype(np.float64) * 2.0**self.fraction_bits)
             about = f"The actions, times 2^{self.fraction_bits}."
-            fixed_actions = by_dimension(fixed.astype(np.int64))
-            tables.add("int32_t", f"{name}_action_fixed", fixed_actions, about)
+            tables.add("int32_t", "action_fixed", by_dimension(fixed.astype(np.int64)), about)
         return tables
 
     def n_actions(self) -> list[int]:
@@ -145,7 +146,7 @@ class Writer:
         return zlib.crc32(json.dumps(about).encode())
 
     def write(self, name: str, values: dict[str, Any], tables: Tables) -> CHeader:
-        """Fill a template in, which also receives what all headers have.
+        """Fill a template in; it also receives this writer's attributes and the agent's settings.
 
         Values have the description, bytes of RAM and of weights, and words read beside what the
         template names.
@@ -153,44 +154,29 @@ class Writer:
         fixed_tables, bins_of_fixed, bins_of_double = conversions(
             self.inputs, self.name, self.fraction_bits
         )
-        flash_bytes = tables.n_bytes + fixed_tables.n_bytes
-        scaling = self.agent.scaling
-        text = (
-            _templates()
-            .get_template(f"{name}.h.jinja")
-            .render(
-                **values,
-                name=self.name,
-                NAME=self.name.upper(),
-                version=__version__,
-                kind=type(self.agent).__name__,
-                seed=self.agent.seed,
-                flash=f"{flash_bytes:,}",
-                float_ram=f"{8 * self.n_observed:,}",
-                scaling=None if scaling is None else list(scaling.lines()),
-                tie_rule=self.agent.learning.tie_rule,
-                inputs=[list(one.usage()) for one in self.inputs],
-                n_observed=self.n_observed,
-                n_inputs=len(self.inputs),
-                n_dimensions=self.n_dimensions,
-                is_vector=self.is_vector,
-                is_box=self.box is not None,
-                fraction_bits=self.fraction_bits,
-                tables=tables.text(),
-                fixed_tables=fixed_tables.text(),
-                bins_of_fixed=bins_of_fixed,
-                float_tables=self._float_tables(),
-                bins_of_double=bins_of_double,
-            )
-        )
+        flash_bytes, scaling = tables.n_bytes + fixed_tables.n_bytes, self.agent.scaling
+        common = {
+            **vars(self),
+            "NAME": self.name.upper(),
+            "version": __version__,
+            "kind": type(self.agent).__name__,
+            "learning": self.agent.learning,
+            "sizes": self.agent.approximator,
+            "flash": f"{flash_bytes:,}",
+            "scaling": None if scaling is None else list(scaling.lines()),
+            "is_box": self.box is not None,
+            "tables": tables.text(),
+            "fixed_tables": fixed_tables.text(),
+            "bins_of_fixed": bins_of_fixed,
+            "float_tables": self._float_tables(),
+            "bins_of_double": bins_of_double,
+        }
         return CHeader(
             name=self.name,
-            text=text,
+            text=_templates().get_template(f"{name}.h.jinja").render({**common, **values}),
             fraction_bits=self.fraction_bits,
             flash_bytes=flash_bytes,
-            weight_bytes=values["weight_bytes"],
-            ram_bytes=values["ram_bytes"],
-            n_words=values["n_words"],
+            **{about: values[about] for about in ("weight_bytes", "ram_bytes", "n_words")},
         )
 
     def _float_tables(self) -> str:
@@ -205,6 +191,79 @@ class Writer:
     def ties(self) -> str:
         """Return how ties are broken where nothing is drawn."""
         return "lowest" if self.agent.learning.tie_rule == "lowest" else "middle"
+
+
+class Learner(Writer):
+    """Makes the header of an agent that learns, and keeps what it has learned in an image.
+
+    An image has fields of fixed sizes, one after the other, and a checksum. The core's state has
+    most of them by the same names.
+    """
+
+    magic: ClassVar[int]
+    streams: ClassVar[tuple[str, ...]]
+    """Random generators, in the order of the image."""
+
+    @abstractmethod
+    def fields(self) -> list[tuple[Any, ...]]:
+        """Return names, types and shapes of an image, as `numpy.dtype` takes them."""
+
+    @abstractmethod
+    def remembered(self, state: dict[str, Any]) -> dict[str, Any]:
+        """Return the fields that are not the same in the core's state."""
+
+    @abstractmethod
+    def recall(self, image: Any, state: dict[str, Any]) -> None:
+        """Put the fields of an image into the core's state; ValueError for impossible ones."""
+
+    def layout(self) -> np.dtype[Any]:
+        """Return the type of an image without its checksum."""
+        head = [("magic", "<u4"), ("fingerprint", "<u4")]
+        return np.dtype([*head, *self.fields()])
+
+    def image(self) -> bytes:
+        """Return the state as the header's bytes."""
+        state, image = self.core.state(), np.zeros((), self.layout())
+        known = {"magic": self.magic, "fingerprint": self.fingerprint(), **state}
+        known |= {"words": self.seeds(state), **self.remembered(state)}
+        for name in image.dtype.names or ():
+            image[name] = known.get(name, 0)
+        content = image.tobytes()
+        return content + zlib.crc32(content).to_bytes(4, "little")
+
+    def restore(self, whole: bytes) -> None:
+        """Give the agent the state of an image, whole and of this agent."""
+        (image,), state = np.frombuffer(whole, self.layout(), 1), self.core.state()
+        for stream, words in zip(self.streams, image["words"], strict=True):
+            state[f"{stream}.words"] = words.copy()
+        state.pop("n_random_left", None)
+        if n_left := image["n_random_left"]:
+            state["n_random_left"] = np.array(n_left, np.int32)
+        self.recall(image, state)
+        self.core.restore(state)
+
+    def seeds(self, state: dict[str, Any]) -> NDArray[np.uint64]:
+        """Return the states of the random generators, shape (n_streams, 4)."""
+        return np.array([state[f"{stream}.words"] for stream in self.streams], np.uint64)
+
+    def values_of_learning(self, state: dict[str, Any]) -> dict[str, Any]:
+        """Return what the templates of all agents that learn need."""
+        return {
+            "state": state,
+            "ties": "draw" if self.agent.learning.tie_rule == "uniform" else self.ties(),
+            "image_bytes": self.layout().itemsize + 4,
+            "image_magic": f"0x{self.magic:08x}",
+            "fingerprint": f"0x{self.fingerprint():08x}",
+        }
+
+
+def require_few_weights(n_weights: int, settings: str) -> None:
+    """Raise ValueError for more weights than a header can hold."""
+    if n_weights > MOST_WEIGHTS:
+        raise ValueError(
+            f"a C header can hold {MOST_WEIGHTS} weights, got {n_weights}: take fewer inputs,"
+            f" {settings} or n_pattern_units"
+        )
 
 
 @cache
