@@ -6,7 +6,7 @@ are trained natively, or with --emulate in the emulator. Counts are exact; of ti
 nothing. Needs Debian's compilers and an emulator: apt install gcc gcc-arm-linux-gnueabihf
 qemu-user.
 
-usage: python bench/arm/learning.py [cartpole|pendulum] [--agent sdnn-c] [--seeds 10] [--emulate]
+usage: python bench/arm/learning.py [cartpole|pendulum] [--agent sdnn-c] [--ram BYTES] [--emulate]
 """
 
 import argparse
@@ -14,21 +14,20 @@ import math
 import re
 import subprocess
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 
-from sdnn.agents import PRESETS, SDNNQLearning, SDNNSarsa
 from sdnn.approximators import LinearSDNNConfig
-from sdnn.export import export_c_header
+from sdnn.export import export_c_header, new_agent
 
 HERE = Path(__file__).parent
 EPISODES = 100
 COUNTED = (2000, 4000)
 """Steps of two runs whose instructions are compared."""
-AGENTS = {"sdnn-linear": SDNNSarsa, "sdnn-c": SDNNQLearning}
+AGENTS = ("sdnn-linear", "sdnn-c")
 ARM = "arm-linux-gnueabihf-gcc"
 CHIP = ("-mthumb", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 
@@ -44,22 +43,19 @@ class Task:
     solved: float
     angles: tuple[int, ...] = ()
 
-    def agent(self, seed, kind):
+    def agent(self, seed, kind, ram_bytes=None):
         """Make the agent, which has learned nothing."""
         high = np.array(self.high)
-        given = {"approximator": self.approximator}
-        if kind is SDNNQLearning:
-            small = PRESETS["small"]
-            config = replace(small.approximator, averaging_interval=0, weight_limit=127)
-            given = {"approximator": config, "learning": small.learning}
-        return kind(
-            gym.spaces.Box(-high, high, dtype=np.float64),
+        given = {"approximator": self.approximator} if kind == "sdnn-linear" else {}
+        space = gym.spaces.Box(-high, high, dtype=np.float64)
+        return new_agent(
+            space,
             self.actions,
-            **given,
-            inputs="all",
+            kind=kind,
+            ram_bytes=ram_bytes,
             angles=self.angles,
-            angle_pairs=[],
             seed=seed,
+            **given,
         )
 
 
@@ -110,11 +106,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("task", nargs="?", choices=TASKS, default="cartpole")
     parser.add_argument("--agent", choices=AGENTS, default="sdnn-linear")
+    parser.add_argument("--ram", type=int, help="Bytes that SDNN-C may take.")
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--emulate", action="store_true", help="Train in the emulator.")
     given = parser.parse_args()
-    name, task, kind = given.task, TASKS[given.task], AGENTS[given.agent]
-    options = ["-DFOLLOWS_PROGRESS"] if kind is SDNNQLearning else []
+    name, task, kind = given.task, TASKS[given.task], given.agent
+    options = ["-DFOLLOWS_PROGRESS"] if kind == "sdnn-c" else []
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         plugin = folder / "instruction_count.so"
@@ -122,7 +119,8 @@ def main():
         subprocess.run(["gcc", "-O2", "-shared", "-fPIC", source, "-o", plugin], check=True)
         returns = []
         for seed in range(1, given.seeds + 1):
-            header = export_c_header(task.agent(seed, kind), folder / "pole.h", learning=True)
+            agent = task.agent(seed, kind, given.ram)
+            header = export_c_header(agent, folder / "pole.h", learning=True)
             native = [program(folder / "native", name, "gcc", *options)]
             emulated = program(folder / "emulated", name, ARM, "-mthumb", "-static", *options)
             runner = ["qemu-arm", emulated] if given.emulate else native

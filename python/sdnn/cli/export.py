@@ -69,10 +69,16 @@ _LARGEST = 2**31  # of readings
     " approximator.n_actions; repeat it for each motor.",
 )
 @click.option(
+    "--agent",
+    "kind",
+    type=click.Choice(["sdnn-linear", "sdnn-c"]),
+    help="With --new: which agent.  [default: sdnn-linear]",
+)
+@click.option(
     "--ram",
     metavar="BYTES",
     type=click.IntRange(1, 2**31),
-    help="With --new: most memory that the agent may take.  [default: 20000]",
+    help="With --new: most memory that the agent may take.  [default: 20000, or 60000 for sdnn-c]",
 )
 @click.option(
     "--set",
@@ -167,23 +173,38 @@ def _check_together(source: Path | None, new: bool, options: dict[str, Any]) -> 
     if not new:
         for key, value in options.items():
             if value not in ((), None):
-                option = {"ranges": "--range", "settings": "--set"}.get(key, f"--{key}")
+                options_of = {"ranges": "--range", "settings": "--set", "kind": "--agent"}
+                option = options_of.get(key, f"--{key}")
                 raise click.UsageError(f"{option} needs --new: the agent of RUN has its own")
 
 
 def _known_agent(source: Path) -> Agent[Any, Any]:
     from sdnn.agents import load_agent
-    from sdnn.runs.run import agent_of
+    from sdnn.runs.config_file import read_spec
+    from sdnn.runs.errors import ConfigError
+    from sdnn.runs.run import CONFIG, agent_of
 
     try:
-        return agent_of(source) if source.is_dir() else load_agent(source)
+        agent = agent_of(source) if source.is_dir() else load_agent(source)
     except ValueError as error:
         raise click.ClickException(str(error)) from error
+    try:
+        environment = read_spec(source / CONFIG).environment if source.is_dir() else None
+    except ConfigError:  # of a damaged file, which the agent does not need
+        environment = None
+    if environment is not None and environment.action_masks:
+        raise click.ClickException(
+            f"{source} was trained with environment.action_masks, which no C header has: it would"
+            " take actions that are not allowed. Train without masks, with a reward that punishes"
+            " such actions"
+        )
+    return agent
 
 
 def _new_agent(
     ranges: Sequence[str],
     actions: Sequence[str],
+    kind: str | None,
     ram: int | None,
     settings: Sequence[str],
     seed: int | None,
@@ -192,9 +213,9 @@ def _new_agent(
     import gymnasium as gym
     import numpy as np
 
-    from sdnn.agents import LINEAR_PRESETS
     from sdnn.arguments import blamed
     from sdnn.export import new_agent
+    from sdnn.export.new import new_settings
     from sdnn.runs.settings import changed
 
     ends = [(-math.pi, math.pi) if one == "angle" else _ends("--range", one) for one in ranges]
@@ -207,18 +228,18 @@ def _new_agent(
                 " learning.discount"
             )
         tables[table][key] = value_of(text)
-    preset = LINEAR_PRESETS["general"]
-    parts = {name: changed(getattr(preset, name), given, name) for name, given in tables.items()}
+    kind = kind or "sdnn-linear"
+    parts = {name: changed(new_settings(kind)[name], tables[name], name) for name in tables}
     low, high = np.array(ends).T
-    memory: dict[str, Any] = {} if ram is None else {"ram_bytes": ram}
     try:
         return new_agent(
             gym.spaces.Box(low, high, dtype=np.float64),
             _action_space(actions),
+            kind=kind,
+            ram_bytes=ram,
             seed=seed or 0,
             angles=[i for i, one in enumerate(ranges) if one == "angle"],
             **parts,
-            **memory,
         )
     except (ValueError, OverflowError, MemoryError) as error:
         name, problem = blamed(error)

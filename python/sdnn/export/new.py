@@ -3,27 +3,35 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
 
-from sdnn.agents import LINEAR_PRESETS, SDNNSarsa
-from sdnn.approximators import LinearSDNNConfig
-from sdnn.arguments import argument_error, shown, whole
-from sdnn.export.linear import LearnerWriter
+from sdnn.agents import LINEAR_PRESETS, PRESETS, SDNNQLearning, SDNNSarsa
+from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
+from sdnn.arguments import argument_error, choice, shown, whole
+from sdnn.export.header import c_header
+from sdnn.export.sdnn_c_learning import MOST_WEIGHT
 
-_UNITS = range(32, 769, 16)
+NewConfig = LinearSDNNConfig | SDNNCConfig
+_KINDS: dict[str, type[SDNNSarsa] | type[SDNNQLearning]] = {
+    "sdnn-linear": SDNNSarsa,
+    "sdnn-c": SDNNQLearning,
+}
+_RAM_BYTES = {"sdnn-linear": 20_000, "sdnn-c": 60_000}
 
 
 def new_agent(
     observation_space: gym.Space[Any],
     action_space: gym.Space[Any],
     *,
-    ram_bytes: int = 20_000,
-    approximator: LinearSDNNConfig | None = None,
+    kind: str = "sdnn-linear",
+    ram_bytes: int | None = None,
+    approximator: NewConfig | None = None,
     **options: Any,
-) -> SDNNSarsa:
+) -> SDNNSarsa | SDNNQLearning:
     """Return an agent that has learned nothing, as large as the memory of a processor allows.
 
     All of its sensors are inputs from the beginning, so it needs no warm-up; `c_header` with
@@ -33,17 +41,20 @@ def new_agent(
     ----------
     observation_space, action_space
         See `Agent`. Every range must be finite, or given as ``observation_range``.
-    ram_bytes : int
-        Most bytes that the agent may take in C: it gets as many ``n_pattern_units`` as fit, 32 to
-        768, unless ``approximator`` has a number of them.
-    approximator : LinearSDNNConfig, optional
+    kind : {"sdnn-linear", "sdnn-c"}
+    ram_bytes : int, optional
+        Most bytes that the agent may take in C; by default 20,000, or 60,000 for ``"sdnn-c"``.
+    approximator : LinearSDNNConfig or SDNNCConfig, optional
+        The linear agent gets as many ``n_pattern_units`` as fit, 32 to 768, unless there is a
+        number of them. SDNN-C gets the units given, by default those of its preset ``small``, or
+        fewer if they do not fit.
     **options
-        Other arguments of `SDNNSarsa`: ``seed``, ``learning``, ``angles``, ...
+        Other arguments of `SDNNSarsa` or `SDNNQLearning`: ``seed``, ``learning``, ``angles``, ...
 
     Raises
     ------
     ValueError
-        If no agent for these spaces is so small; from `SDNNSarsa`.
+        If no agent for these spaces is so small; from `SDNNSarsa` or `SDNNQLearning`.
     RuntimeError
         If a range is not known.
 
@@ -55,27 +66,56 @@ def new_agent(
     >>> c_header(agent, "cart", learning=True).ram_bytes <= 20_000
     True
     """
-    most = whole("ram_bytes", ram_bytes, 1, 2**31)
-    config = LINEAR_PRESETS["general"].approximator if approximator is None else approximator
-    if not isinstance(config, LinearSDNNConfig):
-        raise TypeError(f"approximator must be a LinearSDNNConfig, got {shown(config)}")
-    options = {"inputs": "all", "angle_pairs": [], **options}
+    agent_type = choice("kind", kind, _KINDS)
+    most = _RAM_BYTES[kind] if ram_bytes is None else whole("ram_bytes", ram_bytes, 1, 2**31)
+    given = {**new_settings(kind), "inputs": "all", "angle_pairs": [], **options}
+    config = given["approximator"] if approximator is None else approximator
+    if not isinstance(config, agent_type.approximator_type):
+        expected = agent_type.approximator_type.__name__
+        raise TypeError(f"approximator must be a {expected} for {kind}, got {shown(config)}")
 
-    def agent(n_units: int) -> SDNNSarsa:
-        own = replace(config, n_pattern_units=n_units)
-        return SDNNSarsa(observation_space, action_space, approximator=own, **options)
+    def made(size: Any) -> SDNNSarsa | SDNNQLearning:
+        return agent_type(observation_space, action_space, **{**given, "approximator": size})
 
-    def needed(n_units: int) -> int:
-        writer = LearnerWriter(agent(n_units), "agent", None)
-        return writer.ram_bytes(writer.sizes())
+    def needed(size: Any) -> int:
+        return c_header(made(size), "agent", learning=True).ram_bytes
 
-    if config.n_pattern_units > 0:
-        return agent(config.n_pattern_units)
-    n_fitting = bisect_right(_UNITS, most, key=needed)
+    sizes = _sizes(config)
+    if len(sizes) == 1:
+        return made(config)
+    n_fitting = bisect_right(sizes, most, key=needed)
     if n_fitting == 0:
         raise argument_error(
             "ram_bytes",
-            f"must be at least {needed(_UNITS[0])} for these spaces, got {most}: with fewer"
+            f"must be at least {needed(sizes[0])} for these spaces, got {most}: with fewer"
             " variables, actions or max_pairs an agent needs less",
         )
-    return agent(_UNITS[n_fitting - 1])
+    return made(sizes[n_fitting - 1])
+
+
+def new_settings(kind: str) -> dict[str, Any]:
+    """Return the settings that a new agent begins with, ``approximator`` and ``learning``."""
+    preset = LINEAR_PRESETS["general"] if kind == "sdnn-linear" else PRESETS["small"]
+    config = preset.approximator
+    if isinstance(config, SDNNCConfig):
+        config = replace(config, averaging_interval=0, weight_limit=MOST_WEIGHT)
+    return {"approximator": config, "learning": preset.learning}
+
+
+def _sizes(config: Any) -> Sequence[Any]:
+    """Return the sizes to choose from, the smallest first."""
+    if isinstance(config, LinearSDNNConfig):
+        if config.n_pattern_units > 0:
+            return [config]
+        return [replace(config, n_pattern_units=n) for n in range(32, 769, 16)]
+    # Long patterns are worth more than many hidden units.
+    parts = [*((m, 1) for m in range(3, 8)), *((8, n) for n in range(1, 13))]
+    return [
+        replace(
+            config,
+            n_pattern_units=config.n_pattern_units * m // 8,
+            n_hidden_units=config.n_hidden_units * n // 12,
+            n_active_units=config.n_active_units * n // 12,
+        )
+        for m, n in parts
+    ]

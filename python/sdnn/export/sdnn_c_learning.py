@@ -34,9 +34,10 @@ class SDNNCLearner(Learner, SDNNCWriter):
 
     def __init__(self, agent: SDNNQLearning, name: str, fraction_bits: int | None) -> None:
         if agent.n_dimensions > 1:
-            raise ValueError(
-                "actions must have one dimension for an SDNNQLearning that learns in C, got"
-                f" {agent.n_dimensions}: SDNNSarsa learns with more"
+            raise argument_error(
+                "action_space",
+                "must have one dimension for an SDNNQLearning that learns in C, got"
+                f" {agent.n_dimensions}: SDNNSarsa (sdnn-linear) learns with more",
             )
         super().__init__(agent, name, fraction_bits)
         self._check_settings()

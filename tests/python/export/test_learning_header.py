@@ -242,7 +242,7 @@ def test_other_agents_do_not_learn_in_c():
     vector = SDNNQLearning(
         box(1.0, 2.0), gym.spaces.MultiDiscrete([2, 3]), approximator=network().approximator
     )
-    refuses("actions", c_header, vector, "agent", learning=True)
+    refuses("action_space", c_header, vector, "agent", learning=True)
     full = network()
     weights = full.core.action_value.weights()
     weights[3, 5] = 128

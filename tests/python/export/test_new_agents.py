@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from refusals import refuses
-from sdnn.agents import LINEAR_PRESETS, SDNNSarsa
-from sdnn.approximators import LinearSDNNConfig
+from sdnn.agents import LINEAR_PRESETS, PRESETS, SDNNSarsa
+from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.cli import main
 from sdnn.export import c_header, new_agent
 
@@ -40,6 +40,24 @@ def test_an_agent_is_the_largest_that_fits(ram_bytes, actions):
     assert header.ram_bytes > ram_bytes or n_units == 768
 
 
+@pytest.mark.parametrize(("ram_bytes", "n_hidden"), [(9000, 75), (30_000, 300), (10**6, 900)])
+def test_a_network_is_the_largest_that_fits(ram_bytes, n_hidden):
+    agent = new_agent(SPACE, TWO, kind="sdnn-c", ram_bytes=ram_bytes, seed=3)
+    sizes = agent.approximator
+    assert (sizes.n_hidden_units, sizes.n_active_units) == (n_hidden, n_hidden // 3)
+    assert sizes.n_pattern_units == 40 if n_hidden > 75 else 15 <= sizes.n_pattern_units < 40
+    assert c_header(agent, "agent", learning=True).ram_bytes <= ram_bytes
+
+
+def test_a_network_is_as_large_as_given_and_learns_at_once():
+    given = PRESETS["small"].approximator
+    config = replace(given, n_pattern_units=16, averaging_interval=0, weight_limit=127)
+    agent = new_agent(SPACE, TWO, kind="sdnn-c", ram_bytes=10**6, approximator=config)
+    assert agent.approximator.n_pattern_units == 16
+    assert agent.learning == PRESETS["small"].learning
+    assert "first_weights" not in c_header(agent, "agent", learning=True).text  # drawn on the chip
+
+
 def test_an_agent_keeps_what_is_given():
     config = LinearSDNNConfig(n_pattern_units=100, averaging_interval=0)
     agent = new_agent(SPACE, TWO, ram_bytes=10, approximator=config, angles=[1], seed=5)
@@ -50,6 +68,11 @@ def test_an_agent_keeps_what_is_given():
 def test_what_does_not_fit_or_has_no_range_is_refused():
     refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=1000)
     refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=1.5)
+    refuses("ram_bytes", new_agent, SPACE, TWO, kind="sdnn-c", ram_bytes=5000)
+    refuses("kind", new_agent, SPACE, TWO, kind="rbf")
+    for kind, config in (("sdnn-linear", SDNNCConfig()), ("sdnn-c", LinearSDNNConfig())):
+        given = {"kind": kind, "approximator": config}
+        refuses("approximator", new_agent, SPACE, TWO, **given, error=TypeError)
     unknown = gym.spaces.Box(-np.inf, np.inf, (2,))
     refuses("observation_range", new_agent, unknown, TWO, error=RuntimeError)
     known = new_agent(unknown, TWO, observation_range=([-1, -1], [1, 1]))
@@ -69,6 +92,21 @@ def test_the_command_makes_the_same_agent(export, tmp_path):
     expected = c_header(agent, "agent", learning=True)
     assert (tmp_path / "agent.h").read_text() == expected.text
     assert f"{expected.ram_bytes:,} bytes of memory" in done.stdout
+
+
+def test_the_command_makes_the_same_network(export, tmp_path):
+    settings = ("--set", "approximator.n_actions=3", "--set", "learning.discount=0.9")
+    done = export("--new", *GIVEN, "--actions", "-1:1", "--agent", "sdnn-c", *settings)
+    assert done.exit_code == 0, done.output
+    small = PRESETS["small"]
+    config = replace(small.approximator, n_actions=3, averaging_interval=0, weight_limit=127)
+    agent = new_agent(
+        SPACE, gym.spaces.Box(-1.0, 1.0, (1,), np.float64), kind="sdnn-c", angles=[1],
+        approximator=config, learning=replace(small.learning, discount=0.9),
+    )  # fmt: skip
+    expected = c_header(agent, "agent", learning=True)
+    assert (tmp_path / "agent.h").read_text() == expected.text
+    assert 50_000 < expected.ram_bytes <= 60_000
 
 
 @pytest.mark.parametrize(
@@ -100,10 +138,16 @@ def test_actions_are_numbers_or_ranges(actions, space, export, tmp_path):
         ((*GIVEN, "--actions", "2", "--actions", "0:1"), "--actions"),
         ((*GIVEN, "--actions", "2", "--ram", "500"), "--ram must be at least"),
         ((*GIVEN, "--actions", "2", "--ram", "x"), "--ram"),
+        ((*GIVEN, "--actions", "2", "--agent", "rbf"), "--agent"),
+        ((*GIVEN, "--actions", "2", "--agent", "sdnn-c", "--ram", 5000), "--ram must be at least"),
         ((*GIVEN, "--actions", "2", "--seed", "-1"), "--seed"),
         *(((*GIVEN, "--actions", "2", "--set", one), "--set") for one in ("learning",
           "learning.x=1", "budget.steps=3", "learning.=3", "learning.discount=2",
           "learning.discount=x", "approximator.n_inputs=3", "approximator.n_pattern_units=-1")),
+        *(((*GIVEN, "--actions", "2", "--agent", "sdnn-c", "--set", one), named) for one, named in (
+          ("approximator.averaging_interval=9", "averaging_interval"),
+          ("approximator.weight_limit=0", "weight_limit"), ("learning.traces=dutch", "--set"))),
+        ((*GIVEN, "--actions", "2", "--actions", "3", "--agent", "sdnn-c"), "--actions"),
         *(((*GIVEN, "--actions", one), "--ram") for one in ("65536",)),
     ],
 )  # fmt: skip
@@ -120,7 +164,8 @@ def test_a_run_and_a_new_agent_exclude_each_other(export):
         ((), "RUN"),
         (("one.safetensors", "--new", *GIVEN, "--actions", 2), "omit one.safetensors"),
         *((("one.safetensors", *more), more[0]) for more in (("--range", "0:1"), ("--actions", 2),
-          ("--ram", 9000), ("--seed", 0), ("--set", "learning.discount=0.5"))),
+          ("--ram", 9000), ("--seed", 0), ("--set", "learning.discount=0.5"),
+          ("--agent", "sdnn-c"))),
     ):  # fmt: skip
         done = export(*words)
         assert (done.exit_code, done.stdout) == (2, ""), done.output

@@ -261,6 +261,7 @@ GOOD = {
     "path": lambda: "agent",
     "plan": lambda: (),
     "quick": lambda: True,
+    "kind": lambda: "sdnn-linear",
     "ram_bytes": lambda: 20_000,
     "records": lambda: (),
     "reference": lambda: (),

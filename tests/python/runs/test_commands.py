@@ -143,6 +143,18 @@ def test_export_writes_an_agent_that_learns(invoke):
     assert not Path("b.h").exists()
 
 
+def test_an_agent_that_needs_masks_is_not_exported(invoke, tmp_path):
+    words = ("--agent", "sdnn-linear", "--steps", 60, "--evaluate-every", 0, "--out", "one")
+    masks = ("--set", "environment.action_masks=true")
+    assert invoke("train", "Taxi-v4", *words, *masks).exit_code == 0
+    done = invoke("export", "one", "--c-header", "a.h")
+    assert (done.exit_code, done.stdout) == (1, "")
+    assert "one was trained with environment.action_masks" in done.stderr
+    assert not Path("a.h").exists()
+    (tmp_path / "one" / "config.json").write_text("of another program")
+    assert invoke("export", "one", "--c-header", "a.h").exit_code == 0
+
+
 SCALED = ("--noise", 0.01, "--redundant", 1, "--range", "-4:4", "--range", "1=-2:3")
 SCALED_LINES = [
     "observation[0]: variable 0, from -4.0 to 4.0",
