@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from numbers import Integral, Real
-from typing import Any, ClassVar, TypeVar
+from numbers import Real
+from typing import Any, TypeVar
 
 import numpy as np
 from joblib import effective_n_jobs
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import clone
 from sklearn.utils import check_random_state
-from sklearn.utils._param_validation import Interval, StrOptions
+from sklearn.utils._param_validation import Interval
 
 from sdnn import _core
 from sdnn.estimators.fitted import Fitted
@@ -22,7 +22,6 @@ from sdnn.estimators.inputs import (
     Floats,
     Ints,
     Pairs,
-    add_sections,
     input_pairs,
 )
 from sdnn.estimators.network import (
@@ -34,6 +33,7 @@ from sdnn.estimators.network import (
 )
 from sdnn.estimators.outliers import warn_caller
 from sdnn.estimators.pair_selection import select_pairs, with_categories
+from sdnn.estimators.parameters import SHARE, parameter, wholes, words
 from sdnn.estimators.training import (
     LARGE_SAMPLE,
     History,
@@ -136,51 +136,25 @@ class BaseSDNN(Fitted, CodedInputs):
         As in scikit-learn.
     """
 
-    n_pattern_units: int | None = None
-    pairs: Any = "budget"
-    tables: str = "shared"
-    out_of_range: str = "clip"
-    max_iter: int | None = None
-    n_averaged_epochs: int = 4
-    correction_share: float = 1.0
-    shuffle: bool = True
-    early_stopping: bool = False
-    validation_fraction: float = 0.1
-    n_iter_no_change: int = 10
-    training: str = "auto"
-    memory_limit: int = 2**30
-    warm_start: bool = False
-    random_state: Any = None
-    n_jobs: int | None = None
-    verbose: int = 0
+    n_pattern_units: int | None = parameter(None, wholes(2, 2**24), None)
+    pairs: Any = parameter("budget", words("budget", "all", "auto"), "array-like")
+    tables: str = parameter("shared", words("shared", "separate"))
+    out_of_range: str = parameter("clip", words("clip", "error"))
+    max_iter: int | None = parameter(None, wholes(1, 10**9), None)
+    n_averaged_epochs: int = parameter(4, wholes(1, 1000))
+    correction_share: float = parameter(1.0, SHARE)
+    shuffle: bool = parameter(True, "boolean")
+    early_stopping: bool = parameter(False, "boolean")
+    validation_fraction: float = parameter(0.1, Interval(Real, 0, 1, closed="neither"))
+    n_iter_no_change: int = parameter(10, wholes(1, 10**9))
+    training: str = parameter("auto", words(*_core.TRAINING_FORMS))
+    memory_limit: int = parameter(2**30, wholes(0, 2**62))
+    warm_start: bool = parameter(False, "boolean")
+    random_state: Any = parameter(None, "random_state")
+    n_jobs: int | None = parameter(None, wholes(-4096, 4096), None)
+    verbose: int = parameter(0, "verbose")
 
     refit = False  # the regressor lets its users choose it
-
-    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
-        **CodedInputs._parameter_constraints,
-        "n_pattern_units": [Interval(Integral, 2, 2**24, closed="both"), None],
-        "pairs": [StrOptions({"budget", "all", "auto"}), "array-like"],
-        "tables": [StrOptions({"shared", "separate"})],
-        "out_of_range": [StrOptions({"clip", "error"})],
-        "max_iter": [Interval(Integral, 1, 10**9, closed="both"), None],
-        "n_averaged_epochs": [Interval(Integral, 1, 1000, closed="both")],
-        "correction_share": [Interval(Real, 0, 1, closed="right")],
-        "shuffle": ["boolean"],
-        "early_stopping": ["boolean"],
-        "validation_fraction": [Interval(Real, 0, 1, closed="neither")],
-        "n_iter_no_change": [Interval(Integral, 1, 10**9, closed="both")],
-        "training": [StrOptions(set(_core.TRAINING_FORMS))],
-        "memory_limit": [Interval(Integral, 0, 2**62, closed="both")],
-        "warm_start": ["boolean"],
-        "random_state": ["random_state"],
-        "n_jobs": [Interval(Integral, -4096, 4096, closed="both"), None],
-        "verbose": ["verbose"],
-    }
-
-    def __init_subclass__(cls, **options: Any) -> None:
-        """Add the parameters and attributes documented here to the docstring."""
-        super().__init_subclass__(**options)
-        add_sections(cls, BaseSDNN)
 
     @abc.abstractmethod
     def _check_samples(

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from numbers import Integral
-from typing import Any, ClassVar, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import ClassifierMixin
-from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.multiclass import (
     _ovr_decision_function,
@@ -22,6 +20,7 @@ from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.fitted import mean_of
 from sdnn.estimators.inputs import Array, Floats, Ints, check_labels, class_labels
 from sdnn.estimators.network import Network
+from sdnn.estimators.parameters import SHARE, parameter, wholes, words
 from sdnn.estimators.training import class_weights, sample_weights, weighted_mean
 
 UNITS_EACH = 60
@@ -71,17 +70,10 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     True
     """
 
-    scheme: str = "one_vs_rest"
-    n_units_per_class: int | None = None
-    class_weight: Any = None
-    correction_share: float = 0.25
-
-    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
-        **BaseSDNN._parameter_constraints,
-        "scheme": [StrOptions(set(_core.CLASS_SCHEMES))],
-        "n_units_per_class": [Interval(Integral, 1, 1024, closed="both"), None],
-        "class_weight": [StrOptions({"balanced"}), dict, None],
-    }
+    scheme: str = parameter("one_vs_rest", words(*_core.CLASS_SCHEMES))
+    n_units_per_class: int | None = parameter(None, wholes(1, 1024), None)
+    class_weight: Any = parameter(None, words("balanced"), dict, None)
+    correction_share: float = parameter(0.25, SHARE)
 
     def partial_fit(
         self: Self,

@@ -10,19 +10,19 @@ import inspect
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from numbers import Number
-from typing import Any, ClassVar, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import assert_all_finite
-from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.multiclass import check_classification_targets, unique_labels
 from sklearn.utils.validation import validate_data
 
 from sdnn.arguments import shown
 from sdnn.coding import Coding, RandomInverse, Symbolic, WithMissing, coding_named
 from sdnn.estimators.outliers import OutlierWarning, numbers_to_range, usual_range, warn_caller
+from sdnn.estimators.parameters import parameter, words
 
 Columns = int | str | slice | Sequence[int] | Sequence[str] | Sequence[bool] | Callable[[Any], Any]
 Pairs = list[tuple[int, int]]
@@ -289,13 +289,19 @@ def as_it_came(X: Any) -> Any:
 class CodedInputs(BaseEstimator):
     """Validation of samples for estimators with a parameter ``coding``."""
 
-    coding: Any = "random-inverse"
-    ranges: str = dataclasses.field(default="all", kw_only=True)
+    coding: Any = parameter("random-inverse", str, Coding, list, tuple, kw_only=False)
+    ranges: str = parameter("all", words("all", "robust"))
 
-    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
-        "coding": [str, Coding, list, tuple],
-        "ranges": [StrOptions({"all", "robust"})],
-    }
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Add the parameters and attributes that base classes document to the docstring."""
+        super().__init_subclass__(**options)
+        for base in cls.__bases__:
+            if issubclass(base, CodedInputs):
+                add_sections(cls, base)
+
+    @property
+    def _parameter_constraints(self) -> dict[str, list[Any]]:
+        return {one.name: one.metadata["constraints"] for one in dataclasses.fields(self)}
 
     def set_params(self: Self, **params: Any) -> Self:
         """Set parameters; ``coding__length_scale`` and the like replace fields of codings.

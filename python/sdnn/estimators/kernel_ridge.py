@@ -5,8 +5,8 @@ from __future__ import annotations
 import abc
 import dataclasses
 from collections.abc import Sequence
-from numbers import Integral, Real
-from typing import Any, ClassVar, TypeVar
+from numbers import Real
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import log_softmax, softmax
 from sklearn.base import ClassifierMixin
 from sklearn.utils import check_random_state
-from sklearn.utils._param_validation import Interval, StrOptions
+from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
 from sdnn.arguments import real
@@ -24,7 +24,6 @@ from sdnn.estimators.inputs import (
     CodedInputs,
     CodedRegressor,
     Floats,
-    add_sections,
     check_labels,
     class_labels,
     input_pairs,
@@ -37,9 +36,11 @@ from sdnn.estimators.leave_one_out import (
     portions,
     solve,
 )
+from sdnn.estimators.parameters import parameter, wholes, words
 from sdnn.estimators.training import class_weights, sample_weights
 from sdnn.kernel import N_UNITS, AnalyticKernel
 
+AUTO = words("auto")
 DEGREES = (1, 2, 3)
 LARGEST_TARGET = 1e140  # so that sums of squares are finite
 LOG_STEEPNESS = (0.0, 5.0)  # bounds, for the softmax of scores
@@ -103,25 +104,11 @@ class BaseKernelRidge(CodedInputs):
     grows with the cube of m, and beyond that with the number of samples.
     """
 
-    alpha: float | str = "auto"
-    degree: int | str = "auto"
-    pairs: Any = "all"
-    max_components: int = 2000
-    random_state: Any = None
-
-    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
-        **CodedInputs._parameter_constraints,
-        "alpha": [Interval(Real, 0, np.inf, closed="neither"), StrOptions({"auto"})],
-        "degree": [Interval(Integral, 1, 3, closed="both"), StrOptions({"auto"})],
-        "pairs": [StrOptions({"all"}), "array-like"],
-        "max_components": [Interval(Integral, 10, 2**15, closed="both")],
-        "random_state": ["random_state"],
-    }
-
-    def __init_subclass__(cls, **options: Any) -> None:
-        """Add the parameters and attributes documented here to the docstring."""
-        super().__init_subclass__(**options)
-        add_sections(cls, BaseKernelRidge)
+    alpha: float | str = parameter("auto", Interval(Real, 0, np.inf, closed="neither"), AUTO)
+    degree: int | str = parameter("auto", wholes(1, 3), AUTO)
+    pairs: Any = parameter("all", words("all"), "array-like")
+    max_components: int = parameter(2000, wholes(10, 2**15))
+    random_state: Any = parameter(None, "random_state")
 
     def fit(self: Self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
         """Learn ranges, alpha and degree, and a weight of each component.
@@ -268,12 +255,7 @@ class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
     True
     """
 
-    class_weight: Any = None
-
-    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
-        **BaseKernelRidge._parameter_constraints,
-        "class_weight": [StrOptions({"balanced"}), dict, None],
-    }
+    class_weight: Any = parameter(None, words("balanced"), dict, None)
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         table, labels = self._validated(X, y, reset=True)

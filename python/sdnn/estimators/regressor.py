@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from numbers import Integral
-from typing import Any, ClassVar, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn.utils._param_validation import Interval, StrOptions
 
 from sdnn.arguments import shown
 from sdnn.estimators.base import BaseSDNN, OutOfRangeWarning
 from sdnn.estimators.fitted import mean_of
 from sdnn.estimators.inputs import Array, CodedRegressor, Floats, Ints
 from sdnn.estimators.outliers import warn_caller
+from sdnn.estimators.parameters import parameter, wholes, words
 from sdnn.estimators.training import weighted_mean
 
 MARGIN = 0.2  # that a learned output range adds on either side
@@ -67,17 +66,10 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     (3,)
     """
 
-    n_output_units: int = 280
-    output_range: Any = None
-    refit: bool = False
-
-    _parameter_constraints: ClassVar[dict[str, list[Any]]] = {
-        **BaseSDNN._parameter_constraints,
-        "n_output_units": [Interval(Integral, 1, 2**20, closed="both")],
-        "output_range": ["array-like", None],
-        "out_of_range": [StrOptions({"clip", "widen", "error"})],
-        "refit": ["boolean"],
-    }
+    n_output_units: int = parameter(280, wholes(1, 2**20))
+    output_range: Any = parameter(None, "array-like", None)
+    out_of_range: str = parameter("clip", words("clip", "widen", "error"))
+    refit: bool = parameter(False, "boolean")
 
     def partial_fit(
         self: Self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None

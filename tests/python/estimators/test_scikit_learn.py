@@ -174,7 +174,7 @@ OUTSIDE = {"validation_fraction": 1.0, "random_state": -1, "n_jobs": 5000, "alph
 def test_every_parameter_is_checked_and_named(kind):
     """None of them takes an object of no type; nor a word or a number that it does not know."""
     names = [name for name in kind().get_params(deep=False) if name not in ("coding", "pairs")]
-    assert {"coding", "pairs", *names} == set(kind._parameter_constraints)
+    assert {"coding", "pairs", *names} == set(kind()._parameter_constraints)
     for name in [*names, "coding", "pairs"]:
         for bad in (object(), "unheard", OUTSIDE.get(name, -1)):
             if name == "verbose" and bad == -1:
