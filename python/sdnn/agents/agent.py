@@ -2,53 +2,24 @@
 
 from __future__ import annotations
 
-import abc
-import secrets
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn import _core
+from sdnn.agents.base import Approximator, BaseAgent, Learning
+from sdnn.agents.batches import unbatched
 from sdnn.agents.episode import Transition
-from sdnn.agents.files import SavedAgent
-from sdnn.agents.model import Model
-from sdnn.agents.spaces import (
-    Actions,
-    AnglePairs,
-    Inputs,
-    Observations,
-    Ranges,
-    require_unbatched,
-    space_data,
-    space_of_error,
-)
 from sdnn.agents.training import Training, TrainingResult
-from sdnn.arguments import (
-    argument_error,
-    blamed,
-    flag,
-    is_of_class,
-    real,
-    reward_of,
-    seed_of,
-    shown,
-    whole,
-)
-from sdnn.config import WARM_UP
+from sdnn.arguments import argument_error, blamed, flag, reward_of, shown, whole
 
 if TYPE_CHECKING:
     from sdnn.agents.callbacks import Callback
 
-_MOST_ENVIRONMENTS = 2**14
 
-Approximator = TypeVar("Approximator")
-Learning = TypeVar("Learning")
-
-
-class Agent(SavedAgent, Model, abc.ABC, Generic[Approximator, Learning]):
+class Agent(BaseAgent[Approximator, Learning]):
     """An agent in a Gymnasium environment that learns one transition at a time.
 
     ``train`` is a loop over environments; a robot that brings its own loop calls `begin_episode`,
@@ -87,133 +58,6 @@ class Agent(SavedAgent, Model, abc.ABC, Generic[Approximator, Learning]):
     TypeError, ValueError
         For spaces of another kind; for spaces, ranges or settings that are impossible.
     """
-
-    learning: Learning
-    _approximator: Approximator
-    _controller: _core.Controller
-    _tables: Sequence[NDArray[np.int8]] = ()
-
-    def __init__(
-        self,
-        observation_space: gym.Space[Any],
-        action_space: gym.Space[Any],
-        *,
-        approximator: Approximator | None = None,
-        learning: Learning | None = None,
-        seed: int | None = 0,
-        observation_range: Ranges | None = None,
-        angles: Sequence[int] = (),
-        angle_pairs: AnglePairs = "none",
-        inputs: Inputs = "all",
-        warm_up_steps: int = WARM_UP.default,
-    ) -> None:
-        self._take_spaces(observation_space, action_space)
-        require_unbatched(observation_space, action_space)
-        try:
-            space_data(observation_space)  # what could not be saved had better not be learned
-        except TypeError as error:
-            raise TypeError(f"observation_space {error}") from None
-        self._take_settings(
-            self.approximator_type() if approximator is None else approximator,
-            self.learning_type() if learning is None else learning,
-            seed,
-            warm_up_steps,
-        )
-        self._observation = self._observations.config(
-            observation_range, angles, angle_pairs, inputs
-        )
-        self._action = self._actions.config
-        self._make(tables=list(self._tables))
-
-    def _take_spaces(self, observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
-        self.observation_space = observations
-        self.action_space = actions
-        self._observations = Observations(observations)
-        self._actions = Actions(actions)
-
-    def _take_settings(self, approximator: Any, learning: Any, seed: Any, steps: Any) -> None:
-        for name, part in (("approximator", approximator), ("learning", learning)):
-            kind: type[Any] = getattr(self, f"{name}_type")
-            if not is_of_class(part, kind):
-                raise TypeError(f"{name} must be a {kind.__name__}, got {shown(part)}")
-        self._approximator, self.learning = approximator, learning
-        self.seed = secrets.randbits(63) if seed is None else seed_of(seed)
-        self._warm_up_steps = whole("warm_up_steps", steps, int(WARM_UP.low), int(WARM_UP.high))
-
-    def _make(self, **made_of: Any) -> None:
-        """Make the core's controller."""
-        approximator: Any = self._approximator
-        learning: Any = self.learning
-        try:
-            self._controller = _core.Controller(
-                approximator=approximator,
-                learning=learning,
-                seed=self.seed,
-                observation=self._observation,
-                action=self._action,
-                warm_up_steps=self._warm_up_steps,
-                **made_of,
-            )
-        except ValueError as error:
-            reason = space_of_error(error, self._observations, self._actions)
-            if not reason:
-                raise
-            argument, problem = blamed(error)
-            raise argument_error(argument, f"{problem} ({reason})") from error
-
-    @property
-    def approximator(self) -> Approximator:
-        """Settings as used; sizes that follow from the spaces are known after the warm-up."""
-        used: Any = self._controller.approximator
-        return used  # type: ignore[no-any-return]
-
-    @property
-    def is_warming_up(self) -> bool:
-        """Whether the agent still acts at random to see the ranges of its observations."""
-        return self._controller.is_warming_up
-
-    @property
-    def observation_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lowest and highest values of the observed variables, shapes (n_variables,), as used.
-
-        RuntimeError if the warm-up has not found them yet.
-        """
-        self._require_warm()
-        return self._controller.ranges
-
-    @property
-    def inputs(self) -> list[tuple[str, list[int]]]:
-        """Kinds of the inputs of a state, with the numbers of observed variables.
-
-        ``("variable", [i])``, ``("circular", [i])``, ``("angle", [cosine, sine])`` or
-        ``("symbol", [first, n])``. Empty until a warm-up is over.
-        """
-        return self._controller.inputs
-
-    @property
-    def progress(self) -> float:
-        """The part of the learning that is done, in [0, 1]; ``train`` sets it.
-
-        Settings such as ``final_epsilon`` follow it.
-        """
-        return self._controller.progress
-
-    @progress.setter
-    def progress(self, progress: float) -> None:
-        self._controller.progress = real("progress", progress)
-
-    @property
-    def n_environments(self) -> int:
-        """Number of environments in which the agent learns at once, from 1 to 2**14; may be set.
-
-        Each, from number 0, has an episode of its own; all else is shared. Where there are fewer
-        than before, the transitions that wait in the others are learned. `train` sets it.
-        """
-        return self._controller.n_environments
-
-    @n_environments.setter
-    def n_environments(self, n: int) -> None:
-        self._controller.n_environments = whole("n_environments", n, 1, _MOST_ENVIRONMENTS)
 
     def _check_environment(self, environment: int) -> None:
         if type(environment) is not int or environment:  # most agents have no other than 0
@@ -316,23 +160,51 @@ class Agent(SavedAgent, Model, abc.ABC, Generic[Approximator, Learning]):
         parts = self._controller, self._observations.rows, actions.elements, actions.mask
         return parts if own == [Agent.act, Agent.learn] else None
 
-    @property
-    @abc.abstractmethod
-    def core(self) -> Any:
-        """The compiled agent, which shares all that is learned: states are in [0, 1]."""
+    def predict(
+        self,
+        observation: Any,
+        state: None = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+        action_masks: Any = None,
+    ) -> tuple[Any, None]:
+        """Choose as Stable-Baselines3's models do, for its tools such as ``evaluate_policy``.
 
-    def _require_warm(self) -> _core.Controller:
-        """Return the controller; RuntimeError while it is warming up."""
-        if self.is_warming_up:
-            raise RuntimeError(
-                "the agent is still warming up: it has no ranges of its observations until it has"
-                f" learned {self._warm_up_steps} transitions, or is given observation_range"
-            )
-        return self._controller
+        Parameters
+        ----------
+        observation : element of the observation space, or a batch of several
+            A batch is what a vector environment gives: arrays with one axis more, the first one,
+            in a Dict or Tuple where the space is one.
+        state, episode_start
+            Of recurrent models; not used.
+        deterministic : bool
+            False: explore, as `act` does, in environment 0.
+        action_masks : optional
+            As the mask of `act`, of a batch one for each.
 
-    def _state(self, observation: Any) -> NDArray[np.float64]:
-        """Return the compiled agent's state for an observation."""
-        return self._require_warm().state_of(self._observations.vector("observation", observation))
+        Returns
+        -------
+        The action, or an array of actions along the first axis, and None.
+        """
+        explore = not flag("deterministic", deterministic)
+        several = unbatched(self.observation_space, observation)
+        if several is None:
+            return self._masked_action(observation, explore, action_masks), None
+        masks = [None] * len(several) if action_masks is None else action_masks
+        if not hasattr(masks, "__len__") or len(masks) != len(several):
+            expected = f"one for each of {len(several)} observations"
+            raise argument_error("action_masks", f"must be {expected}, got {shown(action_masks)}")
+        pairs = zip(several, masks, strict=True)
+        return np.stack([self._masked_action(one, explore, mask) for one, mask in pairs]), None
+
+    def _masked_action(self, observation: Any, explore: bool, mask: Any) -> Any:
+        try:
+            return self.act(observation, explore, mask=mask)
+        except ValueError as error:
+            name, problem = blamed(error)
+            if name != "mask":
+                raise
+            raise argument_error("action_masks", problem) from error
 
     def train(
         self,

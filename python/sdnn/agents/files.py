@@ -2,35 +2,21 @@
 
 from __future__ import annotations
 
-import abc
 import base64
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import gymnasium as gym
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn import _core
-from sdnn.agents.scaling import Scaling
-from sdnn.agents.spaces import (
-    Actions,
-    Observations,
-    action_space_of,
-    observation_space_of,
-    space_data,
-    space_of,
-)
-from sdnn.arguments import is_of_class, path_of, seed_of, shown, whole
-from sdnn.config import values_of
+from sdnn.arguments import path_of, seed_of
 from sdnn.files import Arrays, Description, read_file, write_file
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
-
     from sdnn.agents.agent import Agent
 
 _ARRAYS_OF_TRAINING = "training."
@@ -316,131 +302,6 @@ def _are_actions(space: Any, values: NDArray[Any]) -> bool:
     return is_shaped and (
         len(values) == 0 or (is_alike and bool(((low <= values) & (values <= high)).all()))
     )
-
-
-class SavedAgent(abc.ABC):
-    """The half of `Agent` that is in files."""
-
-    kind: ClassVar[str]
-    """The word for this approximator and learning rule in files."""
-    approximator_type: ClassVar[type[Any]]
-    learning_type: ClassVar[type[Any]]
-    wrappers: Sequence[Statistics] = ()
-    """Statistics of the wrappers of its training's environment; kept in files."""
-    observation_space: gym.Space[Any]
-    action_space: gym.Space[Any]
-    seed: int
-    learning: Any
-    _approximator: Any
-    _controller: _core.Controller
-    _observation: _core.ObservationConfig
-    _action: _core.ActionConfig
-    _warm_up_steps: int
-    _scaling: Scaling | None = None
-    _next_episode: int = 0  # of `train` without a seed
-
-    @abc.abstractmethod
-    def _take_spaces(self, observations: gym.Space[Any], actions: gym.Space[Any]) -> None: ...
-    @abc.abstractmethod
-    def _take_settings(self, approximator: Any, learning: Any, seed: Any, steps: Any) -> None: ...
-    @abc.abstractmethod
-    def _make(self, **made_of: Any) -> None: ...
-
-    @property
-    def scaling(self) -> Scaling | None:
-        """Scaling of the run's observations, with ``--noise`` or ``--redundant``; None without.
-
-        May be set, and is kept in files. `train` and `evaluate` refuse environments that do not
-        scale their observations then.
-        """
-        return self._scaling
-
-    @scaling.setter
-    def scaling(self, scaling: Scaling | None) -> None:
-        if not isinstance(scaling, Scaling | None):
-            raise TypeError(f"scaling must be a Scaling or None, got {shown(scaling)}")
-        self._scaling = scaling
-
-    def save(self, path: str | Path) -> None:
-        """Write the whole state as one safetensors file; OSError if it cannot be written."""
-        write_file(path_of("path", path), "agent", self.state(), self.description())
-
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read an agent that `save` wrote.
-
-        OSError if the file cannot be read; ValueError if it is damaged, of another format, or holds
-        another kind of agent.
-        """
-        agent: Any = load_agent(path)
-        if not is_of_class(agent, cls):
-            raise ValueError(f"{path} holds a {type(agent).__name__}, not a {cls.__name__}")
-        return agent  # type: ignore[no-any-return]
-
-    def description(self) -> Description:
-        """Return the settings, from which `rebuild` makes an agent like this one."""
-        more: Description = {} if self.scaling is None else {"scaling": self.scaling.values()}
-        if self.wrappers:
-            more["wrappers"] = msgspec.to_builtins(self.wrappers)
-        if self._next_episode:
-            more["next_episode"] = self._next_episode
-        return {
-            "class": type(self).__name__,
-            "kind": self.kind,
-            "seed": self.seed,
-            "approximator": values_of(self._approximator),
-            "learning": values_of(self.learning),
-            "observation": values_of(self._observation),
-            "action": values_of(self._action),
-            "warm_up_steps": self._warm_up_steps,
-            "observation_space": space_data(self.observation_space),
-            "action_space": space_data(self.action_space),
-            **more,
-        }
-
-    def state(self) -> Arrays:
-        """Return all that the agent remembers, as arrays by name."""
-        return self._controller.state()
-
-    @classmethod
-    def rebuild(cls, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Self:
-        """Make an agent from its `description` and `state`; ValueError if they do not fit."""
-        agent = cls.__new__(cls)
-        agent._observation = _core.ObservationConfig(**description["observation"])
-        agent._action = _core.ActionConfig(**description["action"])
-        if "observation_space" in description:
-            observations = space_of(description["observation_space"])
-            actions = space_of(description["action_space"])
-        else:  # it was made in C++
-            observations = observation_space_of(agent._observation)
-            actions = action_space_of(agent._action)
-        agent._take_spaces(observations, actions)
-        agent._take_settings(
-            cls.approximator_type(**description["approximator"]),
-            cls.learning_type(**description["learning"]),
-            description["seed"],
-            description["warm_up_steps"],
-        )
-        agent._make(state=dict(arrays))
-        n_variables = Observations(observations).n_variables
-        if agent._controller.n_variables != n_variables:
-            raise ValueError(f"observation must be of {n_variables} variables")
-        if "action_space" in description and agent._action != Actions(actions).config:
-            raise ValueError(f"action must be of {agent.action_space}, got {agent._action}")
-        if "wrappers" in description:
-            agent.wrappers = read_statistics(description["wrappers"])
-        if "scaling" in description:
-            agent.scaling = Scaling.of_values(description["scaling"], n_variables)
-        agent._next_episode = whole("next_episode", description.get("next_episode", 0), 0, 2**53)
-        return agent
-
-    def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Make the class known to files, by its name."""
-        super().__init_subclass__(**kwargs)
-        register(cls)
-
-    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        return type(self).rebuild, (self.description(), self.state())
 
 
 def load_agent(path: str | Path) -> Agent[Any, Any]:

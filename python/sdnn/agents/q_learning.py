@@ -12,16 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.agents.agent import Agent, Approximator, Learning
+from sdnn.agents.agent import Agent
+from sdnn.agents.base import Approximator, Learning
 from sdnn.agents.spaces import AnglePairs, Inputs, Ranges
 from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.arguments import choice, real, whole
-from sdnn.config import (
-    WARM_UP,
-    QLearningConfig,
-    RBFNetworkConfig,
-    SDNNCConfig,
-)
+from sdnn.config import WARM_UP, QLearningConfig, RBFNetworkConfig, SDNNCConfig
 
 
 class Preset(NamedTuple):

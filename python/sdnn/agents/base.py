@@ -1,0 +1,315 @@
+"""Settings, spaces and controller of all agents, in memory and in files."""
+
+from __future__ import annotations
+
+import abc
+import secrets
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+
+import gymnasium as gym
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn import _core
+from sdnn.agents.files import Statistics, load_agent, read_statistics, register
+from sdnn.agents.scaling import Scaling
+from sdnn.agents.spaces import (
+    Actions,
+    AnglePairs,
+    Inputs,
+    Observations,
+    Ranges,
+    action_space_of,
+    observation_space_of,
+    require_unbatched,
+    space_data,
+    space_of,
+    space_of_error,
+)
+from sdnn.arguments import (
+    argument_error,
+    blamed,
+    is_of_class,
+    path_of,
+    real,
+    seed_of,
+    shown,
+    whole,
+)
+from sdnn.config import WARM_UP, values_of
+from sdnn.display import Displayed
+from sdnn.files import Arrays, Description, write_file
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+_MOST_ENVIRONMENTS = 2**14
+
+Approximator = TypeVar("Approximator")
+Learning = TypeVar("Learning")
+
+
+class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
+    """The half of `Agent` that knows what it is made of and what it has become."""
+
+    kind: ClassVar[str]
+    """The word for this approximator and learning rule in files."""
+    approximator_type: ClassVar[type[Any]]
+    learning_type: ClassVar[type[Any]]
+    wrappers: Sequence[Statistics] = ()
+    """Statistics of the wrappers of its training's environment; kept in files."""
+    learning: Learning
+    _approximator: Approximator
+    _controller: _core.Controller
+    _tables: Sequence[NDArray[np.int8]] = ()
+    _scaling: Scaling | None = None
+    _next_episode = 0  # of `train` without a seed
+
+    def __init__(
+        self,
+        observation_space: gym.Space[Any],
+        action_space: gym.Space[Any],
+        *,
+        approximator: Approximator | None = None,
+        learning: Learning | None = None,
+        seed: int | None = 0,
+        observation_range: Ranges | None = None,
+        angles: Sequence[int] = (),
+        angle_pairs: AnglePairs = "none",
+        inputs: Inputs = "all",
+        warm_up_steps: int = WARM_UP.default,
+    ) -> None:
+        self._take_spaces(observation_space, action_space)
+        require_unbatched(observation_space, action_space)
+        try:
+            space_data(observation_space)  # what could not be saved had better not be learned
+        except TypeError as error:
+            raise TypeError(f"observation_space {error}") from None
+        self._take_settings(
+            self.approximator_type() if approximator is None else approximator,
+            self.learning_type() if learning is None else learning,
+            seed,
+            warm_up_steps,
+        )
+        self._observation = self._observations.config(
+            observation_range, angles, angle_pairs, inputs
+        )
+        self._action = self._actions.config
+        self._make(tables=list(self._tables))
+
+    def _take_spaces(self, observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
+        self.observation_space = observations
+        self.action_space = actions
+        self._observations = Observations(observations)
+        self._actions = Actions(actions)
+
+    def _take_settings(self, approximator: Any, learning: Any, seed: Any, steps: Any) -> None:
+        for name, part in (("approximator", approximator), ("learning", learning)):
+            kind: type[Any] = getattr(self, f"{name}_type")
+            if not is_of_class(part, kind):
+                raise TypeError(f"{name} must be a {kind.__name__}, got {shown(part)}")
+        self._approximator, self.learning = approximator, learning
+        self.seed = secrets.randbits(63) if seed is None else seed_of(seed)
+        self._warm_up_steps = whole("warm_up_steps", steps, int(WARM_UP.low), int(WARM_UP.high))
+
+    def _make(self, **made_of: Any) -> None:
+        """Make the core's controller."""
+        approximator: Any = self._approximator
+        learning: Any = self.learning
+        try:
+            self._controller = _core.Controller(
+                approximator=approximator,
+                learning=learning,
+                seed=self.seed,
+                observation=self._observation,
+                action=self._action,
+                warm_up_steps=self._warm_up_steps,
+                **made_of,
+            )
+        except ValueError as error:
+            reason = space_of_error(error, self._observations, self._actions)
+            if not reason:
+                raise
+            argument, problem = blamed(error)
+            raise argument_error(argument, f"{problem} ({reason})") from error
+
+    @property
+    def approximator(self) -> Approximator:
+        """Settings as used; sizes that follow from the spaces are known after the warm-up."""
+        used: Any = self._controller.approximator
+        return used  # type: ignore[no-any-return]
+
+    @property
+    def is_warming_up(self) -> bool:
+        """Whether the agent still acts at random to see the ranges of its observations."""
+        return self._controller.is_warming_up
+
+    @property
+    def observation_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lowest and highest values of the observed variables, shapes (n_variables,), as used.
+
+        RuntimeError if the warm-up has not found them yet.
+        """
+        self._require_warm()
+        return self._controller.ranges
+
+    @property
+    def inputs(self) -> list[tuple[str, list[int]]]:
+        """Kinds of the inputs of a state, with the numbers of observed variables.
+
+        ``("variable", [i])``, ``("circular", [i])``, ``("angle", [cosine, sine])`` or
+        ``("symbol", [first, n])``. Empty until a warm-up is over.
+        """
+        return self._controller.inputs
+
+    @property
+    def progress(self) -> float:
+        """The part of the learning that is done, in [0, 1]; ``train`` sets it.
+
+        Settings such as ``final_epsilon`` follow it.
+        """
+        return self._controller.progress
+
+    @progress.setter
+    def progress(self, progress: float) -> None:
+        self._controller.progress = real("progress", progress)
+
+    @property
+    def n_environments(self) -> int:
+        """Number of environments in which the agent learns at once, from 1 to 2**14; may be set.
+
+        Each, from number 0, has an episode of its own; all else is shared. Where there are fewer
+        than before, the transitions that wait in the others are learned. `train` sets it.
+        """
+        return self._controller.n_environments
+
+    @n_environments.setter
+    def n_environments(self, n: int) -> None:
+        self._controller.n_environments = whole("n_environments", n, 1, _MOST_ENVIRONMENTS)
+
+    @property
+    @abc.abstractmethod
+    def core(self) -> Any:
+        """The compiled agent, which shares all that is learned: states are in [0, 1]."""
+
+    def _require_warm(self) -> _core.Controller:
+        """Return the controller; RuntimeError while it is warming up."""
+        if self.is_warming_up:
+            raise RuntimeError(
+                "the agent is still warming up: it has no ranges of its observations until it has"
+                f" learned {self._warm_up_steps} transitions, or is given observation_range"
+            )
+        return self._controller
+
+    def _state(self, observation: Any) -> NDArray[np.float64]:
+        """Return the compiled agent's state for an observation."""
+        return self._require_warm().state_of(self._observations.vector("observation", observation))
+
+    def _facts(self) -> dict[str, object]:
+        """Return what is shown of it."""
+        inputs = "found in the warm-up" if self.is_warming_up else len(self.inputs)
+        return {
+            "observation": self.observation_space,
+            "action": self.action_space,
+            "inputs": inputs,
+            "seed": self.seed,
+        }
+
+    @property
+    def scaling(self) -> Scaling | None:
+        """Scaling of the run's observations, with ``--noise`` or ``--redundant``; None without.
+
+        May be set, and is kept in files. `train` and `evaluate` refuse environments that do not
+        scale their observations then.
+        """
+        return self._scaling
+
+    @scaling.setter
+    def scaling(self, scaling: Scaling | None) -> None:
+        if not isinstance(scaling, Scaling | None):
+            raise TypeError(f"scaling must be a Scaling or None, got {shown(scaling)}")
+        self._scaling = scaling
+
+    def save(self, path: str | Path) -> None:
+        """Write the whole state as one safetensors file; OSError if it cannot be written."""
+        write_file(path_of("path", path), "agent", self.state(), self.description())
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read an agent that `save` wrote.
+
+        OSError if the file cannot be read; ValueError if it is damaged, of another format, or holds
+        another kind of agent.
+        """
+        agent: Any = load_agent(path)
+        if not is_of_class(agent, cls):
+            raise ValueError(f"{path} holds a {type(agent).__name__}, not a {cls.__name__}")
+        return agent  # type: ignore[no-any-return]
+
+    def description(self) -> Description:
+        """Return the settings, from which `rebuild` makes an agent like this one."""
+        more: Description = {} if self.scaling is None else {"scaling": self.scaling.values()}
+        if self.wrappers:
+            more["wrappers"] = msgspec.to_builtins(self.wrappers)
+        if self._next_episode:
+            more["next_episode"] = self._next_episode
+        return {
+            "class": type(self).__name__,
+            "kind": self.kind,
+            "seed": self.seed,
+            "approximator": values_of(self._approximator),
+            "learning": values_of(self.learning),
+            "observation": values_of(self._observation),
+            "action": values_of(self._action),
+            "warm_up_steps": self._warm_up_steps,
+            "observation_space": space_data(self.observation_space),
+            "action_space": space_data(self.action_space),
+            **more,
+        }
+
+    def state(self) -> Arrays:
+        """Return all that the agent remembers, as arrays by name."""
+        return self._controller.state()
+
+    @classmethod
+    def rebuild(cls, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Self:
+        """Make an agent from its `description` and `state`; ValueError if they do not fit."""
+        agent = cls.__new__(cls)
+        agent._observation = _core.ObservationConfig(**description["observation"])
+        agent._action = _core.ActionConfig(**description["action"])
+        if "observation_space" in description:
+            observations = space_of(description["observation_space"])
+            actions = space_of(description["action_space"])
+        else:  # it was made in C++
+            observations = observation_space_of(agent._observation)
+            actions = action_space_of(agent._action)
+        agent._take_spaces(observations, actions)
+        agent._take_settings(
+            cls.approximator_type(**description["approximator"]),
+            cls.learning_type(**description["learning"]),
+            description["seed"],
+            description["warm_up_steps"],
+        )
+        agent._make(state=dict(arrays))
+        n_variables = Observations(observations).n_variables
+        if agent._controller.n_variables != n_variables:
+            raise ValueError(f"observation must be of {n_variables} variables")
+        if "action_space" in description and agent._action != Actions(actions).config:
+            raise ValueError(f"action must be of {agent.action_space}, got {agent._action}")
+        if "wrappers" in description:
+            agent.wrappers = read_statistics(description["wrappers"])
+        if "scaling" in description:
+            agent.scaling = Scaling.of_values(description["scaling"], n_variables)
+        agent._next_episode = whole("next_episode", description.get("next_episode", 0), 0, 2**53)
+        return agent
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Make the class known to files, by its name."""
+        super().__init_subclass__(**kwargs)
+        register(cls)
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return type(self).rebuild, (self.description(), self.state())
