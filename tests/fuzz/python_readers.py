@@ -27,7 +27,7 @@ from checksums import BEFORE, with_checksum
 from made_records import make_record
 from mutated_files import Reader, with_other_bytes, with_other_contents, written
 from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, SDNNSarsa, Training, load_agent
-from sdnn.agents.files import read_statistics
+from sdnn.agents.adapters import read_statistics
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig
 from sdnn.runs import ResultStore, StoreError, TrialRows
 from sdnn.runs.spec import HASH_DIGITS

@@ -2,6 +2,7 @@
 
 from sdnn.agents.adapters import UnusableStepError
 from sdnn.agents.agent import Agent
+from sdnn.agents.base import load_agent
 from sdnn.agents.callbacks import (
     Callback,
     CheckpointCallback,
@@ -15,7 +16,6 @@ from sdnn.agents.callbacks import (
 from sdnn.agents.datasets import learn_from
 from sdnn.agents.episode import Transition, UnrepeatedEpisodeError
 from sdnn.agents.evaluation import Evaluation, evaluate
-from sdnn.agents.files import load_agent
 from sdnn.agents.fixed_rate import FixedRate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.q_learning import PRESETS, Preset, RBFQLearning, SDNNQLearning

@@ -1,4 +1,4 @@
-"""Settings, spaces and controller of all agents, in memory and in files."""
+"""What all agents are made of, and the files of agents and trainings."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import abc
 import secrets
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar
 
 import gymnasium as gym
 import msgspec
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.agents.files import Statistics, load_agent, read_statistics, register
+from sdnn.agents.adapters import Statistics, read_statistics
 from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import (
     Actions,
@@ -41,15 +41,25 @@ from sdnn.arguments import (
 )
 from sdnn.config import WARM_UP, values_of
 from sdnn.display import Displayed
-from sdnn.files import Arrays, Description, write_file
+from sdnn.files import Arrays, Description, read_file, write_file
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+    from sdnn.agents.agent import Agent
+
+_ARRAYS_OF_TRAINING = "training."
+"""Prefix of the names of arrays that are not the agent's."""
 
 _MOST_ENVIRONMENTS = 2**14
 
 Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
+
+_CLASSES: dict[str, type[Any]] = {}
+
+_Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+_Period = Annotated[int, msgspec.Meta(ge=1, le=2**53)]
 
 
 class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
@@ -307,9 +317,152 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         return agent
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Make the class known to files, by its name."""
+        """Make the class known to files, by its name.
+
+        A class that is defined again, as in a notebook or by a script that is imported too,
+        replaces the one before. TypeError for the name of a class of this package, which files
+        could confuse.
+        """
         super().__init_subclass__(**kwargs)
-        register(cls)
+        known = _CLASSES.get(cls.__name__, cls)
+        is_ours = known.__module__.partition(".")[0] == "sdnn"
+        if is_ours and known.__module__ != cls.__module__:
+            raise TypeError(
+                f"an agent's class needs a name of its own, for its files: {cls.__name__} is that"
+                f" of {known.__module__}.{known.__qualname__}"
+            )
+        _CLASSES[cls.__name__] = cls
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         return type(self).rebuild, (self.description(), self.state())
+
+
+def read_agent(path: Path, *kinds: str) -> tuple[Any, Description, Arrays]:
+    """Read a file of one of these kinds: its agent, its description and its arrays.
+
+    OSError if it cannot be read; ValueError if it is damaged, of another kind or format, or does
+    not fit together.
+    """
+    description, arrays = read_file(path, *kinds)
+    name = description.get("class")
+    if str(name) not in _CLASSES:
+        raise ValueError(f"{path} holds an agent of an unknown class, {name!r}")
+    own = {key: a for key, a in arrays.items() if not key.startswith(_ARRAYS_OF_TRAINING)}
+    try:
+        return _CLASSES[str(name)].rebuild(description, own), description, arrays
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is damaged: {error}") from error
+
+
+def load_agent(path: str | Path) -> Agent[Any, Any]:
+    """Read an agent of any kind that `Agent.save` wrote; see `Agent.load`."""
+    agent: Agent[Any, Any] = read_agent(path_of("path", path), "agent", "training")[0]
+    return agent
+
+
+class SavedEpisode(msgspec.Struct, frozen=True, kw_only=True):
+    """The present episode in one environment.
+
+    ``number`` counts all that have begun; ``waits`` is whether the last action's outcome is still
+    to be learned; ``actions`` are those taken, shape (n, ...); ``observation`` is the last one,
+    flattened.
+    """
+
+    number: _Count
+    sum_of_rewards: float
+    waits: bool
+    actions: Any = None
+    observation: Any = None
+
+
+class SavedTraining(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The state that `sdnn.agents.Training` resumes.
+
+    ``present`` has an entry for each environment, ``evaluations`` steps and mean returns;
+    ``next_episode`` is the number of the first that has not begun; ``wrappers`` have learned as
+    much when the present episode began.
+    """
+
+    steps: _Period | None
+    episodes: _Period | None
+    seed: int | None
+    n_steps: _Count
+    n_episodes: _Count
+    n_rows: _Count
+    next_episode: _Count
+    evaluate_every: _Period | None
+    evaluate_every_episodes: _Period | None
+    evaluation_episodes: Annotated[int, msgspec.Meta(ge=1, le=10**9)]
+    limit_bootstraps: bool
+    evaluations: list[tuple[_Count, float]]
+    present: list[SavedEpisode | None]
+    wrappers: list[Statistics] = msgspec.field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        if (self.steps is None) == (self.episodes is None):
+            raise ValueError("one of steps and episodes must be given")
+        if self.seed is not None:
+            seed_of(self.seed)
+        read_statistics(msgspec.to_builtins(self.wrappers))
+
+
+def write_training(path: Path, agent: Any, training: SavedTraining) -> None:
+    """Write both in one file; OSError if it cannot be written."""
+    arrays = agent.state()
+    for i, episode in enumerate(training.present):
+        if episode is not None:
+            arrays[f"{_ARRAYS_OF_TRAINING}{i}.actions"] = episode.actions
+            arrays[f"{_ARRAYS_OF_TRAINING}{i}.observation"] = episode.observation
+    values = msgspec.to_builtins(training, enc_hook=_without_arrays)
+    write_file(path, "training", arrays, {**agent.description(), "training": values})
+
+
+def _without_arrays(value: Any) -> Any:
+    return None if isinstance(value, np.ndarray) else value.item()
+
+
+def read_training(path: Path) -> tuple[Any, SavedTraining]:
+    """Read an agent and its training; errors as of `read_agent`."""
+    agent, description, arrays = read_agent(path, "training")
+
+    def array(name: str) -> NDArray[Any]:
+        # Infinite numbers may be observed: they saturate.
+        if name not in arrays or np.isnan(arrays[name]).any():
+            raise ValueError(f"{path} is damaged: {name} must be there, of numbers")
+        return arrays[name]
+
+    def actions(name: str) -> NDArray[Any]:
+        if not _are_actions(agent.action_space, array(name)):
+            raise ValueError(f"{path} is damaged: {name} must be actions of {agent.action_space}")
+        return arrays[name]
+
+    try:
+        saved = msgspec.convert(description.get("training"), SavedTraining)
+    except msgspec.ValidationError as error:
+        raise ValueError(f"{path} is damaged: training: {error}") from None
+    present = [
+        episode
+        and msgspec.structs.replace(
+            episode,
+            actions=actions(f"{_ARRAYS_OF_TRAINING}{i}.actions"),
+            observation=array(f"{_ARRAYS_OF_TRAINING}{i}.observation"),
+        )
+        for i, episode in enumerate(saved.present)
+    ]
+    return agent, msgspec.structs.replace(saved, present=present)
+
+
+def _are_actions(space: Any, values: NDArray[Any]) -> bool:
+    """Return whether the rows of an array are actions of a space; environments need not check."""
+    if isinstance(space, gym.spaces.Discrete):
+        low, high = space.start, space.start + space.n - 1
+    elif isinstance(space, gym.spaces.Box):
+        low, high = space.low, space.high
+    else:
+        low = getattr(space, "start", 0)
+        high = low + getattr(space, "nvec", 2) - 1
+    is_alike = values.dtype.kind == space.dtype.kind or np.can_cast(values.dtype, space.dtype)
+    is_shaped = values.ndim > 0 and values.shape[1:] == space.shape
+    return is_shaped and (
+        len(values) == 0 or (is_alike and bool(((low <= values) & (values <= high)).all()))
+    )

@@ -13,12 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn.agents.adapters import (
     EnvironmentAdapter,
     OneEnvironment,
+    Statistics,
     StepResults,
     UnusableStepError,
     checked,
+    learning_wrappers,
+    names_of,
     own_copy,
+    statistics_of,
 )
-from sdnn.agents.files import SavedEpisode, Statistics, learning_wrappers, names_of, statistics_of
+from sdnn.agents.base import SavedEpisode
 
 if TYPE_CHECKING:
     from sdnn._core import Controller

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from sdnn.agents.adapters import (
     UnusableStepError,
     checked,
+    fixed,
     has_action_masks,
     mask_in,
     require_single,
@@ -23,13 +23,6 @@ from sdnn.agents.adapters import (
     step_env,
 )
 from sdnn.agents.episode import EVALUATION, episode_seed
-from sdnn.agents.files import (
-    Statistics,
-    learning_wrappers,
-    moments_of,
-    statistics_of,
-    take_statistics,
-)
 from sdnn.agents.spaces import require_same_kind
 from sdnn.arguments import has_methods, seed_of, shown, whole
 from sdnn.display import Displayed
@@ -198,42 +191,3 @@ def greedy_episode(
             if not math.isfinite(total):
                 raise unusable(f"rewards of env must add up to a finite number, got {total}")
             yield GreedyEpisode(n_steps, total, terminated)
-
-
-_FEW = 1.0
-"""The count of statistics that have seen nothing is below it."""
-
-
-@contextmanager
-def fixed(env: Any, learned: Sequence[Statistics]) -> Iterator[None]:
-    """Keep the statistics of an environment's wrappers as they are, for greedy episodes.
-
-    Wrappers that have seen nothing yet take what was learned; a warning names one that cannot.
-    """
-    wrappers = learning_wrappers(env)
-    fresh = [one for one in wrappers if _has_seen_nothing(one)]
-    if fresh and not take_statistics(fresh, learned):
-        warnings.warn(
-            f"{type(fresh[0]).__name__} of env has seen nothing yet, so the agent observes other"
-            " numbers than in training: give the statistics of the training's wrapper to it, or"
-            " evaluate in the environment of the training",
-            RuntimeWarning,
-            stacklevel=3,
-        )
-    before = statistics_of(wrappers)
-    flags = [getattr(one, "update_running_mean", None) for one in wrappers]
-    try:
-        for one, flag in zip(wrappers, flags, strict=True):
-            if flag is not None:
-                one.update_running_mean = False
-        yield
-    finally:
-        take_statistics(wrappers, before)
-        for one, flag in zip(wrappers, flags, strict=True):
-            if flag is not None:
-                one.update_running_mean = flag
-
-
-def _has_seen_nothing(wrapper: Any) -> bool:
-    found = (moments_of(wrapper, name) for name in ("obs_rms", "return_rms"))
-    return any(moments is not None and moments.count < _FEW for moments in found)

@@ -14,18 +14,17 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents.adapters import UnusableStepError, require_single
-from sdnn.agents.callbacks import listed, listeners
-from sdnn.agents.episode import Episodes, Learner
-from sdnn.agents.evaluation import evaluate
-from sdnn.agents.files import (
-    SavedTraining,
-    read_training,
+from sdnn.agents.adapters import (
+    UnusableStepError,
+    require_single,
     share_statistics,
     statistics_of,
     take_statistics,
-    write_training,
 )
+from sdnn.agents.base import SavedTraining, read_training, write_training
+from sdnn.agents.callbacks import listed, listeners
+from sdnn.agents.episode import Episodes, Learner
+from sdnn.agents.evaluation import evaluate
 from sdnn.agents.spaces import require_same_kind
 from sdnn.arguments import flag, has_methods, path_of, shown, whole
 from sdnn.display import Displayed
