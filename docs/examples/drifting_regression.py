@@ -7,9 +7,10 @@
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
+from sklearn.datasets import make_moons
 from sklearn.model_selection import cross_val_score
 
-from sdnn import SDNNRegressor
+from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import RandomInverse
 
 random = np.random.default_rng(1)
@@ -64,6 +65,25 @@ plt.axvline(20, color="0.7", linestyle=":")
 plt.axhline(0.1, color="0.7", label="noise")
 plt.xlabel("portions of 50 samples")
 plt.ylabel("error (root mean square)")
+plt.legend()
+plt.tight_layout()
+plt.show()
+
+# %% [markdown]
+# Last, how long to train. `n_corrected_` counts the samples that each epoch corrected: with classes
+# that hardly overlap the count falls to zero, and training stops by itself; with classes that do it
+# levels off, and further epochs learn the noise.
+
+# %%
+plt.figure(figsize=(7, 3))
+for noise in (0.05, 0.3):
+    points, labels = make_moons(500, noise=noise, random_state=0)
+    classifier = SDNNClassifier(random_state=0).fit(points, labels)
+    epochs = np.arange(1, classifier.n_iter_ + 1)
+    plt.plot(epochs, classifier.n_corrected_, label=f"two moons, noise {noise}")
+plt.ylim(0, None)
+plt.xlabel("epoch")
+plt.ylabel("samples corrected")
 plt.legend()
 plt.tight_layout()
 plt.show()
