@@ -1,6 +1,6 @@
 """Runs what a store of benchmarks lacks, by the engine's loop, and reads what it holds.
 
-The store is packed in a folder (docs/evidence/ has the published one): benchmarks.sqlite.xz. While
+The store is packed in a folder (docs/evidence/ has the published one): benchmarks.npz.xz. While
 something runs it is unpacked beside it, and stays so after a kill or an error: the same command
 continues from there, and packs it once it ends.
 
@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
-import lzma
 import multiprocessing
 import pickle
 import signal
@@ -28,6 +27,7 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
+from packed_store import pack, unpack
 from rich.console import Console
 
 import sdnn
@@ -44,7 +44,7 @@ from sdnn.runs.engine import (
 from sdnn.runs.store import STORE_NAME, ResultStore
 
 EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
-PACKED = "benchmarks.sqlite.xz"
+PACKED = "benchmarks.npz.xz"
 POLL_SECONDS = 0.1  # between two looks at whether it was interrupted
 
 Key = tuple[Any, ...]
@@ -59,6 +59,7 @@ def options(doc: str, *, seeds: int, jobs: int = 1) -> argparse.ArgumentParser:
     parser.add_argument("--jobs", type=int, default=jobs, help="processes (%(default)s)")
     parser.add_argument("--folder", type=Path, default=EVIDENCE, help="of store, figures and pages")
     parser.add_argument("--redraw", action="store_true", help="measure nothing")
+    parser.add_argument("--full", action="store_true", help="print what pages leave out, too")
     return parser
 
 
@@ -127,7 +128,7 @@ def run_missing(
 
 def _unpack(folder: Path, into: Path) -> None:
     if not (into / STORE_NAME).exists() and (folder / PACKED).exists():
-        write_whole(into / STORE_NAME, lzma.decompress((folder / PACKED).read_bytes()))
+        unpack((folder / PACKED).read_bytes(), into)
 
 
 @contextmanager
@@ -139,9 +140,8 @@ def opened(folder: Path) -> Iterator[ResultStore]:
     before = unpacked.read_bytes() if unpacked.exists() else b""
     with ResultStore(folder) as store:
         yield store
-    content = unpacked.read_bytes()
-    if content != before or not (folder / PACKED).exists():
-        write_whole(folder / PACKED, lzma.compress(content, preset=9))
+    if unpacked.read_bytes() != before or not (folder / PACKED).exists():
+        write_whole(folder / PACKED, pack(folder))
     unpacked.unlink()
 
 

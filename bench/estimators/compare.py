@@ -30,6 +30,8 @@ from sklearn.model_selection import RepeatedKFold, RepeatedStratifiedKFold
 
 from sdnn import SDNNRegressor, _core
 from sdnn.coding import RandomInverse
+from sdnn.files import write_whole
+from sdnn.runs.figures import png_bytes
 
 ONCE = (
     "kernel ridge, analytic SDNN kernel", "SVR (RBF)", "Gaussian process (Matern 3/2)",
@@ -255,7 +257,7 @@ def main():
         "kernels": kernel_figure(),
         "useless": useless_figure(measured("regression useless", folder)),
     }.items():
-        figure.savefig(folder / f"regression-{name}.png", dpi=140)
+        write_whole(folder / f"regression-{name}.png", png_bytes(figure, dpi=140))
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ def draw(study: Study, found: Curves, path: Path) -> None:
     for panel in grid.ravel():
         handles.update(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5, fontsize=9)
-    write_whole(path, png_bytes(figure))
+    write_whole(path, png_bytes(figure, dpi=130))
 
 
 def _draw_task(panels, study: Study, found: Curves, name: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -50,25 +50,28 @@ def _goal_rows(found: Curves) -> Iterator[Sequence[str]]:
             continue
         n_reached = int((returns >= goal.at_least).sum())
         asked = round(goal.share * returns.size)
+        reached = f"{n_reached} of {returns.size}"
         yield (
-            *parts_of(case),
+            case,
             f"{goal.steps:,}",
             number(goal.at_least),
             f"{number(np.median(returns))} ({number(returns.min())} to {number(returns.max())})",
-            f"{n_reached} of {returns.size}",
+            reached if n_reached >= asked else f"**{reached}**",
             f"{asked}",
-            "yes" if n_reached >= asked else "**no**",
         )
 
 
-def _end_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
-    for case in (case.id for case in study.cases):
-        here = {v.id: found[case, v.id] for v in study.variants if (case, v.id) in found}
-        if not here:
-            continue
+def _end_table(
+    study: Study, found: Curves, cases: Sequence[str], names: Sequence[str]
+) -> tuple[Sequence[str], list[Sequence[str]]]:
+    """Return header and rows of the medians in some cases, of the agents that any of them has."""
+    variants = [v for v in study.variants if any((case, v.id) in found for case in cases)]
+    rows = []
+    for case in cases:
+        here = {v.id: found[case, v.id] for v in variants if (case, v.id) in found}
         best = max(score(case, trials) for trials in here.values())
         cells = []
-        for variant in study.variants:
+        for variant in variants:
             trials = here.get(variant.id, ())
             cell = number(np.median(last_returns(trials))) if trials else ""
             if trials and score(case, trials) >= best - NOTABLE:
@@ -76,7 +79,40 @@ def _end_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
             if trials and len(trials) < N_SEEDS:
                 cell += f" ({len(trials)})"
             cells.append(cell)
-        yield (*parts_of(case), *cells)
+        rows.append((*parts_of(case)[: len(names)], *cells))
+    return (*names, *(variant.title for variant in variants)), rows
+
+
+def _ours_rows(found: Curves, tasks: Sequence[str], sensors: Iterable[str]) -> Iterator[list[str]]:
+    """Our medians under each change of the sensors, a column for each task."""
+    for change in sensors:
+        trials = [found.get((f"{task} {change}", OURS), ()) for task in tasks]
+        yield [change, *(number(np.median(last_returns(t))) if t else "" for t in trials)]
+
+
+def _cost_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
+    """Medians of each agent over the cases, and their ranges."""
+    for variant in study.variants:
+        own = [trials for (_, name), trials in found.items() if name == variant.id]
+        if own:
+            times = [_microseconds(trials) for trials in own]
+            sizes = [_kibibytes(trials) for trials in own]
+            yield (variant.title, *(_median_and_range(some) for some in (times, sizes)))
+
+
+def _median_and_range(values: Sequence[float]) -> str:
+    low, middle, high = (f"{f(values):,.0f}" for f in (min, np.median, max))
+    return middle if low == high else f"{middle} ({low} to {high})"
+
+
+def _microseconds(trials: Trials) -> float:
+    """Return the median of the processor time of a step."""
+    return 1e6 * float(np.median([t["cpu_seconds"][-1] / t["steps"][-1] for t in trials]))
+
+
+def _kibibytes(trials: Trials) -> float:
+    """Return the median of the size of the training state."""
+    return float(np.median([t["bytes"] for t in trials])) / 1024
 
 
 def _loss_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
@@ -93,13 +129,12 @@ def _loss_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
         theirs, our = (
             f"{number(np.median(m))} ({m.size} seed{'s' * (m.size > 1)})" for m in medians
         )
-        yield (*parts_of(case), title_of(study, variant), theirs, our, f"{100 * difference:.0f} %")
+        yield (case, title_of(study, variant), theirs, our, f"{100 * difference:.0f} %")
 
 
 def _row(study: Study, case: str, variant: str, trials: Trials) -> Sequence[str]:
     medians = [np.median(returns_after(trials, steps)) for steps in STEPS]
     last = last_returns(trials)
-    spent = np.median([t["cpu_seconds"][-1] / t["steps"][-1] for t in trials])
     return (
         *parts_of(case),
         title_of(study, variant),
@@ -107,8 +142,8 @@ def _row(study: Study, case: str, variant: str, trials: Trials) -> Sequence[str]
         *("" if np.isnan(median) else number(median) for median in medians),
         interval(estimate_median(last), 1) if last.size > 1 else number(last[0]),
         f"{trials[0]['steps'][-1]:,}",
-        f"{1e6 * spent:,.0f}",
-        f"{np.median([t['bytes'] for t in trials]) / 1024:,.0f}",
+        f"{_microseconds(trials):,.0f}",
+        f"{_kibibytes(trials):,.0f}",
     )
 
 
@@ -124,18 +159,30 @@ def title_of(study: Study, variant: str) -> str:
 
 def tables(study: Study, found: Curves) -> dict[str, str]:
     """Give each table by its name in the page."""
-    goals = ("task", "sensors", "steps", "goal", "median (range)", "seeds", "asked", "reached")
-    end = ("task", "sensors", *(variant.title for variant in study.variants))
-    losses = ("task", "sensors", "agent", "its median", "ours", "of the way")
-    along = (
+    goals = ("task", "steps", "goal", "median (range)", "seeds", "asked")
+    losses = ("task", "agent", "its median", "ours", "of the way")
+    cases = [case.id for case in study.cases if any(case.id == one for one, _ in found)]
+    clean = [case for case in cases if parts_of(case)[1] == "clean"]
+    changed = [case for case in cases if case not in clean]
+    compared = [case for case in changed if any(k[0] == case and k[1] != OURS for k in found)]
+    tasks = list(dict.fromkeys(parts_of(case)[0] for case in changed))
+    sensors = dict.fromkeys(parts_of(case)[1] for case in changed if case not in compared)
+    return {
+        "goals": markdown(goals, _goal_rows(found)),
+        "at the end": markdown(*_end_table(study, found, clean, ["task"])),
+        "other sensors": markdown(*_end_table(study, found, compared, ["task", "sensors"])),
+        "ours, other sensors": markdown(["sensors", *tasks], _ours_rows(found, tasks, sensors)),
+        "losses": markdown(losses, _loss_rows(study, found)),
+        "costs": markdown(("agent", "us a step", "KiB"), _cost_rows(study, found)),
+    }
+
+
+def along_the_way(study: Study, found: Curves) -> str:
+    """Give the table of every case and agent after some numbers of steps."""
+    header = (
         "task", "sensors", "agent", "seeds", *(f"{steps // 1000}k" for steps in STEPS),
         "at the end", "steps", "us a step", "KiB",
     )  # fmt: skip
     order = [case.id for case in study.cases]
     every = sorted(found, key=lambda key: order.index(key[0]))
-    return {
-        "goals": markdown(goals, _goal_rows(found)),
-        "at the end": markdown(end, _end_rows(study, found)),
-        "losses": markdown(losses, _loss_rows(study, found)),
-        "along the way": markdown(along, (_row(study, *key, found[key]) for key in every)),
-    }
+    return markdown(header, (_row(study, *key, found[key]) for key in every))

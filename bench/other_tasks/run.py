@@ -1,12 +1,12 @@
 """How agents and baselines do on Gymnasium's tasks: clean, and with other sensors.
 
     python bench/other_tasks/run.py [--seeds 10] [--only WORD ...] [--jobs 2]
-        [--folder docs/evidence] [--redraw]
+        [--folder docs/evidence] [--redraw] [--full]
 
 The study is study.toml; --only chooses by the words of case and variant: `--only sdnn-c CartPole`.
 At the end the tables are printed and put into benchmarks.md, and other-tasks.png is drawn, all from
-the store. SAC, TD3 and PPO need `pip install stable-baselines3`, LunarLander `box2d`, Hopper and
-others `mujoco`.
+the store; --full prints every case and agent along the way, too. SAC, TD3 and PPO need `pip install
+stable-baselines3`, LunarLander `box2d`, Hopper and others `mujoco`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from figure import draw
 from measured import options
 from page import show
-from report import tables
+from report import along_the_way, tables
 from studies import curves, run_study
 
 from sdnn.runs.study import Study
@@ -37,6 +37,8 @@ def main() -> None:
         return
     found = curves(KIND, study, given)
     show(tables(study, found), given.folder / "benchmarks.md")
+    if given.full:
+        print(along_the_way(study, found))
     draw(study, found, given.folder / "other-tasks.png")
 
 

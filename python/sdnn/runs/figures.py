@@ -84,16 +84,16 @@ def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
     return png_bytes(figure), svg.getvalue()
 
 
-def png_bytes(figure: Figure) -> bytes:
+def png_bytes(figure: Figure, dpi: int = 200) -> bytes:
     """Return a figure as PNG of 256 colours, which takes a third of the bytes of all colours."""
     from PIL import Image  # comes with matplotlib
 
     drawn, png = BytesIO(), BytesIO()
     with stay_interrupts():
-        figure.savefig(drawn, format="png", dpi=200)
+        figure.savefig(drawn, format="png", dpi=dpi)
         with Image.open(drawn) as image:
             few = image.convert("RGB").quantize(256, dither=Image.Dither.NONE)
-            few.save(png, "PNG", optimize=True, dpi=(200, 200))
+            few.save(png, "PNG", optimize=True, dpi=(dpi, dpi))
     return png.getvalue()
 
 

@@ -135,14 +135,16 @@ def test_tables_by_hand(scripts):
     }
     tables = scripts.report.tables(scripts.study, found)
     goal = tables["goals"].splitlines()[2]
-    assert goal == "| CartPole | clean | 50,000 | 475 | 475 (470 to 480) | 1 of 2 | 2 | **no** |"
+    assert goal == "| CartPole | 50,000 | 475 | 475 (470 to 480) | **1 of 2** | 2 |"
     # (490 - 475) / (475 - 22.4)
     loss = tables["losses"].splitlines()[2]
     assert loss.endswith("| 490 (1 seed) | 475 (2 seeds) | 3 % |")
     assert "| 475 (2) |" in tables["at the end"]
     assert "| **490** (1) |" in tables["at the end"]
-    assert "| 10.5" not in tables["along the way"]
-    assert "| 2 | 10 | 16 | 475 |" in tables["along the way"]
+    assert "| SDNNSarsa | 20 | 2 |" in tables["costs"]
+    along = scripts.report.along_the_way(scripts.study, found)
+    assert "| 10.5" not in along
+    assert "| 2 | 10 | 16 | 475 |" in along
 
 
 def test_evaluations_take_no_part_in_the_processor_time(scripts, monkeypatch):

@@ -1,0 +1,67 @@
+"""Packed stores are unpacked row for row, and the published ones hold what their pages show."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sdnn.runs.store import ResultStore
+from sdnn.runs.trial import TrialKey, TrialRecord, TrialRows
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture(scope="module")
+def packed_store():
+    sys.path.insert(0, str(ROOT / "bench"))
+    try:
+        import packed_store
+
+        yield packed_store
+    finally:
+        sys.path.remove(str(ROOT / "bench"))
+        sys.modules.pop("packed_store", None)
+
+
+def record(trial, returns, **about):
+    lengths = np.arange(3, 3 + len(returns))
+    rows = TrialRows.of_tests(10 * np.arange(len(returns)), lengths, returns, lengths < 5)
+    return TrialRecord(
+        key=TrialKey("s4", "sdnn-c", trial, 2**64 - 1 - trial, "44136fa355b3678a"), config="{}",
+        n_decisions=12, seconds=0.1 + trial, rows=rows, **about,
+    )  # fmt: skip
+
+
+def content(folder):
+    with ResultStore(folder, read_only=True) as store:
+        runs = [(replace(r, rows=None), r.rows.checksum()) for r in store.load()]
+        return runs, store.measurements("squares"), store.measurements("cubes")
+
+
+@pytest.mark.parametrize(
+    "returns", [[10, -5, -250, 0], [0.1, -0.3, 1e300, 5.0], [2.0**60, 1, 0, 3]]
+)
+def test_a_packed_store_is_unpacked_as_it_was(packed_store, tmp_path, returns):
+    with ResultStore(tmp_path / "one") as store:
+        store.add(record(1, returns, version="0.0.9"))
+        store.add(record(0, returns[::-1], finished_at="2026-11-26T00:00:00+00:00"))
+        store.add(record(2, []))
+        store.put("squares", '["a", 1]', {"square": 0.1 + 0.2})
+        store.put("cubes", "[2]", {"cube": [8, None]})
+    packed = packed_store.pack(tmp_path / "one")
+    packed_store.unpack(packed, tmp_path / "two")
+    assert content(tmp_path / "two") == content(tmp_path / "one")
+    assert packed_store.pack(tmp_path / "two") == packed
+    assert [file.name for file in (tmp_path / "two").iterdir()] == ["results.sqlite"]
+
+
+def test_results_that_are_there_stay(packed_store, tmp_path):
+    with ResultStore(tmp_path) as store:
+        store.add(record(0, [1.0]))
+    before = content(tmp_path)
+    with pytest.raises(FileExistsError, match="choose another folder"):
+        packed_store.unpack(packed_store.pack(tmp_path), tmp_path)
+    assert content(tmp_path) == before
+    assert packed_store.pack(tmp_path)
