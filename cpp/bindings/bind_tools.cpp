@@ -115,6 +115,16 @@ py::class_<AcrobotTrial<Agent>> def_trial(py::module_& module, const char* name,
             self.advance(n_episodes);
           },
           py::arg("n_episodes"), "Runs up to n more learning episodes")
+      .def_static(
+          "advance_together",
+          [](const py::typing::Tuple<Trial, py::ellipsis>& trials, int n_decisions) {
+            std::vector<Trial*> all;
+            for (const py::handle trial : trials) all.push_back(&trial.cast<Trial&>());
+            const bindings::WithoutGIL unlocked(all);
+            Trial::advance_together(all, n_decisions);
+          },
+          py::arg("trials"), py::arg("n_decisions"),
+          "Lets each of several trials make n more decisions, or come to its end")
       .def("test_rows", &test_rows<Trial>, "Columns of the test episodes so far");
   return trial;
 }

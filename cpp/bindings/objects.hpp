@@ -107,17 +107,25 @@ class WithoutGIL {
  public:
   /// Throws std::runtime_error if another thread's call is in the way.
   template <class... Object>
-  explicit WithoutGIL(Object&... objects) : uses_(this, objects...) {}
+  explicit WithoutGIL(Object&... objects) : uses_(this, {Use::of(this, objects)...}) {}
+  /// The same for a number of objects that is not known before.
+  template <class Object>
+  explicit WithoutGIL(const std::vector<Object*>& objects) : uses_(this, of_all(objects)) {}
   WithoutGIL(const WithoutGIL&) = delete;
   WithoutGIL& operator=(const WithoutGIL&) = delete;
 
  private:
+  template <class Object>
+  std::vector<Use> of_all(const std::vector<Object*>& objects) const {
+    std::vector<Use> uses;
+    for (Object* const object : objects) uses.push_back(Use::of(this, *object));
+    return uses;
+  }
+
   struct Uses {
-    template <class... Object>
-    explicit Uses(const void* owner, Object&... objects) : owner_(owner) {
-      (require_unused(Use::of(owner, objects), "object"), ...);
-      Use::all().reserve(Use::all().size() + sizeof...(objects));
-      (Use::all().push_back(Use::of(owner, objects)), ...);
+    Uses(const void* owner, const std::vector<Use>& uses) : owner_(owner) {
+      for (const Use& use : uses) require_unused(use, "object");
+      Use::all().insert(Use::all().end(), uses.begin(), uses.end());
     }
     Uses(const Uses&) = delete;
     Uses& operator=(const Uses&) = delete;

@@ -22,6 +22,7 @@
 #include "sdnn/environments/acrobot.hpp"
 #include "sdnn/environments/acrobot_config.hpp"
 #include "sdnn/environments/acrobot_sensors.hpp"
+#include "sdnn/environments/acrobot_team.hpp"
 #include "sdnn/environments/goal_schedule.hpp"
 
 namespace sdnn::tools {
@@ -96,7 +97,9 @@ class AcrobotTrial {
   }
 
   int episode() const noexcept { return episode_; }
-  bool finished() const noexcept { return episode_ == protocol_.episodes; }
+  bool finished() const noexcept {
+    return episode_ == protocol_.episodes && !in_episode_ && !is_test_;
+  }
   /// Decisions made so far, in learning and test episodes.
   std::int64_t n_decisions() const noexcept { return n_decisions_; }
   std::span<const TestRow> rows() const noexcept { return rows_; }
@@ -105,11 +108,11 @@ class AcrobotTrial {
   /// learning do.
   Agent& agent() noexcept { return agent_; }
 
-  /// Runs up to `n_episodes` more learning episodes, with the test episodes that fall due.
+  /// Runs up to `n_episodes` more learning episodes, with the test episodes that fall due; an
+  /// episode under way is finished first.
   ///
-  /// Long work: may be stopped between episodes and then resumed, and within a long one. Whatever
-  /// is thrown within an episode ends the trial: it cannot be taken up there, and advance throws
-  /// std::logic_error from then on.
+  /// Long work: may be stopped between decisions and then resumed. Whatever is thrown within a
+  /// decision ends the trial: advance throws std::logic_error from then on.
   void advance(int n_episodes) {
     advance(n_episodes, [] {});
   }
@@ -118,64 +121,116 @@ class AcrobotTrial {
   template <class AfterDecision>
   void advance(int n_episodes, AfterDecision&& after_decision) {
     core::require_in_range("n_episodes", n_episodes, 0, 1 << 30);
-    if (in_episode_) {
-      core::fail(std::logic_error("the trial was ended within an episode: make a new one"));
-    }
+    require_whole();
     const int last = episode_ + std::min(n_episodes, protocol_.episodes - episode_);
-    while (episode_ < last) {
-      core::interruption_point();
-      if constexpr (requires { agent_.set_progress(0.0); }) {
-        agent_.set_progress(static_cast<double>(episode_) /
-                            static_cast<double>(protocol_.episodes));
+    while (begin_decision(last)) {
+      end_decision(acrobot_.step(torque_, lambda_));
+      after_decision();
+    }
+  }
+
+  /// Advances several trials until each has made `n_decisions` more or is finished: faster than one
+  /// after another, as their acrobots move side by side. The rows are the same.
+  ///
+  /// Trials may stop within an episode. Throws std::invalid_argument unless there are 1 to
+  /// AcrobotTeam::kMaxMembers different trials of equal acrobots; whatever else is thrown may end
+  /// all of them.
+  static void advance_together(std::span<AcrobotTrial* const> trials, int n_decisions) {
+    core::require_in_range("n_decisions", n_decisions, 0, 1 << 30);
+    core::require_in_range("number of trials", trials.size(), 1,
+                           environments::AcrobotTeam::kMaxMembers);
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      trials[i]->require_whole();
+      const auto before = trials.first(i);
+      core::require(std::ranges::find(before, trials[i]) == before.end(), "trials",
+                    "different ones", "one twice");
+      core::require(trials[i]->acrobot_.config() == trials[0]->acrobot_.config(), "trials",
+                    "of the same acrobot", "different ones");
+    }
+    environments::AcrobotTeam team;
+    for (; n_decisions > 0; --n_decisions) {
+      for (std::size_t i = 0; i < trials.size(); ++i) {
+        AcrobotTrial& trial = *trials[i];
+        if (trial.begin_decision(trial.protocol_.episodes)) {
+          team.join(i, trial.acrobot_, trial.torque_, trial.lambda_);
+        }
       }
-      ++episode_;
-      run_episode(sensors_, true, after_decision);
-      if (episode_ % protocol_.evaluate_every_episodes == 0) {
-        rows_.push_back(run_episode(test_sensors_, false, after_decision));
-      }
+      const bool any = team.step([&](std::size_t i, const environments::StepResult& result) {
+        trials[i]->end_decision(result);
+      });
+      if (!any) return;
     }
   }
 
  private:
+  using Action = decltype(std::declval<Agent&>().act(std::span<const double>(), true));
+
   static environments::SensorConfig of_tests(environments::SensorConfig sensors,
                                              const ProtocolConfig& protocol) noexcept {
     if (!protocol.noisy_evaluations) sensors.noise = 0.0;
     return sensors;
   }
 
-  template <class AfterDecision>
-  TestRow run_episode(environments::AcrobotSensors& sensors, bool learning,
-                      AfterDecision& after_decision) {
-    const double lambda = goal_(episode_);
-    TestRow row{.episode = episode_, .steps = 0, .episode_return = 0.0, .solved = false};
-    double n_steps = 0.0;
-    in_episode_ = true;
+  void require_whole() const {
+    if (in_decision_) {
+      core::fail(std::logic_error("the trial was ended within a decision: make a new one"));
+    }
+  }
+
+  environments::AcrobotSensors& sensors() noexcept { return is_test_ ? test_sensors_ : sensors_; }
+
+  /// Chooses the next torque. False if `last` learning episodes are done, with their tests.
+  bool begin_decision(int last) {
+    if (!in_episode_) {
+      if (!is_test_ && episode_ >= last) return false;
+      core::interruption_point();
+    }
+    in_decision_ = true;
+    if (!in_episode_) begin_episode();
+    action_ = agent_.act(observed_, !is_test_);
+    torque_ = max_torque_ * agent_.normalized_action(action_);
+    return true;
+  }
+
+  void begin_episode() {
+    if (!is_test_) {
+      if constexpr (requires { agent_.set_progress(0.0); }) {
+        agent_.set_progress(static_cast<double>(episode_) /
+                            static_cast<double>(protocol_.episodes));
+      }
+      ++episode_;
+    }
+    lambda_ = goal_(episode_);
+    row_ = {.episode = episode_, .steps = 0, .episode_return = 0.0, .solved = false};
     acrobot_.reset();
     agent_.begin_episode();
-    sensors.observe(acrobot_.state(), observed_);
-    for (bool truncated = false; !row.solved && !truncated;) {
-      const auto action = agent_.act(observed_, learning);
-      const auto result = acrobot_.step(max_torque_ * agent_.normalized_action(action), lambda);
-      sensors.observe(acrobot_.state(), next_observed_);
-      if (learning) {
-        agent_.learn(observed_, action, result.reward, next_observed_,
-                     result.terminated || (result.truncated && !protocol_.limit_bootstraps));
-      }
-      std::swap(observed_, next_observed_);
-      ++row.steps;
-      row.episode_return += result.reward;
-      row.solved = result.terminated;
-      truncated = result.truncated;
-      after_decision();
-      n_steps += steps_per_decision_;
-      if (n_steps > kStepsPerPoint) {  // a usual episode is over before
-        core::interruption_point();
-        n_steps = 0.0;
-      }
+    sensors().observe(acrobot_.state(), observed_);
+    in_episode_ = true;
+  }
+
+  /// Learns the result of the decision that was begun; it may end the episode.
+  void end_decision(const environments::StepResult& result) {
+    sensors().observe(acrobot_.state(), next_observed_);
+    if (!is_test_) {
+      agent_.learn(observed_, action_, result.reward, next_observed_,
+                   result.terminated || (result.truncated && !protocol_.limit_bootstraps));
     }
-    in_episode_ = false;
-    n_decisions_ += row.steps;
-    return row;
+    std::swap(observed_, next_observed_);
+    ++n_decisions_;
+    ++row_.steps;
+    row_.episode_return += result.reward;
+    row_.solved = result.terminated;
+    if (result.terminated || result.truncated) {
+      if (is_test_) rows_.push_back(row_);
+      is_test_ = !is_test_ && episode_ % protocol_.evaluate_every_episodes == 0;
+      in_episode_ = false;
+    }
+    in_decision_ = false;
+    n_steps_ += steps_per_decision_;
+    if (n_steps_ > kStepsPerPoint) {  // a usual episode is over before
+      n_steps_ = 0.0;
+      core::interruption_point();
+    }
   }
 
   static constexpr double kStepsPerPoint = 1 << 20;  ///< integration steps
@@ -193,7 +248,14 @@ class AcrobotTrial {
   std::vector<TestRow> rows_;
   std::int64_t n_decisions_ = 0;
   int episode_ = 0;
-  bool in_episode_ = false;  // also after something was thrown there
+  bool is_test_ = false;  // the episode under way, or the next
+  bool in_episode_ = false;
+  bool in_decision_ = false;  // also after something was thrown there
+  TestRow row_ = {};          // of the episode under way, of learning or not
+  double lambda_ = 0.0;
+  Action action_ = {};
+  double torque_ = 0.0;
+  double n_steps_ = 0.0;  // of integration since the last point of interruption
 };
 
 }  // namespace sdnn::tools

@@ -2244,6 +2244,11 @@ class AcrobotTrial:
     """
     SDNN-C learns the acrobot swing-up
     """
+    @staticmethod
+    def advance_together(trials: tuple[AcrobotTrial, ...], n_decisions: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Lets each of several trials make n more decisions, or come to its end
+        """
     def __init__(self, *, approximator: SDNNCConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2276,6 +2281,11 @@ class FuzzyAcrobotTrial:
     """
     Fuzzy Q-learning learns the acrobot swing-up
     """
+    @staticmethod
+    def advance_together(trials: tuple[FuzzyAcrobotTrial, ...], n_decisions: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Lets each of several trials make n more decisions, or come to its end
+        """
     def __init__(self, *, approximator: FuzzyRulesConfig, learning: FuzzyQLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2304,6 +2314,11 @@ class RBFAcrobotTrial:
     """
     Q-learning with an RBF network learns the acrobot swing-up
     """
+    @staticmethod
+    def advance_together(trials: tuple[RBFAcrobotTrial, ...], n_decisions: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Lets each of several trials make n more decisions, or come to its end
+        """
     def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2332,6 +2347,11 @@ class LinearAcrobotTrial:
     """
     Sarsa with a linear readout of the SDNN code learns the acrobot swing-up
     """
+    @staticmethod
+    def advance_together(trials: tuple[LinearAcrobotTrial, ...], n_decisions: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Lets each of several trials make n more decisions, or come to its end
+        """
     def __init__(self, *, approximator: LinearSDNNConfig, learning: SarsaConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:

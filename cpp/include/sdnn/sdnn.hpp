@@ -62,6 +62,7 @@
 #include "sdnn/environments/acrobot_config.hpp"
 #include "sdnn/environments/acrobot_sensors.hpp"
 #include "sdnn/environments/acrobot_state.hpp"
+#include "sdnn/environments/acrobot_team.hpp"
 #include "sdnn/environments/goal_schedule.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/online_layer.hpp"

@@ -13,11 +13,11 @@ import time
 import zlib
 from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from queue import SimpleQueue
 from signal import SIGINT, SIGTERM
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -286,17 +286,20 @@ def run_to_end(
                     return None
         if not trial.finished:
             return None
-        rows = rows_of(trial)
+        return _record(planned, trial, time.thread_time() - begin)
+
+
+def _record(planned: PlannedTrial, trial: Trial | TrainingTrial, seconds: float) -> TrialRecord:
     return TrialRecord(
         key=planned.key,
         config=planned.spec.canonical_json(),
         n_decisions=int(trial.n_decisions),
-        seconds=time.thread_time() - begin,
-        rows=rows,
+        seconds=seconds,
+        rows=rows_of(trial),
     )
 
 
-def _pieces(trial: Trial | TrainingTrial) -> Generator[None, None, None]:
+def _pieces(trial: Trial | TrainingTrial | Team) -> Generator[None, None, None]:
     """Run a trial to its end; yield about every `CHUNK_SECONDS`, and first of all."""
     yield
     if isinstance(trial, TrainingTrial):  # whose episodes may be long
@@ -312,6 +315,70 @@ def _pieces(trial: Trial | TrainingTrial) -> Generator[None, None, None]:
         elif seconds > 2 * CHUNK_SECONDS:
             chunk = max(1, chunk // 2)
         yield
+
+
+class Team:
+    """Compiled trials that advance together: the same acrobot and agent, other sensors or seeds."""
+
+    def __init__(self, planned: Iterable[PlannedTrial]) -> None:
+        self.trials: dict[PlannedTrial, Any] = {
+            one: one.spec.make_trial(one.key.seed) for one in planned
+        }
+        self._n_decisions = dict.fromkeys(self.trials, 0)
+        self._seconds = dict.fromkeys(self.trials, 0.0)
+
+    @property
+    def finished(self) -> bool:
+        """Whether every trial was finished and taken."""
+        return not self.trials
+
+    def advance(self, n_decisions: int) -> None:
+        """Let every trial make ``n_decisions`` more; the time is divided by decisions made."""
+        begin = time.thread_time()
+        trials = tuple(self.trials.values())
+        trials[0].advance_together(trials, n_decisions)
+        seconds = time.thread_time() - begin
+        made = {one: t.n_decisions - self._n_decisions[one] for one, t in self.trials.items()}
+        for one, n in made.items():
+            self._n_decisions[one] += n
+            self._seconds[one] += seconds * n / sum(made.values())
+
+    def take_finished(self) -> Generator[Finished, None, None]:
+        """Yield every trial that has come to its end, and let it go."""
+        for one, trial in tuple(self.trials.items()):
+            if trial.finished:
+                yield Finished(one, _record(one, trial, self._seconds[one]))
+                del self.trials[one]
+
+
+MOST_TOGETHER = 8
+"""Trials in a team: doubles in the widest register."""
+
+MOST_TABLE_BYTES = 2**26
+"""Memory of the table of an agent that runs in a team."""
+
+
+def _joins_a_team(spec: RunSpec) -> bool:
+    entry = spec.entry
+    if not (entry.advances_together and entry.table_bytes and spec.is_compiled):
+        return False
+    return entry.table_bytes(spec.approximator) <= MOST_TABLE_BYTES
+
+
+def teams_of(planned: Iterable[PlannedTrial], jobs: int) -> Iterable[list[PlannedTrial]]:
+    """Divide trials into teams for ``jobs`` threads, in the order of their first trials.
+
+    Trials that are not faster together are teams of one.
+    """
+    kinds: dict[object, list[PlannedTrial]] = {}
+    for one in planned:
+        kind = (one.spec.agent.name, one.spec.acrobot) if _joins_a_team(one.spec) else one.key
+        kinds.setdefault(kind, []).append(one)
+    teams: dict[PlannedTrial, list[PlannedTrial]] = {}
+    for alike in kinds.values():
+        size = min(MOST_TOGETHER, -(-len(alike) // jobs))
+        teams |= {alike[k]: alike[k : k + size] for k in range(0, len(alike), size)}
+    return [teams[one] for one in planned if one in teams]
 
 
 class ThreadExecutor:
@@ -330,8 +397,8 @@ class ThreadExecutor:
         messages: SimpleQueue[Message | None] = SimpleQueue()
         with ThreadPoolExecutor(self.jobs, thread_name_prefix="trial") as pool:
             try:
-                for item in planned:
-                    pool.submit(_run_one, item, messages, stop)
+                for team in teams_of(planned, self.jobs):
+                    pool.submit(_run_team, team, messages, stop)
                 # Every trial sends one last message, None if it was given up after a stop.
                 n_open = len(planned)
                 while n_open:
@@ -342,6 +409,26 @@ class ThreadExecutor:
             except BaseException:  # the pool waits for its threads
                 stop.set()
                 raise
+
+
+def _run_team(
+    planned: Sequence[PlannedTrial], messages: SimpleQueue[Message | None], stop: threading.Event
+) -> None:
+    """Run trials together, and by itself what does not come to its end so; in a worker thread."""
+    left = dict.fromkeys(planned)
+    if len(left) > 1 and not stop.is_set():
+        with suppress(BaseException):  # whoever it concerns raises it again
+            team = Team(planned)
+            for _ in _pieces(team):
+                for one, trial in team.trials.items():
+                    messages.put(Advanced(one, int(trial.episode)))
+                for finished in team.take_finished():
+                    messages.put(finished)
+                    del left[finished.planned]
+                if stop.is_set():
+                    break
+    for one in left:
+        _run_one(one, messages, stop)
 
 
 def _run_one(

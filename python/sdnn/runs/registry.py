@@ -59,6 +59,11 @@ class AgentEntry:
     core_trial
         The trial in C++, made from the core's structs of the settings; an agent without one runs in
         its training.
+    advances_together
+        Whether trials of the agent are faster together, by ``core_trial.advance_together``: its
+        steps take little longer than the acrobot's.
+    table_bytes
+        Memory of what is learned under settings of ``approximator``; None if it is not known.
     presets
         Settings of both by their names, of which a run chooses one; none: their defaults.
     version
@@ -72,6 +77,8 @@ class AgentEntry:
     agent: Callable[..., Learner]
     training: Callable[..., Training] = Training
     core_trial: Callable[..., Trial] | None = None
+    advances_together: bool = False
+    table_bytes: Callable[[Any], int] | None = None
     presets: Mapping[str, Preset] = field(default_factory=dict)
     version: str = ""
 
@@ -170,6 +177,7 @@ for _entry in (
         learning=QLearningConfig,
         agent=SDNNQLearning,
         core_trial=_core.AcrobotTrial,
+        table_bytes=lambda net: net.n_pattern_units * net.n_pairs * net.n_hidden_units,
         presets=PRESETS,
     ),
     AgentEntry(
@@ -179,6 +187,8 @@ for _entry in (
         learning=FuzzyQLearningConfig,
         agent=FuzzyQLearning,
         core_trial=_core.FuzzyAcrobotTrial,
+        advances_together=True,
+        table_bytes=lambda rules: 4 * rules.n_sets**rules.n_inputs * rules.n_actions,
     ),
     AgentEntry(
         id="rbf",
@@ -187,6 +197,8 @@ for _entry in (
         learning=QLearningConfig,
         agent=RBFQLearning,
         core_trial=_core.RBFAcrobotTrial,
+        advances_together=True,
+        table_bytes=lambda network: 8 * network.n_bases ** (network.n_inputs + 1),
     ),
     AgentEntry(
         id="sdnn-linear",

@@ -167,6 +167,33 @@ TEST(AcrobotTrial, PiecesEqualTheWhole) {
   EXPECT_EQ(pieces.agent().action_value(), whole.agent().action_value());
 }
 
+TEST(AcrobotTrial, TogetherTheRowsAreThoseOfEachAlone) {
+  const auto make = [](std::size_t i) {
+    return table_trial({.sensors = {.n_sensors = 4 + static_cast<int>(i % 3), .noise = 0.01},
+                        .protocol = {.episodes = 30 + 10 * static_cast<int>(i)},
+                        .seed = i});
+  };
+  std::vector<decltype(make(0))> alone, together;
+  for (std::size_t i = 0; i < 8; ++i) {
+    alone.push_back(make(i));
+    together.push_back(make(i));
+  }
+  std::vector<decltype(make(0))*> team;
+  for (auto& one : together) team.push_back(&one);
+  using Trial = decltype(make(0));
+  for (const int n : {0, 1, 200, 77}) Trial::advance_together(team, n);
+  EXPECT_EQ(together[3].n_decisions(), 278);
+  together[3].advance(2);  // it finishes the episode under way first
+  for (int i = 0; i < 40; ++i) Trial::advance_together(team, 100);
+  for (std::size_t i = 0; i < 8; ++i) {
+    alone[i].advance(1000);
+    EXPECT_TRUE(together[i].finished());
+    EXPECT_EQ(together[i].n_decisions(), alone[i].n_decisions());
+    EXPECT_EQ(digest(together[i].rows()), digest(alone[i].rows()));
+    EXPECT_EQ(together[i].agent().action_value(), alone[i].agent().action_value());
+  }
+}
+
 TEST(AcrobotTrial, TestEpisodesDoNotChangeWhatIsLearned) {
   for (const double noise : {0.0, 0.02}) {
     Setting setting{.sensors = {.noise = noise}};
@@ -320,6 +347,14 @@ TEST(AcrobotTrial, NamesWhatIsImpossible) {
             "n_sensors must be in [4, 6], got 7");
   EXPECT_EQ(message([] { table_trial({}).advance(-1); }),
             "n_episodes must be in [0, 1073741824], got -1");
+  auto one = table_trial({}), other = table_trial({.acrobot = {.gravity = 1.6}});
+  const auto together = [&](std::vector<decltype(one)*> trials, int n_decisions) {
+    return message([&] { decltype(one)::advance_together(trials, n_decisions); });
+  };
+  EXPECT_EQ(together({}, 1), "number of trials must be in [1, 8], got 0");
+  EXPECT_EQ(together({&one}, -1), "n_decisions must be in [0, 1073741824], got -1");
+  EXPECT_EQ(together({&one, &one}, 1), "trials must be different ones, got one twice");
+  EXPECT_EQ(together({&one, &other}, 1), "trials must be of the same acrobot, got different ones");
 }
 
 }  // namespace

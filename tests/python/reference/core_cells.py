@@ -179,6 +179,9 @@ METHODS = {
     ("SDNNQLearning", "act"): {"state": [0.1, 0.2], "explore": True, "environment": 0},
     ("SDNNQLearning", "set_progress"): {"progress": 0.5},
     ("AcrobotTrial", "advance"): {"n_episodes": 1},
+    ("AcrobotTrial", "advance_together"): {
+        "trials": (core.AcrobotTrial(**GOOD["AcrobotTrial"]()),), "n_decisions": 1
+    },
     ("NetworkParts", "time_values"): {"n_repetitions": 2},
     ("NetworkParts", "time_corrections"): {"n_repetitions": 2, "n_corrected": 3},
     ("NetworkParts", "time_selections"): {

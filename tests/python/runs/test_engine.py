@@ -7,15 +7,19 @@ import pytest
 from rich.console import Console
 
 from refusals import refuses
-from sdnn.runs import ResultStore, StoreError, WorkerLostError
+from sdnn.reproduction import EXPERIMENTS, plan_trials
+from sdnn.runs import ResultStore, StoreError, WorkerLostError, run_trials
 from sdnn.runs.engine import (
     Advanced,
     Begun,
     Failed,
     Finished,
     Noted,
+    PlannedTrial,
     ThreadExecutor,
     TrialBars,
+    run_to_end,
+    teams_of,
 )
 
 
@@ -40,6 +44,47 @@ class Recorder:
 def test_jobs_do_not_change_the_content(tmp_path, run):
     digests = {run(tmp_path / str(jobs), executor=ThreadExecutor(jobs))[1] for jobs in (1, 2, 5)}
     assert len(digests) == 1
+
+
+def plan_of_small_agents(n_trials, n_episodes):
+    cases = EXPERIMENTS[1].with_agents(["fuzzy", "sdnn-c", "rbf"]).cases
+    return plan_trials(cases, n_trials, 0, n_episodes)
+
+
+def test_teams_are_of_one_agent_and_leave_no_thread_idle():
+    plan = plan_of_small_agents(3, 40)
+    teams = teams_of(plan, 2)
+    assert {one for team in teams for one in team} == set(plan)
+    assert sorted(map(len, teams)) == [1] * 12 + [6] * 4
+    assert [plan.index(team[0]) for team in teams] == sorted(plan.index(t[0]) for t in teams)
+    assert all(len({one.key.agent for one in team}) == 1 for team in teams)
+    assert max(map(len, teams_of(plan, 1))) == 8
+    assert max(map(len, teams_of(plan, 12))) == 1
+
+
+def test_trials_in_teams_have_the_rows_of_each_by_itself(tmp_path):
+    plan = plan_of_small_agents(1, 60)
+    with ResultStore(tmp_path) as store:
+        assert run_trials(plan, store, executor=ThreadExecutor(1)).n_run == len(plan)
+        records = {record.key: record for record in store.load()}
+    for one in plan:
+        alone = run_to_end(one, wanted=lambda: True, advanced=lambda episode: None)
+        assert records[one.key].rows.digest() == alone.rows.digest()
+        assert records[one.key].n_decisions == alone.n_decisions
+        assert records[one.key].seconds > 0
+
+
+def test_a_failure_in_a_team_is_of_its_trial_alone(tmp_path, monkeypatch):
+    plan = plan_of_small_agents(1, 20)
+    spec = plan[0].spec
+    bad = PlannedTrial(
+        plan[0].key, spec.replace(acrobot=spec.acrobot.replace(goal_reward=1e39, penalty=1e39))
+    )
+    monkeypatch.setattr("sdnn.runs.engine.teams_of", lambda planned, jobs: [planned])
+    with ResultStore(tmp_path) as store:
+        outcome = run_trials([bad, plan[3]], store, executor=ThreadExecutor(1))
+    assert outcome.n_run == 1
+    assert [f.planned for f in outcome.failures] == [bad]
 
 
 def test_stored_trials_are_not_run_again(tmp_path, fake, run):

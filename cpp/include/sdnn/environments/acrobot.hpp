@@ -55,20 +55,8 @@ class Acrobot {
   /// goal_tolerance >= 0, std::logic_error if the episode is over, std::overflow_error if the
   /// speeds outgrow the integration step.
   StepResult step(double torque, double goal_tolerance) {
-    core::require_in_range("torque", torque, -config().max_torque, config().max_torque);
-    core::require(goal_tolerance >= 0.0, "goal_tolerance", "at least 0", goal_tolerance);
-    if (over_) core::fail(std::logic_error("the episode is over: call reset before step"));
-    const bool goal = integrate(torque, goal_tolerance);
-    state_[0] = wrap_angle(state_[0]);
-    state_[1] = wrap_angle(state_[1]);
-    if (!state_.allFinite()) {
-      over_ = true;
-      core::fail(std::overflow_error("the acrobot's speed is too high for this integration_step"));
-    }
-    ++decisions_;
-    const StepResult result = result_of(config(), state_, goal, decisions_);
-    over_ = result.terminated || result.truncated;
-    return result;
+    check_step(torque, goal_tolerance);
+    return end_step(integrate(torque, goal_tolerance));
   }
 
   /// The present state, its angles in [-pi, pi).
@@ -96,6 +84,28 @@ class Acrobot {
   const AcrobotConfig& config() const noexcept { return dynamics_.config(); }
 
  private:
+  friend class AcrobotTeam;  // which integrates several at once
+
+  void check_step(double torque, double goal_tolerance) const {
+    core::require_in_range("torque", torque, -config().max_torque, config().max_torque);
+    core::require(goal_tolerance >= 0.0, "goal_tolerance", "at least 0", goal_tolerance);
+    if (over_) core::fail(std::logic_error("the episode is over: call reset before step"));
+  }
+
+  // Ends a step whose integration came to the goal, or did not.
+  StepResult end_step(bool goal) {
+    state_[0] = wrap_angle(state_[0]);
+    state_[1] = wrap_angle(state_[1]);
+    if (!state_.allFinite()) {
+      over_ = true;
+      core::fail(std::overflow_error("the acrobot's speed is too high for this integration_step"));
+    }
+    ++decisions_;
+    const StepResult result = result_of(config(), state_, goal, decisions_);
+    over_ = result.terminated || result.truncated;
+    return result;
+  }
+
   // Moves the state on by one decision interval, or to the goal: then true.
   bool integrate(double torque, double goal_tolerance) noexcept {
     const double limit_1 = config().goal_velocity_1 * goal_tolerance;
