@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,10 @@ def to_markdown(results: dict[str, Any]) -> str:
     caches = ", ".join(f"{name} {_size(size)}" for name, size in machine["caches"].items())
     lines = [*describe_run(results), f"caches: {caches}; NumPy's products by {machine['blas']}"]
     about = "".join(f"- {line}\n" for line in lines)
-    return "\n".join([about, *map(_titled, [dense_table(results), *tables(results)])])
+    parts, *others = tables(results)
+    own = [row for row in parts.rows if not row[0].startswith("all ")]  # the first table has them
+    parts = replace(parts, rows=own)
+    return "\n".join([about, *map(_titled, [dense_table(results), parts, *others])])
 
 
 def dense_table(results: Mapping[str, Any]) -> Table:
@@ -53,13 +57,14 @@ def passes_table(passes: list[dict[str, Any]]) -> Table:
     """Return passes of networks that learned for a while beside loads of the lines they read."""
     rows = [
         (f"{one['inputs']}", f"{one['episodes']:,}", one["level"],
-         *(f"{one[name]:.1f}" for name in ("new_state", "pass", "plain_loads")),
+         *(f"{one[name]:.1f}" for name in ("pass", "plain_loads")),
          f"{one['plain_loads'] / one['pass']:.0%}")
         for one in passes
+        if one["level"] != "portable"
     ]  # fmt: skip
     return Table(
         "A pass beside plain loads of the lines that it reads (us, median)",
-        ("inputs", "noisy episodes", "by", "new state", "pass", "loads", "loads / pass"),
+        ("inputs", "noisy episodes", "by", "pass", "loads", "loads / pass"),
         rows,
     )
 
@@ -93,14 +98,14 @@ def _titled(table: Table) -> str:
 def profile_table(profile: dict[str, dict[str, float]]) -> Table:
     """Return functions by their share of the time, one column for each trial."""
     functions = sorted(
-        {name for shares in profile.values() for name in shares},
+        {name for shares in profile.values() for name, share in shares.items() if share >= 3},
         key=lambda name: (-sum(shares.get(name, 0.0) for shares in profile.values()), name),
     )
     rows = [
         (f"`{name}`", *(f"{of[name]:.1f}" if name in of else "" for of in profile.values()))
         for name in functions
     ]
-    title = "Where a trial's time goes (per cent of samples; below 1 left out)"
+    title = "Where a trial's time goes (per cent of samples; functions of at least 3)"
     return Table(title, ("function", *profile), rows)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,17 @@ HEAD = """# Settings of a run
 <!-- Written by docs/write_settings.py from the declarations of the settings. -->
 
 The keys of files for `sdnn train --config FILE`, of `--set KEY=VALUE`, and of
-[studies](../how-to/studies.md): type; default; meaning. `approximator.*` and `learning.*` are those
-of the agent, with the paper's defaults, before a preset. `sdnn train --schema` prints JSON Schema.
+[studies](../how-to/studies.md): default, range, meaning. `approximator.*` and `learning.*` are
+those of the agent, with the paper's defaults, before a preset. `sdnn train --schema` has details.
 
 A study without an environment is about the paper's acrobot: the agent is `sdnn-c` with the preset
 `paper`, the budget 15,000 episodes, and every 10 episodes there is an evaluation of one episode.
 """
+ASSUMPTION = re.compile(r" An assumption\b.*| \(section [^)]*\)")
+NOT_IN_THE_PAPER = re.compile(r" Not in the paper[^.:]*(?:\.|: (\w))")
+"""What the paper has and leaves open is in docs/evidence/assumptions.md."""
+MOST_WORDS = 24
+"""Of several sentences on a setting; the others are left to `sdnn train --schema`."""
 
 
 def page() -> str:
@@ -35,7 +41,7 @@ def page() -> str:
             one["$ref"].rpartition("/")[2] for one in found.get("anyOf", [found]) if "$ref" in one
         ]
         for name in names:
-            text += f"\n### {name}\n\n"
+            text += f"\n### {name}\n\n" if len(names) > 1 else "\n"
             text += "".join(entries(table, name, definitions[name]["properties"], described))
     return text
 
@@ -49,30 +55,55 @@ def entries(
     """Write a line for each setting; what an earlier class has alike is named only."""
     same: dict[str, list[str]] = {}
     for name, found in properties.items():
-        default = found.get("default")
-        what = words(found) + ("" if default in (None, (), {}) else f"; `{default}`")
-        text = found.get("description", "")
+        what, text = words(found), short(found.get("description", ""))
         first = described.setdefault(f"{name} {text}", kind)
         if described.setdefault(f"{name} {what} {text}", kind) != kind:
             same.setdefault(first, []).append(name)
         elif first != kind and len(text.split()) > 5:
             yield f"- **`{table}.{name}`** ({what}): As in {first}.\n"
-        else:
+        elif (twin := twin_of(name, properties)) and name.endswith("_1"):
+            both = f"**`{table}.{name}`**, **`{twin}`**"
+            yield f"- {both} ({what}): {text.replace('link 1', 'each link')}\n"
+        elif not twin:
             yield f"- **`{table}.{name}`** ({what}): {text}\n"
     for first, names in same.items():
         yield f"- As in {first}: {', '.join(f'`{name}`' for name in names)}\n"
 
 
+def twin_of(name: str, properties: dict[str, Any]) -> str:
+    """Return the setting that is the same of the other link, if there is one."""
+    other = name[:-1] + {"1": "2", "2": "1"}.get(name[-1], "")
+    mine, its = (
+        {key: re.sub("[12]", "", f"{value}") for key, value in properties.get(one, {}).items()}
+        for one in (name, other)
+    )
+    return other if other != name and mine == its else ""
+
+
+def short(description: str) -> str:
+    """Return the first sentences of a description, without what they say of the paper."""
+    text = ASSUMPTION.sub("", description)
+    text = NOT_IN_THE_PAPER.sub(lambda found: f" {(found[1] or '').upper()}".rstrip(), text)
+    text, *more = re.split(r"(?<=\.) (?=[A-Z0-9])", text)
+    for one in more:
+        if len(f"{text} {one}".split()) > MOST_WORDS:
+            break
+        text += f" {one}"
+    return text
+
+
 def words(found: dict[str, Any]) -> str:
-    """Write a type with its bounds, but for those that only guard against absurd numbers."""
-    if "anyOf" in found:
-        return ", ".join(words(one) for one in found["anyOf"] if one.get("type") != "null")
-    if "enum" in found:
-        return ", ".join(f"`{word}`" for word in found["enum"] if word is not None)
-    text: str = found.get("type", "")
-    limits = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<="}
-    bounds = {sign: found[key] for key, sign in limits.items() if abs(found.get(key, 1e6)) < 1e6}
-    return text + "".join(f" {sign} {bound:g}" for sign, bound in bounds.items())
+    """Write a default and what else is allowed, but for bounds that go without saying."""
+    default = found.get("default")
+    shown = [] if default in (None, (), {}) else [f"`{default}`"]
+    for one in found.get("anyOf", [found]):
+        if "enum" in one:
+            shown += [f"`{word}`" for word in one["enum"] if word not in (None, default)]
+        elif "exclusiveMinimum" not in one and one.get("maximum", 1e6) < 1e6:
+            shown.append(f"{one['minimum']:g} to {one['maximum']:g}")
+        elif one.get("type") != "null" and default in (None, (), {}):
+            shown.append(one.get("type", ""))
+    return ", ".join(shown)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
 """Problems that nobody tuned for: every estimator with default settings, on some twenty of them.
 
-    python bench/estimators/problems.py [--seeds 10] [--only WORD] [--redraw]
+    python bench/estimators/problems.py [--seeds 10] [--only WORD] [--redraw] [--full]
 
-Measures what the store lacks, draws problems.png and writes the tables of problems.md, both in
-docs/evidence.
+Measures what the store lacks, draws problems.png and writes the table of problems.md, both in
+docs/evidence; --full prints every problem.
 Needs sdnn[river], whose measured data are in the package.
 """
 
@@ -295,12 +295,9 @@ def ranks(middles):
     return (better + (equal + 1) / 2).mean(axis=0)
 
 
-def table(found, problems, models, what="score", middle=np.median):
-    """Medians or means of a score, mean ranks, and the seconds of fitting.
-
-    Where a model was not measured on a problem, it has a rank on those where all were.
-    """
-    middles = np.array(
+def middles_of(found, problems, models, what="score", middle=np.median):
+    """Medians or means of a score, shape (n_problems, n_models); NaN where there is none."""
+    return np.array(
         [
             [
                 middle(scores(found, problem, model, what)) if found[problem, model] else np.nan
@@ -309,27 +306,51 @@ def table(found, problems, models, what="score", middle=np.median):
             for problem in problems
         ]
     )
+
+
+def table(problems, models, middles, shown=None):
+    """A row of scores for each problem, with columns of the shown models only; best in bold."""
+    columns = [place for place, model in enumerate(models) if shown is None or model in shown]
     rows = []
     for problem, row in zip(problems, middles, strict=True):
-        told = (f"{m:.3f}" if np.isfinite(m) else "" for m in row)
-        cells = (f"**{c}**" if m == np.nanmax(row) else c for m, c in zip(row, told, strict=True))
-        rows.append((problem, *cells))
+        told = [f"{m:.3f}" if np.isfinite(m) else "" for m in row]
+        rows.append(
+            (problem, *(f"**{told[i]}**" if row[i] == np.nanmax(row) else told[i] for i in columns))
+        )
+    return markdown(("problem", *(list(models)[i] for i in columns)), rows)
+
+
+def rank_columns(title, models, middles):
+    """Mean ranks by model, of those that were measured on all problems; and on such problems."""
     own = np.array([model not in VARIANTS for model in models])
     there = np.isfinite(middles)
-    rows.append(rank_row("mean rank", middles, own & there.all(axis=0)))
+    columns = {title: rank_column(models, middles, own & there.all(axis=0))}
     if not there.all():
         of_all = there.all(axis=1)
-        rows.append(rank_row(f"mean rank on {of_all.sum()}", middles[of_all], own))
-    spent = ([row["fit_s"] for p in problems for row in found[p, model]] for model in models)
-    rows.append(("*fit, s*", *(f"*{np.median(seconds):.2g}*" for seconds in spent)))
-    return markdown(("problem", *models), rows)
+        columns[f"on {of_all.sum()}"] = rank_column(models, middles[of_all], own)
+    return columns
 
 
-def rank_row(title, middles, is_ranked):
-    """A row of the mean ranks of some models among themselves."""
-    ranked = np.full(len(is_ranked), np.nan)
-    ranked[is_ranked] = ranks(middles[:, is_ranked])
-    return (f"*{title}*", *(f"*{rank:.1f}*" if np.isfinite(rank) else "" for rank in ranked))
+def rank_column(models, middles, is_ranked):
+    """Mean ranks of some models among themselves."""
+    names = [model for model, ranked in zip(models, is_ranked, strict=True) if ranked]
+    found = ranks(middles[:, is_ranked])
+    return {name: f"{rank:.1f}" for name, rank in zip(names, found, strict=True)}
+
+
+def fit_column(found, problems, models):
+    """Median seconds of fitting by model."""
+    return {
+        model: f"{np.median([row['fit_s'] for p in problems for row in found[p, model]]):.2g}"
+        for model in models
+    }
+
+
+def by_model(columns):
+    """A table with a row for each model, from columns by model."""
+    models = dict.fromkeys(model for column in columns.values() for model in column)
+    rows = [(model, *(column.get(model, "") for column in columns.values())) for model in models]
+    return markdown(("model", *columns), rows)
 
 
 def coverages(found):
@@ -383,8 +404,14 @@ def main():
     for (problem, model, _), row in measured(KIND, given.folder).items():
         found[problem, model].append(row)
     draw(found, given.folder / "problems.png")
-    tables = {unit: table(found, *which) for unit, which in TABLES.items()}
-    show(tables, given.folder / "problems.md")
+    summary = {}
+    for unit, (problems, models) in TABLES.items():
+        middles = middles_of(found, problems, models)
+        summary |= rank_columns(f"{unit}, rank", models, middles)
+        summary[f"{unit}, seconds to fit"] = fit_column(found, problems, models)
+        if given.full:
+            print(table(problems, models, middles))
+    show({"made problems": by_model(summary)}, given.folder / "problems.md")
 
 
 if __name__ == "__main__":

