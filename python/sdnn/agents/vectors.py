@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -12,6 +12,7 @@ from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 
 from sdnn.agents.adapters import (
     EnvironmentAdapter,
+    OneEnvironment,
     Options,
     Seeds,
     StepResults,
@@ -26,7 +27,49 @@ from sdnn.arguments import array_of
 
 def vector_adapter(env: gym.vector.VectorEnv[Any, Any, Any]) -> EnvironmentAdapter:
     """Return the adapter for a vector environment."""
+    if type(env) is gym.vector.SyncVectorEnv and getattr(env, "observation_mode", "") == "same":
+        return _Listed(env)
     return _SeparateResets(env) if _resets_each(env) else _OwnResets(env)
+
+
+class _Listed(EnvironmentAdapter):
+    """The environments of a ``SyncVectorEnv``, without its own work in each step and reset."""
+
+    can_repeat = True
+
+    def __init__(self, env: gym.vector.SyncVectorEnv) -> None:
+        self._env = env
+        self._adapters = [OneEnvironment(one) for one in env.envs]
+        self.n_environments = env.num_envs
+        self.masks = [None] * env.num_envs if has_action_masks(env) else None
+
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+        first = self._of_each(seeds, lambda i: self._adapters[i].reset({0: seeds[i]})[0])
+        return dict(zip(seeds, self._converted(first), strict=True))
+
+    def step(self, actions: Sequence[Any]) -> StepResults:
+        numbers = range(self.n_environments)
+        results = self._of_each(numbers, lambda i: self._adapters[i].step([actions[i]]))
+        seen, *rest = ([one for (one,) in column] for column in zip(*results, strict=True))
+        return StepResults(self._converted(seen), *rest)
+
+    def _of_each(self, numbers: Iterable[int], call: Callable[[int], Any]) -> list[Any]:
+        """Return what the call gives of environments; errors name them."""
+        made = []
+        for i in numbers:
+            try:
+                made.append(call(i))
+            except UnusableStepError as error:
+                raise UnusableStepError(f"environment {i}: {error}") from error
+        if self.masks is not None:
+            self.masks = [one.masks[0] if one.masks else None for one in self._adapters]
+        return made
+
+    def _converted(self, seen: list[Any]) -> Any:
+        """Return observations in the numbers of their space, as the vector itself does."""
+        space = self._env.single_observation_space
+        batch: Any = create_empty_array(space, len(seen))
+        return _listed(self._env, concatenate(space, seen, batch))
 
 
 class _Vector(EnvironmentAdapter, abc.ABC):
@@ -44,7 +87,7 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         observations, rewards, terminated, truncated, infos = step_env(
             self._env, self._batch(actions)
         )
-        seen = self._listed(observations)
+        seen = _listed(self._env, observations)
         results = StepResults(
             seen,
             self._column("reward", rewards, "fiub", "numbers"),
@@ -115,12 +158,6 @@ class _Vector(EnvironmentAdapter, abc.ABC):
             )
         return list(column.tolist())
 
-    def _listed(self, observations: Any) -> Any:
-        """Return them one by one, not copied."""
-        if type(observations) is np.ndarray:
-            return observations
-        return list(iterate(self._env.observation_space, observations))
-
 
 class _SeparateResets(_Vector):
     """A vector in which each environment is reset by itself, whatever the autoreset mode.
@@ -137,7 +174,7 @@ class _SeparateResets(_Vector):
         listed: Any = [seeds.get(i) for i in range(self.n_environments)]
         observations, infos = reset_env(self._env, listed, options)
         self._note_masks(infos, seeds)
-        seen = self._listed(observations)
+        seen = _listed(self._env, observations)
         return {i: seen[i] for i in seeds}
 
     def step(self, actions: Sequence[Any]) -> StepResults:
@@ -157,7 +194,7 @@ class _OwnResets(_Vector):
         if self._seen is None:
             observations, infos = reset_env(self._env, seeds[0], None)
             self._note_masks(infos, range(self.n_environments))
-            self._seen = self._listed(observations)
+            self._seen = _listed(self._env, observations)
         elif self._mode != "SAME_STEP":
             return {}
         elif self.masks is not None:
@@ -167,6 +204,13 @@ class _OwnResets(_Vector):
     def step(self, actions: Sequence[Any]) -> StepResults:
         results, self._seen = self._step(actions)
         return results
+
+
+def _listed(env: gym.vector.VectorEnv[Any, Any, Any], observations: Any) -> Any:
+    """Return observations one by one, not copied."""
+    if type(observations) is np.ndarray:
+        return observations
+    return list(iterate(env.observation_space, observations))
 
 
 def _autoreset_mode(env: gym.vector.VectorEnv[Any, Any, Any]) -> str:
