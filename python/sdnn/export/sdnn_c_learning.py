@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents import SDNNQLearning
-from sdnn.arguments import argument_error
+from sdnn.arguments import argument_error, whole
 from sdnn.export.code import Code
 from sdnn.export.sdnn_c import SDNNCWriter
 from sdnn.export.tables import Tables, weight_words
-from sdnn.export.writer import CHeader, Learner
+from sdnn.export.writer import MOST_FRACTION_BITS, CHeader, Learner
 
 _WEIGHTS_STREAM = 3  # see cpp/include/sdnn/core/random.hpp
 _MOST_RETURNS = 256
@@ -140,13 +140,14 @@ class SDNNCLearner(Learner, SDNNCWriter):
 
     def recall(self, image: Any, state: dict[str, Any]) -> None:
         """Put the fields of an image into the core's state; the episode before is over."""
+        fraction_bits = whole("fraction_bits", int(image["fraction_bits"]), 0, MOST_FRACTION_BITS)
         state["action_value.output_range"] = image["action_value.output_range"].copy()
         if self.adapts:
             for name in ("low", "high", "sum", "n_returns", "due"):
                 state[f"range.{name}"] = image[f"range.{name}"]
             state["range.oldest"] = np.uint64(image["range.oldest"])
             rewards = image["range.rewards"][: image["n_rewards"]]
-            state["range.rewards"] = rewards / 2.0 ** int(image["fraction_bits"])
+            state["range.rewards"] = rewards / 2.0**fraction_bits
             state["range.returns"] = image["range.returns"][: image["n_kept_returns"]].copy()
         for name in ("states", "actions", "rewards"):
             state[f"n_step_buffer.{name}"] = state[f"n_step_buffer.{name}"][:0]

@@ -28,7 +28,7 @@ from sdnn.export.tables import (
 )
 
 _DEFAULT_FRACTION_BITS = 16
-_MOST_FRACTION_BITS = 30
+MOST_FRACTION_BITS = 30
 MOST_WEIGHTS = 2**26  # some hundred megabytes of text
 
 
@@ -98,7 +98,7 @@ class Writer(ABC):
             numbers += np.abs(self.box.astype(np.float64)).reshape(-1).tolist()
         largest = max(numbers, default=0.0)
         most = next(
-            (b for b in range(_MOST_FRACTION_BITS, -1, -1) if math.ceil(largest * 2**b) < 2**31), -1
+            (b for b in range(MOST_FRACTION_BITS, -1, -1) if math.ceil(largest * 2**b) < 2**31), -1
         )
         if most < 0:
             raise ValueError(
@@ -107,7 +107,7 @@ class Writer(ABC):
             )
         if given is None:
             return min(most, _DEFAULT_FRACTION_BITS)
-        bits = whole("fraction_bits", given, 0, _MOST_FRACTION_BITS)
+        bits = whole("fraction_bits", given, 0, MOST_FRACTION_BITS)
         if bits > most:
             problem = f"must be at most {most}, so that {largest:g} fits 32 bits, got {bits}"
             raise argument_error("fraction_bits", problem)

@@ -161,6 +161,7 @@ TEST(ReturnRange, RefusesWhatIsNoRange) {
   refused(testing::with_number(good, "low", 1.0), "low");
   refused(testing::with_number(good, "high", -1.0), "high");
   refused(testing::with_number(good, "oldest", std::uint64_t{256}), "oldest");
+  refused(testing::with_number(good, "due", std::uint64_t{1} << 40), "due");
   core::State bad = good;
   bad["returns"] = testing::tensor_of(std::vector<double>(257, 0.0));
   refused(bad, "returns");

@@ -5,9 +5,13 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <string>
 #include <vector>
 
 #include "sdnn/core/random.hpp"
+#include "sdnn/core/state.hpp"
+#include "states.hpp"
 
 namespace sdnn::approximators {
 namespace {
@@ -92,6 +96,19 @@ TEST(LinearSDNN, IsWiredAsIfInputsHadBeenAddedAtOnce) {
   learn_at_random(five, 30, random);
   learn_at_random(at_once, 30, same);
   EXPECT_TRUE(std::ranges::equal(five.weights(), at_once.weights()));
+}
+
+TEST(LinearSDNN, RefusesCountsThatNoReadoutHas) {
+  core::Random random(7, core::Stream::weights);
+  LinearSDNN readout(small_readout(2), kThreeAndTwo, 5);
+  learn_at_random(readout, 9, random);
+  const core::State good = core::state_of(readout);
+  for (const std::string name : {"n_steps", "n_snapshots"}) {
+    for (const std::int64_t bad : {std::int64_t{-1}, std::numeric_limits<std::int64_t>::max()}) {
+      testing::expect_refused(readout, testing::with_number(good, name, bad),
+                              "state: " + name + " must be in [0, ");
+    }
+  }
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ from c_learners import (
 )
 from c_policies import STRICT, TARGETS, box, run
 from refusals import refuses
-from sdnn.agents import RBFQLearning, SDNNQLearning, SDNNSarsa, Transition
+from sdnn.agents import RBFQLearning, SarsaConfig, SDNNQLearning, SDNNSarsa, Transition
 from sdnn.export import c_header, load_image, save_image
 
 SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all")
@@ -74,6 +74,96 @@ def test_any_readings_and_rewards_are_defined(target, tmp_path):
         came, image = lived(command, save_image(agent), lines.astype("<i4"), 1)
         assert np.max(came) < len(agent.actions_of(0))
         load_image(agent, image)
+
+
+HOSTILE = """
+#include <stdio.h>
+#include "agent.h"
+static agent_agent agent;
+static uint8_t image[AGENT_IMAGE_BYTES];
+int main(void) {
+  uint32_t noise = 1, step, i;
+  int is_loaded = 1, n_loaded = 0;
+  while (fread(image, 1, sizeof image, stdin) == sizeof image) {
+    agent_begin(&agent);
+    if (!agent_load(&agent, image)) continue;
+    ++n_loaded;
+    for (step = 0; step < 100; ++step) {
+      int32_t x[2][AGENT_N_OBSERVED], reward = 0;
+      for (i = 0; i < 2 * AGENT_N_OBSERVED + 1; ++i) {
+        noise = noise * 1664525 + 1013904223;
+        reward = noise >> 31 ? (int32_t)(noise << 1) : noise & 1 << 30 ? INT32_MAX : INT32_MIN;
+        if (i < 2 * AGENT_N_OBSERVED) x[i & 1][i / 2] = reward;
+      }
+      agent_learn(&agent, x[0], agent_act(&agent, x[0], step & 1), reward, x[1], step % 9 == 0);
+      agent_q(&agent, x[1], 0);
+    }
+    agent_begin_episode(&agent);
+    agent_save(&agent, image);
+    is_loaded &= agent_load(&agent, image);
+  }
+  printf("%d", n_loaded);
+  return !is_loaded;
+}
+"""
+
+
+@pytest.mark.parametrize("make", [discrete, sarsa, network, small_steps])
+def test_images_of_extreme_numbers_are_refused_or_learn(make, target, tmp_path):
+    """Whatever is loaded is followed by an image that is loaded."""
+    agent = make()
+    live(agent, lines_of(agent, 300, 1, 16), 16)
+    (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
+    (tmp_path / "hostile.c").write_text(HOSTILE)
+    options = (*STRICT, "-O1", *SANITIZED, "-fsanitize=address")
+    run(target.compiler, *options, tmp_path / "hostile.c", "-o", tmp_path / "hostile")
+    random = np.random.default_rng(3)
+    whole = [0, 1, 255, 2**31 - 1, 2**31, 2**32 - 1, 2**45, 2**62 - 101, 2**63, 2**64 - 1]
+    real = np.array([1.0, -1.0, 2.0**99, -(2.0**99), 5e-324, 1e300, np.inf, np.nan, -0.0])
+    words = np.concatenate([np.array(whole, np.uint64), real.view(np.uint64)])
+    images = []
+    for _ in range(200):
+        image = bytearray(save_image(agent))
+        for place in 4 * random.integers(2, 70, random.integers(1, 4)):
+            n_bytes = random.choice([1, 4, 8])
+            image[place : place + n_bytes] = random.choice(words).tobytes()[:n_bytes]
+        if random.random() < 0.3:  # weights
+            most = [b"\xff\xff\x7f\x00", b"\x01\x00\x80\xff"]
+            one = random.choice(most if isinstance(agent, SDNNSarsa) else [b"\xff", b"\x01"])
+            half = len(image) // 8 * 4
+            image[-4 - half : -4] = one * (half // len(one))
+        image[-4:] = zlib.crc32(image[:-4]).to_bytes(4, "little")
+        images.append(bytes(image))
+    n_loaded = int(run(tmp_path / "hostile", input=b"".join(images)))
+    assert 40 < n_loaded < 180
+
+
+def test_the_largest_weights_stay_in_range(target, tmp_path):
+    """A weight of 2^24 - 1, which an image of the largest weights leads to, is halved to 2^23."""
+    learning = SarsaConfig(
+        schedule_steps=0,
+        final_learning_rate=None,
+        traces="replacing",
+        epsilon=0.0,
+        tie_rule="lowest",
+    )
+    agent = SDNNSarsa(gym.spaces.Discrete(9), gym.spaces.Discrete(4), learning=learning)
+    state = agent.core.state()
+    state["action_value.weights"][:] = 2**23 - 1
+    state["action_value.exponent"] = np.array(-10, np.int32)
+    agent.core.restore(state)
+    header, command = build(tmp_path, agent, target, *SANITIZED)
+    values = [round(agent.q_values(symbol)[0] * 2.0**10) for symbol in range(9)]
+    symbol, value = min(enumerate(values), key=lambda one: one[1])
+    assert value == -2 * (2**23 - 1)  # both of its inputs are -1 in the code
+    now, reward = np.eye(9, dtype="<i4")[symbol], 2 * value << header.fraction_bits - 10
+    lines = np.concatenate([[0], now, [0], now, [0], [1], now, [reward], now, [1]], dtype="<i4")
+    lines = lines.reshape(2, -1)
+    came, image = lived(command, save_image(agent), lines, 1)
+    assert came == live(agent, lines, header.fraction_bits)
+    assert image == save_image(agent)
+    assert agent.core.state()["action_value.weights"].max() == 2**22
+    load_image(agent, image)
 
 
 @pytest.mark.parametrize("compiler", ["g++", "clang++"])
@@ -153,7 +243,8 @@ def test_an_image_of_impossible_numbers_changes_nothing():
         live(one, lines[:-1], 16)
         one.act([0.1, 0.2, 0.3])
         one.learn(Transition([0.1, 0.2, 0.3], 0, 1.0, [0.2, 0.2, 0.3], False))
-    for number in (slice(20, 24), slice(24, 32)):  # n_ended, n_learned
+    # n_snapshots, n_ended, n_learned, n_steps
+    for number in (slice(12, 16), slice(20, 24), slice(24, 32), slice(32, 40)):
         forged = bytearray(save_image(agent))
         forged[number] = b"\xff" * len(forged[number])
         forged[-4:] = zlib.crc32(forged[:-4]).to_bytes(4, "little")
@@ -172,9 +263,11 @@ def test_an_image_of_an_impossible_network_changes_nothing():
     agent = network()
     before = save_image(agent)
     first = len(before) - 4 - 4 * c_header(agent, "agent", learning=True).n_words
-    # A stream, progress, the range of values, returns, a byte of 0, sums that are odd.
+    # Fraction bits, a stream, progress, the range of values, when a return is due, returns, a byte
+    # of 0, sums that are odd.
     streams = slice(16, 48)
-    for place, byte in ((streams, 0), (183, 255), (191, 255), (243, 255), (first, 0), (first, 1)):
+    places = [(11, 255), (streams, 0), (183, 255), (191, 255), (239, 1), (243, 255)]
+    for place, byte in (*places, (first, 0), (first, 1)):
         forged = bytearray(before)
         if place == streams:
             forged[place] = bytes(32)

@@ -80,6 +80,8 @@ class ReturnRange {
       archive.expect(is_full || self.oldest_ == 0, "oldest", "0 before there are 256");
       const bool has_enough = self.n_returns_ < kFewReturns || self.returns_.size() >= kFewReturns;
       archive.expect(has_enough, "returns", "32 at least of so many");
+      archive.expect(self.due_ <= self.n_returns_ + returns_between(self.n_returns_), "due",
+                     "soon after n_returns");
       self.returns_.reserve(kMostReturns);
     }
   }
@@ -112,6 +114,11 @@ class ReturnRange {
   static double clipped(double sum) noexcept { return std::clamp(sum, -kLargest, kLargest); }
   static bool is_sum(double number) noexcept { return number >= -kLargest && number <= kLargest; }
 
+  /// Returns from one that is remembered to the next one.
+  static std::uint64_t returns_between(std::uint64_t n_returns) noexcept {
+    return std::max<std::uint64_t>(n_returns / kReturnsPerLife, 1);
+  }
+
   std::size_t horizon() const noexcept {
     return static_cast<std::size_t>(2.0 / std::max(1.0 - discount_, 0.004));
   }
@@ -141,7 +148,7 @@ class ReturnRange {
 
   void note_return(double value) {
     if (++n_returns_ < due_) return;
-    due_ = n_returns_ + std::max<std::uint64_t>(n_returns_ / kReturnsPerLife, 1);
+    due_ = n_returns_ + returns_between(n_returns_);
     if (returns_.size() < kMostReturns) {
       returns_.push_back(clipped(value));
     } else {

@@ -238,7 +238,7 @@ class Sarsa : public WithRates<Sarsa> {
         [&](auto& episode) { serialize_episode(self, episode, archive); });
     if constexpr (Archive::kReads) {
       archive.expect(self.n_learned_ >= 0 && self.n_learned_ <= kMostLearned, "n_learned",
-                     "in [0, 2^46]");
+                     "in [0, 2^45]");
       self.apply_rates();
     }
   }
@@ -247,7 +247,7 @@ class Sarsa : public WithRates<Sarsa> {
   friend class WithRates<Sarsa>;
 
   static constexpr double kLargestReward = 1e300;
-  static constexpr std::int64_t kMostLearned = std::int64_t{1} << 46;
+  static constexpr std::int64_t kMostLearned = std::int64_t{1} << 45;
   static constexpr std::int32_t kOne = Readout::kRateOne;
 
   /// What belongs to the present episode in one environment.

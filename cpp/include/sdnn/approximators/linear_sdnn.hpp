@@ -275,12 +275,9 @@ class LinearSDNN {
   int fit_unit(double number) {
     if (number == 0.0) return 0;
     if (!exponent_) exponent_ = std::ilogb(number) - 30;
-    int n = 0;
-    while (std::abs(std::ldexp(number, -*exponent_)) >= kLargestReward) {
-      double_unit();
-      ++n;
-    }
-    return n;
+    const std::int32_t before = *exponent_;
+    while (std::abs(std::ldexp(number, -*exponent_)) >= kLargestReward) double_unit();
+    return *exponent_ - before;
   }
   std::int64_t units_of(double number) const noexcept {
     if (!exponent_) return 0;
@@ -318,14 +315,13 @@ class LinearSDNN {
       gain -= static_cast<std::int32_t>(
           std::clamp<std::int64_t>(scaled(before, step.decay, 13), -kLargestTrace, kLargestTrace));
     }
-    int n_doubled = 0;
+    const std::int32_t exponent = exponent_.value_or(0);
     ++version_;
     std::int64_t error = std::clamp(step.error, -kLargestError, kLargestError);
     std::int64_t drift = std::clamp(step.correction, -kLargestError, kLargestError);
     while (std::max(std::abs(scaled(error, rate, 28)), std::abs(scaled(drift, rate, 28))) >=
            kLargestWeight) {
       double_unit();
-      ++n_doubled;
       error = halved(error);
       drift = halved(drift);
     }
@@ -353,12 +349,14 @@ class LinearSDNN {
         used |= use.weights;
       }
     }
-    for (; used >= kLargestWeight; used >>= 1) {
+    while (used >= kLargestWeight) {
       double_unit();
-      ++n_doubled;
+      used >>= 1;
+      // Halves are rounded up, so the largest may be too large once more.
+      if (std::ranges::find(weights_, kLargestWeight) != weights_.end()) used |= kLargestWeight;
     }
     if (config_.averaging_interval > 0) note_step();
-    return n_doubled;
+    return exponent_.value_or(0) - exponent;
   }
 
   /// Takes over what a readout with fewer inputs has learned: Q(s, a) is the same, whatever the
@@ -390,7 +388,9 @@ class LinearSDNN {
                      "below 2^23 in size");
       archive.expect(!self.exponent_ || std::abs(*self.exponent_) <= 1100, "exponent",
                      "in [-1100, 1100]");
-      archive.expect(self.n_steps_ >= 0 && self.n_snapshots_ >= 0, "n_steps", "0 or more");
+      archive.expect(self.n_steps_ >> 62 == 0, "n_steps", "in [0, 2^62)");
+      archive.expect(self.n_snapshots_ >= 0 && self.n_snapshots_ <= kMostSnapshots, "n_snapshots",
+                     "in [0, 3072]");
       std::ranges::fill(self.versions_, ++self.version_);
       self.identity_ = core::Identity();
     }
