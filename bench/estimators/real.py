@@ -158,8 +158,8 @@ def main():
     for title, (what, data, models) in TABLES.items():
         middles = problems.middles_of(found, data, models, what, np.mean)
         summary |= problems.rank_columns(f"{title}, rank", models, middles)
-        if what == "score":
-            tables[f"{title}, measured data"] = problems.table(data, models, middles, SHOWN)
+        if title == "R2":
+            tables["R2, measured data"] = problems.table(data, models, middles, SHOWN)
         if given.full:
             print(problems.table(data, models, middles))
     tables["measured data"] = problems.by_model({**summary, **class_columns(found)})

@@ -91,18 +91,12 @@ def _ours_rows(found: Curves, tasks: Sequence[str], sensors: Iterable[str]) -> I
 
 
 def _cost_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
-    """Medians of each agent over the cases, and their ranges."""
+    """Medians of each agent over the cases."""
     for variant in study.variants:
         own = [trials for (_, name), trials in found.items() if name == variant.id]
         if own:
-            times = [_microseconds(trials) for trials in own]
-            sizes = [_kibibytes(trials) for trials in own]
-            yield (variant.title, *(_median_and_range(some) for some in (times, sizes)))
-
-
-def _median_and_range(values: Sequence[float]) -> str:
-    low, middle, high = (f"{f(values):,.0f}" for f in (min, np.median, max))
-    return middle if low == high else f"{middle} ({low} to {high})"
+            spent, kept = (np.median([f(t) for t in own]) for f in (_microseconds, _kibibytes))
+            yield variant.title, f"{spent:,.0f}", f"{kept:,.0f}"
 
 
 def _microseconds(trials: Trials) -> float:
