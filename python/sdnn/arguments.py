@@ -48,14 +48,13 @@ def array_of(name: str, value: Any, kinds: str = "fiub", what: str = "numbers") 
     if is_plain and value.dtype.kind in kinds:
         return np.asarray(value)
     rows = value if isinstance(value, list | tuple) else [value]
-    if any(isinstance(row, np.ma.MaskedArray) for row in rows):
-        raise argument_error(name, f"must be {what} without a mask, got {shown(value)}")
+    has_mask = any(isinstance(row, np.ma.MaskedArray) for row in rows)
+    require(not has_mask, name, f"be {what} without a mask", value)
     try:
         array = np.asarray(value)
     except Exception:  # lists of several lengths, and what arrays of other libraries raise
         array = np.empty(0, object)
-    if array.dtype.kind not in kinds:
-        raise argument_error(name, f"must be {what}, got {shown(value)}")
+    require(array.dtype.kind in kinds, name, f"be {what}", value)
     return array
 
 
@@ -71,6 +70,19 @@ def argument_error(name: str, problem: str, kind: type[Exception] = ValueError) 
     error: Any = kind(problem if is_named else f"{name} {problem}")
     error.argument = name
     return error  # type: ignore[no-any-return]
+
+
+def require(
+    is_so: object, name: str, expected: str, given: Any, kind: type[Exception] = ValueError
+) -> None:
+    """Raise an error about an argument unless something is so; ``expected`` follows "must".
+
+    >>> require(False, "period", "be positive", -1)
+    Traceback (most recent call last):
+    ValueError: period must be positive, got -1
+    """
+    if not is_so:
+        raise argument_error(name, f"must {expected}, got {shown(given)}", kind)
 
 
 def blamed(error: BaseException) -> tuple[str, str]:
@@ -193,11 +205,10 @@ def path_of(name: str, value: Any) -> Path:
     Traceback (most recent call last):
     TypeError: path must be the name of a file, got None
     """
-    if not isinstance(value, str | os.PathLike):
-        raise argument_error(name, f"must be the name of a file, got {shown(value)}", TypeError)
+    require(isinstance(value, str | os.PathLike), name, "be the name of a file", value, TypeError)
     text = os.fspath(value)
-    if not isinstance(text, str) or not text or "\0" in text:
-        raise argument_error(name, f"must be the name of a file, got {shown(value)}")
+    is_name = isinstance(text, str) and text and "\0" not in text
+    require(is_name, name, "be the name of a file", value)
     return Path(text)
 
 
@@ -221,6 +232,5 @@ def has_methods(name: str, value: Any, what: str, *methods: str) -> None:
     Traceback (most recent call last):
     TypeError: env must be a Gymnasium environment, got 5
     """
-    is_object = not isinstance(value, type)
-    if not (is_object and all(callable(getattr(value, method, None)) for method in methods)):
-        raise argument_error(name, f"must be {what}, got {shown(value)}", TypeError)
+    has_all = all(callable(getattr(value, method, None)) for method in methods)
+    require(has_all and not isinstance(value, type), name, f"be {what}", value, TypeError)

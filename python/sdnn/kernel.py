@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sdnn.arguments import array_of, seed_of, shown, whole
+from sdnn.arguments import array_of, require, seed_of, shown, whole
 from sdnn.coding import Coding, coding_named
 
 if TYPE_CHECKING:
@@ -115,10 +115,8 @@ class AnalyticKernel:
         one = array_of("X", X, _CELLS, "a table of numbers or words")
         other = one if Y is None else array_of("Y", Y, _CELLS, "a table of numbers or words")
         for name, table in (("X", one), ("Y", other)):
-            if table.ndim != 2 or table.shape[1] != len(self.codings):
-                raise ValueError(
-                    f"{name} must have shape (n, {len(self.codings)}), got {table.shape}"
-                )
+            is_table = table.ndim == 2 and table.shape[1] == len(self.codings)
+            require(is_table, name, f"have shape (n, {len(self.codings)})", table.shape)
         bins = [
             (coding.bins(one[:, index]), coding.bins(other[:, index]))
             for index, coding in enumerate(self.codings)
@@ -157,8 +155,7 @@ def _read_pairs(pairs: Any, n_inputs: int) -> tuple[tuple[int, int], ...]:
         read = tuple((whole("pairs", a, 0, last), whole("pairs", b, 0, last)) for a, b in pairs)
     except (TypeError, ValueError):
         read = ()
-    if not read:
-        raise ValueError(f"pairs must be pairs of inputs from 0 to {last}, got {shown(pairs)}")
+    require(read, "pairs", f"be pairs of inputs from 0 to {last}", pairs)
     return read
 
 

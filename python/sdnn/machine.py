@@ -12,7 +12,7 @@ import os
 from pathlib import Path
 
 from sdnn import _core
-from sdnn.arguments import shown
+from sdnn.arguments import require
 
 _PROCESSOR_FILE = Path("/proc/cpuinfo")
 
@@ -110,6 +110,5 @@ def set_instruction_set(name: str) -> None:
     'portable'
     >>> set_instruction_set(before)
     """
-    if not isinstance(name, str):
-        raise TypeError(f"name must be that of an instruction set, got {shown(name)}")
+    require(isinstance(name, str), "name", "be that of an instruction set", name, TypeError)
     _core.set_instruction_set(name)

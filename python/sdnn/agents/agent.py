@@ -13,7 +13,7 @@ from sdnn.agents.base import Approximator, BaseAgent, Learning
 from sdnn.agents.batches import unbatched
 from sdnn.agents.episode import Transition
 from sdnn.agents.training import Training, TrainingResult
-from sdnn.arguments import argument_error, blamed, flag, reward_of, shown, whole
+from sdnn.arguments import argument_error, blamed, flag, require, reward_of, shown, whole
 
 if TYPE_CHECKING:
     from sdnn.agents.callbacks import Callback
@@ -191,9 +191,9 @@ class Agent(BaseAgent[Approximator, Learning]):
         if several is None:
             return self._masked_action(observation, explore, action_masks), None
         masks = [None] * len(several) if action_masks is None else action_masks
-        if not hasattr(masks, "__len__") or len(masks) != len(several):
-            expected = f"one for each of {len(several)} observations"
-            raise argument_error("action_masks", f"must be {expected}, got {shown(action_masks)}")
+        are_as_many = hasattr(masks, "__len__") and len(masks) == len(several)
+        expected = f"be one for each of {len(several)} observations"
+        require(are_as_many, "action_masks", expected, action_masks)
         pairs = zip(several, masks, strict=True)
         return np.stack([self._masked_action(one, explore, mask) for one, mask in pairs]), None
 

@@ -35,8 +35,8 @@ from sdnn.arguments import (
     is_of_class,
     path_of,
     real,
+    require,
     seed_of,
-    shown,
     whole,
 )
 from sdnn.config import WARM_UP, values_of
@@ -119,8 +119,7 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
     def _take_settings(self, approximator: Any, learning: Any, seed: Any, steps: Any) -> None:
         for name, part in (("approximator", approximator), ("learning", learning)):
             kind: type[Any] = getattr(self, f"{name}_type")
-            if not is_of_class(part, kind):
-                raise TypeError(f"{name} must be a {kind.__name__}, got {shown(part)}")
+            require(is_of_class(part, kind), name, f"be a {kind.__name__}", part, TypeError)
         self._approximator, self.learning = approximator, learning
         self.seed = secrets.randbits(63) if seed is None else seed_of(seed)
         self._warm_up_steps = whole("warm_up_steps", steps, int(WARM_UP.low), int(WARM_UP.high))
@@ -239,8 +238,8 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
 
     @scaling.setter
     def scaling(self, scaling: Scaling | None) -> None:
-        if not isinstance(scaling, Scaling | None):
-            raise TypeError(f"scaling must be a Scaling or None, got {shown(scaling)}")
+        is_one = isinstance(scaling, Scaling | None)
+        require(is_one, "scaling", "be a Scaling or None", scaling, TypeError)
         self._scaling = scaling
 
     def save(self, path: str | Path) -> None:

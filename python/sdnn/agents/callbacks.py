@@ -10,7 +10,7 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from sdnn.arguments import has_methods, path_of, real, shown, whole
+from sdnn.arguments import has_methods, path_of, real, require, shown, whole
 from sdnn.files import naming, open_to_append, read_bytes, write_whole
 from sdnn.progress import ProgressBars
 
@@ -209,8 +209,8 @@ class Schedule(Callback):
     ) -> None:
         given = {"learning_rate": learning_rate, "epsilon": epsilon}
         for name, function in given.items():
-            if function is not None and not callable(function):
-                raise TypeError(f"{name} must be a function of the progress, got {shown(function)}")
+            is_function = function is None or callable(function)
+            require(is_function, name, "be a function of the progress", function, TypeError)
         self._functions = {name: f for name, f in given.items() if f is not None}
 
     def on_start(self, training: Training) -> None:

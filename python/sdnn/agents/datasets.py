@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 from sdnn.agents.agent import Agent
 from sdnn.agents.episode import Transition
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
-from sdnn.arguments import argument_error, array_of, flag, is_of_class, path_of, shown, whole
+from sdnn.arguments import (
+    argument_error,
+    array_of,
+    flag,
+    is_of_class,
+    path_of,
+    require,
+    shown,
+    whole,
+)
 from sdnn.files import open_regular
 
 _MOST_BYTES = 2**20
@@ -75,13 +84,13 @@ def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> 
     >>> learn_from(agent, [Transition([0.2], 1, 1.0, [0.3], True)], epochs=3)
     3
     """
-    if not is_of_class(agent, Agent) or is_of_class(agent, FuzzyQLearning):
-        problem = f"must be an Agent that learns any action, not FuzzyQLearning, got {shown(agent)}"
-        raise argument_error("agent", problem, TypeError)
+    learns_any = is_of_class(agent, Agent) and not is_of_class(agent, FuzzyQLearning)
+    expected = "be an Agent that learns any action, not FuzzyQLearning"
+    require(learns_any, "agent", expected, agent, TypeError)
     epochs = whole("epochs", epochs, 1, 2**31)
     read = _reader(dataset)
-    if epochs > 1 and isinstance(dataset, Iterator):
-        raise argument_error("epochs", f"must be 1 for an iterator, got {epochs}")
+    is_once = isinstance(dataset, Iterator)
+    require(epochs == 1 or not is_once, "epochs", "be 1 for an iterator", epochs)
     n = 0
     for _ in range(epochs):
         agent.begin_episode()
@@ -110,8 +119,8 @@ def _reader(dataset: Any) -> Callable[[], Iterator[_Logged]]:
         return lambda: _episodes(dataset)
     if isinstance(dataset, Iterable):
         return lambda: ((f"transition {i}", one, False) for i, one in enumerate(dataset))
-    words = "must be a path, arrays by name, a Minari dataset or transitions"
-    raise argument_error("dataset", f"{words}, got {shown(dataset)}", TypeError)
+    expected = "must be a path, arrays by name, a Minari dataset or transitions"
+    raise argument_error("dataset", f"{expected}, got {shown(dataset)}", TypeError)
 
 
 def _lines(path: Path) -> Iterator[_Logged]:
@@ -140,13 +149,11 @@ def _has(values: Mapping[str, Any], names: tuple[str, ...], *more: str) -> bool:
 
 def _arrays_of(values: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     """Return the arrays, of which files mapped to memory are not read yet."""
-    if not _has(values, _ARRAYS, "truncations"):
-        problem = f"must have {', '.join(_ARRAYS)}, perhaps truncations, got {shown([*values])}"
-        raise argument_error("dataset", problem)
+    expected = f"have {', '.join(_ARRAYS)}, perhaps truncations"
+    require(_has(values, _ARRAYS, "truncations"), "dataset", expected, [*values])
     arrays = {name: array_of(f"dataset[{name!r}]", one) for name, one in values.items()}
     lengths = {name: len(one) if one.ndim else 0 for name, one in arrays.items()}
-    if len(set(lengths.values())) > 1:
-        raise argument_error("dataset", f"must be of arrays of one length, got {lengths}")
+    require(len(set(lengths.values())) == 1, "dataset", "be of arrays of one length", lengths)
     return arrays
 
 

@@ -24,7 +24,7 @@ from sdnn.agents.adapters import (
 )
 from sdnn.agents.episode import EVALUATION, episode_seed
 from sdnn.agents.spaces import require_same_kind
-from sdnn.arguments import has_methods, seed_of, shown, whole
+from sdnn.arguments import has_methods, require, seed_of, whole
 from sdnn.display import Displayed
 
 _LONG = 100_000
@@ -122,8 +122,8 @@ def evaluate(
     require_same_kind(agent, env)
     root = None if seed is None else seed_of(seed)
     n_episodes = whole("episodes", episodes, 1, 10**9)
-    if options is not None and not isinstance(options, dict):
-        raise TypeError(f"options must be a dictionary or None, got {shown(options)}")
+    is_options = isinstance(options, dict | None)
+    require(is_options, "options", "be a dictionary or None", options, TypeError)
     returns, lengths, ends = [], [], []
     for episode in range(n_episodes):
         for now in greedy_episode(agent, env, root, episode, options):

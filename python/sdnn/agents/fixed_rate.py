@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from sdnn import _core
-from sdnn.arguments import real, shown
+from sdnn.arguments import real, require
 
 
 class FixedRate(_core.FixedRate):
@@ -56,8 +56,7 @@ class FixedRate(_core.FixedRate):
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         for name, function in (("clock", clock), ("sleep", sleep)):
-            if not callable(function):
-                raise TypeError(f"{name} must be a function, got {shown(function)}")
+            require(callable(function), name, "be a function", function, TypeError)
         super().__init__(real("hz", hz), clock, sleep)
 
     def __iter__(self) -> FixedRate:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.arguments import real, shown, whole
+from sdnn.arguments import real, require, whole
 
 
 def neighbours(n_variables: int, n_redundant: int) -> Iterator[tuple[int, int]]:
@@ -46,8 +46,8 @@ class Scaling:
             pairs = tuple((real("ranges", a), real("ranges", b)) for a, b in self.ranges)
         except (OverflowError, TypeError, ValueError):
             pairs = ()
-        if not pairs or not all(-np.inf < low < high < np.inf for low, high in pairs):
-            raise ValueError(f"ranges must be pairs, finite, low < high, got {shown(self.ranges)}")
+        are_ranges = pairs and all(-np.inf < low < high < np.inf for low, high in pairs)
+        require(are_ranges, "ranges", "be pairs, finite, low < high", self.ranges)
         object.__setattr__(self, "ranges", pairs)
 
     @property

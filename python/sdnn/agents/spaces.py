@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import argument_error, array_of, blamed, shown
+from sdnn.arguments import argument_error, array_of, blamed, require, shown
 from sdnn.bounds import flat_bounds, with_infinities
 
 Inputs: TypeAlias = Literal["all", "relevant"] | Sequence[int]
@@ -55,14 +55,11 @@ class Observations:
         low, high = _ranges(self._low, self._high, None if is_adaptive else ranges)
         pairs: Any = angle_pairs
         if isinstance(angle_pairs, str):
-            pairs = ()
-            if angle_pairs not in ("none", "find"):
-                problem = f"must be 'none', 'find' or pairs of variables, got {shown(angle_pairs)}"
-                raise argument_error("angle_pairs", problem)
+            pairs, expected = (), "be 'none', 'find' or pairs of variables"
+            require(angle_pairs in ("none", "find"), "angle_pairs", expected, angle_pairs)
         is_list = not isinstance(inputs, str)
-        if not is_list and inputs not in ("all", "relevant"):
-            problem = f"must be 'all', 'relevant' or a list of variables, got {shown(inputs)}"
-            raise argument_error("inputs", problem)
+        expected = "be 'all', 'relevant' or a list of variables"
+        require(is_list or inputs in ("all", "relevant"), "inputs", expected, inputs)
         return _core.ObservationConfig(
             low=[None if np.isnan(x) else x for x in low.tolist()],
             high=[None if np.isnan(x) else x for x in high.tolist()],
@@ -82,9 +79,8 @@ class Observations:
                 _check_parts(self._space, observation)
                 return np.asarray(gym.spaces.flatten(self._space, observation), np.float64)
             except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-                raise ValueError(
-                    f"{name} must be of {self._space}, got {shown(observation)}"
-                ) from error
+                problem = f"must be of {self._space}, got {shown(observation)}"
+                raise argument_error(name, problem) from error
         is_plain = type(observation) is np.ndarray and observation.dtype.kind in "fiub"
         values = observation if is_plain else array_of(name, observation)
         if values.shape != self._shape:
@@ -146,10 +142,8 @@ def _ranges(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the range of each variable, as given or from the bounds; NaN: not known."""
     if ranges is not None:
-        if not isinstance(ranges, Sequence) or isinstance(ranges, str) or len(ranges) != 2:
-            raise ValueError(
-                f"observation_range must be (low, high) or 'adaptive', got {shown(ranges)}"
-            )
+        is_pair = isinstance(ranges, Sequence) and not isinstance(ranges, str) and len(ranges) == 2
+        require(is_pair, "observation_range", "be (low, high) or 'adaptive'", ranges)
         try:
             low, high = (
                 with_infinities(
@@ -236,20 +230,17 @@ class Actions:
         """
         if mask is None:
             return None
-        if self.is_box:
-            raise argument_error(name, f"must be None where actions are a Box, got {shown(mask)}")
+        require(not self.is_box, name, "be None where actions are a Box", mask)
         is_of_parts = isinstance(mask, tuple | list) and any(hasattr(x, "__len__") for x in mask)
         parts = [
             array_of(name, one, "fbiu", "0 or 1 per action").reshape(-1)
             for one in (mask if is_of_parts else (mask,))
         ]
         sizes = self.n_actions if is_of_parts else [sum(self.n_actions)]
-        if [part.size for part in parts] != sizes:
-            wanted = " and ".join(map(str, sizes))
-            raise argument_error(name, f"must have {wanted} numbers, got {shown(mask)}")
+        expected = f"have {' and '.join(map(str, sizes))} numbers"
+        require([part.size for part in parts] == sizes, name, expected, mask)
         allowed = np.concatenate(parts)
-        if not ((allowed == 0) | (allowed == 1)).all():
-            raise argument_error(name, f"must be 0 or 1 per action, got {shown(mask)}")
+        require(((allowed == 0) | (allowed == 1)).all(), name, "be 0 or 1 per action", mask)
         return allowed.astype(np.uint8)
 
     def numbers(self, action: Any) -> NDArray[Any]:
@@ -429,13 +420,13 @@ def _finite(values: NDArray[Any]) -> list[Any]:
 
 def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
     """Make the space that `space_data` described; ValueError if there is none."""
-    if data.get("dtype", "<f4") not in _TYPES:
-        raise ValueError(f"dtype must be that of numbers, got {shown(data['dtype'])}")
+    kind = data.get("dtype", "<f4")
+    require(kind in _TYPES, "dtype", "be that of numbers", kind)
     sizes = [data.get("discrete", 0), *np.ravel(data.get("multi_discrete", 0)).tolist()]
     sizes += [int(np.prod(data.get("multi_binary", 0)))]
     if not all(isinstance(size, int) and 0 <= size <= _MOST_VALUES for size in sizes):
         raise ValueError(f"a space must have at most {_MOST_VALUES} values, got {sizes}")
-    dtype: Any = np.dtype(data.get("dtype", "<f4"))
+    dtype: Any = np.dtype(kind)
     if "box" in data:
         low, high = (
             np.array([float(x) if isinstance(x, str) else x for x in end], dtype).reshape(

@@ -26,7 +26,7 @@ from sdnn.agents.callbacks import listed, listeners
 from sdnn.agents.episode import Episodes, Learner
 from sdnn.agents.evaluation import evaluate
 from sdnn.agents.spaces import require_same_kind
-from sdnn.arguments import flag, has_methods, path_of, shown, whole
+from sdnn.arguments import flag, has_methods, path_of, require, shown, whole
 from sdnn.display import Displayed
 from sdnn.interrupts import Interrupts
 
@@ -188,8 +188,9 @@ class Training:
         self.evaluation_env = evaluation_env
         self.evaluation_episodes = whole("evaluation_episodes", evaluation_episodes, 1, 10**9)
         self.limit_bootstraps = flag("limit_bootstraps", limit_bootstraps)
-        if reset_options is not None and not callable(reset_options):
-            raise TypeError(f"reset_options must be a function or None, got {shown(reset_options)}")
+        is_function = reset_options is None or callable(reset_options)
+        expected = "be a function or None"
+        require(is_function, "reset_options", expected, reset_options, TypeError)
         self.reset_options = reset_options
         self.n_steps = self.n_episodes = self.n_rows = 0
         self.evaluations: list[tuple[int, float]] = []
@@ -362,8 +363,8 @@ class Training:
         if self.reset_options is None:
             return None
         options = self.reset_options(episode)
-        if not isinstance(options, Mapping):
-            raise TypeError(f"reset_options must return a mapping, got {shown(options)}")
+        is_mapping = isinstance(options, Mapping)
+        require(is_mapping, "reset_options", "return a mapping", options, TypeError)
         return dict(options)
 
     def _unusable(self, error: Exception, environment: int | None) -> UnusableStepError:

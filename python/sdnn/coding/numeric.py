@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.arguments import array_of, one_of, real, shown, whole
+from sdnn.arguments import array_of, one_of, real, require, shown, whole
 from sdnn.coding.base import Coding, known
 
 MAX_BINS = 65535
@@ -145,10 +145,8 @@ class RandomInverse(Ranged):
         has_range = not (self.low is None and self.high is None)
         if self.spacing == "quantile" and has_range and not is_learned:
             raise ValueError("low and high cannot be given with spacing='quantile'")
-        if not 0 < real("length_scale", self.length_scale) <= LONGEST:
-            raise ValueError(
-                f"length_scale must be in (0, {LONGEST}], got {shown(self.length_scale)}"
-            )
+        is_length = 0 < real("length_scale", self.length_scale) <= LONGEST
+        require(is_length, "length_scale", f"be in (0, {LONGEST}]", self.length_scale)
         if self.knots is not None and not (is_learned and self.spacing == "quantile"):
             raise ValueError(
                 "knots must be given with spacing='quantile' and the range, low and high,"
@@ -293,10 +291,9 @@ class Circular(Anchored):
     def fit(self, column: NDArray[Any], n_units: int) -> Circular:
         self._check_anchors()
         numbers(column)
-        if not 0 < real("period", self.period) < math.inf:
-            raise ValueError(f"period must be positive and finite, got {shown(self.period)}")
-        if not math.isfinite(real("origin", self.origin)):
-            raise ValueError(f"origin must be finite, got {shown(self.origin)}")
+        is_period = 0 < real("period", self.period) < math.inf
+        require(is_period, "period", "be positive and finite", self.period)
+        require(math.isfinite(real("origin", self.origin)), "origin", "be finite", self.origin)
         return self
 
     def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:

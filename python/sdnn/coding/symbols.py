@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.arguments import array_of, one_of, seed_of, shown
+from sdnn.arguments import array_of, one_of, require, seed_of, shown
 from sdnn.coding.base import Coding, known
 from sdnn.coding.numeric import RandomInverse
 
@@ -45,11 +45,11 @@ class Categorical(Coding):
         given: Any = self.categories
         if given is None:
             return
-        if isinstance(given, str | bytes) or not isinstance(given, Iterable):
-            raise ValueError(f"categories must be a tuple of values, got {shown(given)}")
+        is_listed = isinstance(given, Iterable) and not isinstance(given, str | bytes)
+        require(is_listed, "categories", "be a tuple of values", given)
         object.__setattr__(self, "categories", tuple(given))
-        if not all(isinstance(category, Hashable) for category in known(self.categories)):
-            raise ValueError(f"categories must be words or numbers, got {shown(self.categories)}")
+        are_hashable = all(isinstance(category, Hashable) for category in known(self.categories))
+        require(are_hashable, "categories", "be words or numbers", self.categories)
 
     @property
     def learns(self) -> bool:
@@ -109,8 +109,8 @@ class Symbolic(Categorical):
 
     def fit(self, column: NDArray[Any], n_units: int) -> Symbolic:
         given = self.categories
-        if given is not None and (not given or len(set(given)) < len(given)):
-            raise ValueError(f"categories must be different and at least one, got {shown(given)}")
+        are_different = given is None or (given and len(set(given)) == len(given))
+        require(are_different, "categories", "be different and at least one", given)
         return dataclasses.replace(self, categories=self._learned(column))
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
@@ -154,13 +154,11 @@ class CorrelationMatrix(Categorical):
     def fit(self, column: NDArray[Any], n_units: int) -> CorrelationMatrix:
         matrix = np.array(self.matrix)
         is_square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]
-        if not is_square or not np.array_equal(matrix, matrix.T):
-            raise ValueError(f"matrix must be square and symmetric, got {matrix.tolist()}")
-        if not np.all(np.diag(matrix) == 1) or not np.all(np.abs(matrix) <= 1):
-            raise ValueError(
-                "matrix must have ones on its diagonal and entries in [-1, 1], "
-                f"got {matrix.tolist()}"
-            )
+        is_symmetric = is_square and np.array_equal(matrix, matrix.T)
+        require(is_symmetric, "matrix", "be square and symmetric", matrix.tolist())
+        are_correlations = np.all(np.diag(matrix) == 1) and np.all(np.abs(matrix) <= 1)
+        expected = "have ones on its diagonal and entries in [-1, 1]"
+        require(are_correlations, "matrix", expected, matrix.tolist())
         names = self._learned(column)
         if len(set(names)) != len(matrix):
             raise ValueError(
@@ -209,10 +207,8 @@ class WithMissing(Coding):
 
     @property
     def learns(self) -> bool:
-        if not isinstance(self.base, Coding) or isinstance(self.base, WithMissing):
-            raise ValueError(
-                f"base must be a Coding without missing values, got {shown(self.base)}"
-            )
+        is_plain = isinstance(self.base, Coding) and not isinstance(self.base, WithMissing)
+        require(is_plain, "base", "be a Coding without missing values", self.base)
         return self.base.learns
 
     @property

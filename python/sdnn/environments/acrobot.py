@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import array_of, choice, one_of, real, shown
+from sdnn.arguments import array_of, choice, one_of, real, require
 from sdnn.config import AcrobotConfig
 from sdnn.environments.picture import AcrobotMotion, AcrobotPicture
 
@@ -98,8 +98,8 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         self._dtype = choice("dtype", dtype, _DTYPES)
         if render_mode is not None:
             one_of("render_mode", render_mode, tuple(self.metadata["render_modes"]))
-        if config is not None and not isinstance(config, AcrobotConfig):
-            raise TypeError(f"config must be an AcrobotConfig, got {shown(config)}")
+        is_config = isinstance(config, AcrobotConfig | None)
+        require(is_config, "config", "be an AcrobotConfig", config, TypeError)
         self.config = AcrobotConfig() if config is None else config
         self.goal_tolerance = goal_tolerance
         self.render_mode = render_mode
@@ -124,8 +124,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
     @goal_tolerance.setter
     def goal_tolerance(self, value: float) -> None:
         tolerance = real("goal_tolerance", value)
-        if not tolerance >= 0.0:
-            raise ValueError(f"goal_tolerance must be at least 0, got {shown(value)}")
+        require(tolerance >= 0.0, "goal_tolerance", "be at least 0", value)
         self._goal_tolerance = tolerance
 
     def reset(
@@ -159,8 +158,8 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         if not self._was_reset:
             raise gym.error.ResetNeeded("call reset before step")
         share = array_of("action", action, "fiu")
-        if share.size != 1 or not abs(share.item()) <= 1.0:
-            raise ValueError(f"action must be one number in [-1, 1], got {shown(action)}")
+        is_share = share.size == 1 and abs(share.item()) <= 1.0
+        require(is_share, "action", "be one number in [-1, 1]", action)
         self._torque = self.config.max_torque * share.item()
         before = None if self._motion is None else self._acrobot.state()
         reward, terminated, truncated = self._acrobot.step(self._torque, self._tolerance)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import array_of, choice, one_of, seed_of, shown
+from sdnn.arguments import array_of, choice, one_of, require, seed_of
 from sdnn.bounds import with_infinities
 from sdnn.config import SensorConfig
 
@@ -265,10 +265,8 @@ def _ends(name: str, given: ArrayLike | None, bounds: NDArray[Any]) -> NDArray[n
     """Return the lower or upper ends of all ranges, shape (l,)."""
     numbers = bounds if given is None else array_of(name, given)
     ends = with_infinities(numbers.astype(np.float64))
-    if ends.shape != bounds.shape:
-        raise ValueError(
-            f"{name} must have {bounds.size} numbers, one per observed variable, got {shown(given)}"
-        )
+    expected = f"have {bounds.size} numbers, one per observed variable"
+    require(ends.shape == bounds.shape, name, expected, given)
     unbounded = np.flatnonzero(~np.isfinite(ends))
     if unbounded.size:
         raise ValueError(

@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import array_of, one_of, shown, whole
+from sdnn.arguments import array_of, one_of, require, whole
 from sdnn.config import AcrobotConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.picture import AcrobotPicture
@@ -173,11 +173,8 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
         name = "options['reset_mask']"
         chosen = np.ones(self.num_envs, np.bool_) if mask is None else array_of(name, mask, "b")
-        if chosen.shape != (self.num_envs,) or not chosen.any():
-            raise ValueError(
-                f"{name} must be a bool array of shape ({self.num_envs},) with at "
-                f"least one True, got {shown(mask)}"
-            )
+        expected = f"be a bool array of shape ({self.num_envs},) with at least one True"
+        require(chosen.shape == (self.num_envs,) and chosen.any(), name, expected, mask)
         return chosen
 
     def _tolerances_of(self, values: ArrayLike) -> NDArray[np.float64]:
@@ -187,8 +184,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
                 f"goal_tolerance must be a number or of shape ({self.num_envs},), "
                 f"got shape {given.shape}"
             )
-        if not (given >= 0.0).all():
-            raise ValueError(f"goal_tolerance must be at least 0, got {shown(values)}")
+        require((given >= 0.0).all(), "goal_tolerance", "be at least 0", values)
         return np.full(self.num_envs, given, np.float64)
 
     def _begin(self, mask: NDArray[np.bool_]) -> None:

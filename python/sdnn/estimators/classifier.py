@@ -15,7 +15,7 @@ from sklearn.utils.multiclass import (
 )
 
 from sdnn import _core
-from sdnn.arguments import shown
+from sdnn.arguments import require, shown
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.fitted import mean_of
 from sdnn.estimators.inputs import Array, Floats, Ints, check_labels, class_labels
@@ -158,10 +158,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         self.classes_: Array = class_labels(y)
         n_classes = len(self.classes_)
         several, given = self.scheme == "one_vs_rest", self.n_units_per_class
-        if given is not None and given > 1 and not several:
-            raise ValueError(
-                f"n_units_per_class must be 1 or None with scheme='one_vs_one', got {given}"
-            )
+        fits = several or given is None or given == 1
+        require(fits, "n_units_per_class", "be 1 or None with scheme='one_vs_one'", given)
         if given is None:
             given = min(UNITS_EACH, max(2, MOST_UNITS // n_classes)) if several else 1
         self._scheme = self.scheme

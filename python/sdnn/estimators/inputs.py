@@ -19,7 +19,7 @@ from sklearn.utils import assert_all_finite
 from sklearn.utils.multiclass import check_classification_targets, unique_labels
 from sklearn.utils.validation import validate_data
 
-from sdnn.arguments import shown
+from sdnn.arguments import require, shown
 from sdnn.coding import Coding, RandomInverse, Symbolic, WithMissing, coding_named
 from sdnn.estimators.outliers import OutlierWarning, numbers_to_range, usual_range, warn_caller
 from sdnn.estimators.parameters import parameter, words
@@ -81,14 +81,11 @@ def coding_entries(coding: Any) -> list[tuple[Coding, Columns]]:
     """Return the entries (coding, columns) of a coding or a list, names replaced."""
     if not isinstance(coding, list | tuple):
         return [(coding_named(coding), slice(None))]
-    if not coding:
-        raise ValueError(f"coding must name a coding for some columns, got {shown(coding)}")
+    require(coding, "coding", "name a coding for some columns", coding)
     entries = []
     for entry in coding:
-        if not isinstance(entry, list | tuple) or len(entry) != 2:
-            raise ValueError(
-                f"coding must be a list of (coding, columns), got {shown(entry)} in it"
-            )
+        is_pair = isinstance(entry, list | tuple) and len(entry) == 2
+        require(is_pair, "coding", "be a list of (coding, columns)", entry)
         entries.append((coding_named(entry[0]), entry[1]))
     return entries
 
@@ -197,8 +194,8 @@ def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int, seed: in
             away = random.permutation(away)[: max(1, PAIR_BUDGET // n_inputs)]
         inputs = range(n_inputs)
         return sorted((mu, int(mu + step) % n_inputs) for mu in inputs for step in away) or [(0, 0)]
-    if isinstance(pairs, Iterator) or not isinstance(pairs, Iterable):
-        raise ValueError(f"pairs must be a list of (modified, modifier), got {shown(pairs)}")
+    is_listed = isinstance(pairs, Iterable) and not isinstance(pairs, Iterator)
+    require(is_listed, "pairs", "be a list of (modified, modifier)", pairs)
     found = []
     for pair in pairs:
         if not isinstance(pair, list | tuple | np.ndarray) or len(pair) != 2:
@@ -422,12 +419,10 @@ class CodedInputs(BaseEstimator):
                 row = np.asarray(values, dtype=np.float64)
             except (TypeError, ValueError):
                 raise ValueError(f"x must be numbers, got {shown(x)}") from None
-            if not np.isfinite(row).all():
-                raise ValueError(f"x must be finite numbers, got {shown(x)}")
+            require(np.isfinite(row).all(), "x", "be finite numbers", x)
         else:
             row = np.array(values, dtype=object)
-        if row.shape != (len(codings),):
-            raise ValueError(f"x must have {len(codings)} features, got {shown(x)}")
+        require(row.shape == (len(codings),), "x", f"have {len(codings)} features", x)
         return row if row.dtype == np.float64 else self._finite(row[None], codings)[0]
 
     def _values_of(self, x: Mapping[Any, Any], codings: tuple[Coding, ...]) -> list[Any]:
@@ -449,10 +444,9 @@ class CodedInputs(BaseEstimator):
         """Return the very first sample as a table; a mapping names the features."""
         names = list(x) if isinstance(x, Mapping) else None
         row = np.array(list(x.values()) if isinstance(x, Mapping) else x, dtype=object)
-        if row.ndim != 1 or (names is not None and not all(isinstance(n, str) for n in names)):
-            raise ValueError(
-                f"x must be a 1-D array, or a mapping with words as keys, got {shown(x)}"
-            )
+        are_words = all(isinstance(name, str) for name in names or ())
+        expected = "be a 1-D array, or a mapping with words as keys"
+        require(row.ndim == 1 and are_words, "x", expected, x)
         table: Array = self._validated(row[None], reset=True)
         if names is not None:
             self.feature_names_in_ = np.array(names, dtype=object)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from sdnn.arguments import argument_error, shown, whole
+from sdnn.arguments import require, whole
 from sdnn.estimators.fitted import Fitted
 
 if TYPE_CHECKING:
@@ -24,9 +24,8 @@ def plot_importances(model: Fitted, n_most: int = 15) -> Figure:
     """
     from matplotlib.figure import Figure
 
-    if not isinstance(model, Fitted):
-        words = f"must be an SDNNRegressor or SDNNClassifier, got {shown(model)}"
-        raise argument_error("model", words, TypeError)
+    expected = "be an SDNNRegressor or SDNNClassifier"
+    require(isinstance(model, Fitted), "model", expected, model, TypeError)
     n_most = whole("n_most", n_most, 1, 1000)
     names = model._names_or_numbers()
     features = dict(zip(names, model.feature_importances_.tolist(), strict=True))

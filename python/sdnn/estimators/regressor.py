@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sdnn.arguments import shown
+from sdnn.arguments import require, shown
 from sdnn.estimators.base import BaseSDNN, OutOfRangeWarning
 from sdnn.estimators.fitted import mean_of
 from sdnn.estimators.inputs import Array, CodedRegressor, Floats, Ints
@@ -103,8 +103,8 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             targets = np.array(y, dtype=np.float64)
         except (TypeError, ValueError):
             raise ValueError(f"y must be a number or one per output, got {shown(y)}") from None
-        if targets.ndim > 1 or not np.isfinite(targets).all():
-            raise ValueError(f"y must be a finite number or one per output, got {shown(y)}")
+        is_finite = targets.ndim <= 1 and np.isfinite(targets).all()
+        require(is_finite, "y", "be a finite number or one per output", y)
         return self._learn_one(x, targets[None], None)
 
     def predict_one(self, x: Any) -> Any:
@@ -166,16 +166,13 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             is_real = given.dtype.kind in "iuf"  # numbers beyond all floats are objects
             given = given.astype(np.float64) if is_real else np.empty(0)
             given = np.tile(given, (self.n_outputs_, 1)) if given.ndim == 1 else given
-            if (
-                given.shape != (self.n_outputs_, 2)
-                or not np.all(np.isfinite(given))
-                or not np.all(given[:, 0] < given[:, 1])
-                or np.any(np.abs(given) > FURTHEST)
-            ):
-                raise ValueError(
-                    "output_range must be (low, high) or one row (low, high) per output, "
-                    f"within {FURTHEST}, low < high, got {shown(self.output_range)}"
-                )
+            is_range = (
+                given.shape == (self.n_outputs_, 2)
+                and np.all(given[:, 0] < given[:, 1])
+                and np.all(np.abs(given) <= FURTHEST)
+            )
+            expected = f"be (low, high) or one row (low, high) per output, within {FURTHEST}"
+            require(is_range, "output_range", f"{expected}, low < high", self.output_range)
             return given
         self._need_two(targets, "the output_range that is not given")
         low, high = self._ranges_of(targets)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from sklearn.utils.class_weight import compute_sample_weight
 
 from sdnn import _core
-from sdnn.arguments import shown
+from sdnn.arguments import require, shown
 from sdnn.estimators.inputs import Array, Floats, Ints
 from sdnn.estimators.network import Network
 
@@ -81,10 +81,8 @@ def class_weights(class_weight: Any, labels: Array) -> Floats | None:
     if class_weight is None:
         return None
     each: Floats = compute_sample_weight(class_weight, labels)
-    if not np.all((each >= 0) & (each <= LARGEST_WEIGHT)):
-        raise ValueError(
-            f"class_weight must be numbers in [0, {LARGEST_WEIGHT}], got {shown(class_weight)}"
-        )
+    are_weights = np.all((each >= 0) & (each <= LARGEST_WEIGHT))
+    require(are_weights, "class_weight", f"be numbers in [0, {LARGEST_WEIGHT}]", class_weight)
     return sample_weights(each, len(labels), name="class_weight")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 
 from sdnn.agents import SDNNQLearning, SDNNSarsa
-from sdnn.arguments import shown
+from sdnn.arguments import require
 from sdnn.export.header import writer_of
 
 
@@ -28,8 +28,8 @@ def load_image(agent: SDNNQLearning | SDNNSarsa, image: bytes) -> None:
         the agent stays as it is.
     """
     writer = writer_of(agent, "agent", None, learns=True)
-    if not isinstance(image, (bytes, bytearray, memoryview)):
-        raise TypeError(f"image must be bytes, got {shown(image)}")
+    is_bytes = isinstance(image, bytes | bytearray | memoryview)
+    require(is_bytes, "image", "be bytes", image, TypeError)
     whole, expected = bytes(image), writer.image()
     if len(whole) != len(expected):
         raise ValueError(f"image must have {len(expected)} bytes, got {len(whole)}")
