@@ -550,7 +550,7 @@ class LinearSDNNConfig:
     max_pairs : int
         Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least. Must be in [0, 1048576].
     n_pattern_units : int
-        m, units per pattern. 0: as many as make about 3,072 columns, from 64 to 768. Must be in [0, 65536].
+        m, units per pattern. 0: as many as make about 3,072 columns, at most 768; at least 256 where these make no more than 14,336 columns, at least 64 anywhere. Must be in [0, 65536].
     n_anchor_patterns : int
         Random anchor patterns p_1, p_2, ... of a code book (section 3.1: 9). The last one is not assigned to a bin. Must be in [2, 10000].
     n_interpolated : int
@@ -648,7 +648,7 @@ class LinearSDNNConfig:
     @property
     def n_pattern_units(self) -> int:
         """
-        m, units per pattern. 0: as many as make about 3,072 columns, from 64 to 768.
+        m, units per pattern. 0: as many as make about 3,072 columns, at most 768; at least 256 where these make no more than 14,336 columns, at least 64 anywhere.
         """
     @property
     def n_symbols(self) -> tuple[int, ...]:

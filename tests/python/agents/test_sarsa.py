@@ -113,6 +113,15 @@ def test_too_many_states_or_given_units_have_patterns(n_states, n_units):
     assert agent.q_values(0)[1] == pytest.approx(2, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("n_inputs", "n_units"), [(1, 768), (2, 768), (3, 512), (4, 256), (8, 256), (11, 128), (17, 64)]
+)
+def test_units_are_enough_for_patterns_to_differ_but_fewer_where_inputs_are_many(n_inputs, n_units):
+    space = gym.spaces.Box(-1.0, 1.0, (n_inputs,), np.float64)
+    agent = SDNNSarsa(space, gym.spaces.Discrete(2), inputs="all", angle_pairs="none")
+    assert agent.approximator.n_pattern_units == n_units
+
+
 @pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])
 def test_the_scale_of_rewards_changes_nothing_but_the_scale_of_values(scale):
     def values(scale):

@@ -33,7 +33,9 @@ struct LinearSDNNConfig {
   static constexpr auto fields() noexcept {
     return std::tuple_cat(
         coding::state_code_fields<LinearSDNNConfig>(
-            "m, units per pattern. 0: as many as make about 3,072 columns, from 64 to 768.", 0),
+            "m, units per pattern. 0: as many as make about 3,072 columns, at most 768; at least "
+            "256 where these make no more than 14,336 columns, at least 64 anywhere.",
+            0),
         std::tuple(
             core::field("n_actions", &LinearSDNNConfig::n_actions,
                         "Number of actions, of each dimension of a box.", core::within(1, 1 << 16)),
@@ -54,11 +56,14 @@ struct LinearSDNNConfig {
   bool operator==(const LinearSDNNConfig&) const = default;
 };
 
-/// The configuration with a number of units where it has none.
+/// The configuration with a number of units where it has none: patterns of too few units are alike
+/// by chance, and more columns take more time.
 inline LinearSDNNConfig with_pattern_units(LinearSDNNConfig config) noexcept {
   if (config.n_pattern_units == 0) {
     const int n_groups = std::max(1, config.n_inputs * coding::n_partners_of(config));
-    config.n_pattern_units = std::clamp((3072 / n_groups + 32) / 64 * 64, 64, 768);
+    const int usual = (3072 / n_groups + 32) / 64 * 64;
+    const int enough = std::min(256, 14336 / n_groups / 64 * 64);
+    config.n_pattern_units = std::clamp(std::max(usual, enough), 64, 768);
   }
   return config;
 }
