@@ -16,7 +16,7 @@ from sdnn import _core
 from sdnn.approximators import SDNNCConfig
 from sdnn.benchmarks.measurements import Effort, in_turns, measure_decisions, spread
 from sdnn.files import write_whole
-from sdnn.runs.figures import png_bytes
+from sdnn.plots import png_bytes
 
 KIND = "cost of inputs"
 N_INPUTS = range(2, 11)

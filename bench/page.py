@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sdnn.files import write_whole
-from sdnn.runs.results import Estimate
+from sdnn.statistics import Estimate
 
 END = "<!-- end of table -->"
 

@@ -19,9 +19,9 @@ from measured import Processes, is_wanted, measured, run_missing
 
 from sdnn.agents import Callback, Training
 from sdnn.runs import RunSpec
-from sdnn.runs.engine import PlannedTrial, plan_of, run_to_end
+from sdnn.runs.engine import PlannedTrial, run_to_end
 from sdnn.runs.store import ResultStore
-from sdnn.runs.study import Study
+from sdnn.runs.study_file import StudyFile
 from sdnn.runs.trial import TrainingTrial, TrialKey, TrialRecord, TrialRows
 
 N_MILESTONE_EPISODES = 100
@@ -128,24 +128,19 @@ class _Trials:
 
 def run_study(
     kind: str,
-    study: Study,
+    study: StudyFile,
     given: argparse.Namespace,
 ) -> None:
     """Run the trials of a study that are not stored, and store their curves under a kind."""
-    specs = [
-        (case, one.spec)
-        for (case, variant), one in study.combinations.items()
-        if is_wanted((variant, case), given)
-    ]
+    study.pairs = tuple(pair for pair in study.combinations if is_wanted(pair[::-1], given))
     if not given.redraw:
         executor = Processes(learn, given.jobs, study.header.imports)
-        plan = plan_of(specs, study.n_trials, study.seed)
-        run_missing(plan, executor, given.folder, lambda store: _Trials(store, kind))
+        run_missing(study.plan(), executor, given.folder, lambda store: _Trials(store, kind))
 
 
 def curves(
     kind: str,
-    study: Study,
+    study: StudyFile,
     given: argparse.Namespace,
 ) -> Curves:
     """Read the curves of a study's trials.
@@ -156,8 +151,7 @@ def curves(
     stored = measured(kind, given.folder)
     found = {}
     for (case, variant), one in study.combinations.items():
-        plan = plan_of([(case, one.spec)], study.n_trials, study.seed)
-        own = [stored[planned.key] for planned in plan if planned.key in stored]
+        own = [stored[planned.key] for planned in one.trials if planned.key in stored]
         old = [curve for key, curve in stored.items() if (*key[:2], key[4]) == (case, variant, "")]
         if own or old:
             found[case, variant] = own or old

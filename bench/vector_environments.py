@@ -15,8 +15,8 @@ from measured import options
 from page import markdown
 from studies import Curves, curves, run_study
 
-from sdnn.runs.results import estimate_median
-from sdnn.runs.study import Study
+from sdnn.runs.study_file import StudyFile
+from sdnn.statistics import estimate_median
 
 KIND = "vector environments"
 STUDY = Path(__file__).with_suffix(".toml")
@@ -33,7 +33,7 @@ def table_rows(found: Curves) -> Iterator[Sequence[str]]:
 
 def main() -> None:
     given = options(__doc__ or "", seeds=10, jobs=2).parse_args()
-    study = Study(STUDY, n_trials=given.seeds)
+    study = StudyFile(STUDY, n_trials=given.seeds)
     run_study(KIND, study, given)
     heads = (f"after {step:,}" for step in (5_000, 10_000, 15_000))
     header = ("task", "environments", "seeds", *heads, "us per step")

@@ -117,15 +117,33 @@ def run(fake, use_trial):
 
 
 @pytest.fixture
+def collected():
+    """Measure stored trials as the results of an experiment."""
+    from sdnn.reproduction import plan_trials
+    from sdnn.reproduction.reproduce import collect, specs_of
+    from sdnn.runs import ResultStore
+    from sdnn.runs.study import Study
+    from sdnn.runs.sweep import compare
+
+    def _collected(experiment, folder, n_trials, n_episodes=15_000):
+        study = Study("", specs_of(experiment.cases, n_episodes), n_trials=n_trials, seed=0)
+        keys = [one.key for one in plan_trials(experiment.cases, n_trials, 0, n_episodes)]
+        with ResultStore(folder) as store:
+            return collect(experiment, compare(study, store.load(keys)))
+
+    return _collected
+
+
+@pytest.fixture
 def study(tmp_path, monkeypatch):
     """Write a study file and read it; the folder stays importable for the test only."""
-    from sdnn.reproduction.report import read_study
+    from sdnn.reproduction.report import ClaimStudy
 
     monkeypatch.setattr(sys, "path", [*sys.path])
 
     def _study(text, name="mine.toml", **options):
         path = tmp_path / name
         path.write_text(text)
-        return read_study(path, **options)
+        return ClaimStudy(path, **options)
 
     return _study

@@ -31,7 +31,7 @@ from sklearn.model_selection import RepeatedKFold, RepeatedStratifiedKFold
 from sdnn import SDNNRegressor, _core
 from sdnn.coding import RandomInverse
 from sdnn.files import write_whole
-from sdnn.runs.figures import png_bytes
+from sdnn.plots import png_bytes
 
 ONCE = (
     "kernel ridge, analytic SDNN kernel", "SVR (RBF)", "Gaussian process (Matern 3/2)",

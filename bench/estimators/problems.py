@@ -53,7 +53,7 @@ from sklearn.svm import SVC, SVR
 
 from sdnn import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.files import write_whole
-from sdnn.runs.figures import png_bytes
+from sdnn.plots import png_bytes
 
 KIND = "problems"
 N_TRAINING = 500

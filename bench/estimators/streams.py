@@ -29,7 +29,7 @@ from sklearn.neural_network import MLPRegressor
 from sdnn import SDNNRegressor
 from sdnn.estimators.river import RiverRegressor
 from sdnn.files import write_whole
-from sdnn.runs.figures import png_bytes
+from sdnn.plots import png_bytes
 
 KIND = "streams"
 N_SAMPLES = 4000

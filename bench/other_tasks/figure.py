@@ -9,7 +9,7 @@ from studies import Curves
 from tasks import TASKS
 
 from sdnn.files import write_whole
-from sdnn.runs.figures import png_bytes
+from sdnn.plots import png_bytes
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.study import Study
 

@@ -22,7 +22,7 @@ from page import show
 from report import along_the_way, tables
 from studies import curves, run_study
 
-from sdnn.runs.study import Study
+from sdnn.runs.study_file import StudyFile
 
 STUDY = Path(__file__).with_name("study.toml")
 KIND = "other tasks"
@@ -31,7 +31,7 @@ KIND = "other tasks"
 def main() -> None:
     """Run what is missing, then write tables and figure."""
     given = options(__doc__ or "", seeds=10, jobs=2).parse_args()
-    study = Study(STUDY, n_trials=given.seeds)
+    study = StudyFile(STUDY, n_trials=given.seeds)
     run_study(KIND, study, given)
     if given.only:
         return

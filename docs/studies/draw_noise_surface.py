@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from sdnn.files import write_whole
-from sdnn.reproduction.report import read_study
-from sdnn.runs.figures import png_bytes
+from sdnn.plots import png_bytes
+from sdnn.reproduction.report import ClaimStudy
 from sdnn.runs.registry import title_of
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.results import SHARE_STABLE, final_share_solved
@@ -47,7 +47,7 @@ def main() -> None:
     require_matplotlib()
     from matplotlib.figure import Figure
 
-    study = read_study(STUDY)
+    study = ClaimStudy(STUDY)
     with ResultStore(options.kept) as store:
         found = shares(study, store)
     agents = list(dict.fromkeys(agent for _, agent, _ in found))

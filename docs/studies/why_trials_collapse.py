@@ -379,7 +379,7 @@ def table(kept: Kept, n_trials: int) -> Iterator[str]:
 
 def main() -> None:
     """Measure and draw."""
-    from sdnn.runs.figures import png_bytes
+    from sdnn.plots import png_bytes
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=Path("docs/explanation"), help="of the figures")

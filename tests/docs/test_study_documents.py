@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sdnn.reproduction.report import read_study
+from sdnn.reproduction.report import ClaimStudy
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "how-to" / "studies.md").read_text()
@@ -15,7 +15,7 @@ STUDIES = sorted((ROOT / "docs" / "studies").glob("*.toml"))
 
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.stem)
 def test_the_studies_can_be_run(path):
-    read_study(path).check()
+    ClaimStudy(path).check()
 
 
 @pytest.mark.parametrize("name", ["tie-rules", "pendulum"])

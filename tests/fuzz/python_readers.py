@@ -120,7 +120,7 @@ def small_store():
 
 def read_results(results):
     results.load()
-    results.times()
+    results.seconds()
     results.keys(unfinished=True)
     results.measurements("cost")
 

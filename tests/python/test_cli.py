@@ -17,8 +17,8 @@ from click.testing import CliRunner
 
 import sdnn
 from sdnn.cli import main
-from sdnn.reproduction.cases import MOST_EPISODES, select_experiments
-from sdnn.reproduction.reproduce import ReproduceRequest
+from sdnn.reproduction.cases import MOST_EPISODES
+from sdnn.reproduction.reproduce import PaperStudy
 from sdnn.runs import AGENTS, AgentEntry, register
 
 
@@ -116,9 +116,8 @@ def test_quick_run_writes_marked_files_and_one_summary_line(invoke, tmp_path):
         ({"presets": ("robust", "general"), "quick": True}, "-robust-general-quick"),
     ],
 )
-def test_requests_of_other_results_have_other_names(tmp_path, options, mark):
-    request = ReproduceRequest(experiments=select_experiments("a"), out=tmp_path, **options)
-    assert request.file_name("table.json") == f"table{mark}.json"
+def test_requests_of_other_results_have_other_names(options, mark):
+    assert PaperStudy("a", **options).file_name("table.json") == f"table{mark}.json"
 
 
 def test_a_smaller_run_leaves_the_files_of_a_full_one(invoke, tmp_path):
@@ -142,13 +141,11 @@ def test_a_smaller_run_leaves_the_files_of_a_full_one(invoke, tmp_path):
     }
 
 
-def test_the_most_episodes_make_a_trial(tmp_path):
-    parts = {"experiments": select_experiments("a"), "out": tmp_path, "n_trials": 1}
-    request = ReproduceRequest(**parts, n_episodes=MOST_EPISODES)
-    planned = request.plan.trials[0]
+def test_the_most_episodes_make_a_trial():
+    planned = PaperStudy("a", n_trials=1, n_episodes=MOST_EPISODES).plan()[0]
     planned.spec.make_trial(planned.key.seed)
     with pytest.raises(ValueError, match="episodes"):
-        _ = ReproduceRequest(**parts, n_episodes=MOST_EPISODES + 1).plan
+        PaperStudy("a", n_trials=1, n_episodes=MOST_EPISODES + 1)
 
 
 @pytest.fixture
@@ -418,12 +415,17 @@ def test_missing_matplotlib_is_one_clear_line(invoke, tmp_path, monkeypatch):
 
 
 def test_failing_trials_are_exit_code_1(invoke, tmp_path, fake):
-    def make(*, sensors, **parts):
-        if sensors.n_sensors == 6:
-            raise RuntimeError("broken")
-        return fake.FakeTrial(**parts)
+    class Raising(fake.FakeTrial):
+        def __init__(self, *, sensors, **parts):
+            super().__init__(**parts)
+            self._fails = sensors.n_sensors == 6
 
-    result = invoke("reproduce", "a", "--quick", trial=make)
+        def advance(self, n):
+            if self._fails:
+                raise RuntimeError("broken")
+            super().advance(n)
+
+    result = invoke("reproduce", "a", "--quick", trial=Raising)
     assert result.exit_code == 1
     assert re.search("SDNN-C s6.* 1 .*RuntimeError: broken", result.stderr)
     assert "2 of 4 " in result.stderr
@@ -435,11 +437,8 @@ def test_a_command_that_a_signal_ends_has_its_exit_code_and_goes_on(invoke, fake
     class Interrupting(fake.FakeTrial):
         """Interrupts the run when it starts, and never ends by itself."""
 
-        def __init__(self, **parts):
-            super().__init__(**parts)
-            os.kill(os.getpid(), number)
-
         def advance(self, n):
+            os.kill(os.getpid(), number)
             time.sleep(0.001)
 
     result = invoke("reproduce", "a", "--quick", "--jobs", 1, trial=Interrupting)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from sdnn.runs.report import Table
+from sdnn.pages import Table
 
 if TYPE_CHECKING:
     from rich.console import Console

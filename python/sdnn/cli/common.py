@@ -7,7 +7,7 @@ import json
 import shlex
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from signal import SIGINT, SIGTERM
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sdnn.runs import ConfigError, Run, RunOutcome
-    from sdnn.runs.dask_executor import DaskExecutor
-    from sdnn.runs.engine import ThreadExecutor
+    from sdnn.runs.engine import Executor
     from sdnn.runs.report import WrittenReport
+    from sdnn.runs.study import Study
 
 EXIT_FAILURE = 1
 PLAIN_WIDTH = 160
@@ -258,24 +258,32 @@ def json_text(values: Any) -> str:
     return msgspec.json.format(msgspec.json.encode(values), indent=2).decode()
 
 
-def run_and_report(
-    context: click.Context,
-    run: Callable[..., WrittenReport],
-    request: Any,
-    *,
-    as_json: bool,
-    full: bool,
+def run_or_forecast(
+    context: click.Context, study: Study, *, out: Path, executor: Executor, as_json: bool,
+    full: bool, dry_run: bool,
+) -> None:  # fmt: skip
+    """Run a study with a line of progress and print its results, or only what is to be run."""
+    with errors_in_a_line():
+        if dry_run:
+            _print_forecast(study, out, executor.jobs, as_json=as_json)
+            return
+        from rich.console import Console
+
+        from sdnn.runs.engine import TrialBars
+        from sdnn.runs.sweep import run_study
+
+        with TrialBars(Console(stderr=True)) as observer:
+            done = run_study(study, out, executor=executor, observer=observer)
+    _print_report(context, done, out, as_json=as_json, full=full)
+
+
+def _print_report(
+    context: click.Context, done: WrittenReport, out: Path, *, as_json: bool, full: bool
 ) -> None:
-    """Run trials with a line of progress; print the results, what failed and how much is stored."""
-    from rich.console import Console
-
-    from sdnn.runs.engine import TrialBars
-
-    with TrialBars(Console(stderr=True)) as observer:
-        done = run(request, observer=observer)
+    """Print the results, what failed and how much is stored."""
     outcome = done.outcome
     n_stored = outcome.n_reused + outcome.n_run
-    stored = f"{n_stored} of {outcome.n_planned} trials are stored in {request.out}"
+    stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
     for failure in outcome.failures:
         message = f"{type(failure.error).__name__}: {failure.error}"
         click.echo(f"Error: {failure.planned.title} failed: {message}", err=True)
@@ -296,19 +304,16 @@ def run_and_report(
         context.exit(EXIT_FAILURE)
 
 
-def print_forecast(
-    request: Any, *, as_json: bool, more: Mapping[str, Any] | None = None, **options: Any
-) -> None:
-    """Print what is still to be run and how long that takes; as JSON with more values."""
+def _print_forecast(study: Study, out: Path, jobs: int, *, as_json: bool) -> None:
+    """Print what is still to be run and how long that takes."""
     from sdnn.runs.forecast import forecast
     from sdnn.runs.report import duration_words
 
-    found = forecast(request.out, request.groups, request.executor.jobs, **options)
-    found = {**found, **(more or {})}
+    found = forecast(study, out, jobs)
     if as_json:
         click.echo(json.dumps(found, indent=2))
     else:
-        words = rendered("forecast.txt.jinja", out=request.out, duration=duration_words, **found)
+        words = rendered("forecast.txt.jinja", out=out, duration=duration_words, **found)
         click.echo(words, nl=bool(words))
 
 
@@ -363,23 +368,25 @@ _OF_DASK = ("scheduler", "scheduler_timeout")
 
 
 def trial_options(command: Function) -> Function:
-    """Add the options of commands that run trials; the command receives an `executor`."""
+    """Add the options of commands that run trials.
+
+    The command receives those of `run_or_forecast` together, as ``ways``.
+    """
 
     @functools.wraps(command)
     def wrapped(*arguments: Any, where: str, jobs: int | None, **options: Any) -> Any:
         of_dask = {name: options.pop(name) for name in _OF_DASK}
         given = {name: value for name, value in of_dask.items() if value is not None}
-        executor = _make_executor(where, jobs, given)
-        return command(*arguments, executor=executor, **options)
+        ways = {name: options.pop(name) for name in ("out", "as_json", "full", "dry_run")}
+        ways["executor"] = _make_executor(where, jobs, given)
+        return command(*arguments, ways=ways, **options)
 
     for option in reversed(_OPTIONS):
         wrapped = option(wrapped)
     return wrapped
 
 
-def _make_executor(
-    where: str, jobs: int | None, of_dask: dict[str, Any]
-) -> ThreadExecutor | DaskExecutor:
+def _make_executor(where: str, jobs: int | None, of_dask: dict[str, Any]) -> Executor:
     if where == "threads":
         if of_dask:
             name = next(iter(of_dask)).replace("_", "-")

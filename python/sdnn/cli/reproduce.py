@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import click
 
 from sdnn._core import presets
-from sdnn.cli.common import errors_in_a_line, print_forecast, run_and_report, trial_options
-from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_experiments
+from sdnn.cli.common import run_or_forecast, trial_options
+from sdnn.reproduction.cases import MOST_EPISODES, WORDS
 
 
 @click.command(short_help="Run the paper's experiments and write a report.")
@@ -54,13 +55,7 @@ from sdnn.reproduction.cases import MOST_EPISODES, WORDS, includes_cost, select_
 )
 @click.pass_context
 def reproduce(
-    context: click.Context,
-    /,
-    experiment: str,
-    as_json: bool,
-    full: bool,
-    dry_run: bool,
-    **options: Any,
+    context: click.Context, /, experiment: str, ways: Mapping[str, Any], **options: Any
 ) -> None:
     """Run the paper's experiments and write a report with its figures and claims.
 
@@ -70,17 +65,10 @@ def reproduce(
     Finished trials are stored in OUT/results.sqlite; the same command continues where it stopped.
     Files of other agents, trials, episodes or seeds than the paper's have these in their names.
     """
-    from sdnn.reproduction.reproduce import ReproduceRequest, reproduce as run
+    from sdnn.reproduction.reproduce import PaperStudy
 
-    request = ReproduceRequest(
-        experiments=select_experiments(experiment), cost=includes_cost(experiment), **options
-    )
     try:
-        _ = request.plan
+        study = PaperStudy(experiment, **options)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
-    with errors_in_a_line():
-        if dry_run:
-            print_forecast(request, as_json=as_json, more={"costs": request.count_costs()})
-        else:
-            run_and_report(context, run, request, as_json=as_json, full=full)
+    run_or_forecast(context, study, **ways)

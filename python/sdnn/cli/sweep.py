@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
-from sdnn.cli.common import errors_in_a_line, print_forecast, run_and_report, trial_options
+from sdnn.cli.common import run_or_forecast, trial_options
 
 
 @click.command(short_help="Run a study: variants of any setting, trial by trial.")
@@ -34,10 +35,7 @@ def sweep(
     trials: int | None,
     seed: int | None,
     only: tuple[str, ...],
-    as_json: bool,
-    full: bool,
-    dry_run: bool,
-    **options: Any,
+    ways: Mapping[str, Any],
 ) -> None:
     """Run the study in FILE: variants of any setting, compared trial by trial.
 
@@ -47,22 +45,11 @@ def sweep(
     Finished trials are kept in OUT/results.sqlite, which `reproduce` may share; the same command
     continues where it stopped.
     """
-    from sdnn.reproduction.report import add_claims, read_study
+    from sdnn.reproduction.report import ClaimStudy
     from sdnn.runs.errors import ConfigError
-    from sdnn.runs.sweep import SweepRequest, sweep as run
 
     try:
-        request = SweepRequest(
-            study=read_study(file, n_trials=trials, seed=seed),
-            only=tuple(dict.fromkeys(only)),
-            addition=add_claims,
-            **options,
-        )
-        _ = request.plan
+        study = ClaimStudy(file, n_trials=trials, seed=seed, only=only)
     except (ConfigError, ValueError) as error:
         raise click.UsageError(str(error)) from error
-    with errors_in_a_line():
-        if dry_run:
-            print_forecast(request, as_json=as_json, check=request.study.check)
-        else:
-            run_and_report(context, run, request, as_json=as_json, full=full)
+    run_or_forecast(context, study, **ways)

@@ -24,9 +24,8 @@ if TYPE_CHECKING:
     from sdnn.reproduction.cost import CostConfig as CostConfig, CostRecord as CostRecord
     from sdnn.reproduction.figures import draw_cost as draw_cost, draw_experiment as draw_experiment
     from sdnn.reproduction.reproduce import (
-        ReproduceRequest as ReproduceRequest,
+        PaperStudy as PaperStudy,
         case_spec as case_spec,
-        collect as collect,
         plan_trials as plan_trials,
     )
 

@@ -37,16 +37,13 @@ from numpy.typing import NDArray
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
 from sdnn.reproduction.cost import SERIES, CostConfig, CostRecord
 from sdnn.runs.registry import title_of
-from sdnn.runs.results import (
+from sdnn.runs.results import STEP_MEASURES, CaseResult, MeasureName, TrialMeasures, on_equal_terms
+from sdnn.statistics import (
     BOOTSTRAP_SEED,
-    STEP_MEASURES,
     Estimate,
     FloatArray,
-    MeasureName,
-    TrialMeasures,
     estimate_contrast,
     json_number,
-    on_equal_terms,
     tails,
 )
 
@@ -367,4 +364,14 @@ def reference_results() -> tuple[ReferenceResult, ...]:
             rows_digests=tuple(row["rows_digest"] for row in own),
         )
         for (case_id, agent, config_hash, root_seed), own in groups.items()
+    )
+
+
+def more_trials(results: Iterable[CaseResult]) -> tuple[ReferenceResult, ...]:
+    """Return the reference results that have more trials of the same settings than given ones."""
+    run = {(one.case_id, one.agent, one.config_hash): one.n_trials for one in results}
+    return tuple(
+        one
+        for one in reference_results()
+        if one.n_trials > run.get((one.case_id, one.agent, one.config_hash), math.inf)
     )

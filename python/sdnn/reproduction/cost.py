@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
+import msgspec
 import numpy as np
 
 from sdnn import _core, machine
@@ -65,35 +66,21 @@ def cost_series(agents: Iterable[str] | None = None) -> tuple[CostSeries, ...]:
     return tuple(series for name in chosen for series in SERIES if series.agent == name)
 
 
-class CostKey(NamedTuple):
-    """Identity of a measurement: equal ones are stored and measured once."""
-
-    series: str
-    n_inputs: int
-    config_hash: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class CostRecord:
+class CostRecord(msgspec.Struct, frozen=True):
     """The cost of a series at one number of inputs."""
 
     series: str
     n_inputs: int
+    config_hash: str
     microseconds: tuple[float, ...]  # median time of a step in each round
     n_steps: int  # in a round
     table_bytes: int  # memory of what the agent learns
     machine: str
     version: str
-    config_hash: str
-
-    @property
-    def key(self) -> CostKey:
-        """Identity of the measurement."""
-        return CostKey(self.series, self.n_inputs, self.config_hash)
 
     def to_json(self) -> dict[str, Any]:
         """Return it as values that JSON can hold, without its settings."""
-        return {k: v for k, v in asdict(self).items() if k != "config_hash"}
+        return {k: v for k, v in msgspec.structs.asdict(self).items() if k != "config_hash"}
 
 
 def round_rows(costs: Iterable[CostRecord]) -> Iterator[tuple[object, ...]]:
@@ -105,13 +92,10 @@ def round_rows(costs: Iterable[CostRecord]) -> Iterator[tuple[object, ...]]:
 
 
 def load_costs(store: ResultStore, config_hash: str) -> tuple[CostRecord, ...]:
-    """Read the stored measurements under the given settings, sorted by key."""
-    found = (
-        CostRecord(**values | {"microseconds": tuple(values["microseconds"])})
-        for values in store.measurements(KIND).values()
-        if values["config_hash"] == config_hash
-    )
-    return tuple(sorted(found, key=lambda record: record.key))
+    """Read the stored measurements under the given settings, by series and number of inputs."""
+    records = msgspec.convert([*store.measurements(KIND).values()], list[CostRecord])
+    found = [one for one in records if one.config_hash == config_hash]
+    return tuple(sorted(found, key=lambda record: (record.series, record.n_inputs)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,33 +126,40 @@ class CostConfig:
 QUICK_COST = CostConfig(n_rounds=3, round_seconds=0.01, most_plain_inputs=5)
 
 
-def cost_keys(config: CostConfig, agents: Iterable[str] | None = None) -> tuple[CostKey, ...]:
-    """Return the keys of all measurements of some agents (default: all), series by series."""
-    return tuple(
-        CostKey(series.id, n_inputs, config.config_hash)
+def planned_costs(
+    config: CostConfig, agents: Iterable[str] | None = None
+) -> dict[str, tuple[CostSeries, int]]:
+    """Return the measurements of some agents (default: all): series and number of inputs.
+
+    They are by their keys in the store: equal ones are stored and measured once.
+    """
+    config_hash = config.config_hash
+    return {
+        repr((series.id, n_inputs, config_hash)): (series, n_inputs)
         for series in cost_series(agents)
         for n_inputs in sorted(config.n_inputs)
         if not series.is_plain or n_inputs <= config.most_plain_inputs
-    )
+    }
 
 
 def measure_costs(
-    keys: Sequence[CostKey], config: CostConfig, store: ResultStore, observe: Observer
+    planned: Mapping[str, tuple[CostSeries, int]],
+    config: CostConfig,
+    store: ResultStore,
+    observe: Observer,
 ) -> None:
     """Measure what is not stored yet, one after another, and store each at once."""
-    stored = {record.key for record in load_costs(store, config.config_hash)}
-    missing = [key for key in keys if key not in stored]
-    by_id = {series.id: series for series in SERIES}
+    stored = store.measurements(KIND)
+    missing = [key for key in planned if key not in stored]
     for number, key in enumerate(missing):
-        series = by_id[key.series]
-        title = f"cost: {series.title}, {key.n_inputs} inputs"
+        series, n_inputs = planned[key]
+        title = f"cost: {series.title}, {n_inputs} inputs"
         observe(Counted(title, number, len(missing)))
-        measured = measure_steps(series, key.n_inputs, config)
+        measured = measure_steps(series, n_inputs, config)
         if measured is not None:
-            names = ("microseconds", "n_steps", "table_bytes")
-            made = {"machine": machine.description(), "version": _core.__version__}
-            record = key._asdict() | dict(zip(names, measured, strict=True)) | made
-            store.put(KIND, repr(tuple(key)), record)
+            here = machine.description(), _core.__version__
+            record = CostRecord(series.id, n_inputs, config.config_hash, *measured, *here)
+            store.put(KIND, key, msgspec.structs.asdict(record))
 
 
 def measure_steps(

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from sdnn import _core
+from sdnn.pages import Page, Section, Table
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.reproduction.claims import (
     ALWAYS,
     NEVER,
     Check,
     CheckOutcome,
-    Claim,
     ClaimOutcome,
     ReferenceResult,
     TenTrials,
@@ -32,19 +31,17 @@ from sdnn.runs.registry import title_of
 from sdnn.runs.report import (
     MEASURE_END,
     PERCENT,
-    Page,
-    Section,
-    Table,
     format_estimate,
     format_share,
     measure_cells,
     measures_section,
+    plain_number,
     settings_section,
 )
-from sdnn.runs.results import STEP_MEASURES, CaseResult, Estimate
-from sdnn.runs.study import Study
-from sdnn.runs.study_file import KnownCase
+from sdnn.runs.results import STEP_MEASURES, CaseResult, records_of
+from sdnn.runs.study_file import KnownCase, StudyFile
 from sdnn.runs.sweep import Addition, Comparison
+from sdnn.runs.trial import TrialRecord, records_digest
 
 QUICK_WARNING = "QUICK LOOK: a fraction of the experiments, not their result."
 RULE_NOTE = (
@@ -69,15 +66,14 @@ COST_NOTE = (
     " the environment) with the quartiles of rounds, and its ratio to that with one input fewer."
 )
 
-_SHOWN = {
-    Verdict.HOLDS: ("good", "hold"),
-    Verdict.FAILS: ("bad", "do not hold"),
-    Verdict.INCONCLUSIVE: ("open", "inconclusive"),
-    Verdict.UNDECIDED: ("open", "undecided"),
-    Verdict.NOT_JUDGED: ("none", "not judged"),
-    Verdict.NOT_RUN: ("none", "not judged"),
+VERDICT_KINDS = {
+    Verdict.HOLDS.value: "good",
+    Verdict.FAILS.value: "bad",
+    Verdict.INCONCLUSIVE.value: "open",
+    Verdict.UNDECIDED.value: "open",
+    Verdict.NOT_JUDGED.value: "none",
+    Verdict.NOT_RUN.value: "none",
 }
-VERDICT_KINDS = {verdict.value: kind for verdict, (kind, _) in _SHOWN.items()}
 """Color of a verdict's word on a page."""
 
 
@@ -89,7 +85,6 @@ class Report:
     costs: tuple[CostRecord, ...]
     quick: bool
     seed: int  # root of all seeds
-    digest: str  # of the experiments' rows
     agents: tuple[str, ...] = ()  # that were run instead of those of the cases
     reference: tuple[ReferenceResult, ...] = ()  # more trials of the same settings
 
@@ -97,6 +92,16 @@ class Report:
     def results(self) -> list[CaseResult]:
         """The results of all experiments."""
         return [result for _, results in self.experiments for result in results]
+
+    @property
+    def records(self) -> tuple[TrialRecord, ...]:
+        """Their trials, each once, sorted."""
+        return records_of(self.results)
+
+    @cached_property
+    def digest(self) -> str:
+        """The digest of their rows."""
+        return records_digest(self.records)
 
     @cached_property
     def claims(self) -> tuple[ClaimOutcome, ...]:
@@ -132,9 +137,8 @@ class Report:
     def _first_sections(self, pictures: Mapping[str, bytes]) -> Iterator[Section]:
         """Make what the page opens with: the claims, a line each, and the figures."""
         if self.claims:
-            counts = [one for one in tally(c.decided for c in self.claims) if one[0] != "none"]
-            notes = [DECIDED_NOTE] if counts else []
-            yield Section(tally=counts, table=_claim_table(self.claims), notes=notes)
+            table = _claim_table(self.claims)
+            yield Section(table=table, notes=[DECIDED_NOTE] if "verdict" in table.header else [])
         for experiment, _ in self.experiments:
             yield Section(
                 title=experiment.title,
@@ -153,7 +157,9 @@ class Report:
         """Make what opens on demand: the rule, every quantity, measures and settings."""
         folded = []
         if self.claims:
-            folded.append(Section(table=_check_table(self.claims), notes=[RULE_NOTE]))
+            title = "Each quantity of the claims, by these trials alone"
+            table = Table(title, _CHECKS, [*_check_rows(self.claims)], VERDICT_KINDS)
+            folded.append(Section(table=table, notes=[RULE_NOTE]))
         more = _more_table(self.claims)
         if more.rows:
             seeds = sorted({one.root_seed for one in self.reference})
@@ -244,16 +250,15 @@ def _name(check: Check) -> str:
     return check.measure.replace("_", " ") + (", difference" if check.minus else "")
 
 
-def _check_table(claims: Iterable[ClaimOutcome]) -> Table:
-    """Return the verdict on each check by these trials alone."""
-    rows = [
-        (str(claim.claim.number), str(one.check), one.check.paper,
-         format_quantity(one), one.verdict.value)
-        for claim in claims
-        for one in claim.checks
-    ]  # fmt: skip
-    header = ("claim", "measured", "paper", "ours", "verdict")
-    return Table("Each quantity of the claims, by these trials alone", header, rows, VERDICT_KINDS)
+_CHECKS = ("claim", "measured", "paper", "ours", "verdict")
+
+
+def _check_rows(claims: Iterable[ClaimOutcome]) -> Iterator[tuple[str, ...]]:
+    """Yield the verdict on each check by these trials alone, under `_CHECKS`."""
+    for claim in claims:
+        for one in claim.checks:
+            words = (str(claim.claim.number), str(one.check), one.check.paper)
+            yield (*words, format_quantity(one), one.verdict.value)
 
 
 def _more_table(claims: Iterable[ClaimOutcome]) -> Table:
@@ -279,17 +284,6 @@ def _case_json(experiment: Experiment, result: CaseResult) -> dict[str, Any]:
     return names | result.to_json()
 
 
-def tally(verdicts: Iterable[Verdict]) -> list[tuple[str, int, str]]:
-    """Count verdicts: how the page colors each kind, how many there are, and their word.
-
-    >>> tally([Verdict.HOLDS, Verdict.NOT_RUN, Verdict.HOLDS, Verdict.NOT_JUDGED])
-    [('good', 2, 'hold'), ('none', 2, 'not judged')]
-    """
-    counts = Counter(_SHOWN[verdict] for verdict in verdicts)
-    shown = dict.fromkeys(_SHOWN.values())
-    return [(kind, counts[kind, word], word) for kind, word in shown if counts[kind, word]]
-
-
 def format_quantity(checked: CheckOutcome) -> str:
     """Write what our data give of a check's quantity, with its interval."""
     measure, estimate = checked.check.measure, checked.estimate
@@ -307,7 +301,7 @@ def cost_table(costs: Sequence[CostRecord]) -> Table:
     rows = []
     for n_inputs in sorted({cost.n_inputs for cost in costs}):
         table = by_key.get(("fuzzy", n_inputs))
-        size = "-" if table is None else _scaled(table.table_bytes, _BYTES, "B")
+        size = "-" if table is None else f"{table.table_bytes / 1e6:,.3g} MB"
         found = [(by_key.get((s.id, n_inputs)), by_key.get((s.id, n_inputs - 1))) for s in SERIES]
         rows.append((str(n_inputs), *(_cost(*pair) for pair in found), size))
     return Table("Cost of a step", ("inputs", *(one.title for one in SERIES), "FQL's table"), rows)
@@ -317,21 +311,11 @@ def _cost(cost: CostRecord | None, with_one_less: CostRecord | None) -> str:
     if cost is None:
         return "-"
     lower, middle, upper = np.percentile(cost.microseconds, (25, 50, 75))
-    text, *ends = (_scaled(time, _TIMES, "us") for time in (middle, lower, upper))
-    text = f"{text} [{', '.join(ends)}]"
+    low, text, high = (plain_number(time, 1) for time in (lower, middle, upper))
+    text = f"{text} us [{low}, {high}]"
     if with_one_less is None:
         return text
     return f"{text}, {_growth(middle / float(np.median(with_one_less.microseconds)))}"
-
-
-_TIMES = (("s", 1e6), ("ms", 1e3))
-_BYTES = (("GB", 1e9), ("MB", 1e6), ("kB", 1e3))
-
-
-def _scaled(value: float, units: Iterable[tuple[str, float]], unit: str) -> str:
-    """Write a value in the first unit that it reaches, else in another one."""
-    name, size = next(((name, size) for name, size in units if value >= size), (unit, 1))
-    return f"{value / size:.3g} {name}"
 
 
 def _growth(ratio: float) -> str:
@@ -341,120 +325,84 @@ def _growth(ratio: float) -> str:
 MIN_TRIALS_TO_DRAW = 2 * PAPER_TRIALS
 """Fewer trials are too few to draw ten from."""
 
-CLAIMS_NOTE = (
-    "A claim is shown where the study has every case and agent that it speaks of. (moved): the"
-    " verdict about the reference is another one."
-)
+CLAIMS_NOTE = "A claim is shown where the study has every case and agent that it speaks of."
 CHANCES_NOTE = (
     f"In how many draws of {PAPER_TRIALS} of a variant's trials, as the paper's ten were one, the"
-    " medians lie in all ranges of a claim, and of all claims together; with intervals over the"
-    f" trials that are drawn from. Shown from {MIN_TRIALS_TO_DRAW} trials on."
+    " medians lie in all ranges of a claim; with intervals over the trials that are drawn from."
+    f" Shown from {MIN_TRIALS_TO_DRAW} trials on."
 )
-_MOVED = " (moved)"
-_KINDS = {"-": "none", **{word + end: kind for word, kind in VERDICT_KINDS.items()
-                          for end in ("", _MOVED)}}  # fmt: skip
 
 
-def read_study(path: Path, *, n_trials: int | None = None, seed: int | None = None) -> Study:
-    """Read a study that may name the paper's cases; see `sdnn.runs.study.Study`."""
-    known_cases = {
-        case.id: KnownCase(
-            case.title, {"sensors.n_sensors": case.n_sensors, "sensors.noise": case.noise}
-        )
-        for case in PAPER_CASES.values()
-    }
-    return Study(path, n_trials=n_trials, seed=seed, known_cases=known_cases)
+class ClaimStudy(StudyFile):
+    """A study that may name the paper's cases, and whose report has verdicts on its claims."""
+
+    def __init__(self, path: Path, **options: Any) -> None:
+        known_cases = {
+            case.id: KnownCase(
+                case.title, {"sensors.n_sensors": case.n_sensors, "sensors.noise": case.noise}
+            )
+            for case in PAPER_CASES.values()
+        }
+        super().__init__(path, known_cases=known_cases, **options)
+
+    def additions(self, comparison: Comparison) -> Addition:
+        """Make verdicts about all claims, how often ten trials show them, and the quantities."""
+        judged = judge_variants(comparison)
+        values = [
+            {
+                "variant": variant,
+                "ten_trials_show_it": one.chance and one.chance.to_json(PAPER_EPISODES),
+                **one.to_json(),
+            }
+            for variant, claims in judged.items()
+            for one in claims.values()
+        ]
+        numbers = sorted({number for claims in judged.values() for number in claims})
+        if not numbers:
+            return [], {"claims": values}
+        titles = {variant.id: variant.title for variant in comparison.variants}
+        header = ("variant", *(f"claim {number}" for number in numbers))
+
+        def rows(cell: Callable[[ClaimOutcome], str]) -> list[tuple[str, ...]]:
+            return [
+                (titles[variant], *(cell(claims[n]) if n in claims else "-" for n in numbers))
+                for variant, claims in judged.items()
+            ]
+
+        verdicts = rows(lambda one: one.verdict.value)
+        table = Table("The paper's claims", header, verdicts, {"-": "none", **VERDICT_KINDS})
+        sections = [Section(table=table, notes=[CLAIMS_NOTE, RULE_NOTE])]
+        if self.n_trials >= MIN_TRIALS_TO_DRAW:
+            chances = rows(lambda one: format_share(one.chance))
+            table = Table("How often ten trials show the claims", header, chances)
+            sections.append(Section(level=3, table=table, notes=[CHANCES_NOTE]))
+        checks = [
+            (titles[variant], *row)
+            for variant, claims in judged.items()
+            for row in _check_rows(claims.values())
+        ]
+        table = Table("Each quantity of the claims", ("variant", *_CHECKS), checks, VERDICT_KINDS)
+        return [*sections, Section(folded=[Section(table=table)])], {"claims": values}
 
 
-class StudyClaims:
-    """The paper's claims about the variants of a study.
+def judge_variants(comparison: Comparison) -> dict[str, dict[int, ClaimOutcome]]:
+    """Judge the paper's claims about each variant of a study, by its id and the claim's number.
 
     A case counts as the paper's by its id, an agent by its own: what a variant has changed is what
-    is judged. `by_variant` has the claims of which every quantity is measured, by variant and
-    number of the claim; `shown` are the claims about any variant.
+    is judged. Claims of which a quantity is not measured are left out.
     """
-
-    def __init__(self, comparison: Comparison) -> None:
-        self.comparison = comparison
-        results: dict[str, list[CaseResult]] = {v.id: [] for v in comparison.variants}
-        for (case, variant), measured in comparison.measured.items():
-            if case in PAPER_CASES and measured.combination.spec.environment is None:
-                results[variant].append(measured.result)
-        self._ten_trials = {variant: TenTrials(own) for variant, own in results.items()}
-        self.by_variant = {
-            variant: {
-                outcome.claim.number: replace(outcome, chance=self._chance(variant, outcome.claim))
-                for outcome in judge_claims(own)
-                if all(checked.estimate is not None for checked in outcome.checks)
-            }
-            for variant, own in results.items()
+    judged = {}
+    for variant in comparison.variants:
+        results = [
+            one.result
+            for (case, name), one in comparison.measured.items()
+            if name == variant.id and case in PAPER_CASES
+            if one.combination.spec.environment is None
+        ]
+        draws = TenTrials(results if comparison.study.n_trials >= MIN_TRIALS_TO_DRAW else ())
+        judged[variant.id] = {
+            outcome.claim.number: replace(outcome, chance=draws.chance(outcome.claim))
+            for outcome in judge_claims(results)
+            if all(checked.estimate is not None for checked in outcome.checks)
         }
-        found = {n: one.claim for own in self.by_variant.values() for n, one in own.items()}
-        self.shown = tuple(found[number] for number in sorted(found))
-
-    def moved(self, variant: str, outcome: ClaimOutcome) -> bool | None:
-        """Return whether the verdict differs from that of the reference; None if one is missing."""
-        reference = self.comparison.study.reference
-        other = self.by_variant.get(reference, {}).get(outcome.claim.number)
-        if variant == reference or other is None:
-            return None
-        if Verdict.NOT_JUDGED in (outcome.verdict, other.verdict):
-            return None
-        return outcome.verdict is not other.verdict
-
-    def sections(self) -> Iterator[Section]:
-        """Make verdicts about all claims, how often ten trials show them, and the quantities."""
-        titles = {variant.id: variant.title for variant in self.comparison.variants}
-        header = ("variant", *(f"claim {claim.number}" for claim in self.shown))
-        verdicts, chances = [], []
-        for variant, claims in self.by_variant.items():
-            own = [claims.get(claim.number) for claim in self.shown]
-            verdicts.append((titles[variant], *(self._verdict(variant, one) for one in own)))
-            if together := self._chance(variant, *(one.claim for one in own if one)):
-                shares = (format_share(one.chance if one else None) for one in own)
-                chances.append((titles[variant], *shares, format_share(together)))
-        if self.shown:
-            table = Table("The paper's claims", header, verdicts, _KINDS)
-            yield Section(table=table, notes=[CLAIMS_NOTE, RULE_NOTE])
-        if chances:
-            title = "How often ten trials show the claims"
-            table = Table(title, (*header, "all of these"), chances)
-            yield Section(level=3, table=table, notes=[CHANCES_NOTE])
-        tables = [self._details(claim, titles) for claim in self.shown]
-        yield Section(folded=[Section(table=table) for table in tables])
-
-    def _verdict(self, variant: str, outcome: ClaimOutcome | None) -> str:
-        if outcome is None:
-            return "-"
-        return outcome.verdict.value + (_MOVED if self.moved(variant, outcome) else "")
-
-    def _details(self, claim: Claim, titles: Mapping[str, str]) -> Table:
-        rows = []
-        for variant, claims in self.by_variant.items():
-            if found := claims.get(claim.number):
-                cells = (f"{format_quantity(one)}: {one.verdict.value}" for one in found.checks)
-                rows.append((titles[variant], *cells, self._verdict(variant, found)))
-        measured = (f"{one} (paper: {one.paper})" for one in claim.checks)
-        header = ("variant", *measured, "verdict")
-        return Table(f"Claim {claim.number}: {claim.text}", header, rows)
-
-    def _chance(self, variant: str, *claims: Claim) -> Estimate | None:
-        if self.comparison.study.n_trials < MIN_TRIALS_TO_DRAW or not claims:
-            return None
-        return self._ten_trials[variant].chance(*claims)
-
-
-def add_claims(comparison: Comparison) -> Addition:
-    """Make the addition about the paper's claims to the report of a study."""
-    claims = StudyClaims(comparison)
-    shown = [
-        {
-            "variant": variant,
-            "moved": claims.moved(variant, one),
-            "ten_trials_show_it": one.chance and one.chance.to_json(PAPER_EPISODES),
-            **one.to_json(),
-        }
-        for variant, outcomes in claims.by_variant.items()
-        for one in outcomes.values()
-    ]
-    return Addition(sections=[*claims.sections()], json={"claims": shown})
+    return judged

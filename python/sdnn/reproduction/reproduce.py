@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
-import time
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from sdnn.arguments import one_of, whole
 from sdnn.config import SensorConfig
-from sdnn.files import csv_bytes, remove_abandoned_files
+from sdnn.files import csv_bytes
+from sdnn.plots import figure_bytes
 from sdnn.reproduction import cost
 from sdnn.reproduction.cases import (
     EXPERIMENTS,
@@ -20,221 +19,151 @@ from sdnn.reproduction.cases import (
     PAPER_TRIALS,
     Case,
     Experiment,
+    includes_cost,
+    select_experiments,
 )
-from sdnn.reproduction.claims import reference_results
-from sdnn.reproduction.cost import CostConfig, CostKey, CostRecord
+from sdnn.reproduction.claims import more_trials
+from sdnn.reproduction.cost import CostConfig
 from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.report import Report
-from sdnn.runs.engine import Executor, Observer, PlannedTrial, ThreadExecutor, plan_of, run_trials
-from sdnn.runs.figures import figure_bytes
-from sdnn.runs.registry import split_label
-from sdnn.runs.report import WrittenReport, describe_call, require_matplotlib
-from sdnn.runs.results import CaseResult, measure
+from sdnn.runs.engine import Observer, PlannedTrial
+from sdnn.runs.registry import split_label, title_of
+from sdnn.runs.report import Content
+from sdnn.runs.results import CaseResult
 from sdnn.runs.settings import AgentSpec, BudgetSpec
 from sdnn.runs.spec import PAPER_INTERVAL, RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.trial import ROW_HEADER, TrialKey, TrialRecord, records_digest, trial_rows
+from sdnn.runs.study import Layer, Study, StudyCase, StudyVariant
+from sdnn.runs.sweep import Comparison
+from sdnn.runs.trial import ROW_HEADER, trial_rows
 
 QUICK_TRIALS = 2
 QUICK_EPISODES = 300
 
 
-@dataclass(frozen=True)
-class Plan:
-    """Trials that a request needs, in order, and those that its report may show."""
-
-    trials: tuple[PlannedTrial, ...]
-    costs: tuple[CostKey, ...]
-    # All of them: those are shown whose trials are all stored, asked for or not.
-    experiments: tuple[tuple[Experiment, tuple[TrialKey, ...]], ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ReproduceRequest:
-    """Selection of what to run, and the folder for the results.
+class PaperStudy(Study):
+    """The paper's experiments: agents as variants in its cases.
 
     Files of other agents, presets, trials, episodes or seeds than the default have these in their
     names, and those of a quick look are marked so. Costs are always measured in this process.
+
+    ValueError if the trials are too short or too long, no agent has one of the ids, or only costs
+    are asked for, of agents that have none.
+
+    Parameters
+    ----------
+    word
+        What is run: one of `WORDS`. What is stored of the rest is shown, too.
+    n_trials, n_episodes
+        Trials per case and agent, and learning episodes per trial, of which a test needs at least
+        ten. By default the paper's, or with `quick` few.
+    seed
+        Root of all seeds.
+    quick
+        Whether only a fraction is run.
+    agents
+        Agents to run in every case instead of the case's own.
+    presets
+        Presets under which SDNN-C runs beside the agents of every case.
     """
 
-    experiments: tuple[Experiment, ...]
-    cost: bool = False  # whether to measure costs too
-    out: Path  # folder of the result file, figures and tables
-    n_trials: int | None = None  # per case and agent; default the paper's, or `QUICK_TRIALS`
-    n_episodes: int | None = None  # per trial; default the paper's, or `QUICK_EPISODES`
-    seed: int = 0  # root of all seeds
-    executor: Executor = field(default_factory=ThreadExecutor)
-    quick: bool = False  # whether only a fraction is run
-    agents: tuple[str, ...] = ()  # to run in every case instead of the case's own
-    presets: tuple[str, ...] = ()  # under which SDNN-C runs beside the agents of every case
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "agents", tuple(dict.fromkeys(self.agents)))
-        object.__setattr__(self, "presets", tuple(dict.fromkeys(self.presets)))
-
-    @property
-    def _defaults(self) -> tuple[int, int]:
-        """Numbers of trials and episodes."""
-        quick, paper = (QUICK_TRIALS, QUICK_EPISODES), (PAPER_TRIALS, PAPER_EPISODES)
-        return quick if self.quick else paper
-
-    @cached_property
-    def episodes(self) -> int:
-        """Learning episodes of a trial, of which a test needs at least ten; else a ValueError."""
-        n_episodes = self.n_episodes or self._defaults[1]
-        return whole("episodes", n_episodes, PAPER_INTERVAL, MOST_EPISODES)
-
-    @cached_property
-    def plan(self) -> Plan:
-        """The plan of the request, made at the first use.
-
-        Raises ValueError if the trials are too short or too long, no agent has one of the ids, or
-        only costs are asked for, of agents that have none.
-        """
-        by_id = {experiment.id: experiment for experiment in (*EXPERIMENTS, *self.experiments)}
-        known = [one.with_agents(self.agents, self.presets) for one in by_id.values()]
-        planned = plan_trials(
-            [case for experiment in known for case in experiment.cases],
-            self.n_trials or self._defaults[0],
-            self.seed,
-            self.episodes,
+    def __init__(
+        self,
+        word: str = "all",
+        *,
+        n_trials: int | None = None,
+        n_episodes: int | None = None,
+        seed: int = 0,
+        quick: bool = False,
+        agents: Iterable[str] = (),
+        presets: Iterable[str] = (),
+    ) -> None:
+        defaults = (QUICK_TRIALS, QUICK_EPISODES) if quick else (PAPER_TRIALS, PAPER_EPISODES)
+        trials, episodes = n_trials or defaults[0], n_episodes or defaults[1]
+        asked = {one.id for one in select_experiments(word)}
+        self.quick, self.agents, presets = quick, dict.fromkeys(agents), dict.fromkeys(presets)
+        self.experiments = [one.with_agents(self.agents, presets) for one in EXPERIMENTS]
+        cases = [case for one in self.experiments for case in one.cases]
+        whole("episodes", episodes, PAPER_INTERVAL, MOST_EPISODES)
+        super().__init__("", specs_of(cases, episodes), n_trials=trials, seed=seed)
+        wanted = {pair for one in self.experiments if one.id in asked for pair in one.pairs}
+        self.pairs = tuple(pair for pair in self.combinations if pair in wanted)
+        self.cost_config = cost.QUICK_COST if quick else CostConfig()
+        self.costs = (
+            cost.planned_costs(self.cost_config, self.agents or None) if includes_cost(word) else {}
         )
-        asked = {experiment.id for experiment in self.experiments}
-        wanted = {pair for e in known if e.id in asked for pair in e.pairs}
-        costs = cost.cost_keys(self.cost_config, self.agents or None) if self.cost else ()
-        if self.cost and not (wanted or costs):
+        if not (self.pairs or self.costs):
             measured = dict.fromkeys(series.agent for series in cost.SERIES)
             raise ValueError(
                 f"agents whose cost is measured are {', '.join(measured)},"
                 f" got {', '.join(self.agents)}"
             )
-        return Plan(
-            trials=tuple(p for p in planned if p.key[:2] in wanted),
-            costs=costs,
-            experiments=tuple(
-                (e, tuple(p.key for p in planned if p.key[:2] in e.pairs)) for e in known
-            ),
-        )
+        self._marks = [
+            *self.agents,
+            *(["with"] if self.agents and presets else []),  # else as an agent with a preset
+            *presets,
+            *([f"{trials}-trials"] if trials != defaults[0] else []),
+            *([f"{episodes}-episodes"] if episodes != defaults[1] else []),
+            *([f"seed-{seed}"] if seed else []),
+            *(["quick"] if quick else []),
+        ]
 
-    @property
-    def groups(self) -> dict[tuple[str, str], list[PlannedTrial]]:
-        """The trials of each agent in each case, by their ids."""
-        groups: dict[tuple[str, str], list[PlannedTrial]] = {}
-        for planned in self.plan.trials:
-            groups.setdefault(planned.key[:2], []).append(planned)
-        return groups
+    def measure(self, store: ResultStore, observe: Observer) -> None:
+        """Measure the costs that are not stored."""
+        cost.measure_costs(self.costs, self.cost_config, store, observe)
 
-    def count_costs(self) -> dict[str, int]:
-        """Count the costs that are planned, and those that are stored, without making any file."""
-        measured: set[CostKey] = set()
-        if (self.out / STORE_NAME).exists():
-            with ResultStore(self.out, read_only=True) as store:
-                measured = {one.key for one in _costs(self, store)}
-        costs = self.plan.costs
-        return {"planned": len(costs), "stored": len(measured.intersection(costs))}
-
-    @property
-    def cost_config(self) -> CostConfig:
-        """Effort of the measurement of costs."""
-        return cost.QUICK_COST if self.quick else CostConfig()
+    def other_work(self, out: Path) -> dict[str, Any]:
+        """Count the costs that are asked for, and those that are stored."""
+        measured: dict[str, Any] = {}
+        if (out / STORE_NAME).exists():
+            with ResultStore(out, read_only=True) as store:
+                measured = store.measurements(cost.KIND)
+        n_stored = len(self.costs.keys() & measured.keys())
+        return {"costs": {"planned": len(self.costs), "stored": n_stored}}
 
     def file_name(self, name: str) -> str:
-        """Name of a file of this request, such as ``table-rbf-3-trials-quick.json``.
-
-        Requests that give other results have other names.
-        """
+        """Return a name such as ``table-rbf-3-trials-quick.json``: other results, another name."""
         stem, _, kind = name.rpartition(".")
-        marks = list(self.agents)
-        if self.agents and self.presets:
-            marks.append("with")  # sdnn-c with robust is not the agent sdnn-c-robust
-        marks += self.presets
-        given = {"trials": self.n_trials, "episodes": self.n_episodes}
-        for (word, number), default in zip(given.items(), self._defaults, strict=True):
-            if number and number != default:
-                marks.append(f"{number}-{word}")
-        marks += [f"seed-{self.seed}"] if self.seed else []
-        marks += ["quick"] if self.quick else []
-        return "-".join([stem, *marks]) + f".{kind}"
+        return "-".join([stem, *self._marks]) + f".{kind}"
+
+    def report(self, comparison: Comparison, store: ResultStore) -> Content | None:
+        """Make the report of every experiment that is complete, and of costs.
+
+        None where trials that were asked for are missing.
+        """
+        if not comparison.measured.keys() >= set(self.pairs):
+            return None
+        stored = comparison.measured.keys()
+        found = [(e, collect(e, comparison)) for e in self.experiments if e.pairs <= stored]
+        stored_costs = cost.load_costs(store, self.cost_config.config_hash)
+        shown = {series.id for series in cost.cost_series(self.agents or None)}
+        report = Report(
+            experiments=tuple(found),
+            costs=tuple(one for one in stored_costs if one.series in shown),
+            quick=self.quick,
+            seed=self.seed,
+            agents=tuple(self.agents),
+            reference=more_trials(result for _, results in found for result in results),
+        )
+        drawn = {
+            f"experiment-{experiment.id}": draw_experiment(experiment, results, quick=self.quick)
+            for experiment, results in found
+        }
+        files: dict[str, bytes] = {}
+        if report.costs:
+            drawn["cost"] = draw_cost(report.costs, quick=self.quick)
+            files["cost.csv"] = csv_bytes(cost.COST_ROW_HEADER, cost.round_rows(report.costs))
+        for name, figure in drawn.items():
+            files[f"{name}.png"], files[f"{name}.svg"] = figure_bytes(figure)
+        files["results.csv"] = csv_bytes(ROW_HEADER, trial_rows(report.records))
+        page = report.page({name: files[f"{name}.svg"] for name in drawn})
+        return Content(page=page, table=report.to_json(), files=files, shown=report.records)
 
 
-def reproduce(request: ReproduceRequest, *, observer: Observer | None = None) -> WrittenReport:
-    """Run what is missing; when all is there, draw the figures and write tables and page.
-
-    The files cover every experiment whose trials are all stored under the request's settings, not
-    only those that were asked for now. None is written unless every trial is there.
-
-    RunError before any trial if matplotlib is not installed or the result file cannot be
-    used; later if the cluster cannot run trials any more: what was finished is stored. ValueError
-    if nothing can be run as requested.
-    """
-    require_matplotlib()
-    begin = time.monotonic()
-    plan = request.plan
-    with ResultStore(request.out) as store:
-        remove_abandoned_files(request.out)
-        outcome = run_trials(plan.trials, store, executor=request.executor, observer=observer)
-        if outcome.failures or outcome.interrupted:
-            return WrittenReport(outcome)
-        cost.measure_costs(plan.costs, request.cost_config, store, observer or (lambda _: None))
-        report, records = _read(request, store)
-    drawn = {
-        f"experiment-{experiment.id}": draw_experiment(experiment, results, quick=request.quick)
-        for experiment, results in report.experiments
-    }
-    contents: dict[str, bytes] = {}
-    if report.costs:
-        drawn["cost"] = draw_cost(report.costs, quick=request.quick)
-        contents["cost.csv"] = csv_bytes(cost.COST_ROW_HEADER, cost.round_rows(report.costs))
-    for name, figure in drawn.items():
-        contents[f"{name}.png"], contents[f"{name}.svg"] = figure_bytes(figure)
-    contents["results.csv"] = csv_bytes(ROW_HEADER, trial_rows(records))
-    page = report.page({name: contents[f"{name}.svg"] for name in drawn})
-    return WrittenReport(outcome, page, table=report.to_json()).write(
-        contents,
-        lambda name: request.out / request.file_name(name),
-        describe_call(outcome, time.monotonic() - begin, records),
-    )
-
-
-def _read(request: ReproduceRequest, store: ResultStore) -> tuple[Report, tuple[TrialRecord, ...]]:
-    """Read everything that is complete under the request's settings, and the trials it is from."""
-    stored = store.keys()
-    complete = [(e, keys) for e, keys in request.plan.experiments if stored.issuperset(keys)]
-    records = store.load(key for _, keys in complete for key in keys)
-    shown = {series.id for series in cost.cost_series(request.agents or None)}
-    experiments = tuple((e, collect(e, records)) for e, _ in complete)
-    n_run = {
-        (one.case_id, one.agent, one.config_hash): one.n_trials
-        for _, results in experiments
-        for one in results
-    }
-    report = Report(
-        experiments=experiments,
-        costs=tuple(one for one in _costs(request, store) if one.series in shown),
-        quick=request.quick,
-        seed=request.seed,
-        digest=records_digest(records),
-        agents=request.agents,
-        reference=tuple(
-            one
-            for one in reference_results()
-            if one.n_trials > n_run.get((one.case_id, one.agent, one.config_hash), math.inf)
-        ),
-    )
-    return report, records
-
-
-def _costs(request: ReproduceRequest, store: ResultStore) -> tuple[CostRecord, ...]:
-    return cost.load_costs(store, request.cost_config.config_hash)
-
-
-def collect(experiment: Experiment, records: Iterable[TrialRecord]) -> tuple[CaseResult, ...]:
-    """Measure the trials of each case and agent of an experiment; others are passed over."""
-    by_pair: dict[tuple[str, str], list[TrialRecord]] = {}
-    for record in records:
-        by_pair.setdefault(record.key[:2], []).append(record)
+def collect(experiment: Experiment, comparison: Comparison) -> tuple[CaseResult, ...]:
+    """Return the results of each agent in each case of an experiment, with the titles there."""
     return tuple(
-        measure(case.title, by_pair.get((case.id, agent), ()))
+        replace(comparison.measured[case.id, agent].result, title=case.title)
         for case in experiment.cases
         for agent in case.agents
     )
@@ -254,14 +183,21 @@ def case_spec(case: Case, agent: str, n_episodes: int = PAPER_EPISODES) -> RunSp
     )
 
 
-def plan_trials(
-    cases: Iterable[Case], n_trials: int, root_seed: int, n_episodes: int = PAPER_EPISODES
-) -> tuple[PlannedTrial, ...]:
-    """List the trials of all agents in the given cases; see `sdnn.runs.engine.plan_of`.
+def specs_of(
+    cases: Iterable[Case], n_episodes: int = PAPER_EPISODES
+) -> Iterator[tuple[StudyCase, StudyVariant, RunSpec, Layer]]:
+    """Yield all agents in the given cases, as `Study` receives them.
 
     Experiments share the trials of cases that have the same id.
     """
-    specs = (
-        (case.id, case_spec(case, agent, n_episodes)) for case in cases for agent in case.agents
-    )
-    return plan_of(specs, n_trials, root_seed)
+    for case in cases:
+        for agent in case.agents:
+            variant = StudyVariant(agent, title_of(agent))
+            yield StudyCase(case.id, case.title), variant, case_spec(case, agent, n_episodes), {}
+
+
+def plan_trials(
+    cases: Iterable[Case], n_trials: int, root_seed: int, n_episodes: int = PAPER_EPISODES
+) -> tuple[PlannedTrial, ...]:
+    """List the trials of all agents in the given cases."""
+    return Study("", specs_of(cases, n_episodes), n_trials=n_trials, seed=root_seed).plan()

@@ -38,11 +38,7 @@ if TYPE_CHECKING:
         agent_entry as agent_entry,
         register as register,
     )
-    from sdnn.runs.results import (
-        CaseResult as CaseResult,
-        Estimate as Estimate,
-        measure as measure,
-    )
+    from sdnn.runs.results import CaseResult as CaseResult, measure as measure
     from sdnn.runs.run import (
         Goal as Goal,
         Run as Run,
@@ -63,5 +59,6 @@ if TYPE_CHECKING:
         TrialRecord as TrialRecord,
         TrialRows as TrialRows,
     )
+    from sdnn.statistics import Estimate as Estimate
 
 __getattr__, __dir__, __all__ = attach(globals())

@@ -29,8 +29,8 @@ HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "hig
 
 Kind: TypeAlias = Literal["return", "running median", "evaluation"]
 
-_CHANGES_NOTHING = ("seed", "output")  # of a configuration: may differ within a group
-_NOT_NAMED = ("0", "0.0", "none", "false", "null")  # values that a name leaves out
+_TASK = ("environment", "acrobot", "goal", "sensors")  # tables of a configuration
+_CHANGES_NOTHING = ("seed", "output", "budget.steps", "budget.episodes")  # but for the goals
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,48 +45,35 @@ class Group:
 def groups_of(runs: Sequence[Run]) -> list[Group]:
     """Put runs together that differ in their seeds only, in the order of the first of each.
 
-    Names have the settings that are not the default; agents of the same name on the same task are
-    told apart by all that differs.
+    Names of tasks and of their agents have the settings in which they differ.
     """
-    groups: dict[tuple[tuple[str, str], ...], list[Run]] = {}
+    members: dict[tuple[tuple[str, str], ...], list[Run]] = {}
     for run in runs:
-        values = {k: v for k, v in run.spec.full_values().items() if k not in _CHANGES_NOTHING}
-        definition = dict(_flat(values)) | {"goals": ", then ".join(_goals(run))}
-        groups.setdefault(tuple(sorted(definition.items())), []).append(run)
-    names = [_names(members[0]) for members in groups.values()]
-    found = []
-    for name, own, members in zip(names, groups, groups.values(), strict=True):
-        others = [dict(one) for other, one in zip(names, groups, strict=True) if other == name]
-        words = [_word(k, v) for k, v in own if any(one.get(k, v) != v for one in others)]
-        agent = ", ".join([name[1], *words])
-        found.append(Group(task=name[0], agent=agent, runs=tuple(members)))
-    return found
+        settings = dict(_flat(run.spec.full_values())) | {"goals": ", then ".join(_goals(run))}
+        members.setdefault(tuple(sorted(settings.items())), []).append(run)
+    groups = []
+    for own, same in members.items():
+        spec = same[0].spec
+        task, agent = [spec.task], [f"{spec.agent.name} {spec.agent.preset or ''}".strip()]
+        rivals = [(dict(s), r[0].spec) for s, r in members.items() if r[0].spec.task == spec.task]
+        for key, value in own:
+            is_of_task = key.partition(".")[0] in _TASK
+            others = (s for s, other in rivals if is_of_task or other.label == spec.label)
+            if any(other.get(key) != value for other in others):
+                word = value if key == "goals" else f"{key.rpartition('.')[2]}={value}"
+                (task if is_of_task else agent).append(word)
+        groups.append(Group(task=", ".join(task), agent=", ".join(agent), runs=tuple(same)))
+    return groups
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
     for name, value in values.items():
+        if f"{prefix}{name}" in _CHANGES_NOTHING:
+            continue
         if isinstance(value, Mapping):
             yield from _flat(value, f"{prefix}{name}.")
-        elif f"{prefix}{name}" not in ("budget.steps", "budget.episodes"):
+        else:
             yield f"{prefix}{name}", value if isinstance(value, str) else json.dumps(value)
-
-
-def _names(run: Run) -> tuple[str, str]:
-    """Return the name of the task and that of the agent."""
-    task, agent = [run.spec.task], [f"{run.spec.agent.name} {run.spec.agent.preset or ''}".strip()]
-    for key, value in _flat(run.spec.values()):
-        table = key.partition(".")[0]
-        if key in ("environment.id", "agent.name", "agent.preset"):
-            continue
-        if table in ("environment", "acrobot", "goal", "sensors") and value not in _NOT_NAMED:
-            task.append(_word(key, value))
-        if table in ("agent", "approximator", "learning"):
-            agent.append(_word(key, value))
-    return ", ".join(task), ", ".join(agent)
-
-
-def _word(key: str, value: str) -> str:
-    return value if key == "goals" else f"{key.rpartition('.')[2]}={value}"
 
 
 def _goals(run: Run) -> Iterator[str]:
@@ -153,34 +140,30 @@ def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
 
 
 def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
-    """Make the curves of one run, or the one of several, and notes on what it leaves out."""
+    """Make the curves of each run, or the one of several that have evaluations, and notes."""
     rows = {run: run.rows() for run in group.runs}
-    kind: Kind = "evaluation"
-    series = {run: _series(own, kind) for run, own in rows.items()}
-    if not any(len(steps) for steps, _ in series.values()):
-        kind = "running median"
-        series = {run: _series(own, kind) for run, own in rows.items()}
-    what = "no evaluation" if kind == "evaluation" else "no episode and no evaluation"
-    notes = [
-        f"{run.folder}: {what} is whole yet" for run, (steps, _) in series.items() if not len(steps)
-    ]
-    series = {run: one for run, one in series.items() if len(one[0])}
-    if len(series) < 2:
-        return [curve for run in series for curve in _curves_of_run(group, run, rows[run])], notes
-    folders = ", ".join(str(run.folder) for run in series)
-    steps = _steps_of_all([own for own, _ in series.values()], is_grid=kind == "evaluation")
+    series = {run: _series(own, "evaluation") for run, own in rows.items()}
+    evaluated = {run: one for run, one in series.items() if len(one[0])}
+    what = "no evaluation" if evaluated else "no episode and no evaluation"
+    shown = [*evaluated] or [run for run, own in rows.items() if own]
+    notes = [f"{run.folder}: {what} is whole yet" for run in group.runs if run not in shown]
+    if len(evaluated) < 2:
+        return [curve for run in shown for curve in _curves_of_run(group, run, rows[run])], notes
+    folders = ", ".join(str(run.folder) for run in evaluated)
+    steps = reduce(np.intersect1d, [own for own, _ in evaluated.values()])
     if not len(steps):
         return [], [*notes, f"{folders}: they have no step in common"]
-    if kind == "evaluation" and any(own[-1] > steps[-1] for own, _ in series.values()):
+    if any(own[-1] > steps[-1] for own, _ in evaluated.values()):
         notes.append(f"{folders}: drawn to step {steps[-1]}, which all of them have reached")
-    values = np.array([np.interp(steps, own, numbers) for own, numbers in series.values()])
+    values = np.array([means[np.isin(own, steps)] for own, means in evaluated.values()])
     low, middle, high = np.percentile(values, (25, 50, 75), axis=0)
-    names: dict[str, Any] = {"task": group.task, "agent": group.agent, "n_runs": len(series)}
-    return [Curve(**names, kind=kind, steps=steps, values=middle, low=low, high=high)], notes
+    names: dict[str, Any] = {"task": group.task, "agent": group.agent, "n_runs": len(evaluated)}
+    return [
+        Curve(**names, kind="evaluation", steps=steps, values=middle, low=low, high=high)
+    ], notes
 
 
-def _curves_of_run(group: Group, run: Run, rows: Sequence[Any]) -> list[Curve]:
-    curves = []
+def _curves_of_run(group: Group, run: Run, rows: Sequence[Any]) -> Iterator[Curve]:
     for kind in get_args(Kind):
         steps, values = _series(rows, kind)
         bounds = {}
@@ -190,18 +173,7 @@ def _curves_of_run(group: Group, run: Run, rows: Sequence[Any]) -> list[Curve]:
             bounds = {"low": low, "high": high}
         if len(steps):
             names: dict[str, Any] = {"task": group.task, "agent": group.agent, "kind": kind}
-            curves.append(Curve(**names, run=str(run.folder), steps=steps, values=values, **bounds))
-    return curves
-
-
-def _steps_of_all(all_steps: Sequence[NDArray[np.int64]], is_grid: bool) -> NDArray[np.int64]:
-    """Find steps at which all have numbers: shared ones, or a hundred within what all reached."""
-    if is_grid:
-        return reduce(np.intersect1d, all_steps)
-    first = max(int(steps[0]) for steps in all_steps)
-    last = min(int(steps[-1]) for steps in all_steps)
-    steps = np.linspace(first, last, 100 if first <= last else 0)
-    return np.unique(steps.astype(np.int64))
+            yield Curve(**names, run=str(run.folder), steps=steps, values=values, **bounds)
 
 
 def _series(rows: Sequence[Any], kind: Kind) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -12,12 +12,12 @@ import json
 import logging
 import math
 import pickle
-import threading
 import time
 from collections import deque
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from queue import SimpleQueue
+from threading import Event
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sdnn import _core
@@ -44,14 +44,17 @@ MISMATCH = f"__import__({__name__!r}, fromlist=['mismatch']).mismatch(version, p
 
 
 def probe(planned: PlannedTrial) -> str:
-    """Return settings and first rows of a trial: equal where all its rows are equal.
+    """Return settings and first rows of a trial, or its error: equal where all rows are equal.
 
     A trial in Python is only made: it may be long, and its libraries may round differently.
     """
-    with opened(planned.spec.make_trial(planned.key.seed)) as trial:
-        if planned.spec.is_compiled:
-            trial.advance(PROBE_EPISODES)
-        return f"{planned.spec.canonical_json()}, {rows_of(trial).digest()}"
+    try:
+        with opened(planned.spec.make_trial(planned.key.seed)) as trial:
+            if planned.spec.is_compiled:
+                trial.advance(PROBE_EPISODES)
+            return f"{planned.spec.canonical_json()}, {rows_of(trial).digest()}"
+    except Exception as error:  # reported when it is run, as with every executor
+        return type(error).__name__
 
 
 def mismatch(version: str, probes: Sequence[tuple[bytes, str]]) -> str:
@@ -63,12 +66,8 @@ def mismatch(version: str, probes: Sequence[tuple[bytes, str]]) -> str:
     return ""
 
 
-def run_on_worker(pickled: bytes) -> TrialRecord:
-    """Run a trial; Dask places it again if it was cancelled and is wanted once more.
-
-    It comes as bytes: a worker that cannot unpickle a task falls silent, but a task that cannot
-    unpickle its argument reports an error.
-    """
+def run_on_worker(planned: PlannedTrial) -> TrialRecord:
+    """Run a trial; Dask places it again if it was cancelled and is wanted once more."""
     from distributed import Reschedule, get_worker
 
     worker = get_worker()
@@ -85,22 +84,10 @@ def run_on_worker(pickled: bytes) -> TrialRecord:
             reported = time.monotonic()
             worker.log_event(PROGRESS_TOPIC, (key, episode))
 
-    record = run_to_end(pickle.loads(pickled), wanted=wanted, advanced=advanced)
+    record = run_to_end(planned, wanted=wanted, advanced=advanced)
     if record is None:
         raise Reschedule
     return record
-
-
-def probes_of(planned: Iterable[PlannedTrial]) -> Iterator[tuple[bytes, str]]:
-    """Make probes of the first trial of each kind, but of those that will fail anyway."""
-    kinds: dict[tuple[str, bool], PlannedTrial] = {}
-    for one in planned:
-        kinds.setdefault((one.key.agent, one.spec.is_compiled), one)
-    for one in kinds.values():
-        try:
-            yield pickle.dumps(one), probe(one)
-        except Exception:  # reported when it is run, as with every executor
-            continue
 
 
 class DaskExecutor:
@@ -130,9 +117,7 @@ class DaskExecutor:
         self.scheduler = scheduler
         self.scheduler_timeout = scheduler_timeout
 
-    def run(
-        self, planned: Sequence[PlannedTrial], stop: threading.Event
-    ) -> Generator[Message, None, None]:
+    def run(self, planned: Sequence[PlannedTrial], stop: Event) -> Generator[Message, None, None]:
         """Run the trials; see `sdnn.runs.engine.Executor`.
 
         ClusterError if the scheduler is lost, or there is no fitting worker for too long.
@@ -150,8 +135,8 @@ class DaskExecutor:
             finally:
                 client.close(timeout=CONNECT_SECONDS)
 
-    def _connect(self, stop: threading.Event) -> Generator[Message, None, Client | None]:
-        """Connect, in short attempts, so that Ctrl-C ends them."""
+    def _connect(self, stop: Event) -> Generator[Message, None, Client | None]:
+        """Connect, in short attempts, so that Ctrl-C ends them; None if it did."""
         from distributed import Client
 
         end = time.monotonic() + self.scheduler_timeout
@@ -163,29 +148,23 @@ class DaskExecutor:
             except OSError as error:  # it may come, and its file, too
                 if time.monotonic() > end:
                     raise self.failure(f"no scheduler at {self.scheduler}: {error}") from error
-                if not waits:
-                    yield Noted(f"waiting for the scheduler at {self.scheduler}: {error}")
-                waits = True
-            except ValueError as error:
-                raise self._refusal(error) from error
+            except (ValueError, LookupError, TypeError, RecursionError) as error:
+                raise ClusterError(
+                    f"scheduler must be an address or a scheduler file, got {self.scheduler}"
+                    f" ({type(error).__name__}: {error})"
+                ) from error
+            if not waits:
+                yield Noted(f"waiting for the scheduler at {self.scheduler}")
+            waits = True
             stop.wait(WORKERS_SECONDS)
         return None
 
     def _address(self) -> str:
         """Return the address, from a scheduler file if it is one."""
         path = Path(self.scheduler)
-        if path.suffix != ".json" and not path.is_file():
-            return self.scheduler
-        try:
+        if path.suffix == ".json" or path.is_file():
             return str(json.loads(read_bytes(path, MOST_BYTES))["address"])
-        except (ValueError, LookupError, TypeError, RecursionError) as error:
-            raise self._refusal(error) from error
-
-    def _refusal(self, error: Exception) -> ClusterError:
-        return ClusterError(
-            f"scheduler must be an address or a scheduler file, got {self.scheduler}"
-            f" ({type(error).__name__}: {error})"
-        )
+        return self.scheduler
 
     def failure(self, problem: str) -> ClusterError:
         """Return the error that ends the run."""
@@ -211,14 +190,15 @@ class _Run:
     ) -> None:
         self.executor = executor
         self.client = client
-        self.probes = list(probes_of(planned))
+        kinds = {(one.key.agent, one.spec.is_compiled): one for one in reversed(planned)}
+        self.probes = [(pickle.dumps(one), probe(one)) for one in kinds.values()]
         self.waiting = deque((one, 1) for one in planned)  # with the number of the submission
         self.placed: dict[str, _Placed] = {}  # by key
         self.threads: dict[str, int] = {}  # of the workers that fit
         self.refused: dict[str, str] = {}  # why others do not
         self.unserved_since: float | None = None
 
-    def messages(self, stop: threading.Event) -> Generator[Message, None, None]:
+    def messages(self, stop: Event) -> Generator[Message, None, None]:
         """Run until every trial is finished or failed, or `stop` is set."""
         from distributed import as_completed
 
@@ -231,7 +211,9 @@ class _Run:
                 looked = time.monotonic()
                 yield from self.look_at_workers()
             while self.waiting and len(self.placed) < sum(self.threads.values()):
-                yield from self.submit(*self.waiting.popleft(), completed)
+                placed = self.place(*self.waiting.popleft())
+                completed.add(placed.future)
+                yield Advanced(placed.planned, 0)
             if stop.wait(RESULTS_SECONDS):
                 return
             while not progress.empty():
@@ -240,7 +222,7 @@ class _Run:
                     yield Advanced(self.placed[key].planned, episode)
             for future, result in completed.next_batch(block=False):
                 if future.key in self.placed:
-                    yield from self.complete(future, result)
+                    yield ended(self.placed.pop(future.key), result)
 
     def look_at_workers(self) -> Generator[Message, None, None]:
         """Admit new workers that fit, and take back what waits for lost ones only."""
@@ -248,11 +230,11 @@ class _Run:
         threads = client.sync(client.scheduler.ncores, callback_timeout=ANSWER_SECONDS)
         self.threads = {one: n for one, n in threads.items() if one in self.threads}
         self.refused = {one: why for one, why in self.refused.items() if one in threads}
-        new = threads.keys() - self.threads.keys() - self.refused.keys()
+        new = [one for one in threads if one not in {*self.threads, *self.refused}]
         given = {"version": _core.__version__, "probes": self.probes}
         answers: dict[str, Any] = {}
         if new:
-            answers = client.run(eval, MISMATCH, given, workers=list(new), on_error="return")
+            answers = client.run(eval, MISMATCH, given, workers=new, on_error="return")
         for worker, answer in answers.items():
             if answer == "":
                 self.threads[worker] = threads[worker]
@@ -269,7 +251,7 @@ class _Run:
                     self.waiting.appendleft((trial, n + 1))
                 else:
                     yield Failed(trial, WorkerLostError(f"all its workers were lost, {n} times"))
-        seconds, scheduler = self.executor.scheduler_timeout, self.executor.scheduler
+        scheduler, seconds = self.executor.scheduler, self.executor.scheduler_timeout
         if self.threads:
             self.unserved_since = None
         elif self.unserved_since is None:
@@ -279,36 +261,24 @@ class _Run:
             fits = f" fits: {'; '.join(self.refused.values())}" if self.refused else ""
             raise self.executor.failure(f"no worker at {scheduler}{fits}; waited {seconds:g} s")
 
-    def submit(self, planned: PlannedTrial, n: int, completed: Any) -> Iterator[Message]:
+    def place(self, planned: PlannedTrial, n: int) -> _Placed:
         """Submit a trial; its identity is its key, so that drivers with the same trial share it."""
-        yield Advanced(planned, 0)
-        try:
-            pickled = pickle.dumps(planned)
-        except Exception as error:
-            yield Failed(planned, error)
-            return
         # With the number of the submission, because Dask remembers how a key ended.
         key = "-".join(map(str, ("trial", _core.__version__, *planned.key, n)))
-        workers = frozenset(self.threads)
-        future = self.client.submit(run_on_worker, pickled, key=key, workers=list(workers))
-        self.placed[key] = _Placed(planned, n, workers, future)
-        completed.add(future)
+        future = self.client.submit(run_on_worker, planned, key=key, workers=list(self.threads))
+        self.placed[key] = _Placed(planned, n, frozenset(self.threads), future)
+        return self.placed[key]
 
-    def complete(self, future: Future, result: Any) -> Iterator[Message]:
-        """Report how a trial ended."""
-        from distributed import KilledWorker
 
-        planned = self.placed.pop(future.key).planned
-        expected = _core.__version__, planned.spec.canonical_json()
-        if future.status == "finished" and (result.version, result.config) != expected:
-            version = f"sdnn {result.version}, not {_core.__version__}"
-            yield Failed(planned, ClusterError(f"run by other code or settings: {version}"))
-        elif future.status == "finished":
-            yield Advanced(planned, planned.spec.length)
-            yield Finished(planned, result)
-        elif future.status != "error":
-            raise OSError("it does not know the trials any more")
-        elif isinstance(result[1], KilledWorker):
-            yield Failed(planned, WorkerLostError(f"worker after worker was lost: {result[1]}"))
-        else:
-            yield Failed(planned, result[1])
+def ended(placed: _Placed, result: Any) -> Message:
+    """Return how a trial ended."""
+    from distributed import KilledWorker
+
+    if placed.future.status == "finished":
+        return Finished(placed.planned, result)
+    if placed.future.status != "error":
+        raise OSError("it does not know the trials any more")
+    error = result[1]
+    if isinstance(error, KilledWorker):
+        error = WorkerLostError(f"worker after worker was lost: {error}")
+    return Failed(placed.planned, error)

@@ -67,22 +67,18 @@ class PlannedTrial:
         return f"{title_of(self.key.agent)} {self.key.case_id}, trial {self.key.trial + 1}"
 
 
-def plan_of(
-    specs: Iterable[tuple[str, RunSpec]], n_trials: int, root_seed: int
+def trials_of(
+    case_id: str, spec: RunSpec, n_trials: int, root_seed: int
 ) -> tuple[PlannedTrial, ...]:
-    """List the trials of specifications, each with the id of its case; equal trials come once.
-
-    The first trial of every specification comes first, so an interrupted run covers all evenly.
-    """
-    whole("n_trials", n_trials, 0, 10**6)
-    parts = [(case_id, spec, spec.label, spec.config_hash) for case_id, spec in specs]
-    plan: dict[TrialKey, PlannedTrial] = {}
-    for number in range(n_trials):
-        for case_id, spec, label, config_hash in parts:
-            seed = trial_seed(root_seed, case_id, number)
-            key = TrialKey(case_id, label, number, seed, config_hash)
-            plan.setdefault(key, PlannedTrial(key, spec))
-    return tuple(plan.values())
+    """List the trials of a specification in a case."""
+    label, config_hash = spec.label, spec.config_hash
+    return tuple(
+        PlannedTrial(
+            TrialKey(case_id, label, number, trial_seed(root_seed, case_id, number), config_hash),
+            spec,
+        )
+        for number in range(whole("n_trials", n_trials, 0, 10**6))
+    )
 
 
 # What happens, as executors report it and observers receive it.

@@ -1,28 +1,18 @@
-"""Figures of stored rows: learning curves of runs and of trials, and of studies.
-
-matplotlib is an extra and is imported when it is needed. Figures are made without pyplot, so no
-window, backend or style of the user's session is touched.
-"""
+"""Figures of stored rows: learning curves of runs and of trials, and of studies."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from io import BytesIO
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.interrupts import stay_interrupts
+from sdnn.plots import FAINT, INK, color_of, label, new_figure, style
 from sdnn.runs.registry import labels, title_of
 from sdnn.runs.report import require_matplotlib
-from sdnn.runs.results import (
-    CENSORED_MEASURES,
-    CaseResult,
-    MeasureName,
-    estimate_mean,
-    running_median,
-)
+from sdnn.runs.results import CaseResult, MeasureName
+from sdnn.statistics import estimate_mean, running_median
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,12 +20,6 @@ if TYPE_CHECKING:
 
     from sdnn.runs.curves import Curve
     from sdnn.runs.sweep import Comparison, Measured
-
-COLORS = (
-    "#1f5a96", "#c2542d", "#3c7d4b", "#7a5195", "#8a6d1d", "#4a4a4a",
-    "#2a9d9d", "#c65b8e", "#7fa328", "#9b3d3d",
-)  # fmt: skip
-INK, FAINT, GRID = "#2b2b2b", "#6f6f6f", "#e4e4e4"
 
 SMOOTHED_TESTS = 25
 """Test episodes in the running median of a long run, which lies over the thin median curve."""
@@ -53,71 +37,9 @@ _TITLES: dict[MeasureName, str] = {
 _OF_STEPS, _OF_RETURNS = tuple(_TITLES)[:2], tuple(_TITLES)[2:]
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """Make a figure whose panels leave room for titles, legend and footer.
-
-    Raises a `PlotUnavailableError` if matplotlib is not installed.
-    """
-    require_matplotlib()
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
-def color_of(place: int) -> str:
-    """Return the color of a thing by its place in a list, the same whatever else is shown."""
-    return COLORS[place % len(COLORS)]
-
-
 def agent_colors(agents: Iterable[str]) -> dict[str, str]:
     """Return the colors of agents, each once, by their places in the registry."""
     return {agent: color_of(labels().index(agent)) for agent in agents}
-
-
-def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
-    """Return a figure as PNG and as SVG; the same rows give the same bytes."""
-    from matplotlib import rc_context
-
-    svg = BytesIO()
-    with stay_interrupts(), rc_context({"svg.hashsalt": "sdnn"}):
-        figure.savefig(svg, format="svg", metadata={"Date": None})
-    return png_bytes(figure), svg.getvalue()
-
-
-def png_bytes(figure: Figure, dpi: int = 200) -> bytes:
-    """Return a figure as PNG of 256 colours, which takes a third of the bytes of all colours."""
-    from PIL import Image  # comes with matplotlib
-
-    drawn, png = BytesIO(), BytesIO()
-    with stay_interrupts():
-        figure.savefig(drawn, format="png", dpi=dpi)
-        with Image.open(drawn) as image:
-            few = image.convert("RGB").quantize(256, dither=Image.Dither.NONE)
-            few.save(png, "PNG", optimize=True, dpi=(dpi, dpi))
-    return png.getvalue()
-
-
-def style(axes: Axes, grid: Literal["x", "y"] = "y") -> None:
-    """Draw a panel in the style of all figures of trials, with grid lines across one axis."""
-    axes.grid(axis=grid, color=GRID, linewidth=0.7)
-    axes.set_axisbelow(True)
-    axes.tick_params(colors=INK, labelsize=8.5)
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-def label(figure: Figure, title: str, below: str, footer: str, color: str = FAINT) -> None:
-    """Write a title, a line below it, and small lines at the foot, for which panels make room.
-
-    Dollar signs stay as they are: the user's titles hold no formulas.
-    """
-    from matplotlib.text import Text
-
-    figure.suptitle(f"{title}\n", x=0.012, ha="left", fontsize=12, color=INK)
-    y = 1 - 0.32 / figure.get_figheight()
-    figure.text(0.012, y, below, fontsize=8.5, va="top", color=color)
-    figure.supxlabel(footer, x=0.012, ha="left", fontsize=6.5, color=FAINT, linespacing=1.4)
-    for text in figure.findobj(Text):
-        text.set_parse_math(False)
 
 
 def draw_steps(
@@ -147,7 +69,11 @@ def draw_steps(
 
 
 def draw_curves(curves: Sequence[Curve]) -> Figure:
-    """Draw the curves of runs: a panel per task, a color per agent."""
+    """Draw the curves of runs: a panel per task, a color per agent.
+
+    Raises a `PlotUnavailableError` if matplotlib is not installed.
+    """
+    require_matplotlib()
     tasks = list(dict.fromkeys(curve.task for curve in curves))
     agents = list(dict.fromkeys(curve.agent for curve in curves))
     colors = {agent: color_of(place) for place, agent in enumerate(agents)}
@@ -169,7 +95,7 @@ def _draw_curve(axes: Axes, curve: Curve, color: str) -> None:
     if curve.kind == "return":
         axes.plot(curve.steps, curve.values, ".", ms=2, color=color, alpha=0.25, label=label)
         return
-    is_main = curve.kind == "evaluation" or curve.n_runs > 1
+    is_main = curve.kind == "evaluation"
     width, dashes, marker = (1.8, "-", "o") if is_main else (1.0, "--", "")
     axes.plot(
         curve.steps, curve.values, dashes, lw=width, marker=marker, ms=3, color=color, label=label
@@ -183,7 +109,8 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
 
     Faint dots are trials, since outcomes often lie in two heaps; a large dot is their median, of
     shares their mean, and a bar its interval. It is filled for the reference and where a variant
-    differs from it. The footer names the source of the rows.
+    differs from it. Censored values are at the last episode. The footer names the source of the
+    rows.
     """
     cases = comparison.cases
     n_columns = min(len(cases), CASES_PER_ROW)
@@ -201,8 +128,6 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
         _draw_case(pair, comparison, case.id, with_names=column == 0)
         pair[0].set_title(case.title, fontsize=9, loc="left", color=INK)
     study = comparison.study
-    # Triangles are drawn where trials differ in length, and so in where they are cut off.
-    ends = {one.result.last_episode for one in comparison.measured.values()}
     label(
         figure,
         study.title,
@@ -210,9 +135,7 @@ def draw_study(comparison: Comparison, footer: str) -> Figure:
         "Faint dots: trials. Large dot: their median (of the share solved: mean) with its 95 %"
         " interval; filled: the reference, and what\ndiffers from it trial by trial (the interval"
         " of the mean paired difference leaves 0 out)."
-        " Numbers at the right: trials that end solved.\n"
-        + ("Triangles: beyond the last episode. " if len(ends) > 1 else "")
-        + footer,
+        f" Numbers at the right: trials that end solved.\n{footer}",
     )
     return figure
 
@@ -224,19 +147,16 @@ def _draw_case(
     lines = {variant.id: line for line, variant in enumerate(comparison.variants)}
     reference = comparison.study.reference
     colors = agent_colors(one.result.agent for one in comparison.measured.values())
-    ends = {one.result.last_episode for one in measured}
     names = _OF_STEPS if "final_steps" in measured[0].result.values else _OF_RETURNS
     for axes, name in zip(pair, names, strict=True):
         axes.set_visible(True)
-        # Where all trials are of one length, what is censored lies at the axis' end.
-        marks_censored = name in CENSORED_MEASURES and len(ends) > 1
         for one in measured:
             if name in one.result.values:
                 _draw_variant(
                     axes, one, name, lines[one.variant.id], colors[one.result.agent],
-                    one.variant.id == reference, marks_censored,
+                    one.variant.id == reference,
                 )  # fmt: skip
-        _label_case(axes, name, max(ends))
+        _label_case(axes, name, max(one.result.last_episode for one in measured))
         axes.set_ylim(len(lines) - 0.4, -0.6)
         words = [v.title if with_names else "" for v in comparison.variants]
         axes.set_yticks(range(len(lines)), words)
@@ -245,8 +165,7 @@ def _draw_case(
 
 
 def _draw_variant(
-    axes: Axes, measured: Measured, name: MeasureName, line: int, color: str, is_reference: bool,
-    marks_censored: bool,
+    axes: Axes, measured: Measured, name: MeasureName, line: int, color: str, is_reference: bool
 ) -> None:  # fmt: skip
     result = measured.result
     scale = 100 if name == "final_share_solved" else 1
@@ -254,13 +173,7 @@ def _draw_variant(
     # By rank, so that equal values lie side by side and the picture is the same each time.
     order = np.argsort(np.argsort(values, kind="stable"))
     offsets = np.linspace(-_SPREAD, _SPREAD, values.size)[order] if values.size > 1 else np.zeros(1)
-    is_beyond = marks_censored & np.isinf(result.values[name])
-    for mark, shown in (("o", ~is_beyond), (">", is_beyond)):
-        if shown.any():
-            axes.scatter(
-                values[shown], (line + offsets)[shown], s=9, color=color, alpha=0.28, linewidths=0,
-                zorder=2, marker=mark,
-            )  # fmt: skip
+    axes.scatter(values, line + offsets, s=9, color=color, alpha=0.28, linewidths=0, zorder=2)
     estimate = result.medians[name]
     if name == "final_share_solved":
         # Most trials end near 0 or 1: their median would jump from one to the other.
@@ -271,9 +184,8 @@ def _draw_variant(
     axes.plot([lower, upper], [line, line], color=color, linewidth=1.6, zorder=3)
     is_filled = is_reference or measured.differs(name)
     axes.plot(
-        value, line, ">" if marks_censored and np.isinf(estimate.value) else "o", markersize=5.5,
-        color=color, zorder=4, clip_on=False, markeredgewidth=1.3,
-        markerfacecolor=color if is_filled else "white",
+        value, line, "o", markersize=5.5, color=color, zorder=4, clip_on=False,
+        markeredgewidth=1.3, markerfacecolor=color if is_filled else "white",
     )  # fmt: skip
     if is_reference:
         axes.axvline(value, color=color, linewidth=0.9, linestyle=":", zorder=1)

@@ -3,118 +3,87 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from sdnn.machine import n_cores
 from sdnn.runs.engine import PlannedTrial
 from sdnn.runs.errors import RunError
-from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.trial import TrialKey, TrialTime, opened
+from sdnn.runs.study import Study
+from sdnn.runs.trial import TrialKey, opened
 
 PROBE_SECONDS = 0.3  # processor time of a probe, about
 
-Times = dict[tuple[str, str], tuple[str, list[TrialTime]]]
-"""Times of trials by case and agent, and whether these are stored trials or a probe."""
 
-
-def forecast(
-    out: Path,
-    groups: Mapping[tuple[str, str], Sequence[PlannedTrial]],
-    jobs: int,
-    check: Callable[[set[TrialKey]], None] = lambda stored: None,
-) -> dict[str, Any]:
+def forecast(study: Study, out: Path, jobs: int) -> dict[str, Any]:
     """Count what is to be run and estimate how long it takes, without making any file.
 
-    `groups` are trials of one specification each, by the ids of the case and of what runs in it;
-    `check` receives what is stored in `out` before any trial is begun, and may raise. Returns
-    values that JSON can hold. The ``upper`` seconds are null where the trials that they are from
-    are shorter: later episodes are longer where the task gets harder. A RunError says that a trial
-    that is begun to see how long it takes fails, or that the result file cannot be used.
+    Returns values that JSON can hold. Estimates from the start of a trial are too low where the
+    task gets harder: later episodes are longer. A RunError says that a configuration is refused,
+    that a trial that is begun to see how long it takes fails, or that the result file cannot be
+    used.
     """
-    stored: set[TrialKey] = set()
-    times: Times = {}
+    stored: dict[TrialKey, float] = {}
     if (out / STORE_NAME).exists() or out.is_file():
         with ResultStore(out, read_only=True) as store:
-            stored = store.keys()
-            for one in store.times():
-                if one.n_episodes:
-                    times.setdefault(one.key[:2], ("stored trial", []))[1].append(one)
-    check(stored)
+            stored = store.seconds()
+    study.check(stored)
     works: list[dict[str, Any]] = []
-    planned: set[TrialKey] = set()
     missing: dict[TrialKey, tuple[float, bool]] = {}  # variants that are the same share trials
-    for (case, variant), group in groups.items():
-        keys, spec = [one.key for one in group], group[0].spec
+    probes: dict[tuple[str, str], tuple[float, int]] = {}
+    for pair in study.pairs:
+        keys, spec = study.keys(*pair), study.combinations[pair].spec
         left = [key for key in keys if key not in stored]
-        estimate = trial_seconds(keys[0], spec, times) if left else None
-        if estimate:
-            missing |= dict.fromkeys(left, (estimate["lower"], spec.is_compiled))
-        planned.update(keys)
+        own = [stored[key] for key in keys if key in stored]
+        source = f"{len(own)} stored trial{'s' if len(own) > 1 else ''}"
+        if not own:
+            if keys[0][:2] not in probes:
+                probes[keys[0][:2]] = _probe(PlannedTrial(keys[0], spec))
+            rate, n_episodes = probes[keys[0][:2]]
+            own, source = [rate * spec.length], f"the first {n_episodes} episodes of one"
+        seconds = sum(own) / len(own)
+        missing |= dict.fromkeys(left, (seconds, spec.is_compiled))
         works.append(
             {
-                "case": case,
-                "variant": variant,
+                "case": pair[0],
+                "variant": pair[1],
                 "agent": spec.label,
                 "steps": spec.budget.steps,
                 "episodes": spec.budget.episodes,
                 "config_hash": spec.config_hash,
                 "planned": len(keys),
                 "stored": len(keys) - len(left),
-                "seconds_of_a_trial": estimate,
+                "seconds_of_a_trial": seconds,
+                "source": source,
             }
         )
-    lower = wall_seconds([*missing.values()], jobs)
-    estimates = [one["seconds_of_a_trial"] for one in works if one["seconds_of_a_trial"]]
-    upper = None if any(one["upper"] is None for one in estimates) else lower
+    n_planned = len(study.plan())
     return {
         "trials": works,
-        "planned": len(planned),
-        "stored": len(planned) - len(missing),
+        "planned": n_planned,
+        "stored": n_planned - len(missing),
         "jobs": jobs,
-        "seconds": {"lower": lower, "upper": upper},
+        "seconds": wall_seconds([*missing.values()], jobs),
+        **study.other_work(out),
     }
 
 
-def trial_seconds(key: TrialKey, spec: RunSpec, times: Times) -> dict[str, Any]:
-    """Estimate the processor time of a trial from trials of its configuration, else of its agent.
-
-    If there are none of its case and agent, a trial is begun, and added to `times`.
-    """
-    if key[:2] not in times:
-        times[key[:2]] = "probe", [_probe(key, spec)]
-    kind, alike = times[key[:2]]
-    same = [one for one in alike if one.key.config_hash == key.config_hash]
-    found = same or alike
-    source = f"{len(found)} {kind}{'s' if len(found) > 1 else ''}"
-    source += f" of this {'configuration' if same else 'case and agent'}"
-    amount = sum(t.n_episodes if spec.budget.steps is None else t.n_decisions for t in found)
-    every = spec.protocol.evaluate_every_episodes or 1
-    shortest = min(one.n_episodes for one in found)
-    seconds = sum(one.seconds for one in found) / amount * spec.length
-    if shortest >= (spec.budget.episodes or 0) // every * every:
-        return {"lower": seconds, "upper": seconds, "source": source}
-    source += f": as in the first {shortest} episodes"
-    return {"lower": seconds, "upper": None, "source": source}
-
-
-def _probe(key: TrialKey, spec: RunSpec) -> TrialTime:
-    """Run the start of a trial."""
+def _probe(planned: PlannedTrial) -> tuple[float, int]:
+    """Run the start of a trial: processor time by its budget's unit, and how many episodes."""
+    spec = planned.spec
     try:
-        with opened(spec.make_trial(key.seed)) as trial:
+        with opened(spec.make_trial(planned.key.seed)) as trial:
             begin = time.thread_time()
             seconds = 0.0
             while seconds < PROBE_SECONDS and not trial.finished:
                 trial.advance(spec.protocol.evaluate_every_episodes or 1)
                 seconds = time.thread_time() - begin
-            n_episodes, n_decisions = int(trial.episode), int(trial.n_decisions)
+            n_episodes = int(trial.episode)
+            amount = n_episodes if spec.budget.steps is None else int(trial.n_decisions)
+            return seconds / amount, n_episodes
     except Exception as error:  # whatever a trial raises
-        raise RunError(
-            f"{PlannedTrial(key, spec).title} fails: {type(error).__name__}: {error}"
-        ) from error
-    return TrialTime(key=key, seconds=seconds, n_episodes=n_episodes, n_decisions=n_decisions)
+        raise RunError(f"{planned.title} fails: {type(error).__name__}: {error}") from error
 
 
 def wall_seconds(trials: list[tuple[float, bool]], jobs: int) -> float:

@@ -1,16 +1,11 @@
-"""Pages of figures and tables: on the screen, as Markdown and as HTML; each cell is written once.
-
-Jinja and rich are imported when they are needed.
-"""
+"""Parts of the reports of trials: sections, numbers as text, and the files that are written."""
 
 from __future__ import annotations
 
-import base64
 import json
 import math
-import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,20 +14,13 @@ import numpy as np
 
 from sdnn import machine
 from sdnn.files import write_whole
+from sdnn.pages import Page, Section
 from sdnn.runs.engine import TrialsOutcome
 from sdnn.runs.errors import PlotUnavailableError
-from sdnn.runs.results import (
-    CONFIDENCE,
-    MEASURES,
-    RETURN_MEASURES,
-    CaseResult,
-    Estimate,
-    MeasureName,
-)
+from sdnn.runs.results import MEASURES, RETURN_MEASURES, CaseResult, MeasureName
+from sdnn.statistics import CONFIDENCE, Estimate
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from sdnn.runs.trial import TrialRecord
 
 PERCENT = f"{100 * CONFIDENCE:.0f} %"
@@ -42,121 +30,6 @@ NOTE = (
 )
 MEASURE_END = ("decisions", "us/decision")
 """Header of the last `measure_cells`."""
-
-_MARKUP = re.compile(r"[\\`*_#<|~&@$]|\](?=[(\[])|:(?=//)|(?<=www)\.", re.IGNORECASE)
-"""Characters that Markdown interprets; brackets only where they would make a link."""
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table of texts."""
-
-    title: str
-    header: tuple[str, ...]
-    rows: Sequence[tuple[str, ...]]
-    kinds: Mapping[str, str] = field(default_factory=dict)  # color of a text: good, bad, open, none
-    brief: Sequence[str] = ()  # columns that a terminal shows by default: all
-
-    def print(self, console: Console, *, full: bool = True) -> None:
-        """Print it: all columns, or the brief ones, which fit 80 characters."""
-        from rich import box
-        from rich.table import Table as RichTable
-        from rich.text import Text
-
-        title = Text(self.title)
-        shown = RichTable(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-        columns = [
-            i for i, name in enumerate(self.header) if full or not self.brief or name in self.brief
-        ]
-        for i in columns:
-            shown.add_column(Text(self.header[i]), overflow="fold")
-        for row in self.rows:
-            shown.add_row(*(Text(row[i]) for i in columns))
-        console.print(shown)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Section:
-    """A part of a page, shown in the order of its fields; what is empty is left out.
-
-    The title is that of the table by default; one of level 0 is a faint paragraph. A tally has
-    counts: how one is colored, the number, and what is counted. A picture is an SVG. Folded
-    sections, of notes, terms, text and table, open on demand.
-    """
-
-    title: str = ""
-    level: int = 2
-    tally: Sequence[tuple[str, int, str]] = ()
-    picture: bytes = b""
-    alt: str = ""
-    is_narrow: bool = False
-    table: Table | None = None
-    notes: Sequence[str] = ()
-    terms: Mapping[str, str] = field(default_factory=dict)
-    text: str = ""
-    folded: Sequence[Section] = ()
-
-    @property
-    def heading(self) -> str:
-        """The title, by default that of the table."""
-        return self.title or (self.table.title if self.table else "")
-
-    @property
-    def picture_url(self) -> str:
-        """The figure as an address that holds it: its names cannot clash with those of another."""
-        return "data:image/svg+xml;base64," + base64.b64encode(self.picture).decode()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Page:
-    """A report: its head, its sections, and where the rows come from."""
-
-    title: str
-    intro: str
-    warnings: Sequence[str] = ()
-    sections: Sequence[Section]
-    source: str
-
-    @property
-    def tables(self) -> Iterator[Table]:
-        """All tables; those that open on demand come last."""
-        yield from (one.table for one in self.sections if one.table)
-        yield from (one.table for part in self.sections for one in part.folded if one.table)
-
-    @property
-    def notes(self) -> list[str]:
-        """Explanations below the tables; those of files and settings are with their texts."""
-        parts = [*self.sections, *(o for part in self.sections for o in part.folded if not o.text)]
-        notes = [note for part in parts for note in part.notes]
-        return notes + [f"{name}: {text}." for part in parts for name, text in part.terms.items()]
-
-    def print(self, console: Console, *, full: bool = False) -> None:
-        """Print it without figures: tables that fit 80 characters, or everything."""
-        for line in (self.title, self.intro, *self.warnings):
-            console.print(line, highlight=False, markup=False)
-        for table in self.tables if full else (one.table for one in self.sections if one.table):
-            table.print(console, full=full)
-        for note in self.notes if full else (note for one in self.sections for note in one.notes):
-            console.print(note, style="dim", highlight=False, markup=False)
-
-    def to_markdown(self) -> str:
-        """Write it without figures."""
-        return self._render("page.md.jinja")
-
-    def to_html(self, call: str) -> str:
-        """Make it one self-contained HTML page; `call` is the command that made it."""
-        return self._render("page.html.jinja", call=call)
-
-    def _render(self, name: str, **values: str) -> str:
-        from jinja2 import Environment, PackageLoader, StrictUndefined
-
-        environment = Environment(
-            loader=PackageLoader("sdnn.runs", "."), autoescape=".html." in name,
-            undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-            keep_trailing_newline=True,
-        )  # fmt: skip
-        environment.filters["markdown"] = markdown_text
-        return environment.get_template(name).render(page=self, **values)
 
 
 @dataclass(frozen=True)
@@ -168,15 +41,24 @@ class WrittenReport:
     files: tuple[Path, ...] = ()
     table: dict[str, Any] = field(default_factory=dict)
 
+
+@dataclass(frozen=True, kw_only=True)
+class Content:
+    """What is to be written of trials: the page, its table, and files by their names.
+
+    ``shown`` are the trials that it is of.
+    """
+
+    page: Page
+    table: dict[str, Any]
+    files: Mapping[str, bytes | Iterable[bytes]]
+    shown: Sequence[TrialRecord]
+
     def write(
-        self,
-        contents: Mapping[str, bytes | Iterable[bytes]],
-        path_of: Callable[[str], Path],
-        call: str,
+        self, outcome: TrialsOutcome, path_of: Callable[[str], Path], call: str
     ) -> WrittenReport:
-        """Write the page, its table and other contents, each under its name, and return this."""
-        assert self.page is not None
-        everything = dict(contents) | {
+        """Write everything, each under its name; `call` is the command that made it."""
+        everything = dict(self.files) | {
             "results.md": self.page.to_markdown().encode(),
             "table.json": (json.dumps(self.table, indent=2, allow_nan=False) + "\n").encode(),
             "report.html": self.page.to_html(call).encode(),
@@ -184,16 +66,7 @@ class WrittenReport:
         files = {path_of(name): content for name, content in everything.items()}
         for path, content in files.items():
             write_whole(path, content)
-        return replace(self, files=tuple(files))
-
-
-def markdown_text(text: str) -> str:
-    r"""Write a text for a line of Markdown, in which it can be no markup, HTML or link.
-
-    >>> markdown_text("<b> [1, 2] | [a](b)")
-    '\\<b> [1, 2] \\| [a\\](b)'
-    """
-    return _MARKUP.sub(r"\\\g<0>", " ".join(text.split()))
+        return WrittenReport(outcome, self.page, tuple(files), self.table)
 
 
 def require_matplotlib() -> None:

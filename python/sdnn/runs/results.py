@@ -1,14 +1,9 @@
-"""Measures of the trials of an agent in a case, and statistics over trials.
+"""Measures of the trials of an agent in a case.
 
 Measures give a number for each trial, from its test episodes alone. They were fixed before the data
 of the noisy cases were seen. Their arrays hold one value per test episode, (n_tests,): ``episode``
 the learning episodes done before it, ``steps`` its steps, ``solved`` whether it reached the goal,
 ``episode_return`` its sum of rewards.
-
-The spread that matters is the one between trials, so every interval is a percentile bootstrap over
-whole trials. Each call draws from a generator of its own with a fixed seed: an interval depends on
-the values alone. Its ends are values of the bootstrap distribution, never interpolated, so
-censored, infinite trials are allowed.
 """
 
 from __future__ import annotations
@@ -24,8 +19,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn.runs.trial import TrialRecord, TrialRows
-
-FloatArray = NDArray[np.float64]
+from sdnn.statistics import Estimate, FloatArray, estimate_median, json_number
 
 MeasureName = Literal[
     "episodes_to_learn",
@@ -162,120 +156,6 @@ CENSORED_MEASURES: tuple[MeasureName, ...] = ("episodes_to_learn", "episode_of_c
 """Measures that are infinite if they lie beyond the last episode."""
 
 
-CONFIDENCE, BOOTSTRAP_SEED = 0.95, 2015
-_N_RESAMPLES = 10_000
-
-
-def json_number(value: float, last_episode: int | None) -> float | str | None:
-    """Return a number as JSON can hold it: NaN is null, infinity ``">last_episode"`` or null.
-
-    >>> json_number(math.inf, 15000)
-    '>15000'
-    """
-    if math.isnan(value) or (math.isinf(value) and last_episode is None):
-        return None
-    return f">{last_episode}" if math.isinf(value) else value
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A statistic over trials, infinite where it is censored, with its interval.
-
-    The ends are NaN where there are fewer than two trials.
-    """
-
-    value: float
-    lower: float
-    upper: float
-
-    def to_json(self, last_episode: int) -> dict[str, float | str | None]:
-        """Return it as values that JSON can hold; what is censored is ``">last_episode"``."""
-        return {name: json_number(value, last_episode) for name, value in vars(self).items()}
-
-
-def running_median(values: ArrayLike, window: int) -> FloatArray:
-    """Return the median of each value with its neighbours, fewer at both ends; the window is odd.
-
-    >>> running_median([1, 9, 2, 3, 8], 3)
-    array([5. , 2. , 3. , 3. , 5.5])
-    """
-    padded = np.pad(np.asarray(values, np.float64), window // 2, constant_values=np.nan)
-    return np.asarray(np.nanmedian(sliding_window_view(padded, window), axis=1))
-
-
-def estimate_median(values: ArrayLike) -> Estimate:
-    """Return the median of the values of trials, (n_trials,), with its interval.
-
-    >>> estimate_median([4.0, 4.0, 4.0])
-    Estimate(value=4.0, lower=4.0, upper=4.0)
-    """
-    return _estimate(_median, values)
-
-
-def estimate_mean(values: ArrayLike) -> Estimate:
-    """Return the mean of the values of trials, (n_trials,), with its interval; NaN gives NaN.
-
-    Raises ValueError if there are no values or an infinite one.
-
-    >>> estimate_mean([3.0, 3.0])
-    Estimate(value=3.0, lower=3.0, upper=3.0)
-    """
-    _check_finite("averaged", values)
-    return _estimate(lambda sample: np.asarray(np.mean(sample, axis=-1)), values)
-
-
-def estimate_contrast(
-    values: ArrayLike,
-    others: ArrayLike,
-    contrast: Callable[[FloatArray, FloatArray], FloatArray] = np.subtract,
-) -> Estimate:
-    """Compare the medians of two groups of trials; each group is resampled by itself.
-
-    NaN gives NaN; ValueError if a group has no values or an infinite one.
-
-    >>> estimate_contrast([7.0, 7.0], [4.0, 4.0, 4.0])
-    Estimate(value=3.0, lower=3.0, upper=3.0)
-    """
-    _check_finite("compared", values, others)
-    return _estimate(
-        lambda first, second: contrast(_median(first), _median(second)), values, others
-    )
-
-
-def tails(distribution: FloatArray, confidence: float = CONFIDENCE) -> FloatArray:
-    """Return the ends of the middle part of distributions over the last axis, values of theirs.
-
-    >>> tails(np.arange(101.0), 0.9)
-    array([ 5., 95.])
-    """
-    tail = (1 - confidence) / 2
-    ends = np.quantile(distribution, (tail, 1 - tail), axis=-1, method="inverted_cdf")
-    return np.asarray(ends, np.float64)
-
-
-def _estimate(statistic: Callable[..., FloatArray], *groups: ArrayLike) -> Estimate:
-    samples = [np.asarray(values, np.float64) for values in groups]
-    for sample in samples:
-        if sample.ndim != 1 or sample.size == 0:
-            raise ValueError(f"values must be one per trial, got shape {sample.shape}")
-    value = float(statistic(*samples))
-    if min(sample.size for sample in samples) == 1:
-        return Estimate(value, math.nan, math.nan)
-    generator = np.random.default_rng(BOOTSTRAP_SEED)
-    drawn = [s[generator.integers(s.size, size=(_N_RESAMPLES, s.size))] for s in samples]
-    lower, upper = tails(statistic(*drawn))
-    return Estimate(value, float(lower), float(upper))
-
-
-def _median(values: FloatArray) -> FloatArray:
-    return np.asarray(np.median(values, axis=-1))
-
-
-def _check_finite(done: str, *groups: ArrayLike) -> None:
-    if any(np.isinf(np.asarray(values, np.float64)).any() for values in groups):
-        raise ValueError(f"{done} values must not be infinite; cap censored ones first")
-
-
 @dataclass(frozen=True, kw_only=True)
 class TrialMeasures:
     """Measures of the trials of an agent in a case, with or without their rows."""
@@ -390,6 +270,12 @@ def measure(
         title=title,
         records=tuple(records),
     )  # fmt: skip
+
+
+def records_of(results: Iterable[CaseResult]) -> tuple[TrialRecord, ...]:
+    """Return all trials of results, each once, sorted: equal settings share them."""
+    records = {one.key: one for result in results for one in result.records}
+    return tuple(records[key] for key in sorted(records))
 
 
 def on_equal_terms(name: MeasureName, *measured: TrialMeasures) -> tuple[FloatArray, ...]:

@@ -24,7 +24,7 @@ import numpy as np
 from sdnn.files import is_there, open_regular
 from sdnn.runs.errors import StoreError
 from sdnn.runs.spec import HASH_DIGITS
-from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows, TrialTime
+from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows
 
 STORE_NAME = "results.sqlite"
 SCHEMA_VERSION = 6
@@ -192,17 +192,10 @@ class ResultStore:
             runs = self._runs()
             return {run.key for run in runs if unfinished or run.finished_at is not None}
 
-    def times(self) -> tuple[TrialTime, ...]:
-        """Return how long the finished trials took, without reading their rows."""
-        columns = {"run_id": (int,), "max(episode)": (int,)}
+    def seconds(self) -> dict[TrialKey, float]:
+        """Return the processor times of the finished trials, without reading their rows."""
         with _as_store_error(self.path):
-            read = self._read("rows", columns, "GROUP BY run_id")
-            n_episodes = dict(zip(*read, strict=True))
-            return tuple(
-                TrialTime(run.key, run.seconds, n_episodes.get(run.id, 0), run.n_decisions)
-                for run in self._runs()
-                if run.finished_at is not None
-            )
+            return {run.key: run.seconds for run in self._runs() if run.finished_at is not None}
 
     def load(self, keys: Iterable[TrialKey] | None = None) -> tuple[TrialRecord, ...]:
         """Return the finished trials of the given keys (default: all), sorted by key.

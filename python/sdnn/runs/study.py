@@ -1,30 +1,58 @@
-"""A study: cases, variants, and the specification of each variant in each case, from a file."""
+"""A study: cases, variants, and the specification of each variant in each case."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-from sdnn.runs.engine import PlannedTrial, plan_of
+from sdnn.runs.engine import Observer, PlannedTrial, trials_of
 from sdnn.runs.errors import ConfigError
-from sdnn.runs.settings import possible_words
 from sdnn.runs.spec import RunSpec
-from sdnn.runs.study_file import (
-    BASE,
-    MOST_COMBINATIONS,
-    MOST_TRIALS,
-    KnownCase,
-    Layer,
-    StudyCase,
-    StudyFile,
-    StudyVariant,
-)
+from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrialKey, opened
+from sdnn.tables import KeyPath
 
-DEFAULT = "default"
-"""The variant that others are compared with unless the file names another, if there is one."""
+if TYPE_CHECKING:
+    from sdnn.runs.report import Content
+    from sdnn.runs.sweep import Comparison
+
+
+class Setting(NamedTuple):
+    """A value of a study file, and its place in the file."""
+
+    value: Any
+    where: KeyPath
+
+
+Layer: TypeAlias = dict[tuple[str, ...], Setting]
+"""Settings by their names: ``("learning", "discount")``."""
+
+Pair: TypeAlias = tuple[str, str]
+"""Ids of a case and of a variant."""
+
+
+@dataclass(frozen=True)
+class StudyCase:
+    """A task, with settings that override those of the base and of the agent."""
+
+    id: str  # the word used in the result file; seeds are derived from it
+    title: str
+    settings: Layer = field(default_factory=dict)
+    where: KeyPath = ()
+
+
+@dataclass(frozen=True)
+class StudyVariant:
+    """A named set of settings that override all others."""
+
+    id: str
+    title: str
+    settings: Layer = field(default_factory=dict)
+    where: KeyPath = ()
+    case_settings: Mapping[str, Layer] = field(default_factory=dict)  # override even these
+    only: tuple[str, ...] = ()  # ids of the cases in which it runs; none: all
 
 
 class Combination(NamedTuple):
@@ -37,85 +65,81 @@ class Combination(NamedTuple):
     trials: tuple[PlannedTrial, ...]
 
 
-class Study(StudyFile):
-    """A study, read from a file; modules that it imports are looked for beside it, too.
-
-    ConfigError if the file cannot be read, or has something unknown or impossible; the message
-    names file, line and key. What only agents and environments refuse is found by `check`.
+class Study:
+    """Variants in cases; `sdnn.runs.study_file.StudyFile` reads one from its file.
 
     Parameters
     ----------
-    path
-        A TOML file; ``docs/how-to/studies.md`` describes it.
-    known_cases
-        Cases that the file may name, by their ids.
+    title
+        For a reader.
+    specs
+        Each variant in each case in which it runs, what is run of it, and the settings of a file
+        that made it.
     n_trials, seed
-        Trials of each variant in each case, and the root of all seeds, instead of the file's. The
-        seed of a trial depends on the root, its case and its number only, so that variants can be
-        compared trial by trial.
+        Trials of each variant in each case, and the root of all seeds. The seed of a trial depends
+        on the root, its case and its number only, so that variants can be compared trial by trial.
+    reference
+        Id of the variant that the others are compared with.
 
     Attributes
     ----------
-    reference : str
-        Id of the variant that the others are compared with.
     cases, variants : tuple
-        In the order of the file, but for the reference, which comes first.
+        In the order in which they are first named.
     combinations : dict
         Every variant in every case in which it runs, by their ids (case, variant).
+    pairs : tuple
+        Ids of those that are to be run: all by default; what is stored of others is shown, too.
     """
+
+    source, text = "", ""  # of the file that it is from
 
     def __init__(
         self,
-        path: Path,
+        title: str,
+        specs: Iterable[tuple[StudyCase, StudyVariant, RunSpec, Layer]],
         *,
-        known_cases: Mapping[str, KnownCase] | None = None,
-        n_trials: int | None = None,
-        seed: int | None = None,
+        n_trials: int,
+        seed: int,
+        reference: str = "",
     ) -> None:
-        super().__init__(path, known_cases or {})
-        header = self.header
-        self.title = header.title or path.stem
-        self.n_trials = header.trials if n_trials is None else n_trials
-        self.seed = header.seed if seed is None else seed
-        known = [variant.id for variant in self.variants]
-        default = next((name for name in (DEFAULT, BASE) if name in known), known[0])
-        self.reference = default if header.reference is None else header.reference
-        if self.reference not in known:
-            words = f"no variant {self.reference!r}; {possible_words(self.reference, known)}"
-            raise self.file.error(("study", "reference"), words)
-        self.variants = tuple(sorted(self.variants, key=lambda one: one.id != self.reference))
-        n_combinations = sum(len(variant.only or self.cases) for variant in self.variants)
-        if n_combinations > MOST_COMBINATIONS:
-            problem = f"must be at most {MOST_COMBINATIONS} in all cases, got {n_combinations}"
-            raise self.file.error(("variants",), problem)
-        if self.n_trials * n_combinations > MOST_TRIALS:
-            given = f"{self.n_trials} of {n_combinations} each"
-            problem = f"must be at most {MOST_TRIALS} in all, got {given}"
-            raise self.file.error(("study", "trials"), problem)
-        self.combinations: dict[tuple[str, str], Combination] = {}
-        for case, variant in itertools.product(self.cases, self.variants):
-            if case.id in (variant.only or [case.id]):
-                spec, settings = self.spec(case, variant)
-                trials = plan_of([(case.id, spec)], self.n_trials, self.seed)
-                made = Combination(case, variant, spec, settings, trials)
-                self.combinations[case.id, variant.id] = made
+        self.title, self.n_trials, self.seed = title, n_trials, seed
+        self.reference = reference
+        self.combinations: dict[Pair, Combination] = {}
+        for case, variant, spec, settings in specs:
+            trials = trials_of(case.id, spec, n_trials, seed)
+            one = Combination(case, variant, spec, settings, trials)
+            self.combinations.setdefault((case.id, variant.id), one)
+        self.pairs = tuple(self.combinations)
+        found = self.combinations.values()
+        self.cases = tuple({one.case.id: one.case for one in found}.values())
+        self.variants = tuple({one.variant.id: one.variant for one in found}.values())
 
     def keys(self, case_id: str, variant_id: str) -> tuple[TrialKey, ...]:
         """List where the results of the trials of a variant in a case are stored."""
         return tuple(planned.key for planned in self.combinations[case_id, variant_id].trials)
 
-    def chosen(self, only: Collection[str] = ()) -> tuple[tuple[str, str], ...]:
-        """List the ids of case and variant of some variants (default: all); ValueError if none."""
-        known = [variant.id for variant in self.variants]
-        for name in only:
-            if name not in known:
-                raise ValueError(f"no variant {name!r}; {possible_words(name, known)}")
-        return tuple(pair for pair in self.combinations if not only or pair[1] in only)
+    def plan(self) -> tuple[PlannedTrial, ...]:
+        """List the trials of `pairs`, each once.
 
-    def plan(self, only: Collection[str] = ()) -> tuple[PlannedTrial, ...]:
-        """List the trials of some variants (default: all), each once; see `chosen`."""
-        specs = ((pair[0], self.combinations[pair].spec) for pair in self.chosen(only))
-        return plan_of(specs, self.n_trials, self.seed)
+        The first trial of each comes first, so an interrupted run covers all evenly.
+        """
+        rounds = zip(*(self.combinations[pair].trials for pair in self.pairs), strict=True)
+        return tuple({one.key: one for trials in rounds for one in trials}.values())
+
+    def measure(self, store: ResultStore, observe: Observer) -> None:
+        """Measure and store what else than trials is asked for."""
+
+    def other_work(self, out: Path) -> dict[str, Any]:
+        """Count what else than trials is asked for, as values that JSON can hold."""
+        return {}
+
+    def report(self, comparison: Comparison, store: ResultStore) -> Content | None:
+        """Make the report of what is complete; None if there is nothing."""
+        raise NotImplementedError
+
+    def file_name(self, name: str) -> str:
+        """Return the name of a file of the report in a folder that others share."""
+        return name
 
     def same_as(self, variant_id: str) -> str | None:
         """Return the first variant before another one that is the same in every case."""
@@ -144,7 +168,13 @@ class Study(StudyFile):
                     _require_comparable(one.spec)
             except Exception as error:  # of whatever agent or environment
                 refusal = one.spec.refusal(error)
-                raise self.refusal(one.settings, one.case, one.variant, refusal) from error
+                raise self.refusal(one.case, one.variant, one.settings, refusal) from error
+
+    def refusal(
+        self, case: StudyCase, variant: StudyVariant, settings: Layer, error: ConfigError
+    ) -> ConfigError:
+        """Return the error about a variant in a case, with its place in a file."""
+        return error
 
 
 def _require_comparable(spec: RunSpec) -> None:

@@ -7,19 +7,19 @@ import itertools
 import json
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple
 
 from msgspec import Meta
 
-from sdnn.runs.config_file import ConfigFile, KeyPath, dotted
+from sdnn.runs.config_file import ConfigFile
 from sdnn.runs.environment import find_module, search_folder
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.registry import default_agent, labels, split_label
+from sdnn.runs.report import Content
 from sdnn.runs.settings import (
     SHORTHANDS,
     Settings,
@@ -30,7 +30,13 @@ from sdnn.runs.settings import (
     read,
 )
 from sdnn.runs.spec import RunSpec
+from sdnn.runs.store import ResultStore
+from sdnn.runs.study import Layer, Setting, Study, StudyCase, StudyVariant
+from sdnn.runs.sweep import Addition, Comparison, study_content
+from sdnn.tables import KeyPath, dotted
 
+DEFAULT = "default"
+"""The variant that others are compared with unless the file names another, if there is one."""
 BASE = "base"
 """The variant without overrides, where axes are varied one at a time or nothing varies."""
 
@@ -66,17 +72,6 @@ class StudyHeader(Settings, frozen=True):
     """Modules to import, which may register agents and environments."""
 
 
-class Setting(NamedTuple):
-    """A value of a study file, and its place in the file."""
-
-    value: Any
-    where: KeyPath
-
-
-Layer: TypeAlias = dict[tuple[str, ...], Setting]
-"""Settings by their names: ``("learning", "discount")``."""
-
-
 class KnownCase(NamedTuple):
     """A case that studies may name: its title and settings, which a study cannot change."""
 
@@ -84,43 +79,89 @@ class KnownCase(NamedTuple):
     settings: Mapping[str, Any]
 
 
-@dataclass(frozen=True)
-class StudyCase:
-    """A task, with settings that override those of the base and of the agent."""
+class StudyFile(Study):
+    """A study, read from a file; modules that it imports are looked for beside it, too.
 
-    id: str  # the word used in the result file; seeds are derived from it
-    title: str
-    settings: Layer
-    where: KeyPath
+    ConfigError if the file cannot be read, or has something unknown or impossible; the message
+    names file, line and key. What only agents and environments refuse is found by `check`.
 
+    Parameters
+    ----------
+    path
+        A TOML file; ``docs/how-to/studies.md`` describes it.
+    known_cases
+        Cases that the file may name, by their ids.
+    n_trials, seed
+        See `Study`; instead of the file's.
+    only
+        Ids of the variants to run; none: all. A ValueError if there is no variant of a name.
+    """
 
-@dataclass(frozen=True)
-class StudyVariant:
-    """A named set of settings that override all others."""
-
-    id: str
-    title: str
-    settings: Layer
-    where: KeyPath
-    case_settings: Mapping[str, Layer] = field(default_factory=dict)  # override even these
-    only: tuple[str, ...] = ()  # ids of the cases in which it runs; none: all
-
-
-class StudyFile:
-    """The tables of a study, read from its TOML file; ``known_cases`` may be named in it."""
-
-    def __init__(self, path: Path, known_cases: Mapping[str, KnownCase]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        known_cases: Mapping[str, KnownCase] | None = None,
+        n_trials: int | None = None,
+        seed: int | None = None,
+        only: Collection[str] = (),
+    ) -> None:
         self.file = ConfigFile.read(path)
+        self.source, self.text = path.name, self.file.text
         try:
             check_names(self.file.values, TABLES)
-            self.header = read(StudyHeader, self.file.values.get("study", {}), "study")
+            self.header = header = read(StudyHeader, self.file.values.get("study", {}), "study")
             self._import()
             self.base = self._layer((BASE,), self._table(BASE))
             self.agents = dict(self._read_agents())
-            self.cases = self._read_cases(known_cases)
-            self.variants = self._read_variants()
+            cases = self._read_cases(known_cases or {})
+            variants = self._read_variants(cases)
         except ConfigError as error:
             raise self.file.located(error) from error
+        known = [variant.id for variant in variants]
+        default = next((name for name in (DEFAULT, BASE) if name in known), known[0])
+        reference = default if header.reference is None else header.reference
+        if reference not in known:
+            words = f"no variant {reference!r}; {possible_words(reference, known)}"
+            raise self.file.error(("study", "reference"), words)
+        variants = tuple(sorted(variants, key=lambda one: one.id != reference))
+        pairs = [
+            pair
+            for pair in itertools.product(cases, variants)
+            if pair[0].id in (pair[1].only or [pair[0].id])
+        ]
+        if len(pairs) > MOST_COMBINATIONS:
+            problem = f"must be at most {MOST_COMBINATIONS} in all cases, got {len(pairs)}"
+            raise self.file.error(("variants",), problem)
+        n_trials = header.trials if n_trials is None else n_trials
+        if n_trials * len(pairs) > MOST_TRIALS:
+            given = f"{n_trials} of {len(pairs)} each"
+            problem = f"must be at most {MOST_TRIALS} in all, got {given}"
+            raise self.file.error(("study", "trials"), problem)
+        super().__init__(
+            header.title or path.stem,
+            ((*pair, *self.spec(*pair)) for pair in pairs),
+            n_trials=n_trials,
+            seed=header.seed if seed is None else seed,
+            reference=reference,
+        )
+        self.cases, self.variants = cases, variants
+        for name in only:
+            if name not in known:
+                raise ValueError(f"no variant {name!r}; {possible_words(name, known)}")
+        self.pairs = tuple(pair for pair in self.pairs if not only or pair[1] in only)
+
+    def additions(self, comparison: Comparison) -> Addition:
+        """Make what else the report has."""
+        return (), {}
+
+    def report(self, comparison: Comparison, store: ResultStore) -> Content | None:
+        """Make the report of the variants that are complete."""
+        return study_content(comparison, self.additions(comparison))
+
+    def file_name(self, name: str) -> str:
+        """Return a name that begins with that of the study's file."""
+        return f"{self.file.path.stem}-{name}"
 
     def spec(self, case: StudyCase, variant: StudyVariant) -> tuple[RunSpec, Layer]:
         """Put the layers of a variant in a case together; returns the settings as well.
@@ -142,10 +183,10 @@ class StudyFile:
             values = {".".join(name): setting.value for name, setting in settings.items()}
             return RunSpec.from_values(overridden({}, values)), settings
         except ConfigError as error:
-            raise self.refusal(settings, case, variant, error) from error
+            raise self.refusal(case, variant, settings, error) from error
 
     def refusal(
-        self, settings: Layer, case: StudyCase, variant: StudyVariant, error: ConfigError
+        self, case: StudyCase, variant: StudyVariant, settings: Layer, error: ConfigError
     ) -> ConfigError:
         """Make the error about a variant in a case, at the setting that has the error's key."""
         text = f"{error.problem} (case {case.id}, variant {variant.id})"
@@ -238,7 +279,7 @@ class StudyFile:
         if ("environment", "id") in self.base:
             # A place for the only task there is.
             name = str(self.base["environment", "id"].value)
-            return (StudyCase(name, name, {}, ()),)
+            return (StudyCase(name, name),)
         raise self.file.error(
             (),
             'no cases: give some of the paper\'s, [study] cases = ["s4", ...], tables [cases.ID]'
@@ -264,13 +305,13 @@ class StudyFile:
         own = {name: Setting(value, where) for name, value in fixed.items()}
         return StudyCase(case_id, title, own | settings, where)
 
-    def _read_variants(self) -> tuple[StudyVariant, ...]:
+    def _read_variants(self, cases: Sequence[StudyCase]) -> tuple[StudyVariant, ...]:
         variants: dict[str, StudyVariant] = {}
         for name in self._table("variants"):
             where = ("variants", name)
             table, of_cases = self._table(*where), self._table(*where, "cases")
             table.pop("cases", None)
-            known = [case.id for case in self.cases]
+            known = [case.id for case in cases]
             only = checked(tuple[str, ...], table.pop("only", ()), dotted((*where, "only")))
             for number, case_id in enumerate(only):
                 if case_id not in known:
@@ -291,7 +332,7 @@ class StudyFile:
                 words = f"there is a variant {variant.id!r} already"
                 raise self.file.error(variant.where, words)
             variants[variant.id] = variant
-        return tuple(variants.values()) or (StudyVariant(BASE, BASE, {}, ()),)
+        return tuple(variants.values()) or (StudyVariant(BASE, BASE),)
 
     def _axis_variants(self) -> Iterator[StudyVariant]:
         """Make the variants of the axes: the base and every value alone, or all combinations."""

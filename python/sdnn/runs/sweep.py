@@ -1,28 +1,27 @@
-"""Run a study, compare its variants and write the results: the body of ``sdnn sweep``."""
+"""Run studies, compare variants and write the results: ``sdnn sweep``, and what any study needs."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.files import csv_pieces, gzip_pieces, remove_abandoned_files
-from sdnn.runs.engine import Executor, Observer, PlannedTrial, ThreadExecutor, run_trials
-from sdnn.runs.figures import draw_study, figure_bytes
+from sdnn.pages import Page, Section, Table
+from sdnn.plots import figure_bytes
+from sdnn.runs.engine import Executor, Observer, run_trials
+from sdnn.runs.figures import draw_study
 from sdnn.runs.registry import title_of
 from sdnn.runs.report import (
     MEASURE_END,
     PERCENT,
-    Page,
-    Section,
-    Table,
+    Content,
     WrittenReport,
     describe_call,
     format_estimate,
@@ -38,16 +37,15 @@ from sdnn.runs.results import (
     SHARE_STABLE,
     STEP_MEASURES,
     CaseResult,
-    Estimate,
     MeasureName,
-    estimate_mean,
     measure,
     on_equal_terms,
+    records_of,
 )
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.study import Combination, Study
-from sdnn.runs.study_file import StudyCase, StudyVariant
+from sdnn.runs.study import Combination, Pair, Study, StudyCase, StudyVariant
 from sdnn.runs.trial import ROW_HEADER, TrialRecord, records_digest, trial_rows
+from sdnn.statistics import Estimate, estimate_mean
 
 MIN_TRIALS_TO_DIFFER = 6
 """Fewer paired trials are all on one side by chance more often than once in twenty times."""
@@ -107,7 +105,12 @@ class Comparison:
     """Complete parts of a study, by ids of case and variant: those that have every trial."""
 
     study: Study
-    measured: Mapping[tuple[str, str], Measured]
+    measured: Mapping[Pair, Measured]
+
+    @property
+    def records(self) -> tuple[TrialRecord, ...]:
+        """All trials; see `records_of`."""
+        return records_of(one.result for one in self.measured.values())
 
     @property
     def cases(self) -> tuple[StudyCase, ...]:
@@ -151,12 +154,79 @@ def compare(study: Study, records: Iterable[TrialRecord]) -> Comparison:
     return Comparison(study, measured)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Addition:
-    """Additions to the results of a study, such as verdicts, for the page and the JSON."""
+def run_study(
+    study: Study, out: Path, *, executor: Executor | None = None, observer: Observer | None = None
+) -> WrittenReport:
+    """Run what is missing, then draw and write everything that is complete.
 
-    sections: Sequence[Section] = ()
-    json: dict[str, Any] = field(default_factory=dict)
+    A variant in a case is complete when all its trials are stored, whether asked for now or not. A
+    trial that raises leaves its variant out of the report and nothing else. There is no report if
+    nothing is complete, or the run was interrupted.
+
+    RunError before any trial if a configuration is refused, matplotlib is not installed or
+    the result file cannot be used; later if the cluster cannot run trials any more: what was
+    finished is stored.
+
+    Parameters
+    ----------
+    study
+        What is run.
+    out
+        Folder of the result file, figures, tables and page.
+    executor, observer
+        See `sdnn.runs.engine.run_trials`.
+    """
+    require_matplotlib()
+    begin = time.monotonic()
+    is_new = not (out / STORE_NAME).exists()
+    if is_new:
+        study.check()  # before the folder is made
+    with ResultStore(out) as store:
+        if not is_new:
+            study.check(store.keys())
+        remove_abandoned_files(out)
+        outcome = run_trials(study.plan(), store, executor=executor, observer=observer)
+        if outcome.interrupted:
+            return WrittenReport(outcome)
+        study.measure(store, observer or (lambda _: None))
+        keys = {key for pair in study.combinations for key in study.keys(*pair)}
+        content = study.report(compare(study, store.load(keys)), store)
+    if content is None:
+        return WrittenReport(outcome)
+    call = describe_call(outcome, time.monotonic() - begin, content.shown)
+    return content.write(outcome, lambda name: out / study.file_name(name), call)
+
+
+Addition: TypeAlias = tuple[Sequence[Section], Mapping[str, Any]]
+"""What else a report has, such as verdicts: sections of the page, and values of the JSON."""
+
+
+def study_content(comparison: Comparison, addition: Addition) -> Content | None:
+    """Make the report of what is complete of a study that was read from a file."""
+    if not comparison.measured:
+        return None
+    digest = records_digest(comparison.records)
+    footer = (
+        f"{comparison.study.source}; sdnn {_core.__version__}; digest of the rows {digest[:16]}"
+    )
+    png, svg = figure_bytes(draw_study(comparison, footer))
+    # Test episodes of variants that are the same come more than once.
+    tests = (
+        (variant, *row)
+        for (_, variant), measured in comparison.measured.items()
+        for row in trial_rows(measured.result.records)
+    )
+    return Content(
+        page=study_page(comparison, digest, addition, svg),
+        table=study_json(comparison, digest, addition),
+        files={
+            "figure.png": png,
+            "figure.svg": svg,
+            "trials.csv": csv_pieces(*trial_table(comparison)),
+            "results.csv.gz": gzip_pieces(csv_pieces(("variant", *ROW_HEADER), tests)),
+        },
+        shown=comparison.records,
+    )
 
 
 def study_page(comparison: Comparison, digest: str, addition: Addition, picture: bytes) -> Page:
@@ -172,7 +242,7 @@ def study_page(comparison: Comparison, digest: str, addition: Addition, picture:
         " trials and are left out."
     )
     alt = f"{study.title}: each variant in each case, trial by trial"
-    file = Section(title=study.file.path.name, text=study.file.text)
+    file = Section(title=study.source, text=study.text)
     titles = (
         (f"{m.variant.title}, {m.result.title}, {title_of(m.result.agent)}", m.result)
         for m in comparison.measured.values()
@@ -183,13 +253,13 @@ def study_page(comparison: Comparison, digest: str, addition: Addition, picture:
         warnings=[missing] if n_measured < n_all else [],
         sections=[
             Section(title="At a glance", picture=picture, alt=alt),
-            *addition.sections,
+            *addition[0],
             *_case_sections(comparison),
             _measures(comparison),
             Section(title="The study", folded=[file]),
             settings_section(titles),
         ],
-        source=f"Study {study.file.path.name}; root seed {study.seed}; digest of the rows"
+        source=f"Study {study.source}; root seed {study.seed}; digest of the rows"
         f" {digest[:16]}; sdnn {_core.__version__}.",
     )
 
@@ -243,7 +313,7 @@ def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[
     study = comparison.study
     return {
         "title": study.title,
-        "file": study.file.path.name,
+        "file": study.source,
         "n_trials": study.n_trials,
         "seed": study.seed,
         "reference": study.reference,
@@ -266,89 +336,8 @@ def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[
             }
             for (case, variant), m in comparison.measured.items()
         ],
-        **addition.json,
+        **addition[1],
     }
-
-
-@dataclass(frozen=True, kw_only=True)
-class SweepRequest:
-    """A study and how to run it."""
-
-    study: Study
-    out: Path  # folder of the result file, figure, tables and page
-    executor: Executor = field(default_factory=ThreadExecutor)
-    only: tuple[str, ...] = ()  # ids of the variants to run; none: all
-    # Makes what else the report has.
-    addition: Callable[[Comparison], Addition] = lambda _: Addition()
-
-    @property
-    def groups(self) -> dict[tuple[str, str], tuple[PlannedTrial, ...]]:
-        """The trials of each variant in each case, by the ids of case and variant."""
-        chosen = self.study.chosen(self.only)
-        return {pair: self.study.combinations[pair].trials for pair in chosen}
-
-    @cached_property
-    def plan(self) -> tuple[PlannedTrial, ...]:
-        """The trials that are asked for; a ValueError if there is no variant of a name."""
-        return tuple(self.study.plan(self.only))
-
-
-def sweep(request: SweepRequest, *, observer: Observer | None = None) -> WrittenReport:
-    """Run what is missing, then draw and write everything that is complete.
-
-    A variant in a case is complete when all its trials are stored, whether asked for now or not. A
-    trial that raises leaves its variant out of the report and nothing else. There is no report if
-    nothing is complete, or the run was interrupted.
-
-    RunError before any trial if a configuration is refused, matplotlib is not installed or
-    the result file cannot be used; later if the cluster cannot run trials any more: what was
-    finished is stored. ValueError if there is no variant of that name.
-    """
-    require_matplotlib()
-    begin = time.monotonic()
-    study, plan = request.study, request.plan
-    is_new = not (request.out / STORE_NAME).exists()
-    if is_new:
-        study.check()  # before the folder is made
-    with ResultStore(request.out) as store:
-        if not is_new:
-            study.check(store.keys())
-        remove_abandoned_files(request.out)
-        outcome = run_trials(plan, store, executor=request.executor, observer=observer)
-        if outcome.interrupted:
-            return WrittenReport(outcome)
-        records = store.load({key for pair in study.combinations for key in study.keys(*pair)})
-    comparison = compare(study, records)
-    if not comparison.measured:
-        return WrittenReport(outcome)
-    complete = {key for pair in comparison.measured for key in study.keys(*pair)}
-    shown = [record for record in records if record.key in complete]
-    digest = records_digest(shown)
-    addition = request.addition(comparison)
-    name = study.file.path.name
-    footer = f"{name}; sdnn {_core.__version__}; digest of the rows {digest[:16]}"
-    png, svg = figure_bytes(draw_study(comparison, footer))
-    done = WrittenReport(
-        outcome,
-        page=study_page(comparison, digest, addition, svg),
-        table=study_json(comparison, digest, addition),
-    )
-    # Test episodes of variants that are the same come more than once.
-    tests = (
-        (variant, *row)
-        for (_, variant), measured in comparison.measured.items()
-        for row in trial_rows(measured.result.records)
-    )
-    return done.write(
-        {
-            "figure.png": png,
-            "figure.svg": svg,
-            "trials.csv": csv_pieces(*trial_table(comparison)),
-            "results.csv.gz": gzip_pieces(csv_pieces(("variant", *ROW_HEADER), tests)),
-        },
-        lambda end: request.out / f"{study.file.path.stem}-{end}",
-        describe_call(outcome, time.monotonic() - begin, shown),
-    )
 
 
 def trial_table(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:

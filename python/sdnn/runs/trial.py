@@ -212,15 +212,6 @@ class TrialRecord:
     rows: TrialRows
 
 
-class TrialTime(NamedTuple):
-    """The processor time of a finished trial, and its episodes and decisions."""
-
-    key: TrialKey
-    seconds: float
-    n_episodes: int
-    n_decisions: int
-
-
 def records_digest(records: Iterable[TrialRecord]) -> str:
     """Return the SHA-256 of the results of trials, to compare runs.
 

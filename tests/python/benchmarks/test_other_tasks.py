@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from measurements_for_tests import squared
-from sdnn.runs.results import Estimate
+from sdnn.statistics import Estimate
 
 EVIDENCE = Path(__file__).parents[3] / "docs" / "evidence"
 BENCH = Path(__file__).parents[3] / "bench"
@@ -35,7 +35,7 @@ def scripts():
 
         yield argparse.Namespace(
             measured=measured, page=page, report=report, run=run, studies=studies,
-            study=run.Study(run.STUDY),
+            study=run.StudyFile(run.STUDY),
         )  # fmt: skip
     finally:
         sys.path[:] = path
@@ -116,7 +116,7 @@ def test_a_trial_runs_in_a_process_of_its_own_and_once(scripts, tmp_path):
         agent = "tiles"
         """
     )
-    study, found = scripts.run.Study(file, n_trials=1), {}
+    study, found = scripts.run.StudyFile(file, n_trials=1), {}
     for _ in range(2):
         studies.run_study("x", study, given(tmp_path, "tiles"))
         found, before = studies.curves("x", study, given(tmp_path)), found

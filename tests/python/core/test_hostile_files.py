@@ -60,7 +60,7 @@ def content_of(folder):
             [r.rows.table.tolist() for r in records],
             store.rows(make_record(7).key).table.tolist(),
             store.keys(),
-            store.times(),
+            store.seconds(),
             store.measurements("cost"),
         )
 

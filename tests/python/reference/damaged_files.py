@@ -76,7 +76,7 @@ READERS = {
     "lines": Reader("rows.jsonl", lambda: [b'{"a": 1}\n' * 4], read_lines, (OSError,)),
     "scheduler": Reader(
         "scheduler.json", lambda: [b'{"address": "tcp://a:1"}'], read_scheduler_file,
-        (RunError, OSError),
+        (ValueError, LookupError, TypeError, RecursionError, OSError),
     ),
 }  # fmt: skip
 

@@ -18,7 +18,7 @@ from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.agents import load_agent
 from sdnn.coding import Symbolic, WithMissing
 from sdnn.estimators import libsdnn
-from sdnn.reproduction.report import read_study
+from sdnn.reproduction.report import ClaimStudy
 from sdnn.runs import ResultStore, StoreError
 from sdnn.runs.config_file import read_spec
 from sdnn.runs.errors import RunError
@@ -101,7 +101,7 @@ def store():
 def read_store(path):
     with ResultStore(path.parent) as results:
         results.load()
-        results.times()
+        results.seconds()
         results.measurements("cost")
 
 
@@ -134,7 +134,7 @@ READERS = {
     "study": Reader(
         "study.toml",
         lambda: contents_of("docs/studies", "*.toml"),
-        read_study,
+        ClaimStudy,
         (RunError,),
     ),
     "run": Reader("run.toml", lambda: [RUN], read_spec, (RunError,)),

@@ -11,11 +11,11 @@ from sdnn.reproduction import CostConfig, draw_cost
 from sdnn.reproduction.cost import (
     QUICK_COST,
     SERIES,
-    cost_keys,
     cost_series,
     load_costs,
     measure_costs,
     measure_steps,
+    planned_costs,
 )
 from sdnn.reproduction.report import cost_table
 from sdnn.runs import ResultStore, StoreError
@@ -46,21 +46,18 @@ def measured(monkeypatch):
     def _measured(folder, measure, config=SMALL):
         monkeypatch.setattr("sdnn.reproduction.cost.measure_steps", measure)
         with ResultStore(folder) as store:
-            keys = cost_keys(config)
-            measure_costs(keys, config, store, lambda _: None)
+            measure_costs(planned_costs(config), config, store, lambda _: None)
             return load_costs(store, config.config_hash)
 
     return _measured
 
 
 def test_keys_are_all_series_in_ascending_inputs():
-    keys = cost_keys(SMALL)
-    assert [(key.series, key.n_inputs) for key in keys] == [
-        (series.id, n) for series in SERIES for n in (2, 3)
-    ]
-    assert {key.config_hash for key in keys} == {SMALL.config_hash}
-    quick = cost_keys(QUICK_COST)
-    assert max(key.n_inputs for key in quick if key.series == "rbf-plain") == 5
+    planned = planned_costs(SMALL)
+    assert [*planned.values()] == [(series, n) for series in SERIES for n in (2, 3)]
+    assert all(SMALL.config_hash in key for key in planned)
+    quick = planned_costs(QUICK_COST)
+    assert max(n for series, n in quick.values() if series.id == "rbf-plain") == 5
     assert len(quick) == 3 * 7 + 4
     assert replace(SMALL, n_rounds=4).config_hash != SMALL.config_hash
     assert CostConfig().n_inputs == tuple(range(2, 9))
@@ -86,7 +83,7 @@ def test_what_is_stored_is_not_measured_again(tmp_path, measured):
     third = FakeMeasure()
     again = measured(tmp_path, third)
     assert third.asked == []
-    assert [cost.key for cost in again] == [cost.key for cost in costs]
+    assert again == costs
     np.testing.assert_array_equal(costs[0].microseconds, [16.0, 32.0, 48.0])
     assert (costs[0].n_steps, costs[0].table_bytes) == (5, 81)
     assert {cost.machine for cost in costs} == {machine.description()}
@@ -126,9 +123,9 @@ def test_table_gives_times_and_growth(tmp_path, measured):
     table = cost_table(measured(tmp_path / "all", FakeMeasure()))
     rows = table.rows
     assert table.header[1:] == (*(s.title for s in SERIES), "FQL's table")
-    assert rows[0][1] == "32 us [24 us, 40 us]"
-    assert rows[1][1] == "128 us [96 us, 160 us], 4.0x"
-    assert rows[1][-1] == "729 B"
+    assert rows[0][1] == "32 us [24, 40]"
+    assert rows[1][1] == "128 us [96, 160], 4.0x"
+    assert rows[1][-1] == "0.000729 MB"
 
 
 def test_figure_holds_the_stored_rows(tmp_path, measured):
@@ -160,8 +157,9 @@ def test_what_there_is_no_memory_for_is_left_out():
 
 
 def test_costs_of_some_agents():
-    assert {key.series for key in cost_keys(SMALL, ["rbf"])} == {"rbf", "rbf-plain"}
-    refuses("tiles", cost_keys, SMALL, ["tiles"])
+    found = {series.id for series, _ in planned_costs(SMALL, ["rbf"]).values()}
+    assert found == {"rbf", "rbf-plain"}
+    refuses("tiles", planned_costs, SMALL, ["tiles"])
 
 
 def make_agents(n_inputs, seed):

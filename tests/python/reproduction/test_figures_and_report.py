@@ -11,30 +11,28 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-import sdnn.reproduction.reproduce as reproduce_module
 from refusals import refuses
-from sdnn.reproduction import collect, draw_experiment, plan_trials, select_experiments
+from sdnn.plots import figure_bytes
+from sdnn.reproduction import PaperStudy, draw_experiment, plan_trials, select_experiments
 from sdnn.reproduction.report import Report
-from sdnn.reproduction.reproduce import ReproduceRequest, reproduce
 from sdnn.runs import AGENTS, PlotUnavailableError, ResultStore, measure
 from sdnn.runs.engine import TrialsOutcome
-from sdnn.runs.figures import SMOOTHED_TESTS, agent_colors, figure_bytes
+from sdnn.runs.figures import SMOOTHED_TESTS, agent_colors
 from sdnn.runs.report import describe_call, format_estimate
-from sdnn.runs.results import Estimate, running_median
+from sdnn.runs.sweep import run_study
 from sdnn.runs.trial import ROW_HEADER, records_digest, trial_rows
+from sdnn.statistics import Estimate, running_median
 
 (EXPERIMENT,) = select_experiments("a")
 PICTURES = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
 
 
 @pytest.fixture
-def results(tmp_path, fake, run):
+def results(tmp_path, fake, run, collected):
     """Three fake trials of 3000 episodes, beside trials of another seed in the same store."""
     run(tmp_path, fake.make_plan(2, 3000, root_seed=9))
-    plan = fake.make_plan(3, 3000)
-    run(tmp_path, plan)
-    with ResultStore(tmp_path) as store:
-        return collect(EXPERIMENT, store.load(p.key for p in plan))
+    run(tmp_path, fake.make_plan(3, 3000))
+    return collected(EXPERIMENT, tmp_path, 3, 3000)
 
 
 def all_text(figure):
@@ -69,11 +67,9 @@ def test_panels_hold_the_stored_rows(results):
         assert axes.get_xlim() == (0, 3000)
 
 
-def test_short_runs_are_drawn_as_they_are(tmp_path, fake, run):
-    plan = fake.make_plan(2, 300)
-    run(tmp_path, plan)
-    with ResultStore(tmp_path) as store:
-        results = collect(EXPERIMENT, store.load(p.key for p in plan))
+def test_short_runs_are_drawn_as_they_are(tmp_path, fake, run, collected):
+    run(tmp_path, fake.make_plan(2, 300))
+    results = collected(EXPERIMENT, tmp_path, 2, 300)
     for axes, result in zip(draw_experiment(EXPERIMENT, results).axes, results, strict=True):
         ((_, line),) = curves_of(axes)
         np.testing.assert_array_equal(line, np.median(result.steps, axis=0))
@@ -103,13 +99,12 @@ def test_figures_are_repeatable_to_the_byte(results):
 
 def test_missing_matplotlib_is_told_before_any_trial(monkeypatch, tmp_path):
     monkeypatch.setattr("sdnn.runs.report.find_spec", lambda name: None)
-    request = ReproduceRequest(experiments=(EXPERIMENT,), out=tmp_path / "out", quick=True)
     with pytest.raises(PlotUnavailableError, match="pip install matplotlib"):
-        reproduce(request)
+        run_study(PaperStudy("a", quick=True), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
-def test_a_run_plans_once_and_reads_its_trials_once(monkeypatch, tmp_path, fake, use_trial):
+def test_a_run_reads_its_trials_once(monkeypatch, tmp_path, fake, use_trial):
     use_trial(fake.FakeTrial)
     calls = []
 
@@ -120,25 +115,20 @@ def test_a_run_plans_once_and_reads_its_trials_once(monkeypatch, tmp_path, fake,
 
         return call
 
-    monkeypatch.setattr(reproduce_module, "plan_trials", counted("plan", plan_trials))
     monkeypatch.setattr(ResultStore, "_record", counted("trial", ResultStore._record))
-    request = ReproduceRequest(experiments=select_experiments("all"), out=tmp_path, quick=True)
-    done = reproduce(request)
+    done = run_study(PaperStudy(quick=True), tmp_path)
     # SDNN-C in Case I belongs to both figures.
     assert [len(one["cases"]) for one in done.table["experiments"]] == [2, 8]
-    assert calls == ["plan"] + ["trial"] * 18
+    assert calls == ["trial"] * 18
     with ResultStore(tmp_path) as store:
         assert done.table["digest"] == records_digest(store.load())
 
 
-def test_a_colour_stands_for_an_agent_in_every_figure(tmp_path, fake, run):
+def test_a_colour_stands_for_an_agent_in_every_figure(tmp_path, run, collected):
     def colors(*agents):
         other = EXPERIMENT.with_agents(agents)
-        plan = plan_trials(other.cases, 1, 0, 100)
-        run(tmp_path, plan)
-        with ResultStore(tmp_path) as store:
-            results = collect(other, store.load(p.key for p in plan))
-        figure = draw_experiment(other, results)
+        run(tmp_path, plan_trials(other.cases, 1, 0, 100))
+        figure = draw_experiment(other, collected(other, tmp_path, 1, 100))
         (legend,) = figure.legends
         lines = {line.get_color() for line in figure.axes[0].get_lines()}
         return [text.get_text() for text in legend.get_texts()], lines
@@ -197,7 +187,6 @@ def report(results):
         costs=(),
         quick=False,
         seed=0,
-        digest="d" * 64,
     )
 
 
@@ -241,7 +230,7 @@ def test_markdown_holds_the_tables(report):
     assert "not their result" in markdown
     lines = [line for line in markdown.splitlines() if line.startswith("|")]
     assert len(lines) == sum(2 + len(table.rows) for table in page.tables)
-    assert "digest of the rows dddddddddddddddd" in markdown
+    assert f"digest of the rows {report.digest[:16]}" in markdown
 
 
 def test_row_files_hold_every_test_episode_once(report, results):

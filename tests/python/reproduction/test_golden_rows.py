@@ -2,8 +2,7 @@
 
 import hashlib
 
-from sdnn.reproduction import select_experiments
-from sdnn.reproduction.reproduce import ReproduceRequest
+from sdnn.reproduction import PaperStudy
 from sdnn.runs import ResultStore, run_trials
 
 GOLDEN = "daeab97b4c3adff9796000959c2049d42692378a7d55dc3816a4010ef08760b4"
@@ -23,8 +22,7 @@ def digest_of(plan, records):
 
 
 def test_the_quick_reproduction_has_the_golden_rows(tmp_path):
-    request = ReproduceRequest(experiments=select_experiments("all"), out=tmp_path, quick=True)
-    plan = request.plan.trials
+    plan = PaperStudy(quick=True).plan()
     with ResultStore(tmp_path) as store:
         outcome = run_trials(plan, store)
         records = {record.key: record for record in store.load()}

@@ -11,10 +11,8 @@ import sdnn.reproduction.reproduce as reproduce_module
 from refusals import refuses
 from sdnn.reproduction import (
     EXPERIMENTS,
-    ReproduceRequest,
-    collect,
+    PaperStudy,
     plan_trials,
-    select_experiments,
 )
 from sdnn.reproduction.cases import PAPER_EPISODES
 from sdnn.reproduction.claims import (
@@ -32,9 +30,9 @@ from sdnn.reproduction.claims import (
     reference_results,
 )
 from sdnn.reproduction.report import Report
-from sdnn.reproduction.reproduce import reproduce
 from sdnn.runs import Estimate, ResultStore, measure, run_trials
 from sdnn.runs.results import STEP_MEASURES, TrialMeasures
+from sdnn.runs.sweep import run_study
 
 _SCRIPT = Path(__file__).parents[3] / "docs" / "studies" / "write_reference_results.py"
 _SPEC = importlib.util.spec_from_file_location("write_reference_results", _SCRIPT)
@@ -179,12 +177,10 @@ def test_a_reference_result_is_what_running_it_gives(tmp_path, agent):
 
 
 @pytest.fixture
-def fake_results(tmp_path, fake, run):
+def fake_results(tmp_path, run, collected):
     """Twelve fake trials of all episodes in each case of Experiment A."""
-    plan = plan_trials(EXPERIMENTS[0].cases, 12, 0)
-    run(tmp_path, plan)
-    with ResultStore(tmp_path) as store:
-        return collect(EXPERIMENTS[0], store.load(p.key for p in plan))
+    run(tmp_path, plan_trials(EXPERIMENTS[0].cases, 12, 0))
+    return collected(EXPERIMENTS[0], tmp_path, 12)
 
 
 def test_what_is_written_of_trials_is_read_again(monkeypatch, tmp_path, fake_results):
@@ -211,7 +207,7 @@ def test_short_trials_are_not_kept(fake_results):
 def report_of(results, kept=()):
     return Report(
         experiments=((EXPERIMENTS[0], tuple(results)),), costs=(), quick=False, seed=0,
-        digest="d" * 64, reference=tuple(kept),
+        reference=tuple(kept),
     )  # fmt: skip
 
 
@@ -242,19 +238,18 @@ def test_reports_tell_what_reference_results_say(fake_results):
     assert (told["verdict"], told["decided"]) == ("holds", "inconclusive")
     page = report.page(picture).to_html("")
     assert "root seed 7" in page
-    assert "<b>1</b>inconclusive" in page
+    assert 'class="verdict open">inconclusive</td>' in page
 
 
 def test_only_more_trials_of_the_same_settings_are_shown(monkeypatch, tmp_path, fake, use_trial):
     use_trial(fake.FakeTrial)
-    (experiment,) = select_experiments("a")
 
     def shown(**request):
         found = []
         monkeypatch.setattr(
             reproduce_module, "Report", lambda **parts: found.append(Report(**parts)) or found[-1]
         )
-        reproduce(ReproduceRequest(experiments=(experiment,), out=tmp_path, **request))
+        run_study(PaperStudy("a", **request), tmp_path)
         return {(one.case_id, one.n_trials) for one in found[0].reference}
 
     assert shown(n_trials=2) == {("s4", 100), ("s6", 100)}

@@ -1,49 +1,23 @@
-"""Estimates of time, from made-up stored trials and from a probe of a trial of known speed."""
-
-from dataclasses import replace
+"""Estimates of time, from stored trials and from a probe of a trial of known speed."""
 
 import pytest
 
-from sdnn.runs import AGENTS, BudgetSpec, RunSpec, TrialKey, forecast
-from sdnn.runs.forecast import trial_seconds, wall_seconds
-from sdnn.runs.trial import TrialTime
+from made_records import make_record
+from sdnn.runs import ResultStore, forecast
+from sdnn.runs.forecast import wall_seconds
 
-CONFIG = RunSpec(budget=BudgetSpec(episodes=1005))
-KEY = TrialKey("s4", "sdnn-c", 0, 1, "mine")
-
-
-def stored(seconds, n_episodes=1000, n_decisions=10_000, **changes):
-    return TrialTime(
-        key=KEY._replace(**changes), seconds=seconds, n_episodes=n_episodes, n_decisions=n_decisions
-    )
-
-
-def estimate(times, key=KEY, config=CONFIG):
-    return trial_seconds(key, config, {key[:2]: ("stored trial", times)})
+STUDY = """
+[study]
+trials = 2
+cases = ["s4"]
+[base]
+budget.episodes = 1005
+[axes]
+learning.discount = [0.8, 0.9]
+"""
 
 
-def test_trials_of_the_same_configuration_count_first():
-    times = [stored(2.0), stored(4.0), stored(50.0, config_hash="other")]
-    found = estimate(times)
-    assert found["lower"] == found["upper"] == pytest.approx(3.0 * 1.005)
-    assert found["source"].startswith("2 ")
-    assert "this configuration" in found["source"]
-
-
-def test_then_those_of_the_same_case_and_agent():
-    found = estimate([stored(50.0, config_hash="other")])
-    assert found["lower"] == found["upper"] == pytest.approx(50.25)
-    assert found["source"].startswith("1 stored trial ")
-    assert "configuration" not in found["source"]
-
-
-def test_shorter_trials_give_the_least():
-    found = estimate([stored(1.0, n_episodes=100, n_decisions=1000)])
-    assert (found["lower"], found["upper"]) == (pytest.approx(10.05), None)
-    assert "as in the first 100 episodes" in found["source"]
-
-
-def test_a_probe_is_made_once_for_a_case_and_agent(fake, monkeypatch):
+def test_stored_trials_count_and_else_a_probe(fake, use_trial, study, tmp_path, monkeypatch):
     made = []
 
     class Probed(fake.FakeTrial):
@@ -57,19 +31,23 @@ def test_a_probe_is_made_once_for_a_case_and_agent(fake, monkeypatch):
 
     clock = [0.0]
     monkeypatch.setattr(forecast.time, "thread_time", lambda: clock[0])
-    monkeypatch.setitem(AGENTS, "sdnn-c", replace(AGENTS["sdnn-c"], core_trial=Probed))
-    times = {("s4", "fuzzy"): ("stored trial", [stored(9.0, agent="fuzzy")])}
-    found = trial_seconds(KEY, CONFIG, times)
+    use_trial(Probed)
+    mine = study(STUDY)
+    out = tmp_path / "out"
+    first = mine.combinations["s4", "discount=0.8"].trials[0]
+    with ResultStore(out) as store:
+        config = first.spec.canonical_json()
+        store.add(make_record(0, config, key=first.key, seconds=3.0))
+    found = forecast.forecast(mine, out, 1)
+    by_variant = {one["variant"]: one for one in found["trials"]}
+    stored = by_variant["discount=0.8"]
+    assert (stored["seconds_of_a_trial"], stored["source"]) == (3.0, "1 stored trial")
     # 10 episodes in 0.1 s: 0.3 s are reached after 30 or 40.
-    assert found["lower"] == pytest.approx(10.05)
-    assert found["upper"] is None
-    assert found["source"].startswith("1 probe of this configuration: as in the first ")
-    whole = CONFIG.replace(budget=BudgetSpec(episodes=20))
-    found = trial_seconds(KEY._replace(config_hash="other"), whole, times)
-    assert found["lower"] == found["upper"] == pytest.approx(0.2)
-    assert found["source"].startswith("1 probe ")
-    assert "configuration" not in found["source"]
-    assert made == [1]
+    for name in ("base", "discount=0.9"):
+        assert by_variant[name]["seconds_of_a_trial"] == pytest.approx(10.05)
+        assert by_variant[name]["source"].startswith("the first ")
+    assert len(made) == 2 + 1  # tried, but for one that is the same, and one probe
+    assert found["seconds"] == pytest.approx(3.0 + 2 * 10.05)
 
 
 def test_python_trials_share_a_core(monkeypatch):

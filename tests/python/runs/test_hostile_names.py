@@ -11,9 +11,9 @@ from hypothesis import example, given, settings, strategies as st
 from markdown_it import MarkdownIt
 
 from sdnn.files import csv_bytes
-from sdnn.reproduction.report import add_claims
-from sdnn.runs.figures import draw_study, figure_bytes
-from sdnn.runs.report import Page, Section, Table
+from sdnn.pages import Page, Section, Table
+from sdnn.plots import figure_bytes
+from sdnn.runs.figures import draw_study
 from sdnn.runs.sweep import compare, study_json, study_page, trial_table
 from sdnn.runs.trial import TrialRecord, TrialRows
 
@@ -90,7 +90,7 @@ def test_html_shows_names_as_they_are(name):
         title=name, intro=name, warnings=[name], source=name,
         sections=[
             Section(picture=b"<svg/>", alt=name, table=table, notes=[name], terms={name: name}),
-            Section(tally=[("good", 1, name)], title=name),
+            Section(title=name),
             Section(folded=[Section(title=name, notes=[name], text=name, table=table)]),
         ],
     )  # fmt: skip
@@ -122,11 +122,12 @@ def test_a_study_of_hostile_names(study, name):
     comparison = compare(mine, records)
     _, svg = figure_bytes(draw_study(comparison, name))
     assert "script" not in {element.tag for element in ElementTree.fromstring(svg).iter()}
-    page = study_page(comparison, "abc", add_claims(comparison), svg)
+    additions = mine.additions(comparison)
+    page = study_page(comparison, "abc", additions, svg)
     assert "script" not in Tags(page.to_html("")).tags
     markdown = MarkdownIt("gfm-like", {"linkify": False}).render(page.to_markdown())
     assert set(Tags(markdown).tags) <= HARMLESS_TAGS
-    assert json.loads(json.dumps(study_json(comparison, "abc", add_claims(comparison))))
+    assert json.loads(json.dumps(study_json(comparison, "abc", additions)))
     table = csv_bytes(*trial_table(comparison)).decode()
     cells = {cell for row in csv.reader(table.splitlines(True)) for cell in row}
     assert {cell for cell in cells if cell.startswith(("=", "+", "-", "@", "\t"))} == set()

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 
 from sdnn.runs import TrialRows
-from sdnn.runs.results import (
-    MEASURES,
-    episode_of_collapse,
-    episodes_to_learn,
-    final_share_solved,
-)
+from sdnn.runs.results import MEASURES, episode_of_collapse, episodes_to_learn, final_share_solved
 
 
 def episodes(steps):

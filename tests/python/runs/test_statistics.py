@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn.runs.results import (
+from sdnn.statistics import (
     Estimate,
     estimate_contrast,
     estimate_mean,

@@ -38,14 +38,10 @@ def test_stored_trial_comes_back_exactly(tmp_path):
 
 def test_times_are_read_without_rows(tmp_path):
     with ResultStore(tmp_path) as store:
-        assert store.times() == ()
+        assert store.seconds() == {}
         store.add(make_record(0))
         store.add(make_record(1, steps=(), seconds=2.0))
-        times = store.times()
-    assert [(t.key.trial, t.seconds, t.n_decisions, t.n_episodes) for t in times] == [
-        (0, 0.5, 57, 20), (1, 2.0, 57, 0),
-    ]  # fmt: skip
-    assert times[0].key == make_record(0).key
+        assert store.seconds() == {make_record(0).key: 0.5, make_record(1).key: 2.0}
 
 
 def test_every_row_reaches_its_labels(tmp_path):
@@ -81,7 +77,7 @@ def test_a_folder_that_is_only_looked_at_stays_as_it_is(tmp_path):
     content = path.read_bytes()
     with ResultStore(path.parent, read_only=True) as store:
         assert records_digest(store.load()) == digest
-        assert len(store.times()) == 3
+        assert len(store.seconds()) == 3
         assert list(path.parent.iterdir()) == [path]
         refuses("readonly", store.add, make_record(7), error=StoreError)
     assert list(path.parent.iterdir()) == [path]
@@ -89,7 +85,7 @@ def test_a_folder_that_is_only_looked_at_stays_as_it_is(tmp_path):
     for folder in (tmp_path / "empty", tmp_path / "none"):
         with ResultStore(folder, read_only=True) as store:
             assert store.keys() == set()
-            assert (store.times(), store.measurements("cost")) == ((), {})
+            assert (store.seconds(), store.measurements("cost")) == ({}, {})
     assert (tmp_path / "empty" / path.name).stat().st_size == 0
     assert not (tmp_path / "none").exists()
 

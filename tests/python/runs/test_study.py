@@ -220,17 +220,20 @@ def test_options_override_the_file(study):
 
 
 def test_some_variants_only(study):
-    found = study(PAPER + "[axes]\nlearning.discount = [0.5, 0.7]\n")
-    assert {p.spec.learning.discount for p in found.plan(["discount=0.5"])} == {0.5}
+    text = PAPER + "[axes]\nlearning.discount = [0.5, 0.7]\n"
+    found = study(text, only=["discount=0.5"])
+    assert {p.spec.learning.discount for p in found.plan()} == {0.5}
+    assert len(found.combinations) == 9
     with pytest.raises(ValueError, match=r"discount=0\.6.*discount=0\.[57]"):
-        found.plan(["discount=0.6"])
+        study(text, only=["discount=0.6"])
 
 
 def test_a_variant_runs_only_in_its_cases(study):
-    found = study(PAPER + "[variants.a]\n[variants.b]\nonly = ['s6']\nlearning.discount = 0.5\n")
+    text = PAPER + "[variants.a]\n[variants.b]\nonly = ['s6']\nlearning.discount = 0.5\n"
+    found = study(text)
     assert set(configs(found)) == {("s4", "a"), ("s4-noise", "a"), ("s6", "a"), ("s6", "b")}
     assert len(found.plan()) == 8
-    assert {p.key.case_id for p in found.plan(["b"])} == {"s6"}
+    assert {p.key.case_id for p in study(text, only=["b"]).plan()} == {"s6"}
     assert found.same_as("b") is None
 
 

@@ -174,19 +174,19 @@ def test_dry_run_counts_and_estimates_without_making_a_file(invoke, tmp_path):
     assert lines[0].startswith(
         "s4 base: 2 trials x 300 episodes of sdnn-c, 0 of them stored in results; a trial takes"
     )
-    assert "(by 1 probe of this configuration)" in lines[0]
+    assert "(by the first 300 episodes of one)" in lines[0]
     assert lines[-1].startswith("in all 8 trials, 0 of them stored; the rest takes about")
     invoke("sweep", "mine.toml", "--trials", 1)
     lines = invoke("sweep", "mine.toml", "--dry-run").stdout.splitlines()
     assert "1 of them stored in results" in lines[0]
-    assert "(by 1 stored trial of this configuration)" in lines[0]
+    assert "(by 1 stored trial)" in lines[0]
     found = json.loads(invoke("sweep", "mine.toml", "--dry-run", "--json", "--jobs", 3).stdout)
     assert (found["planned"], found["stored"], found["jobs"]) == (8, 4, 3)
     assert len(found["trials"]) == 6
     invoke("sweep", "mine.toml")
     done = json.loads(invoke("sweep", "mine.toml", "--dry-run", "--json").stdout)
-    assert done["seconds"] == {"lower": 0.0, "upper": 0.0}
-    assert {t["seconds_of_a_trial"] for t in done["trials"]} == {None}
+    assert done["seconds"] == 0.0
+    assert {t["source"] for t in done["trials"]} == {"2 stored trials"}
 
 
 def test_a_trial_that_raises_is_told_by_a_dry_run(invoke, fake):

@@ -1,0 +1,137 @@
+"""Pages of figures and tables: on the screen, as Markdown and as HTML; each cell is written once.
+
+Jinja and rich are imported when they are needed.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_MARKUP = re.compile(r"[\\`*_#<|~&@$]|\](?=[(\[])|:(?=//)|(?<=www)\.", re.IGNORECASE)
+"""Characters that Markdown interprets; brackets only where they would make a link."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of texts."""
+
+    title: str
+    header: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    kinds: Mapping[str, str] = field(default_factory=dict)  # color of a text: good, bad, open, none
+    brief: Sequence[str] = ()  # columns that a terminal shows by default: all
+
+    def print(self, console: Console, *, full: bool = True) -> None:
+        """Print it: all columns, or the brief ones, which fit 80 characters."""
+        from rich import box
+        from rich.table import Table as RichTable
+        from rich.text import Text
+
+        title = Text(self.title)
+        shown = RichTable(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+        columns = [
+            i for i, name in enumerate(self.header) if full or not self.brief or name in self.brief
+        ]
+        for i in columns:
+            shown.add_column(Text(self.header[i]), overflow="fold")
+        for row in self.rows:
+            shown.add_row(*(Text(row[i]) for i in columns))
+        console.print(shown)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A part of a page, shown in the order of its fields; what is empty is left out.
+
+    The title is that of the table by default; one of level 0 is a faint paragraph. A picture is an
+    SVG. Folded sections, of notes, terms, text and table, open on demand.
+    """
+
+    title: str = ""
+    level: int = 2
+    picture: bytes = b""
+    alt: str = ""
+    is_narrow: bool = False
+    table: Table | None = None
+    notes: Sequence[str] = ()
+    terms: Mapping[str, str] = field(default_factory=dict)
+    text: str = ""
+    folded: Sequence[Section] = ()
+
+    @property
+    def heading(self) -> str:
+        """The title, by default that of the table."""
+        return self.title or (self.table.title if self.table else "")
+
+    @property
+    def picture_url(self) -> str:
+        """The figure as an address that holds it: its names cannot clash with those of another."""
+        return "data:image/svg+xml;base64," + base64.b64encode(self.picture).decode()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Page:
+    """A report: its head, its sections, and where the rows come from."""
+
+    title: str
+    intro: str
+    warnings: Sequence[str] = ()
+    sections: Sequence[Section]
+    source: str
+
+    @property
+    def tables(self) -> Iterator[Table]:
+        """All tables; those that open on demand come last."""
+        yield from (one.table for one in self.sections if one.table)
+        yield from (one.table for part in self.sections for one in part.folded if one.table)
+
+    @property
+    def notes(self) -> list[str]:
+        """Explanations below the tables; those of files and settings are with their texts."""
+        parts = [*self.sections, *(o for part in self.sections for o in part.folded if not o.text)]
+        notes = [note for part in parts for note in part.notes]
+        return notes + [f"{name}: {text}." for part in parts for name, text in part.terms.items()]
+
+    def print(self, console: Console, *, full: bool = False) -> None:
+        """Print it without figures: tables that fit 80 characters, or everything."""
+        for line in (self.title, self.intro, *self.warnings):
+            console.print(line, highlight=False, markup=False)
+        for table in self.tables if full else (one.table for one in self.sections if one.table):
+            table.print(console, full=full)
+        for note in self.notes if full else (note for one in self.sections for note in one.notes):
+            console.print(note, style="dim", highlight=False, markup=False)
+
+    def to_markdown(self) -> str:
+        """Write it without figures."""
+        return self._render("page.md.jinja")
+
+    def to_html(self, call: str) -> str:
+        """Make it one self-contained HTML page; `call` is the command that made it."""
+        return self._render("page.html.jinja", call=call)
+
+    def _render(self, name: str, **values: str) -> str:
+        from jinja2 import Environment, PackageLoader, StrictUndefined
+
+        environment = Environment(
+            loader=PackageLoader("sdnn", "."), autoescape=".html." in name,
+            undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+            keep_trailing_newline=True,
+        )  # fmt: skip
+        environment.filters["markdown"] = markdown_text
+        return environment.get_template(name).render(page=self, **values)
+
+
+def markdown_text(text: str) -> str:
+    r"""Write a text for a line of Markdown, in which it can be no markup, HTML or link.
+
+    >>> markdown_text("<b> [1, 2] | [a](b)")
+    '\\<b> [1, 2] \\| [a\\](b)'
+    """
+    return _MARKUP.sub(r"\\\g<0>", " ".join(text.split()))

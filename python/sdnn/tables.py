@@ -1,0 +1,102 @@
+"""Tables of TOML and JSON from strangers: parsed within limits, and where their keys are."""
+
+from __future__ import annotations
+
+import bisect
+import json
+import re
+from contextlib import suppress
+from typing import Any, TypeAlias
+
+import msgspec
+
+MOST_LEVELS = 32
+"""Most levels of tables and arrays within each other."""
+TOO_DEEP = f"must have at most {MOST_LEVELS} tables and arrays within each other"
+_MOST_PARSED = 2**21
+"""Bytes that are parsed to find a line; in larger files none is found."""
+
+KeyPath: TypeAlias = tuple[str | int, ...]
+"""Keys from the top of a document to a value; elements of arrays are numbers from 0."""
+
+
+def line_of(text: str, key: KeyPath) -> int | None:
+    """Return the line, from 1, of a key in TOML, or of the nearest table around it.
+
+    It is the first line with which the text's beginning has the key.
+    """
+    lines = text.splitlines()
+    n_left = _MOST_PARSED
+
+    def begins(last: int) -> bool:
+        """Return whether the first lines, with the rest of their last value, have the key."""
+        nonlocal n_left
+        for end in range(last + 1, len(lines) + 1):
+            beginning = "\n".join(lines[:end])
+            n_left -= len(beginning)
+            if n_left < 0:
+                raise OverflowError
+            with suppress(msgspec.DecodeError):
+                return _has(msgspec.toml.decode(beginning), key)
+        return True
+
+    with suppress(OverflowError):
+        while key:
+            found = bisect.bisect_left(range(len(lines)), True, key=begins)
+            if found < len(lines):
+                return found + 1
+            key = key[:-1]
+    return None
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Parse TOML; ValueError for a key of many parts, which would take time without end."""
+    for part in re.split(r"[={},\n]", text):
+        if part.count(".") > MOST_LEVELS:
+            raise ValueError(f"a key must have at most {MOST_LEVELS} parts, got {part[:40]!r}...")
+    values: dict[str, Any] = msgspec.toml.decode(text)
+    return values
+
+
+def deep_key(values: dict[str, Any]) -> KeyPath | None:
+    """Return the key of a value that is too deep, if there is one."""
+    level: list[tuple[KeyPath, Any]] = [((), values)]
+    for _ in range(MOST_LEVELS):
+        items = (
+            (key, value.items() if isinstance(value, dict) else enumerate(value))
+            for key, value in level
+        )
+        level = [
+            ((*key, name), inner)
+            for key, pairs in items
+            for name, inner in pairs
+            if isinstance(inner, dict | list)
+        ]
+    return level[0][0] if level else None
+
+
+def _has(value: Any, key: KeyPath) -> bool:
+    for name in key:
+        try:
+            value = value[name]
+        except (IndexError, KeyError, TypeError):
+            return False
+    return True
+
+
+def dotted(key: KeyPath) -> str:
+    """Write a key as TOML would.
+
+    Examples
+    --------
+    >>> dotted(("axes", "learning.tie_rule", 1))
+    'axes."learning.tie_rule"[1]'
+    """
+    text = ""
+    for name in key:
+        if isinstance(name, int):
+            text += f"[{name}]"
+        else:
+            bare = name.replace("-", "").replace("_", "").isalnum() and name.isascii()
+            text += ("." if text else "") + (name if bare else json.dumps(name))
+    return text
