@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from sdnn.agents import Training
+from sdnn.agents.registry import AgentEntry, register
 from sdnn.runs.config_file import ConfigFile
-from sdnn.runs.registry import AgentEntry, register
 
 SETTINGS = ConfigFile.read(Path(__file__).with_name("zoo.toml")).values
 

@@ -17,7 +17,7 @@ import gymnasium as gym
 import numpy as np
 from tile_coding import listed_actions
 
-from sdnn.runs.registry import AgentEntry, register
+from sdnn.agents.registry import AgentEntry, register
 
 DISCOUNT, TRACE_DECAY = 0.99, 0.8
 ENTROPY = 0.01

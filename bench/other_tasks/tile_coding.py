@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import gymnasium as gym
 import numpy as np
 
+from sdnn.agents.registry import AgentEntry, register
 from sdnn.bounds import flat_bounds
-from sdnn.runs.registry import AgentEntry, register
 
 try:
     from numba import njit

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
+from sdnn.agents.registry import title_of
 from sdnn.files import write_whole
 from sdnn.plots import png_bytes
 from sdnn.reproduction.report import ClaimStudy
-from sdnn.runs.registry import title_of
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.results import SHARE_STABLE, final_share_solved
 from sdnn.runs.store import ResultStore

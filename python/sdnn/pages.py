@@ -135,3 +135,27 @@ def markdown_text(text: str) -> str:
     '\\<b> [1, 2] \\| [a\\](b)'
     """
     return _MARKUP.sub(r"\\\g<0>", " ".join(text.split()))
+
+
+def plain_number(value: float, decimals: int, sign: str = "") -> str:
+    """Write a number with a given number of decimals at most.
+
+    >>> plain_number(2.50, 2), plain_number(-0.01, 1), plain_number(1234.25, 2, sign="+")
+    ('2.5', '0', '+1,234.25')
+    """
+    rounded = round(value, decimals) or 0.0
+    text = f"{rounded:{sign},.{decimals}f}".rstrip("0").rstrip(".")
+    return text if rounded else "0"
+
+
+def duration_words(seconds: float) -> str:
+    """Write a time for a reader.
+
+    >>> duration_words(61.4), duration_words(3661.4)
+    ('1 min 1 s', '1 h 1 min')
+    """
+    if seconds >= 3600:
+        hours, minutes = divmod(round(seconds / 60), 60)
+        return f"{hours} h {minutes} min"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

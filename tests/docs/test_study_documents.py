@@ -27,9 +27,8 @@ def test_the_page_shows_the_studies_as_they_are(name):
 @pytest.mark.parametrize(
     "name",
     [
-        "runs.config_file", "runs.engine", "runs.environment", "runs.registry", "runs.settings",
-        "runs.spec",
-        "runs.report", "runs.results", "reproduction.report",
+        "tables", "runs.engine", "runs.environment", "agents.registry", "runs.settings",
+        "runs.spec", "runs.report", "runs.results", "pages", "statistics",
     ],
 )  # fmt: skip
 def test_examples_in_docstrings(name):

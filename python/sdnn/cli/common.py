@@ -306,8 +306,8 @@ def _print_report(
 
 def _print_forecast(study: Study, out: Path, jobs: int, *, as_json: bool) -> None:
     """Print what is still to be run and how long that takes."""
+    from sdnn.pages import duration_words
     from sdnn.runs.forecast import forecast
-    from sdnn.runs.report import duration_words
 
     found = forecast(study, out, jobs)
     if as_json:

@@ -98,8 +98,3 @@ def select_experiments(word: str) -> tuple[Experiment, ...]:
     """Return the experiments that one of `WORDS` stands for; none for ``"cost"``."""
     one_of("experiment", word, WORDS)
     return tuple(e for e in EXPERIMENTS if word in (e.id, "all"))
-
-
-def includes_cost(word: str) -> bool:
-    """Return whether one of `WORDS` includes the measurement of costs."""
-    return word in (COST, "all")

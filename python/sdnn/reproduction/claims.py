@@ -34,9 +34,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.agents.registry import title_of
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
 from sdnn.reproduction.cost import SERIES, CostConfig, CostRecord
-from sdnn.runs.registry import title_of
 from sdnn.runs.results import STEP_MEASURES, CaseResult, MeasureName, TrialMeasures, on_equal_terms
 from sdnn.statistics import (
     BOOTSTRAP_SEED,

@@ -17,8 +17,8 @@ import msgspec
 import numpy as np
 
 from sdnn import _core, machine
+from sdnn.agents.registry import AGENTS, split_label
 from sdnn.runs.engine import Counted, Observer
-from sdnn.runs.registry import AGENTS, split_label
 from sdnn.runs.store import ResultStore
 
 SEED = 1

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from sdnn import _core
-from sdnn.pages import Page, Section, Table
+from sdnn.agents.registry import title_of
+from sdnn.pages import Page, Section, Table, plain_number
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.reproduction.claims import (
     ALWAYS,
@@ -27,7 +28,6 @@ from sdnn.reproduction.claims import (
     judge_claims,
 )
 from sdnn.reproduction.cost import SERIES, CostRecord
-from sdnn.runs.registry import title_of
 from sdnn.runs.report import (
     MEASURE_END,
     PERCENT,
@@ -35,7 +35,6 @@ from sdnn.runs.report import (
     format_share,
     measure_cells,
     measures_section,
-    plain_number,
     settings_section,
 )
 from sdnn.runs.results import STEP_MEASURES, CaseResult, records_of

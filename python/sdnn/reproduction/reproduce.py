@@ -7,19 +7,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from sdnn.agents.registry import split_label, title_of
 from sdnn.arguments import one_of, whole
 from sdnn.config import SensorConfig
 from sdnn.files import csv_bytes
 from sdnn.plots import figure_bytes
 from sdnn.reproduction import cost
 from sdnn.reproduction.cases import (
+    COST,
     EXPERIMENTS,
     MOST_EPISODES,
     PAPER_EPISODES,
     PAPER_TRIALS,
     Case,
     Experiment,
-    includes_cost,
     select_experiments,
 )
 from sdnn.reproduction.claims import more_trials
@@ -27,7 +28,6 @@ from sdnn.reproduction.cost import CostConfig
 from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.report import Report
 from sdnn.runs.engine import Observer, PlannedTrial
-from sdnn.runs.registry import split_label, title_of
 from sdnn.runs.report import Content
 from sdnn.runs.results import CaseResult
 from sdnn.runs.settings import AgentSpec, BudgetSpec
@@ -89,9 +89,9 @@ class PaperStudy(Study):
         wanted = {pair for one in self.experiments if one.id in asked for pair in one.pairs}
         self.pairs = tuple(pair for pair in self.combinations if pair in wanted)
         self.cost_config = cost.QUICK_COST if quick else CostConfig()
-        self.costs = (
-            cost.planned_costs(self.cost_config, self.agents or None) if includes_cost(word) else {}
-        )
+        self.costs = {}
+        if word in (COST, "all"):
+            self.costs = cost.planned_costs(self.cost_config, self.agents or None)
         if not (self.pairs or self.costs):
             measured = dict.fromkeys(series.agent for series in cost.SERIES)
             raise ValueError(

@@ -13,6 +13,12 @@ from typing import TYPE_CHECKING
 from sdnn.lazy import attach
 
 if TYPE_CHECKING:
+    from sdnn.agents.registry import (
+        AGENTS as AGENTS,
+        AgentEntry as AgentEntry,
+        agent_entry as agent_entry,
+        register as register,
+    )
     from sdnn.runs.dask_executor import DaskExecutor as DaskExecutor
     from sdnn.runs.engine import (
         Executor as Executor,
@@ -31,12 +37,6 @@ if TYPE_CHECKING:
         RunTerminatedError as RunTerminatedError,
         StoreError as StoreError,
         WorkerLostError as WorkerLostError,
-    )
-    from sdnn.runs.registry import (
-        AGENTS as AGENTS,
-        AgentEntry as AgentEntry,
-        agent_entry as agent_entry,
-        register as register,
     )
     from sdnn.runs.results import CaseResult as CaseResult, measure as measure
     from sdnn.runs.run import (

@@ -55,10 +55,10 @@ def groups_of(runs: Sequence[Run]) -> list[Group]:
     for own, same in members.items():
         spec = same[0].spec
         task, agent = [spec.task], [f"{spec.agent.name} {spec.agent.preset or ''}".strip()]
-        rivals = [(dict(s), r[0].spec) for s, r in members.items() if r[0].spec.task == spec.task]
+        alike = [(dict(s), r[0].spec) for s, r in members.items() if r[0].spec.task == spec.task]
         for key, value in own:
             is_of_task = key.partition(".")[0] in _TASK
-            others = (s for s, other in rivals if is_of_task or other.label == spec.label)
+            others = (s for s, other in alike if is_of_task or other.label == spec.label)
             if any(other.get(key) != value for other in others):
                 word = value if key == "goals" else f"{key.rpartition('.')[2]}={value}"
                 (task if is_of_task else agent).append(word)

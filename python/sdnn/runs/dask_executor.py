@@ -195,7 +195,7 @@ class _Run:
         self.waiting = deque((one, 1) for one in planned)  # with the number of the submission
         self.placed: dict[str, _Placed] = {}  # by key
         self.threads: dict[str, int] = {}  # of the workers that fit
-        self.refused: dict[str, str] = {}  # why others do not
+        self.problems: dict[str, str] = {}  # why workers get no trials; "" where they fit
         self.unserved_since: float | None = None
 
     def messages(self, stop: Event) -> Generator[Message, None, None]:
@@ -228,21 +228,20 @@ class _Run:
         """Admit new workers that fit, and take back what waits for lost ones only."""
         client = self.client
         threads = client.sync(client.scheduler.ncores, callback_timeout=ANSWER_SECONDS)
-        self.threads = {one: n for one, n in threads.items() if one in self.threads}
-        self.refused = {one: why for one, why in self.refused.items() if one in threads}
-        new = [one for one in threads if one not in {*self.threads, *self.refused}]
-        given = {"version": _core.__version__, "probes": self.probes}
+        self.problems = {one: why for one, why in self.problems.items() if one in threads}
         answers: dict[str, Any] = {}
-        if new:
+        if new := [one for one in threads if one not in self.problems]:
+            given = {"version": _core.__version__, "probes": self.probes}
             answers = client.run(eval, MISMATCH, given, workers=new, on_error="return")
         for worker, answer in answers.items():
-            if answer == "":
-                self.threads[worker] = threads[worker]
-            elif not isinstance(answer, OSError):  # else it was lost meanwhile
-                if isinstance(answer, BaseException):
-                    answer = f"it cannot run these trials: {type(answer).__name__}: {answer}"
-                self.refused[worker] = f"worker {worker} was refused, {answer}"
-                yield Noted(self.refused[worker])
+            if isinstance(answer, OSError):  # it was lost meanwhile
+                continue
+            if isinstance(answer, BaseException):
+                answer = f"it cannot run these trials: {type(answer).__name__}: {answer}"
+            self.problems[worker] = answer and f"worker {worker} was refused, {answer}"
+            if answer:
+                yield Noted(self.problems[worker])
+        self.threads = {one: n for one, n in threads.items() if self.problems.get(one) == ""}
         for key, (trial, n, workers, future) in list(self.placed.items()):
             if workers.isdisjoint(self.threads):
                 del self.placed[key]
@@ -258,7 +257,7 @@ class _Run:
             self.unserved_since = time.monotonic()
             yield Noted(f"waiting for workers at {scheduler}")
         elif time.monotonic() - self.unserved_since > seconds:
-            fits = f" fits: {'; '.join(self.refused.values())}" if self.refused else ""
+            fits = f" fits: {'; '.join(self.problems.values())}" if self.problems else ""
             raise self.executor.failure(f"no worker at {scheduler}{fits}; waited {seconds:g} s")
 
     def place(self, planned: PlannedTrial, n: int) -> _Placed:

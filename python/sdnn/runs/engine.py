@@ -21,11 +21,11 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from sdnn.agents.registry import title_of
 from sdnn.arguments import shown, whole
 from sdnn.interrupts import Interrupts
 from sdnn.machine import instruction_set, n_cores
 from sdnn.progress import ProgressBars
-from sdnn.runs.registry import title_of
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrainingTrial, Trial, TrialKey, TrialRecord, opened, rows_of

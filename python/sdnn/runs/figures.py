@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.agents.registry import labels, title_of
 from sdnn.plots import FAINT, INK, color_of, label, new_figure, style
-from sdnn.runs.registry import labels, title_of
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.results import CaseResult, MeasureName
 from sdnn.statistics import estimate_mean, running_median

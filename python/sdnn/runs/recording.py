@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from importlib.util import find_spec
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from sdnn.agents import UnusableStepError
 from sdnn.agents.evaluation import greedy_episode
-from sdnn.files import whole_file, write_whole
+from sdnn.files import whole_file
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
@@ -24,7 +23,8 @@ from sdnn.runs.spec import RunSpec
 
 SUFFIXES = (".gif", ".mp4")
 
-_PACKAGES = {".gif": ("PIL", "Pillow"), ".mp4": ("imageio_ffmpeg", "imageio-ffmpeg")}
+_PALETTES = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"
+"""A palette for each picture: one for all would keep the pictures of an hour in the memory."""
 
 FRAMES_PER_SECOND = 30
 """Rate for environments that give none."""
@@ -56,9 +56,8 @@ def record(
     """
     if path.suffix not in SUFFIXES:
         raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
-    module, package = _PACKAGES[path.suffix]
-    if find_spec(module) is None:
-        raise RunError(f"{path} needs {package}, which is missing: pip install {package}")
+    if find_spec("imageio_ffmpeg") is None:
+        raise RunError(f"{path} needs imageio-ffmpeg, which is missing: pip install imageio-ffmpeg")
     agent = run.agent()
     root = run.fresh_seed if seed is None else seed
     recording = Recording(agent.is_warming_up)
@@ -78,9 +77,8 @@ def record(
 
         rate = float((env.metadata or {}).get("render_fps") or FRAMES_PER_SECOND)
         path.parent.mkdir(parents=True, exist_ok=True)
-        write = _write_gif if path.suffix == ".gif" else _write_mp4
         try:
-            write(path, frames(), rate)
+            _write(path, frames(), rate)
         except UnusableStepError as error:
             raise RunError(f"{run.spec.task}: {error}") from error
     return recording
@@ -109,46 +107,27 @@ def _filmed(spec: RunSpec) -> gym.Env[Any, Any]:
     return spec.make_env("evaluation_sensor_noise", render_mode="rgb_array_list")
 
 
-def _write_gif(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:
-    from PIL import Image
-
-    shown = min(rate, _FASTEST_GIF)
-
-    def pictures() -> Iterator[Image.Image]:
-        for frame in frames:
-            # Few colors each: an hour's frames in full color would fill the memory.
-            picture = Image.fromarray(frame).quantize(128)
-            yield picture
-        yield from [picture] * round(shown)  # the end stays for a second before it begins anew
-
-    all_pictures = pictures()
-    first = next(all_pictures)
-    content = BytesIO()
-    first.save(
-        content,
-        format="GIF",
-        save_all=True,
-        append_images=all_pictures,
-        duration=round(1000 / shown),
-        loop=0,
-    )
-    write_whole(path, content.getvalue())
-
-
-def _write_mp4(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:
+def _write(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:
     import imageio_ffmpeg
 
+    is_gif = path.suffix == ".gif"
+    options: dict[str, Any] = {"quality": 7, "output_params": ["-f", "mp4"]}
+    if is_gif:
+        rate = min(rate, _FASTEST_GIF)
+        end = str(round(100 / rate) + 100)  # stays for a second before it begins anew
+        parameters = ["-f", "gif", "-vf", _PALETTES, "-final_delay", end]
+        options = {"codec": "gif", "pix_fmt_out": "pal8", "output_params": parameters}
     with whole_file(path) as file, ExitStack() as stack:
         writer = None
         for frame in frames:
-            # The video's pictures have even sides.
-            even = np.pad(frame, [(0, n % 2) for n in frame.shape[:2]] + [(0, 0)], mode="edge")
+            if not is_gif:  # whose pictures have even sides
+                edges = [(0, n % 2) for n in frame.shape[:2]] + [(0, 0)]
+                frame = np.pad(frame, edges, mode="edge")
             if writer is None:
-                size = (even.shape[1], even.shape[0])
+                size = (frame.shape[1], frame.shape[0])
                 writer = imageio_ffmpeg.write_frames(
-                    file.name, size, fps=rate, macro_block_size=2, quality=7,
-                    output_params=["-f", "mp4"],
-                )  # fmt: skip
+                    file.name, size, fps=rate, macro_block_size=1, **options
+                )
                 stack.enter_context(closing(writer))
                 writer.send(None)
-            writer.send(np.ascontiguousarray(even))
+            writer.send(np.ascontiguousarray(frame))

@@ -14,7 +14,7 @@ import numpy as np
 
 from sdnn import machine
 from sdnn.files import write_whole
-from sdnn.pages import Page, Section
+from sdnn.pages import Page, Section, duration_words, plain_number
 from sdnn.runs.engine import TrialsOutcome
 from sdnn.runs.errors import PlotUnavailableError
 from sdnn.runs.results import MEASURES, RETURN_MEASURES, CaseResult, MeasureName
@@ -161,27 +161,3 @@ def decimals_of(estimate: Estimate, measure: MeasureName) -> int:
         return 1
     extent = float(np.ptp(ends)) or float(np.abs(ends).max()) / 100
     return min(max(1, 1 - math.floor(math.log10(extent))), 300)
-
-
-def plain_number(value: float, decimals: int, sign: str = "") -> str:
-    """Write a number with a given number of decimals at most.
-
-    >>> plain_number(2.50, 2), plain_number(-0.01, 1), plain_number(1234.25, 2, sign="+")
-    ('2.5', '0', '+1,234.25')
-    """
-    rounded = round(value, decimals) or 0.0
-    text = f"{rounded:{sign},.{decimals}f}".rstrip("0").rstrip(".")
-    return text if rounded else "0"
-
-
-def duration_words(seconds: float) -> str:
-    """Write a time for a reader.
-
-    >>> duration_words(61.4), duration_words(3661.4)
-    ('1 min 1 s', '1 h 1 min')
-    """
-    if seconds >= 3600:
-        hours, minutes = divmod(round(seconds / 60), 60)
-        return f"{hours} h {minutes} min"
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

@@ -15,6 +15,14 @@ from msgspec import Meta
 from sdnn.agents import Agent, Preset
 from sdnn.agents.episode import Learner
 from sdnn.agents.q_learning import CodedAgent
+from sdnn.agents.registry import (
+    AGENTS,
+    AgentEntry,
+    agent_entry,
+    default_agent,
+    label_of,
+    split_label,
+)
 from sdnn.arguments import blamed, is_of_class, shown
 from sdnn.config import ProtocolConfig
 from sdnn.environments import (
@@ -28,14 +36,6 @@ from sdnn.environments import (
 )
 from sdnn.runs.environment import EnvironmentSpec, Stream
 from sdnn.runs.errors import ConfigError
-from sdnn.runs.registry import (
-    AGENTS,
-    AgentEntry,
-    agent_entry,
-    default_agent,
-    label_of,
-    split_label,
-)
 from sdnn.runs.settings import (
     SHORTHANDS,
     AgentSpec,
@@ -284,7 +284,8 @@ class RunSpec(Settings, frozen=True):
             limit_bootstraps=self.protocol.limit_bootstraps,
             noisy_evaluations=self.protocol.noisy_evaluations,
         )
-        return entry.core_trial(**parts, protocol=protocol, seed=self.seed)
+        trial: Trial = entry.core_trial(**parts, protocol=protocol, seed=self.seed)
+        return trial
 
     @property
     def length(self) -> int:

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import msgspec
 
+from sdnn.agents.registry import AGENTS
 from sdnn.config import Field, fields_of
-from sdnn.runs.registry import AGENTS
 from sdnn.runs.settings import schemas_of
 from sdnn.runs.spec import ACROBOT, RunSpec
 

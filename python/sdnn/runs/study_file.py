@@ -15,10 +15,10 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from msgspec import Meta
 
+from sdnn.agents.registry import default_agent, labels, split_label
 from sdnn.runs.config_file import ConfigFile
 from sdnn.runs.environment import find_module, search_folder
 from sdnn.runs.errors import ConfigError
-from sdnn.runs.registry import default_agent, labels, split_label
 from sdnn.runs.report import Content
 from sdnn.runs.settings import (
     SHORTHANDS,

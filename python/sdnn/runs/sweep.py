@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
+from sdnn.agents.registry import title_of
 from sdnn.files import csv_pieces, gzip_pieces, remove_abandoned_files
 from sdnn.pages import Page, Section, Table
 from sdnn.plots import figure_bytes
 from sdnn.runs.engine import Executor, Observer, run_trials
 from sdnn.runs.figures import draw_study
-from sdnn.runs.registry import title_of
 from sdnn.runs.report import (
     MEASURE_END,
     PERCENT,
@@ -126,8 +126,7 @@ class Comparison:
 
     def of_case(self, case_id: str) -> tuple[Measured, ...]:
         """List what is measured in a case, in the order of the variants."""
-        pairs = ((case_id, variant.id) for variant in self.study.variants)
-        return tuple(self.measured[pair] for pair in pairs if pair in self.measured)
+        return tuple(one for (case, _), one in self.measured.items() if case == case_id)
 
 
 def compare(study: Study, records: Iterable[TrialRecord]) -> Comparison:
@@ -205,10 +204,8 @@ def study_content(comparison: Comparison, addition: Addition) -> Content | None:
     """Make the report of what is complete of a study that was read from a file."""
     if not comparison.measured:
         return None
-    digest = records_digest(comparison.records)
-    footer = (
-        f"{comparison.study.source}; sdnn {_core.__version__}; digest of the rows {digest[:16]}"
-    )
+    digest, source = records_digest(comparison.records), comparison.study.source
+    footer = f"{source}; sdnn {_core.__version__}; digest of the rows {digest[:16]}"
     png, svg = figure_bytes(draw_study(comparison, footer))
     # Test episodes of variants that are the same come more than once.
     tests = (

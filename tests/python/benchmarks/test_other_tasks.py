@@ -22,7 +22,7 @@ FOLDERS = (BENCH, BENCH / "other_tasks")
 @pytest.fixture(scope="module")
 def scripts():
     """The modules beside the command, whose names and agents are theirs alone while it runs."""
-    from sdnn.runs.registry import AGENTS
+    from sdnn.agents.registry import AGENTS
 
     before, path, agents = set(sys.modules), list(sys.path), dict(AGENTS)
     sys.path[:0] = map(str, FOLDERS)

@@ -844,7 +844,7 @@ def test_other_failures_are_exit_code_1(invoke, monkeypatch):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
     monkeypatch.setattr("sdnn.runs.recording.find_spec", lambda name: None)
     result = invoke("record", "one", "x.gif")
-    assert (result.exit_code, "Pillow" in result.stderr) == (1, True)
+    assert (result.exit_code, "imageio-ffmpeg" in result.stderr) == (1, True)
 
 
 @pytest.mark.parametrize(

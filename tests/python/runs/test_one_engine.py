@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 import sdnn
-from sdnn.runs.registry import AGENTS
+from sdnn.agents.registry import AGENTS
 
 PACKAGE = Path(sdnn.__file__).parent
 

@@ -7,6 +7,7 @@ import pytest
 
 from refusals import refuses
 from sdnn.agents import LINEAR_PRESETS, FuzzyQLearning, RBFQLearning, SDNNQLearning, Training
+from sdnn.agents.registry import AGENTS, agent_entry, register
 from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
 from sdnn.runs import (
     AgentSpec,
@@ -17,7 +18,6 @@ from sdnn.runs import (
     ProtocolSpec,
     RunSpec,
 )
-from sdnn.runs.registry import AGENTS, agent_entry, register
 
 CART_POLE = EnvironmentSpec(id="CartPole-v1")
 

@@ -8,6 +8,7 @@ import pytest
 from refusals import refuses
 from sdnn import _core
 from sdnn.agents import PRESETS
+from sdnn.agents.registry import labels, title_of
 from sdnn.reproduction import Case, case_spec
 from sdnn.runs import (
     AGENTS,
@@ -20,7 +21,6 @@ from sdnn.runs import (
     agent_entry,
     register,
 )
-from sdnn.runs.registry import labels, title_of
 from sdnn.runs.trial import TrainingTrial, TrialRows, training_trial
 
 SEED = 11

@@ -11,28 +11,17 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sdnn import _core
-from sdnn.agents import (
-    LINEAR_PRESETS,
-    PRESETS,
-    FuzzyQLearning,
-    FuzzyQLearningConfig,
-    Preset,
-    QLearningConfig,
-    RBFQLearning,
-    SarsaConfig,
-    SDNNQLearning,
-    SDNNSarsa,
-    Training,
-)
 from sdnn.agents.episode import Learner
+from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
+from sdnn.agents.q_learning import PRESETS, Preset, RBFQLearning, SDNNQLearning
+from sdnn.agents.sarsa import LINEAR_PRESETS, SDNNSarsa
+from sdnn.agents.training import Training
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.arguments import argument_error, shown
-
-if TYPE_CHECKING:
-    from sdnn.runs.trial import Trial
+from sdnn.config import FuzzyQLearningConfig, QLearningConfig, SarsaConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +65,7 @@ class AgentEntry:
     learning: type[Any]
     agent: Callable[..., Learner]
     training: Callable[..., Training] = Training
-    core_trial: Callable[..., Trial] | None = None
+    core_trial: Callable[..., Any] | None = None
     advances_together: bool = False
     table_bytes: Callable[[Any], int] | None = None
     presets: Mapping[str, Preset] = field(default_factory=dict)
