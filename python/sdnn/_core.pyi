@@ -96,7 +96,7 @@ class SDNNCConfig:
     weight_limit : int
         Largest size, in steps of the lattice, of the sum or difference of two weights of a hidden unit: where a correction would exceed it, the unit is not corrected. An agent that learns in C needs 127 or less. 0: 16383, beyond which is an error. Must be in [0, 16383].
     averaging_interval : int
-        Corrections between snapshots of the weights, of which the network keeps an average for greedy actions, or a 64th part of all if that is more. The latest count most; weights take four times the memory. 0, as in the paper: no average. Must be in [0, 1000000000].
+        Corrections between snapshots of the weights, of which the network keeps an average for greedy actions, or a 64th part of all if that is more. The latest count most; weights take three times the memory. 0, as in the paper: no average. Must be in [0, 1000000000].
     max_table_bytes : int
         A larger network (weights, patterns, remembered potentials) is refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
     
@@ -128,7 +128,7 @@ class SDNNCConfig:
     @property
     def averaging_interval(self) -> int:
         """
-        Corrections between snapshots of the weights, of which the network keeps an average for greedy actions, or a 64th part of all if that is more. The latest count most; weights take four times the memory. 0, as in the paper: no average.
+        Corrections between snapshots of the weights, of which the network keeps an average for greedy actions, or a 64th part of all if that is more. The latest count most; weights take three times the memory. 0, as in the paper: no average.
         """
     @property
     def balanced_anchors(self) -> bool:

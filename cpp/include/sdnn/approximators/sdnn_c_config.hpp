@@ -122,7 +122,7 @@ struct SDNNCConfig {
                 "averaging_interval", &SDNNCConfig::averaging_interval,
                 "Corrections between snapshots of the weights, of which the network keeps an "
                 "average for greedy actions, or a 64th part of all if that is more. The latest "
-                "count most; weights take four times the memory. 0, as in the paper: no average.",
+                "count most; weights take three times the memory. 0, as in the paper: no average.",
                 core::within(0, 1000000000)),
             core::field("max_table_bytes", &SDNNCConfig::max_table_bytes,
                         "A larger network (weights, patterns, remembered potentials) is refused "

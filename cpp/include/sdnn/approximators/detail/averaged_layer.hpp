@@ -15,9 +15,8 @@ namespace sdnn::approximators {
 
 namespace detail {
 
-/// value / 2^(kFractionBits + more), halves up.
-inline std::int64_t rounded_average(std::int64_t value, int more) noexcept {
-  const int bits = WeightAverage::kFractionBits + more;
+/// value / 2^bits, halves up.
+inline std::int64_t rounded_average(std::int64_t value, int bits) noexcept {
   return (value + (std::int64_t{1} << (bits - 1))) >> bits;
 }
 
@@ -26,14 +25,16 @@ inline std::int64_t rounded_average(std::int64_t value, int more) noexcept {
 /// The average of a threshold, and of the weight of the unit of x_SD that has these columns; of
 /// this at most `limit`, so that no sum of two leaves a layer's range.
 inline std::int32_t averaged_threshold(const WeightAverage& average, std::size_t unit) noexcept {
-  return static_cast<std::int32_t>(detail::rounded_average(average.threshold(unit), 0));
+  return static_cast<std::int32_t>(
+      detail::rounded_average(average.threshold(unit), WeightAverage::kFractionBits));
 }
 inline std::int32_t averaged_weight(const WeightAverage& average, std::size_t unit,
                                     const PairedColumns& columns, std::int64_t limit) noexcept {
   std::int64_t weight = average.weight(unit, columns.first);
   if (columns.paired) weight += columns.sign * std::int64_t{average.weight(unit, columns.second)};
-  return static_cast<std::int32_t>(
-      std::clamp(detail::rounded_average(weight, columns.paired ? 1 : 0), -limit, limit));
+  return static_cast<std::int32_t>(std::clamp(
+      detail::rounded_average(weight, average.fraction_bits() + (columns.paired ? 1 : 0)), -limit,
+      limit));
 }
 
 /// A layer of averaged weights, which never changes, and the log that caches need of it.

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "sdnn/approximators/hidden_layer.hpp"
@@ -18,8 +19,9 @@ namespace sdnn::approximators {
 /// learned first is forgotten, the swings of late learning cancel each other. A unit's sign is then
 /// that which its potential mostly had, so a value is near the median of what it was. Snapshots are
 /// taken every `interval` corrections, later every n / 64, and move the average by a power of two
-/// of the way, about 8 / n times the corrections in between. All numbers are integers, in units of
-/// 2^-14 steps of the lattice, so equal corrections give equal bits.
+/// of the way, about 8 / n times the corrections in between. All numbers are integers, so equal
+/// corrections give equal bits. Weights have two bytes, of which 14 bits are for fractions of a
+/// step of the lattice, or fewer where one needs more for whole steps.
 ///
 /// Source: Polyak, B., Juditsky, A. (1992). Acceleration of stochastic approximation by averaging;
 /// Shamir, O., Zhang, T. (2013). Stochastic gradient descent for non-smooth optimization, section
@@ -37,7 +39,7 @@ class WeightAverage {
         thresholds_(n_units_) {}
 
   static constexpr double n_bytes(double n_units, double n_columns) noexcept {
-    return n_units * (4.0 * n_columns + 8.0);
+    return n_units * (2.0 * n_columns + 8.0);
   }
 
   /// Number of snapshots in the average; 0: there is none yet.
@@ -54,11 +56,13 @@ class WeightAverage {
   /// Forgets what it is made of: the layer has other weights now.
   void forget(std::uint64_t n_corrections) noexcept {
     n_snapshots_ = 0;
+    fraction_bits_ = kFractionBits;
     due_ = n_corrections + interval_;
   }
 
-  /// The average of a weight and of a threshold, in 2^-14 steps.
-  std::int32_t weight(std::size_t unit, std::size_t column) const noexcept {
+  /// The average of a weight, in 2^-fraction_bits() steps, and of a threshold, in 2^-14 steps.
+  int fraction_bits() const noexcept { return fraction_bits_; }
+  std::int16_t weight(std::size_t unit, std::size_t column) const noexcept {
     return weights_[index(unit, column)];
   }
   std::int64_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
@@ -66,7 +70,7 @@ class WeightAverage {
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
-    std::vector<std::int32_t> weights(self.n_units_ * self.n_columns_);
+    std::vector<std::int16_t> weights(self.n_units_ * self.n_columns_);
     if constexpr (!Archive::kReads) {
       for (std::size_t unit = 0; unit < self.n_units_; ++unit) {
         for (std::size_t j = 0; j < self.n_columns_; ++j) {
@@ -76,13 +80,13 @@ class WeightAverage {
     }
     archive.fixed("weights", {self.n_units_, self.n_columns_}, weights);
     archive.fixed("thresholds", {self.n_units_}, self.thresholds_);
+    archive.number("fraction_bits", self.fraction_bits_);
     archive.number("n_snapshots", self.n_snapshots_);
     archive.number("due", self.due_);
     if constexpr (Archive::kReads) {
-      for (const std::int32_t weight : weights) {
-        archive.expect(weight >= -kLargestWeight && weight <= kLargestWeight, "weights",
-                       "averages of weights");
-      }
+      archive.expect(
+          self.fraction_bits_ >= kFewestFractionBits && self.fraction_bits_ <= kFractionBits,
+          "fraction_bits", "in [1, 14]");
       for (const std::int64_t threshold : self.thresholds_) {
         archive.expect(threshold >= -kLargestThreshold && threshold <= kLargestThreshold,
                        "thresholds", "averages of thresholds");
@@ -97,7 +101,8 @@ class WeightAverage {
 
  private:
   static constexpr int kLogSnapshots = 6;
-  static constexpr std::int32_t kLargestWeight = HiddenLayer::kWeightLimit << kFractionBits;
+  static constexpr int kFewestFractionBits = 1;  // with which every weight fits
+  static_assert(HiddenLayer::kWeightLimit << kFewestFractionBits <= INT16_MAX);
   static constexpr std::int64_t kLargestThreshold = std::int64_t{1} << (30 + kFractionBits);
 
   /// -log2 of what a snapshot counts.
@@ -110,13 +115,11 @@ class WeightAverage {
 
   void add(const HiddenLayer& layer, int shift) {
     const std::int32_t half = shift > 0 ? 1 << (shift - 1) : 0;
-    std::int32_t* average = weights_.data();
+    std::int16_t* average = weights_.data();
     for (std::size_t block = 0; block < layer.n_blocks(); ++block) {
       for (std::size_t column = 0; column < n_columns_; ++column) {
         const auto weights = layer.weights_of(block, column);
-        for (std::size_t i = 0; i < weights.size(); ++i) {
-          average[i] += ((weights[i] << kFractionBits) - average[i] + half) >> shift;
-        }
+        while (!move(average, weights, shift, half)) halve();
         average += weights.size();
       }
     }
@@ -125,6 +128,32 @@ class WeightAverage {
       thresholds_[unit] += (now - thresholds_[unit] + half) >> shift;
     }
     ++n_snapshots_;
+  }
+
+  /// Moves the averages of a block's weights towards these; false, and nothing has moved, if one
+  /// needs more bits.
+  template <class Weights>
+  bool move(std::int16_t* average, const Weights& weights, int shift, std::int32_t half) noexcept {
+    Weights moved;
+    std::int32_t excess = 0;
+    for (std::size_t i = 0; i < moved.size(); ++i) {
+      const std::int32_t before = average[i];
+      moved[i] = before + (((weights[i] << fraction_bits_) - before + half) >> shift);
+      excess |= moved[i] ^ static_cast<std::int16_t>(moved[i]);
+    }
+    if (excess != 0) return false;
+    for (std::size_t i = 0; i < moved.size(); ++i) {
+      average[i] = static_cast<std::int16_t>(moved[i]);
+    }
+    return true;
+  }
+
+  /// Gives one bit of the fractions to the whole steps; halves up.
+  void halve() noexcept {
+    --fraction_bits_;
+    for (std::int16_t& weight : std::span(weights_.data(), weights_.size())) {
+      weight = static_cast<std::int16_t>((weight + 1) >> 1);
+    }
   }
 
   std::size_t index(std::size_t unit, std::size_t column) const noexcept {
@@ -136,7 +165,8 @@ class WeightAverage {
   std::uint64_t interval_;
   std::uint64_t due_;  ///< corrections at the next snapshot
   std::uint64_t n_snapshots_ = 0;
-  core::AlignedBuffer<std::int32_t> weights_;  ///< [block][column][unit in block]
+  int fraction_bits_ = kFractionBits;
+  core::AlignedBuffer<std::int16_t> weights_;  ///< [block][column][unit in block]
   std::vector<std::int64_t> thresholds_;
 };
 
