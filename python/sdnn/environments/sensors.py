@@ -275,3 +275,17 @@ def _ends(name: str, given: ArrayLike | None, bounds: NDArray[Any]) -> NDArray[n
             " variable; values outside saturate"
         )
     return ends
+
+
+def in_own_units(env: Env, low: NDArray[np.float64], high: NDArray[np.float64]) -> Env:
+    """Undo `UnitSensors`, whose ranges are ``low`` to ``high``, (l,), above other sensors.
+
+    What these have appended to the observation has the range [-1, 1].
+    """
+    n_redundant = env.observation_space.shape[0] - low.size  # type: ignore[index]
+    low = np.append(low, np.full(n_redundant, -1.0))
+    high = np.append(high, np.full(n_redundant, 1.0))
+    space = gym.spaces.Box(low.astype(np.float32), high.astype(np.float32))
+    return gym.wrappers.TransformObservation(
+        env, lambda unit: (low + unit * (high - low)).astype(np.float32), space
+    )

@@ -57,6 +57,15 @@ def probe(planned: PlannedTrial) -> str:
         return type(error).__name__
 
 
+def probes_of(planned: Sequence[PlannedTrial]) -> list[tuple[bytes, str]]:
+    """Make probes of the first trial of each kind; ClusterError if one cannot be sent."""
+    kinds = {(one.key.agent, one.spec.is_compiled): one for one in reversed(planned)}
+    try:
+        return [(pickle.dumps(one), probe(one)) for one in kinds.values()]
+    except Exception as error:  # of whatever settings an agent has
+        raise ClusterError(f"trials cannot be sent to workers: {error}") from error
+
+
 def mismatch(version: str, probes: Sequence[tuple[bytes, str]]) -> str:
     """Return why this build gets no trials; nothing if it has the version and gives the probes."""
     if _core.__version__ != version:
@@ -190,8 +199,7 @@ class _Run:
     ) -> None:
         self.executor = executor
         self.client = client
-        kinds = {(one.key.agent, one.spec.is_compiled): one for one in reversed(planned)}
-        self.probes = [(pickle.dumps(one), probe(one)) for one in kinds.values()]
+        self.probes = probes_of(planned)
         self.waiting = deque((one, 1) for one in planned)  # with the number of the submission
         self.placed: dict[str, _Placed] = {}  # by key
         self.threads: dict[str, int] = {}  # of the workers that fit

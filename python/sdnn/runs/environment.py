@@ -20,6 +20,7 @@ from sdnn.agents.scaling import Scaling, neighbours
 from sdnn.arguments import shown
 from sdnn.bounds import flat_bounds
 from sdnn.environments import ActionMasks, NoisySensors, RedundantSensors, UnitSensors
+from sdnn.environments.sensors import in_own_units
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.settings import Settings
 
@@ -138,7 +139,7 @@ class EnvironmentSpec(Settings, frozen=True):
                 env = RedundantSensors(env, [partial(mean_of, *pair) for pair in pairs])
             if self.noise:
                 env = NoisySensors(env, self.noise, edge="saturate", stream=stream)
-            return _in_own_units(env, low, high) if self.own_units else env
+            return in_own_units(env, low, high) if self.own_units else env
         except BaseException:
             env.close()
             raise
@@ -263,18 +264,6 @@ def find_module(name: str) -> None:
     package = name.partition(".")[0]
     if package and package not in sys.modules and importlib.util.find_spec(package) is None:
         sys.path += [folder for folder in _folders if folder not in sys.path]
-
-
-def _in_own_units(
-    env: gym.Env[Any, Any], low: NDArray[np.float64], high: NDArray[np.float64]
-) -> gym.Env[Any, Any]:
-    n_redundant = env.observation_space.shape[0] - low.size  # type: ignore[index]
-    low = np.append(low, np.full(n_redundant, -1.0))
-    high = np.append(high, np.full(n_redundant, 1.0))
-    space = gym.spaces.Box(low.astype(np.float32), high.astype(np.float32))
-    return gym.wrappers.TransformObservation(
-        env, lambda unit: (low + unit * (high - low)).astype(np.float32), space
-    )
 
 
 def render_modes(env: gym.Env[Any, Any]) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from refusals import refuses
 from sdnn.cli import main
 from sdnn.reproduction import EXPERIMENTS, plan_trials
 from sdnn.runs import ClusterError, DaskExecutor
-from sdnn.runs.dask_executor import probe
+from sdnn.runs.dask_executor import probe, probes_of
 
 pytest.importorskip("distributed", reason="needs Dask")
 
@@ -21,6 +21,12 @@ def test_a_probe_depends_on_settings_and_rows():
     first, second = plan_trials(EXPERIMENTS[0].cases, 1, 0, 30)
     assert probe(first) == probe(first) != probe(second)
     assert first.spec.canonical_json() in probe(first)
+
+
+def test_trials_that_cannot_be_sent_are_refused():
+    plan = plan_trials(EXPERIMENTS[0].cases, 1, 0, 30)
+    object.__setattr__(plan[0], "lock", threading.Lock())
+    refuses("lock", probes_of, plan, error=ClusterError)
 
 
 @pytest.fixture
