@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.files import write_whole
+from sdnn.runs.errors import StoreError
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows
 
@@ -139,10 +140,13 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="folder of the store")
     parser.add_argument("--pack", action="store_true", help="write the file")
     given = parser.parse_args()
-    if given.pack:
-        write_whole(given.file, pack(given.folder))
-    else:
-        unpack(given.file.read_bytes(), given.folder)
+    try:
+        if given.pack:
+            write_whole(given.file, pack(given.folder))
+        else:
+            unpack(given.file.read_bytes(), given.folder)
+    except (OSError, ValueError, StoreError) as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":

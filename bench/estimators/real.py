@@ -44,7 +44,9 @@ TABLES = {
     "accuracy": ("score", CLASSIFICATION, CLASSIFIERS),
     "AUC": ("auc", CLASSIFICATION, CLASSIFIERS),
 }
-SHOWN = ("SDNN", "SDNN kernel ridge", "gradient boosting", "random forest", "linear")
+SHOWN = (
+    "SDNN", "SDNN kernel ridge", "gradient boosting", "random forest", "Gaussian process", "linear"
+)  # fmt: skip
 """Models in the page; --full prints all."""
 
 
