@@ -58,27 +58,14 @@ def values_of(config: Any) -> dict[str, Any]:
 
 def _complete(kind: Any) -> None:
     """Make a class of the core a dataclass: for `dataclasses.replace`, `fields` and `asdict`."""
-    fields = fields_of(kind)
-    like = dataclasses.make_dataclass(
-        kind.__name__,
-        [(field.name, field.type, dataclasses.field(default=field.default)) for field in fields],
-        init=False,
-        repr=False,
-        eq=False,
-        kw_only=True,
-    )
+    fields = [
+        (field.name, field.type, dataclasses.field(default=field.default))
+        for field in fields_of(kind)
+    ]
+    like = dataclasses.make_dataclass(kind.__name__, fields, repr=False, eq=False, kw_only=True)
     kind.__dataclass_fields__ = vars(like)["__dataclass_fields__"]
     kind.__annotations__ = like.__annotations__
-    parameters = [
-        inspect.Parameter(
-            field.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=field.default,
-            annotation=field.type,
-        )
-        for field in fields
-    ]
-    kind.__signature__ = inspect.Signature(parameters)
+    kind.__signature__ = inspect.signature(like).replace(return_annotation=inspect.Signature.empty)
 
 
 (WARM_UP,) = fields_of(Controller)

@@ -431,7 +431,7 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
         return arrays[name]
 
     def actions(name: str) -> NDArray[Any]:
-        if not _are_actions(agent.action_space, array(name)):
+        if not Actions(agent.action_space).hold(array(name)):
             raise ValueError(f"{path} is damaged: {name} must be actions of {agent.action_space}")
         return arrays[name]
 
@@ -449,19 +449,3 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
         for i, episode in enumerate(saved.present)
     ]
     return agent, msgspec.structs.replace(saved, present=present)
-
-
-def _are_actions(space: Any, values: NDArray[Any]) -> bool:
-    """Return whether the rows of an array are actions of a space; environments need not check."""
-    if isinstance(space, gym.spaces.Discrete):
-        low, high = space.start, space.start + space.n - 1
-    elif isinstance(space, gym.spaces.Box):
-        low, high = space.low, space.high
-    else:
-        low = getattr(space, "start", 0)
-        high = low + getattr(space, "nvec", 2) - 1
-    is_alike = values.dtype.kind == space.dtype.kind or np.can_cast(values.dtype, space.dtype)
-    is_shaped = values.ndim > 0 and values.shape[1:] == space.shape
-    return is_shaped and (
-        len(values) == 0 or (is_alike and bool(((low <= values) & (values <= high)).all()))
-    )

@@ -280,10 +280,9 @@ class Episodes:
         numbers = self._begin_episodes() if None in present else {}
         before = self._before = self._latest
         waiting = self.waiting = [i for i, episode in enumerate(present) if episode is not None]
-        try:
-            actions = self._actions = self.rounds.act(before, self._actions, waiting, self._masks)
-        except ValueError as error:
-            raise self._unusable(error, None) from error
+        actions = self._actions = self._checked(
+            self.rounds.act, before, self._actions, waiting, self._masks
+        )
         for i in waiting:
             episode: Any = present[i]
             episode.n_steps += 1
@@ -293,7 +292,7 @@ class Episodes:
             results = self.results = self._adapter.step(actions)
         except UnusableStepError as error:
             raise self._unusable(error, None) from error
-        self._latest = self._read("next_observation", results.observations)
+        self._latest = self._checked(self.rounds.read, "next_observation", results.observations)
         self._read_masks()
         for i, number in numbers.items():
             if self.present[i] is None:
@@ -347,22 +346,20 @@ class Episodes:
     def _put(self, seen: dict[int, Any]) -> None:
         """Read the observations of all, or some, environments."""
         if len(seen) == self.n_environments:
-            self._latest = self._read("observation", list(seen.values()))
+            self._latest = self._checked(self.rounds.read, "observation", list(seen.values()))
         else:
             for i, first in seen.items():
-                self._latest[i] = self._read("observation", [first])[0]
+                self._latest[i] = self._checked(self.rounds.read, "observation", [first])[0]
         self._read_masks()
 
     def _read_masks(self) -> None:
         if self._adapter.masks is not None:
-            try:
-                self._masks = self.rounds.masks(self._adapter.masks)
-            except ValueError as error:
-                raise self._unusable(error, None) from error
+            self._masks = self._checked(self.rounds.masks, self._adapter.masks)
 
-    def _read(self, name: str, seen: Any) -> Any:
+    def _checked(self, read: Callable[..., Any], *given: Any) -> Any:
+        """Return what a function makes of what an environment gave, or raise that it cannot."""
         try:
-            return self.rounds.read(name, seen)
+            return read(*given)
         except ValueError as error:
             raise self._unusable(error, None) from error
 
@@ -458,7 +455,7 @@ class Episodes:
             ]
             self.results = self._adapter.step(self._actions)
             self._before = self._latest
-            self._latest = self._read("observation", self.results.observations)
+            self._latest = self._checked(self.rounds.read, "observation", self.results.observations)
             self._read_masks()
             ends = zip(self.results.terminated, self.results.truncated, strict=True)
             ended = {i for i, (terminated, truncated) in enumerate(ends) if terminated or truncated}

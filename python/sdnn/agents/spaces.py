@@ -223,6 +223,15 @@ class Actions:
         """Make the elements of the space that have these numbers, one of each row."""
         return numbers.astype(self._dtype).reshape(self._rows)
 
+    def hold(self, rows: NDArray[Any]) -> bool:
+        """Return whether the rows of an array are elements; environments need not check."""
+        if rows.ndim == 0 or rows.shape[1:] != self._rows[1:]:
+            return False
+        is_alike = rows.dtype.kind == self._dtype.kind or np.can_cast(rows.dtype, self._dtype)
+        values = rows.reshape(len(rows), len(self.config.low))
+        are_within = (self.config.low <= values) & (values <= self.config.high)
+        return len(rows) == 0 or (is_alike and bool(are_within.all()))
+
     def mask(self, name: str, mask: Any) -> NDArray[np.uint8] | None:
         """Return which actions are allowed, 1 or 0 for each; ValueError if it is no mask.
 

@@ -39,15 +39,18 @@ KEYS = (
 
 WARMING_UP = "the agent is still warming up: it acts at random and has learned nothing yet"
 
-run_argument = click.argument(
-    "folder", metavar="RUN", type=click.Path(exists=True, file_okay=False, path_type=Path)
-)
+RUN = click.Path(exists=True, file_okay=False, path_type=Path)
+OLD_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+NEW_FILE = click.Path(dir_okay=False, path_type=Path)
+SEED = click.IntRange(min=0, max=2**64 - 1)
+
+run_argument = click.argument("folder", metavar="RUN", type=RUN)
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON.")
 
 seed_option = click.option(
     "--seed",
-    type=click.IntRange(min=0, max=2**64 - 1),
+    type=SEED,
     help="Root of the episodes' seeds.  [default: others than those of the training]",
 )
 

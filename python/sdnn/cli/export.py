@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sdnn.cli.common import (
+    NEW_FILE,
+    SEED,
     json_option,
     json_text,
     named_values,
@@ -39,7 +41,7 @@ _LARGEST = 2**31  # of readings
     "path",
     metavar="FILE",
     required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=NEW_FILE,
     help="A C99 header with the greedy policy, in integers: for small processors.",
 )
 @click.option(
@@ -90,7 +92,7 @@ _LARGEST = 2**31  # of readings
 )
 @click.option(
     "--seed",
-    type=click.IntRange(min=0, max=2**64 - 1),
+    type=SEED,
     help="With --new: root of the agent's random numbers.  [default: 0]",
 )
 @click.option(

@@ -6,21 +6,15 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.common import check_ending, option_words, run_command
+from sdnn.cli.common import NEW_FILE, RUN, check_ending, option_words, run_command
 
 
 @click.command(short_help="Draw the learning curves of runs.")
-@click.argument(
-    "folders",
-    metavar="RUN...",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, file_okay=False, path_type=Path),
-)
+@click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=RUN)
 @click.option(
     "--out",
     metavar="FILE",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=NEW_FILE,
     help="A .png, .svg or .pdf file.  [default: curves.png in RUN, or here for several]",
 )
 def plot(folders: tuple[Path, ...], out: Path | None) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from sdnn.cli.common import (
+    NEW_FILE,
     WARMING_UP,
     check_ending,
     run_argument,
@@ -19,7 +20,7 @@ from sdnn.cli.common import (
 
 @click.command(short_help="Record an episode of a run as .gif or .mp4.")
 @run_argument
-@click.argument("out", metavar="OUT", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("out", metavar="OUT", type=NEW_FILE)
 @seed_option
 @click.option(
     "--steps",

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from sdnn._core import presets
-from sdnn.cli.common import run_or_forecast, trial_options
+from sdnn.cli.common import SEED, run_or_forecast, trial_options
 from sdnn.reproduction.cases import MOST_EPISODES, WORDS
 
 
@@ -27,13 +27,7 @@ from sdnn.reproduction.cases import MOST_EPISODES, WORDS
     help="Learning episodes per trial.  [default: 15000, as in the paper]",
 )
 @trial_options
-@click.option(
-    "--seed",
-    type=click.IntRange(min=0, max=2**64 - 1),
-    default=0,
-    show_default=True,
-    help="Root of all seeds.",
-)
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Root of all seeds.")
 @click.option(
     "--quick",
     is_flag=True,

@@ -6,13 +6,7 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.common import (
-    json_option,
-    run_argument,
-    run_command,
-    train_run,
-    words_of_run,
-)
+from sdnn.cli.common import json_option, run_argument, run_command, train_run, words_of_run
 
 
 @click.command(short_help="Resume a run from its last checkpoint.")

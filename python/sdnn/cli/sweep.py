@@ -8,21 +8,17 @@ from typing import Any
 
 import click
 
-from sdnn.cli.common import run_or_forecast, trial_options
+from sdnn.cli.common import OLD_FILE, SEED, run_or_forecast, trial_options
 
 
 @click.command(short_help="Run a study: variants of any setting, trial by trial.")
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("file", type=OLD_FILE)
 @click.option(
     "--trials",
     type=click.IntRange(1, 100_000),
     help="Trials per case and variant, instead of the file's.",
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(min=0, max=2**64 - 1),
-    help="Root of all seeds, instead of the file's.",
-)
+@click.option("--seed", type=SEED, help="Root of all seeds, instead of the file's.")
 @trial_options
 @click.option(
     "--only", metavar="VARIANT", multiple=True, help="Run this variant only; may be repeated."

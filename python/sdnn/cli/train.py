@@ -12,6 +12,7 @@ import click
 
 from sdnn.cli.common import (
     KEYS,
+    OLD_FILE,
     json_option,
     named_values,
     option_of,
@@ -95,7 +96,7 @@ def given_values(options: dict[str, Any]) -> dict[str, Any]:
     "--config",
     "file",
     metavar="FILE",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=OLD_FILE,
     help="A specification in TOML, or another run's config.json; options override it.",
 )
 @click.option(

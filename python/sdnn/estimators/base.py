@@ -16,14 +16,7 @@ from sklearn.utils._param_validation import Interval
 
 from sdnn import _core
 from sdnn.estimators.fitted import Fitted
-from sdnn.estimators.inputs import (
-    Array,
-    CodedInputs,
-    Floats,
-    Ints,
-    Pairs,
-    input_pairs,
-)
+from sdnn.estimators.inputs import Array, CodedInputs, Floats, Ints, Pairs, input_pairs
 from sdnn.estimators.network import (
     FEW_SAMPLES,
     Network,

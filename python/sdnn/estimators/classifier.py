@@ -9,10 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import ClassifierMixin
 from sklearn.utils.metaestimators import available_if
-from sklearn.utils.multiclass import (
-    _ovr_decision_function,
-    unique_labels,
-)
+from sklearn.utils.multiclass import _ovr_decision_function, unique_labels
 
 from sdnn import _core
 from sdnn.arguments import require, shown
