@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -182,7 +183,7 @@ def _check_together(source: Path | None, new: bool, options: dict[str, Any]) -> 
 
 def _known_agent(source: Path) -> Agent[Any, Any]:
     from sdnn.agents import load_agent
-    from sdnn.runs.config_file import read_spec
+    from sdnn.runs.config_file import ConfigFile
     from sdnn.runs.errors import ConfigError
     from sdnn.runs.run import CONFIG, agent_of
 
@@ -190,11 +191,12 @@ def _known_agent(source: Path) -> Agent[Any, Any]:
         agent = agent_of(source) if source.is_dir() else load_agent(source)
     except ValueError as error:
         raise click.ClickException(str(error)) from error
-    try:
-        environment = read_spec(source / CONFIG).environment if source.is_dir() else None
-    except ConfigError:  # of a damaged file, which the agent does not need
-        environment = None
-    if environment is not None and environment.action_masks:
+    environment: Any = None
+    if source.is_dir():
+        with suppress(ConfigError):  # of a damaged file, which the agent does not need
+            # No specification is made of it: that would import what it names.
+            environment = ConfigFile.read(source / CONFIG).values.get("environment")
+    if isinstance(environment, dict) and environment.get("action_masks"):
         raise click.ClickException(
             f"{source} was trained with environment.action_masks, which no C header has: it would"
             " take actions that are not allowed. Train without masks, with a reward that punishes"
