@@ -77,6 +77,15 @@ def test_learning_compiles_for_microcontrollers(name, kind, needs, tmp_path):
     assert called <= wide
 
 
+@pytest.mark.parametrize("name", LEARNERS)
+def test_learning_compiles_where_int_has_16_bits(name, needs, tmp_path):
+    needs("clang")
+    (tmp_path / "agent.h").write_text(c_header(LEARNERS[name](), "agent", learning=True).text)
+    (tmp_path / "agent.c").write_text('#include "agent.h"\n')
+    options = (*STRICT, "-ffreestanding", "-Wno-unused-function", "--target=msp430")
+    run("clang", *options, "-fsyntax-only", tmp_path / "agent.c")
+
+
 def test_symbols_are_readings_of_one_and_zero(target, tmp_path):
     check_symbols(target, tmp_path)
 
