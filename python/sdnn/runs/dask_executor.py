@@ -157,11 +157,9 @@ class DaskExecutor:
             except OSError as error:  # it may come, and its file, too
                 if time.monotonic() > end:
                     raise self.failure(f"no scheduler at {self.scheduler}: {error}") from error
-            except (ValueError, LookupError, TypeError, RecursionError) as error:
-                raise ClusterError(
-                    f"scheduler must be an address or a scheduler file, got {self.scheduler}"
-                    f" ({type(error).__name__}: {error})"
-                ) from error
+            except ValueError as error:
+                words = f"an address or a scheduler file, got {self.scheduler} ({error})"
+                raise ClusterError(f"scheduler must be {words}") from error
             if not waits:
                 yield Noted(f"waiting for the scheduler at {self.scheduler}")
             waits = True
@@ -171,9 +169,12 @@ class DaskExecutor:
     def _address(self) -> str:
         """Return the address, from a scheduler file if it is one."""
         path = Path(self.scheduler)
-        if path.suffix == ".json" or path.is_file():
+        if path.suffix != ".json" and not path.is_file():
+            return self.scheduler
+        try:
             return str(json.loads(read_bytes(path, MOST_BYTES))["address"])
-        return self.scheduler
+        except (ValueError, LookupError, TypeError, RecursionError) as error:
+            raise ValueError(f"{path}: {type(error).__name__}: {error}") from error
 
     def failure(self, problem: str) -> ClusterError:
         """Return the error that ends the run."""
