@@ -122,7 +122,7 @@ def test_the_length_scale_is_where_the_correlation_is_one_over_e(half, length_sc
     n_units = 2 * half
     coding = RandomInverse(length_scale=length_scale).fit(UNIT, n_units)
     kept = 1 - 4 * coding.n_flipped / n_units
-    if kept > 0 and coding.size > 20 and length_scale < 1:
+    if kept > 0.5 and coding.size > 20 and length_scale < 1:  # else each step is too coarse
         distance = length_scale * coding.size
         assert abs(kept**distance - np.exp(-1)) < 0.1
 
