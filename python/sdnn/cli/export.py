@@ -116,7 +116,7 @@ def export(
     new: bool,
     **options: Any,
 ) -> None:
-    r"""Write the agent of RUN, a run's folder or an agent's file, in a form for other programs.
+    """Write the agent of RUN, a run's folder or an agent's file, in a form for other programs.
 
     The header observes what the agent did: with --noise or --redundant, variables scaled to [0, 1].
     Its comments name the ranges.
@@ -126,7 +126,7 @@ def export(
     \b
     sdnn export --new --range -2.4:2.4 --range -3:3 --range -0.21:0.21
       --range -3.5:3.5 --actions 2 --c-header pole.h
-    """
+    """  # noqa: D301
     from sdnn.export import c_header
     from sdnn.files import write_whole
 

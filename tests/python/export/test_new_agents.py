@@ -125,6 +125,11 @@ def test_actions_are_numbers_or_ranges(actions, space, export, tmp_path):
     assert (tmp_path / "agent.h").read_text() == c_header(agent, "agent", learning=True).text
 
 
+def test_the_help_has_a_command_in_lines_of_its_own():
+    told = CliRunner().invoke(main, ["export", "--help"]).stdout
+    assert "\n  sdnn export --new --range -2.4:2.4 --range -3:3 --range -0.21:0.21\n" in told
+
+
 @pytest.mark.parametrize(
     ("words", "named"),
     [
