@@ -21,6 +21,7 @@ from threading import Event
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sdnn import _core
+from sdnn.arguments import require
 from sdnn.files import read_bytes
 from sdnn.runs.config_file import MOST_BYTES
 from sdnn.runs.engine import Advanced, Failed, Finished, Message, Noted, PlannedTrial, run_to_end
@@ -115,12 +116,9 @@ class DaskExecutor:
     jobs = 1  # the size of the cluster is not known
 
     def __init__(self, scheduler: str, *, scheduler_timeout: float = 300.0) -> None:
-        if not scheduler:
-            raise ValueError("scheduler must be an address or a scheduler file, got ''")
-        if not 0 < scheduler_timeout < math.inf:
-            raise ValueError(
-                f"scheduler_timeout must be finite and above 0, got {scheduler_timeout}"
-            )
+        require(scheduler, "scheduler", "be an address or a scheduler file", scheduler)
+        is_possible = 0 < scheduler_timeout < math.inf
+        require(is_possible, "scheduler_timeout", "be finite and above 0", scheduler_timeout)
         if importlib.util.find_spec("distributed") is None:
             raise ClusterError('trials on a cluster need Dask: pip install "dask[distributed]"')
         self.scheduler = scheduler
