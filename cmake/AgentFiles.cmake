@@ -1,9 +1,19 @@
 # sdnn::agent_files is sdnn::sdnn and nlohmann/json, which the headers of saved agents include
-# (core/safetensors.hpp, agents/agent_file.hpp): there if that library is.
+# (core/safetensors.hpp, agents/agent_file.hpp): there if that library is. sdnn::saved_agent is the
+# library behind agents/saved_agent.hpp, compiled with the first program that is linked to it.
 find_package(nlohmann_json 3.9 CONFIG QUIET)
 if(TARGET nlohmann_json::nlohmann_json AND NOT TARGET sdnn::agent_files)
   add_library(sdnn::agent_files INTERFACE IMPORTED GLOBAL)
   target_link_libraries(sdnn::agent_files INTERFACE sdnn::sdnn nlohmann_json::nlohmann_json)
+  get_property(sdnn_languages GLOBAL PROPERTY ENABLED_LANGUAGES)
+  if("CXX" IN_LIST sdnn_languages)
+    find_file(sdnn_saved_agent_file saved_agent.cpp NO_CACHE REQUIRED NO_DEFAULT_PATH
+      PATHS "${CMAKE_CURRENT_LIST_DIR}" "${CMAKE_CURRENT_LIST_DIR}/../cpp/compiled")
+    add_library(sdnn_saved_agent STATIC EXCLUDE_FROM_ALL "${sdnn_saved_agent_file}")
+    set_target_properties(sdnn_saved_agent PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    target_link_libraries(sdnn_saved_agent PUBLIC sdnn::sdnn PRIVATE sdnn::agent_files)
+    add_library(sdnn::saved_agent ALIAS sdnn_saved_agent)
+  endif()
 elseif(NOT TARGET nlohmann_json::nlohmann_json AND NOT sdnn_FIND_QUIETLY)
   message(STATUS "sdnn::agent_files is left out: no nlohmann/json (apt install nlohmann-json3-dev)")
 endif()

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "folders.hpp"
+#include "sdnn/agents/saved_agent.hpp"
 #include "states.hpp"
 
 namespace sdnn::agents {
@@ -51,7 +52,8 @@ ControllerConfig rbf() {
   return config;
 }
 
-void live(Controller& controller, int n_steps) {
+template <class Agent>
+void live(Agent& controller, int n_steps) {
   for (int t = 0; t < n_steps; ++t) {
     const Numbers observed{0.1 * (t % 10), 1.0 * (t % 7)}, next{0.1 * ((t + 1) % 10), 1.0};
     const auto taken = controller.act(observed);
@@ -75,6 +77,23 @@ TEST(AgentFile, TheControllerThatIsReadContinuesAsTheOneThatWasWritten) {
       EXPECT_EQ(core::state_of(file.controller), core::state_of(again.controller));
     }
   }
+}
+
+TEST(AgentFile, ASavedAgentIsTheController) {
+  const testing::Folder folder;
+  AgentFile file{Controller(small())};
+  live(file.controller, 10);
+  file.write(folder / "agent");
+  SavedAgent saved(folder / "agent");
+  EXPECT_EQ(saved.n_variables(), 2U);
+  EXPECT_EQ(saved.n_dimensions(), 1U);
+  saved.begin_episode();
+  file.controller.begin_episode();
+  live(saved, 40);
+  live(file.controller, 40);
+  saved.write(folder / "saved");
+  file.write(folder / "agent");
+  EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "saved"));
 }
 
 TEST(AgentFile, SettingsHaveTheNamesAndWordsOfTheConfigurations) {
