@@ -158,12 +158,17 @@ class OneEnvironment(EnvironmentAdapter):
             self.masks = [mask_in(info)]
         return {0: first}
 
-    def step(self, actions: Sequence[Any]) -> StepResults:
-        """Take the only action."""
-        seen, reward, terminated, truncated, info = step_env(self._env, own_copy(actions[0]))
+    def take(self, action: Any) -> tuple[Any, float, bool, bool]:
+        """Take an action; return what a step gives but for the info."""
+        seen, reward, terminated, truncated, info = step_env(self._env, own_copy(action))
         reward, terminated, truncated = checked(reward, terminated, truncated)
         if self.masks is not None:
             self.masks = [None if terminated else mask_in(info)]
+        return seen, reward, terminated, truncated
+
+    def step(self, actions: Sequence[Any]) -> StepResults:
+        """Take the only action."""
+        seen, reward, terminated, truncated = self.take(actions[0])
         listed = seen[np.newaxis] if type(seen) is np.ndarray else [seen]
         return StepResults(listed, [reward], [terminated], [truncated])
 

@@ -44,21 +44,22 @@ class _Listed(EnvironmentAdapter):
         self.masks = [None] * env.num_envs if has_action_masks(env) else None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
-        first = self._of_each(seeds, lambda i: self._adapters[i].reset({0: seeds[i]})[0])
+        first = self._of_each(seeds, lambda one, i: one.reset({0: seeds[i]})[0])
         return dict(zip(seeds, self._converted(first), strict=True))
 
     def step(self, actions: Sequence[Any]) -> StepResults:
-        numbers = range(self.n_environments)
-        results = self._of_each(numbers, lambda i: self._adapters[i].step([actions[i]]))
-        seen, *rest = ([one for (one,) in column] for column in zip(*results, strict=True))
+        made = self._of_each(range(self.n_environments), lambda one, i: one.take(actions[i]))
+        seen, *rest = map(list, zip(*made, strict=True))
         return StepResults(self._converted(seen), *rest)
 
-    def _of_each(self, numbers: Iterable[int], call: Callable[[int], Any]) -> list[Any]:
+    def _of_each(
+        self, numbers: Iterable[int], call: Callable[[OneEnvironment, int], Any]
+    ) -> list[Any]:
         """Return what the call gives of environments; errors name them."""
         made = []
         for i in numbers:
             try:
-                made.append(call(i))
+                made.append(call(self._adapters[i], i))
             except UnusableStepError as error:
                 raise UnusableStepError(f"environment {i}: {error}") from error
         if self.masks is not None:
@@ -68,6 +69,10 @@ class _Listed(EnvironmentAdapter):
     def _converted(self, seen: list[Any]) -> Any:
         """Return observations in the numbers of their space, as the vector itself does."""
         space = self._env.single_observation_space
+        if type(space) is gym.spaces.Box and all(type(one) is np.ndarray for one in seen):
+            rows = np.array(seen)
+            if rows.dtype == space.dtype:
+                return rows
         batch: Any = create_empty_array(space, len(seen))
         return _listed(self._env, concatenate(space, seen, batch))
 
