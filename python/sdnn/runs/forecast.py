@@ -31,16 +31,17 @@ def forecast(study: Study, out: Path, jobs: int) -> dict[str, Any]:
     study.check(stored)
     works: list[dict[str, Any]] = []
     missing: dict[TrialKey, tuple[float, bool]] = {}  # variants that are the same share trials
-    probes: dict[tuple[str, str], tuple[float, int]] = {}
+    probes: dict[tuple[str, str, bool], tuple[float, int]] = {}
     for pair in study.pairs:
         keys, spec = study.keys(*pair), study.combinations[pair].spec
         left = [key for key in keys if key not in stored]
         own = [stored[key] for key in keys if key in stored]
         source = f"{len(own)} stored trial{'s' if len(own) > 1 else ''}"
         if not own:
-            if keys[0][:2] not in probes:
-                probes[keys[0][:2]] = _probe(PlannedTrial(keys[0], spec))
-            rate, n_episodes = probes[keys[0][:2]]
+            kind = (*keys[0][:2], spec.budget.steps is None)  # a rate is by the budget's unit
+            if kind not in probes:
+                probes[kind] = _probe(PlannedTrial(keys[0], spec))
+            rate, n_episodes = probes[kind]
             own, source = [rate * spec.length], f"the first {n_episodes} episodes of one"
         seconds = sum(own) / len(own)
         missing |= dict.fromkeys(left, (seconds, spec.is_compiled))

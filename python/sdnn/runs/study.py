@@ -141,15 +141,14 @@ class Study:
         """Return the name of a file of the report in a folder that others share."""
         return name
 
-    def same_as(self, variant_id: str) -> str | None:
-        """Return the first variant before another one that is the same in every case."""
-
-        def hashes(variant: str) -> list[TrialKey]:
-            return [self.keys(case, name)[0] for case, name in self.combinations if name == variant]
-
-        mine = hashes(variant_id)
-        first = next(variant.id for variant in self.variants if hashes(variant.id) == mine)
-        return None if first == variant_id else first
+    def copies(self) -> dict[str, str]:
+        """Map each variant that is the same as an earlier one in every case to the first such."""
+        hashes: dict[str, list[TrialKey]] = {variant.id: [] for variant in self.variants}
+        for case, variant in self.combinations:
+            hashes[variant].append(self.keys(case, variant)[0])
+        firsts: dict[tuple[TrialKey, ...], str] = {}
+        found = {name: firsts.setdefault(tuple(keys), name) for name, keys in hashes.items()}
+        return {name: first for name, first in found.items() if first != name}
 
     def check(self, stored: Collection[TrialKey] = ()) -> None:
         """Make a trial of every specification once, so that nothing is run that could not be.

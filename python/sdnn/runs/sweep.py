@@ -297,8 +297,8 @@ def _difference(measured: Measured, name: MeasureName) -> str:
 def _measures(comparison: Comparison) -> Section:
     """Explain the measures shown, and which variants are the same."""
     found, study = comparison.measured.values(), comparison.study
-    copies = ((v.id, study.same_as(v.id)) for v in study.variants)
-    notes = [f"The variant {variant} is the same as {first}." for variant, first in copies if first]
+    copies = study.copies().items()
+    notes = [f"The variant {variant} is the same as {first}." for variant, first in copies]
     notes += [DIFFERENCE_NOTE] if any(m.differences for m in found) else []
     notes += [SOLVED_NOTE] if any(m.solved_at_end is not None for m in found) else []
     shown = {name for m in found for name in m.result.values}
@@ -307,7 +307,7 @@ def _measures(comparison: Comparison) -> Section:
 
 def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[str, Any]:
     """Return the results as values that JSON can hold; see `CaseResult.to_json`."""
-    study = comparison.study
+    study, copies = comparison.study, comparison.study.copies()
     return {
         "title": study.title,
         "file": study.source,
@@ -318,7 +318,7 @@ def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[
         "digest": digest,
         "cases": [{"id": case.id, "title": case.title} for case in study.cases],
         "variants": [
-            {"id": v.id, "title": v.title, "same_as": study.same_as(v.id)} for v in study.variants
+            {"id": v.id, "title": v.title, "same_as": copies.get(v.id)} for v in study.variants
         ],
         "results": [
             {

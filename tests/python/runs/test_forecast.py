@@ -50,6 +50,27 @@ def test_stored_trials_count_and_else_a_probe(fake, use_trial, study, tmp_path, 
     assert found["seconds"] == pytest.approx(3.0 + 2 * 10.05)
 
 
+def test_goals_in_steps_and_in_episodes_are_probed_apart(study, tmp_path, monkeypatch):
+    def probe(planned):
+        return 3.0 if planned.spec.budget.steps is None else 0.01, 5  # for an episode, a step
+
+    monkeypatch.setattr(forecast, "_probe", probe)
+    mine = study("""
+    [study]
+    trials = 1
+    [base]
+    environment = "CartPole-v1"
+    [variants.episodes]
+    budget.episodes = 100
+    protocol.evaluate_every_episodes = 50
+    [variants.steps]
+    budget.steps = 20000
+    protocol.evaluate_every = 10000
+    """)
+    found = forecast.forecast(mine, tmp_path / "out", 1)
+    assert [one["seconds_of_a_trial"] for one in found["trials"]] == [300.0, 200.0]
+
+
 def test_python_trials_share_a_core(monkeypatch):
     monkeypatch.setattr(forecast, "n_cores", lambda: 16)
     compiled, locked = (8.0, True), (4.0, False)

@@ -137,9 +137,7 @@ def test_axes_vary_one_key_at_a_time(study):
     assert of_s6["tie_rule=middle"].learning.tie_rule == "middle"
     assert of_s6["noise=0.01"].sensors.noise == 0.01
     assert of_s6["scale=50"] == of_s6["base"].replace(goal=replace(of_s6["base"].goal, scale=50.0))
-    assert found.same_as("tie_rule=uniform") == "base"
-    assert found.same_as("tie_rule=middle") is None
-    assert found.same_as("base") is None
+    assert found.copies() == {"tie_rule=uniform": "base"}
     assert len(found.plan()) == 2 * 3 * 5  # what is the same is run once
 
 
@@ -234,7 +232,7 @@ def test_a_variant_runs_only_in_its_cases(study):
     assert set(configs(found)) == {("s4", "a"), ("s4-noise", "a"), ("s6", "a"), ("s6", "b")}
     assert len(found.plan()) == 8
     assert {p.key.case_id for p in study(text, only=["b"]).plan()} == {"s6"}
-    assert found.same_as("b") is None
+    assert found.copies() == {}
 
 
 PLUGIN = """
