@@ -69,6 +69,8 @@ class _Listed(EnvironmentAdapter):
     def _converted(self, seen: list[Any]) -> Any:
         """Return observations in the numbers of their space, as the vector itself does."""
         space = self._env.single_observation_space
+        if any(np.shape(one) != space.shape for one in seen if type(one) is np.ndarray):
+            return seen  # the agent refuses them by name
         if type(space) is gym.spaces.Box and all(type(one) is np.ndarray for one in seen):
             rows = np.array(seen)
             if rows.dtype == space.dtype:

@@ -298,7 +298,8 @@ class CodedInputs(BaseEstimator):
 
     @property
     def _parameter_constraints(self) -> dict[str, list[Any]]:
-        return {one.name: one.metadata["constraints"] for one in dataclasses.fields(self)}
+        declared = [one for one in dataclasses.fields(self) if "constraints" in one.metadata]
+        return {one.name: one.metadata["constraints"] for one in declared}
 
     def set_params(self: Self, **params: Any) -> Self:
         """Set parameters; ``coding__length_scale`` and the like replace fields of codings.

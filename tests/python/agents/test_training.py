@@ -209,6 +209,9 @@ def test_of_several_environments_the_one_is_told_that_cannot_be_learned_from():
     envs = gym.vector.SyncVectorEnv([Corridor, lambda: Broken(reward=np.nan)])
     with pytest.raises(UnusableStepError, match=r"environment 1\b.*\breward\b"):
         corridor_agent().train(envs, steps=40)
+    envs = gym.vector.SyncVectorEnv([Corridor, lambda: Broken(seen=np.zeros(2))])
+    with pytest.raises(UnusableStepError, match="next_observation must have shape"):
+        corridor_agent().train(envs, steps=40)
 
 
 def test_a_reward_that_would_leave_the_range_of_weights_is_told_with_its_place():

@@ -1,5 +1,6 @@
 """The estimators keep scikit-learn's rules."""
 
+import dataclasses
 import pickle
 import subprocess
 import sys
@@ -183,6 +184,15 @@ def test_every_parameter_is_checked_and_named(kind):
             if hasattr(kind, "learn_one"):
                 options = {"classes": [0, 1]} if kind is SDNNClassifier else {}
                 refuses(name, kind(**{name: bad}).learn_one, X[0], 1, **options)
+
+
+def test_subclasses_may_have_parameters_and_defaults_of_their_own():
+    @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
+    class Mine(SDNNRegressor):
+        correction_share: float = 0.5
+        note: str = ""
+
+    assert clone(Mine(**SMALL, note="x")).fit(X, Y).note == "x"
 
 
 def test_output_ranges_are_checked():
