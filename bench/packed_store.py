@@ -145,7 +145,7 @@ def main() -> None:
             write_whole(given.file, pack(given.folder))
         else:
             unpack(given.file.read_bytes(), given.folder)
-    except (OSError, ValueError, StoreError, sqlite3.Error) as error:
+    except (OSError, ValueError, lzma.LZMAError, StoreError, sqlite3.Error) as error:
         parser.error(str(error))
 
 

@@ -43,7 +43,8 @@ def new_agent(
         See `Agent`. Every range must be finite, or given as ``observation_range``.
     kind : {"sdnn-linear", "sdnn-c"}
     ram_bytes : int, optional
-        Most bytes that the agent may take in C; by default 20,000, or 60,000 for ``"sdnn-c"``.
+        Most bytes that the agent may take in C; by default 20,000, or 60,000 for ``"sdnn-c"``, and
+        whatever it takes for a given number of ``n_pattern_units`` of the linear agent.
     approximator : LinearSDNNConfig or SDNNCConfig, optional
         The linear agent gets as many ``n_pattern_units`` as fit, 32 to 768, unless there is a
         number of them. SDNN-C gets the units given, by default those of its preset ``small``, or
@@ -81,14 +82,14 @@ def new_agent(
         return c_header(made(size), "agent", learning=True).ram_bytes
 
     sizes = _sizes(config)
-    if len(sizes) == 1:
+    if len(sizes) == 1 and ram_bytes is None:
         return made(config)
     n_fitting = bisect_right(sizes, most, key=needed)
     if n_fitting == 0:
         raise argument_error(
             "ram_bytes",
             f"must be at least {needed(sizes[0])} for these spaces, got {most}: with fewer"
-            " variables, actions or max_pairs an agent needs less",
+            " variables, actions, units or max_pairs an agent needs less",
         )
     return made(sizes[n_fitting - 1])
 
@@ -113,9 +114,9 @@ def _sizes(config: Any) -> Sequence[Any]:
     return [
         replace(
             config,
-            n_pattern_units=config.n_pattern_units * m // 8,
-            n_hidden_units=config.n_hidden_units * n // 12,
-            n_active_units=config.n_active_units * n // 12,
+            n_pattern_units=max(2, config.n_pattern_units * m // 8),
+            n_hidden_units=max(1, config.n_hidden_units * n // 12),
+            n_active_units=max(1, config.n_active_units * n // 12),
         )
         for m, n in parts
     ]

@@ -58,9 +58,16 @@ def test_a_network_is_as_large_as_given_and_learns_at_once():
     assert "first_weights" not in c_header(agent, "agent", learning=True).text  # drawn on the chip
 
 
+def test_a_network_may_have_few_units():
+    few = {"n_pattern_units": 4, "n_hidden_units": 8, "n_active_units": 3}
+    config = SDNNCConfig(**few, averaging_interval=0, weight_limit=127)
+    agent = new_agent(SPACE, TWO, kind="sdnn-c", ram_bytes=10**6, approximator=config)
+    assert agent.approximator.n_active_units == 3
+
+
 def test_an_agent_keeps_what_is_given():
     config = LinearSDNNConfig(n_pattern_units=100, averaging_interval=0)
-    agent = new_agent(SPACE, TWO, ram_bytes=10, approximator=config, angles=[1], seed=5)
+    agent = new_agent(SPACE, TWO, approximator=config, angles=[1], seed=5)
     assert (agent.approximator.n_pattern_units, agent.seed) == (100, 5)
     assert [(kind, list(at)) for kind, at in agent.inputs] == [("variable", [0]), ("circular", [1])]
 
@@ -69,6 +76,8 @@ def test_what_does_not_fit_or_has_no_range_is_refused():
     refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=1000)
     refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=1.5)
     refuses("ram_bytes", new_agent, SPACE, TWO, kind="sdnn-c", ram_bytes=5000)
+    larger = LinearSDNNConfig(n_pattern_units=512)
+    refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=20_000, approximator=larger)
     refuses("kind", new_agent, SPACE, TWO, kind="rbf")
     for kind, config in (("sdnn-linear", SDNNCConfig()), ("sdnn-c", LinearSDNNConfig())):
         given = {"kind": kind, "approximator": config}
