@@ -262,7 +262,7 @@ def statistics_of(wrappers: Sequence[Any]) -> list[Statistics]:
 
 
 def take_statistics(wrappers: Sequence[Any], learned: Sequence[Statistics]) -> bool:
-    """Give each wrapper what one of its name has learned, in order; whether all have got theirs."""
+    """Give each wrapper, in order, what one of its name has learned; return whether all match."""
     left = list(learned)
     for wrapper in wrappers:
         own = next((one for one in left if _fits(wrapper, one)), None)

@@ -190,6 +190,7 @@ class Agent(BaseAgent[Approximator, Learning]):
         several = unbatched(self.observation_space, observation)
         if several is None:
             return self._masked_action(observation, explore, action_masks), None
+        require(len(several) > 0, "observation", "be at least one", observation)
         masks = [None] * len(several) if action_masks is None else action_masks
         are_as_many = hasattr(masks, "__len__") and len(masks) == len(several)
         expected = f"be one for each of {len(several)} observations"

@@ -1,4 +1,4 @@
-"""What all agents are made of, and the files of agents and trainings."""
+"""The settings and the state of all agents, and the files of agents and trainings."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ _Period = Annotated[int, msgspec.Meta(ge=1, le=2**53)]
 
 
 class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
-    """The half of `Agent` that knows what it is made of and what it has become."""
+    """The settings and the state of an agent, and its files; `Agent` adds acting and learning."""
 
     kind: ClassVar[str]
     """The word for this approximator and learning rule in files."""

@@ -224,7 +224,7 @@ class Actions:
         return numbers.astype(self._dtype).reshape(self._rows)
 
     def hold(self, rows: NDArray[Any]) -> bool:
-        """Return whether the rows of an array are elements; environments need not check."""
+        """Return whether all rows of an array are elements: environments may not check them."""
         if rows.ndim == 0 or rows.shape[1:] != self._rows[1:]:
             return False
         is_alike = rows.dtype.kind == self._dtype.kind or np.can_cast(rows.dtype, self._dtype)

@@ -55,7 +55,7 @@ class _Listed(EnvironmentAdapter):
     def _of_each(
         self, numbers: Iterable[int], call: Callable[[OneEnvironment, int], Any]
     ) -> list[Any]:
-        """Return what the call gives of environments; errors name them."""
+        """Return the result of the call for each environment; errors name the environment."""
         made = []
         for i in numbers:
             try:

@@ -120,7 +120,7 @@ class Noted(NamedTuple):
 
 
 class Counted(NamedTuple):
-    """How much of something else than trials is done, such as of measurements."""
+    """Progress of other work than trials, such as measurements."""
 
     title: str
     done: int
@@ -134,7 +134,7 @@ Observer = Callable[[Message], None]
 
 
 class TrialBars(ProgressBars):
-    """An observer with a bar for each trial, one for all, and one for what else is counted."""
+    """An observer with a bar for each trial, one for all, and one for other work."""
 
     _n_open = 0
 

@@ -44,7 +44,7 @@ class WrittenReport:
 
 @dataclass(frozen=True, kw_only=True)
 class Content:
-    """What is to be written of trials: the page, its table, and files by their names.
+    """A report to be written: its page, its table, and files by their names.
 
     ``shown`` are the trials that it is of.
     """

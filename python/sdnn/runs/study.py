@@ -127,10 +127,10 @@ class Study:
         return tuple({one.key: one for trials in rounds for one in trials}.values())
 
     def measure(self, store: ResultStore, observe: Observer) -> None:
-        """Measure and store what else than trials is asked for."""
+        """Measure and store what is asked for besides trials."""
 
     def other_work(self, out: Path) -> dict[str, Any]:
-        """Count what else than trials is asked for, as values that JSON can hold."""
+        """Count what is asked for besides trials, as values that JSON can hold."""
         return {}
 
     def report(self, comparison: Comparison, store: ResultStore) -> Content | None:

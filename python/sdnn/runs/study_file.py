@@ -152,7 +152,7 @@ class StudyFile(Study):
         self.pairs = tuple(pair for pair in self.pairs if not only or pair[1] in only)
 
     def additions(self, comparison: Comparison) -> Addition:
-        """Make what else the report has."""
+        """Make the additions to the report."""
         return (), {}
 
     def report(self, comparison: Comparison, store: ResultStore) -> Content | None:

@@ -197,7 +197,7 @@ def run_study(
 
 
 Addition: TypeAlias = tuple[Sequence[Section], Mapping[str, Any]]
-"""What else a report has, such as verdicts: sections of the page, and values of the JSON."""
+"""Additions to a report, such as verdicts: sections of the page, and values of the JSON."""
 
 
 def study_content(comparison: Comparison, addition: Addition) -> Content | None:

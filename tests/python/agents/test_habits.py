@@ -33,6 +33,7 @@ def test_predict_takes_one_observation_or_several(trained):
     assert agent.predict(several[0])[0] == actions[0]
     assert agent.predict(several[0], deterministic=False)[0] in env.action_space
     refuses("deterministic", agent.predict, several[0], deterministic="yes", error=TypeError)
+    refuses("observation", agent.predict, several[:0])
 
 
 def test_predict_of_listed_states_and_of_boxes():
