@@ -171,7 +171,11 @@ def _new_file(path: Path) -> BinaryIO:
     """Create the partial file, locked while it is open: it does not count as abandoned."""
     while True:
         name = f"{path.name}.{secrets.token_hex(8)}{PARTIAL_SUFFIX}"
-        file = path.with_name(name).open("xb")  # O_EXCL, which follows no link
+        try:
+            file = path.with_name(name).open("xb")  # O_EXCL, which follows no link
+        except OSError as error:
+            error.filename = str(path)  # the one that the caller knows
+            raise
         # Another process may have removed it before it was locked.
         if lock(file.fileno()) is not False and os.path.exists(file.name):
             return file

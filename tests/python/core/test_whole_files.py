@@ -191,3 +191,9 @@ def test_a_full_disk_names_the_file(tmp_path, monkeypatch):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no such device here")
 def test_a_full_device_is_named():
     refuses("/dev/full", write_whole, Path("/dev/full"), b"much", error=OSError)
+
+
+def test_a_file_that_cannot_be_made_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError) as refused:
+        write_whole(tmp_path / "none" / "out.txt", b"x")
+    assert refused.value.filename == str(tmp_path / "none" / "out.txt")
