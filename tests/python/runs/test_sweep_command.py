@@ -174,12 +174,12 @@ def test_dry_run_counts_and_estimates_without_making_a_file(invoke, tmp_path):
     assert lines[0].startswith(
         "s4 base: 2 trials x 300 episodes of sdnn-c, 0 of them stored in results; a trial takes"
     )
-    assert "(by the first 300 episodes of one)" in lines[0]
+    assert "(from the first 300 episodes of one)" in lines[0]
     assert lines[-1].startswith("in all 8 trials, 0 of them stored; the rest takes about")
     invoke("sweep", "mine.toml", "--trials", 1)
     lines = invoke("sweep", "mine.toml", "--dry-run").stdout.splitlines()
     assert "1 of them stored in results" in lines[0]
-    assert "(by 1 stored trial)" in lines[0]
+    assert "(from 1 stored trial)" in lines[0]
     found = json.loads(invoke("sweep", "mine.toml", "--dry-run", "--json", "--jobs", 3).stdout)
     assert (found["planned"], found["stored"], found["jobs"]) == (8, 4, 3)
     assert len(found["trials"]) == 6
