@@ -73,7 +73,9 @@ def new_agent(
     config = given["approximator"] if approximator is None else approximator
     if not isinstance(config, agent_type.approximator_type):
         expected = agent_type.approximator_type.__name__
-        raise TypeError(f"approximator must be a {expected} for {kind}, got {shown(config)}")
+        raise TypeError(
+            f"approximator must have the type {expected} for {kind}, got {shown(config)}"
+        )
 
     def made(size: Any) -> SDNNSarsa | SDNNQLearning:
         return agent_type(observation_space, action_space, **{**given, "approximator": size})

@@ -281,7 +281,13 @@ def ended(placed: _Placed, result: Any) -> Message:
     from distributed import KilledWorker
 
     if placed.future.status == "finished":
-        return Finished(placed.planned, result)
+        planned = placed.planned
+        given = (result.version, result.key, result.config)
+        if given != (_core.__version__, planned.key, planned.spec.canonical_json()):
+            # Its worker began anew, with other code, after it had been admitted.
+            words = f"its worker's sdnn {result.version} ran other settings than were asked for"
+            return Failed(planned, ClusterError(words))
+        return Finished(planned, result)
     if placed.future.status != "error":
         raise OSError("it does not know the trials any more")
     error = result[1]

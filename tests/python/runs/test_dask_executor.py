@@ -1,9 +1,11 @@
 """What `DaskExecutor` and its options refuse without a cluster; tests/cluster has the others."""
 
+import dataclasses
 import importlib.util
 import os
 import socket
 import threading
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
@@ -12,7 +14,8 @@ from refusals import refuses
 from sdnn.cli import main
 from sdnn.reproduction import EXPERIMENTS, plan_trials
 from sdnn.runs import ClusterError, DaskExecutor
-from sdnn.runs.dask_executor import probe, probes_of
+from sdnn.runs.dask_executor import ended, probe, probes_of
+from sdnn.runs.engine import Failed, Finished, run_to_end
 
 pytest.importorskip("distributed", reason="needs Dask")
 
@@ -27,6 +30,23 @@ def test_trials_that_cannot_be_sent_are_refused():
     plan = plan_trials(EXPERIMENTS[0].cases, 1, 0, 30)
     object.__setattr__(plan[0], "lock", threading.Lock())
     refuses("lock", probes_of, plan, error=ClusterError)
+
+
+def test_a_result_of_another_version_or_trial_fails():
+    first, second = plan_trials(EXPERIMENTS[0].cases, 1, 0, 10)
+    record = run_to_end(first, wanted=lambda: True, advanced=lambda episode: None)
+
+    def result_of(planned, record):
+        future = SimpleNamespace(status="finished")
+        return ended(SimpleNamespace(planned=planned, future=future), record)
+
+    assert result_of(first, record) == Finished(first, record)
+    for planned, other in (
+        (second, record),
+        (first, dataclasses.replace(record, version="0.0.1")),
+        (first, dataclasses.replace(record, config="{}")),
+    ):
+        assert isinstance(result_of(planned, other), Failed)
 
 
 @pytest.fixture
