@@ -119,7 +119,12 @@ py::class_<AcrobotTrial<Agent>> def_trial(py::module_& module, const char* name,
           "advance_together",
           [](const py::typing::Tuple<Trial, py::ellipsis>& trials, int n_decisions) {
             std::vector<Trial*> all;
-            for (const py::handle trial : trials) all.push_back(&trial.cast<Trial&>());
+            for (const py::handle trial : trials) {
+              if (!py::isinstance<Trial>(trial)) {
+                throw py::type_error("trials must be trials of one kind of agent");
+              }
+              all.push_back(&trial.cast<Trial&>());
+            }
             const bindings::WithoutGIL unlocked(all);
             Trial::advance_together(all, n_decisions);
           },
