@@ -121,7 +121,9 @@ py::class_<AcrobotTrial<Agent>> def_trial(py::module_& module, const char* name,
             std::vector<Trial*> all;
             for (const py::handle trial : trials) {
               if (!py::isinstance<Trial>(trial)) {
-                throw py::type_error("trials must be trials of one kind of agent");
+                const py::str given(py::type::handle_of(trial).attr("__name__"));
+                throw py::type_error("trials must all have the class of the method, got " +
+                                     std::string(given));
               }
               all.push_back(&trial.cast<Trial&>());
             }

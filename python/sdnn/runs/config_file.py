@@ -14,7 +14,7 @@ import msgspec
 from sdnn.files import read_bytes
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.spec import RunSpec
-from sdnn.tables import TOO_DEEP, KeyPath, deep_key, dotted, line_of, parse_toml
+from sdnn.toml import TOO_DEEP, KeyPath, deep_key, dotted, line_of, parse_toml
 
 FORMAT = "sdnn-run-2"
 """Format of the configuration in a run's folder."""

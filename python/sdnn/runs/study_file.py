@@ -33,7 +33,7 @@ from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.study import Layer, Setting, Study, StudyCase, StudyVariant
 from sdnn.runs.sweep import Addition, Comparison, study_content
-from sdnn.tables import KeyPath, dotted
+from sdnn.toml import KeyPath, dotted
 
 DEFAULT = "default"
 """The variant that others are compared with unless the file names another, if there is one."""

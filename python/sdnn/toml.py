@@ -1,4 +1,4 @@
-"""Tables of TOML and JSON from strangers: parsed within limits, and where their keys are."""
+"""TOML and JSON from strangers: parsed within limits, and where their keys are."""
 
 from __future__ import annotations
 
