@@ -98,6 +98,12 @@ TEST(LinearSDNN, IsWiredAsIfInputsHadBeenAddedAtOnce) {
   EXPECT_TRUE(std::ranges::equal(five.weights(), at_once.weights()));
 }
 
+TEST(LinearSDNN, HasTheSmallestPatternsWithAnyNumberOfInputs) {
+  for (const int n_inputs : {300, 50'000, std::numeric_limits<int>::max()}) {
+    EXPECT_EQ(with_pattern_units({.n_inputs = n_inputs}).n_pattern_units, 64) << n_inputs;
+  }
+}
+
 TEST(LinearSDNN, RefusesCountsThatNoReadoutHas) {
   core::Random random(7, core::Stream::weights);
   LinearSDNN readout(small_readout(2), kThreeAndTwo, 5);

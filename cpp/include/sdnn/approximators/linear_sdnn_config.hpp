@@ -60,10 +60,13 @@ struct LinearSDNNConfig {
 /// by chance, and more columns take more time.
 inline LinearSDNNConfig with_pattern_units(LinearSDNNConfig config) noexcept {
   if (config.n_pattern_units == 0) {
-    const int n_groups = std::max(1, config.n_inputs * coding::n_partners_of(config));
-    const int usual = (3072 / n_groups + 32) / 64 * 64;
-    const int enough = std::min(256, 14336 / n_groups / 64 * 64);
-    config.n_pattern_units = std::clamp(std::max(usual, enough), 64, 768);
+    // Of any number of inputs, impossible ones too: hence 64 bits.
+    const std::int64_t n_partners = coding::n_partners_of(config);
+    const std::int64_t n_groups = std::max<std::int64_t>(1, config.n_inputs * n_partners);
+    const std::int64_t usual = (3072 / n_groups + 32) / 64 * 64;
+    const std::int64_t enough = std::min<std::int64_t>(256, 14336 / n_groups / 64 * 64);
+    config.n_pattern_units =
+        static_cast<int>(std::clamp<std::int64_t>(std::max(usual, enough), 64, 768));
   }
   return config;
 }
