@@ -277,11 +277,17 @@ def run_or_forecast(
 
         with TrialBars(Console(stderr=True)) as observer:
             done = run_study(study, out, executor=executor, observer=observer)
-    _print_report(context, done, out, as_json=as_json, full=full)
+    _print_report(context, study, done, out, as_json=as_json, full=full)
 
 
 def _print_report(
-    context: click.Context, done: WrittenReport, out: Path, *, as_json: bool, full: bool
+    context: click.Context,
+    study: Study,
+    done: WrittenReport,
+    out: Path,
+    *,
+    as_json: bool,
+    full: bool,
 ) -> None:
     """Print the results, what failed and how much is stored."""
     outcome = done.outcome
@@ -289,7 +295,8 @@ def _print_report(
     stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
     for failure in outcome.failures:
         message = f"{type(failure.error).__name__}: {failure.error}"
-        click.echo(f"Error: {failure.planned.title} failed: {message}", err=True)
+        variants = ", ".join(study.variants_of(failure.planned.key))
+        click.echo(f"Error: {failure.planned.title}, of {variants}, failed: {message}", err=True)
     if outcome.interrupted:
         what = "terminated" if outcome.signal == SIGTERM else "interrupted"
         message = f"{what}; {stored}; the same command continues from there"

@@ -118,6 +118,10 @@ class Study:
         """List where the results of the trials of a variant in a case are stored."""
         return tuple(planned.key for planned in self.combinations[case_id, variant_id].trials)
 
+    def variants_of(self, key: TrialKey) -> tuple[str, ...]:
+        """List the ids of the variants that a trial is of."""
+        return tuple(variant for case, variant in self.pairs if key in self.keys(case, variant))
+
     def plan(self) -> tuple[PlannedTrial, ...]:
         """List the trials of `pairs`, each once.
 
