@@ -12,7 +12,7 @@ import math
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import gymnasium as gym
 import msgspec
@@ -23,6 +23,8 @@ from sdnn.arguments import flag, has_methods, reward_of, shown
 
 Seeds: TypeAlias = Mapping[int, int | None]
 Options: TypeAlias = dict[str, Any] | None
+
+_SCALARS = (np.generic, int, float)
 
 _OLD_API = (
     "; an environment of Gym before 0.26 can be wrapped:"
@@ -84,18 +86,6 @@ def step_env(env: Any, action: Any) -> tuple[Any, Any, Any, Any, Any]:
     return made  # type: ignore[return-value]
 
 
-class StepResults(NamedTuple):
-    """The results of a step in every environment, each in an array or a list of all.
-
-    ``observations`` are the last ones of episodes that ended.
-    """
-
-    observations: Any
-    rewards: list[float]
-    terminated: list[bool]
-    truncated: list[bool]
-
-
 def checked(reward: Any, terminated: Any, truncated: Any) -> tuple[float, bool, bool]:
     """Return a finite float and bools; UnusableStepError for something else."""
     try:
@@ -114,19 +104,23 @@ def own_copy(value: Any) -> Any:
     """Copy what others may write to: environments may keep their state, or change an action."""
     if type(value) is np.ndarray:
         return value.copy()
-    return value if isinstance(value, (np.generic, int, float)) else copy.deepcopy(value)
+    return value if isinstance(value, _SCALARS) else copy.deepcopy(value)
 
 
 class EnvironmentAdapter(abc.ABC):
     """The interface of all environments, single and vectorized.
 
     ``can_repeat`` is whether each environment can be reset at any time, with a seed of its own.
-    ``masks`` are those of the actions allowed after the last reset or step in each, None where it
-    has none; None altogether where `has_action_masks` is False.
+    ``rewards``, ``terminated`` and ``truncated`` are those of the last step in each. ``masks`` are
+    those of the actions allowed after the last reset or step in each, None where it has none; None
+    altogether where `has_action_masks` is False.
     """
 
     n_environments: int
     can_repeat: bool
+    rewards: list[float]
+    terminated: list[bool]
+    truncated: list[bool]
     masks: list[Any] | None
 
     @abc.abstractmethod
@@ -137,8 +131,11 @@ class EnvironmentAdapter(abc.ABC):
         """
 
     @abc.abstractmethod
-    def step(self, actions: Sequence[Any]) -> StepResults:
-        """Take an action in each; any one where the episode has not begun."""
+    def step(self, actions: Sequence[Any]) -> Any:
+        """Take an action in each, any one where the episode has not begun.
+
+        Returns what is observed, in an array or a list: the last observations where episodes end.
+        """
 
 
 class OneEnvironment(EnvironmentAdapter):
@@ -149,6 +146,7 @@ class OneEnvironment(EnvironmentAdapter):
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         self._env = env
+        self.rewards, self.terminated, self.truncated = [0.0], [False], [False]
         self.masks = [None] if has_action_masks(env) else None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
@@ -166,11 +164,10 @@ class OneEnvironment(EnvironmentAdapter):
             self.masks = [None if terminated else mask_in(info)]
         return seen, reward, terminated, truncated
 
-    def step(self, actions: Sequence[Any]) -> StepResults:
+    def step(self, actions: Sequence[Any]) -> Any:
         """Take the only action."""
-        seen, reward, terminated, truncated = self.take(actions[0])
-        listed = seen[np.newaxis] if type(seen) is np.ndarray else [seen]
-        return StepResults(listed, [reward], [terminated], [truncated])
+        seen, self.rewards[0], self.terminated[0], self.truncated[0] = self.take(actions[0])
+        return seen[np.newaxis] if type(seen) is np.ndarray else [seen]
 
 
 # Wrappers that learn: they have an attribute ``obs_rms`` or ``return_rms`` with numbers ``mean``,

@@ -14,7 +14,6 @@ from sdnn.agents.adapters import (
     EnvironmentAdapter,
     OneEnvironment,
     Statistics,
-    StepResults,
     UnusableStepError,
     checked,
     learning_wrappers,
@@ -109,12 +108,16 @@ class Rounds:
     def act(
         self, observations: Any, actions: Sequence[Any], environments: list[int], masks: Any = None
     ) -> Any:
-        """Return actions in all environments: new ones in these, the others as they were."""
+        """Return actions as `learn` takes them: new ones in these, the others as they were."""
         taken = list(actions)
         for i in environments:
             mask = {} if masks is None else {"mask": masks[i]}
             taken[i] = self._learner.act(observations[i], **self.places[i], **mask)
         return taken
+
+    def elements(self, actions: Any) -> Any:
+        """Return the elements of the action space that `act` has chosen."""
+        return actions
 
     def learn(
         self,
@@ -152,9 +155,10 @@ class _CoreRounds(Rounds):
         mask: Callable[[str, Any], NDArray[np.uint8] | None],
     ) -> None:
         super().__init__(learner, n_environments)
-        self.progressing, self._act, self._elements = core, core.act_each, elements
+        self.progressing, self._act = core, core.act_each
         self._mask, self._n_actions = mask, sum(core.n_actions)
         self.read = read  # type: ignore[assignment, method-assign]
+        self.elements = elements  # type: ignore[method-assign]
         self.learn = core.learn_each  # type: ignore[method-assign]
 
     def flat(self, observation: Any) -> NDArray[np.float64]:
@@ -170,10 +174,10 @@ class _CoreRounds(Rounds):
     def act(
         self, observations: Any, actions: Sequence[Any], environments: list[int], masks: Any = None
     ) -> Any:
-        taken = self._elements(self._act(observations, environments, masks))
+        taken = self._act(observations, environments, masks)
         if len(environments) < len(taken):
             for i in set(range(len(taken))).difference(environments):
-                taken[i] = actions[i]
+                taken[i] = np.ravel(actions[i])
         return taken
 
 
@@ -230,13 +234,12 @@ class Episodes:
         Of the episode that begins next.
     waiting : list of int
         Environments whose last step is to be learned, in order.
-    results : StepResults
-        Of the last step.
+    adapter : EnvironmentAdapter
+        It has the rewards and ends of the last step.
     wrappers, learned : list
         Those that learn, and what they had learned when the last episode began.
     """
 
-    results: StepResults
     _before: Any  # observations before the last step, and the latest ones
     _latest: Any
     _masks: Any = None  # of the latest observations, where environments have them
@@ -253,14 +256,15 @@ class Episodes:
         self._env, self._seed, self._options = env, seed, options
         self._has_seeds = seed is not None
         self._unusable = unusable
-        self._adapter = _adapter_for(env)
+        self.adapter = _adapter_for(env)
         self.wrappers = learning_wrappers(env)
         self.learned: list[Statistics] = []
-        n = self.n_environments = self._adapter.n_environments
+        n = self.n_environments = self.adapter.n_environments
         self.rounds: Rounds = _rounds_of(learner, n)
         self.next_number = first
         self.present: list[Episode | None] = [None] * n
         self.waiting: list[int] = []
+        self._every = list(range(n))
         self._actions: Any = [None] * n
 
     @property
@@ -270,30 +274,38 @@ class Episodes:
 
     def leave(self) -> None:
         """Begin anew in every environment with the next step, with other seeds."""
-        self._adapter = _adapter_for(self._env)
+        self.adapter = _adapter_for(self._env)
         self.present[:] = [None] * self.n_environments
         self.waiting = []
 
     def advance(self) -> None:
         """Begin episodes where none is present, and take a step in every environment."""
-        present = self.present
-        numbers = self._begin_episodes() if None in present else {}
+        present, numbers = self.present, {}
+        waiting = self.waiting = self._every.copy()
+        if None in present:
+            numbers = self._begin_episodes()
+            waiting[:] = [i for i in waiting if present[i] is not None]
         before = self._before = self._latest
-        waiting = self.waiting = [i for i, episode in enumerate(present) if episode is not None]
-        actions = self._actions = self._checked(
-            self.rounds.act, before, self._actions, waiting, self._masks
-        )
+        try:
+            actions = self._actions = self.rounds.act(before, self._actions, waiting, self._masks)
+        except ValueError as error:
+            raise self._unusable(error, None) from error
+        elements = self.rounds.elements(actions)
         for i in waiting:
             episode: Any = present[i]
             episode.n_steps += 1
             if self._has_seeds:
-                episode.actions.append(actions[i])
+                episode.actions.append(elements[i])
         try:
-            results = self.results = self._adapter.step(actions)
+            seen = self.adapter.step(elements)
         except UnusableStepError as error:
             raise self._unusable(error, None) from error
-        self._latest = self._checked(self.rounds.read, "next_observation", results.observations)
-        self._read_masks()
+        try:
+            self._latest = self.rounds.read("next_observation", seen)
+            if self.adapter.masks is not None:
+                self._masks = self.rounds.masks(self.adapter.masks)
+        except ValueError as error:
+            raise self._unusable(error, None) from error
         for i, number in numbers.items():
             if self.present[i] is None:
                 self.present[i] = Episode(number)
@@ -301,25 +313,24 @@ class Episodes:
 
     def learn_waiting(self, most: int, limit_bootstraps: bool, progress: list[float]) -> list[int]:
         """Learn steps that wait, none after an episode's end; return in which environments."""
-        results, ends = self.results, self.results.terminated
+        rewards, ends, cut = self.adapter.rewards, self.adapter.terminated, self.adapter.truncated
         environments = self.waiting[:most]
         for k, i in enumerate(environments, 1):
-            if ends[i] or results.truncated[i]:
+            if ends[i] or cut[i]:
                 del environments[k:]
         if not limit_bootstraps:
-            ends = [one or other for one, other in zip(ends, results.truncated, strict=True)]
+            ends = [one or other for one, other in zip(ends, cut, strict=True)]
         before, after = self._before, self._latest
         try:
             n = self.rounds.learn(
-                before, self._actions, results.rewards, after, ends, environments, progress,
-                self._masks,
-            )  # fmt: skip
+                before, self._actions, rewards, after, ends, environments, progress, self._masks
+            )
         except (ValueError, OverflowError) as error:
             raise self._unusable(error, environments[0]) from error
-        del self.waiting[:n]
-        for i in environments[:n]:
-            self.present[i].sum_of_rewards += results.rewards[i]  # type: ignore[union-attr]
-        return environments[:n]
+        del self.waiting[:n], environments[n:]
+        for i in environments:
+            self.present[i].sum_of_rewards += rewards[i]  # type: ignore[union-attr]
+        return environments
 
     def _begin_episodes(self) -> dict[int, int]:
         """Begin an episode where the last one is over; return their numbers."""
@@ -341,7 +352,7 @@ class Episodes:
             i: None if self._seed is None else episode_seed(self._seed, _LEARNING, number)
             for i, number in numbers.items()
         }
-        return self._adapter.reset(seeds, self._options(1 + max(numbers.values())))
+        return self.adapter.reset(seeds, self._options(1 + max(numbers.values())))
 
     def _put(self, seen: dict[int, Any]) -> None:
         """Read the observations of all, or some, environments."""
@@ -353,8 +364,8 @@ class Episodes:
         self._read_masks()
 
     def _read_masks(self) -> None:
-        if self._adapter.masks is not None:
-            self._masks = self._checked(self.rounds.masks, self._adapter.masks)
+        if self.adapter.masks is not None:
+            self._masks = self._checked(self.rounds.masks, self.adapter.masks)
 
     def _checked(self, read: Callable[..., Any], *given: Any) -> Any:
         """Return what a function makes of what an environment gave, or raise that it cannot."""
@@ -385,7 +396,7 @@ class Episodes:
         environments are others, or cannot be reset one by one with seeds.
         """
         self._require_repeatable(len(saved))
-        if self.wrappers and not isinstance(self._adapter, OneEnvironment) and any(saved):
+        if self.wrappers and not isinstance(self.adapter, OneEnvironment) and any(saved):
             raise UnrepeatedEpisodeError(
                 f"env must repeat its episodes, but {type(self.wrappers[0]).__name__} has learned"
                 " from several environments at once: repeat_episodes=False begins new ones"
@@ -417,7 +428,7 @@ class Episodes:
             raise ValueError(
                 "repeat_episodes must be False for a training whose episodes had no seeds, got True"
             )
-        if not self._adapter.can_repeat:
+        if not self.adapter.can_repeat:
             raise ValueError(
                 "env must reset each of its environments with a seed of its own where episodes are"
                 f" repeated, got {type(self._env.unwrapped).__name__}: repeat_episodes=False begins"
@@ -435,8 +446,7 @@ class Episodes:
         taken = {i: episode.actions.array() for i, episode in present.items()}
         n_rounds = max(map(len, taken.values()), default=0)
         leader = next((i for i, one in taken.items() if len(one) == n_rounds), 0)
-        every = range(self.n_environments)
-        ended = set(every)
+        ended = set(self._every)
         for t in range(n_rounds + bool(taken)):
             begins = {i for i, own in taken.items() if n_rounds - len(own) == t}
             if t < n_rounds or n_rounds == 0:
@@ -451,13 +461,13 @@ class Episodes:
                 taken[i][t - n_rounds]
                 if i in taken and t >= n_rounds - len(taken[i])
                 else taken[leader][t]
-                for i in every
+                for i in self._every
             ]
-            self.results = self._adapter.step(self._actions)
+            seen = self.adapter.step(self._actions)
             self._before = self._latest
-            self._latest = self._checked(self.rounds.read, "observation", self.results.observations)
+            self._latest = self._checked(self.rounds.read, "observation", seen)
             self._read_masks()
-            ends = zip(self.results.terminated, self.results.truncated, strict=True)
+            ends = zip(self.adapter.terminated, self.adapter.truncated, strict=True)
             ended = {i for i, (terminated, truncated) in enumerate(ends) if terminated or truncated}
 
 

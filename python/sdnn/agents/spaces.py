@@ -89,10 +89,11 @@ class Observations:
 
     def rows(self, name: str, observations: Any) -> NDArray[np.float64]:
         """Return a copy of several ones, shape (n, n_variables); ValueError as of `vector`."""
-        rows, is_array = observations, type(observations) is np.ndarray
-        if not (is_array and rows.dtype.kind in "fiub" and rows.shape[1:] == self._shape):
-            rows = [self.vector(name, one) for one in observations]
-        rows = np.array(rows, np.float64)
+        is_array = type(observations) is np.ndarray and observations.dtype.kind in "fiub"
+        if is_array and observations.shape[1:] == self._shape:
+            rows = observations.astype(np.float64)
+        else:
+            rows = np.array([self.vector(name, one) for one in observations], np.float64)
         return rows if rows.ndim == 2 else rows.reshape(-1, self.n_variables)
 
 

@@ -395,9 +395,10 @@ class Training:
         episodes, n = self._episodes, self.n_steps
         while not episodes.waiting:  # where all begin with the step, none waits
             episodes.advance()
-        most, progress = min(self._next_call - n, episodes.n_environments), []
-        if most > 1 and self.steps is not None:
-            progress = [(n + k) / self.steps for k in range(1, most)]
+        most, progress = self._next_call - n, []
+        if episodes.n_environments > 1 and self.steps is not None:
+            n_most = min(most, episodes.n_environments)
+            progress = [(n + k) / self.steps for k in range(1, n_most)]
         learned = episodes.learn_waiting(most, self.limit_bootstraps, progress)
         self.n_steps += len(learned)
         return learned[-1]
@@ -409,8 +410,8 @@ class Training:
         """
         rows: list[Row] = []
         failure: Exception | None = None
-        terminated = self._episodes.results.terminated[i]
-        ends = terminated or self._episodes.results.truncated[i]
+        terminated = self._episodes.adapter.terminated[i]
+        ends = terminated or self._episodes.adapter.truncated[i]
         if ends:
             rows.append(self._episode_row(i, terminated))
             self.n_episodes += 1

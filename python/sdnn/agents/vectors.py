@@ -15,7 +15,6 @@ from sdnn.agents.adapters import (
     OneEnvironment,
     Options,
     Seeds,
-    StepResults,
     UnusableStepError,
     has_action_masks,
     mask_in,
@@ -47,10 +46,10 @@ class _Listed(EnvironmentAdapter):
         first = self._of_each(seeds, lambda one, i: one.reset({0: seeds[i]})[0])
         return dict(zip(seeds, self._converted(first), strict=True))
 
-    def step(self, actions: Sequence[Any]) -> StepResults:
+    def step(self, actions: Sequence[Any]) -> Any:
         made = self._of_each(range(self.n_environments), lambda one, i: one.take(actions[i]))
-        seen, *rest = map(list, zip(*made, strict=True))
-        return StepResults(self._converted(seen), *rest)
+        seen, self.rewards, self.terminated, self.truncated = map(list, zip(*made, strict=True))
+        return self._converted(seen)
 
     def _of_each(
         self, numbers: Iterable[int], call: Callable[[OneEnvironment, int], Any]
@@ -69,7 +68,7 @@ class _Listed(EnvironmentAdapter):
     def _converted(self, seen: list[Any]) -> Any:
         """Return observations in the numbers of their space, as the vector itself does."""
         space = self._env.single_observation_space
-        if any(np.shape(one) != space.shape for one in seen if type(one) is np.ndarray):
+        if any(one.shape != space.shape for one in seen if type(one) is np.ndarray):
             return seen  # the agent refuses them by name
         if type(space) is gym.spaces.Box and all(type(one) is np.ndarray for one in seen):
             rows = np.array(seen)
@@ -89,20 +88,17 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         self.masks = [None] * env.num_envs if has_action_masks(env) else None
         self._begun: list[Any] = []  # masks after resets in the same step
 
-    def _step(self, actions: Any) -> tuple[StepResults, Any]:
-        """Return the results, and what is observed after resets in the same step."""
+    def _step(self, actions: Any) -> tuple[Any, Any]:
+        """Return what is observed, and what is after resets in the same step."""
         observations, rewards, terminated, truncated, infos = step_env(
             self._env, self._batch(actions)
         )
         seen = _listed(self._env, observations)
-        results = StepResults(
-            seen,
-            self._column("reward", rewards, "fiub", "numbers"),
-            self._column("terminated", terminated, "b", "bools"),
-            self._column("truncated", truncated, "b", "bools"),
-        )
-        ended = [a or b for a, b in zip(results.terminated, results.truncated, strict=True)]
-        self._take_masks(infos, results.terminated, ended)
+        self.rewards = self._column("reward", rewards, "fiub", "numbers")
+        self.terminated = self._column("terminated", terminated, "b", "bools")
+        self.truncated = self._column("truncated", truncated, "b", "bools")
+        ended = [a or b for a, b in zip(self.terminated, self.truncated, strict=True)]
+        self._take_masks(infos, self.terminated, ended)
         if self._mode == "SAME_STEP" and any(ended):
             if "final_obs" not in infos:
                 raise ValueError(
@@ -110,8 +106,8 @@ class _Vector(EnvironmentAdapter, abc.ABC):
                     f" autoreset in the same step, got {sorted(infos)}"
                 )
             last = [infos["final_obs"][i] if ended[i] else one for i, one in enumerate(seen)]
-            results = results._replace(observations=last)
-        return results, seen
+            return last, seen
+        return seen, seen
 
     def _take_masks(self, infos: Any, terminated: Sequence[bool], ended: Sequence[bool]) -> None:
         """Take the masks of what is observed: of episodes that ended, those of their ends."""
@@ -184,7 +180,7 @@ class _SeparateResets(_Vector):
         seen = _listed(self._env, observations)
         return {i: seen[i] for i in seeds}
 
-    def step(self, actions: Sequence[Any]) -> StepResults:
+    def step(self, actions: Sequence[Any]) -> Any:
         return self._step(actions)[0]
 
 
@@ -208,9 +204,9 @@ class _OwnResets(_Vector):
             self.masks = [self._begun[i] if i in seeds else m for i, m in enumerate(self.masks)]
         return {i: self._seen[i] for i in seeds}
 
-    def step(self, actions: Sequence[Any]) -> StepResults:
-        results, self._seen = self._step(actions)
-        return results
+    def step(self, actions: Sequence[Any]) -> Any:
+        observations, self._seen = self._step(actions)
+        return observations
 
 
 def _listed(env: gym.vector.VectorEnv[Any, Any, Any], observations: Any) -> Any:
