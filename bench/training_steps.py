@@ -1,15 +1,17 @@
-"""How long a step of training takes in Python, beside the environment's own.
+"""How long a step of training takes in Python, and what of it is the environment and the core.
 
     python bench/training_steps.py [--tasks CartPole-v1 ...] [--agents sdnn-linear ...]
 
-Twenty steps of a training and twenty of the environment alone, with random actions, in turn. Of
-each the quickest twentieth counts: other work on the machine can only add to it. The difference is
-what the agent takes, with all that Python does around it.
+In turn, a hundred rounds or so each: a training, the environment alone with random actions, and the
+calls of the core that act and learn, minus such calls for no environment. Of each the quickest
+twentieth counts: other work on the machine can only add to it. "beside" is the training minus the
+environment, "ratio" the training against environment and core together.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -22,8 +24,9 @@ import sdnn.environments  # noqa: F401  (registers the acrobot)
 from sdnn.agents import SDNNQLearning, SDNNSarsa, Training
 
 AGENTS = {kind.kind: kind for kind in (SDNNSarsa, SDNNQLearning)}
-HEADER = ("task", "agent", "environments", "training", "environment alone", "difference", "ratio")
-CALLS = 20
+HEADER = ("task", "agent", "environments", "training", "environment", "core", "beside", "ratio")
+SECONDS = 2e-3
+ROUNDS = 100
 PERCENT = 5
 WARM_UP = 5_000
 
@@ -39,21 +42,21 @@ def stepping(env: Any, n_envs: int) -> Iterator[int]:
     """Step an environment with random actions; yield the steps so far."""
     env.reset(seed=0)
     env.action_space.seed(0)
-    actions = [env.action_space.sample() for _ in range(1_000)]
+    actions = [env.action_space.sample() for _ in range(ROUNDS)]
     n_steps = 0
     while True:
         for action in actions:
             _, _, terminated, truncated, _ = env.step(action)
             if n_envs == 1 and (terminated or truncated):
                 env.reset()
-            n_steps += n_envs
-            yield n_steps
+        n_steps += n_envs * ROUNDS
+        yield n_steps
 
 
 def training(learner: Any, env: Any) -> Iterator[int]:
     """Train for ever; yield the steps so far."""
     endless = Training(learner, env, steps=10**9, seed=1)
-    for _ in endless.pieces(0.0):
+    for _ in endless.pieces(SECONDS):
         yield endless.n_steps
 
 
@@ -64,9 +67,40 @@ def slices(steps: Iterator[int]) -> Callable[[], float]:
     def take() -> float:
         nonlocal done
         before, began = done, time.thread_time()
-        for _ in range(CALLS):
-            done = next(steps)
+        done = next(steps)
         return (time.thread_time() - began) * 1e6 / (done - before)
+
+    return take
+
+
+def core_slices(
+    learner: Any, task: str, n_envs: int, environments: list[int]
+) -> Callable[[], float]:
+    """Return a function that has the core act and learn in some environments of n.
+
+    It returns the microseconds of a step, of which there are n in each round.
+    """
+    core, read, elements, _ = learner.core_parts()
+    core.n_environments = n_envs
+    env = gym.make_vec(task, num_envs=n_envs, vectorization_mode="sync")
+    latest = read("observation", env.reset(seed=0)[0])
+    every = list(range(n_envs))
+
+    def rounds() -> Iterator[tuple[Any, ...]]:
+        nonlocal latest
+        for _ in range(ROUNDS):
+            before, numbers = latest, core.act_each(latest, every)
+            seen, rewards, terminated, _, _ = env.step(elements(numbers))
+            latest = read("next_observation", seen)
+            yield before, numbers, rewards.tolist(), latest, terminated.tolist()
+
+    def take() -> float:
+        steps = list(rounds())
+        began = time.thread_time()
+        for step in steps:
+            core.act_each(step[0], environments)
+            core.learn_each(*step, environments, [])
+        return (time.thread_time() - began) * 1e6 / (ROUNDS * n_envs)
 
     return take
 
@@ -80,20 +114,24 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=500)
     given = parser.parse_args()
     rows = []
-    for task in given.tasks:
-        for agent in given.agents:
-            for n_envs in given.n_envs:
-                env = make(task, 1)
-                learner = AGENTS[agent](env.observation_space, env.action_space, seed=1)
-                learner.train(env, steps=WARM_UP)
-                both = (
-                    slices(training(learner, make(task, n_envs))),
-                    slices(stepping(make(task, n_envs), n_envs)),
-                )
-                times = [[take() for take in both] for _ in range(given.repeats)]
-                trained, alone = np.percentile(times, PERCENT, axis=0)
-                cells = (f"{us:.1f}" for us in (trained, alone, trained - alone))
-                rows.append((task, agent, str(n_envs), *cells, f"{trained / alone:.2f}"))
+    for task, agent, n_envs in itertools.product(given.tasks, given.agents, given.n_envs):
+        env = make(task, 1)
+        learners = [
+            AGENTS[agent](env.observation_space, env.action_space, seed=1) for _ in range(2)
+        ]
+        for learner in learners:
+            learner.train(env, steps=WARM_UP)
+        parts = (
+            slices(training(learners[0], make(task, n_envs))),
+            slices(stepping(make(task, n_envs), n_envs)),
+            core_slices(learners[1], task, n_envs, list(range(n_envs))),
+            core_slices(learners[1], task, n_envs, []),
+        )
+        times = [[take() for take in parts] for _ in range(given.repeats)]
+        trained, alone, core, calls = np.percentile(times, PERCENT, axis=0)
+        core -= calls
+        cells = (f"{us:.1f}" for us in (trained, alone, core, trained - alone))
+        rows.append((task, agent, str(n_envs), *cells, f"{trained / (alone + core):.2f}"))
     print(markdown(HEADER, rows))
 
 

@@ -158,7 +158,7 @@ class _CoreRounds(Rounds):
         self.progressing, self._act = core, core.act_each
         self._mask, self._n_actions = mask, sum(core.n_actions)
         self.read = read  # type: ignore[assignment, method-assign]
-        self.elements = elements  # type: ignore[method-assign]
+        self.elements = elements  # type: ignore[assignment, method-assign]
         self.learn = core.learn_each  # type: ignore[method-assign]
 
     def flat(self, observation: Any) -> NDArray[np.float64]:

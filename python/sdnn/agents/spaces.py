@@ -91,7 +91,7 @@ class Observations:
         """Return a copy of several ones, shape (n, n_variables); ValueError as of `vector`."""
         is_array = type(observations) is np.ndarray and observations.dtype.kind in "fiub"
         if is_array and observations.shape[1:] == self._shape:
-            rows = observations.astype(np.float64)
+            rows: NDArray[np.float64] = observations.astype(np.float64)
         else:
             rows = np.array([self.vector(name, one) for one in observations], np.float64)
         return rows if rows.ndim == 2 else rows.reshape(-1, self.n_variables)
