@@ -1393,7 +1393,7 @@ class SarsaConfig:
     bootstrap : {'sarsa', 'q_learning'}
         What targets bootstrap from: `sarsa`: the value of the next action; `q_learning`: the best value, and traces end where a worse action is taken (Watkins).
     traces : {'dutch', 'replacing'}
-        What a trace becomes in a state that returns: `dutch`: such that learning equals the forward view at every step (true online); `replacing`: as if it were the first time.
+        What a trace becomes in a state that returns: `dutch`: such that learning equals the forward view at every step (true online), in one environment; `replacing`: as if it were the first time, always so in several.
     schedule_steps : int
         Steps after which alpha and epsilon have gone half of the way to their final values: after t steps they have gone t / (t + schedule_steps) of it, whatever the planned end; epsilon goes to 0 by default, but stays where observations are discrete alone. With 0 they follow the agent's progress. Must be in [0, 1073741824].
     max_action_repeat : int
@@ -1516,7 +1516,7 @@ class SarsaConfig:
     @property
     def traces(self) -> typing.Literal['dutch', 'replacing']:
         """
-        What a trace becomes in a state that returns: `dutch`: such that learning equals the forward view at every step (true online); `replacing`: as if it were the first time.
+        What a trace becomes in a state that returns: `dutch`: such that learning equals the forward view at every step (true online), in one environment; `replacing`: as if it were the first time, always so in several.
         """
 class FuzzyQLearningConfig:
     """

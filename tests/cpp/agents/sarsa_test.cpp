@@ -212,6 +212,23 @@ TEST(Sarsa, EnvironmentsHaveTracesOfTheirOwn) {
   EXPECT_THROW(together.learn(a, {0}, 0.0, b, false, 1), std::invalid_argument);
 }
 
+TEST(Sarsa, TracesAreReplacingInSeveralEnvironments) {
+  const auto state_after = [](TraceKind traces, std::size_t n_environments) {
+    Sarsa agent = agent_of({.traces = traces});
+    agent.set_n_environments(n_environments);
+    core::Random random(1, core::Stream::useless_inputs);
+    State state{0.5, 0.5};
+    for (int step = 0; step < 100; ++step) {
+      const State next{random.uniform(), random.uniform()};
+      agent.learn(state, {random.below(3)}, random.normal(), next, false);
+      state = next;
+    }
+    return core::state_of(agent);
+  };
+  EXPECT_EQ(state_after(TraceKind::dutch, 2), state_after(TraceKind::replacing, 2));
+  EXPECT_NE(state_after(TraceKind::dutch, 1), state_after(TraceKind::replacing, 1));
+}
+
 TEST(Sarsa, RefusesWhatCannotBeLearnedAndLearnsNothing) {
   Sarsa agent = agent_of({});
   const State a{0.1, 0.1};

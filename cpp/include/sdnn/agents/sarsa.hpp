@@ -49,7 +49,8 @@ namespace sdnn::agents {
 /// True online temporal-difference learning (algorithm 2); Watkins, C. (1989), Q(lambda).
 ///
 /// An agent may learn in several environments at once, numbered from 0: each has a trace of its
-/// own.
+/// own, a replacing one where there are several: Q - Q_old would hold what the others corrected,
+/// and traces would pass it on and on.
 class Sarsa : public WithRates<Sarsa> {
  public:
   using Readout = approximators::LinearSDNN;
@@ -462,7 +463,7 @@ class Sarsa : public WithRates<Sarsa> {
     const auto discount = static_cast<std::int64_t>(std::lround(config_.discount * (1 << 15)));
     const std::int64_t target = action_value_.units_of(episode.reward) +
                                 ((next * discount + (std::int64_t{1} << 14)) >> 15);
-    const bool is_dutch = config_.traces == TraceKind::dutch;
+    const bool is_dutch = config_.traces == TraceKind::dutch && n_environments() == 1;
     const std::int64_t drift = is_dutch ? value - episode.old_value : 0;
     episode.old_value = next;
     const auto decay = static_cast<std::int32_t>(

@@ -61,8 +61,8 @@ struct SarsaConfig {
                         "taken (Watkins)."),
             core::field("traces", &SarsaConfig::traces,
                         "What a trace becomes in a state that returns: `dutch`: such that learning "
-                        "equals the forward view at every step (true online); `replacing`: as if "
-                        "it were the first time."),
+                        "equals the forward view at every step (true online), in one environment; "
+                        "`replacing`: as if it were the first time, always so in several."),
             core::field(
                 "schedule_steps", &SarsaConfig::schedule_steps,
                 "Steps after which alpha and epsilon have gone half of the way to their "
