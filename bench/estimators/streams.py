@@ -94,8 +94,8 @@ def ours(seed, **options):
     return RiverRegressor(SDNNRegressor(out_of_range="widen", random_state=seed, **options))
 
 
-def our_classifier(seed, **options):
-    return RiverClassifier(SDNNClassifier(random_state=seed, **options))
+def our_classifier(seed, share=0.5):
+    return RiverClassifier(SDNNClassifier(correction_share=share, random_state=seed))
 
 
 REGRESSORS = {
@@ -111,7 +111,7 @@ REGRESSORS = {
 }
 CLASSIFIERS = {
     "SDNN": our_classifier,
-    "SDNN, correction_share=.5": lambda seed: our_classifier(seed, correction_share=0.5),
+    "SDNN, correction_share=.25": lambda seed: our_classifier(seed, 0.25),
     "adaptive random forest": lambda seed: forest.ARFClassifier(seed=seed),
     "Hoeffding adaptive tree": lambda seed: tree.HoeffdingAdaptiveTreeClassifier(seed=seed),
     "nearest neighbours": lambda seed: scaled(neighbors.KNNClassifier()),

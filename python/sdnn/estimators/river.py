@@ -15,6 +15,7 @@ from sdnn.arguments import flag, shown, whole
 from sdnn.estimators.classifier import SDNNClassifier
 from sdnn.estimators.inputs import Floats, codings_of_columns
 from sdnn.estimators.outliers import numbers_to_range
+from sdnn.estimators.regressor import SDNNRegressor
 
 WINDOW = 500  # samples whose range is followed
 
@@ -81,14 +82,19 @@ class Waiting:
 
     least_targets = 1  # different ones among the first samples
 
-    def __init__(self, model: Any, grace_period: int = 100, follows_ranges: bool = True) -> None:
-        self.model = model
+    def __init__(
+        self, model: Any = None, grace_period: int = 100, follows_ranges: bool = True
+    ) -> None:
+        self.model = self._default() if model is None else model
         self.grace_period = whole("grace_period", grace_period, 2, 2**53)
         self.follows_ranges = flag("follows_ranges", follows_ranges)
         self.fitted: Any = None
         self.ranges: FollowedRanges | None = None
         self.samples: list[dict[str, Any]] = []
         self.targets: list[Any] = []
+
+    def _default(self) -> Any:
+        raise NotImplementedError
 
     def learn_one(self, x: dict[Hashable, Any], y: Any) -> None:
         """Learn one sample; if the model refuses one of the first, all of them are dropped."""
@@ -138,14 +144,17 @@ class RiverRegressor(Waiting, base.Regressor):
 
     Parameters
     ----------
-    model : SDNNRegressor
-        Cloned. ``out_of_range="widen"`` suits drifting streams; features that samples may lack
-        need the coding "with-missing", but must be in the first samples.
+    model : SDNNRegressor, default=SDNNRegressor(out_of_range="widen")
+        Cloned. Features that samples may lack need the coding "with-missing", but must be in the
+        first samples.
     grace_period : int, default=100
         Samples from which ranges and categories are learned; until then the mean is predicted.
     follows_ranges : bool, default=True
         Whether learned ranges of inputs become those of the last 500 samples as the stream drifts.
     """
+
+    def _default(self) -> SDNNRegressor:
+        return SDNNRegressor(out_of_range="widen")
 
     def predict_one(self, x: dict[Hashable, Any]) -> float:
         """Predict one target."""
@@ -159,8 +168,9 @@ class RiverClassifier(Waiting, base.Classifier):
 
     Parameters
     ----------
-    model : SDNNClassifier
-        Cloned; missing features as for `RiverRegressor`.
+    model : SDNNClassifier, default=SDNNClassifier(correction_share=0.5)
+        Cloned; missing features as for `RiverRegressor`. A stream shows each sample once, which
+        needs larger corrections.
     grace_period : int, default=100
         Samples, of at least two classes, from which ranges, categories and classes are learned.
         Until then label frequencies are predicted. A class that comes later gets units of its own,
@@ -170,6 +180,9 @@ class RiverClassifier(Waiting, base.Classifier):
     """
 
     least_targets = 2
+
+    def _default(self) -> SDNNClassifier:
+        return SDNNClassifier(correction_share=0.5)
 
     @property
     def _multiclass(self) -> bool:  # what River asks of classifiers

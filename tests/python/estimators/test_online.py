@@ -285,6 +285,8 @@ def test_river_streams_are_learned():
             labelled.learn_one(row, label)
     assert np.mean(hits) > 0.8
     assert labelled.clone().fitted is None
+    assert RiverRegressor().clone().model.out_of_range == "widen"
+    assert RiverClassifier().clone().model.correction_share == 0.5
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
