@@ -209,14 +209,15 @@ def draw_scores(found, path):
                 color = "white" if ranks[y, x] < 3.5 else "black"
                 axes.text(x, y, text, ha="center", va="center", weight=weight, color=color)
         axes.set_yticks(range(len(data)), data)
-        names = [name.replace(", ", ",\n").replace(" ", "\n", 1) for name in models]
+        names = [name.replace(" ", "\n", 1).replace("=", "\n=") for name in models]
         axes.set_xticks(range(len(models)), names, fontsize=9)
         axes.tick_params(length=0, labeltop=True, labelbottom=False)
         axes.spines[:].set_visible(False)
         axes.set_title(title, loc="left", weight="bold")
-    write_whole(path, png_bytes(figure))
+    write_whole(path, png_bytes(figure, DPI))
 
 
+DPI = 130
 COLORS = ("#1f5fa8", "#d9822b", "#5b8c5a", "#a05195")
 
 
@@ -228,9 +229,8 @@ def draw(found, path, data, last, label):
     for axes, stream in zip(figure.subplots(n_rows, 4, sharex=True).flat, data, strict=True):
         for model, color in zip(shown, COLORS, strict=True):
             windows = np.array([row["windows"] for row in found[stream, model]])
-            low, middle, high = np.quantile(windows, (0.1, 0.5, 0.9), axis=0)
+            middle = np.median(windows, axis=0)
             x = (np.arange(len(middle)) + 0.5) / len(middle)
-            axes.fill_between(x, low, high, color=color, alpha=0.15, linewidth=0)
             axes.plot(x, middle, color=color, label=model, linewidth=1.6)
         if data is REGRESSION:
             axes.set_yscale("log")
@@ -243,10 +243,11 @@ def draw(found, path, data, last, label):
         axes.spines[["top", "right"]].set_visible(False)
         axes.tick_params(labelsize=9)
     figure.supylabel(label, fontsize=10)
-    figure.supxlabel("share of the stream", fontsize=10)
+    for axes in figure.axes[-4:]:
+        axes.set_xlabel("share of the stream", fontsize=10)
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center",
                   ncols=len(shown), frameon=False, fontsize=10)  # fmt: skip
-    write_whole(path, png_bytes(figure))
+    write_whole(path, png_bytes(figure, DPI))
 
 
 def keys(n_seeds):
