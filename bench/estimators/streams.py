@@ -82,7 +82,7 @@ class PerceptronOfClasses(Perceptron):
 
     def learn_one(self, x, y):
         self.scaler.learn_one(x)
-        self.model.partial_fit(self._row(x), [y], self.classes)
+        self.model.partial_fit(self._row(x), [y], classes=self.classes)
         self.is_fitted = True
 
 
