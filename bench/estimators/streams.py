@@ -196,17 +196,12 @@ def by_model(found, data, models, most, timed):
 
 
 def by_stream(found, data, models):
-    """SDNN's score and rank in each stream, and the best of the others."""
-    ranks = places(found, data, models)["SDNN"]
-    rows = []
-    for stream, rank in zip(data, ranks, strict=True):
-        scores = {name: score(found[stream, name]) for name in models if name[:4] != "SDNN"}
-        best = max(scores, key=scores.get)
-        own = told(score(found[stream, "SDNN"]))
-        rows.append((stream, own, f"{told(scores[best])} {best}", f"{rank:g}"))
-    counts = sorted({len(found[stream, "SDNN"]) for stream in data})
-    note = f"*Medians of {' or '.join(map(str, counts))} seeds.*"
-    return markdown(("stream", "SDNN", "best other", "rank"), rows) + f"\n{note}\n"
+    """All scores."""
+    rows = [
+        (stream, str(len(found[stream, "SDNN"])), *(told(score(found[stream, m])) for m in models))
+        for stream in data
+    ]
+    return markdown(("stream", "seeds", *models), rows)
 
 
 def draw_scores(found, path):
@@ -217,7 +212,7 @@ def draw_scores(found, path):
     for axes, (title, data, models) in zip(
         figure.subplots(2, 1, height_ratios=heights), kinds, strict=True
     ):
-        ranks = np.array(list(places(found, data, models).values())).T
+        ranks = np.array([*places(found, data, models).values()]).T
         axes.imshow(ranks, cmap="Blues_r", vmin=-1, vmax=10, aspect="auto")
         for y, stream in enumerate(data):
             for x, name in enumerate(models):
@@ -225,7 +220,9 @@ def draw_scores(found, path):
                 text = told(score(found[stream, name]))
                 color = "white" if ranks[y, x] < 3.5 else "black"
                 axes.text(x, y, text, ha="center", va="center", weight=weight, color=color)
-        axes.set_yticks(range(len(data)), data)
+        seeds = [len(found[stream, "SDNN"]) for stream in data]
+        names = [f"{stream} ({n})" for stream, n in zip(data, seeds, strict=True)]
+        axes.set_yticks(range(len(data)), names)
         names = [name.replace(" ", "\n", 1).replace("=", "\n=") for name in models]
         axes.set_xticks(range(len(models)), names, fontsize=9)
         axes.tick_params(length=0, labeltop=True, labelbottom=False)
@@ -290,9 +287,10 @@ def main():
     tables = {
         "regression": by_model(found, REGRESSION, REGRESSORS, 1, "Friedman, local drift"),
         "classification": by_model(found, CLASSIFICATION, CLASSIFIERS, 3, "Agrawal"),
-        "R2": by_stream(found, REGRESSION, REGRESSORS),
-        "accuracy": by_stream(found, CLASSIFICATION, CLASSIFIERS),
     }
+    if given.full:
+        print(by_stream(found, REGRESSION, REGRESSORS))
+        print(by_stream(found, CLASSIFICATION, CLASSIFIERS))
     show(tables, folder / "streams.md")
 
 
