@@ -6,10 +6,13 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <concepts>
+#include <cstddef>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -96,17 +99,35 @@ inline bool is_truth(pybind11::handle value) {
          !PySequence_Check(value.ptr());
 }
 
-struct FieldInfo {
+struct Field;
+
+/// What Python needs to know of a type of values.
+struct ValueType {
+  std::string (*hint)();
+  std::string (*expected)();
+  bool has_bounds;
+  bool is_whole;
+  pybind11::object (*to_python)(const void* value);
+  bool (*read)(pybind11::handle source, void* value, const Field& field);
+};
+
+/// A field of one configuration, with where its value is. The type of the value is erased, because
+/// code for every field of every configuration takes long to compile: what follows is compiled once
+/// for a type of values.
+struct Field {
   const char* name;
+  const char* doc;
   core::Bounds bounds;
+  const ValueType* type;
+  void* value;
 };
 
 /// Reads a Python value; false if it is of another type. True is no number, and 1.0 no whole one.
 template <class Value>
-bool read_value(pybind11::handle source, Value& value, const FieldInfo& field);
+bool read_value(pybind11::handle source, Value& value, const Field& field);
 
 template <std::integral Number>
-bool read_whole(pybind11::handle source, Number& value, const FieldInfo& field) {
+bool read_whole(pybind11::handle source, Number& value, const Field& field) {
   namespace py = pybind11;
   if (is_truth(source) || PyIndex_Check(source.ptr()) == 0) return false;
   const auto number = py::reinterpret_steal<py::object>(PyNumber_Index(source.ptr()));
@@ -128,7 +149,7 @@ bool read_whole(pybind11::handle source, Number& value, const FieldInfo& field) 
 }
 
 template <class Value>
-bool read_value(pybind11::handle source, Value& value, const FieldInfo& field) {
+bool read_value(pybind11::handle source, Value& value, const Field& field) {
   namespace py = pybind11;
   if constexpr (kIsOptional<Value>) {
     value.reset();
@@ -186,117 +207,146 @@ pybind11::object python_value(const Value& value) {
   }
 }
 
+template <class Value>
+inline constexpr ValueType kValueType{
+    .hint = &hint_of<Value>,
+    .expected = &expected_words<Value>,
+    .has_bounds = !std::is_same_v<Value, bool> && !core::HasWords<Value>,
+    .is_whole = std::integral<Value>,
+    .to_python = [](const void* value) -> pybind11::object {
+      return python_value(*static_cast<const Value*>(value));
+    },
+    .read =
+        [](pybind11::handle source, void* value, const Field& field) {
+          return read_value(source, *static_cast<Value*>(value), field);
+        },
+};
+
+/// The fields of a configuration; their values may be written if it may.
 template <class Config>
-pybind11::dict dictionary_of(const Config& config) {
+auto fields_of(const Config& config) {
+  const auto erased = [&config](const auto& field) {
+    using Value = core::FieldValue<std::remove_cvref_t<decltype(field)>, Config>;
+    return Field{field.name, field.doc, field.bounds, &kValueType<Value>,
+                 const_cast<Value*>(&field.of(config))};
+  };
+  return std::apply([&](const auto&... field) { return std::array{erased(field)...}; },
+                    Config::fields());
+}
+
+inline pybind11::object python_value_of(const Field& field) {
+  return field.type->to_python(field.value);
+}
+
+inline pybind11::dict dictionary_of(std::span<const Field> fields) {
   pybind11::dict values;
-  std::apply(
-      [&](const auto&... field) { ((values[field.name] = python_value(field.of(config))), ...); },
-      Config::fields());
+  for (const Field& field : fields) values[field.name] = python_value_of(field);
   return values;
 }
 
-/// The configuration with other values of some fields. Throws ArgumentTypeError for a value of
-/// another type, ArgumentError for one out of its bounds, pybind11::type_error for unknown names.
-template <class Config>
-Config changed(Config config, const pybind11::kwargs& changes) {
+/// Gives fields other values. Throws ArgumentTypeError for a value of another type, ArgumentError
+/// for a word that is none, ArgumentTypeError for unknown names.
+inline void change(std::span<const Field> fields, const pybind11::kwargs& changes) {
   namespace py = pybind11;
   std::size_t n_known = 0;
-  const auto read = [&](const auto& field) {
-    if (!changes.contains(field.name)) return;
+  for (const Field& field : fields) {
+    if (!changes.contains(field.name)) continue;
     ++n_known;
-    using Value = core::FieldValue<std::remove_cvref_t<decltype(field)>, Config>;
     const py::object source = changes[field.name];
-    if (read_value(source, field.of(config), FieldInfo{field.name, field.bounds})) return;
+    if (field.type->read(source, field.value, field)) continue;
     throw ArgumentTypeError(field.name, std::string(field.name) + " must be " +
-                                            expected_words<Value>() + ", got " + shown(source));
-  };
-  std::apply([&](const auto&... field) { (read(field), ...); }, Config::fields());
-  if (n_known < changes.size()) {
-    const py::dict known = dictionary_of(config);
-    for (const auto& [name, value] : changes) {
-      if (known.contains(name)) continue;
-      const auto word = name.template cast<std::string>();
-      throw ArgumentTypeError(word, word + " is not a field: they are " +
-                                        py::str(", ").attr("join")(known).cast<std::string>());
-    }
+                                            field.type->expected() + ", got " + shown(source));
   }
+  if (n_known == changes.size()) return;
+  const py::dict known = dictionary_of(fields);
+  for (const auto& [name, value] : changes) {
+    if (known.contains(name)) continue;
+    const auto word = name.cast<std::string>();
+    throw ArgumentTypeError(word, word + " is not a field: they are " +
+                                      py::str(", ").attr("join")(known).cast<std::string>());
+  }
+}
+
+/// The configuration with other values of some fields. Throws as change does, ArgumentError for a
+/// value out of its bounds.
+template <class Config>
+Config changed(Config config, const pybind11::kwargs& changes) {
+  change(fields_of(config), changes);
   core::check_fields(config);
   return config;
 }
 
 /// (name, type hint, default, documentation, low, high, whether low itself is excluded) of each.
-template <class Config>
-pybind11::tuple described_fields() {
-  namespace py = pybind11;
-  const Config defaults;
-  return std::apply(
-      [&](const auto&... field) {
-        return py::make_tuple(py::make_tuple(
-            field.name, hint_of<core::FieldValue<std::remove_cvref_t<decltype(field)>, Config>>(),
-            python_value(field.of(defaults)), field.doc, field.bounds.low, field.bounds.high,
-            field.bounds.excludes_low)...);
-      },
-      Config::fields());
+inline pybind11::tuple described_fields(std::span<const Field> fields) {
+  pybind11::tuple described(fields.size());
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    const Field& field = fields[i];
+    described[i] =
+        pybind11::make_tuple(field.name, field.type->hint(), python_value_of(field), field.doc,
+                             field.bounds.low, field.bounds.high, field.bounds.excludes_low);
+  }
+  return described;
 }
 
 /// A docstring in numpydoc's form.
-template <class Config>
-std::string docstring(const char* doc) {
+inline std::string docstring(const char* doc, std::span<const Field> fields) {
   std::string text = std::string(doc) + "\n\nParameters\n----------\n";
-  const auto add = [&text](const auto& field) {
-    using Value = core::FieldValue<std::remove_cvref_t<decltype(field)>, Config>;
-    std::string hint = hint_of<Value>();
+  for (const Field& field : fields) {
+    std::string hint = field.type->hint();
     if (hint.starts_with("typing.Literal[")) hint = '{' + hint.substr(15, hint.size() - 16) + '}';
     text += std::string(field.name) + " : " + hint + "\n    " + field.doc;
-    if constexpr (!std::is_same_v<Value, bool> && !core::HasWords<Value>) {
-      const std::string bounds = core::words_of(field.bounds, std::integral<Value>);
+    if (field.type->has_bounds) {
+      const std::string bounds = core::words_of(field.bounds, field.type->is_whole);
       if (bounds != "finite") text += " Must be " + bounds + '.';
     }
     text += '\n';
-  };
-  std::apply([&](const auto&... field) { (add(field), ...); }, Config::fields());
+  }
   return text +
          "\nRaises\n------\nTypeError, ValueError\n    For a value of another type or out of its"
          " bounds; ``argument`` is its name.\n";
+}
+
+/// "name=value, ..." of all fields.
+inline std::string listed(std::span<const Field> fields) {
+  std::string values;
+  for (const Field& field : fields) {
+    values += (values.empty() ? "" : ", ") + std::string(field.name) + "=" +
+              std::string(pybind11::repr(python_value_of(field)));
+  }
+  return values;
 }
 
 /// Binds a configuration.
 template <class Config>
 pybind11::class_<Config> bind_config(pybind11::module_& module, const char* name, const char* doc) {
   namespace py = pybind11;
-  const std::string text = docstring<Config>(doc);
-  py::class_<Config> type(module, name, text.c_str());
+  const Config defaults;
+  const auto fields = fields_of(defaults);
+  py::class_<Config> type(module, name, docstring(doc, fields).c_str());
   type.def(py::init([](const py::kwargs& values) { return changed(Config{}, values); }));
-  std::apply(
-      [&type](const auto&... field) {
-        (type.def_property_readonly(
-             field.name, [field](const Config& self) { return python_value(field.of(self)); },
-             field.doc),
-         ...);
-      },
-      Config::fields());
-  type.attr("fields") = described_fields<Config>();
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    type.def_property_readonly(
+        fields[i].name, [i](const Config& self) { return python_value_of(fields_of(self)[i]); },
+        fields[i].doc);
+  }
+  type.attr("fields") = described_fields(fields);
   const auto replace = [](const Config& self, const py::kwargs& changes) {
     return changed(self, changes);
   };
   type.def("replace", replace, "Return a copy with other values of some fields.");
   type.def("__replace__", replace);
   type.def("__repr__", [](const py::object& self) {
-    std::string values;
-    for (const auto& [key, value] : dictionary_of(self.cast<const Config&>())) {
-      values += (values.empty() ? "" : ", ") + key.template cast<std::string>() + "=" +
-                std::string(pybind11::repr(value));
-    }
-    return py::cast<std::string>(py::type::of(self).attr("__name__")) + "(" + values + ")";
+    return py::cast<std::string>(py::type::of(self).attr("__name__")) + "(" +
+           listed(fields_of(self.cast<const Config&>())) + ")";
   });
   type.def("__eq__", [](const Config& self, const py::object& other) {
     return py::isinstance<Config>(other) && self == other.cast<const Config&>();
   });
   type.def("__hash__", [](const Config& self) {
-    return py::hash(py::tuple(dictionary_of(self).attr("values")()));
+    return py::hash(py::tuple(dictionary_of(fields_of(self)).attr("values")()));
   });
   type.def(
-      py::pickle([](const Config& self) { return dictionary_of(self); },
+      py::pickle([](const Config& self) { return dictionary_of(fields_of(self)); },
                  [](const py::dict& values) { return changed(Config{}, py::kwargs(values)); }));
   return type;
 }

@@ -166,7 +166,7 @@ void bind_controller(py::module_& module) {
     return std::pair(array_of(self.observations().low()), array_of(self.observations().high()));
   };
   py::class_<Controller> type(module, "Controller", "An agent in the units of its task");
-  type.attr("fields") = bindings::described_fields<ControllerConfig>();
+  type.attr("fields") = bindings::described_fields(bindings::fields_of(ControllerConfig{}));
   type.def(py::init([config_of](const agents::AnyApproximatorConfig& approximator,
                                 const agents::AnyLearningConfig& learning, std::uint64_t seed,
                                 const agents::ObservationConfig& observation,

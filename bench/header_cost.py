@@ -1,0 +1,71 @@
+"""Print what a changed header of the core costs: the CPU seconds of the units that include it.
+
+Compiles every unit of the Python core once, one after another, as a build folder would: `python
+bench/header_cost.py build/editable`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+INCLUDE = Path(__file__).resolve().parents[1] / "cpp" / "include"
+
+
+def compiled(command: str, folder: str, scratch: Path) -> tuple[float, float, set[str]]:
+    """Compile a unit; return its CPU seconds, its memory in MB and the files that it includes."""
+    words = shlex.split(command)
+    words[words.index("-o") + 1] = str(scratch / "unit.o")
+    listed = ["-MD", "-MF", str(scratch / "unit.d")]
+    with subprocess.Popen(
+        [*words, *listed], cwd=folder, env={**os.environ, "CCACHE_DISABLE": "1"}
+    ) as compiler:
+        _, status, used = os.wait4(compiler.pid, 0)
+        compiler.returncode = os.waitstatus_to_exitcode(status)
+    if compiler.returncode != 0:
+        sys.exit(f"a unit does not compile: {command}")
+    names = (scratch / "unit.d").read_text().replace("\\\n", " ").split()
+    return (
+        used.ru_utime + used.ru_stime,
+        used.ru_maxrss / 1024,
+        {os.path.realpath(n) for n in names},
+    )
+
+
+def main() -> None:
+    """Compile the units and print the headers by cost."""
+    if len(sys.argv) != 2:
+        sys.exit("usage: python bench/header_cost.py BUILD_FOLDER")
+    listing = subprocess.run(
+        ["ninja", "-C", sys.argv[1], "-t", "compdb"], capture_output=True, text=True, check=True
+    )
+    start = listing.stdout.index("[\n")  # after the line that names the folder
+    units = [
+        unit
+        for unit in json.loads(listing.stdout[start:])
+        if "_core.dir" in unit["output"] and unit["output"].endswith(".o")
+    ]
+    cost = {str(header): 0.0 for header in INCLUDE.rglob("*.hpp")}
+    total = peak = 0.0
+    with tempfile.TemporaryDirectory() as scratch:
+        for unit in units:
+            seconds, memory, included = compiled(unit["command"], unit["directory"], Path(scratch))
+            print(f"{seconds:6.1f} s {memory:6.0f} MB  {Path(unit['file']).name}", flush=True)
+            total, peak = total + seconds, max(peak, memory)
+            for header in included & cost.keys():
+                cost[header] += seconds
+    for header in sorted(cost, key=lambda header: cost[header]):
+        print(f"{cost[header]:6.1f} s  {Path(header).relative_to(INCLUDE)}")
+    median = statistics.median(cost.values())
+    print(f"{total:.0f} s in all, median header {median:.0f} s, worst {max(cost.values()):.0f} s")
+    print(f"{peak:.0f} MB at the peak")
+
+
+if __name__ == "__main__":
+    main()
