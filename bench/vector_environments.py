@@ -35,7 +35,7 @@ def main() -> None:
     given = options(__doc__ or "", seeds=10, jobs=2).parse_args()
     study = StudyFile(STUDY, n_trials=given.seeds)
     run_study(KIND, study, given)
-    heads = (f"after {step:,}" for step in (5_000, 10_000, 15_000))
+    heads = (f"after {step:,}" for step in (20_000, 40_000, 60_000))
     header = ("task", "environments", "seeds", *heads, "us per step")
     print(markdown(header, table_rows(curves(KIND, study, given))))
 
