@@ -71,6 +71,24 @@ Matrix counts_of(const ParallelPerceptron& layer, const Bins& bins, std::size_t 
   return out;
 }
 
+py::array_t<std::int32_t> counts_of_all(
+    const std::vector<std::shared_ptr<ParallelPerceptron>>& layers, const Bins& bins,
+    std::size_t n_groups, int n_threads) {
+  std::vector<const ParallelPerceptron*> pointers;
+  for (const auto& layer : layers) {
+    core::require(layer != nullptr, "layers", "ParallelPerceptron objects", "None");
+    pointers.push_back(layer.get());
+  }
+  core::require(!layers.empty(), "layers", "at least one layer", layers.size());
+  const auto values = copied(matrix(bins, "bins", layers[0]->code().n_inputs()));
+  static_cast<void>(layers[0]->group_size(n_groups));  // before an array of that many is asked for
+  py::array_t<std::int32_t> out({layers.size(), static_cast<std::size_t>(bins.shape(0)), n_groups});
+  const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
+  const bindings::WithoutGIL unlocked(pointers);
+  ParallelPerceptron::counts(pointers, values, n_groups, n_threads, items);
+  return out;
+}
+
 py::tuple libsdnn_tables(int n_units, const std::vector<std::pair<int, int>>& inputs,
                          const ArrayArgument<std::int32_t>& pairs,
                          const std::vector<std::uint32_t>& seed, const std::string& library) {
@@ -227,6 +245,9 @@ void bind_estimators(py::module_& module) {
           "copy",
           [](const ParallelPerceptron& self) { return std::make_shared<ParallelPerceptron>(self); },
           "A layer of its own with the same weights");
+  module.def("counts_of_all", &counts_of_all, py::arg("layers"), py::arg("bins"),
+             py::arg("n_groups") = 1, py::arg("n_threads") = 1,
+             "How many units of each group fire, in each of some layers of one code");
   bind_online_layer(module);
 
   module.attr("TRAINING_FORMS") = names_of(estimators::kTrainingForms);

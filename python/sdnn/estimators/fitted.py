@@ -17,7 +17,7 @@ from sdnn.arguments import seed_of, whole
 from sdnn.coding import Coding, WithMissing, from_dict, to_dict
 from sdnn.coding.symbols import Categorical
 from sdnn.estimators.inputs import Array, Floats, Ints, coding_entries
-from sdnn.estimators.network import InputCode, Network, code_bytes
+from sdnn.estimators.network import FEW_SAMPLES, InputCode, Network, code_bytes
 from sdnn.files import Arrays, Description, read_file, write_file
 
 Self = TypeVar("Self", bound="Fitted")
@@ -87,10 +87,14 @@ class Fitted(Learned, BaseEstimator):
         """Integer thresholds, shape (n_units,)."""
         return self._fitted_network.thresholds
 
-    def _counts(self, bins: Ints, n_groups: int, n_threads: int) -> list[Ints]:
-        """Return the firing counts of each averaged network, shape (n_samples, n_groups)."""
+    def _counts(self, bins: Ints, n_groups: int, n_threads: int) -> Ints:
+        """Return the firing counts of averaged networks, (n_networks, n_samples, n_groups)."""
         networks = (*self._earlier, self.network_)
-        return [network.counts(bins, n_groups, n_threads) for network in networks]
+        if len(networks) == 1 or len(bins) <= FEW_SAMPLES:
+            return np.stack([network.counts(bins, n_groups, n_threads) for network in networks])
+        layers = [network.layer for network in networks]
+        counts: Ints = _core.counts_of_all(layers, bins, n_groups, n_threads)
+        return counts
 
     def _names_or_numbers(self) -> list[Any]:
         """Return the names of the features, or their numbers."""
@@ -194,7 +198,7 @@ class Fitted(Learned, BaseEstimator):
             raise ValueError(f"{path} is damaged: {error or repr(error)}") from error
 
 
-def mean_of(arrays: Sequence[Array]) -> Array:
+def mean_of(arrays: Sequence[Array] | Array) -> Array:
     """Return the mean of arrays; a single one as it is."""
     mean: Array = np.mean(arrays, axis=0) if len(arrays) > 1 else arrays[0]
     return mean

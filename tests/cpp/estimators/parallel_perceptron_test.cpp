@@ -105,6 +105,32 @@ TEST(ParallelPerceptron, BlocksAndSinglesAgree) {
   }
 }
 
+TEST(ParallelPerceptron, CountsOfLayersAreThoseOfEach) {
+  const auto code = code_of_three(130);
+  const ParallelPerceptron narrow(code, 100, 5, 3);
+  const ParallelPerceptron wide(code, 100, 6, 100000);
+  const ParallelPerceptron* const layers[] = {&narrow, &wide, &narrow};
+  core::Random random(8, core::Stream::exploration);
+  for (const std::size_t n_queries : {0U, 5U, 700U}) {
+    std::vector<std::int32_t> bins(3 * n_queries);
+    for (auto& bin : bins) bin = static_cast<std::int32_t>(random.below(40));
+    std::vector<std::int32_t> together(3 * n_queries * 4);
+    ParallelPerceptron::counts(layers, bins, 4, 2, together);
+    std::vector<std::int32_t> expected;
+    for (const ParallelPerceptron* const layer : layers) {
+      std::vector<std::int32_t> alone(n_queries * 4);
+      layer->counts(bins, 4, 1, alone);
+      expected.insert(expected.end(), alone.begin(), alone.end());
+    }
+    EXPECT_EQ(together, expected);
+  }
+  const ParallelPerceptron other(code_of_three(130), 100, 5, 3);
+  const ParallelPerceptron* const unlike[] = {&narrow, &other};
+  std::vector<std::int32_t> out;
+  EXPECT_THROW(ParallelPerceptron::counts(unlike, {}, 1, 1, out), std::invalid_argument);
+  EXPECT_THROW(ParallelPerceptron::counts({}, {}, 1, 1, out), std::invalid_argument);
+}
+
 TEST(ParallelPerceptron, DrawsWholeNumbersInRange) {
   const ParallelPerceptron layer(small_code(), 400, 3, 2);
   std::vector<int> seen(5);

@@ -33,12 +33,12 @@ TEST(TrainingForm, MemoryByHand) {
             2U);
   EXPECT_EQ(estimators::form_memory(TrainingForm::plain, 280, code, 2000), 0U);
   EXPECT_EQ(estimators::form_memory(TrainingForm::block, 280, code, 2000),
-            4U * 288 * (4096 + 256 + 32) +
+            4U * 288 * (4096 + 256 + 32) + 2U * 96 * (256 + 4 * 256) +
                 256U * (2 * 64 * 8 + 4096 + 4 * 288 + 2 * 256 + 2000 + 32 * 4));
   EXPECT_EQ(estimators::form_memory(TrainingForm::block, 280, code, 2000, true) -
                 estimators::form_memory(TrainingForm::block, 280, code, 2000),
             256U * (2 * 64 * 8 + 4096 + 2 * 4 * 288 + 2000 + 32 * 4) + 2 * (512 * 512 - 256 * 256) +
-                2000U * (512 * 2 + 2000 + 32 * 4));
+                2 * 96 * 4 * 256 + 2000U * (512 * 2 + 2000 + 32 * 4));
   EXPECT_EQ(estimators::form_memory(TrainingForm::dual, 280, code, 2000),
             2000U * 2016 * 2 + 280U * 2016 * 4 + 2000U * 288 * 2 + 2000U * 2 * 64 * 8 +
                 4U * 288 * (128 + 32) + 2U * 128 * 128);

@@ -36,7 +36,7 @@ class OnlineLayer {
         words_(2 * layer_->code().n_words()),
         slots_(layer_->code().n_words()),
         potentials_(layer_->n_units()) {
-    const WeightTiles<std::int32_t>& tiles = layer_->tiles();
+    const WeightTiles<std::int32_t>& tiles = std::as_const(*layer_).tiles();
     std::vector<std::int32_t> column(tiles.n_units());
     for (std::size_t slot = 0; slot < tiles.n_slots(); ++slot) {
       for (std::size_t i = 0; i < column.size(); ++i) column[i] = tiles.at(i, slot);

@@ -19,6 +19,7 @@
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/detail/interruption.hpp"
+#include "sdnn/core/detail/on_demand.hpp"
 #include "sdnn/core/errors.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/estimators/detail/pair_walk.hpp"
@@ -107,7 +108,10 @@ class ParallelPerceptron {
   }
 
   /// Weights for trainers; check_norms() holds them to the layer's promise.
-  WeightTiles<std::int32_t>& tiles() noexcept { return weights_; }
+  WeightTiles<std::int32_t>& tiles() noexcept {
+    narrow_.reset();
+    return weights_;
+  }
   const WeightTiles<std::int32_t>& tiles() const noexcept { return weights_; }
   std::span<std::int32_t> thresholds() noexcept { return thresholds_; }
   std::span<const std::int32_t> thresholds() const noexcept { return thresholds_; }
@@ -138,31 +142,87 @@ class ParallelPerceptron {
     return largest;
   }
 
-  /// Calls consume(query, potentials) once per query, in an order of its own and from up to
-  /// `n_threads` threads at a time.
+  using Layers = std::span<const ParallelPerceptron* const>;
+
+  /// Calls consume(layer, query, potentials) once per layer and query, in an order of its own and
+  /// from up to `n_threads` threads at a time.
   ///
-  /// Neighbouring queries share most of their code, so the potentials of one become those of the
-  /// next by the columns in which they differ. Shapes: bins (n_queries, n_inputs), potentials
-  /// (n_padded_units,), of which the first n_units mean something. Throws std::invalid_argument for
-  /// bins out of range or n_threads < 1.
+  /// Neighbouring queries share most of their code, and many queries what a pair of inputs adds to
+  /// their potentials. Shapes: bins (n_queries, n_inputs), potentials (n_padded_units,), of which
+  /// the first n_units mean something. Throws std::invalid_argument for no layers or layers that
+  /// differ in their code or size, bins out of range or n_threads < 1.
+  template <class Consume>
+  static void for_each_query(Layers layers, std::span<const std::int32_t> bins, int n_threads,
+                             const Consume& consume) {
+    core::require(!layers.empty(), "layers", "at least one layer", layers.size());
+    const Code& code = *layers[0]->code_;
+    for (const ParallelPerceptron* const layer : layers) {
+      core::require(layer->code_ == layers[0]->code_ && layer->n_units() == layers[0]->n_units(),
+                    "layers", "of one code and size", "another one");
+    }
+    core::require_in_range("n_threads", n_threads, 1, 4096);
+    code.check_bins(bins);
+    const auto order = query_order(bins, code.n_inputs());
+    std::vector<std::shared_ptr<const Narrow>> narrow;
+    if (order.size() > kFewQueries) {
+      for (const ParallelPerceptron* const layer : layers) {
+        narrow.push_back(layer->narrow_.get([&] { return Narrow(code, layer->weights_); }));
+      }
+    }
+    if (narrow.empty() || is_short_walk(code, bins, order)) {
+      const auto sweep = [&](std::size_t begin, std::size_t end) {
+        const auto some = std::span(order).subspan(begin, end - begin);
+        for (std::size_t k = 0; k < layers.size(); ++k) {
+          const auto answer = [&](const auto& tiles, std::size_t n_per_sum) {
+            layers[k]->sweep(
+                tiles, n_per_sum, bins, some,
+                [&](std::size_t query, const std::int32_t* values) { consume(k, query, values); });
+          };
+          if (narrow.empty() || narrow[k]->n_chunks == 0) {
+            answer(layers[k]->weights_, std::size_t{1} << 30);  // no potential can overflow
+          } else {
+            answer(narrow[k]->tiles, narrow[k]->n_per_sum);
+          }
+        }
+      };
+      return in_parts(order.size(), layers[0]->most_at_once(kSweptAtOnce), n_threads, sweep);
+    }
+    const auto answer = [&](const auto& tiles, std::size_t n_chunks) {
+      const std::size_t n_padded = layers[0]->n_padded_units();
+      const auto add = [&](std::size_t begin, std::size_t end) {
+        const std::size_t n = end - begin;
+        std::vector<std::int32_t> values(layers.size() * n * n_padded);
+        for (std::size_t k = 0; k < layers.size() * n; ++k) {
+          layers[k / n]->start_from_zero(&values[k * n_padded]);
+        }
+        add_codes(code, std::span(tiles), n_chunks,
+                  bins.subspan(begin * code.n_inputs(), n * code.n_inputs()), values.data());
+        for (std::size_t k = 0; k < layers.size() * n; ++k) {
+          consume(k / n, begin + k % n, &values[k * n_padded]);
+        }
+      };
+      in_parts(order.size(), layers[0]->most_at_once(kAddedAtOnce / layers.size()), n_threads, add);
+    };
+    const std::size_t n_chunks = (*std::ranges::min_element(narrow, {}, [](const auto& weights) {
+                                   return weights->n_chunks;
+                                 }))->n_chunks;
+    std::vector<const WeightTiles<std::int16_t>*> tiles;
+    std::vector<const WeightTiles<std::int32_t>*> wide_tiles;
+    for (std::size_t k = 0; k < layers.size(); ++k) {
+      tiles.push_back(&narrow[k]->tiles);
+      wide_tiles.push_back(&layers[k]->weights_);
+    }
+    n_chunks > 0 ? answer(tiles, n_chunks) : answer(wide_tiles, kMostChunks);
+  }
+  /// The same for this layer, consume(query, potentials).
   template <class Consume>
   void for_each_query(std::span<const std::int32_t> bins, int n_threads,
                       const Consume& consume) const {
-    core::require_in_range("n_threads", n_threads, 1, 4096);
-    code_->check_bins(bins);
-    const std::size_t n_queries = bins.size() / code_->n_inputs();
-    if (n_queries == 0) return;
-    const auto order = query_order(bins, code_->n_inputs());
-    if (n_queries <= kFewQueries)
-      return answer_all<Sweep>(weights_, bins, order, n_threads, consume);
-    // A copy in 16 bits is half as much to read; it pays if many queries share it.
-    const auto answer = [&]<class Way>(Way, bool is_narrow) {
-      if (!is_narrow) return answer_all<Way>(weights_, bins, order, n_threads, consume);
-      answer_all<Way>(WeightTiles<std::int16_t>(weights_), bins, order, n_threads, consume);
-    };
-    constexpr std::int64_t kLargest = std::numeric_limits<std::int16_t>::max();
-    if (is_short_walk(bins, order)) return answer(Sweep{}, weights_.largest() <= kLargest / 16);
-    answer(Blocks{}, largest_word_norm() <= kLargest / std::int64_t{kChunkWords});
+    const ParallelPerceptron* const alone = this;
+    for_each_query(Layers(&alone, 1), bins, n_threads,
+                   [&](std::size_t, std::size_t query, const std::int32_t* values) {
+                     consume(query, values);
+                   });
   }
 
   /// Potentials in the order of the queries. Shapes: bins (n_queries, n_inputs), out
@@ -183,19 +243,27 @@ class ParallelPerceptron {
     return n_units() / n_groups;
   }
 
-  /// Number of firing units in each of `n_groups` equal groups. Shapes: bins
-  /// (n_queries, n_inputs), out (n_queries, n_groups). Throws std::invalid_argument unless n_groups
-  /// divides n_units, for an out of another size, and like for_each_query.
-  void counts(std::span<const std::int32_t> bins, std::size_t n_groups, int n_threads,
-              std::span<std::int32_t> out) const {
-    const std::size_t size = group_size(n_groups);
-    require_size(out, bins.size() / code_->n_inputs() * n_groups);
-    const auto count = [&](std::size_t query, const std::int32_t* values) {
+  /// Number of firing units of each layer in each of `n_groups` equal groups. Shapes: bins
+  /// (n_queries, n_inputs), out (n_layers, n_queries, n_groups). Throws std::invalid_argument
+  /// unless n_groups divides n_units, for an out of another size, and like for_each_query.
+  static void counts(Layers layers, std::span<const std::int32_t> bins, std::size_t n_groups,
+                     int n_threads, std::span<std::int32_t> out) {
+    core::require(!layers.empty(), "layers", "at least one layer", layers.size());
+    const std::size_t size = layers[0]->group_size(n_groups);
+    const std::size_t n_queries = bins.size() / layers[0]->code_->n_inputs();
+    require_size(out, layers.size() * n_queries * n_groups);
+    const auto count = [&](std::size_t layer, std::size_t query, const std::int32_t* values) {
       for (std::size_t g = 0; g < n_groups; ++g) {
-        out[query * n_groups + g] = count_firing(values + g * size, size);
+        out[(layer * n_queries + query) * n_groups + g] = count_firing(values + g * size, size);
       }
     };
-    for_each_query(bins, n_threads, count);
+    for_each_query(layers, bins, n_threads, count);
+  }
+  /// The same for this layer. Shapes: out (n_queries, n_groups).
+  void counts(std::span<const std::int32_t> bins, std::size_t n_groups, int n_threads,
+              std::span<std::int32_t> out) const {
+    const ParallelPerceptron* const alone = this;
+    counts(Layers(&alone, 1), bins, n_groups, n_threads, out);
   }
 
  private:
@@ -221,86 +289,68 @@ class ParallelPerceptron {
     return slots;
   }
 
-  /// From query to query, by the columns in which their codes differ.
-  struct Sweep {
-    template <class Weight, class Consume>
-    static void answer(const ParallelPerceptron& layer, const WeightTiles<Weight>& tiles,
-                       std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
-                       const Consume& consume) {
-      const Code& code = layer.code();
-      const std::size_t n_words = code.n_words();
-      const std::size_t n_per_sum = most_per_sum(tiles);
-      std::vector<std::uint64_t> words(4 * n_words);
-      std::uint64_t* now = words.data();  // active, then positive
-      std::uint64_t* before = now + 2 * n_words;
-      std::vector<std::int32_t> values(layer.n_padded_units());
-      const auto start_from_zero = [&] {  // the potentials of the code of zeros
-        for (std::size_t i = 0; i < layer.n_units(); ++i) values[i] = -layer.thresholds_[i];
-      };
-      start_from_zero();
-      coding::ColumnLists slots(n_words);
-      for (const std::uint32_t query : order) {
-        code.encode(bins.subspan(query * code.n_inputs(), code.n_inputs()), now, now + n_words);
-        const coding::TernaryCode next{now, now + n_words};
-        slots.read_changes({before, before + n_words}, next);
-        // Counting costs too, and is worth it for codes that are far apart.
-        const std::size_t n_changes = slots.columns().size();
-        if (n_changes > code.max_active() / 2 && n_changes > coding::n_active(next, n_words)) {
-          start_from_zero();
-          slots.read(next);
+  /// Weights in 16 bits, half as much to read, if the sums over chunks fit.
+  struct Narrow {
+    Narrow(const Code& code, const WeightTiles<std::int32_t>& weights) {
+      std::int64_t largest = 1;  // no unit's |weights| in a chunk sum up to more
+      for (const PairChunk& chunk : pair_chunks(code)) {
+        std::int64_t norm = 0;
+        for (const std::size_t word : chunk.words) {
+          norm += weights.largest_norm(64 * word, 64 * (word + 1));
         }
-        tiles.add_columns(slots.columns(), n_per_sum, values.data());
-        consume(query, values.data());
-        std::swap(now, before);
+        largest = std::max(largest, norm);
       }
+      constexpr std::int64_t kLargest = std::numeric_limits<std::int16_t>::max();
+      n_chunks = static_cast<std::size_t>(kLargest / largest);
+      if (n_chunks == 0) return;
+      tiles = WeightTiles<std::int16_t>(weights);
+      n_per_sum = static_cast<std::size_t>(kLargest / std::max(tiles.largest(), std::int64_t{1}));
     }
-    /// Weights that a thread adds between two checks: a tenth of a second of them.
-    static constexpr std::size_t kAddedAtOnce = std::size_t{1} << 32;
+    std::size_t n_chunks;       // whose sums fit together
+    std::size_t n_per_sum = 0;  // weights whose sum fits
+    WeightTiles<std::int16_t> tiles;
   };
 
-  /// Many queries together, in each pair of inputs along a walk of its own.
-  struct Blocks {
-    template <class Weight, class Consume>
-    static void answer(const ParallelPerceptron& layer, const WeightTiles<Weight>& tiles,
-                       std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
-                       const Consume& consume) {
-      const std::size_t n_padded = layer.n_padded_units();
-      const auto chunks = pair_chunks(layer.code());
-      std::vector<std::int32_t> values(std::min(order.size(), kBlock) * n_padded);
-      const std::size_t n_blocks = (order.size() + kBlock - 1) / kBlock;
-      for (std::size_t block = 0; block < n_blocks; ++block) {
-        const std::size_t begin = block * order.size() / n_blocks;
-        const auto some = order.subspan(begin, (block + 1) * order.size() / n_blocks - begin);
-        for (std::size_t q = 0; q < some.size(); ++q) {
-          for (std::size_t i = 0; i < layer.n_units(); ++i) {
-            values[q * n_padded + i] = -layer.thresholds_[i];
-          }
-        }
-        add_codes(layer.code(), chunks, tiles, bins, some, values.data());
-        for (std::size_t q = 0; q < some.size(); ++q) consume(some[q], &values[q * n_padded]);
-      }
-    }
-    static constexpr std::size_t kBlock = 1024;
-    static constexpr std::size_t kAddedAtOnce = std::size_t{1} << 34;  // of which most are skipped
-  };
-
-  /// Weights whose sum fits into their type.
-  static std::size_t most_per_sum(const WeightTiles<std::int16_t>& tiles) noexcept {
-    return static_cast<std::size_t>(std::numeric_limits<std::int16_t>::max() /
-                                    std::max<std::int64_t>(tiles.largest(), 1));
+  /// The potentials of the code of zeros.
+  void start_from_zero(std::int32_t* potentials) const noexcept {
+    for (std::size_t i = 0; i < n_units(); ++i) potentials[i] = -thresholds_[i];
   }
-  static std::size_t most_per_sum(const WeightTiles<std::int32_t>& /*tiles*/) noexcept {
-    return std::size_t{1} << 30;  // no potential can overflow
+
+  /// From query to query, by the columns in which their codes differ.
+  template <class Weight, class Consume>
+  void sweep(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
+             std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
+             const Consume& consume) const {
+    const std::size_t n_words = code_->n_words();
+    std::vector<std::uint64_t> words(4 * n_words);
+    std::uint64_t* now = words.data();  // active, then positive
+    std::uint64_t* before = now + 2 * n_words;
+    std::vector<std::int32_t> values(n_padded_units());
+    start_from_zero(values.data());
+    coding::ColumnLists slots(n_words);
+    for (const std::uint32_t query : order) {
+      code_->encode(bins.subspan(query * code_->n_inputs(), code_->n_inputs()), now, now + n_words);
+      const coding::TernaryCode next{now, now + n_words};
+      slots.read_changes({before, before + n_words}, next);
+      // Counting costs too, and is worth it for codes that are far apart.
+      const std::size_t n_changes = slots.columns().size();
+      if (n_changes > code_->max_active() / 2 && n_changes > coding::n_active(next, n_words)) {
+        start_from_zero(values.data());
+        slots.read(next);
+      }
+      tiles.add_columns(slots.columns(), n_per_sum, values.data());
+      consume(query, values.data());
+      std::swap(now, before);
+    }
   }
 
   /// Do so few columns change from one query to the next that a sweep is best? By some of them.
-  bool is_short_walk(std::span<const std::int32_t> bins,
-                     std::span<const std::uint32_t> order) const {
-    const std::size_t n_words = code_->n_words();
+  static bool is_short_walk(const Code& code, std::span<const std::int32_t> bins,
+                            std::span<const std::uint32_t> order) {
+    const std::size_t n_words = code.n_words();
     std::vector<std::uint64_t> words(4 * n_words);
     const auto code_at = [&](std::size_t place, std::uint64_t* to) {
-      code_->encode(bins.subspan(order[place] * code_->n_inputs(), code_->n_inputs()), to,
-                    to + n_words);
+      code.encode(bins.subspan(order[place] * code.n_inputs(), code.n_inputs()), to, to + n_words);
       return coding::TernaryCode{to, to + n_words};
     };
     coding::ColumnLists slots(n_words);
@@ -314,51 +364,36 @@ class ParallelPerceptron {
     return n_changes < kChangesPerWord * n_steps * n_words;
   }
 
-  /// The largest sum of a unit's |weights| in a word.
-  std::int64_t largest_word_norm() const {
-    std::int64_t largest = 0;
-    for (std::size_t slot = 0; slot < weights_.n_slots(); slot += 64) {
-      largest = std::max(largest, weights_.largest_norm(slot, slot + 64));
-    }
-    return largest;
+  /// Queries of a thread between two checks for an interruption: a tenth of a second of additions.
+  std::size_t most_at_once(std::size_t n_added) const noexcept {
+    return std::clamp<std::size_t>(n_added / (code_->n_slots() * n_padded_units()), 64, 4096);
   }
 
-  template <class Way, class Weight, class Consume>
-  void answer_all(const WeightTiles<Weight>& tiles, std::span<const std::int32_t> bins,
-                  std::span<const std::uint32_t> order, int n_threads,
-                  const Consume& consume) const {
-    const std::size_t n_added = code_->n_slots() * n_padded_units();
-    const std::size_t most = std::clamp<std::size_t>(Way::kAddedAtOnce / n_added, 64, 4096) *
-                             static_cast<std::size_t>(n_threads);
-    for (; !order.empty(); order = order.subspan(std::min(most, order.size()))) {
+  /// Calls work(begin, end) for parts of up to `most` queries, n_threads of them at a time.
+  template <class Work>
+  static void in_parts(std::size_t n_queries, std::size_t most, int n_threads, const Work& work) {
+    const auto n_parts = std::min(static_cast<std::size_t>(n_threads), (n_queries + 255) / 256);
+    const std::size_t n_rounds = n_queries == 0 ? 0 : (n_queries - 1) / (most * n_parts) + 1;
+    const auto begin_of = [&](std::size_t k) { return k * n_queries / (n_rounds * n_parts); };
+    for (std::size_t k = 0; k < n_rounds * n_parts; k += n_parts) {
       core::interruption_point();
-      answer_part<Way>(tiles, bins, order.first(std::min(most, order.size())), n_threads, consume);
+      std::vector<std::jthread> threads;  // joined at the end of the scope
+      for (std::size_t part = 1; part < n_parts; ++part) {
+        threads.emplace_back(work, begin_of(k + part), begin_of(k + part + 1));
+      }
+      work(begin_of(k), begin_of(k + 1));
     }
-  }
-
-  template <class Way, class Weight, class Consume>
-  void answer_part(const WeightTiles<Weight>& tiles, std::span<const std::int32_t> bins,
-                   std::span<const std::uint32_t> order, int n_threads,
-                   const Consume& consume) const {
-    const std::size_t n_parts =
-        std::min(static_cast<std::size_t>(n_threads), (order.size() + 255) / 256);
-    std::vector<std::jthread> threads;  // joined at the end of the scope
-    for (std::size_t part = 1; part < n_parts; ++part) {
-      const std::size_t begin = part * order.size() / n_parts;
-      const std::size_t end = (part + 1) * order.size() / n_parts;
-      threads.emplace_back([&, begin, end] {
-        Way::answer(*this, tiles, bins, order.subspan(begin, end - begin), consume);
-      });
-    }
-    Way::answer(*this, tiles, bins, order.first(order.size() / n_parts), consume);
   }
 
   static constexpr std::size_t kFewQueries = 64;
-  static constexpr std::size_t kChangesPerWord = 4;  // from which blocks are quicker
+  static constexpr std::size_t kChangesPerWord = 4;  // from which pair by pair is quicker
+  static constexpr std::size_t kSweptAtOnce = std::size_t{1} << 32;
+  static constexpr std::size_t kAddedAtOnce = std::size_t{1} << 36;  // of which most are skipped
 
   std::shared_ptr<const Code> code_;
   WeightTiles<std::int32_t> weights_;
   std::vector<std::int32_t> thresholds_;
+  core::OnDemand<Narrow> narrow_;
 };
 
 }  // namespace sdnn::estimators

@@ -62,7 +62,7 @@ TEST(BlockTraining, ChangesToWideWeightsWithoutChangingThem) {
   auto problem = testing::random_problem(5);
   const std::size_t n_columns = problem.code->n_columns();
   for (const std::int32_t start :
-       {250, 20000}) {  // 128 of them just fit into 16 bits, and not at all
+       {127, 20000}) {  // 256 of them just fit into 16 bits, and not at all
     std::vector<std::int32_t> weights(problem.n_units * n_columns);
     for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = i % 2 == 0 ? start : -start;
     const std::vector<std::int32_t> thresholds(problem.n_units);

@@ -2,8 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
-#include <numeric>
+#include <span>
 #include <vector>
 
 #include "estimators/codes.hpp"
@@ -13,6 +14,7 @@
 namespace sdnn {
 namespace {
 
+using estimators::ChunkCode;
 using estimators::ChunkedWeights;
 using estimators::CodeWalk;
 using estimators::kChunkColumns;
@@ -26,12 +28,28 @@ std::vector<testing::Code> some_codes(std::size_t n_words, core::Random& random)
   return codes;
 }
 
+CodeWalk walk_through(const std::vector<testing::Code>& codes, std::size_t n_words) {
+  std::vector<ChunkCode> words(codes.size());
+  for (std::size_t k = 0; k < codes.size(); ++k) {
+    std::copy_n(codes[k].words().active, n_words, words[k].active);
+    std::copy_n(codes[k].words().positive, n_words, words[k].positive);
+  }
+  CodeWalk walk;
+  walk.steps.resize(codes.size());
+  walk.columns.resize(64 * n_words * codes.size() + 2);
+  const auto* const end =
+      estimators::list_steps(words, n_words, walk.columns.data(), walk.steps.data());
+  walk.columns.resize(static_cast<std::size_t>(end - walk.columns.data()));
+  return walk;
+}
+
 template <class Weight>
 void check_walk(std::int32_t largest) {
   core::Random random(8, core::Stream::weights);
-  for (const std::size_t n_words : {kChunkWords, 3 * kChunkWords}) {
+  const std::vector<std::uint16_t> places{3, 2, 2, 0, 4, 5, 7, 6, 1, 7};
+  const std::vector<std::uint16_t> others{0, 1, 2, 3, 4, 5, 6, 7, 7, 6};
+  for (const std::size_t n_words : {std::size_t{1}, std::size_t{2}, kChunkWords}) {
     const auto codes = some_codes(n_words, random);
-    const std::vector<std::uint32_t> order{3, 2, 1, 0, 4, 5, 7, 6};
     for (std::size_t width = 16; width <= estimators::kMostUnits<Weight>; width += 16) {
       core::AlignedBuffer<Weight> rows(kChunkColumns * width);
       for (auto& weight : rows.span()) {
@@ -41,20 +59,21 @@ void check_walk(std::int32_t largest) {
       }
       const std::size_t stride = width + 3;
       testing::on_every_instruction_set([&](auto level) {
-        const CodeWalk walk(order, n_words, [&](std::uint32_t k) { return codes[k].words(); });
-        ASSERT_EQ(walk.n_chunks(), n_words / kChunkWords);
-        for (std::size_t chunk = 0; chunk < walk.n_chunks(); ++chunk) {
-          std::vector<std::int32_t> potentials(codes.size() * stride, 11);
-          estimators::walk_chunk(rows.data(), width, walk.steps(), walk.changes(chunk),
-                                 potentials.data(), stride);
-          for (std::size_t k = 0; k < codes.size(); ++k) {
-            for (std::size_t i = 0; i < stride; ++i) {
-              std::int32_t expected = 11;
-              for (std::size_t c = 0; i < width && c < kChunkColumns; ++c) {
-                expected += codes[k].at(chunk * kChunkColumns + c) * rows[c * width + i];
-              }
-              ASSERT_EQ(potentials[k * stride + i], expected) << level << ' ' << width << ' ' << k;
+        const CodeWalk walk = walk_through(codes, n_words);
+        std::vector<Weight> sums(codes.size() * width);
+        estimators::sum_steps(rows.data(), width, walk, sums.data());
+        const std::vector<estimators::StepSums<Weight>> added{{sums.data(), places.data()},
+                                                              {sums.data(), others.data()}};
+        std::vector<std::int32_t> potentials(places.size() * stride, 11);
+        estimators::add_step_sums(std::span(added), width, places.size(), potentials.data(),
+                                  stride);
+        for (std::size_t k = 0; k < places.size(); ++k) {
+          for (std::size_t i = 0; i < stride; ++i) {
+            std::int32_t expected = 11;
+            for (std::size_t c = 0; i < width && c < 64 * n_words; ++c) {
+              expected += (codes[places[k]].at(c) + codes[others[k]].at(c)) * rows[c * width + i];
             }
+            ASSERT_EQ(potentials[k * stride + i], expected) << level << ' ' << width << ' ' << k;
           }
         }
       });
@@ -63,29 +82,26 @@ void check_walk(std::int32_t largest) {
 }
 
 TEST(CodeWalk, SumsWhatEachCodeAsksFor) {
-  check_walk<std::int16_t>(255);  // 128 columns of 255 just fit
+  check_walk<std::int16_t>(63);  // twice 256 columns of 63 just fit
   check_walk<std::int32_t>(1000000);
 }
 
 TEST(CodeWalk, StartsFromZeroWhereThatIsNearer) {
   core::Random random(9, core::Stream::weights);
-  const auto codes = some_codes(4 * kChunkWords, random);
-  std::vector<std::uint32_t> order(codes.size());
-  std::iota(order.begin(), order.end(), 0U);
-  const CodeWalk walk(order, 4 * kChunkWords, [&](std::uint32_t k) { return codes[k].words(); });
-  EXPECT_FALSE(walk.steps()[3].from_zero);
-  EXPECT_TRUE(walk.steps().back().from_zero);
+  const CodeWalk walk = walk_through(some_codes(kChunkWords, random), kChunkWords);
+  EXPECT_FALSE(walk.steps[3].from_zero);
+  EXPECT_TRUE(walk.steps.back().from_zero);
 }
 
 TEST(ChunkedWeights, HoldTheTilesAndZerosBeyond) {
   WeightTiles<std::int32_t> tiles(20, 3 * 64);
   tiles.at(17, 130) = -300;
   tiles.at(17, 131) = 40000;
-  const ChunkedWeights<std::int32_t> wide(tiles, 4);
+  const ChunkedWeights<std::int32_t> wide(tiles, {0, 3, 1, 4, 2, 5, 6, 7});
   EXPECT_EQ(wide.n_chunks(), 2U);
   EXPECT_EQ(wide.n_padded_units(), 32U);
-  EXPECT_EQ(wide.chunk(1, 17)[130 - kChunkColumns], -300);
-  EXPECT_EQ(wide.chunk(1, 17)[127], 0);
+  EXPECT_EQ(wide.chunk(1, 17)[2], -300);
+  EXPECT_EQ(wide.chunk(0, 17)[64], 0);
   EXPECT_EQ(wide.largest_chunk_norm(), 40300);
   EXPECT_EQ(ChunkedWeights<std::int32_t>::bytes(32, 4), 4U * 32 * 256);
 }
@@ -96,9 +112,10 @@ TEST(ChunkedWeights, GoThereAndBack) {
   for (std::size_t i = 0; i < 200; ++i) {
     for (std::size_t slot = 0; slot < 128; ++slot) tiles.at(i, slot) = ++value;
   }
-  const ChunkedWeights<std::int16_t> narrow(ChunkedWeights<std::int32_t>(tiles, 2));
+  const std::vector<std::size_t> words{1, 0, 2, 3};
+  const ChunkedWeights<std::int16_t> narrow(ChunkedWeights<std::int32_t>(tiles, words));
   WeightTiles<std::int32_t> back(200, 128);
-  narrow.copy_to(back);
+  narrow.copy_to(back, words);
   for (std::size_t i = 0; i < 200; ++i) {
     for (std::size_t slot = 0; slot < 128; ++slot) ASSERT_EQ(back.at(i, slot), tiles.at(i, slot));
   }

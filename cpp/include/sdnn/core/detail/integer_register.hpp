@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -45,16 +46,24 @@ struct IntegerRegister {
   /// to[i] += the i-th integer, in the type of `to`, which is as wide or wider.
   template <class Wide>
   SDNN_INLINE void add_to(Wide* to) const noexcept {
-    using Part = IntegerRegister<Wide>;
-    typedef Wide Converted __attribute__((vector_size(kSize * sizeof(Wide))));
-    const Converted all = __builtin_convertvector(v, Converted);
-    unrolled<kSize / Part::kSize>([&](auto part) SDNN_INLINE_LAMBDA {
+    if constexpr (sizeof(Wide) == sizeof(Integer)) {
+      IntegerRegister sum = *this;
+      sum.add(to);
+      sum.store(to);
+    } else {  // each integer beside its sign; GCC converts vectors in many small pieces
+      using Twice = std::conditional_t<sizeof(Integer) == 1, std::int16_t, std::int32_t>;
+      using Half = IntegerRegister<Twice>;
+      static_assert(std::endian::native == std::endian::little, "the sign comes second");
+      const Vector sign = (Vector)(v < 0);
       [&]<std::size_t... Index>(std::index_sequence<Index...>) SDNN_INLINE_LAMBDA {
-        Part sum{__builtin_shufflevector(all, all, (part() * Part::kSize + Index)...)};
-        sum.add(to + part() * Part::kSize);
-        sum.store(to + part() * Part::kSize);
-      }(std::make_index_sequence<Part::kSize>());
-    });
+        Half{(typename Half::Vector)__builtin_shufflevector(v, sign,
+                                                            (Index / 2 + Index % 2 * kSize)...)}
+            .add_to(to);
+        Half{(typename Half::Vector)__builtin_shufflevector(
+                 v, sign, (kSize / 2 + Index / 2 + Index % 2 * kSize)...)}
+            .add_to(to + kSize / 2);
+      }(std::make_index_sequence<kSize>());
+    }
   }
 };
 

@@ -2,12 +2,12 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -19,8 +19,8 @@
 #include "sdnn/core/detail/worker_team.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/detail/code_walk.hpp"
+#include "sdnn/estimators/detail/pair_walk.hpp"
 #include "sdnn/estimators/detail/presentation_window.hpp"
-#include "sdnn/estimators/detail/query_order.hpp"
 #include "sdnn/estimators/detail/signed_sums.hpp"
 #include "sdnn/estimators/detail/transposition.hpp"
 #include "sdnn/estimators/detail/weight_tiles.hpp"
@@ -31,10 +31,10 @@ namespace sdnn::estimators {
 /// Presents samples in blocks.
 ///
 /// A pass over the weights, a few cache-resident columns of some units at a time, sums the block's
-/// potentials, from sample to sample along a short walk through their codes. What the block's own
-/// corrections change in its later potentials follows exactly from the inner products of its codes;
-/// the weights are corrected before the next pass, all corrections of a unit together. Weights are
-/// kept in 16 bits, in 32 as soon as a sum of them could leave 16.
+/// potentials, for each two inputs along a short walk through the codes of their pair. What the
+/// block's own corrections change in its later potentials follows exactly from the inner products
+/// of its codes; the weights are corrected before the next pass, all corrections of a unit
+/// together. Weights are kept in 16 bits, in 32 as soon as a sum of them could leave 16.
 ///
 /// Blocks are large where the same ones come again in every epoch, each in the order of the data,
 /// and there is memory to keep what does not change of them. `Product` is an integer that holds
@@ -46,7 +46,9 @@ class BlockTraining {
                 int n_threads, bool keeps_plans)
       : layer_(std::move(layer)),
         bins_(bins.begin(), bins.end()),
-        n_words_(words_for(layer_->code())),
+        chunks_(pair_chunks(layer_->code())),
+        word_order_(order_of(chunks_, words_for(layer_->code()))),
+        n_words_(word_order_.size()),
         team_(static_cast<std::size_t>(n_threads)),
         most_samples_(keeps_plans ? kLargeBlock : kSmallBlock),
         keeps_plans_(keeps_plans),
@@ -58,7 +60,7 @@ class BlockTraining {
         potentials_(most_samples_ * layer_->n_padded_units()),
         window_(layer_->n_padded_units(), most_samples_),
         pending_(layer_->n_units()),
-        weights_(std::in_place_type<Wide>, layer_->tiles(), n_words_),
+        weights_(std::in_place_type<Wide>, std::as_const(*layer_).tiles(), word_order_),
         chunk_norm_(std::get<Wide>(weights_).largest_chunk_norm()) {
     if (chunk_norm_ <= kLargestSum) weights_ = Narrow(std::get<Wide>(weights_));
   }
@@ -83,21 +85,24 @@ class BlockTraining {
                            std::size_t n_samples, bool keeps_plans) noexcept {
     const std::size_t n_padded = core::round_up(n_units, kTileStep);
     const std::size_t n_words = words_for(code);
+    const std::size_t n_chunks = pair_chunks(code).size();
     const std::size_t size = keeps_plans ? kLargeBlock : kSmallBlock;
     const auto plan_bytes = [&](std::size_t n) {
-      return sizeof(Product) * n * size + CodeWalk::bytes(n, n_words, code.max_active());
+      return sizeof(Product) * n * size + CodeWalk::bytes(n, n_chunks, code.max_active());
     };
     return Wide::bytes(n_padded, n_words)                // weights_, or half of it
            + 2 * sizeof(std::uint64_t) * size * n_words  // words_
            + 64 * size * n_words                         // entries_
            + sizeof(std::int32_t) * size * n_padded      // potentials_
            + PresentationWindow::bytes(n_padded, size)   // window_
+           + ChunkSums<std::int16_t>::bytes(size)        // of a thread
            + plan_bytes(size)                            // of the block at hand
            + (keeps_plans ? plan_bytes(n_samples) : 0);  // plans_
   }
 
   void synchronize() {
-    std::visit([&](const auto& weights) { weights.copy_to(layer_->tiles()); }, weights_);
+    std::visit([&](const auto& weights) { weights.copy_to(layer_->tiles(), word_order_); },
+               weights_);
   }
 
  private:
@@ -107,18 +112,26 @@ class BlockTraining {
 
   /// Words of a code, filled up with zeros to whole chunks.
   static std::size_t words_for(const coding::SelectiveDesensitization& code) noexcept {
-    return core::round_up(code.n_words(), 2 * kChunkWords);
+    return core::round_up(code.n_words(), kChunkWords);
+  }
+
+  /// The words of all chunks, then those that fill the last one.
+  static std::vector<std::size_t> order_of(std::span<const PairChunk> chunks, std::size_t n_words) {
+    std::vector<std::size_t> order;
+    for (const PairChunk& chunk : chunks) {
+      order.insert(order.end(), chunk.words.begin(), chunk.words.end());
+    }
+    while (order.size() < n_words) order.push_back(order.size());
+    return order;
   }
 
   using Narrow = ChunkedWeights<std::int16_t>;
   using Wide = ChunkedWeights<std::int32_t>;
   static constexpr std::int64_t kLargestSum = std::numeric_limits<std::int16_t>::max();
-  template <class Weight>
-  using Columns = std::array<Weight, kChunkColumns * kMostUnits<Weight>>;
 
   /// Parts of a block that do not change.
   struct Plan {
-    CodeWalk walk;
+    std::vector<CodeWalk> walks;  // of each chunk
     std::size_t stride = 0;
     core::AlignedBuffer<Product> products;  // (size, stride), 1 added to each
   };
@@ -146,8 +159,8 @@ class BlockTraining {
   template <class Rule>
   TrainingCount present_block(std::span<const std::int32_t> samples, Plan* plan, Rule& rule) {
     encode(samples);
-    if (plan->walk.empty()) make_plan(samples, plan);
-    sum_potentials(samples.size(), plan->walk);
+    if (plan->walks.empty()) make_plan(samples, plan);
+    sum_potentials(samples.size(), plan->walks);
     const TrainingCount count = window_.present(
         samples, plan->products.data(), plan->stride, rule,
         [&](std::size_t b, Correction correction) {
@@ -170,7 +183,7 @@ class BlockTraining {
       code.encode(std::span(bins_).subspan(static_cast<std::size_t>(samples[b]) * code.n_inputs(),
                                            code.n_inputs()),
                   active, active + n_words_);
-      expand_code(code_of(b), n_words_, kChunkWords, entries_.data() + kChunkColumns * b,
+      expand_code(code_of(b), word_order_, kChunkWords, entries_.data() + kChunkColumns * b,
                   kChunkColumns * most_samples_);
     });
   }
@@ -192,35 +205,43 @@ class BlockTraining {
       const auto* const first = bins_.data() + static_cast<std::size_t>(sample) * n_inputs;
       bins.insert(bins.end(), first, first + n_inputs);
     }
-    plan->walk = CodeWalk(query_order(bins, n_inputs), n_words_,
-                          [&](std::uint32_t b) { return code_of(b); });
+    PairWalks walks(layer_->code(), bins);
+    plan->walks.resize(chunks_.size());
+    for (std::size_t k = 0; k < chunks_.size(); ++k) walks.find(chunks_[k], plan->walks[k]);
   }
 
-  void sum_potentials(std::size_t n_samples, const CodeWalk& walk) {
+  void sum_potentials(std::size_t n_samples, std::span<const CodeWalk> walks) {
     const std::size_t n_padded = layer_->n_padded_units();
     for (std::size_t b = 0; b < n_samples; ++b) {
       std::int32_t* const values = &potentials_[b * n_padded];
       for (std::size_t i = 0; i < layer_->n_units(); ++i) values[i] = -layer_->thresholds()[i];
     }
-    std::visit([&](const auto& weights) { walk_over(weights, walk); }, weights_);
+    std::visit([&](const auto& weights) { add_walks(weights, n_samples, walks); }, weights_);
     transpose(potentials_.data(), n_padded, n_samples, n_padded, window_.row(0), window_.stride());
   }
 
   template <class Weight>
-  void walk_over(const ChunkedWeights<Weight>& weights, const CodeWalk& walk) {
+  void add_walks(const ChunkedWeights<Weight>& weights, std::size_t n_samples,
+                 std::span<const CodeWalk> walks) {
     const std::size_t n_padded = layer_->n_padded_units();
-    const std::size_t n_parts = (n_padded + kMostUnits<Weight> - 1) / kMostUnits<Weight>;
+    const std::size_t n_parts =
+        core::round_up((n_padded + kMostUnits<Weight> - 1) / kMostUnits<Weight>, team_.size());
     const std::size_t width = core::round_up((n_padded + n_parts - 1) / n_parts, kTileStep);
+    const std::size_t fits =
+        std::is_same_v<Weight, std::int16_t>
+            ? static_cast<std::size_t>(kLargestSum / std::max<std::int64_t>(chunk_norm_, 1))
+            : kMostChunks;
+    std::vector<ChunkSums<Weight>> sums(team_.size(), ChunkSums<Weight>(n_samples, fits));
     team_.run([&](std::size_t part) {
-      alignas(core::kCacheLine) Columns<Weight> columns;
       for (std::size_t first = part * width; first < n_padded; first += team_.size() * width) {
         const std::size_t n = std::min(width, n_padded - first);
-        for (std::size_t chunk = 0; chunk < walk.n_chunks(); ++chunk) {
-          transpose(weights.chunk(chunk, first), kChunkColumns, n, kChunkColumns, columns.data(),
-                    n);
-          walk_chunk(columns.data(), n, walk.steps(), walk.changes(chunk),
-                     potentials_.data() + first, n_padded);
-        }
+        const auto read_rows = [&](std::size_t k, Weight* rows) {
+          const PairChunk& chunk = chunks_[k];
+          transpose(
+              weights.chunk(chunk.place / kChunkWords, first) + chunk.place % kChunkWords * 64,
+              kChunkColumns, n, 64 * chunk.words.size(), rows, n);
+        };
+        sums[part].add(walks, n, read_rows, potentials_.data() + first, n_padded);
       }
     });
   }
@@ -258,6 +279,8 @@ class BlockTraining {
 
   std::shared_ptr<ParallelPerceptron> layer_;
   std::vector<std::int32_t> bins_;
+  std::vector<PairChunk> chunks_;
+  std::vector<std::size_t> word_order_;  // of the weights
   std::size_t n_words_;
   core::WorkerTeam team_;
   std::size_t most_samples_;

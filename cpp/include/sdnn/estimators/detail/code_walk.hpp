@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -18,25 +19,24 @@
 
 namespace sdnn::estimators {
 
-/// Words of a code whose rows of weights are added together: 128 columns of 96 units in 16 bits fit
+/// Words of a code whose rows of weights are added together: 256 columns of 96 units in 16 bits fit
 /// into the first cache.
-inline constexpr std::size_t kChunkWords = 2;
+inline constexpr std::size_t kChunkWords = 4;
 inline constexpr std::size_t kChunkColumns = 64 * kChunkWords;
 
 /// The weights of many units in chunks of columns, in each chunk unit after unit: n_padded_units
-/// units and n_words * 64 slots, the ones that tiles lack all 0.
+/// units and 64 slots for each word, those of words that tiles lack all 0.
 template <class Weight>
 class ChunkedWeights {
  public:
-  /// `n_words` is a multiple of kChunkWords, and at least the tiles'.
-  ChunkedWeights(const WeightTiles<std::int32_t>& tiles, std::size_t n_words)
-      : ChunkedWeights(tiles.n_padded_units(), n_words) {
-    for (std::size_t i = 0; i < tiles.n_units(); ++i) {
-      for (std::size_t slot = 0; slot < tiles.n_slots(); ++slot) {
-        chunk(slot / kChunkColumns, i)[slot % kChunkColumns] =
-            static_cast<Weight>(tiles.at(i, slot));
-      }
-    }
+  /// The numbers of the words in the order of the chunks, a multiple of kChunkWords.
+  using Words = std::vector<std::size_t>;
+
+  ChunkedWeights(const WeightTiles<std::int32_t>& tiles, const Words& words)
+      : ChunkedWeights(tiles.n_padded_units(), words.size()) {
+    for_each_slot(tiles, words, [&](std::size_t unit, std::size_t slot, std::size_t at) {
+      weights_[at] = static_cast<Weight>(tiles.at(unit, slot));
+    });
   }
   /// A copy in another type. The weights must fit.
   template <class Other>
@@ -61,12 +61,10 @@ class ChunkedWeights {
     return weights_.data() + (chunk * n_padded_units_ + unit) * kChunkColumns;
   }
 
-  void copy_to(WeightTiles<std::int32_t>& tiles) const noexcept {
-    for (std::size_t i = 0; i < tiles.n_units(); ++i) {
-      for (std::size_t slot = 0; slot < tiles.n_slots(); ++slot) {
-        tiles.at(i, slot) = chunk(slot / kChunkColumns, i)[slot % kChunkColumns];
-      }
-    }
+  void copy_to(WeightTiles<std::int32_t>& tiles, const Words& words) const {
+    for_each_slot(tiles, words, [&](std::size_t unit, std::size_t slot, std::size_t at) {
+      tiles.at(unit, slot) = weights_[at];
+    });
   }
 
   /// The largest sum of a unit's |weights| in a chunk.
@@ -82,6 +80,21 @@ class ChunkedWeights {
   }
 
  private:
+  /// Calls visit(unit, slot, where its weight is).
+  template <class Visit>
+  void for_each_slot(const WeightTiles<std::int32_t>& tiles, const Words& words,
+                     const Visit& visit) const {
+    for (std::size_t unit = 0; unit < tiles.n_units(); ++unit) {
+      for (std::size_t place = 0; place < words.size(); ++place) {
+        if (64 * words[place] >= tiles.n_slots()) continue;
+        const std::size_t chunk = place / kChunkWords;
+        const std::size_t at =
+            (chunk * n_padded_units_ + unit) * kChunkColumns + place % kChunkWords * 64;
+        for (std::size_t k = 0; k < 64; ++k) visit(unit, 64 * words[place] + k, at + k);
+      }
+    }
+  }
+
   ChunkedWeights(std::size_t n_padded_units, std::size_t n_words)
       : n_padded_units_(n_padded_units),
         n_chunks_(n_words / kChunkWords),
@@ -96,158 +109,163 @@ class ChunkedWeights {
 template <class Weight>
 inline constexpr std::size_t kMostUnits = 6 * core::IntegerRegister<Weight>::kSize;
 
-namespace detail {
+/// kChunkWords words of a code: where it is not 0, and where it is +1.
+struct ChunkCode {
+  std::uint64_t active[kChunkWords];
+  std::uint64_t positive[kChunkWords];
+};
 
-SDNN_INLINE std::uint8_t* list_chunk_changes_body(const coding::TernaryCode& from,
-                                                  const coding::TernaryCode& to,
-                                                  std::size_t n_words, std::uint8_t* at,
-                                                  std::uint8_t** ends) noexcept {
-  for (std::size_t w = 0; w < n_words; w += kChunkWords) {
-    for (const bool rising : {true, false}) {
-      core::unrolled<kChunkWords>([&](std::size_t k) SDNN_INLINE_LAMBDA {
-        const coding::detail::WordChanges changes(from, to, w + k);
-        at = coding::detail::append_few_bits<4>(at, rising ? changes.up : changes.down, 64 * k);
-        at = coding::detail::append_few_bits<4>(at, rising ? changes.up_again : changes.down_again,
-                                                64 * k);
-      });
-      *ends++ = at;
-    }
-  }
-  return at;
-}
-
-}  // namespace detail
-
-/// Lists what leads from one code to another, chunk by chunk: the columns that rise, one that rises
-/// by 2 twice, then those that fall.
-///
-/// Writes numbers inside the chunk from `at` on, at most 2 * 64 * n_words + 4, and where each list
-/// ends. Returns the end. `n_words` is a multiple of kChunkWords.
-SDNN_KERNEL(std::uint8_t*, list_chunk_changes,
-            (const coding::TernaryCode& from, const coding::TernaryCode& to, std::size_t n_words,
-             std::uint8_t* at, std::uint8_t** ends),
-            (from, to, n_words, at, ends))
-
-/// Samples in the order of a walk, and the columns in which each code differs from the one before.
-class CodeWalk {
- public:
-  /// To a sample, from the one before or from the code of zeros.
+/// The codes of samples in one chunk: different ones along a walk, and which of them a sample has.
+struct CodeWalk {
+  /// From the code before, or from the code of zeros: columns that rise, then columns that fall.
   struct Step {
-    std::uint32_t sample;
+    std::uint16_t n_rising;
+    std::uint16_t n_falling;
     bool from_zero;
   };
-  /// In one chunk, step by step: columns that rise, then columns that fall, and how many there are.
-  struct Changes {
-    struct Count {
-      std::uint16_t rising;
-      std::uint16_t falling;
-    };
-    std::vector<std::uint8_t> columns;
-    std::vector<Count> counts;
-  };
+  std::vector<std::uint8_t> columns;  ///< of all steps
+  std::vector<Step> steps;
+  std::vector<std::uint16_t> places;  ///< of each sample: the step that leads to its code
 
-  CodeWalk() = default;
-  /// Through codes of n_words, a multiple of kChunkWords, along `order`; code_of(sample) has to
-  /// stay where it is until the walk is made.
-  template <class CodeOf>
-  CodeWalk(std::span<const std::uint32_t> order, std::size_t n_words, const CodeOf& code_of)
-      : chunks_(n_words / kChunkWords) {
-    const std::vector<std::uint64_t> zeros(n_words);
-    std::vector<std::uint8_t> columns(2 * 64 * n_words + 4);
-    std::vector<std::uint8_t*> ends(2 * chunks_.size());
-    coding::TernaryCode last{zeros.data(), zeros.data()};
-    for (const std::uint32_t sample : order) {
-      const coding::TernaryCode code = code_of(sample);
-      const auto list = [&](const coding::TernaryCode& from) {
-        const auto* const end =
-            list_chunk_changes(from, code, n_words, columns.data(), ends.data());
-        return static_cast<std::size_t>(end - columns.data());
-      };
-      bool from_zero = steps_.empty();
-      if (list(last) > coding::n_active(code, n_words)) {
-        list({zeros.data(), zeros.data()});
-        from_zero = true;
-      }
-      steps_.push_back({sample, from_zero});
-      const std::uint8_t* begin = columns.data();
-      for (std::size_t c = 0; c < chunks_.size(); ++c) {
-        const std::uint8_t* const middle = ends[2 * c];
-        const std::uint8_t* const end = ends[2 * c + 1];
-        chunks_[c].columns.insert(chunks_[c].columns.end(), begin, end);
-        chunks_[c].counts.push_back(
-            {static_cast<std::uint16_t>(middle - begin), static_cast<std::uint16_t>(end - middle)});
-        begin = end;
-      }
-      last = code;
-    }
-  }
-
-  /// The most bytes that walks through n_samples codes take.
-  static std::size_t bytes(std::size_t n_samples, std::size_t n_words,
+  /// The most samples that places can tell apart.
+  static constexpr std::size_t kMostSamples = std::size_t{1} << 16;
+  /// The most bytes that the walks of all chunks of n_samples codes take.
+  static std::size_t bytes(std::size_t n_samples, std::size_t n_chunks,
                            std::size_t most_active) noexcept {
-    return n_samples * (most_active + n_words / kChunkWords * sizeof(Changes::Count));
+    return n_samples * (most_active + n_chunks * (sizeof(Step) + sizeof(std::uint16_t)));
   }
-
-  bool empty() const noexcept { return steps_.empty(); }
-  std::size_t n_chunks() const noexcept { return chunks_.size(); }
-  std::span<const Step> steps() const noexcept { return steps_; }
-  const Changes& changes(std::size_t chunk) const noexcept { return chunks_[chunk]; }
-
- private:
-  std::vector<Step> steps_;
-  std::vector<Changes> chunks_;
 };
 
 namespace detail {
 
+SDNN_INLINE std::uint8_t* list_steps_body(std::span<const ChunkCode> codes, std::size_t n_words,
+                                          std::uint8_t* at, CodeWalk::Step* steps) noexcept {
+  ChunkCode last{};
+  for (const ChunkCode& code : codes) {
+    const coding::TernaryCode from{last.active, last.positive};
+    const coding::TernaryCode to{code.active, code.positive};
+    int n_changes = 0;
+    int n_active = 0;
+    for (std::size_t w = 0; w < n_words; ++w) {
+      const coding::detail::WordChanges changes(from, to, w);
+      n_changes += std::popcount(changes.up) + std::popcount(changes.up_again) +
+                   std::popcount(changes.down) + std::popcount(changes.down_again);
+      n_active += std::popcount(code.active[w]);
+    }
+    const bool from_zero = n_changes > n_active;
+    if (from_zero) last = {};
+    const std::uint8_t* const begin = at;
+    const std::uint8_t* middle = at;
+    for (const bool rising : {true, false}) {
+      for (std::size_t w = 0; w < n_words; ++w) {
+        const coding::detail::WordChanges changes(from, to, w);
+        at = coding::detail::append_few_bits<2>(at, rising ? changes.up : changes.down, 64 * w);
+        const std::uint64_t again = rising ? changes.up_again : changes.down_again;
+        if (again != 0) at = coding::detail::append_few_bits<1>(at, again, 64 * w);
+      }
+      if (rising) middle = at;
+    }
+    *steps++ = {static_cast<std::uint16_t>(middle - begin), static_cast<std::uint16_t>(at - middle),
+                from_zero};
+    last = code;
+  }
+  return at;
+}
+
 template <class Weight>
-SDNN_INLINE void walk_chunk_body(const Weight* rows, std::size_t width,
-                                 std::span<const CodeWalk::Step> steps,
-                                 const CodeWalk::Changes& changes, std::int32_t* potentials,
-                                 std::size_t stride) noexcept {
+SDNN_INLINE void sum_steps_body(const Weight* rows, std::size_t width, const CodeWalk& walk,
+                                Weight* sums) noexcept {
   using Lane = core::IntegerRegister<Weight>;
   for_width<kMostUnits<Weight>>(width, [&]<std::size_t Width>(Size<Width>) SDNN_INLINE_LAMBDA {
     constexpr std::size_t kRegisters = Width / Lane::kSize;
     Lane sum[kRegisters];
     core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].clear(); });
-    const std::uint8_t* column = changes.columns.data();
-    const CodeWalk::Changes::Count* count = changes.counts.data();
-    for (const CodeWalk::Step& step : steps) {
+    const std::uint8_t* column = walk.columns.data();
+    Weight* to = sums;
+    for (const CodeWalk::Step& step : walk.steps) {
       if (step.from_zero) {
         core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].clear(); });
       }
-      for (const std::uint8_t* const end = column + count->rising; column != end; ++column) {
+      for (const std::uint8_t* const end = column + step.n_rising; column != end; ++column) {
         const Weight* const row = rows + *column * Width;
         core::unrolled<kRegisters>([&](std::size_t r)
                                        SDNN_INLINE_LAMBDA { sum[r].add(row + r * Lane::kSize); });
       }
-      for (const std::uint8_t* const end = column + count->falling; column != end; ++column) {
+      for (const std::uint8_t* const end = column + step.n_falling; column != end; ++column) {
         const Weight* const row = rows + *column * Width;
         core::unrolled<kRegisters>(
             [&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].subtract(row + r * Lane::kSize); });
       }
-      ++count;
-      std::int32_t* const to = potentials + step.sample * stride;
       core::unrolled<kRegisters>([&](std::size_t r)
-                                     SDNN_INLINE_LAMBDA { sum[r].add_to(to + r * Lane::kSize); });
+                                     SDNN_INLINE_LAMBDA { sum[r].store(to + r * Lane::kSize); });
+      to += Width;
     }
   });
 }
 
 }  // namespace detail
 
-/// Adds to potentials[sample * stride + i], i = 0 .. width - 1, what the columns of a chunk
-/// contribute to each sample of a walk. The sum over a sample's columns in the chunk has to fit
-/// into Weight.
+/// Sums of the steps of a walk, and of each sample the step that it takes.
+template <class Weight>
+struct StepSums {
+  const Weight* sums;
+  const std::uint16_t* places;
+};
+
+namespace detail {
+
+template <class Weight>
+SDNN_INLINE void add_step_sums_body(std::span<const StepSums<Weight>> walks, std::size_t width,
+                                    std::size_t n_samples, std::int32_t* potentials,
+                                    std::size_t stride) noexcept {
+  using Lane = core::IntegerRegister<Weight>;
+  for_width<kMostUnits<Weight>>(width, [&]<std::size_t Width>(Size<Width>) SDNN_INLINE_LAMBDA {
+    constexpr std::size_t kRegisters = Width / Lane::kSize;
+    for (std::size_t s = 0; s < n_samples; ++s, potentials += stride) {
+      Lane sum[kRegisters];
+      core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].clear(); });
+      for (const StepSums<Weight>& walk : walks) {
+        const Weight* const row = walk.sums + std::size_t{walk.places[s]} * Width;
+        core::unrolled<kRegisters>([&](std::size_t r)
+                                       SDNN_INLINE_LAMBDA { sum[r].add(row + r * Lane::kSize); });
+      }
+      core::unrolled<kRegisters>(
+          [&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].add_to(potentials + r * Lane::kSize); });
+    }
+  });
+}
+
+}  // namespace detail
+
+/// Lists what leads from code to code, from the code of zeros to the first and wherever that is
+/// nearer: the columns that rise, one that rises by 2 twice, then those that fall. Only the first
+/// `n_words` words of a code count. At most 64 columns a word and step, and 2 more at the end.
+/// Returns their end.
+SDNN_KERNEL(std::uint8_t*, list_steps,
+            (std::span<const ChunkCode> codes, std::size_t n_words, std::uint8_t* at,
+             CodeWalk::Step* steps),
+            (codes, n_words, at, steps))
+
+/// sums[s * width + i] = the sum of the weights of unit i over the code of step s. A sum over
+/// a chunk has to fit into Weight.
 ///
 /// Shapes: rows (kChunkColumns, width).
-SDNN_KERNEL(void, walk_chunk,
-            (const std::int16_t* rows, std::size_t width, std::span<const CodeWalk::Step> steps,
-             const CodeWalk::Changes& changes, std::int32_t* potentials, std::size_t stride),
-            (rows, width, steps, changes, potentials, stride))
-SDNN_KERNEL(void, walk_chunk,
-            (const std::int32_t* rows, std::size_t width, std::span<const CodeWalk::Step> steps,
-             const CodeWalk::Changes& changes, std::int32_t* potentials, std::size_t stride),
-            (rows, width, steps, changes, potentials, stride))
+SDNN_KERNEL(void, sum_steps,
+            (const std::int16_t* rows, std::size_t width, const CodeWalk& walk, std::int16_t* sums),
+            (rows, width, walk, sums))
+SDNN_KERNEL(void, sum_steps,
+            (const std::int32_t* rows, std::size_t width, const CodeWalk& walk, std::int32_t* sums),
+            (rows, width, walk, sums))
+
+/// Adds to potentials[s * stride + i], i = 0 .. width - 1, the sums of sample s in all walks, whose
+/// sum has to fit into Weight.
+SDNN_KERNEL(void, add_step_sums,
+            (std::span<const StepSums<std::int16_t>> walks, std::size_t width,
+             std::size_t n_samples, std::int32_t* potentials, std::size_t stride),
+            (walks, width, n_samples, potentials, stride))
+SDNN_KERNEL(void, add_step_sums,
+            (std::span<const StepSums<std::int32_t>> walks, std::size_t width,
+             std::size_t n_samples, std::int32_t* potentials, std::size_t stride),
+            (walks, width, n_samples, potentials, stride))
 
 }  // namespace sdnn::estimators

@@ -1,16 +1,19 @@
-/// Potentials of a block of queries, pair by pair of inputs.
+/// Potentials of a block of samples, pair by pair of inputs.
 ///
-/// Many inputs leave no order of the queries in which neighbours have similar codes. The columns of
+/// Many inputs leave no order of the samples in which neighbours have similar codes. The columns of
 /// one pair depend on two inputs alone, so each pair has an order of its own, a short walk through
 /// a plane.
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "sdnn/coding/detail/ternary_code.hpp"
@@ -23,101 +26,91 @@
 
 namespace sdnn::estimators {
 
-/// kChunkWords words of a code: where it is not 0, and where it is +1.
-struct ChunkCode {
-  std::uint64_t active[kChunkWords];
-  std::uint64_t positive[kChunkWords];
+/// 1, 2 or kChunkWords words of a code that depend on the same two inputs.
+struct PairChunk {
+  std::size_t one;
+  std::size_t other;
+  std::vector<std::size_t> words;
+  std::size_t place = 0;  ///< of its first word among those of all chunks
 };
 
-namespace detail {
-
-SDNN_INLINE std::uint8_t* list_steps_body(std::span<const ChunkCode> codes, std::size_t n_words,
-                                          std::uint8_t* at,
-                                          CodeWalk::Changes::Count* counts) noexcept {
-  ChunkCode last{};
-  for (const ChunkCode& code : codes) {
-    const coding::TernaryCode from{last.active, last.positive};
-    const coding::TernaryCode to{code.active, code.positive};
-    const std::uint8_t* const begin = at;
-    for (std::size_t w = 0; w < n_words; ++w) {
-      const coding::detail::WordChanges changes(from, to, w);
-      at = coding::detail::append_few_bits<2>(at, changes.up, 64 * w);
-      if (changes.up_again != 0) {
-        at = coding::detail::append_few_bits<1>(at, changes.up_again, 64 * w);
-      }
+/// All words of a code in chunks, large ones first: both pairs of two inputs together.
+inline std::vector<PairChunk> pair_chunks(const coding::SelectiveDesensitization& code) {
+  std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> words;
+  for (std::size_t p = 0; p < code.n_pairs(); ++p) {
+    const coding::InputPair pair = code.pair(p);
+    for (std::size_t w = p * code.n_pair_words(); w < (p + 1) * code.n_pair_words(); ++w) {
+      words[std::minmax(pair.modified, pair.modifier)].push_back(w);
     }
-    const std::uint8_t* const middle = at;
-    for (std::size_t w = 0; w < n_words; ++w) {
-      const coding::detail::WordChanges changes(from, to, w);
-      at = coding::detail::append_few_bits<2>(at, changes.down, 64 * w);
-      if (changes.down_again != 0) {
-        at = coding::detail::append_few_bits<1>(at, changes.down_again, 64 * w);
-      }
-    }
-    *counts++ = {static_cast<std::uint16_t>(middle - begin),
-                 static_cast<std::uint16_t>(at - middle)};
-    last = code;
   }
-  return at;
+  std::vector<PairChunk> chunks;
+  std::size_t place = 0;
+  for (const std::size_t size : {kChunkWords, std::size_t{2}, std::size_t{1}}) {
+    for (auto& [inputs, left] : words) {
+      for (; left.size() >= size; left.resize(left.size() - size), place += size) {
+        const auto last = std::span(left).last(size);
+        chunks.push_back({inputs.first, inputs.second, {last.begin(), last.end()}, place});
+      }
+    }
+  }
+  return chunks;
 }
 
-}  // namespace detail
-
-/// Lists what leads from code to code, from the code of zeros to the first: the columns that rise,
-/// one that rises by 2 twice, then those that fall, and how many these are. Only the first
-/// `n_words` words of a code count. At most 128 columns a word and step, and 2 more at the end.
-/// Returns their end.
-SDNN_KERNEL(std::uint8_t*, list_steps,
-            (std::span<const ChunkCode> codes, std::size_t n_words, std::uint8_t* at,
-             CodeWalk::Changes::Count* counts),
-            (codes, n_words, at, counts))
-
-/// Orders of a block of queries, one for each two inputs: in strips of equal bins of one, forth
-/// and back along the other.
-class PairOrders {
+/// Walks of samples through the codes of each two inputs: in strips of equal bins of one, forth and
+/// back along the other.
+class PairWalks {
  public:
-  PairOrders(const coding::SelectiveDesensitization& code, std::span<const std::int32_t> bins,
-             std::span<const std::uint32_t> queries)
-      : n_strips_(static_cast<std::size_t>(
-            std::max(1.0, std::round(std::sqrt(static_cast<double>(queries.size()) / 3.0))))),
+  /// Shapes: bins (n_samples, n_inputs), at most CodeWalk::kMostSamples.
+  PairWalks(const coding::SelectiveDesensitization& code, std::span<const std::int32_t> bins)
+      : code_(code),
         inputs_(code.n_inputs()),
-        order_(queries.size()) {
-    const std::size_t n = queries.size();
+        order_(bins.size() / code.n_inputs()),
+        columns_(kChunkColumns * order_.size() + 2) {
+    const auto few = static_cast<std::size_t>(
+        std::max(1.0, std::round(std::sqrt(static_cast<double>(order_.size()) / 3.0))));
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
-      if (code.n_bins(i) == 0) continue;
+      const std::size_t n_bins = code.n_bins(i);
+      if (n_bins == 0) continue;
+      const std::size_t n_strips = 2 * few < n_bins ? few : n_bins;
       Input& input = inputs_[i];
-      input.bins.resize(n);
-      input.strips.resize(n);
-      input.begins.resize(n_strips_ + 1);
-      for (std::size_t q = 0; q < n; ++q) {
-        input.bins[q] = bins[queries[q] * inputs_.size() + i];
-        input.strips[q] = static_cast<std::uint32_t>(static_cast<std::size_t>(input.bins[q]) *
-                                                     n_strips_ / code.n_bins(i));
-        ++input.begins[input.strips[q] + 1];
+      input.begins.resize(n_strips + 1);
+      std::vector<std::uint32_t> places(n_bins + 1);
+      for (std::size_t s = 0; s < order_.size(); ++s) {
+        const std::int32_t bin = bins[s * inputs_.size() + i];
+        input.bins.push_back(bin);
+        input.strips.push_back(
+            static_cast<std::uint32_t>(static_cast<std::size_t>(bin) * n_strips / n_bins));
+        ++input.begins[input.strips[s] + 1];
+        ++places[static_cast<std::size_t>(bin) + 1];
       }
       std::partial_sum(input.begins.begin(), input.begins.end(), input.begins.begin());
-      input.sorted.resize(n);
-      std::iota(input.sorted.begin(), input.sorted.end(), std::uint32_t{0});
-      std::stable_sort(
-          input.sorted.begin(), input.sorted.end(),
-          [&](std::uint32_t a, std::uint32_t b) { return input.bins[a] < input.bins[b]; });
+      std::partial_sum(places.begin(), places.end(), places.begin());
+      input.sorted.resize(order_.size());
+      for (std::size_t s = 0; s < order_.size(); ++s) {
+        input.sorted[places[static_cast<std::size_t>(input.bins[s])]++] =
+            static_cast<std::uint32_t>(s);
+      }
     }
   }
 
-  std::int32_t bin(std::size_t input, std::uint32_t query) const noexcept {
-    return inputs_[input].bins[query];
-  }
-
-  /// Places of the queries in the block; valid until the next call.
-  std::span<const std::uint32_t> of(std::size_t one, std::size_t other) {
-    const Input& strips = inputs_[one];
-    begins_.assign(strips.begins.begin(), strips.begins.end() - 1);
-    ends_.assign(strips.begins.begin() + 1, strips.begins.end());
-    for (const std::uint32_t query : inputs_[other].sorted) {
-      const std::uint32_t strip = strips.strips[query];
-      order_[strip % 2 == 0 ? begins_[strip]++ : --ends_[strip]] = query;
+  /// The walk through the codes in a chunk.
+  void find(const PairChunk& chunk, CodeWalk& walk) {
+    const Input& one = inputs_[chunk.one];
+    const Input& other = inputs_[chunk.other];
+    walk.places.resize(order_.size());
+    codes_.clear();
+    std::pair last{-1, -1};
+    sort(one, other);
+    for (const std::uint32_t sample : order_) {
+      const std::pair now{one.bins[sample], other.bins[sample]};
+      if (now != last) add_code(chunk, sample);
+      walk.places[sample] = static_cast<std::uint16_t>(codes_.size() - 1);
+      last = now;
     }
-    return order_;
+    walk.steps.resize(codes_.size());
+    const std::uint8_t* const end =
+        list_steps(codes_, chunk.words.size(), columns_.data(), walk.steps.data());
+    walk.columns.assign(static_cast<const std::uint8_t*>(columns_.data()), end);
   }
 
  private:
@@ -125,86 +118,115 @@ class PairOrders {
     std::vector<std::int32_t> bins;
     std::vector<std::uint32_t> strips;
     std::vector<std::uint32_t> begins;  // of the strips in an order, and its end
-    std::vector<std::uint32_t> sorted;  // by bins
+    std::vector<std::uint32_t> sorted;  // samples by bins
   };
 
-  std::size_t n_strips_;
-  std::vector<Input> inputs_;
-  std::vector<std::uint32_t> order_, begins_, ends_;
-};
-
-/// Up to kChunkWords words of a code that depend on the same two inputs.
-struct PairChunk {
-  std::size_t one;
-  std::size_t other;
-  std::vector<std::size_t> words;
-};
-
-/// All words of a code in chunks: both pairs of two inputs together.
-inline std::vector<PairChunk> pair_chunks(const coding::SelectiveDesensitization& code) {
-  std::vector<std::size_t> order(code.n_pairs());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  const auto inputs_of = [&](std::size_t p) {
-    const coding::InputPair pair = code.pair(p);
-    return std::minmax({pair.modified, pair.modifier});
-  };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return inputs_of(a) < inputs_of(b); });
-  std::vector<PairChunk> chunks;
-  for (const std::size_t p : order) {
-    const auto [one, other] = inputs_of(p);
-    for (std::size_t w = 0; w < code.n_pair_words(); ++w) {
-      if (chunks.empty() || chunks.back().words.size() == kChunkWords || chunks.back().one != one ||
-          chunks.back().other != other) {
-        chunks.push_back({one, other, {}});
-      }
-      chunks.back().words.push_back(p * code.n_pair_words() + w);
+  void sort(const Input& one, const Input& other) {
+    begins_.assign(one.begins.begin(), one.begins.end() - 1);
+    ends_.assign(one.begins.begin() + 1, one.begins.end());
+    for (const std::uint32_t sample : other.sorted) {
+      const std::uint32_t strip = one.strips[sample];
+      order_[strip % 2 == 0 ? begins_[strip]++ : --ends_[strip]] = sample;
     }
   }
-  return chunks;
-}
 
-/// Adds the weights of each query's code to its potentials, potentials[q * n_padded_units + i].
-///
-/// The sum of a unit's |weights| in the slots of kChunkWords words has to fit into Weight.
-template <class Weight>
-void add_codes(const coding::SelectiveDesensitization& code, std::span<const PairChunk> chunks,
-               const WeightTiles<Weight>& tiles, std::span<const std::int32_t> bins,
-               std::span<const std::uint32_t> queries, std::int32_t* potentials) {
-  PairOrders orders(code, bins, queries);
-  std::vector<CodeWalk::Step> steps(queries.size());
-  std::vector<ChunkCode> codes(queries.size());
-  CodeWalk::Changes changes;
-  changes.columns.resize(2 * kChunkColumns * queries.size() + 2);
-  changes.counts.resize(queries.size());
-  core::AlignedBuffer<Weight> rows(kChunkColumns * kMostUnits<Weight>);
-  for (const PairChunk& chunk : chunks) {
-    const auto order = orders.of(chunk.one, chunk.other);
-    for (std::size_t q = 0; q < order.size(); ++q) steps[q] = {order[q], q == 0};
+  void add_code(const PairChunk& chunk, std::uint32_t sample) {
+    ChunkCode& code = codes_.emplace_back();
     for (std::size_t k = 0; k < chunk.words.size(); ++k) {
-      const std::size_t p = chunk.words[k] / code.n_pair_words();
-      const std::size_t w = chunk.words[k] % code.n_pair_words();
-      const coding::InputPair pair = code.pair(p);
-      for (std::size_t q = 0; q < order.size(); ++q) {
-        code.encode_word(p, w, orders.bin(pair.modified, order[q]),
-                         orders.bin(pair.modifier, order[q]), &codes[q].active[k],
-                         &codes[q].positive[k]);
-      }
+      const std::size_t p = chunk.words[k] / code_.n_pair_words();
+      const coding::InputPair pair = code_.pair(p);
+      code_.encode_word(p, chunk.words[k] % code_.n_pair_words(),
+                        inputs_[pair.modified].bins[sample], inputs_[pair.modifier].bins[sample],
+                        &code.active[k], &code.positive[k]);
     }
-    list_steps(codes, chunk.words.size(), changes.columns.data(), changes.counts.data());
-    for (std::size_t t = 0; t < tiles.n_tiles(); ++t) {
-      const std::size_t width = tiles.width(t);
-      for (std::size_t first = 0; first < width; first += kMostUnits<Weight>) {
-        const std::size_t n = std::min(width - first, kMostUnits<Weight>);
-        for (std::size_t k = 0; k < chunk.words.size(); ++k) {
-          const Weight* row = tiles.tile(t) + 64 * chunk.words[k] * width + first;
-          for (std::size_t slot = 64 * k; slot < 64 * (k + 1); ++slot, row += width) {
-            std::copy_n(row, n, rows.data() + slot * n);
+  }
+
+  const coding::SelectiveDesensitization& code_;
+  std::vector<Input> inputs_;
+  std::vector<std::uint32_t> order_, begins_, ends_;
+  std::vector<ChunkCode> codes_;
+  std::vector<std::uint8_t> columns_;
+};
+
+/// Chunks whose sums are added together: more would leave the second cache.
+inline constexpr std::size_t kMostChunks = 4;
+/// Chunks whose walks are known at a time, so that potentials of some units stay in the caches.
+inline constexpr std::size_t kWalks = 32;
+
+/// Sums what chunks of columns contribute to potentials, some chunks at a time.
+template <class Weight>
+class ChunkSums {
+ public:
+  /// The sums over n_chunks chunks have to fit into Weight.
+  ChunkSums(std::size_t n_samples, std::size_t n_chunks)
+      : n_samples_(n_samples),
+        n_chunks_(std::min(n_chunks, kMostChunks)),
+        rows_(kChunkColumns * kMostUnits<Weight>),
+        sums_(n_chunks_ * n_samples * kMostUnits<Weight>) {}
+
+  static constexpr std::size_t bytes(std::size_t n_samples) noexcept {
+    return sizeof(Weight) * kMostUnits<Weight> * (kChunkColumns + kMostChunks * n_samples);
+  }
+
+  /// Adds to potentials[s * stride + i], i = 0 .. width - 1, the codes of the samples in the walks'
+  /// chunks. read_rows(k, rows) writes the weights in the chunk of the k-th, (columns, width).
+  template <class ReadRows>
+  void add(std::span<const CodeWalk> walks, std::size_t width, const ReadRows& read_rows,
+           std::int32_t* potentials, std::size_t stride) {
+    std::array<StepSums<Weight>, kMostChunks> added;
+    for (std::size_t k = 0, n = 0; k < walks.size(); ++k) {
+      read_rows(k, rows_.data());
+      Weight* const sums = sums_.data() + n * n_samples_ * width;
+      sum_steps(rows_.data(), width, walks[k], sums);
+      added[n++] = {sums, walks[k].places.data()};
+      if (n < n_chunks_ && k + 1 < walks.size()) continue;
+      add_step_sums(std::span<const StepSums<Weight>>(added).first(n), width, n_samples_,
+                    potentials, stride);
+      n = 0;
+    }
+  }
+
+ private:
+  std::size_t n_samples_;
+  std::size_t n_chunks_;
+  core::AlignedBuffer<Weight> rows_;
+  core::AlignedBuffer<Weight> sums_;  // (n_chunks, n_samples, width)
+};
+
+/// Adds the weights of each sample's code to its potentials in some layers of one size,
+/// potentials[(layer * n_samples + s) * n_padded_units + i].
+///
+/// The sums over n_chunks chunks have to fit into Weight.
+template <class Weight>
+void add_codes(const coding::SelectiveDesensitization& code,
+               std::span<const WeightTiles<Weight>* const> layers, std::size_t n_chunks,
+               std::span<const std::int32_t> bins, std::int32_t* potentials) {
+  const std::size_t n_samples = bins.size() / code.n_inputs();
+  const auto chunks = pair_chunks(code);
+  PairWalks pair_walks(code, bins);
+  ChunkSums<Weight> sums(n_samples, n_chunks);
+  std::vector<CodeWalk> walks;
+  for (std::size_t done = 0; done < chunks.size(); done += walks.size()) {
+    walks.resize(std::min(kWalks, chunks.size() - done));
+    for (std::size_t k = 0; k < walks.size(); ++k) pair_walks.find(chunks[done + k], walks[k]);
+    std::int32_t* to = potentials;
+    for (const WeightTiles<Weight>* const tiles : layers) {
+      for (std::size_t first = 0; first < tiles->n_padded_units(); first += kMostUnits<Weight>) {
+        const std::size_t t = first / kTileUnits;
+        const std::size_t n = std::min(tiles->n_padded_units() - first, kMostUnits<Weight>);
+        const auto read_rows = [&](std::size_t k, Weight* rows) {
+          for (const std::size_t word : chunks[done + k].words) {
+            const Weight* row = tiles->tile(t) + 64 * word * tiles->width(t) + first % kTileUnits;
+            const std::size_t n_together = n == tiles->width(t) ? 64 : 1;  // which is quicker
+            for (std::size_t slot = 0; slot < 64; slot += n_together) {
+              rows = std::copy_n(row, n_together * n, rows);
+              row += n_together * tiles->width(t);
+            }
           }
-        }
-        walk_chunk(rows.data(), n, steps, changes, potentials + t * kTileUnits + first,
-                   tiles.n_padded_units());
+        };
+        sums.add(walks, n, read_rows, to + first, tiles->n_padded_units());
       }
+      to += n_samples * tiles->n_padded_units();
     }
   }
 }

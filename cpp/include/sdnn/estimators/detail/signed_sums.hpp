@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "sdnn/coding/detail/ternary_code.hpp"
@@ -127,13 +128,13 @@ SDNN_INLINE void expand_bits(std::uint32_t plus, std::uint32_t minus,
 #pragma GCC diagnostic pop
 #endif
 
-SDNN_INLINE void expand_code_body(const coding::TernaryCode& code, std::size_t n_words,
-                                  std::size_t chunk_words, std::int8_t* entries,
-                                  std::size_t chunk_stride) noexcept {
-  for (std::size_t w = 0; w < n_words; w += chunk_words, entries += chunk_stride) {
+SDNN_INLINE void expand_code_body(const coding::TernaryCode& code,
+                                  std::span<const std::size_t> words, std::size_t chunk_words,
+                                  std::int8_t* entries, std::size_t chunk_stride) noexcept {
+  for (std::size_t w = 0; w < words.size(); w += chunk_words, entries += chunk_stride) {
     for (std::size_t k = 0; k < chunk_words; ++k) {
-      const std::uint64_t plus = code.positive[w + k];
-      const std::uint64_t minus = code.active[w + k] & ~plus;
+      const std::uint64_t plus = code.positive[words[w + k]];
+      const std::uint64_t minus = code.active[words[w + k]] & ~plus;
       for (const std::size_t half : {0U, 1U}) {
         expand_bits(static_cast<std::uint32_t>(plus >> 32 * half),
                     static_cast<std::uint32_t>(minus >> 32 * half), entries + 64 * k + 32 * half);
@@ -172,11 +173,11 @@ SDNN_KERNEL(void, add_row,
             (std::int32_t* to, const std::int32_t* row, std::int32_t direction, std::size_t size),
             (to, row, direction, size))
 
-/// A code as rows to add, a chunk of `chunk_words` words of it in each: entries[c * chunk_stride +
-/// k] is its +1, 0 or -1 in column k of chunk c. `n_words` is a multiple of `chunk_words`.
+/// Some words of a code as rows to add, `chunk_words` in each: entries[c * chunk_stride + k] is its
+/// +1, 0 or -1 in column k of chunk c. Their number is a multiple of `chunk_words`.
 SDNN_KERNEL(void, expand_code,
-            (const coding::TernaryCode& code, std::size_t n_words, std::size_t chunk_words,
-             std::int8_t* entries, std::size_t chunk_stride),
-            (code, n_words, chunk_words, entries, chunk_stride))
+            (const coding::TernaryCode& code, std::span<const std::size_t> words,
+             std::size_t chunk_words, std::int8_t* entries, std::size_t chunk_stride),
+            (code, words, chunk_words, entries, chunk_stride))
 
 }  // namespace sdnn::estimators
