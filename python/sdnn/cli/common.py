@@ -296,7 +296,7 @@ def _print_report(
     for failure in outcome.failures:
         message = f"{type(failure.error).__name__}: {failure.error}"
         variants = ", ".join(study.variants_of(failure.planned.key))
-        click.echo(f"Error: {failure.planned.title}, of {variants}, failed: {message}", err=True)
+        click.echo(f"Error: {failure.planned.title} ({variants}) failed: {message}", err=True)
     if outcome.interrupted:
         what = "terminated" if outcome.signal == SIGTERM else "interrupted"
         message = f"{what}; {stored}; the same command continues from there"

@@ -150,7 +150,7 @@ def test_a_trial_that_raises_leaves_out_its_variant_only(invoke, fake, tmp_path)
 
     result = invoke("sweep", "mine.toml", trial=Raising)
     assert result.exit_code == 1
-    words = ", of discount=0.8, failed: OverflowError: a weight would leave its range"
+    words = " (discount=0.8) failed: OverflowError: a weight would leave its range"
     assert result.stderr.count(words) == 2
     assert "6 of 8 " in result.stdout
     assert " 1 of 6 " in result.stdout
