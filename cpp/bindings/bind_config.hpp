@@ -167,7 +167,7 @@ bool read_value(pybind11::handle source, Value& value, const Field& field) {
   } else if constexpr (core::HasWords<Value>) {
     const auto words = words_of(Value{});
     const auto found = py::isinstance<py::str>(source)
-                           ? std::ranges::find(words, source.cast<std::string_view>())
+                           ? std::ranges::find(words, text_of(source))
                            : words.end();
     if (found == words.end()) {
       core::require(false, field.name, expected_words<Value>(), shown(source));

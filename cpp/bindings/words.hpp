@@ -10,6 +10,19 @@
 
 #include "sdnn/core/config_fields.hpp"
 
+namespace sdnn::bindings {
+
+/// A Python text, empty where UTF-8 has none: arguments of a command may have any bytes.
+inline std::string_view text_of(pybind11::handle text) {
+  Py_ssize_t size = 0;
+  const char* const data = PyUnicode_AsUTF8AndSize(text.ptr(), &size);
+  if (data != nullptr) return {data, static_cast<std::size_t>(size)};
+  PyErr_Clear();
+  return {};
+}
+
+}  // namespace sdnn::bindings
+
 namespace pybind11::detail {
 
 template <class Enum>
@@ -24,7 +37,7 @@ class type_caster<Enum, std::enable_if_t<sdnn::core::HasWords<Enum>>> {
   bool load(handle source, bool) {
     if (!isinstance<str>(source)) return false;
     const auto words = words_of(Enum{});
-    const auto found = std::ranges::find(words, source.cast<std::string_view>());
+    const auto found = std::ranges::find(words, sdnn::bindings::text_of(source));
     value = static_cast<Enum>(found - words.begin());
     return found != words.end();
   }

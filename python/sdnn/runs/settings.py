@@ -129,7 +129,7 @@ def checked(kind: Any, value: Any, key: str) -> Any:
                     checked(get_args(one)[1], item, f"{key}.{name}")
     try:
         made = msgspec.convert(value, kind)
-    except msgspec.ValidationError as error:
+    except (msgspec.ValidationError, UnicodeEncodeError) as error:  # any bytes of a command line
         text, _, path = str(error).partition(" - at `$")
         problem = _problem(_alternatives(kind) if not path else (), text)
         raise ConfigError(key + path[:-1], f"{problem}, got {shown(value)}") from None

@@ -435,6 +435,8 @@ def test_several_environments_are_learned_in(invoke):
         (["CartPole-v1", "--set", "learning.discount=x"], "--set learning.discount: must be a"),
         (["CartPole-v1", "--set", "learning.discount=2"], "--set learning.discount: must"),
         (["CartPole-v1", "--set", "agent.angles=[7]"], "--set agent.angles: must"),
+        (["CartPole-v1", "--set", "learning.traces=\udcff"], "learning.traces: must be one"),
+        (["CartPole-v1", "--set", "agent.inputs=\udcff"], "--inputs: must be one of"),
         (["CartPole-v1", "--env-arg", "5"], "--env-arg must be NAME=VALUE"),
         (["CartPole-v1", "--env-arg", "color=5"], "--env-arg: CartPole-v1 cannot be made"),
         (["CartPole-v1", "--evaluate-every", -1], "--evaluate-every"),
