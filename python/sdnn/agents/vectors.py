@@ -66,16 +66,22 @@ class _Listed(EnvironmentAdapter):
         return made
 
     def _converted(self, seen: list[Any]) -> Any:
-        """Return observations in the numbers of their space, as the vector itself does."""
+        """Return observations in the numbers of their space, as the vector itself does.
+
+        Others stay as they are: the agent refuses them by name.
+        """
         space = self._env.single_observation_space
         if any(one.shape != space.shape for one in seen if type(one) is np.ndarray):
-            return seen  # the agent refuses them by name
+            return seen
         if type(space) is gym.spaces.Box and all(type(one) is np.ndarray for one in seen):
             rows = np.array(seen)
             if rows.dtype == space.dtype:
                 return rows
         batch: Any = create_empty_array(space, len(seen))
-        return _listed(self._env, concatenate(space, seen, batch))
+        try:
+            return _listed(self._env, concatenate(space, seen, batch))
+        except (LookupError, TypeError, ValueError):
+            return seen
 
 
 class _Vector(EnvironmentAdapter, abc.ABC):

@@ -107,6 +107,14 @@ def test_columns_of_a_vector_have_a_value_for_each_environment(part):
     assert trained(Points(**{part: [False, False]})).n_steps == 20
 
 
+@pytest.mark.parametrize("found", [None, {"a": 1}, np.array([0, "a"], object), np.zeros((1, 2))])
+def test_what_is_no_observation_is_refused_in_one_of_several_environments(found):
+    bad = Point(lambda made: (found, *made[1:]))
+    envs = gym.vector.SyncVectorEnv([Point, lambda: bad])
+    with pytest.raises(UnusableStepError, match="in step 5: next_observation must"):
+        trained(envs)
+
+
 @pytest.mark.parametrize("use", [trained, evaluated])
 def test_the_old_interface_is_named(use):
     for n in (1, 4, 6):
