@@ -53,8 +53,9 @@ def c_header(
     The header is C99 and C++, needs ``<stdint.h>`` only, no heap and no floating point. The
     policy's action is that of ``agent.act(observation, explore=False)``; where the agent would draw
     one of several best actions, it takes the middle of their widest run. An agent that learns does
-    and remembers in C what it would in Python, to the bit, as long as observations and rewards are
-    multiples of ``2**-fraction_bits``. See docs/how-to/small-processors.md.
+    and remembers in C what it would in Python in one environment, to the bit, as long as
+    observations and rewards are multiples of ``2**-fraction_bits``. See
+    docs/how-to/small-processors.md.
 
     Parameters
     ----------
