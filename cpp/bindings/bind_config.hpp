@@ -166,9 +166,8 @@ bool read_value(pybind11::handle source, Value& value, const Field& field) {
     return true;
   } else if constexpr (core::HasWords<Value>) {
     const auto words = words_of(Value{});
-    const auto found = py::isinstance<py::str>(source)
-                           ? std::ranges::find(words, text_of(source))
-                           : words.end();
+    const auto found =
+        py::isinstance<py::str>(source) ? std::ranges::find(words, text_of(source)) : words.end();
     if (found == words.end()) {
       core::require(false, field.name, expected_words<Value>(), shown(source));
     }
@@ -222,7 +221,7 @@ inline constexpr ValueType kValueType{
         },
 };
 
-/// The fields of a configuration; their values may be written if it may.
+/// The fields of a configuration. Their values may be written only where it is not const.
 template <class Config>
 auto fields_of(const Config& config) {
   const auto erased = [&config](const auto& field) {
@@ -245,7 +244,7 @@ inline pybind11::dict dictionary_of(std::span<const Field> fields) {
 }
 
 /// Gives fields other values. Throws ArgumentTypeError for a value of another type, ArgumentError
-/// for a word that is none, ArgumentTypeError for unknown names.
+/// for an unknown word, ArgumentTypeError for unknown names.
 inline void change(std::span<const Field> fields, const pybind11::kwargs& changes) {
   namespace py = pybind11;
   std::size_t n_known = 0;
