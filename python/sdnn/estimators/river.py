@@ -11,7 +11,7 @@ import pandas as pd
 from river import base
 from sklearn.base import clone
 
-from sdnn.arguments import flag, shown, whole
+from sdnn.arguments import flag, require, shown, whole
 from sdnn.estimators.classifier import SDNNClassifier
 from sdnn.estimators.inputs import Floats, codings_of_columns
 from sdnn.estimators.outliers import numbers_to_range
@@ -80,21 +80,22 @@ class FollowedRanges:
 class Waiting:
     """Collects the first samples, from which ranges, categories and classes are learned."""
 
+    usual: Any  # the model where none is given
     least_targets = 1  # different ones among the first samples
 
     def __init__(
         self, model: Any = None, grace_period: int = 100, follows_ranges: bool = True
     ) -> None:
-        self.model = self._default() if model is None else model
+        kind = type(self.usual)
+        chosen = clone(self.usual) if model is None else model
+        require(isinstance(chosen, kind), "model", f"be an {kind.__name__}", chosen, TypeError)
+        self.model = chosen
         self.grace_period = whole("grace_period", grace_period, 2, 2**53)
         self.follows_ranges = flag("follows_ranges", follows_ranges)
         self.fitted: Any = None
         self.ranges: FollowedRanges | None = None
         self.samples: list[dict[str, Any]] = []
         self.targets: list[Any] = []
-
-    def _default(self) -> Any:
-        raise NotImplementedError
 
     def learn_one(self, x: dict[Hashable, Any], y: Any) -> None:
         """Learn one sample; if the model refuses one of the first, all of them are dropped."""
@@ -153,8 +154,7 @@ class RiverRegressor(Waiting, base.Regressor):
         Whether learned ranges of inputs become those of the last 500 samples as the stream drifts.
     """
 
-    def _default(self) -> SDNNRegressor:
-        return SDNNRegressor(out_of_range="widen")
+    usual = SDNNRegressor(out_of_range="widen")
 
     def predict_one(self, x: dict[Hashable, Any]) -> float:
         """Predict one target."""
@@ -181,8 +181,7 @@ class RiverClassifier(Waiting, base.Classifier):
 
     least_targets = 2
 
-    def _default(self) -> SDNNClassifier:
-        return SDNNClassifier(correction_share=0.5)
+    usual = SDNNClassifier(correction_share=0.5)
 
     @property
     def _multiclass(self) -> bool:  # what River asks of classifiers

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <new>
 #include <span>
 #include <stdexcept>
 #include <vector>
@@ -129,6 +130,18 @@ TEST(ParallelPerceptron, CountsOfLayersAreThoseOfEach) {
   std::vector<std::int32_t> out;
   EXPECT_THROW(ParallelPerceptron::counts(unlike, {}, 1, 1, out), std::invalid_argument);
   EXPECT_THROW(ParallelPerceptron::counts({}, {}, 1, 1, out), std::invalid_argument);
+}
+
+TEST(ParallelPerceptron, ThrowsWhatAThreadThrows) {
+  const std::vector<std::int32_t> weights(6);
+  const ParallelPerceptron layer(small_code(), 2, weights, std::vector<std::int32_t>(2));
+  const std::vector<std::int32_t> bins(2000);
+  for (const std::size_t query : {0, 999, 1999}) {
+    const auto consume = [&](std::size_t asked, const std::int32_t*) {
+      if (asked == query) throw std::bad_alloc();
+    };
+    EXPECT_THROW(layer.for_each_query(bins, 3, consume), std::bad_alloc) << query;
+  }
 }
 
 TEST(ParallelPerceptron, DrawsWholeNumbersInRange) {

@@ -287,6 +287,9 @@ def test_river_streams_are_learned():
     assert labelled.clone().fitted is None
     assert RiverRegressor().clone().model.out_of_range == "widen"
     assert RiverClassifier().clone().model.correction_share == 0.5
+    for kind, wrong in ((RiverRegressor, SDNNClassifier()), (RiverClassifier, 3)):
+        with pytest.raises(TypeError, match="model must be an SDNN"):
+            kind(wrong)
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <exception>
 #include <limits>
 #include <memory>
 #include <span>
@@ -369,19 +370,31 @@ class ParallelPerceptron {
     return std::clamp<std::size_t>(n_added / (code_->n_slots() * n_padded_units()), 64, 4096);
   }
 
-  /// Calls work(begin, end) for parts of up to `most` queries, n_threads of them at a time.
+  /// Calls work(begin, end) for parts of up to `most` queries, n_threads of them at a time. Throws
+  /// what any of them throws.
   template <class Work>
   static void in_parts(std::size_t n_queries, std::size_t most, int n_threads, const Work& work) {
     const auto n_parts = std::min(static_cast<std::size_t>(n_threads), (n_queries + 255) / 256);
     const std::size_t n_rounds = n_queries == 0 ? 0 : (n_queries - 1) / (most * n_parts) + 1;
     const auto begin_of = [&](std::size_t k) { return k * n_queries / (n_rounds * n_parts); };
+    std::vector<std::exception_ptr> errors(n_parts);
     for (std::size_t k = 0; k < n_rounds * n_parts; k += n_parts) {
       core::interruption_point();
-      std::vector<std::jthread> threads;  // joined at the end of the scope
-      for (std::size_t part = 1; part < n_parts; ++part) {
-        threads.emplace_back(work, begin_of(k + part), begin_of(k + part + 1));
+      const auto try_part = [&, k](std::size_t part) noexcept {
+        try {
+          work(begin_of(k + part), begin_of(k + part + 1));
+        } catch (...) {
+          errors[part] = std::current_exception();
+        }
+      };
+      {
+        std::vector<std::jthread> threads;  // joined at the end of the scope
+        for (std::size_t part = 1; part < n_parts; ++part) threads.emplace_back(try_part, part);
+        try_part(0);
       }
-      work(begin_of(k), begin_of(k + 1));
+      for (const std::exception_ptr& error : errors) {
+        if (error) std::rethrow_exception(error);
+      }
     }
   }
 
