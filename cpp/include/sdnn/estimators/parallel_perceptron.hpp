@@ -381,11 +381,15 @@ class ParallelPerceptron {
     for (std::size_t k = 0; k < n_rounds * n_parts; k += n_parts) {
       core::interruption_point();
       const auto try_part = [&, k](std::size_t part) noexcept {
+#if SDNN_EXCEPTIONS
         try {
           work(begin_of(k + part), begin_of(k + part + 1));
         } catch (...) {
           errors[part] = std::current_exception();
         }
+#else
+        work(begin_of(k + part), begin_of(k + part + 1));
+#endif
       };
       {
         std::vector<std::jthread> threads;  // joined at the end of the scope
