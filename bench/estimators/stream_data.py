@@ -43,7 +43,7 @@ LED_OPTIONS = {"noise_percentage": 0.1, "irrelevant_features": True}
 
 
 def wave(seed):
-    """A wave over three inputs, one of them useless, that turns and grows quicker by and by."""
+    """A wave over three inputs, one of them useless, that turns and becomes shorter."""
     random = np.random.RandomState(seed)
     for number in range(N_SAMPLES):
         a, b, c = random.uniform(-1, 1, 3)

@@ -177,7 +177,7 @@ class _CoreRounds(Rounds):
         taken = self._act(observations, environments, masks)
         if len(environments) < len(taken):
             for i in set(range(len(taken))).difference(environments):
-                taken[i] = np.ravel(actions[i])
+                taken[i] = np.ravel(actions[i])  # an element of the space after a replay
         return taken
 
 
@@ -286,6 +286,7 @@ class Episodes:
             numbers = self._begin_episodes()
             waiting[:] = [i for i in waiting if present[i] is not None]
         before = self._before = self._latest
+        # What _checked and _read_masks do, without their calls: this runs at every step.
         try:
             actions = self._actions = self.rounds.act(before, self._actions, waiting, self._masks)
         except ValueError as error:

@@ -90,7 +90,7 @@ class Fitted(Learned, BaseEstimator):
     def _counts(self, bins: Ints, n_groups: int, n_threads: int) -> Ints:
         """Return the firing counts of averaged networks, (n_networks, n_samples, n_groups)."""
         networks = (*self._earlier, self.network_)
-        if len(networks) == 1 or len(bins) <= FEW_SAMPLES:
+        if len(bins) <= FEW_SAMPLES:
             return np.stack([network.counts(bins, n_groups, n_threads) for network in networks])
         layers = [network.layer for network in networks]
         counts: Ints = _core.counts_of_all(layers, bins, n_groups, n_threads)

@@ -50,7 +50,7 @@ namespace sdnn::agents {
 ///
 /// An agent may learn in several environments at once, numbered from 0: each has a trace of its
 /// own, a replacing one where there are several: Q - Q_old would hold what the others corrected,
-/// and traces would pass it on and on.
+/// and dutch traces would carry it further.
 class Sarsa : public WithRates<Sarsa> {
  public:
   using Readout = approximators::LinearSDNN;
