@@ -10,6 +10,8 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
+
     from typing_extensions import Self
 
 
@@ -57,3 +59,20 @@ def stay_interrupts() -> Iterator[None]:
         yield
     if interrupts.received is not None:
         raise KeyboardInterrupt
+
+
+@contextmanager
+def thread_pool(n_threads: int) -> Iterator[ThreadPoolExecutor]:
+    """Run a block with a pool of threads, all of which have ended when it is left.
+
+    Python before 3.13 takes a thread for ended once a Ctrl-C has broken the waiting for it, and
+    crashes if the thread is in C++ as the interpreter ends (python/cpython#90882).
+    """
+    from concurrent.futures import ThreadPoolExecutor
+
+    pool = ThreadPoolExecutor(n_threads)
+    try:
+        yield pool
+    finally:
+        with stay_interrupts():
+            pool.shutdown()

@@ -1,6 +1,7 @@
 import os
 import signal
 import threading
+import time
 from contextlib import suppress
 
 import gymnasium as gym
@@ -8,7 +9,7 @@ import pytest
 
 from refusals import refuses
 from sdnn.agents import Callback, CheckpointCallback, JSONLines, SDNNQLearning, Training
-from sdnn.interrupts import Interrupts, stay_interrupts
+from sdnn.interrupts import Interrupts, stay_interrupts, thread_pool
 
 
 @pytest.fixture(autouse=True)
@@ -142,3 +143,17 @@ def test_other_threads_have_no_ctrl_c():
     thread.start()
     thread.join()
     assert entered == [signal.default_int_handler]
+
+
+def test_threads_of_a_pool_have_ended_after_a_ctrl_c_that_comes_while_they_are_waited_for():
+    ended = []
+
+    def work():
+        time.sleep(0.1)
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.2)
+        ended.append(True)
+
+    with pytest.raises(KeyboardInterrupt), thread_pool(1) as pool:
+        pool.submit(work)
+    assert ended

@@ -13,7 +13,6 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import date
 from typing import Any, TypeAlias
@@ -22,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
+from sdnn.interrupts import thread_pool
 from sdnn.machine import (
     available_instruction_sets,
     instruction_set,
@@ -211,7 +211,7 @@ def measure_threads(n_inputs: int, noise: float, effort: Effort) -> dict[str, An
 
     def seconds(n_threads: int) -> tuple[float, float]:
         trials = [_short_trial(n_inputs, noise, effort.n_episodes) for _ in range(n_threads)]
-        with ThreadPoolExecutor(n_threads) as pool:
+        with thread_pool(n_threads) as pool:
             begin = time.perf_counter()
             processor = list(pool.map(advance, trials))
             return time.perf_counter() - begin, sum(processor) / n_threads

@@ -12,7 +12,6 @@ import threading
 import time
 import zlib
 from collections.abc import Callable, Generator, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from queue import SimpleQueue
@@ -23,7 +22,7 @@ import numpy as np
 
 from sdnn.agents.registry import title_of
 from sdnn.arguments import shown, whole
-from sdnn.interrupts import Interrupts
+from sdnn.interrupts import Interrupts, thread_pool
 from sdnn.machine import instruction_set, n_cores
 from sdnn.progress import ProgressBars
 from sdnn.runs.spec import RunSpec
@@ -391,7 +390,7 @@ class ThreadExecutor:
     ) -> Generator[Message, None, None]:
         """Run the trials; see `Executor`."""
         messages: SimpleQueue[Message | None] = SimpleQueue()
-        with ThreadPoolExecutor(self.jobs, thread_name_prefix="trial") as pool:
+        with thread_pool(self.jobs) as pool:
             try:
                 for team in teams_of(planned, self.jobs):
                     pool.submit(_run_team, team, messages, stop)
@@ -402,7 +401,7 @@ class ThreadExecutor:
                     n_open -= not isinstance(message, Advanced)
                     if message is not None:
                         yield message
-            except BaseException:  # the pool waits for its threads
+            except BaseException:
                 stop.set()
                 raise
 
