@@ -17,7 +17,7 @@ _NO_EXPONENT = -(2**31)
 _WEIGHTS = {"weights": "action_value.weights", "averaged": "action_value.averaged_weights"}
 """Names in the header and in the core's state."""
 _ONE = 1 << 16  # of rates
-_MOST_TOLERANCE = 2**40  # above any value
+_MOST_TOLERANCE = 2**62  # in units: above any difference of values
 
 
 class LinearWriter(Writer):
@@ -60,9 +60,13 @@ class LinearWriter(Writer):
             "n_actions": n_actions,
             "n_windows": window * self.n_dimensions,
             "most_rows": max(n_actions) + window - 1,
-            "tolerance": math.floor(min(self.agent.learning.tie_tolerance, _MOST_TOLERANCE)),
             "is_linear": True,
         }
+
+    def tolerance(self) -> tuple[int, int]:
+        """Return the tolerance of ties as a number below 2^62, times 2 to a power."""
+        fraction, exponent = math.frexp(self.agent.learning.tie_tolerance)
+        return int(fraction * _MOST_TOLERANCE), exponent - 62
 
     def add_code(self, tables: Tables, sizes: dict[str, Any]) -> None:
         """Add the constants of the code and of the readout's rows."""
@@ -83,6 +87,9 @@ class LinearWriter(Writer):
             weights = state["action_value.averaged_weights"]
         tables.add("int32_t", "weights", weights[:, self.columns()].reshape(-1))
         most_columns = sizes["most_columns"]
+        number, exponent = self.tolerance()
+        shift = int(state.get("action_value.exponent", 0)) - exponent
+        tolerance = min(number << max(-shift, 0) >> max(shift, 0), _MOST_TOLERANCE)
         n_words = min(most_columns, sizes["n_columns"]) * sizes["n_rows"]
         ram_bytes = most_columns * sizes["bytes_of_column"] + 8 * sizes["most_rows"]
         values = {
@@ -90,6 +97,7 @@ class LinearWriter(Writer):
             "ram_bytes": ram_bytes + 12 * self.n_inputs,
             "n_words": n_words,
             "ties": self.ties(),
+            "tolerance": f", INT64_C({tolerance})" if tolerance else "",
         }
         return self.write("c_linear", {**sizes, **values}, tables)
 
@@ -149,6 +157,7 @@ class LearnerWriter(Learner, LinearWriter):
         self.add_code(tables, sizes)
         about = "What the agent begins with: states of its random generators."
         tables.add("uint64_t", "seeds", self.seeds(state), about)
+        number, exponent = self.tolerance()
         n_image_weights = (1 + self.averages) * sizes["n_weights"]
         for mine, name in _WEIGHTS.items():
             rows = state.get(name)
@@ -167,6 +176,10 @@ class LearnerWriter(Learner, LinearWriter):
             "epsilon": self._rate("epsilon"),
             "decay": round(learning.discount * learning.trace_decay * 8192),
             "discount": round(learning.discount * 32768),
+            "tolerance": f", {self.name}_tolerance(agent)" if number else "",
+            "tolerance_number": number,
+            "tolerance_exponent": exponent,
+            "most_tolerance": _MOST_TOLERANCE,
             "known": known,
             "image_head": self.layout().itemsize - 4 * n_image_weights,
             "n_image_weights": n_image_weights,

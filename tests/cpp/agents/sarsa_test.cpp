@@ -106,6 +106,45 @@ TEST(Sarsa, RatesHaveGoneHalfOfTheWayAfterScheduleSteps) {
   EXPECT_EQ(agent.learning_rate(), 0.75);
 }
 
+SarsaConfig with_tolerance(double tolerance) {
+  return {.policy = {.epsilon = 0.0,
+                     .n_greedy_steps = 0,
+                     .tie_rule = TieRule::lowest,
+                     .tie_tolerance = tolerance},
+          .final_learning_rate = {}};
+}
+
+// Rewards of 1 and 0.8 tie within 0.25, of 1 and 0.7 do not, whatever a unit of values is.
+TEST(Sarsa, TheToleranceOfTiesIsInValues) {
+  const State a{0.1, 0.1};
+  for (const double scale : {1.0, 1e-300, 1e250}) {
+    Sarsa agent = agent_of(with_tolerance(0.25 * scale));
+    const auto first_after = [&](double reward) {
+      agent.learn(a, {0}, reward * scale, a, true);
+      EXPECT_NEAR(q(agent, a, 0) / scale, reward, 0.01);
+      return agent.act(a).front();
+    };
+    EXPECT_EQ(agent.act(a).front(), 0U);
+    agent.learn(a, {2}, scale, a, true);
+    EXPECT_EQ(first_after(0.8), 0U);
+    EXPECT_EQ(first_after(0.7), 2U);
+    const auto exponent = agent.action_value().exponent();
+    agent.learn(a, {1}, 100.0 * scale, a, true);
+    EXPECT_EQ(agent.act(a).front(), 1U);
+    agent.learn(a, {1}, 0.0, a, true);
+    EXPECT_GE(*agent.action_value().exponent(), *exponent + 4);
+    EXPECT_EQ(first_after(0.8), 0U);
+    EXPECT_EQ(first_after(0.7), 2U);
+  }
+}
+
+TEST(Sarsa, ActionsThatAreNotAllowedNeverTie) {
+  const State a{0.1, 0.1};
+  Sarsa agent = agent_of(with_tolerance(1e308));
+  agent.learn(a, {2}, 1e-300, a, true);
+  EXPECT_EQ(agent.act(a, true, 0, std::vector<std::uint8_t>{0, 1, 1}).front(), 1U);
+}
+
 TEST(Sarsa, RefusesMasksThatDoNotFit) {
   Sarsa agent = agent_of({}, {3, 2});
   auto workspace = agent.workspace();

@@ -102,6 +102,19 @@ def test_listed_states_have_a_table(tmp_path):
         np.testing.assert_array_equal(values[:, 0], 0)
 
 
+@pytest.mark.parametrize(
+    ("tie_rule", "tie_tolerance", "expected"),
+    [("lowest", 0.0, 3), ("lowest", 0.25, 1), ("middle", 0.25, 2), ("lowest", 0.35, 0)],
+)
+def test_values_within_the_tolerance_tie(tie_rule, tie_tolerance, expected):
+    learning = SarsaConfig(epsilon=0.0, tie_rule=tie_rule, tie_tolerance=tie_tolerance)
+    agent = SDNNSarsa(gym.spaces.Discrete(2), gym.spaces.Discrete(4), learning=learning)
+    for action, reward in enumerate([0.7, 0.8, 0.9, 1.0]):
+        agent.learn(Transition(0, action, reward, 1, terminated=True))
+    np.testing.assert_allclose(agent.q_values(0), [0.7, 0.8, 0.9, 1.0], atol=0.01)
+    assert agent.act(0) == agent.act(0, explore=False) == expected
+
+
 @pytest.mark.parametrize(("n_states", "n_units"), [(1, 0), (2000, 0), (5, 40)])
 def test_too_many_states_or_given_units_have_patterns(n_states, n_units):
     agent = SDNNSarsa(

@@ -31,7 +31,15 @@ from c_policies import (
     symbols_agent,
 )
 from refusals import refuses
-from sdnn.agents import PRESETS, FuzzyQLearning, RBFQLearning, SDNNQLearning
+from sdnn.agents import (
+    PRESETS,
+    FuzzyQLearning,
+    RBFQLearning,
+    SarsaConfig,
+    SDNNQLearning,
+    SDNNSarsa,
+    Transition,
+)
 from sdnn.export import c_header, export_c_header
 from sdnn.export.tables import weight_words
 
@@ -47,6 +55,23 @@ def target(needs):
 @pytest.mark.parametrize("name", AGENTS)
 def test_the_actions_are_the_agents(name, target, tmp_path):
     check_all_actions(name, target, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("reward", "tie_tolerance", "expected"),
+    [
+        (1.0, 0.25, f", INT64_C({2**21})"),
+        (1.0, 2.0**-24, ""),
+        (1e-30, 0.0, ""),
+        (1e-30, 1.0, f", INT64_C({2**62})"),
+    ],
+)
+def test_the_tolerance_of_ties_is_in_units_of_values(reward, tie_tolerance, expected):
+    """A reward of 1 is that of two weights of 23 bits: a unit is 2^-23."""
+    rule = SarsaConfig(tie_rule="lowest", tie_tolerance=tie_tolerance)
+    agent = SDNNSarsa(Discrete(2), Discrete(2), learning=rule)
+    agent.learn(Transition(0, 1, reward, 1, terminated=True))
+    assert f"return policy_best(sums, 2{expected});" in c_header(agent, "policy").text
 
 
 def test_symbols_are_readings_of_one_and_zero(target, tmp_path):

@@ -48,7 +48,7 @@ def dutch():
 
 def several():
     """Two dimensions, two inputs: groups left over alone; rates without a schedule."""
-    learning = SarsaConfig(schedule_steps=0, learning_rate=0.3, epsilon=0.3)
+    learning = SarsaConfig(schedule_steps=0, learning_rate=0.3, epsilon=0.3, tie_tolerance=0.4)
     spaces = box(1.0, 2.0), gym.spaces.MultiDiscrete([3, 5])
     return SDNNSarsa(*spaces, seed=4, learning=learning, **_with(SMALL))
 

@@ -166,9 +166,11 @@ def linear_agent():
 
 
 def linear_vector_agent():
+    """Two dimensions, ties within a tolerance."""
     return SDNNSarsa(
         box(2.0, 3.0), gym.spaces.MultiDiscrete([3, 4]), seed=10, angle_pairs=[], inputs="all",
         approximator=LinearSDNNConfig(n_pattern_units=40, averaging_interval=0),
+        learning=SarsaConfig(tie_rule="middle", tie_tolerance=0.3),
     )  # fmt: skip
 
 

@@ -111,11 +111,8 @@ class EpsilonGreedy {
   std::size_t random_action(std::size_t n_actions) noexcept {
     return static_cast<std::size_t>(exploration_.below(n_actions));
   }
-  /// One of the best actions; ties are broken by the streams of learning or evaluation, or
-  /// by those that the caller owns. Shape: values (n_actions,). Throws as select does.
-  std::size_t best_action(std::span<const double> values, bool explore) {
-    return greedy(values, explore ? ties_ : evaluation_ties_);
-  }
+  /// One of the best actions; `ties` decides between several. Shape: values (n_actions,). Throws as
+  /// select does.
   std::size_t best_action(std::span<const double> values, core::Random& ties) const {
     return greedy(values, ties);
   }
@@ -124,9 +121,9 @@ class EpsilonGreedy {
   }
   /// The same where numbers that rise with the values stand for them: `least` is the least one that
   /// ties with the best.
-  std::size_t best_action(std::span<const std::int32_t> counts, std::int32_t least,
-                          core::Random& ties) const {
-    return one_of(counts, least, ties);
+  template <class Number>
+  std::size_t best_action(std::span<const Number> numbers, Number least, core::Random& ties) const {
+    return one_of(numbers, least, ties);
   }
   /// The stream that breaks ties in learning, or in evaluation.
   core::Random& ties(bool explore) noexcept { return explore ? ties_ : evaluation_ties_; }

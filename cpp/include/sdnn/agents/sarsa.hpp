@@ -133,9 +133,7 @@ class Sarsa : public WithRates<Sarsa> {
     require_mask("mask", mask);
     read(state, workspace);
     exclude_from(workspace, mask);
-    return each_best(workspace, [&](std::span<const double> row) {
-      return exploration_.policy().best_action(row, ties);
-    });
+    return each_best(workspace, ties);
   }
 
   /// The two steps of act without `explore`: `read` takes the time and is for many threads, as
@@ -248,6 +246,7 @@ class Sarsa : public WithRates<Sarsa> {
   friend class WithRates<Sarsa>;
 
   static constexpr double kLargestReward = 1e300;
+  static constexpr double kMostTolerance = 0x1p62;  ///< in units: above any difference of values
   static constexpr std::int64_t kMostLearned = std::int64_t{1} << 45;
   static constexpr std::int32_t kOne = Readout::kRateOne;
 
@@ -369,20 +368,23 @@ class Sarsa : public WithRates<Sarsa> {
     }
   }
 
-  /// The action that has best(row of values) in each dimension.
-  template <class Best>
-  static Action each_best(const Workspace& workspace, const Best& best) {
+  /// One of the best actions in each dimension. The tolerance is in whole units, as values are.
+  Action each_best(const Workspace& workspace, core::Random& ties) const {
+    const EpsilonGreedy& policy = exploration_.policy();
+    const double tolerance =
+        std::ldexp(policy.config().tie_tolerance, -action_value_.exponent().value_or(0));
+    // Finite, so that actions that are not allowed never tie.
+    const double whole = std::floor(std::min(tolerance, kMostTolerance));
     Action action(workspace.values.size());
     for (std::size_t d = 0; d < action.size(); ++d) {
-      action[d] = best(std::span<const double>(workspace.values[d]));
+      const std::span<const double> row = workspace.values[d];
+      action[d] = policy.best_action(row, best_value(row) - whole, ties);
     }
     return action;
   }
   Action best_of(Workspace& workspace, bool explore, ActionMask mask) {
     exclude_from(workspace, mask);
-    return each_best(workspace, [&](std::span<const double> row) {
-      return exploration_.policy().best_action(row, explore);
-    });
+    return each_best(workspace, exploration_.policy().ties(explore));
   }
 
   std::int64_t best_sum(Readout::Workspace& read, ActionMask mask) const {
