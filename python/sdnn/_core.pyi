@@ -1949,6 +1949,8 @@ class ObservationConfig:
         Highest value of each variable; none: not known.
     adaptive : bool
         Whether ranges of numbers are fitted, within low and high.
+    narrowed : bool
+        Whether ranges that are far wider than what is observed are fitted.
     angles : tuple[int, ...]
         Variables that wrap around in their ranges.
     angle_pairs : tuple[tuple[int, ...], ...]
@@ -1975,7 +1977,7 @@ class ObservationConfig:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., relevant_only: bool = ..., inputs: collections.abc.Sequence[int] = ...) -> None:
+    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., narrowed: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., relevant_only: bool = ..., inputs: collections.abc.Sequence[int] = ...) -> None:
         ...
     def __replace__(self, **changes: typing.Any) -> ObservationConfig:
         ...
@@ -2021,6 +2023,11 @@ class ObservationConfig:
     def low(self) -> tuple[float | None, ...]:
         """
         Lowest value of each variable; none: not known.
+        """
+    @property
+    def narrowed(self) -> bool:
+        """
+        Whether ranges that are far wider than what is observed are fitted.
         """
     @property
     def relevant_only(self) -> bool:

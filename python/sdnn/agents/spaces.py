@@ -64,6 +64,7 @@ class Observations:
             low=[None if np.isnan(x) else x for x in low.tolist()],
             high=[None if np.isnan(x) else x for x in high.tolist()],
             adaptive=is_adaptive,
+            narrowed=ranges is None,
             angles=angles,
             angle_pairs=pairs,
             find_angle_pairs=isinstance(angle_pairs, str) and angle_pairs == "find",

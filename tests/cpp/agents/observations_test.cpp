@@ -94,6 +94,19 @@ TEST(Observations, AdaptiveRangesLeaveOutWhatIsRareAndStayWithinTheFixedOnes) {
   EXPECT_EQ(high_of(observations), (Numbers{7.0, 4.0, 1.0, 10.0, pi, 3.0}));
 }
 
+TEST(Observations, NarrowedRangesAreFittedWhereTheFixedOneIsMoreThanTwiceAsWide) {
+  const double pi = std::numbers::pi;
+  // What is seen of 0 to 4 has a fitted range of -1 to 5; constants and what is beyond have none.
+  const ObservationConfig config{.low = {-6.0, -6.0, 0.0, -100.0, -100.0, -pi, {}},
+                                 .high = {6.0, 6.1, 100.0, 100.0, 3.0, pi, {}},
+                                 .narrowed = true,
+                                 .angles = {5}};
+  const Numbers seen{0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 2.0, 4.0, 1.0, 4.0};
+  const auto observations = fitted(config, seen);
+  EXPECT_EQ(low_of(observations), (Numbers{-6.0, -1.0, 0.0, -100.0, -100.0, -pi, -1.0}));
+  EXPECT_EQ(high_of(observations), (Numbers{6.0, 5.0, 5.0, 100.0, 3.0, pi, 5.0}));
+}
+
 TEST(Observations, PairsOnTheCircleAreFound) {
   ObservationConfig config{.low = Ends(4, -10.0), .high = Ends(4, 10.0), .find_angle_pairs = true};
   Numbers seen, standing;

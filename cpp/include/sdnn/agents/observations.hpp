@@ -24,6 +24,7 @@ struct ObservationConfig {
   std::vector<std::optional<double>> low = {};
   std::vector<std::optional<double>> high = {};
   bool adaptive = false;
+  bool narrowed = false;
   std::vector<int> angles = {};
   std::vector<std::vector<int>> angle_pairs = {};
   bool find_angle_pairs = false;
@@ -39,6 +40,8 @@ struct ObservationConfig {
                     "Highest value of each variable; none: not known."),
         core::field("adaptive", &ObservationConfig::adaptive,
                     "Whether ranges of numbers are fitted, within low and high."),
+        core::field("narrowed", &ObservationConfig::narrowed,
+                    "Whether ranges that are far wider than what is observed are fitted."),
         core::field("angles", &ObservationConfig::angles,
                     "Variables that wrap around in their ranges."),
         core::field("angle_pairs", &ObservationConfig::angle_pairs,
@@ -59,7 +62,8 @@ struct ObservationConfig {
 ///
 /// A number's range is the fixed one, or fitted to observations: from the lowest to the highest,
 /// and a quarter more at each end. Adaptive ranges leave out one in twenty observations at each
-/// end and stay within the fixed range. Pairs of neighbouring variables that lie and move on the
+/// end and stay within the fixed range; narrowed ones are fitted where the fixed range is more than
+/// twice as wide. Pairs of neighbouring variables that lie and move on the
 /// unit circle, or around it by what is noise, can be found.
 class Observations {
  public:
@@ -166,6 +170,8 @@ class Observations {
     for (std::size_t i = 0; i < n_variables(); ++i) {
       if (is_unknown(ranges.low[i])) {
         std::tie(ranges.low[i], ranges.high[i]) = fitted_range(column(seen, i), i);
+      } else if (config_.narrowed && roles_[i] == Role::number && !is_one_of(pairs, i)) {
+        narrow(ranges, i, column(seen, i));
       }
     }
     take(ranges, pairs);
@@ -247,6 +253,7 @@ class Observations {
   using Pairs = std::vector<std::vector<int>>;
 
   static constexpr double kHeadroom = 0.25;
+  static constexpr double kMuchWider = 2.0;
   static constexpr std::size_t kRare = 20;
   static constexpr double kNearCircle = 1e-3;  // single precision and some rounding
   // Around the circle: with noise of a tenth of the range the correlation of squares is -0.65, and
@@ -307,6 +314,23 @@ class Observations {
     const double high = config_.high[i].value_or(infinity);
     if (!std::isfinite(low) || !std::isfinite(high)) return std::nullopt;
     return std::pair(low, high);
+  }
+
+  static bool is_one_of(const Pairs& pairs, std::size_t variable) {
+    return std::ranges::any_of(pairs, [variable](const std::vector<int>& pair) {
+      return index(pair[0]) == variable || index(pair[1]) == variable;
+    });
+  }
+
+  static void narrow(Ranges& ranges, std::size_t i, const std::vector<double>& seen) {
+    const auto [least, most] = std::ranges::minmax(seen);
+    if (!(most > least)) return;
+    const auto [low, high] = widened(least, most);
+    const bool is_much_wider = ranges.high[i] - ranges.low[i] > kMuchWider * (high - low);
+    const bool is_within = least >= ranges.low[i] && most <= ranges.high[i];
+    if (!is_much_wider || !is_within) return;
+    ranges.low[i] = std::max(low, ranges.low[i]);
+    ranges.high[i] = std::min(high, ranges.high[i]);
   }
 
   static std::pair<double, double> widened(double low, double high) noexcept {
