@@ -1257,7 +1257,7 @@ class QLearningConfig:
     n_steps : int
         Rewards in a target before it bootstraps. Not in the paper, which has 1: with more, a transition is learned, once, when so many steps are known or the episode ends. Must be in [1, 1000].
     value_range : {'fixed', 'adaptive'}
-        Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that follows the returns of late (`adaptive`): rare ones are clipped, and time limits end no return. Not in the paper.
+        Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that follows the returns of late (`adaptive`): rare ones are clipped, and time limits end no return. An RBF network has no range. Not in the paper.
     max_action_repeat : int
         Steps that a random action may last. Not in the paper, which has 1: with more, it is kept for at least k steps with probability 1 / k. With a linear readout each episode that terminates halves it, down to 5. Must be in [1, 1000000].
     final_learning_rate : float | None
@@ -1368,7 +1368,7 @@ class QLearningConfig:
     @property
     def value_range(self) -> typing.Literal['fixed', 'adaptive']:
         """
-        Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that follows the returns of late (`adaptive`): rare ones are clipped, and time limits end no return. Not in the paper.
+        Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that follows the returns of late (`adaptive`): rare ones are clipped, and time limits end no return. An RBF network has no range. Not in the paper.
         """
 class SarsaConfig:
     """

@@ -44,10 +44,12 @@ struct QLearningConfig {
                         "has 1: with more, a transition is learned, once, when so many "
                         "steps are known or the episode ends.",
                         core::within(1, 1000)),
-            core::field("value_range", &QLearningConfig::value_range,
-                        "Whether Q has the approximator's range, q_low to q_high (`fixed`), "
-                        "or one that follows the returns of late (`adaptive`): rare ones are "
-                        "clipped, and time limits end no return. Not in the paper.")),
+            core::field(
+                "value_range", &QLearningConfig::value_range,
+                "Whether Q has the approximator's range, q_low to q_high (`fixed`), "
+                "or one that follows the returns of late (`adaptive`): rare ones are "
+                "clipped, and time limits end no return. An RBF network has no range. Not in the "
+                "paper.")),
         schedule_fields<QLearningConfig>());
   }
   bool operator==(const QLearningConfig&) const = default;

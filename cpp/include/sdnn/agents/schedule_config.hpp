@@ -76,24 +76,39 @@ inline double scheduled(double first, const std::optional<double>& last, Schedul
   return first * core::exp(progress * core::log(*last / first));
 }
 
+/// Whether alpha and epsilon follow the progress, and not the number of steps.
+template <class Config>
+bool follows_progress(const Config& config) noexcept {
+  if constexpr (requires { config.schedule_steps; }) return config.schedule_steps == 0;
+  return true;
+}
+
 }  // namespace detail
 
-/// Alpha and epsilon at a progress in [0, 1].
+/// Alpha and epsilon at a progress in [0, 1]; the first values where they do not follow it.
 template <class Config>
 double learning_rate_at(const Config& config, double progress) noexcept {
+  if (!detail::follows_progress(config)) return config.learning_rate;
   return detail::scheduled(config.learning_rate, config.final_learning_rate, config.schedule,
                            progress);
 }
 template <class Config>
 double epsilon_at(const Config& config, double progress) noexcept {
+  if (!detail::follows_progress(config)) return config.policy.epsilon;
   return detail::scheduled(config.policy.epsilon, config.final_epsilon, config.schedule,
                            std::min(1.0, progress / config.exploration_fraction));
 }
 
-/// Throws std::invalid_argument naming the field that is out of range.
+/// Throws std::invalid_argument naming the field that is out of range or would have no effect.
 template <class Config>
 Config checked_schedule(const Config& config) {
   core::check_fields(config);
+  if (!detail::follows_progress(config)) {
+    core::require(config.schedule == Schedule::linear, "schedule",
+                  "linear where schedule_steps is not 0", "exponential");
+    core::require(config.exploration_fraction == 1.0, "exploration_fraction",
+                  "1 where schedule_steps is not 0", config.exploration_fraction);
+  }
   if (config.schedule == Schedule::exponential && config.final_epsilon) {
     const char* const expected = "greater than 0 where the schedule is exponential";
     core::require(config.policy.epsilon > 0.0, "epsilon", expected, config.policy.epsilon);

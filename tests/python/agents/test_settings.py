@@ -1,0 +1,124 @@
+"""Every setting of an agent has an effect on what it does, or is listed here."""
+
+import dataclasses
+import typing
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from refusals import refuses
+from sdnn.agents import SarsaConfig, SDNNSarsa, Transition
+from sdnn.agents.registry import AGENTS
+from sdnn.config import fields_of
+
+N_STEPS = 300
+CODE = {"n_pattern_units": 24, "n_anchor_patterns": 4, "n_interpolated": 5, "n_actions": 5}
+NETWORK = {"n_hidden_units": 60, "n_active_units": 20, "q_low": -2.0, "q_high": 4.0}
+POLICY = {"epsilon": 0.4, "n_greedy_steps": 3}
+RATES = POLICY | {"final_learning_rate": 0.4, "final_epsilon": 0.02}
+FIRST = {
+    "sdnn-c": (CODE | NETWORK | {"initial_weights": "uniform"}, RATES),
+    "fuzzy": ({"n_sets": 3, "n_actions": 5}, POLICY),
+    "rbf": ({"n_bases": 3, "n_actions": 5}, RATES),
+    "sdnn-linear": (CODE, RATES | {"schedule_steps": 0}),
+}
+"""Settings of which one at a time is changed: small, and such that the others matter."""
+
+WITHOUT_EFFECT = {
+    "every agent": {
+        "n_inputs": "the observation space has it",
+        "max_table_bytes": "it only refuses",
+    },
+    "sdnn-c": {"learning_coefficient": "it scales weights and thresholds alike"},
+    "rbf": {"value_range": "such a network has no range"},
+}
+"""Settings that change nothing, and why."""
+
+
+def others(field, value):
+    """Return other values of a setting, some of them out of its range."""
+    kinds = typing.get_args(field.type) or (field.type,)
+    if isinstance(value, bool):
+        return [not value]
+    if isinstance(value, str):
+        return [word for word in kinds if word != value]
+    if isinstance(value, tuple):  # of each input
+        return [(True, False, False) if bool in kinds else (3, 0, 0)]
+    kind = int if int in kinds else float
+    tried = [kind(one) for one in (0.3, 0.9, 1, 2, 5, 20)]
+    return [one for one in dict.fromkeys([kind((value or 0) * 2), *tried]) if one != value]
+
+
+def life(entry, n_dimensions, approximator, learning):
+    """Return the actions of a short life, and values and greedy actions after it."""
+    agent = entry.agent(
+        gym.spaces.Box(0.0, 1.0, (3,), np.float64),
+        gym.spaces.Box(-1.0, 1.0, (n_dimensions,), np.float64),
+        approximator=approximator,
+        learning=learning,
+        seed=1,
+        angle_pairs="none",
+        inputs="all",
+    )
+    random = np.random.default_rng(1)
+    observation, actions = random.random(3), []
+    for step in range(N_STEPS):
+        agent.progress = step / N_STEPS
+        action = agent.act(observation)
+        place = np.clip(observation[0] + 0.2 * action.mean() + random.normal(0, 0.02), 0, 1)
+        next_observation = np.array([place, *random.random(2)])
+        reward = float(place > 0.7) + 0.5 * observation[1] - 0.1 * abs(action[0])
+        end = random.random()
+        agent.learn(Transition(observation, action, reward, next_observation, end < 0.05))
+        observation = next_observation
+        if end < 0.1:
+            agent.begin_episode()
+            observation = random.random(3)
+        actions.append(action)
+    values = getattr(agent, "q_values", None) or agent.value
+    probes = random.random((20, 3))
+    actions += [agent.act(probe, explore=False) for probe in probes]
+    return np.stack(actions), np.stack([values(probe) for probe in probes])
+
+
+@pytest.mark.parametrize("n_dimensions", [1, 2])
+@pytest.mark.parametrize("name", AGENTS)
+def test_every_setting_has_an_effect(name, n_dimensions):
+    entry = AGENTS[name]
+    approximator, learning = FIRST.get(name, ({}, {}))
+    parts = {
+        "approximator": entry.approximator(**approximator),
+        "learning": entry.learning(**learning),
+    }
+    usual = life(entry, n_dimensions, **parts)
+
+    def has_effect(part, field):
+        for value in others(field, getattr(parts[part], field.name)):
+            try:
+                changed = dataclasses.replace(parts[part], **{field.name: value})
+                found = life(entry, n_dimensions, **parts | {part: changed})
+            except ValueError:
+                continue
+            if not all(map(np.array_equal, found, usual)):
+                return True
+        return False
+
+    fields = [(part, field) for part, config in parts.items() for field in fields_of(type(config))]
+    listed = WITHOUT_EFFECT["every agent"] | WITHOUT_EFFECT.get(name, {})
+    without = {field.name for part, field in fields if not has_effect(part, field)}
+    assert without == listed.keys() & {field.name for _, field in fields}
+
+
+def test_what_belongs_to_the_progress_is_refused_where_nothing_follows_it():
+    def agent(**learning):
+        space = gym.spaces.Box(-1.0, 1.0, (3,), np.float64)
+        return SDNNSarsa(space, gym.spaces.Discrete(2), learning=SarsaConfig(**learning))
+
+    refuses("schedule", agent, schedule="exponential", final_epsilon=0.1)
+    refuses("exploration_fraction", agent, exploration_fraction=0.5)
+    for schedule_steps, expected in ((0, 0.55), (100, 1.0)):
+        one = agent(schedule_steps=schedule_steps, final_learning_rate=0.1)
+        one.progress = 0.5
+        assert one.is_warming_up
+        assert one.learning_rate == pytest.approx(expected)
