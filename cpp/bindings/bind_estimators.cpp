@@ -229,7 +229,6 @@ void bind_trainer_methods(py::class_<Trainer, std::shared_ptr<Trainer>>& trainer
 }  // namespace
 
 void bind_estimators(py::module_& module) {
-  using Code = coding::SelectiveDesensitization;
   py::class_<ParallelPerceptron, std::shared_ptr<ParallelPerceptron>>(
       module, "ParallelPerceptron", "Units over a code, with integer weights")
       .def(py::init(&make_layer), py::arg("code"), py::arg("n_units"), py::arg("seed") = 0,

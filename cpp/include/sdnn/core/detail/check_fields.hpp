@@ -51,7 +51,7 @@ void check_bounds(const char* name, const Value& value, const Bounds& bounds) {
   } else if constexpr (requires { value.has_value(); }) {
     if (value) check_bounds(name, *value, bounds);
   } else {
-    for (const auto item : value) check_bounds(name, item, bounds);
+    for (const auto& item : value) check_bounds(name, item, bounds);
   }
 }
 
