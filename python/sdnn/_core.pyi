@@ -1950,7 +1950,7 @@ class ObservationConfig:
     adaptive : bool
         Whether ranges of numbers are fitted, within low and high.
     narrowed : bool
-        Whether ranges that are far wider than what is observed are fitted.
+        Whether ranges of few inputs that are far wider than what is observed are fitted.
     angles : tuple[int, ...]
         Variables that wrap around in their ranges.
     angle_pairs : tuple[tuple[int, ...], ...]
@@ -2027,7 +2027,7 @@ class ObservationConfig:
     @property
     def narrowed(self) -> bool:
         """
-        Whether ranges that are far wider than what is observed are fitted.
+        Whether ranges of few inputs that are far wider than what is observed are fitted.
         """
     @property
     def relevant_only(self) -> bool:

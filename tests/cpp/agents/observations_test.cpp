@@ -94,17 +94,24 @@ TEST(Observations, AdaptiveRangesLeaveOutWhatIsRareAndStayWithinTheFixedOnes) {
   EXPECT_EQ(high_of(observations), (Numbers{7.0, 4.0, 1.0, 10.0, pi, 3.0}));
 }
 
-TEST(Observations, NarrowedRangesAreFittedWhereTheFixedOneIsMoreThanTwiceAsWide) {
-  const double pi = std::numbers::pi;
-  // What is seen of 0 to 4 has a fitted range of -1 to 5; constants and what is beyond have none.
-  const ObservationConfig config{.low = {-6.0, -6.0, 0.0, -100.0, -100.0, -pi, {}},
-                                 .high = {6.0, 6.1, 100.0, 100.0, 3.0, pi, {}},
-                                 .narrowed = true,
-                                 .angles = {5}};
-  const Numbers seen{0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 2.0, 4.0, 1.0, 4.0};
-  const auto observations = fitted(config, seen);
-  EXPECT_EQ(low_of(observations), (Numbers{-6.0, -1.0, 0.0, -100.0, -100.0, -pi, -1.0}));
-  EXPECT_EQ(high_of(observations), (Numbers{6.0, 5.0, 5.0, 100.0, 3.0, pi, 5.0}));
+TEST(Observations, NarrowedRangesOfFewInputsAreFittedWhereTheFixedOneIsMoreThanTwiceAsWide) {
+  const auto range = [](double low, double high, Numbers seen, std::size_t n_variables = 1) {
+    ObservationConfig config{.narrowed = true};
+    config.low.assign(n_variables, low);
+    config.high.assign(n_variables, high);
+    Numbers rows;
+    for (const double x : seen) rows.insert(rows.end(), n_variables, x);
+    const auto observations = fitted(config, rows);
+    return std::pair(observations.low().front(), observations.high().front());
+  };
+  // What is seen of 0 to 4 has a fitted range of -1 to 5, of a width of 6.
+  EXPECT_EQ(range(-6.0, 6.0, {0.0, 4.0}), std::pair(-6.0, 6.0));
+  EXPECT_EQ(range(-6.0, 6.1, {0.0, 4.0}), std::pair(-1.0, 5.0));
+  EXPECT_EQ(range(0.0, 100.0, {0.0, 4.0}), std::pair(0.0, 5.0));
+  EXPECT_EQ(range(-100.0, 100.0, {4.0, 4.0}), std::pair(-100.0, 100.0));  // a constant
+  EXPECT_EQ(range(-100.0, 3.0, {0.0, 4.0}), std::pair(-100.0, 3.0));      // beyond
+  EXPECT_EQ(range(-100.0, 100.0, {0.0, 4.0}, 4), std::pair(-1.0, 5.0));
+  EXPECT_EQ(range(-100.0, 100.0, {0.0, 4.0}, 5), std::pair(-100.0, 100.0));
 }
 
 TEST(Observations, PairsOnTheCircleAreFound) {

@@ -41,7 +41,8 @@ struct ObservationConfig {
         core::field("adaptive", &ObservationConfig::adaptive,
                     "Whether ranges of numbers are fitted, within low and high."),
         core::field("narrowed", &ObservationConfig::narrowed,
-                    "Whether ranges that are far wider than what is observed are fitted."),
+                    "Whether ranges of few inputs that are far wider than what is observed are "
+                    "fitted."),
         core::field("angles", &ObservationConfig::angles,
                     "Variables that wrap around in their ranges."),
         core::field("angle_pairs", &ObservationConfig::angle_pairs,
@@ -63,8 +64,9 @@ struct ObservationConfig {
 /// A number's range is the fixed one, or fitted to observations: from the lowest to the highest,
 /// and a quarter more at each end. Adaptive ranges leave out one in twenty observations at each
 /// end and stay within the fixed range; narrowed ones are fitted where the fixed range is more than
-/// twice as wide. Pairs of neighbouring variables that lie and move on the
-/// unit circle, or around it by what is noise, can be found.
+/// twice as wide and inputs are few: many would have too little data for finer bins. Pairs of
+/// neighbouring variables that lie and move on the unit circle, or around it by what is noise, can
+/// be found.
 class Observations {
  public:
   /// Symbols are inputs of their own where the approximator codes symbols; it gets `least_inputs`
@@ -167,10 +169,11 @@ class Observations {
   void fit(std::span<const double> seen) {
     const auto pairs = config_.find_angle_pairs ? pairs_in(seen) : config_.angle_pairs;
     Ranges ranges = fixed_ranges(pairs);
+    const bool narrows = config_.narrowed && inputs_with(pairs).size() <= kFewInputs;
     for (std::size_t i = 0; i < n_variables(); ++i) {
       if (is_unknown(ranges.low[i])) {
         std::tie(ranges.low[i], ranges.high[i]) = fitted_range(column(seen, i), i);
-      } else if (config_.narrowed && roles_[i] == Role::number && !is_one_of(pairs, i)) {
+      } else if (narrows && roles_[i] == Role::number && !is_one_of(pairs, i)) {
         narrow(ranges, i, column(seen, i));
       }
     }
@@ -254,6 +257,7 @@ class Observations {
 
   static constexpr double kHeadroom = 0.25;
   static constexpr double kMuchWider = 2.0;
+  static constexpr std::size_t kFewInputs = 4;
   static constexpr std::size_t kRare = 20;
   static constexpr double kNearCircle = 1e-3;  // single precision and some rounding
   // Around the circle: with noise of a tenth of the range the correlation of squares is -0.65, and
