@@ -66,7 +66,8 @@ def thread_pool(n_threads: int) -> Iterator[ThreadPoolExecutor]:
     """Run a block with a pool of threads, all of which have ended when it is left.
 
     Python before 3.13 takes a thread for ended once a Ctrl-C has broken the waiting for it, and
-    crashes if the thread is in C++ as the interpreter ends (python/cpython#90882).
+    crashes if the thread is in C++ as the interpreter ends (python/cpython#90882). A second Ctrl-C
+    while threads are waited for acts as usual: it gives up what hangs.
     """
     from concurrent.futures import ThreadPoolExecutor
 

@@ -24,6 +24,7 @@ from sdnn.agents.registry import (
     split_label,
 )
 from sdnn.arguments import blamed, is_of_class, shown
+from sdnn.bounds import flat_bounds
 from sdnn.config import ProtocolConfig
 from sdnn.environments import (
     AcrobotConfig,
@@ -364,8 +365,10 @@ class RunSpec(Settings, frozen=True):
         given, environment = self._of_spaces(), self.environment
         if _is_kind_of(self.entry.agent, CodedAgent):  # by its preset
             given |= {"angle_pairs": self.agent.angle_pairs, "inputs": self.agent.inputs}
-        if environment is None or not environment.ranges or environment.has_other_sensors:
+        if environment is None or not environment.ranges:
             return given
+        if environment.has_other_sensors:  # given ranges are the space's then
+            return {"observation_range": flat_bounds(env.observation_space), **given}
         if "observation_range" in given:
             raise ConfigError(
                 "environment.ranges", "must not be given together with adaptive ranges"

@@ -239,6 +239,20 @@ def test_ranges_are_given_or_seen():
     assert caught.value.key == "environment.ranges"
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_given_ranges_are_not_narrowed(noise):
+    environment = EnvironmentSpec(id="CartPole-v1", noise=noise)
+    given = {str(i): (-100.0, 100.0) for i in range(4)}
+    spec = RunSpec(environment=environment.replace(ranges=given), agent="sdnn-linear")
+    env = spec.environment.make()
+    agent = spec.make_agent(env)
+    agent.train(env, steps=spec.agent.warm_up_steps)
+    assert not agent.is_warming_up
+    low, high = agent.observation_range
+    expected = (0.0, 1.0) if noise else (-100.0, 100.0)
+    assert set(zip(low, high, strict=True)) == {expected}
+
+
 def test_agents_are_made_with_preset_and_settings():
     env = CART_POLE.make()
     for name, kind in {"sdnn-c": SDNNQLearning, "rbf": RBFQLearning}.items():
