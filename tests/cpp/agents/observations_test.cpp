@@ -108,8 +108,9 @@ TEST(Observations, NarrowedRangesOfFewInputsAreFittedWhereTheFixedOneIsMoreThanT
   EXPECT_EQ(range(-6.0, 6.0, {0.0, 4.0}), std::pair(-6.0, 6.0));
   EXPECT_EQ(range(-6.0, 6.1, {0.0, 4.0}), std::pair(-1.0, 5.0));
   EXPECT_EQ(range(0.0, 100.0, {0.0, 4.0}), std::pair(0.0, 5.0));
-  EXPECT_EQ(range(-100.0, 100.0, {4.0, 4.0}), std::pair(-100.0, 100.0));  // a constant
-  EXPECT_EQ(range(-100.0, 3.0, {0.0, 4.0}), std::pair(-100.0, 3.0));      // beyond
+  EXPECT_EQ(range(-100.0, 100.0, {4.0, 4.0}), std::pair(-100.0, 100.0));      // a constant
+  EXPECT_EQ(range(-1.0, 1.0, {0.5, 0.5F + 0x1p-24F}), std::pair(-1.0, 1.0));  // but for rounding
+  EXPECT_EQ(range(-100.0, 3.0, {0.0, 4.0}), std::pair(-100.0, 3.0));          // beyond
   EXPECT_EQ(range(-100.0, 100.0, {0.0, 4.0}, 4), std::pair(-1.0, 5.0));
   EXPECT_EQ(range(-100.0, 100.0, {0.0, 4.0}, 5), std::pair(-100.0, 100.0));
 }

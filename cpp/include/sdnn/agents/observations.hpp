@@ -257,6 +257,7 @@ class Observations {
 
   static constexpr double kHeadroom = 0.25;
   static constexpr double kMuchWider = 2.0;
+  static constexpr double kRounding = 1e-6;  // relative, of single precision and some more
   static constexpr std::size_t kFewInputs = 4;
   static constexpr std::size_t kRare = 20;
   static constexpr double kNearCircle = 1e-3;  // single precision and some rounding
@@ -328,7 +329,8 @@ class Observations {
 
   static void narrow(Ranges& ranges, std::size_t i, const std::vector<double>& seen) {
     const auto [least, most] = std::ranges::minmax(seen);
-    if (!(most > least)) return;
+    const double rounding = kRounding * std::max(std::abs(least), std::abs(most));
+    if (!(most - least > rounding)) return;
     const auto [low, high] = widened(least, most);
     const bool is_much_wider = ranges.high[i] - ranges.low[i] > kMuchWider * (high - low);
     const bool is_within = least >= ranges.low[i] && most <= ranges.high[i];
