@@ -84,16 +84,14 @@ struct NamedLinearPreset {
   LinearPreset preset;
 };
 
-/// The paper's rule, one-step Q-learning, in the paper's task: 61 torques whose neighbours share
-/// nine of ten units, patterns of 100 units, and half the paper's step, with which noisy sensors do
-/// no lasting harm.
+/// The paper's rule and rates, one-step Q-learning with alpha 0.5, in the paper's task: 61 torques
+/// that share no units, and patterns of 200 units.
 inline LinearPreset paper_linear_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs,
-                           .n_pattern_units = 100,
+                           .n_pattern_units = 200,
                            .n_actions = 61,
-                           .action_window = 10,
                            .averaging_interval = 0},
-          .learning = {.learning_rate = 0.25,
+          .learning = {.learning_rate = 0.5,
                        .discount = 0.9,
                        .policy = {},
                        .trace_decay = 0.0,
