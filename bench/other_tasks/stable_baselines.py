@@ -45,7 +45,7 @@ class StableBaselines:
     normalize: Callable[[Any], Any] = staticmethod(lambda observation: observation)
 
     def __init__(self, *_spaces, approximator, learning, seed, algorithm) -> None:
-        self.algorithm, self.seed = algorithm, seed
+        self.algorithm, self.seed = algorithm, seed % 2**32  # all that Stable-Baselines3 takes
         self.settings = dict(SETTINGS[algorithm][learning.task])
 
     def begin_episode(self) -> None:
