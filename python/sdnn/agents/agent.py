@@ -38,9 +38,9 @@ class Agent(BaseAgent[Approximator, Learning]):
         The root of every random stream of the agent. None: drawn, and kept as ``agent.seed``.
     observation_range : (low, high) or "adaptive", optional
         Two numbers, or two for each observed variable; values outside are clipped. By default the
-        bounds of the space, and what the warm-up sees where these are infinite or, if there is a
-        warm-up and at most four inputs, more than twice as wide. ``"adaptive"``: what the warm-up
-        sees of all variables but angles, without a twentieth at each end.
+        bounds of the space, and what the warm-up sees where these are infinite or, in `SDNNSarsa`
+        with at most four inputs, more than twice as wide. ``"adaptive"``: what the warm-up sees of
+        all variables but angles, without a twentieth at each end.
     angles : sequence of int
         Variables that are angles: their ranges wrap around.
     angle_pairs : "none", "find" or sequence of (int, int)

@@ -69,6 +69,8 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
     """The word for this approximator and learning rule in files."""
     approximator_type: ClassVar[type[Any]]
     learning_type: ClassVar[type[Any]]
+    narrows_ranges: ClassVar[bool] = False
+    """Whether bounds of a space that are far wider than what a warm-up sees are not its ranges."""
     wrappers: Sequence[Statistics] = ()
     """Statistics of the wrappers of its training's environment; kept in files."""
     learning: Learning
@@ -105,7 +107,7 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
             warm_up_steps,
         )
         self._observation = self._observations.config(
-            observation_range, angles, angle_pairs, inputs
+            observation_range, angles, angle_pairs, inputs, narrows=self.narrows_ranges
         )
         self._action = self._actions.config
         self._make(tables=list(self._tables))

@@ -51,6 +51,7 @@ class SDNNSarsa(CodedAgent[LinearSDNNConfig, SarsaConfig]):
     """
 
     kind = "sdnn-linear"
+    narrows_ranges = True
     approximator_type = LinearSDNNConfig
     learning_type = SarsaConfig
     presets = LINEAR_PRESETS

@@ -48,7 +48,13 @@ class Observations:
             raise ValueError(f"observation_space must have a variable, got {space}")
 
     def config(
-        self, ranges: Ranges | None, angles: Sequence[int], angle_pairs: AnglePairs, inputs: Inputs
+        self,
+        ranges: Ranges | None,
+        angles: Sequence[int],
+        angle_pairs: AnglePairs,
+        inputs: Inputs,
+        *,
+        narrows: bool = False,
     ) -> _core.ObservationConfig:
         """Return the core's settings for these arguments of `sdnn.agents.Agent`."""
         is_adaptive = isinstance(ranges, str) and ranges == "adaptive"
@@ -64,7 +70,7 @@ class Observations:
             low=[None if np.isnan(x) else x for x in low.tolist()],
             high=[None if np.isnan(x) else x for x in high.tolist()],
             adaptive=is_adaptive,
-            narrowed=ranges is None,
+            narrowed=narrows and ranges is None,
             angles=angles,
             angle_pairs=pairs,
             find_angle_pairs=isinstance(angle_pairs, str) and angle_pairs == "find",
