@@ -70,7 +70,7 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
     approximator_type: ClassVar[type[Any]]
     learning_type: ClassVar[type[Any]]
     narrows_ranges: ClassVar[bool] = False
-    """Whether bounds of a space that are far wider than what a warm-up sees are not its ranges."""
+    """Whether a warm-up narrows bounds of the space that are far wider than what it sees."""
     wrappers: Sequence[Statistics] = ()
     """Statistics of the wrappers of its training's environment; kept in files."""
     learning: Learning
