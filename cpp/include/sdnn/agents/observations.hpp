@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -108,6 +109,10 @@ class Observations {
   std::span<const double> high() const noexcept { return ranges_.high; }
   std::span<const ObservedInput> inputs() const noexcept { return inputs_; }
   std::size_t n_inputs() const noexcept { return inputs_.size(); }
+  /// Whether inputs are to be chosen by relevance. Of two both are kept, and of one a copy is made.
+  bool has_choice() const {
+    return config_.relevant_only && inputs_with(pairs_).size() > kAlwaysKept;
+  }
   /// Which inputs are angles.
   std::vector<bool> circular() const {
     std::vector<bool> circular;
@@ -184,6 +189,7 @@ class Observations {
   /// for each input that there is. Requires that it is fitted, and that one is kept.
   void keep(const std::vector<bool>& kept) {
     const std::vector<bool> present = kept_inputs();
+    assert(kept.size() == present.size());
     const bool is_first = kept_.empty();
     for (std::size_t i = 0; i < kept.size(); ++i) {
       if (kept[i] && (is_first || !present[i])) kept_.push_back(static_cast<std::int32_t>(i));
@@ -237,7 +243,7 @@ class Observations {
       archive.taking("low", [&] { self.take(ranges, pairs); });
       archive.expect(n_first <= kept.size() && (n_first > 0 || kept.empty()), "n_first",
                      "as many as are kept, or fewer");
-      std::vector<bool> is_kept(self.n_inputs());
+      std::vector<bool> is_kept(self.kept_inputs().size());
       for (std::size_t k = 0; k < kept.size(); ++k) {
         const auto i = static_cast<std::size_t>(kept[k]);
         archive.expect(i < is_kept.size() && !is_kept[i], "kept", "different inputs");
@@ -259,6 +265,7 @@ class Observations {
   static constexpr double kMuchWider = 2.0;
   static constexpr double kRounding = 1e-6;  // relative, of single precision and some more
   static constexpr std::size_t kFewInputs = 4;
+  static constexpr std::size_t kAlwaysKept = 2;
   static constexpr std::size_t kRare = 20;
   static constexpr double kNearCircle = 1e-3;  // single precision and some rounding
   // Around the circle: with noise of a tenth of the range the correlation of squares is -0.65, and
@@ -371,9 +378,8 @@ class Observations {
     return config_.find_angle_pairs &&
            std::ranges::adjacent_find(roles_, are_numbers) != roles_.end();
   }
-  /// Of two inputs both are kept; see Relevance.
   bool may_leave_out_inputs() const {
-    return config_.relevant_only && inputs_with(config_.angle_pairs).size() > 2;
+    return config_.relevant_only && inputs_with(config_.angle_pairs).size() > kAlwaysKept;
   }
 
   Pairs pairs_in(std::span<const double> seen) const {
