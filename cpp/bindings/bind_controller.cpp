@@ -299,6 +299,23 @@ void bind_controller(py::module_& module) {
             return use;
           },
           "Of each variable: the share of its range that it used, and how often it was beyond")
+      .def_property_readonly(
+          "refused_reward", [](const Controller& self) { return self.reward_scale().refused(); },
+          "The first reward that was too large to be learned, and its number from 1; or None")
+      .def_property_readonly(
+          "reward_size", [](const Controller& self) { return self.reward_scale().present_size(); },
+          "The largest recent reward is 2 to this power, or up to twice that; or None")
+      .def_property(
+          "reward_scale",
+          [](const Controller& self) {
+            return bindings::arrays_of(core::state_of(self.reward_scale()));
+          },
+          [](Controller& self, const py::dict& state) {
+            agents::RewardScale scale;
+            core::restore(scale, bindings::state_from(state));
+            self.set_reward_scale(scale);
+          },
+          "How large rewards are: arrays by name")
       .def(
           "state", [](const Controller& self) { return bindings::arrays_of(core::state_of(self)); },
           "What it remembers: arrays by name");

@@ -2187,6 +2187,24 @@ class Controller:
         """
         Lowest and highest values, (n_variables,) each
         """
+    @property
+    def refused_reward(self) -> tuple[float, int] | None:
+        """
+        The first reward that was too large to be learned, and its number from 1; or None
+        """
+    @property
+    def reward_scale(self) -> dict:
+        """
+        How large rewards are: arrays by name
+        """
+    @reward_scale.setter
+    def reward_scale(self, arg1: dict) -> None:
+        ...
+    @property
+    def reward_size(self) -> int | None:
+        """
+        The largest recent reward is 2 to this power, or up to twice that; or None
+        """
 class ProtocolConfig:
     """
     Learning protocol of a trial; the defaults are the paper's (section 4.2).

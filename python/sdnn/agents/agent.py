@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +59,8 @@ class Agent(BaseAgent[Approximator, Learning]):
     TypeError, ValueError
         For spaces of another kind; for spaces, ranges or settings that are impossible.
     """
+
+    _has_warned = False
 
     def _check_environment(self, environment: int) -> None:
         if type(environment) is not int or environment:  # most agents have no other than 0
@@ -151,6 +154,20 @@ class Agent(BaseAgent[Approximator, Learning]):
             flag("terminated", terminated),
             environment,
             self._actions.mask("next_mask", next_mask),
+        )
+        self.warn_of_refused_reward()
+
+    def warn_of_refused_reward(self) -> None:
+        """Warn once if a reward was too large to be learned, as the glitch of a sensor is."""
+        refused = self._controller.refused_reward
+        if refused is None or self._has_warned:
+            return
+        self._has_warned = True
+        reward, number = refused
+        warnings.warn(
+            f"reward {reward:g} of transition {number} is more than 65,536 times as large as all"
+            " recent ones: it was not learned. If such rewards are true and recur, they will be",
+            stacklevel=2,
         )
 
     def core_parts(self) -> tuple[Any, ...] | None:

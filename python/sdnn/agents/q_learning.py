@@ -76,6 +76,22 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         return self._require_warm().agent
 
     @property
+    def reward_scale(self) -> dict[str, Any]:
+        """How large rewards are, numbers by name; see cpp/include/sdnn/agents/reward_scale.hpp."""
+        return dict(self._require_warm().reward_scale)
+
+    def restore(self, state: dict[str, Any], reward_scale: dict[str, Any]) -> None:
+        """Restore the state of `core`, and how large rewards are; ValueError if they do not fit."""
+        controller = self._require_warm()
+        before = controller.reward_scale
+        controller.reward_scale = reward_scale
+        try:
+            self.core.restore(state)
+        except ValueError:
+            controller.reward_scale = before
+            raise
+
+    @property
     def n_dimensions(self) -> int:
         """Dimensions of an action."""
         return len(self._action.low)

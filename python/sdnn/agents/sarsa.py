@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from sdnn import _core
 from sdnn.agents.q_learning import CodedAgent, presets_of
 from sdnn.config import LinearSDNNConfig, SarsaConfig
@@ -55,3 +57,25 @@ class SDNNSarsa(CodedAgent[LinearSDNNConfig, SarsaConfig]):
     approximator_type = LinearSDNNConfig
     learning_type = SarsaConfig
     presets = LINEAR_PRESETS
+
+    def learning_report(self) -> dict[str, Any]:
+        """Return statistics of learning so far, to find settings that cannot work.
+
+        Returns
+        -------
+        dict
+            Those of all agents that learn values of actions (`ValueAgent.learning_report`), and
+            ``value_unit``: the step in which values are counted; ``recent_reward``: the size of the
+            largest recent reward, to a factor of 2 (with fewer than some thousand units in it,
+            small rewards are rounded); both None before a reward that is not 0.
+
+        Raises
+        ------
+        RuntimeError
+            While the agent is warming up.
+        """
+        exponent, size = self.core.action_value.exponent, self._controller.reward_size
+        return super().learning_report() | {
+            "value_unit": None if exponent is None else 2.0**exponent,
+            "recent_reward": None if size is None else 2.0**size,
+        }

@@ -260,6 +260,7 @@ class Training:
         with Interrupts(self.stop) as interrupts, ExitStack() as stack:
             stack.callback(setattr, self, "_stops", False)
             stack.callback(self._keep_statistics)
+            stack.callback(self._warn_of_refused_reward)
             for callback in self.callbacks:
                 callback.on_start(self)
                 stack.callback(callback.on_end, self)
@@ -354,6 +355,10 @@ class Training:
             training._episodes.repeat(saved.present)
         return training
 
+    def _warn_of_refused_reward(self) -> None:
+        if hasattr(self.agent, "warn_of_refused_reward"):
+            self.agent.warn_of_refused_reward()
+
     def _keep_statistics(self) -> None:
         """Let the agent keep what the wrappers of its environment have learned."""
         if hasattr(self.agent, "wrappers"):
@@ -416,6 +421,7 @@ class Training:
             rows.append(self._episode_row(i, terminated))
             self.n_episodes += 1
             self._episodes.present[i] = None
+            self._warn_of_refused_reward()
             if self.evaluate_every_episodes is not None and self._lacks_evaluation:
                 self._episodes.rounds.begin_episode(i)  # which learns what still waits
         if (learner := self._episodes.rounds.progressing) is not None:

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from sdnn.agents import SDNNSarsa
 from sdnn.export.code import Code
 from sdnn.export.tables import Tables
-from sdnn.export.writer import CHeader, Learner, Writer, require_few_weights
+from sdnn.export.writer import NONE, SCALE_FIELDS, CHeader, Learner, Writer, require_few_weights
 
-_NO_EXPONENT = -(2**31)
 _WEIGHTS = {"weights": "action_value.weights", "averaged": "action_value.averaged_weights"}
 """Names in the header and in the core's state."""
 _ONE = 1 << 16  # of rates
@@ -118,6 +117,7 @@ class LearnerWriter(Learner, LinearWriter):
             ("n_ended", "<u4"),
             ("n_learned", "<u8"),
             ("action_value.n_steps", "<u8"),
+            *SCALE_FIELDS,
             ("words", "<u8", (4, 4)),
             *((name, "<i4", (sizes["n_rows"], sizes["n_columns"])) for name in kept),
         ]
@@ -131,7 +131,7 @@ class LearnerWriter(Learner, LinearWriter):
         """Return the fields that are not the same in the core's state."""
         columns = self.columns()
         rows = {name: state[name][:, columns] for name in _WEIGHTS.values() if name in state}
-        return {"action_value.exponent": _NO_EXPONENT, **state, **rows}
+        return {"action_value.exponent": NONE, **state, **rows}
 
     def recall(self, image: Any, state: dict[str, Any]) -> None:
         """Put the fields of an image into the core's state; the episode before is over."""
@@ -141,7 +141,7 @@ class LearnerWriter(Learner, LinearWriter):
         for name in ("action_value.n_steps", "action_value.n_snapshots", "n_learned"):
             if name in state:
                 state[name] = np.array(image[name], np.int64)
-        for name, nothing in (("action_value.exponent", _NO_EXPONENT), ("n_ended", 0)):
+        for name, nothing in (("action_value.exponent", NONE), ("n_ended", 0)):
             state.pop(name, None)
             if image[name] != nothing:
                 state[name] = np.array(image[name], np.int32)
@@ -153,7 +153,7 @@ class LearnerWriter(Learner, LinearWriter):
     def header(self) -> CHeader:
         """Make the header."""
         learning, sizes, tables = self.agent.learning, self.sizes(), self.tables_of_spaces()
-        state, known = self.core.state(), list[str]()
+        state, known = self.state(), list[str]()
         self.add_code(tables, sizes)
         about = "What the agent begins with: states of its random generators."
         tables.add("uint64_t", "seeds", self.seeds(state), about)
@@ -176,6 +176,7 @@ class LearnerWriter(Learner, LinearWriter):
             "epsilon": self._rate("epsilon"),
             "decay": round(learning.discount * learning.trace_decay * 8192),
             "discount": round(learning.discount * 32768),
+            "horizon_bits": 16 - max(32768 - round(learning.discount * 32768), 1).bit_length(),
             "tolerance": f", {self.name}_tolerance(agent)" if number else "",
             "tolerance_number": number,
             "tolerance_exponent": exponent,
@@ -200,7 +201,7 @@ class LearnerWriter(Learner, LinearWriter):
     def ram_bytes(self, sizes: dict[str, Any]) -> int:
         """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
         code = 8 + 4 * self.n_inputs + sizes["bytes_of_column"] * sizes["most_columns"]
-        n_bytes: int = 8 * 3 + 32 * 4 + 4 * (2 + self.averages) * sizes["n_weights"] + 4 * 10
+        n_bytes: int = 8 * 3 + 16 + 32 * 4 + 4 * (2 + self.averages) * sizes["n_weights"] + 4 * 10
         n_bytes += 4 * (2 * self.n_dimensions + self.n_inputs) + 2 * (-(-code // 4) * 4)
         n_bytes += 3 + int(sizes["n_rows"])
         return -(-n_bytes // 8) * 8

@@ -13,7 +13,7 @@ from sdnn.arguments import argument_error, whole
 from sdnn.export.code import Code
 from sdnn.export.sdnn_c import SDNNCWriter
 from sdnn.export.tables import Tables, weight_words
-from sdnn.export.writer import MOST_FRACTION_BITS, CHeader, Learner
+from sdnn.export.writer import MOST_FRACTION_BITS, SCALE_FIELDS, CHeader, Learner
 
 _WEIGHTS_STREAM = 3  # see cpp/include/sdnn/core/random.hpp
 _MOST_RETURNS = 256
@@ -113,6 +113,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
             ("fraction_bits", "<u4"),
             ("n_random_left", "<u4"),
             ("words", "<u8", (5, 4)),
+            *SCALE_FIELDS,
             ("progress", "<f8"),
             ("action_value.output_range", "<f8", (2,)),
             *of_range,
@@ -200,7 +201,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
 
     def header(self) -> CHeader:
         """Make the header."""
-        code, state = self.code, self.core.state()
+        code, state = self.code, self.state()
         sizes, network = self.agent.approximator, self.network()
         tables, is_new = self.tables_of_spaces(), self._is_new()
         code.add_tables(tables)
@@ -277,7 +278,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
         n_steps = self.agent.learning.n_steps
         columns = -(-shape["bytes_of_column"] * shape["most_columns"] // 4) * 4
         one_state = 8 + 4 * self.n_inputs + columns + 4 + 4 * self.n_units
-        n_bytes = 5 * 32 + 5 * 8 + (n_steps + 1) * one_state + 12 * n_steps
+        n_bytes = 5 * 32 + 16 + 5 * 8 + (n_steps + 1) * one_state + 12 * n_steps
         n_bytes += 4 * self.n_words + 4 * self.n_units
         n_bytes += 4 * (10 + self.n_inputs + self.n_observed)
         if self.adapts:

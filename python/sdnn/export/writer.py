@@ -22,6 +22,14 @@ from sdnn.export.tables import Input, Tables, by_dimension, conversions, joined,
 
 _DEFAULT_FRACTION_BITS = 16
 MOST_FRACTION_BITS = 30
+NONE = -(2**31)
+"""A number in an image that stands for none."""
+SCALE = "reward_scale"
+SCALE_FIELDS = [
+    (f"{SCALE}.n_rewards", "<u8"),
+    (f"{SCALE}.size", "<i4"),
+    (f"{SCALE}.size_in_window", "<i4"),
+]
 MOST_WEIGHTS = 2**26  # some hundred megabytes of text
 
 
@@ -214,9 +222,14 @@ class Learner(Writer):
         head = [("magic", "<u4"), ("fingerprint", "<u4")]
         return np.dtype([*head, *self.fields()])
 
+    def state(self) -> dict[str, Any]:
+        """Return the core's state, and the scale of rewards, with all of its numbers."""
+        scale = {"size": NONE, "size_in_window": NONE, **self.agent.reward_scale}
+        return {**self.core.state(), **{f"{SCALE}.{name}": n for name, n in scale.items()}}
+
     def image(self) -> bytes:
         """Return the state as the header's bytes."""
-        state, image = self.core.state(), np.zeros((), self.layout())
+        state, image = self.state(), np.zeros((), self.layout())
         known = {"magic": self.magic, "fingerprint": self.fingerprint(), **state}
         known |= {"words": self.seeds(state), **self.remembered(state)}
         for name in image.dtype.names or ():
@@ -233,7 +246,10 @@ class Learner(Writer):
         if n_left := image["n_random_left"]:
             state["n_random_left"] = np.array(n_left, np.int32)
         self.recall(image, state)
-        self.core.restore(state)
+        names = [name for name in image.dtype.names or () if name.startswith(SCALE)]
+        kept = {name: np.array(image[name]) for name in names if image[name] != NONE}
+        scale = {name.removeprefix(f"{SCALE}."): number for name, number in kept.items()}
+        self.agent.restore(state, scale)
 
     def seeds(self, state: dict[str, Any]) -> NDArray[np.uint64]:
         """Return the states of the random generators, shape (n_streams, 4)."""
@@ -243,11 +259,18 @@ class Learner(Writer):
         """Return what the templates of all agents that learn need."""
         return {
             "state": state,
+            "size": c_number(state[f"{SCALE}.size"]),
+            "size_in_window": c_number(state[f"{SCALE}.size_in_window"]),
             "ties": "draw" if self.agent.learning.tie_rule == "uniform" else self.ties(),
             "image_bytes": self.layout().itemsize + 4,
             "image_magic": f"0x{self.magic:08x}",
             "fingerprint": f"0x{self.fingerprint():08x}",
         }
+
+
+def c_number(number: Any) -> str:
+    """Write a number of 32 bits in C."""
+    return "INT32_MIN" if number == NONE else str(int(number))
 
 
 def require_few_weights(n_weights: int, settings: str) -> None:

@@ -298,3 +298,18 @@ def test_a_network_keeps_the_inputs_of_its_warm_up():
             inputs = agent.inputs
     assert agent.inputs == inputs
     assert 4 in agent.learning_report()["left_out"]
+
+
+def test_a_glitch_of_the_reward_is_not_learned_and_the_unit_is_reported():
+    agent, same = (SDNNSarsa(gym.spaces.Discrete(2), gym.spaces.Discrete(2)) for _ in range(2))
+    assert agent.learning_report()["value_unit"] is None
+    for step in range(3000):
+        if step == 1000:
+            with pytest.warns(UserWarning, match=r"reward -1e\+12 of transition 1001"):
+                agent.learn(Transition(0, 0, -1e12, 0, terminated=True))
+        for one in (agent, same):
+            one.learn(Transition(0, 1, 3.0, 0, terminated=True))
+    assert agent.q_values(0).tolist() == same.q_values(0).tolist()
+    report = agent.learning_report()
+    assert report["recent_reward"] == 2.0
+    assert report["value_unit"] == same.learning_report()["value_unit"] < 1e-5

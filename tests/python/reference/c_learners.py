@@ -182,6 +182,8 @@ def lines_of(agent, n_steps, seed, fraction_bits):
         reward = random.choice([0.0, 1.0, -1.0, random.normal(), 100.0 * random.normal()])
         if random.random() < 0.002:
             reward *= 300.0
+        if len(lines) < n_steps // 4:  # then glitches are 2^27 times as large
+            reward = np.sign(reward) * (2.0**15 if random.random() < 0.02 else 2.0**-12)
         ends = random.random()
         lines.append([1, *now, reward, *following, ends < 0.03])
         now = None if ends < 0.06 else following
@@ -194,6 +196,7 @@ def live(agent, lines, fraction_bits):
     """The indices of the actions that the library's agent takes for the lines."""
     n, scale = (lines.shape[1] - 3) // 2, 2.0**fraction_bits
     actions = []
+    agent._has_warned = True  # of rewards that are too large
     for line in lines.tolist():
         now, following = np.array(line[1 : n + 1]) / scale, np.array(line[n + 2 : -1]) / scale
         if isinstance(agent.observation_space, gym.spaces.Discrete):

@@ -26,6 +26,7 @@
 #include "sdnn/agents/observations.hpp"
 #include "sdnn/agents/range_use.hpp"
 #include "sdnn/agents/relevance.hpp"
+#include "sdnn/agents/reward_scale.hpp"
 #include "sdnn/agents/schedule_config.hpp"
 #include "sdnn/agents/warm_up.hpp"
 #include "sdnn/approximators/linear_sdnn_config.hpp"
@@ -215,20 +216,24 @@ class Controller : public WithRates<Controller> {
     return workspace.action;
   }
 
-  /// Learns a transition. The action is any of the task's, of a box the nearest one that can be
-  /// taken; of fuzzy Q-learning, that of the last act with `explore` in the environment. Of a state
-  /// that is not terminal, `next_mask` may allow some actions only. Shapes as in act. Throws
-  /// std::invalid_argument for others and for numbers that have no state, and then nothing has
-  /// changed; as the agent does.
+  /// How large rewards are, and which one was too large to be learned.
+  const RewardScale& reward_scale() const noexcept { return reward_scale_; }
+  void set_reward_scale(const RewardScale& scale) { reward_scale_ = scale; }
+
+  /// Learns a transition, unless its reward is far beyond the recent ones; see RewardScale. The
+  /// action is any of the task's, of a box the nearest one that can be taken; of fuzzy Q-learning,
+  /// that of the last act with `explore` in the environment. Of a state that is not terminal,
+  /// `next_mask` may allow some actions only. Shapes as in act. Throws std::invalid_argument for
+  /// others and for numbers that have no state, and then nothing has changed; as the agent does.
   void learn(std::span<const double> observation, std::span<const double> action, double reward,
              std::span<const double> next_observation, bool terminated, std::size_t environment = 0,
              ActionMask next_mask = {}) {
     if (terminated) next_mask = {};
     actions_.require_mask("next_mask", next_mask);
+    core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
     if (warm_up_) {
       observations_.require_numbers("observation", observation);
       actions_.require_action(action);
-      core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
       observations_.require_numbers("next_observation", next_observation);
       warm_up_->learn({false, environment, observation, action, reward, next_observation,
                        terminated, next_mask});
@@ -238,8 +243,7 @@ class Controller : public WithRates<Controller> {
     observations_.scale(observation, state_);
     find_indices(action, environment);
     observations_.scale(next_observation, next_state_, "next_observation");
-    agents::learn(*agent_, state_, indices_, reward, next_state_, terminated, environment,
-                  next_mask);
+    learn_scaled(reward, terminated, environment, next_mask);
     notes_.note(observation);
     const WarmUp::Step step{false,  environment,      observation, action,
                             reward, next_observation, terminated};
@@ -273,6 +277,7 @@ class Controller : public WithRates<Controller> {
       }
       if (self.latest_) archive.part("latest", *self.latest_);
       std::visit([&archive](auto& agent) { archive.part("agent", agent); }, *self.agent_);
+      archive.part("reward_scale", self.reward_scale_);
     }
     archive.part("taken", self.taken_);
     if constexpr (Archive::kReads) self.end_reading(archive);
@@ -371,7 +376,7 @@ class Controller : public WithRates<Controller> {
   void end_warm_up() {
     Observations fitted = observations_;
     fitted.fit(warm_up_->seen());
-    if (config_.observation.relevant_only) {
+    if (fitted.has_choice()) {
       fitted.keep(Relevance(detail::experience_of(fitted, *warm_up_, n_dimensions()))
                       .inputs(fitted.required()));
     }
@@ -429,8 +434,23 @@ class Controller : public WithRates<Controller> {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
       indices_[d] = actions_.index_of(step.action[d], d);
     }
-    agents::learn(*agent_, state_, indices_, step.reward, next_state_, step.terminated,
-                  step.environment, step.next_mask);
+    learn_scaled(step.reward, step.terminated, step.environment, step.next_mask);
+  }
+
+  /// Learns the transition in state_, indices_ and next_state_.
+  void learn_scaled(double reward, bool terminated, std::size_t environment, ActionMask next_mask) {
+    RewardScale scale = reward_scale_;  // unchanged if the agent throws
+    if (!scale.accepts(reward)) {
+      reward_scale_ = scale;
+      return;
+    }
+    agents::learn(*agent_, state_, indices_, reward, next_state_, terminated, environment,
+                  next_mask);
+    const auto size_in_window = scale.end_window();
+    reward_scale_ = scale;
+    if (auto* const linear = std::get_if<Sarsa>(&*agent_); linear != nullptr && size_in_window) {
+      linear->refine_unit(*size_in_window, *scale.size());
+    }
   }
 
   template <class Archive>
@@ -477,6 +497,7 @@ class Controller : public WithRates<Controller> {
   std::vector<double> state_, next_state_, action_;
   std::vector<std::size_t> indices_;
   detail::TakenActions taken_;
+  RewardScale reward_scale_;
   core::Identity identity_;
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -208,6 +209,27 @@ class Sarsa : public WithRates<Sarsa> {
     }
   }
 
+  /// Makes the unit of values smaller where it is larger than it has to be: while no weight needs
+  /// its 8 upper bits; and where recent rewards have so few bits that values 1,024 times those they
+  /// could sum up to would fit. Then weights of larger values are clipped. Sizes of rewards are
+  /// those of RewardScale, the last window's and the recent one.
+  void refine_unit(std::int32_t size_in_window, std::int32_t size) {
+    if (!action_value_.exponent()) return;
+    const std::int32_t exponent = *action_value_.exponent();
+    const std::int64_t n_weights = action_value_.n_weights_of(episodes_.of(0).present.code());
+    const std::int64_t rest = std::max<std::int64_t>(kDiscountOne - discount(), 1);
+    const int least_bits =
+        Readout::most_bits_of(n_weights) - (kDiscountBits - floor_log2(rest)) - kImplausibleBits;
+    const int n_free =
+        std::min(action_value_.spare_bits(), 30 - (size_in_window - exponent)) - kRoomBits;
+    const int n_lacking = least_bits - (size - exponent);
+    const int n_refined = action_value_.refine_unit(std::max({n_free, n_lacking, 0}));
+    for (std::size_t i = 0; i < episodes_.size(); ++i) {
+      std::int64_t& old_value = episodes_.of(i).old_value;
+      old_value = Readout::refined(old_value, n_refined);
+    }
+  }
+
   /// Takes over what an agent with fewer inputs has learned; see LinearSDNN. In each environment
   /// the transition that waits is learned, and the trace ends.
   void continue_from(Sarsa fewer) {
@@ -249,6 +271,10 @@ class Sarsa : public WithRates<Sarsa> {
   static constexpr double kMostTolerance = 0x1p62;  ///< in units: above any difference of values
   static constexpr std::int64_t kMostLearned = std::int64_t{1} << 45;
   static constexpr std::int32_t kOne = Readout::kRateOne;
+  static constexpr int kDiscountBits = 15;
+  static constexpr std::int64_t kDiscountOne = std::int64_t{1} << kDiscountBits;
+  static constexpr int kRoomBits = 8;  ///< that a smaller unit leaves for larger weights
+  static constexpr int kImplausibleBits = 10;
 
   /// What belongs to the present episode in one environment.
   struct Episode {
@@ -338,6 +364,13 @@ class Sarsa : public WithRates<Sarsa> {
     rate_ = std::max(1, static_cast<std::int32_t>(std::lround(rate * kOne)));
     exploration_.policy().set_epsilon(static_cast<double>(std::lround(epsilon * kOne)) /
                                       static_cast<double>(kOne));
+  }
+
+  static int floor_log2(std::int64_t x) noexcept {
+    return static_cast<int>(std::bit_width(static_cast<std::uint64_t>(x))) - 1;
+  }
+  std::int64_t discount() const noexcept {
+    return std::lround(config_.discount * static_cast<double>(kDiscountOne));
   }
 
   void require_mask(const char* name, ActionMask mask) const {
@@ -462,9 +495,8 @@ class Sarsa : public WithRates<Sarsa> {
   void correct(Episode& episode, std::int64_t next) {
     const std::int64_t value =
         in_range([&] { return action_value_.sum(episode.present, episode.action); }, &next);
-    const auto discount = static_cast<std::int64_t>(std::lround(config_.discount * (1 << 15)));
     const std::int64_t target = action_value_.units_of(episode.reward) +
-                                ((next * discount + (std::int64_t{1} << 14)) >> 15);
+                                ((next * discount() + (kDiscountOne >> 1)) >> kDiscountBits);
     const bool is_dutch = config_.traces == TraceKind::dutch && n_environments() == 1;
     const std::int64_t drift = is_dutch ? value - episode.old_value : 0;
     episode.old_value = next;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -33,7 +34,8 @@ namespace sdnn::approximators {
 /// Everything is an integer. A value counts *units* of 2^exponent; weights have the same unit. The
 /// exponent follows the rewards: the first one that is not 0 has 31 bits, and when a weight would
 /// need more than 23 bits, or a value more than 33, all are halved and the exponent grows by one.
-/// So there is no range of values to be chosen, and sums are exact in any order.
+/// Who learns may make units smaller again (refine_unit). So there is no range of values to be
+/// chosen, and sums are exact in any order.
 ///
 /// The code is the paired one of StateCode, whose inner products are half of those of x_SD: a
 /// quarter of its columns are not neutral.
@@ -274,7 +276,7 @@ class LinearSDNN {
   /// Requires a finite number of at most 1e300 in size.
   int fit_unit(double number) {
     if (number == 0.0) return 0;
-    if (!exponent_) exponent_ = std::ilogb(number) - 30;
+    if (!exponent_) exponent_ = std::max(std::ilogb(number) - 30, kLeastExponent);
     const std::int32_t before = *exponent_;
     while (std::abs(std::ldexp(number, -*exponent_)) >= kLargestReward) double_unit();
     return *exponent_ - before;
@@ -284,7 +286,8 @@ class LinearSDNN {
     return static_cast<std::int64_t>(std::floor(std::ldexp(number, -*exponent_) + 0.5));
   }
   double value_of(std::int64_t units) const noexcept {
-    return std::ldexp(static_cast<double>(units), exponent_.value_or(0));
+    constexpr double kMost = std::numeric_limits<double>::max();
+    return std::clamp(std::ldexp(static_cast<double>(units), exponent_.value_or(0)), -kMost, kMost);
   }
 
   /// Twice as large a unit: weights are halved, halves up. Who keeps values halves them likewise.
@@ -295,6 +298,41 @@ class LinearSDNN {
     for (std::int32_t& weight : averaged_) weight = halved(weight);
     std::ranges::fill(versions_, ++version_);
   }
+  /// The number of bits that no weight needs.
+  int spare_bits() const noexcept {
+    std::uint32_t used = 0;
+    for (const std::int32_t weight : weights_) used |= size_bits(weight);
+    for (const std::int32_t weight : averaged_) used |= size_bits(weight);
+    return kWeightBits - static_cast<int>(std::bit_width(used));
+  }
+  /// Makes the unit 2^n times smaller: weights are multiplied by 2^n, and clipped where they have
+  /// no room. Whoever keeps values multiplies them likewise. Returns n, or less where the unit
+  /// would become too small for a number.
+  int refine_unit(int n) noexcept {
+    assert(exponent_ && n >= 0);
+    n = std::min(n, *exponent_ - kLeastExponent);
+    if (n == 0) return 0;
+    *exponent_ -= n;
+    for (std::int32_t& weight : weights_) weight = multiplied(weight, n);
+    for (std::int32_t& weight : averaged_) weight = multiplied(weight, n);
+    std::ranges::fill(versions_, ++version_);
+    return n;
+  }
+  /// A value in units that became 2^n times smaller, clipped where it has no room.
+  static std::int64_t refined(std::int64_t units, int n) noexcept {
+    return std::clamp(units << std::min(n, kWeightBits), 1 - kLargestValue, kLargestValue - 1);
+  }
+  /// The largest number of bits that a value with so many weights can have.
+  static int most_bits_of(std::int64_t n_weights) noexcept {
+    const auto bits = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(n_weights)));
+    return std::min(kWeightBits + bits - 1, 33);
+  }
+  /// The number of weights that have a part in Q(s, a) of the code's state, 1 at least.
+  std::int64_t n_weights_of(const Code& code) const noexcept {
+    return std::max<std::int64_t>(
+        1, std::int64_t{code.n_active()} * static_cast<std::int64_t>(n_dimensions() * window()));
+  }
+
   /// Whether a value has more bits than it may: then double the unit.
   static bool is_too_large(std::int64_t units) noexcept {
     return units >= kLargestValue || units <= -kLargestValue;
@@ -304,9 +342,7 @@ class LinearSDNN {
   /// error along the trace, less rate / n times the correction along the code, where n is the
   /// number of weights that have a part in Q(s, a). Returns how often the unit was doubled.
   int learn(const Code& code, std::span<const std::size_t> action, Trace& trace, const Step& step) {
-    const std::int64_t n = std::max<std::int64_t>(
-        1, std::int64_t{code.n_active()} * static_cast<std::int64_t>(n_dimensions() * window()));
-    const std::int64_t rate = (std::int64_t{step.rate} << 12) / n;  // 2^28 for 1
+    const std::int64_t rate = (std::int64_t{step.rate} << 12) / n_weights_of(code);  // 2^28 for 1
     RowStep row_step{
         .decay = step.decay, .gain = 0, .replace = 0, .step = 0, .shift = 1, .correction = 0};
     std::int32_t gain = kTraceOne;
@@ -402,10 +438,21 @@ class LinearSDNN {
     std::size_t first_row;
   };
 
-  static constexpr std::int32_t kLargestWeight = 1 << 23;
+  static constexpr int kWeightBits = 23;
+  static constexpr std::int32_t kLargestWeight = 1 << kWeightBits;
+  static constexpr std::int32_t kLeastExponent = -1074;  // that of the least number
   static constexpr std::int64_t kLargestValue = std::int64_t{1} << 33;
   static constexpr double kLargestReward = 4294967296.0;
   static constexpr std::int64_t kLargestError = (std::int64_t{1} << 34) - 1;
+
+  static std::uint32_t size_bits(std::int32_t weight) noexcept {
+    return static_cast<std::uint32_t>(weight ^ (weight >> 31));
+  }
+  static std::int32_t multiplied(std::int32_t weight, int n) noexcept {
+    constexpr std::int64_t kMost = kLargestWeight - 1;
+    return static_cast<std::int32_t>(
+        std::clamp(std::int64_t{weight} << std::min(n, kWeightBits), -kMost, kMost));
+  }
 
   std::size_t window() const noexcept { return static_cast<std::size_t>(config_.action_window); }
 

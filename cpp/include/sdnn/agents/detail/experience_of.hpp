@@ -8,11 +8,12 @@
 
 #include "sdnn/agents/observations.hpp"
 #include "sdnn/agents/relevance.hpp"
+#include "sdnn/agents/reward_scale.hpp"
 #include "sdnn/agents/warm_up.hpp"
 
 namespace sdnn::agents::detail {
 
-/// Transitions, one environment after the other.
+/// Transitions, one environment after the other. A reward that is not learned counts as 0.
 inline RandomExperience experience_of(const Observations& fitted, const WarmUp& transitions,
                                       std::size_t n_dimensions) {
   std::vector<std::size_t> order(transitions.size());
@@ -20,6 +21,7 @@ inline RandomExperience experience_of(const Observations& fitted, const WarmUp& 
   std::ranges::stable_sort(order, {}, [&](auto t) { return transitions.step(t).environment; });
   RandomExperience experience{.n_inputs = fitted.n_inputs(), .circular = fitted.circular()};
   experience.actions.resize(n_dimensions);
+  RewardScale scale;
   std::vector<double> state(fitted.n_inputs());
   for (std::size_t k = 0; k < order.size(); ++k) {
     const WarmUp::Step step = transitions.step(order[k]);
@@ -30,7 +32,7 @@ inline RandomExperience experience_of(const Observations& fitted, const WarmUp& 
     for (std::size_t d = 0; d < n_dimensions; ++d) {
       experience.actions[d].push_back(step.action[d]);
     }
-    experience.rewards.push_back(step.reward);
+    experience.rewards.push_back(scale.accepts(step.reward) ? step.reward : 0.0);
     if (k > 0 && step.begins) experience.ends.back() = true;
     experience.ends.push_back(step.terminated);
   }

@@ -1,0 +1,68 @@
+#include "sdnn/agents/reward_scale.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+
+#include "sdnn/agents/sarsa.hpp"
+#include "sdnn/approximators/linear_sdnn.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+// 2^17 is 17 powers of two above 1; each refusal brings it 4 nearer.
+TEST(RewardScale, RefusesWhatIsFarBeyondUntilItRecurs) {
+  RewardScale scale;
+  EXPECT_TRUE(scale.accepts(0.0));
+  EXPECT_FALSE(scale.size());
+  for (const double reward : {1.0, -1.5, 65536.0}) EXPECT_TRUE(scale.accepts(reward));
+  RewardScale other = scale;
+  EXPECT_EQ(scale.size(), 16);
+  for (int n_refused = 0; n_refused < 2; ++n_refused) EXPECT_FALSE(scale.accepts(-0x1p40));
+  EXPECT_EQ(scale.size(), 24);
+  EXPECT_TRUE(scale.accepts(-0x1p40));
+  EXPECT_EQ(scale.refused()->first, -0x1p40);
+  EXPECT_EQ(scale.refused()->second, 5U);
+  EXPECT_FALSE(other.refused());
+}
+
+// From 40 to 16 above the largest reward of a window, which is 0, less a quarter, and so on.
+TEST(RewardScale, ForgetsASizeThatNoRewardReaches) {
+  RewardScale scale;
+  ASSERT_TRUE(scale.accepts(0x1p40));
+  for (int n = 1; n < 1024; ++n) scale.accepts(0.0);
+  EXPECT_EQ(scale.end_window(), 40);
+  for (const int expected : {12, 9, 6, 4, 3, 2, 1, 0, 0}) {
+    for (int n = 0; n < 1023; ++n) scale.accepts(1.0);
+    EXPECT_FALSE(scale.end_window());
+    scale.accepts(0.0);
+    EXPECT_EQ(scale.end_window(), 0);
+    EXPECT_EQ(scale.size(), expected);
+  }
+  for (int n = 0; n < 1024; ++n) scale.accepts(0.0);
+  EXPECT_FALSE(scale.end_window());
+}
+
+// The first reward of 2^60 has 31 bits, so that 1 is none; the smaller unit clips its value.
+TEST(Sarsa, RefinesItsUnitForSmallerRewards) {
+  Sarsa agent({{.n_inputs = 2, .n_pattern_units = 40}, std::vector<std::size_t>{3}, 1}, {}, 1);
+  const std::vector<double> state{0.3, 0.6};
+  const auto value = [&](std::size_t action) {
+    auto workspace = agent.workspace();
+    return agent.values(state, workspace)[action];
+  };
+  agent.learn(state, {0}, 0x1p60, state, true);
+  EXPECT_GT(value(0), 0x1p50);
+  agent.learn(state, {1}, 1.0, state, true);
+  EXPECT_EQ(value(1), 0.0);
+  agent.refine_unit(0, 0);
+  EXPECT_LT(value(0), 0x1p20);
+  agent.learn(state, {1}, 1.0, state, true);
+  EXPECT_GT(value(1), 0.1);
+  const auto exponent = agent.action_value().exponent();
+  agent.refine_unit(0, 0);
+  EXPECT_EQ(agent.action_value().exponent(), exponent);
+}
+
+}  // namespace
+}  // namespace sdnn::agents
