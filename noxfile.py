@@ -123,6 +123,36 @@ def robustness(session):
 
 
 @quick()
+def soak(session):
+    """Let agents learn in random spaces under AddressSanitizer and UBSan; ``-- --lives 2000``."""
+    run_soak(session, *session.posargs)
+
+
+@weekly(name="soak-weekly")
+def soak_weekly(session):
+    """Do the same for long."""
+    run_soak(session, "--lives", "2000")
+
+
+def run_soak(session, *arguments):
+    """Build the package with sanitizers in a folder, and run random lives with it."""
+    folder, flags = ROOT / "build" / "asan", "-O1 -g1 -fsanitize=address,undefined"
+    install = ["pip", "install", "-q", "--no-deps", "--no-build-isolation", "--upgrade"]
+    defines = [f"-Ccmake.define.CMAKE_CXX_FLAGS={flags} -fno-sanitize-recover=all"]
+    if shutil.which("ccache"):
+        defines.append("-Ccmake.define.CMAKE_CXX_COMPILER_LAUNCHER=ccache")
+    python(session, "-m", *install, f"--target={folder}", "-Ccmake.build-type=None", *defines, ".")
+    libraries = [
+        session.run("g++", f"-print-file-name=lib{name}.so", silent=True, external=True).strip()
+        for name in ("asan", "ubsan")
+    ]
+    options = "detect_leaks=0:allocator_may_return_null=1"
+    environment = {"LD_PRELOAD": " ".join(libraries), "ASAN_OPTIONS": options}
+    environment["PYTHONPATH"] = str(folder)
+    python(session, "tests/robustness/soak.py", *arguments, env=environment)
+
+
+@quick()
 def emulation(session):
     """Compile the C headers of agents for Arm too; run them in an emulator."""
     pytest(session, "tests/emulation")

@@ -15,6 +15,7 @@ LEAST = {
     "command_cells": 40,
     "mutation_cells": N_MUTATIONS,
     "damage_cells": 120,
+    "single_input_cells": 32,
 }
 """Cells that a row must have, so that none is empty; others 700."""
 

@@ -9,6 +9,7 @@ import core_cells
 import damaged_files
 import mutated_files
 import public_cells
+import random_lives
 
 AGENTS = [kind.__name__ for kind in bad_inputs.SETTINGS]
 N_MUTATIONS = 300
@@ -22,6 +23,7 @@ MATRICES = {
         *((bad_inputs.method_cells, kind) for kind in bad_inputs.KINDS),
         *((bad_inputs.file_cells, kind) for kind in AGENTS),
         (bad_inputs.loop_cells,),
+        (random_lives.single_input_cells,),
     ],
     "core": [(core_cells.never_made_cells,), (core_cells.argument_cells,)],
     "classes": [

@@ -1,0 +1,216 @@
+"""Lives of agents in random spaces with random settings, for the soak and for single inputs.
+
+A life trains through the warm-up and all choices of inputs, is saved and loaded in between, and
+both agents continue alike.
+"""
+
+import warnings
+
+import gymnasium as gym
+import numpy as np
+
+from sdnn.agents import (
+    FuzzyQLearning,
+    FuzzyQLearningConfig,
+    QLearningConfig,
+    RBFQLearning,
+    SarsaConfig,
+    SDNNQLearning,
+    SDNNSarsa,
+    load_agent,
+)
+from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
+
+AGENTS = (SDNNSarsa, SDNNQLearning, RBFQLearning, FuzzyQLearning)
+INF = np.inf
+SINGLE_INPUTS = {
+    "bounded": gym.spaces.Box(-1.0, 1.0, (1,)),
+    "unbounded": gym.spaces.Box(-INF, INF, (1,)),
+    "half bounded": gym.spaces.Box(0.0, INF, (1,)),
+    "angle": gym.spaces.Box(-1.0, 1.0, (2,)),
+    "symbol": gym.spaces.Discrete(3),
+    "one symbol": gym.spaces.Discrete(1),
+    "binary": gym.spaces.MultiBinary(1),
+    "Dict": gym.spaces.Dict({"x": gym.spaces.Box(-INF, INF, (1,), np.float64)}),
+}
+REWARDS = (0.0, 1.0, -1.0, 1e-3, 1e12, -1e30, 1e300, 5e-324)
+
+
+class Walk(gym.Env):
+    """Random walks in any space; the first action moves the first number."""
+
+    def __init__(self, space, actions, seed, *, has_angle=False, has_glitches=False):
+        self.observation_space, self.action_space = space, actions
+        self.random, self.n, self.has_angle = np.random.default_rng(seed), 0, has_angle
+        self.has_glitches, self.x = has_glitches, 0.0
+
+    def _filled(self, space):
+        if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
+            parts = space.spaces.items() if isinstance(space, gym.spaces.Dict) else enumerate(space)
+            filled = {name: self._filled(part) for name, part in parts}
+            return filled if isinstance(space, gym.spaces.Dict) else tuple(filled.values())
+        if not isinstance(space, gym.spaces.Box):
+            space.seed(int(self.random.integers(2**31)))
+            return space.sample()
+        values = self.random.normal(size=space.shape) * self.random.choice([0.01, 1.0, 100.0])
+        values[:1] = self.x
+        if self.has_angle:
+            values[:2] = np.cos(self.x), np.sin(self.x)
+        values[2:4] = 0.5  # constants
+        return np.clip(values, space.low, space.high).astype(space.dtype)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        if seed is not None:
+            self.random = np.random.default_rng(seed)
+        self.n, self.x = 0, self.random.uniform(-1, 1)
+        return self._filled(self.observation_space), {}
+
+    def step(self, action):
+        self.n += 1
+        self.x += 0.1 * (float(np.ravel(action)[0]) - 0.5)
+        reward = -abs(self.x)
+        if self.has_glitches and self.random.random() < 0.05:
+            reward = self.random.choice(REWARDS)
+        is_over = self.random.random() < 0.05
+        return self._filled(self.observation_space), float(reward), is_over, self.n >= 30, {}
+
+
+def random_space(random):
+    """Return a space of 1 to 40 variables, and whether it begins with an angle."""
+    kind = random.choice(["Box", "Box", "Box", "Discrete", "MultiBinary", "Dict", "Tuple"])
+    n = int(random.choice([1, 2, 3, 4, 6, 10, 40]))
+    low = np.where(random.random(n) < 0.5, -INF, -random.uniform(0.1, 3.0, n))
+    high = np.where(random.random(n) < 0.5, INF, random.uniform(0.1, 3.0, n))
+    has_angle = bool(n > 1 and random.random() < 0.4)
+    if has_angle:
+        low[:2], high[:2] = -1.0, 1.0
+    dtype = random.choice([np.float32, np.float64])
+    box = gym.spaces.Box(low.astype(dtype), high.astype(dtype), dtype=dtype)
+    others = {
+        "Discrete": gym.spaces.Discrete(n, start=int(random.integers(-2, 3))),
+        "MultiBinary": gym.spaces.MultiBinary(n),
+        "Dict": gym.spaces.Dict({"a": gym.spaces.Discrete(3), "b": box}),
+        "Tuple": gym.spaces.Tuple([box, gym.spaces.MultiDiscrete([2, 3])]),
+    }
+    return others.get(kind, box), has_angle and kind == "Box"
+
+
+def random_actions(random, agent_class):
+    box = gym.spaces.Box(-1.0, 1.0, (int(random.integers(1, 3)),))
+    several = gym.spaces.MultiDiscrete([2, 3])
+    spaces = [box] if agent_class is FuzzyQLearning else [box, gym.spaces.Discrete(3), several]
+    return spaces[random.integers(len(spaces))]
+
+
+def random_settings(random, agent_class):
+    """Return small networks and settings that matter for the kinds of inputs."""
+    n = int(random.choice([0, 5, 100]))
+    common = {
+        "observation_range": random.choice([None, "adaptive"]),
+        "warm_up_steps": int(random.choice([2, 50, 120, 200])),
+    }
+    if agent_class is SDNNSarsa:
+        learning = SarsaConfig(
+            discount=float(random.choice([0.0, 0.9, 0.99, 1.0])),
+            bootstrap=str(random.choice(["sarsa", "q_learning"])),
+            traces=str(random.choice(["dutch", "replacing"])),
+            tie_tolerance=float(random.choice([0.0, 0.5])),
+        )
+        config = LinearSDNNConfig(
+            n_pattern_units=int(random.choice([16, 40])), averaging_interval=n,
+            max_pairs=int(random.choice([0, 0, 6])), n_actions=int(random.choice([3, 5])),
+        )  # fmt: skip
+    elif agent_class is SDNNQLearning:
+        learning = QLearningConfig(n_steps=int(random.choice([1, 4])))
+        config = SDNNCConfig(
+            n_pattern_units=16, n_hidden_units=40, n_active_units=10, n_actions=4,
+            averaging_interval=n, max_pairs=int(random.choice([0, 6])),
+        )  # fmt: skip
+    elif agent_class is RBFQLearning:
+        return common | {
+            "approximator": RBFNetworkConfig(n_bases=3, n_actions=3),
+            "learning": QLearningConfig(),
+        }
+    else:
+        return common | {
+            "approximator": FuzzyRulesConfig(n_sets=3, n_actions=3),
+            "learning": FuzzyQLearningConfig(),
+        }
+    return common | {
+        "approximator": config, "learning": learning,
+        "angle_pairs": str(random.choice(["find", "none"])),
+        "inputs": str(random.choice(["relevant", "relevant", "all"])),
+    }  # fmt: skip
+
+
+def live(agent, env, warm_up_steps, n_steps):
+    """Train, save and load in between; return what differs, or ""."""
+    for n in (warm_up_steps // 2 + 1, warm_up_steps, n_steps):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of rewards, ranges and long episodes
+            agent.save("agent.safetensors")
+            same = load_agent("agent.safetensors")
+            for one in (agent, same):
+                one.train(env, steps=n, seed=n)
+    if differing := differences(agent._controller.state(), same._controller.state()):
+        return f"{differing} differ after loading"
+    if agent._controller.is_warming_up:
+        return "the warm-up does not end"
+    values = [v for name, v in agent._controller.state().items() if v.dtype.kind == "f"]
+    return "" if all(np.isfinite(v).all() for v in values) else "values are not finite"
+
+
+def differences(state, other):
+    names = state.keys() | other.keys()
+    return [
+        name
+        for name in sorted(names)
+        if name not in state or name not in other or state[name].tobytes() != other[name].tobytes()
+    ]
+
+
+def single_input_cells():
+    """Every agent learns from a single variable, angle or symbol, of known range or not."""
+    for agent_class in AGENTS:
+        for name, space in SINGLE_INPUTS.items():
+            yield f"{agent_class.__name__} of {name}", _single_cell(agent_class, name, space)
+
+
+def _single_cell(agent_class, name, space):
+    def run():
+        random = np.random.default_rng(0)
+        actions = random_actions(random, agent_class)
+        env = Walk(space, actions, 1, has_angle=name == "angle")
+        settings = random_settings(random, agent_class)
+        agent = agent_class(space, actions, seed=1, **settings)
+        return live(agent, env, settings["warm_up_steps"], 500)
+
+    return run
+
+
+def soak_cells(first, n):
+    """Random lives with the numbers ``first`` to ``first + n - 1``."""
+    for number in range(first, first + n):
+        yield f"life {number}", _soak_cell(number)
+
+
+def _soak_cell(number):
+    def run():
+        random = np.random.default_rng(number)
+        agent_class = AGENTS[random.choice(4, p=[0.6, 0.2, 0.1, 0.1])]
+        space, has_angle = random_space(random)
+        if agent_class in (RBFQLearning, FuzzyQLearning) and gym.spaces.flatdim(space) > 4:
+            agent_class = SDNNSarsa
+        actions = random_actions(random, agent_class)
+        options = {"has_angle": has_angle, "has_glitches": bool(random.random() < 0.3)}
+        n_environments = int(random.choice([1, 1, 1, 3]))
+        envs = [Walk(space, actions, number + i, **options) for i in range(n_environments)]
+        env = envs[0]
+        if n_environments > 1:
+            env = gym.vector.SyncVectorEnv([lambda one=one: one for one in envs])
+        settings = random_settings(random, agent_class)
+        agent = agent_class(space, actions, seed=number, **settings)
+        return live(agent, env, settings["warm_up_steps"], int(random.choice([300, 900])))
+
+    return run
