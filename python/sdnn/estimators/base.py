@@ -448,9 +448,7 @@ class BaseSDNN(Fitted, CodedInputs):
 
     def _bins_of_one(self, x: Any) -> Ints:
         """Return the bins of one sample to predict, without overhead."""
-        network = self._fitted_network
-        network.online(self.memory_limit)
-        code = network.input_code
+        code = self._fitted_network.input_code
         return code.bins_of_row(self._row(x, code.codings, code.is_numeric))
 
     def transform_code(self, X: ArrayLike) -> NDArray[np.int8]:

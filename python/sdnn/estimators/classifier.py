@@ -234,7 +234,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         if self._n_units_each > 1:
             scores = self._scores(bins, n_threads)
         else:
-            networks = (*self._earlier, self.network_)
+            networks = self._networks_for(len(bins))
             each = [network.potentials(bins, n_threads) for network in networks]
             scores = mean_of(each).astype(np.float64)
         if self._scheme == "one_vs_rest":

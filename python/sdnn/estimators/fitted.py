@@ -17,7 +17,7 @@ from sdnn.arguments import seed_of, whole
 from sdnn.coding import Coding, WithMissing, from_dict, to_dict
 from sdnn.coding.symbols import Categorical
 from sdnn.estimators.inputs import Array, Floats, Ints, coding_entries
-from sdnn.estimators.network import FEW_SAMPLES, InputCode, Network, code_bytes
+from sdnn.estimators.network import InputCode, Network, code_bytes
 from sdnn.files import Arrays, Description, read_file, write_file
 
 Self = TypeVar("Self", bound="Fitted")
@@ -54,6 +54,7 @@ class Fitted(Learned, BaseEstimator):
     """Attributes of an estimator that holds a network, and its file."""
 
     coding: Any
+    memory_limit: int
     network_: Network
     _earlier: tuple[Network, ...] = ()
     _n_weighted = 0  # samples that came to partial_fit with weights
@@ -87,10 +88,17 @@ class Fitted(Learned, BaseEstimator):
         """Integer thresholds, shape (n_units,)."""
         return self._fitted_network.thresholds
 
+    def _networks_for(self, n_samples: int) -> tuple[Network, ...]:
+        """Return the averaged networks, ready to predict a number of samples."""
+        networks = (*self._earlier, self.network_)
+        for network in networks:
+            network.expect_few(n_samples, self.memory_limit // len(networks))
+        return networks
+
     def _counts(self, bins: Ints, n_groups: int, n_threads: int) -> Ints:
         """Return the firing counts of averaged networks, (n_networks, n_samples, n_groups)."""
-        networks = (*self._earlier, self.network_)
-        if len(bins) <= FEW_SAMPLES:
+        networks = self._networks_for(len(bins))
+        if all(network.predicts_in_bytes(len(bins)) for network in networks):
             return np.stack([network.counts(bins, n_groups, n_threads) for network in networks])
         layers = [network.layer for network in networks]
         counts: Ints = _core.counts_of_all(layers, bins, n_groups, n_threads)

@@ -17,7 +17,9 @@ from sdnn.coding.symbols import missing_as_nan
 from sdnn.estimators.inputs import PAIR_BUDGET, Array, Floats, Ints, Pairs
 
 COLUMN_BUDGET = 16000  # columns divided among the pairs by default
-FEW_SAMPLES = 32  # up to which weights in bytes are faster
+FEW_SAMPLES = 32  # up to which weights in bytes learn faster
+FEW_TO_PREDICT = 12  # up to which they predict faster
+WORTH_BYTES = 2  # samples predicted, few at a time, after which weights are copied into bytes
 
 
 def units_for_pairs(n_pairs: int) -> int:
@@ -172,6 +174,7 @@ class Network:
         self.input_code = input_code
         self.n_units = n_units
         self._online: _core.OnlineLayer | None = None
+        self._n_predicted = 0  # samples, few at a time
         self._learned: object = None  # marks the last change of the online layer
         self._synchronized: object = None  # the last change that the other layer has
         self._lock = threading.RLock()
@@ -216,6 +219,20 @@ class Network:
                 self._online = self._online or _core.OnlineLayer(self._layer)
         return self._online
 
+    def expect_few(self, n_samples: int, memory_limit: int) -> None:
+        """Copy the weights into bytes once predicting few samples at a time is worth it."""
+        if self._online is None and n_samples <= FEW_TO_PREDICT:
+            if self._n_predicted >= WORTH_BYTES:
+                self.online(memory_limit)
+            self._n_predicted += n_samples
+
+    def predicts_in_bytes(self, n_samples: int) -> bool:
+        """Whether a number of samples is predicted by the layer for single samples."""
+        is_behind = self._synchronized is not self._learned
+        return self._online is not None and n_samples <= (
+            FEW_SAMPLES if is_behind else FEW_TO_PREDICT
+        )
+
     def learn_online(self, bins: Ints, rule: tuple[Any, ...], memory_limit: int) -> bool:
         """Learn samples in place, in order; return False without a layer for single samples.
 
@@ -244,13 +261,13 @@ class Network:
 
     def potentials(self, bins: Ints, n_threads: int) -> Ints:
         """Return the potentials, shape (n_samples, n_units)."""
-        if self._online is not None and len(bins) <= FEW_SAMPLES:
+        if self._online is not None and self.predicts_in_bytes(len(bins)):
             return self._online.potentials(bins)
         return self.layer.potentials(bins, n_threads=n_threads)
 
     def counts(self, bins: Ints, n_groups: int, n_threads: int) -> Ints:
         """Return the numbers of units that fire, shape (n_samples, n_groups)."""
-        if self._online is not None and len(bins) <= FEW_SAMPLES:
+        if self.predicts_in_bytes(len(bins)):
             firing = self.potentials(bins, n_threads) > 0
             counts: Ints = firing.reshape(len(bins), n_groups, -1).sum(axis=2, dtype=np.int32)
             return counts

@@ -101,9 +101,10 @@ class HiddenLayer {
     assert(changes.size() == n_units_);
     const std::int32_t limit = std::min(kByteLimit, weight_limit_);
     for (std::size_t unit = 0; unit < n_units_; ++unit) {
-      std::int8_t& byte = bytes_[byte_index(unit, column)];
+      const std::size_t at = byte_index(unit, column);
+      std::int8_t& byte = bytes_[at];
       const std::int32_t value = byte + sign * changes[unit];
-      if (may_have_high_[unit] || std::abs(value) > limit) {
+      if (std::abs(value) > limit || (may_have_high_[unit] && high_bytes_[at] != 0)) {
         set_weight(unit, column, weight(unit, column) + sign * changes[unit]);
         continue;
       }

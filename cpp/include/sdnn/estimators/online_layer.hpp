@@ -39,7 +39,11 @@ class OnlineLayer {
     const WeightTiles<std::int32_t>& tiles = std::as_const(*layer_).tiles();
     std::vector<std::int32_t> column(tiles.n_units());
     for (std::size_t slot = 0; slot < tiles.n_slots(); ++slot) {
-      for (std::size_t i = 0; i < column.size(); ++i) column[i] = tiles.at(i, slot);
+      for (std::size_t t = 0; t < tiles.n_tiles(); ++t) {
+        const std::size_t begin = t * kTileUnits;
+        const std::size_t n = std::min(kTileUnits, column.size() - begin);
+        std::copy_n(tiles.tile(t) + slot * tiles.width(t), n, column.data() + begin);
+      }
       hidden_.add_to_column(slot, column, 1);
     }
     for (std::size_t i = 0; i < column.size(); ++i) hidden_.set_threshold(i, layer_->threshold(i));
