@@ -15,7 +15,7 @@ array([[1.  , 0.52, 0.15]])
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn.arguments import array_of, require, seed_of, shown, whole
 from sdnn.coding import Coding, coding_named
+from sdnn.coding.base import CODINGS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,6 +33,7 @@ __all__ = ["AnalyticKernel", "correlations", "plot_similarity", "similarity"]
 N_UNITS = 2000  # default number of units per pattern
 MOST_INPUTS = 4096
 _CELLS = "fiubUSO"  # types of tables
+OF_VALUES = ("low", "high", "knots", "period", "origin", "categories")  # fields of codings
 ENTRIES_AT_ONCE = 2**18  # entries of a kernel matrix computed at a time
 
 
@@ -45,12 +47,20 @@ def fitted(coding: str | Coding, n_units: int) -> Coding:
     return one.fit(np.array(ends if is_constant else [0.0, 1.0]), n_units)
 
 
-def shared(matrices: Iterable[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-    """Return the matrices, equal ones as one object."""
-    found: list[NDArray[np.float64]] = []
-    for matrix in matrices:
-        found.append(next((same for same in found if np.array_equal(same, matrix)), matrix))
-    return found
+def pattern_key(coding: Coding) -> Hashable:
+    """Return what the correlations of a fitted coding depend on: all but its range or categories.
+
+    >>> from sdnn.coding import Symbolic
+    >>> pattern_key(Symbolic(categories="ab")) == pattern_key(Symbolic(categories="cd"))
+    True
+    """
+    if type(coding) not in CODINGS.values():
+        return id(coding)
+    fields = {name: value for name, value in vars(coding).items() if name not in OF_VALUES}
+    parts = (
+        pattern_key(value) if isinstance(value, Coding) else value for value in fields.values()
+    )
+    return type(coding), coding.size, *parts
 
 
 def correlations(coding: str | Coding, n_units: int = N_UNITS) -> NDArray[np.float64]:
@@ -104,7 +114,10 @@ class AnalyticKernel:
         self.codings = tuple(fitted(one, n_units) for one in coding)
         self.pairs = tuple(every) if pairs is None else _read_pairs(pairs, len(inputs))
         self._every = pairs is None
-        self._correlations = shared(one.correlations(n_units) for one in self.codings)
+        keys = list(map(pattern_key, self.codings))
+        different = dict(zip(keys, self.codings, strict=True))
+        matrices = {key: one.correlations(n_units) for key, one in different.items()}
+        self._correlations = [matrices[key] for key in keys]
 
     def __call__(self, X: ArrayLike, Y: ArrayLike | None = None) -> NDArray[np.float64]:
         """Compute the kernel of X, shape (n_samples, n_inputs), and Y (X where None).

@@ -199,8 +199,10 @@ class RandomInverse(Ranged):
         return _core.random_inverse_patterns(n_units, self.size, known(self.n_flipped), seed)
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        distance = np.abs(np.subtract.outer(np.arange(self.size), np.arange(self.size)))
-        return np.power(1 - 4 * known(self.n_flipped) / n_units, distance)
+        of_distances = np.power(1 - 4 * known(self.n_flipped) / n_units, np.arange(self.size))
+        # A view: every diagonal has one value.
+        both_ways = np.concatenate([of_distances[:0:-1], of_distances])
+        return np.lib.stride_tricks.sliding_window_view(both_ways, self.size)[::-1]
 
 
 class Anchored(Coding):
