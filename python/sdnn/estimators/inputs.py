@@ -6,7 +6,6 @@ import abc
 import contextlib
 import dataclasses
 import datetime
-import inspect
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from numbers import Number
@@ -209,21 +208,6 @@ def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int, seed: in
     return found
 
 
-def add_sections(cls: type, base: type) -> None:
-    """Add the sections of a base class's docstring, those it lacks before its examples."""
-    if not (cls.__doc__ and base.__doc__):
-        return
-    text = inspect.cleandoc(cls.__doc__)
-    for section in inspect.cleandoc(base.__doc__).split("\n\n")[1:]:
-        title, rule, content = section.split("\n", 2)
-        heading = f"{title}\n{rule}\n"
-        if heading in text:
-            text = text.replace(heading, f"{heading}{content}\n", 1)
-        else:
-            text = text.replace("Examples\n", f"{section}\n\nExamples\n", 1)
-    cls.__doc__ = text
-
-
 def check_labels(y: Array) -> None:
     """Raise ValueError for what are no labels of classes."""
     kinds: dict[type, Any] = {}
@@ -288,13 +272,6 @@ class CodedInputs(BaseEstimator):
 
     coding: Any = parameter("random-inverse", str, Coding, list, tuple, kw_only=False)
     ranges: str = parameter("all", words("all", "robust"))
-
-    def __init_subclass__(cls, **options: Any) -> None:
-        """Add the parameters and attributes that base classes document to the docstring."""
-        super().__init_subclass__(**options)
-        for base in cls.__bases__:
-            if issubclass(base, CodedInputs):
-                add_sections(cls, base)
 
     @property
     def _parameter_constraints(self) -> dict[str, list[Any]]:

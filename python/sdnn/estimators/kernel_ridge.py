@@ -59,50 +59,7 @@ def of_degree(kernel: Floats, degree: int) -> Floats:
 
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class BaseKernelRidge(CodedInputs):
-    """Base class of `SDNNKernelRidge` and `SDNNKernelClassifier`, with the parameters of both.
-
-    Parameters
-    ----------
-    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
-        As for `SDNNRegressor`.
-    ranges : {"all", "robust"}, default="all"
-        Whether learned ranges reach to outliers, with an `OutlierWarning`, or leave them out;
-        "robust" also clips targets.
-    alpha : float or "auto", default="auto"
-        Strength of the penalty, above 0. "auto" takes the one with the smallest error when each
-        sample is left out, by a closed formula.
-    degree : {1, 2, 3} or "auto", default="auto"
-        The kernel k itself, (k + k^2) / 2 or k^3: functions of up to 2, 4 or 6 inputs. "auto" takes
-        the one with the smallest error of the same kind.
-    pairs : "all" or list of (modified, modifier), default="all"
-        Pairs of features, by number or name; a modifier of None leaves a pattern plain. All pairs
-        are as fast as one per feature.
-    max_components : int, default=2000
-        Most samples that span the solution. Up to this number it is exact, beyond that of low
-        rank (Nystroem's method).
-    random_state : int, RandomState or None, default=None
-        Draws the components from more samples.
-
-    Attributes
-    ----------
-    kernel_ : AnalyticKernel
-        The kernel k.
-    alpha_, degree_ : float, int
-        The penalty and the degree in use.
-    leave_one_out_error_ : float
-        Mean squared error when each sample is left out, in variances of the targets.
-    X_fit_ : ndarray, shape (n_components, n_features)
-    dual_coef_, intercept_ : ndarray, shapes (n_components, n_outputs) and (n_outputs,)
-        Outputs are ``kernel @ dual_coef_ + intercept_``, with the kernel of the degree.
-    n_features_in_, feature_names_in_ : int, ndarray of str
-        As in scikit-learn.
-
-    Notes
-    -----
-    For m components, or m samples if these are fewer, `fit` takes ``48 m^2`` bytes, ``98304 m``
-    more with low rank, `predict` ``65536 m``, and both ``8 n_bins^2`` per different coding. Time
-    grows with the cube of m, and beyond that with the number of samples.
-    """
+    """Base class of `SDNNKernelRidge` and `SDNNKernelClassifier`, with the parameters of both."""
 
     alpha: float | str = parameter("auto", Interval(Real, 0, np.inf, closed="neither"), AUTO)
     degree: int | str = parameter("auto", wholes(1, 3), AUTO)
@@ -205,6 +162,48 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
 
     Its settings need no search. It does not learn online.
 
+    Parameters
+    ----------
+    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
+        As for `SDNNRegressor`.
+    ranges : {"all", "robust"}, default="all"
+        Whether learned ranges reach to outliers, with an `OutlierWarning`, or leave them out;
+        "robust" also clips targets.
+    alpha : float or "auto", default="auto"
+        Strength of the penalty, above 0. "auto" takes the one with the smallest error when each
+        sample is left out, by a closed formula.
+    degree : {1, 2, 3} or "auto", default="auto"
+        The kernel k itself, (k + k^2) / 2 or k^3: functions of up to 2, 4 or 6 inputs. "auto" takes
+        the one with the smallest error of the same kind.
+    pairs : "all" or list of (modified, modifier), default="all"
+        Pairs of features, by number or name; a modifier of None leaves a pattern plain. All pairs
+        are as fast as one per feature.
+    max_components : int, default=2000
+        Most samples that span the solution. Up to this number it is exact, beyond that of low
+        rank (Nystroem's method).
+    random_state : int, RandomState or None, default=None
+        Draws the components from more samples.
+
+    Attributes
+    ----------
+    kernel_ : AnalyticKernel
+        The kernel k.
+    alpha_, degree_ : float, int
+        The penalty and the degree in use.
+    leave_one_out_error_ : float
+        Mean squared error when each sample is left out, in variances of the targets.
+    X_fit_ : ndarray, shape (n_components, n_features)
+    dual_coef_, intercept_ : ndarray, shapes (n_components, n_outputs) and (n_outputs,)
+        Outputs are ``kernel @ dual_coef_ + intercept_``, with the kernel of the degree.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        As in scikit-learn.
+
+    Notes
+    -----
+    For m components, or m samples if these are fewer, `fit` takes ``48 m^2`` bytes, ``98304 m``
+    more with low rank, `predict` ``65536 m``, and both ``8 n_bins^2`` per different coding. Time
+    grows with the cube of m, and beyond that with the number of samples.
+
     Examples
     --------
     >>> import numpy as np
@@ -236,15 +235,51 @@ class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
 
     Parameters
     ----------
+    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
+        As for `SDNNRegressor`.
+    ranges : {"all", "robust"}, default="all"
+        Whether learned ranges reach to outliers, with an `OutlierWarning`, or leave them out;
+        "robust" also clips targets.
+    alpha : float or "auto", default="auto"
+        Strength of the penalty, above 0. "auto" takes the one with the smallest error when each
+        sample is left out, by a closed formula.
+    degree : {1, 2, 3} or "auto", default="auto"
+        The kernel k itself, (k + k^2) / 2 or k^3: functions of up to 2, 4 or 6 inputs. "auto" takes
+        the one with the smallest error of the same kind.
+    pairs : "all" or list of (modified, modifier), default="all"
+        Pairs of features, by number or name; a modifier of None leaves a pattern plain. All pairs
+        are as fast as one per feature.
+    max_components : int, default=2000
+        Most samples that span the solution. Up to this number it is exact, beyond that of low
+        rank (Nystroem's method).
+    random_state : int, RandomState or None, default=None
+        Draws the components from more samples.
     class_weight : "balanced" or dict, optional
         Weight of the samples of each class.
 
     Attributes
     ----------
+    kernel_ : AnalyticKernel
+        The kernel k.
+    alpha_, degree_ : float, int
+        The penalty and the degree in use.
+    leave_one_out_error_ : float
+        Mean squared error when each sample is left out, in variances of the targets.
+    X_fit_ : ndarray, shape (n_components, n_features)
+    dual_coef_, intercept_ : ndarray, shapes (n_components, n_outputs) and (n_outputs,)
+        Outputs are ``kernel @ dual_coef_ + intercept_``, with the kernel of the degree.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        As in scikit-learn.
     classes_ : ndarray, shape (n_classes,)
         The labels, sorted.
     steepness_ : float
         Of the softmax of scores; it has the smallest log loss when each sample is left out.
+
+    Notes
+    -----
+    For m components, or m samples if these are fewer, `fit` takes ``48 m^2`` bytes, ``98304 m``
+    more with low rank, `predict` ``65536 m``, and both ``8 n_bins^2`` per different coding. Time
+    grows with the cube of m, and beyond that with the number of samples.
 
     Examples
     --------

@@ -33,6 +33,54 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
 
     Parameters
     ----------
+    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
+        How inputs become patterns: "random-inverse", "anchor", "circular", "symbolic", or an
+        object of `sdnn.coding`; for all inputs, or for columns given as to scikit-learn's
+        ColumnTransformer (other inputs have "random-inverse"). Columns of a data frame of type
+        "category" are symbols, which may be missing, unless a list or an object codes them.
+    ranges : {"all", "robust"}, default="all"
+        Whether learned ranges reach to outliers, with an `OutlierWarning`, or leave them out.
+    n_pattern_units : int, optional
+        Units per pattern, even. None divides about 16,000 columns among the pairs.
+    pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
+        Pairs of features, by number or name; a modifier of None leaves a pattern plain. "budget"
+        takes all pairs up to 22 features, beyond that an even random share: 500 pairs, or one per
+        feature. "auto" drops features that do not matter, half of them at a time, by the score of a
+        held-out fifth, which takes up to five times as long.
+    tables : {"shared", "separate"}, default="shared"
+        One table of patterns per input, permuted for each pair, or two tables per pair.
+    max_iter : int, optional
+        Largest number of epochs of `fit`, which stops early once nothing is corrected. None: 30,
+        or as many as present 80,000 samples, at least 5. Use more for exact targets, say 300.
+    n_averaged_epochs : int, default=4
+        Predict the mean over the networks after the last epoch of `fit` and after so many, less
+        one, of every third epoch before (from 5,001 samples on, of every one). `partial_fit`
+        resumes from the last alone.
+    correction_share : float
+        Share of the missing or superfluous units that a sample corrects, at least one; in (0, 1].
+        Default: 1 in regression; 1/4 in classification, where samples of classes overlap.
+    shuffle : bool, default=True
+        Whether each epoch has a new random order; from 5,001 samples without weights on, of blocks
+        of 512 samples, which are drawn once: half of the time.
+    early_stopping : bool, default=False
+        Whether to hold out samples, stop when their score no longer improves, and keep the best
+        weights.
+    validation_fraction : float, default=0.1
+        Fraction of the sample held out by early stopping.
+    n_iter_no_change : int, default=10
+        Epochs without improvement before early stopping.
+    training : {"auto", "dual", "block", "plain"}, default="auto"
+        Form of training; affects time and memory, never the result.
+    memory_limit : int, default=2**30
+        Bytes for weights and patterns of all networks kept, and again for training.
+    warm_start : bool, default=False
+        Whether `fit` resumes with the existing network, ranges and categories.
+    random_state : int, RandomState or None, default=None
+        Determines patterns, initial weights, orders and the validation share.
+    n_jobs : int, optional
+        Threads; the result does not depend on it.
+    verbose : int, default=0
+        Whether to show a progress bar, with the time left.
     n_output_units : int, default=280
         Units per output, which divide the output range into as many steps.
     output_range : (float, float) or array_like of shape (n_outputs, 2), optional
@@ -47,6 +95,28 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
 
     Attributes
     ----------
+    codings_ : tuple of Coding
+        The fitted coding of each input.
+    pairs_ : tuple of (int, int)
+        The pairs (modified, modifier) in use; equal numbers for a plain pattern.
+    pair_names_ : list of (name, name or None)
+        The same by feature names (numbers without names), as ``pairs`` takes them.
+    pair_importances_ : ndarray, shape (n_pairs,)
+        Squared change of the weights of each pair, normalized to a sum of 1.
+    feature_importances_ : ndarray, shape (n_features,)
+        Mean importance of the pairs with each feature, normalized; RFE and friends use it.
+    weights_ : ndarray of int32, shape (n_units, n_pairs * n_pattern_units)
+    thresholds_ : ndarray of int32, shape (n_units,)
+    n_inputs_out_of_range_ : int
+        Values learned since the last `fit` that were outside their range.
+    n_iter_ : int
+        Epochs of the last `fit` and calls of `partial_fit` since.
+    n_corrected_ : ndarray of int64, shape (n_epochs,)
+        Samples corrected in each epoch of the last `fit`.
+    training_form_, training_memory_ : str, int
+        Form of training that the last `fit` chose, and its bytes beside the weights.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        As in scikit-learn.
     output_range_ : ndarray, shape (n_outputs, 2)
     n_outputs_, n_outputs_out_of_range_ : int
         Number of outputs, and of targets outside the range since the last `fit`.
