@@ -21,7 +21,6 @@ if TYPE_CHECKING:
         read_parameter_file as read_parameter_file,
     )
     from sdnn.estimators.outliers import OutlierWarning as OutlierWarning
-    from sdnn.estimators.plots import plot_importances as plot_importances
     from sdnn.estimators.regressor import SDNNRegressor as SDNNRegressor
 
 _load, __dir__, __all__ = attach(globals())

@@ -106,10 +106,6 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         The pairs (modified, modifier) in use; equal numbers for a plain pattern.
     pair_names_ : list of (name, name or None)
         The same by feature names (numbers without names), as ``pairs`` takes them.
-    pair_importances_ : ndarray, shape (n_pairs,)
-        Squared change of the weights of each pair, normalized to a sum of 1.
-    feature_importances_ : ndarray, shape (n_features,)
-        Mean importance of the pairs with each feature, normalized; RFE and friends use it.
     weights_ : ndarray of int32, shape (n_units, n_pairs * n_pattern_units)
     thresholds_ : ndarray of int32, shape (n_units,)
     n_inputs_out_of_range_ : int

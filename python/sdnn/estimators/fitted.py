@@ -115,31 +115,21 @@ class Fitted(Learned, BaseEstimator):
         names = self._names_or_numbers()
         return [(names[mu], None if mu == nu else names[nu]) for mu, nu in self.pairs_]
 
-    @property
-    def pair_importances_(self) -> Floats:
-        """Squared change of the weights of each pair, normalized, shape (n_pairs,)."""
-        network = self._fitted_network
+    def _weight_changes(self) -> Floats:
+        """Return the mean squared change of the weights of pairs with each feature."""
+        network = self.network_
         code = network.input_code
         begun = _core.ParallelPerceptron(code.core, network.n_units, seed=self._weight_seed)
         change = network.weights - begun.weights
         of_pairs = change.reshape(network.n_units, len(code.pairs), code.n_units)
         squares: Floats = np.square(of_pairs, dtype=np.float64).sum(axis=(0, 2))
-        shares: Floats = squares / max(squares.sum(), 1.0)
-        return shares
-
-    @property
-    def feature_importances_(self) -> Floats:
-        """Mean importance of the pairs with each feature, normalized, shape (n_features,)."""
-        importances = self.pair_importances_.tolist()  # first: it may raise NotFittedError
-        total = np.zeros(self.n_features_in_)
-        count = np.zeros(self.n_features_in_)
-        for pair, importance in zip(self.pairs_, importances, strict=True):
+        total, count = np.zeros((2, self.n_features_in_))
+        for pair, square in zip(code.pairs, squares.tolist(), strict=True):
             for feature in set(pair):
-                total[feature] += importance
+                total[feature] += square
                 count[feature] += 1
         means: Floats = total / np.maximum(count, 1)
-        shares: Floats = means / (means.sum() or 1.0)
-        return shares
+        return means
 
     def save(self, path: str | Path) -> None:
         """Write the fitted estimator to a safetensors file with JSON metadata, without pickle.

@@ -41,8 +41,9 @@ def select_pairs(
 ) -> Pairs:
     """Return the pairs of the features with which a held-out fifth is predicted best.
 
-    The features are halved by their importances down to two, those of the best score taken; fewer
-    win where scores are equal. Classes have their share in the held-out part.
+    The features are halved by how much training changes the weights of their pairs, down to two,
+    and those of the best score taken; fewer win where scores are equal. Classes have their share
+    in the held-out part.
     """
     labels = np.asarray(y)
     features = np.arange(n_features)
@@ -70,5 +71,5 @@ def select_pairs(
             best = score, pairs
         if len(features) <= 2:
             return best[1]
-        ranked = np.argsort(-fitted.feature_importances_[features], kind="stable")
+        ranked = np.argsort(-fitted._weight_changes()[features], kind="stable")
         features = np.sort(features[ranked[: (len(features) + 1) // 2]])

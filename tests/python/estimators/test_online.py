@@ -401,8 +401,6 @@ def test_classes_of_a_river_stream_may_come_late():
     hits = [model.predict_one(row) == name for row, name in zip(ROWS, names, strict=True)]
     assert np.mean(hits) > 0.8
     assert set(model.predict_proba_one(ROWS[0])) == {"low", "middle", "high"}
-    importances = model.fitted.pair_importances_
-    assert importances.sum() == pytest.approx(1.0)
     for label in (3, 2.5, None):
         refuses("y", model.learn_one, ROWS[0], label)
     refuses("x", model.learn_one, {"other": 1.0}, "highest")
