@@ -211,7 +211,7 @@ class BaseSDNN(Fitted, CodedInputs):
         if hasattr(self, "network_"):
             work._check_outputs(y, classes)
             code = work.network_.input_code
-            row = work._row(x, code.codings, code.is_numeric)
+            row = work._row(x, code)
             work._note_inputs(row[None])
             bins = code.bins_of_row(row)
         else:
@@ -372,7 +372,7 @@ class BaseSDNN(Fitted, CodedInputs):
     def _bins_of_one(self, x: Any) -> Ints:
         """Return the bins of one sample to predict, without overhead."""
         code = self._fitted_network.input_code
-        return code.bins_of_row(self._row(x, code.codings, code.is_numeric))
+        return code.bins_of_row(self._row(x, code))
 
     def transform_code(self, X: ArrayLike) -> NDArray[np.int8]:
         """Return the code of samples: +1, 0, -1, shape (n_samples, n_pairs * n_pattern_units)."""

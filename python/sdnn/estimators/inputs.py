@@ -20,6 +20,7 @@ from sklearn.utils.validation import validate_data
 
 from sdnn.arguments import require, shown
 from sdnn.coding import Coding, RandomInverse, Symbolic, WithMissing, coding_named
+from sdnn.coding.symbols import missing_as_nan
 from sdnn.estimators.outliers import OutlierWarning, numbers_to_range, usual_range, warn_caller
 from sdnn.estimators.parameters import parameter, words
 
@@ -389,19 +390,29 @@ class CodedInputs(BaseEstimator):
                 f"{type(self).__name__} to learn {what}"
             )
 
-    def _row(self, x: Any, codings: tuple[Coding, ...], is_numeric: bool) -> Array:
+    def _row(self, x: Any, code: Any) -> Array:
         """Return one sample, a row or a mapping from names, checked, shape (n_features,)."""
+        codings = code.codings
         values: Any = self._values_of(x, codings) if isinstance(x, Mapping) else x
-        if is_numeric:
+        if code.is_numeric:
             try:
                 row = np.asarray(values, dtype=np.float64)
             except (TypeError, ValueError):
-                raise ValueError(f"x must be numbers, got {shown(x)}") from None
-            require(np.isfinite(row).all(), "x", "be finite numbers", x)
+                try:
+                    row = missing_as_nan(np.array(values, dtype=object))
+                except (TypeError, ValueError):
+                    raise ValueError(f"x must be numbers, got {shown(x)}") from None
         else:
             row = np.array(values, dtype=object)
         require(row.shape == (len(codings),), "x", f"have {len(codings)} features", x)
-        return row if row.dtype == np.float64 else self._finite(row[None], codings)[0]
+        if not code.is_numeric:
+            of_one: Array = self._finite(row[None], codings)[0]
+            return of_one
+        is_number = np.isfinite(row)
+        if not is_number.all():
+            is_number |= np.isnan(row) & code.may_lack
+            require(is_number.all(), "x", "be finite numbers", x)
+        return row
 
     def _values_of(self, x: Mapping[Any, Any], codings: tuple[Coding, ...]) -> list[Any]:
         """Return a sample's values in feature order, None for missing ones."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.coding import Coding
+from sdnn.coding import Coding, WithMissing
 from sdnn.coding.symbols import missing_as_nan
 from sdnn.estimators.inputs import PAIR_BUDGET, Array, Floats, Ints, Pairs
 
@@ -38,6 +38,11 @@ def code_bytes(codings: Sequence[Coding], pairs: Sequence[tuple[int, int]], n_un
     return int(of_pairs * n_units * 9 / 8)  # a byte a unit, and a bit in the core
 
 
+def present(coding: Coding) -> Coding:
+    """Return the coding of values that are not missing."""
+    return coding.base if isinstance(coding, WithMissing) else coding
+
+
 class InputCode:
     """Turns samples into bins, and bins into the code that the network reads.
 
@@ -60,7 +65,8 @@ class InputCode:
         self.used = sorted({index for pair in self.pairs for index in pair})
         place = {index: number for number, index in enumerate(self.used)}
         self.core_pairs = np.array([(place[mu], place[nu]) for mu, nu in self.pairs], np.int32)
-        self.is_numeric = all(coding.is_numeric for coding in self.codings)
+        self.may_lack = np.array([isinstance(coding, WithMissing) for coding in self.codings])
+        self.is_numeric = all(present(coding).is_numeric for coding in self.codings)
         self.core = _core.SelectiveDesensitization(modified, modifiers, self.core_pairs)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -84,12 +90,13 @@ class InputCode:
     @functools.cached_property
     def _even(self) -> tuple[Any, ...] | None:
         """Return inputs in pairs, ranges and numbers of bins, if all bins have equal width."""
-        ranges = [self.codings[index].even_range() for index in self.used]
+        codings = [present(self.codings[index]) for index in self.used]
+        ranges = [coding.even_range() for coding in codings]
         if any(ends is None or not ends[0] / 2 < ends[1] / 2 for ends in ranges):
             return None
         every = self.used == list(range(len(self.codings)))
         low, high = np.array(ranges, dtype=np.float64).T
-        sizes = np.array([self.codings[index].size for index in self.used], dtype=np.int32)
+        sizes = np.array([coding.size for coding in codings], dtype=np.int32)
         return slice(None) if every else np.array(self.used), low, high, sizes
 
     def bins_of_row(self, row: Array) -> Ints:
@@ -97,9 +104,13 @@ class InputCode:
         if self._even is None or row.dtype != np.float64:
             return self.bins(row[None])
         used, low, high, sizes = self._even
-        inside = np.minimum(np.maximum(row[used], low), high)
+        values = row[used]
+        inside = np.minimum(np.maximum(values, low), high)
         where = (inside / 2 - low / 2) / (high / 2 - low / 2)  # as in `sdnn.coding.numeric`
+        is_missing = values != values
+        where[is_missing] = 0
         bins: Ints = np.minimum((where * sizes).astype(np.int32), sizes - 1)
+        bins[is_missing] = sizes[is_missing]
         return bins[None]
 
     @functools.cached_property

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import abc
 import collections
-from collections.abc import Hashable, Mapping
-from typing import Any
+import dataclasses
+import math
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -12,20 +15,70 @@ from river import base
 from sklearn.base import clone
 
 from sdnn.arguments import flag, require, shown, whole
+from sdnn.coding import Coding, Symbolic, WithMissing
+from sdnn.coding.symbols import is_missing
 from sdnn.estimators.classifier import SDNNClassifier
-from sdnn.estimators.inputs import Floats, codings_of_columns
+from sdnn.estimators.growth import grow
+from sdnn.estimators.inputs import Floats, coding_entries, codings_of_columns
+from sdnn.estimators.network import COLUMN_BUDGET, present
 from sdnn.estimators.outliers import numbers_to_range
 from sdnn.estimators.regressor import SDNNRegressor
 
 WINDOW = 500  # samples whose range is followed
+REMEMBERED = 1000  # last samples, from which new features and categories are learned
+FEWEST = 5  # of these that must have a new feature or category
+MOST_FEATURES = 1000  # later ones are ignored
+MOST_CATEGORIES = 1000  # of a feature; later ones are as missing values
 
 
-def named(x: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return a sample with strings as names, as scikit-learn requires."""
+def cleaned(x: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return a sample with strings as names and None for missing values."""
     sample = {str(name): value for name, value in x.items()}
     if len(sample) < len(x):
         raise ValueError(f"the names of features must differ as text, got {shown(list(x))}")
+    for name, value in sample.items():
+        if type(value) is str or (type(value) is float and math.isfinite(value)):
+            continue
+        if is_missing(value):
+            sample[name] = None
+            continue
+        try:
+            is_finite = isinstance(value, str) or math.isfinite(value)
+        except (OverflowError, TypeError, ValueError):
+            is_finite = False
+        if not is_finite:
+            expected = "be finite numbers, words, or None where they are missing"
+            raise ValueError(f"the values of x must {expected}, got {shown(value)} for {name!r}")
     return sample
+
+
+def number(value: Any) -> Any:
+    """Return a number, also of a word that is one; None for other words."""
+    if not isinstance(value, str):
+        return value
+    try:
+        read = float(value)
+    except ValueError:
+        return None
+    return read if math.isfinite(read) else None
+
+
+def unchanged(value: Any) -> Any:
+    """Return a category as it is."""
+    return value
+
+
+def known_columns(coding: Any, names: Collection[str]) -> Any:
+    """Return a coding, or a list of (coding, columns) without names that no sample has had."""
+    if not isinstance(coding, list | tuple):
+        return coding
+    known: list[Any] = []
+    for entry, columns in coding_entries(coding):
+        listed: Any = [columns] if isinstance(columns, str) else columns
+        if isinstance(listed, list | tuple):
+            listed = [column for column in listed if type(column) is not str or column in names]
+        known.append((entry, listed))
+    return known
 
 
 class FollowedRanges:
@@ -48,6 +101,14 @@ class FollowedRanges:
         self.recent[: len(last)] = last
         self.n_seen = len(last)
         self.now = self.low, self.high
+
+    def extend(self, ends: Mapping[str, tuple[float, float]], last: pd.DataFrame) -> None:
+        """Follow more features, of which the last samples are given."""
+        more = FollowedRanges(ends, last)
+        self.names += more.names
+        self.low, self.high = np.append(self.low, more.low), np.append(self.high, more.high)
+        self.recent = np.hstack([self.recent, more.recent])
+        self.now = np.append(self.now[0], more.low), np.append(self.now[1], more.high)
 
     def note(self, values: Floats) -> None:
         """Take a sample's numbers, NaN where there are none, into the window."""
@@ -78,7 +139,10 @@ class FollowedRanges:
 
 
 class Waiting:
-    """Collects the first samples, from which ranges, categories and classes are learned."""
+    """Collects the first samples, from which ranges, categories and classes are learned.
+
+    Later features and categories are learned from the last samples, once they have come in some.
+    """
 
     usual: Any  # the model where none is given
     least_targets = 1  # different ones among the first samples
@@ -94,50 +158,181 @@ class Waiting:
         self.follows_ranges = flag("follows_ranges", follows_ranges)
         self.fitted: Any = None
         self.ranges: FollowedRanges | None = None
-        self.samples: list[dict[str, Any]] = []
-        self.targets: list[Any] = []
+        most = max(self.grace_period, REMEMBERED)
+        self.samples: collections.deque[dict[str, Any]] = collections.deque(maxlen=most)
+        self.targets: collections.deque[Any] = collections.deque(maxlen=most)
+        self.n_learned = 0
+        self.n_before_news: int | None = None  # samples before something new came
+        self.reads: dict[str, Callable[[Any], Any]] = {}  # how values of a feature are read
+        self.categories: dict[str, set[Any]] = {}  # of features whose categories are learned
+        self.most_columns = 0  # of a code that grows
 
     def learn_one(self, x: dict[Hashable, Any], y: Any) -> None:
-        """Learn one sample; if the model refuses one of the first, all of them are dropped."""
+        """Learn one sample; what is refused changes nothing."""
+        sample = cleaned(x)
+        self._check_target(y)
         if self.fitted is not None:
-            self._learn(self._sample(x, learns=True), y)
-            return
-        sample = named(x)
+            self._learn(self._sample(sample, learns=True), y)
         self.samples.append(sample)
         self.targets.append(y)
-        if len(self.samples) < self.grace_period or len(set(self.targets)) < self.least_targets:
-            return
-        # The model cannot say which sample it refuses, and would refuse it for ever.
-        samples, self.samples = self.samples, []
-        targets, self.targets = self.targets, []
-        is_classifier = isinstance(self.model, SDNNClassifier)
-        options = {"classes": np.unique(targets)} if is_classifier else {}
-        frame = pd.DataFrame(samples)
-        frame = frame[sorted(frame)]  # whatever the order of the dictionaries
-        try:
-            self.fitted = clone(self.model).partial_fit(frame, np.array(targets), **options)
-        except ValueError as error:
-            raise ValueError(f"the first {len(samples)} samples are dropped: {error}") from error
-        if self.follows_ranges:
-            self._follow(frame)
+        self.n_learned += 1
+        if self.fitted is not None:
+            self._learn_news(sample)
+        elif len(self.samples) >= self.grace_period and (
+            len(set(self.targets)) >= self.least_targets
+        ):
+            try:
+                self._begin()
+            except ValueError:  # for which a setting is the reason: samples were checked
+                self.samples.pop()
+                self.targets.pop()
+                raise
+
+    @abc.abstractmethod
+    def _check_target(self, y: Any) -> None:
+        """Raise ValueError for an impossible target."""
 
     def _learn(self, sample: dict[str, Any], y: Any) -> None:
         self.fitted.learn_one(sample, y)
 
-    def _sample(self, x: Mapping[Any, Any], learns: bool = False) -> dict[str, Any]:
-        sample = named(x)
-        return sample if self.ranges is None else self.ranges.moved(sample, learns)
-
-    def _follow(self, frame: pd.DataFrame) -> None:
-        """Follow the ranges that were learned from the first samples."""
-        unfitted = codings_of_columns(self.model.coding, list(frame), frame.shape[1], frame)
-        ends = {
-            name: fitted.ends()
-            for name, coding, fitted in zip(frame, unfitted, self.fitted.codings_, strict=True)
-            if numbers_to_range(coding, frame[name].to_numpy()) is not None
+    def _sample(self, sample: Mapping[str, Any], learns: bool = False) -> dict[str, Any]:
+        """Return the values of the features that are known, None for missing ones."""
+        get = sample.get
+        read = {
+            name: None if (value := get(name)) is None else as_read(value)
+            for name, as_read in self.reads.items()
         }
-        if ends:
-            self.ranges = FollowedRanges(ends, frame)
+        return read if self.ranges is None else self.ranges.moved(read, learns)
+
+    def _codings(self, names: list[str], new: list[str]) -> list[Coding]:
+        """Return the codings of new features among all names; note how their values are read."""
+        frame = pd.DataFrame({name: [x.get(name) for x in self.samples] for name in names})
+        coding = known_columns(self.model.coding, names)
+        chosen = dict(zip(names, codings_of_columns(coding, names, len(names), frame), strict=True))
+        codings: list[Coding] = []
+        for name in new:
+            coding = chosen[name]
+            self.reads[name] = number if present(coding).is_numeric else unchanged
+            if self.reads[name] is number and any(
+                isinstance(x.get(name), str) and number(x[name]) is None for x in self.samples
+            ):
+                coding, self.reads[name] = Symbolic(), str
+            codings.append(coding if isinstance(coding, WithMissing) else WithMissing(base=coding))
+        return codings
+
+    def _frame(self) -> pd.DataFrame:
+        """Return the last samples, as they are read."""
+        rows = [
+            [None if (value := x.get(name)) is None else read(value) for x in self.samples]
+            for name, read in self.reads.items()
+        ]
+        return pd.DataFrame(dict(zip(self.reads, rows, strict=True)))
+
+    def _begin(self) -> None:
+        """Learn ranges, categories, classes and weights from the last samples."""
+        come = dict.fromkeys(
+            name for x in self.samples for name in sorted(x) if x[name] is not None
+        )
+        names = sorted(list(come)[:MOST_FEATURES])  # whatever the order of the dictionaries
+        if not names:
+            return
+        self.reads, self.categories = {}, {}
+        codings = self._codings(names, names)
+        frame, targets = self._frame(), np.array(self.targets)
+        entries = [(coding, [name]) for name, coding in zip(names, codings, strict=True)]
+        fitted = clone(self.model).set_params(coding=entries)
+        options = {}
+        if isinstance(self.model, SDNNClassifier):
+            before = [] if self.fitted is None else self.fitted.classes_.tolist()
+            options["classes"] = np.unique([*before, *self.targets])
+        self.fitted = fitted.partial_fit(frame, targets, **options)
+        self.ranges = None
+        self._follow(codings, self.fitted.codings_, frame)
+        n_columns = self.fitted.network_.input_code.core.n_columns
+        self.most_columns = 2 * max(COLUMN_BUDGET, n_columns)
+
+    def _follow(
+        self, codings: Sequence[Coding], fitted: Sequence[Coding], frame: pd.DataFrame
+    ) -> None:
+        """Follow the ranges, and note the categories, that were learned for a frame's columns."""
+        ends: dict[str, Any] = {}
+        for name, coding, learned in zip(frame, codings, fitted, strict=True):
+            if numbers_to_range(coding, frame[name].to_numpy()) is not None:
+                ends[name] = learned.ends()
+            if isinstance(base := present(learned), Symbolic) and coding.learns:
+                self.categories[name] = set(base.categories or ())
+        if ends and self.follows_ranges:
+            if self.ranges is None:
+                self.ranges = FollowedRanges(ends, frame)
+            else:
+                self.ranges.extend(ends, frame)
+
+    def _is_new(self, name: str, value: Any) -> bool:
+        """Return whether a feature, or a category of it, is not known."""
+        if value is None or name not in self.reads:
+            return value is not None and len(self.reads) < MOST_FEATURES
+        known = self.categories.get(name)
+        if known is None or len(known) >= MOST_CATEGORIES:
+            return False
+        return self.reads[name](value) not in known
+
+    def _learn_news(self, sample: Mapping[str, Any]) -> None:
+        """Learn features and categories some time after the first of them came."""
+        if self.n_before_news is None:
+            may_be_new = self.categories or not sample.keys() <= self.reads.keys()
+            if not (may_be_new and any(self._is_new(*item) for item in sample.items())):
+                return
+            self.n_before_news = self.n_learned - 1
+        n_last = self.n_learned - self.n_before_news
+        if n_last < max(self.grace_period, min(self.n_learned // 10, REMEMBERED)):
+            return
+        self.n_before_news = None
+        counts = collections.Counter(
+            (name, None if name not in self.reads else self.reads[name](value))
+            for x in self.samples
+            for name, value in x.items()
+            if self._is_new(name, value)
+        )
+        often = [item for item, n in counts.items() if n >= FEWEST]
+        new = sorted(name for name, _ in often if name not in self.reads)
+        new = new[: MOST_FEATURES - len(self.reads)] if isinstance(self.model.pairs, str) else []
+        changed: dict[int, Coding] = {}
+        for index, (name, coding) in enumerate(
+            zip(list(self.reads), self.fitted.codings_, strict=True)
+        ):
+            more = sorted(
+                (value for other, value in often if other == name),
+                key=lambda value: (isinstance(value, str), value),
+            )
+            if more:
+                base: Any = present(coding)
+                known = (*base.categories, *more)[:MOST_CATEGORIES]
+                base = dataclasses.replace(base, categories=known)
+                changed[index] = dataclasses.replace(coding, base=base)
+        if not (new or changed):
+            return
+        before = self.reads.copy(), self.categories.copy()
+        try:
+            self._grow(new, changed, n_last)
+        except BaseException:
+            self.reads, self.categories = before
+            raise
+
+    def _grow(self, new: list[str], changed: Mapping[int, Coding], n_last: int) -> None:
+        """Learn new features and categories from the last samples, or begin anew with these."""
+        unfitted = self._codings([*self.reads, *new], new)
+        frame = self._frame()[new]
+        n_units = self.fitted.network_.input_code.n_units
+        codings = self.fitted._fit_codings(unfitted, frame.to_numpy(dtype=object), n_units)
+        added = dict(zip(new, codings, strict=True))
+        if not grow(self.fitted, added, changed, self.most_columns):
+            self._begin()
+            return
+        self._follow(unfitted, codings, frame)
+        for index, coding in changed.items():
+            self.categories[list(self.reads)[index]] = set(cast(Any, present(coding)).categories)
+        for x, y in list(zip(self.samples, self.targets, strict=True))[-n_last:]:
+            self._learn(self._sample(x), y)
 
 
 class RiverRegressor(Waiting, base.Regressor):
@@ -146,21 +341,31 @@ class RiverRegressor(Waiting, base.Regressor):
     Parameters
     ----------
     model : SDNNRegressor, default=SDNNRegressor(out_of_range="widen")
-        Cloned. Features that samples may lack need the coding "with-missing", but must be in the
-        first samples.
+        Cloned. Features that a sample lacks, None and NaN are missing values; a feature with words
+        is symbolic, unless the model has another coding for it.
     grace_period : int, default=100
         Samples from which ranges and categories are learned; until then the mean is predicted.
+        Features and categories that come later are learned once the first of them came so many
+        samples ago (or a tenth of all, up to 1,000) and they are in 5 of the last 1,000. At most
+        1,000 features, and categories of each, are learned.
     follows_ranges : bool, default=True
         Whether learned ranges of inputs become those of the last 500 samples as the stream drifts.
     """
 
     usual = SDNNRegressor(out_of_range="widen")
 
+    def _check_target(self, y: Any) -> None:
+        try:
+            is_finite = math.isfinite(y)
+        except (OverflowError, TypeError, ValueError):
+            is_finite = False
+        require(is_finite, "y", "be a finite number", y)
+
     def predict_one(self, x: dict[Hashable, Any]) -> float:
         """Predict one target."""
         if self.fitted is None:
             return float(np.mean(self.targets)) if self.targets else 0.0
-        return float(self.fitted.predict_one(self._sample(x)))
+        return float(self.fitted.predict_one(self._sample(cleaned(x))))
 
 
 class RiverClassifier(Waiting, base.Classifier):
@@ -169,12 +374,12 @@ class RiverClassifier(Waiting, base.Classifier):
     Parameters
     ----------
     model : SDNNClassifier, default=SDNNClassifier(correction_share=0.5)
-        Cloned; missing features as for `RiverRegressor`. A stream shows each sample once, which
-        needs larger corrections.
+        Cloned; missing values and words as for `RiverRegressor`. A stream shows each sample once,
+        which needs larger corrections.
     grace_period : int, default=100
         Samples, of at least two classes, from which ranges, categories and classes are learned.
-        Until then label frequencies are predicted. A class that comes later gets units of its own,
-        but is an error with ``scheme="one_vs_one"``.
+        Until then label frequencies are predicted. Later features as in `RiverRegressor`. A class
+        that comes later gets units of its own, but is an error with ``scheme="one_vs_one"``.
     follows_ranges : bool, default=True
         As in `RiverRegressor`.
     """
@@ -187,6 +392,11 @@ class RiverClassifier(Waiting, base.Classifier):
     def _multiclass(self) -> bool:  # what River asks of classifiers
         return True
 
+    def _check_target(self, y: Any) -> None:
+        first = self.targets[0] if self.targets else y
+        is_label = not is_missing(y) and isinstance(y, str) == isinstance(first, str)
+        require(is_label, "y", f"be a label, like {shown(first)}", y)
+
     def _learn(self, sample: dict[str, Any], y: Any) -> None:
         if y not in self.fitted.classes_:
             self.fitted._bins_of_one(sample)  # which raises before a class is added
@@ -196,7 +406,7 @@ class RiverClassifier(Waiting, base.Classifier):
     def predict_one(self, x: dict[Hashable, Any], **_options: Any) -> Any:
         """Predict one label; None before the first sample."""
         if self.fitted is not None:
-            return self.fitted.predict_one(self._sample(x))
+            return self.fitted.predict_one(self._sample(cleaned(x)))
         # The first to come where several are equally frequent.
         return max(dict.fromkeys(self.targets), key=self.targets.count, default=None)
 
@@ -213,5 +423,5 @@ class RiverClassifier(Waiting, base.Classifier):
         if self.fitted is None:
             n_samples = len(self.targets)
             return {y: n / n_samples for y, n in collections.Counter(self.targets).items()}
-        each = self.fitted.predict_proba_one(self._sample(x)).tolist()
+        each = self.fitted.predict_proba_one(self._sample(cleaned(x))).tolist()
         return dict(zip(self.fitted.classes_.tolist(), each, strict=True))

@@ -1,0 +1,99 @@
+"""Inputs and categories that a trained network gets later, without losing what it has learned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn import _core
+from sdnn.coding import Coding
+from sdnn.estimators.base import BaseSDNN
+from sdnn.estimators.inputs import PAIR_BUDGET, Pairs
+from sdnn.estimators.network import InputCode, Network
+
+Table = NDArray[np.int8]
+
+
+def pairs_of_new(n_before: int, n_new: int, random: np.random.RandomState) -> Pairs:
+    """Return pairs of new inputs and earlier ones: all, or a random share beyond the budget.
+
+    >>> pairs_of_new(2, 1, np.random.RandomState(0))
+    [(2, 0), (0, 2), (2, 1), (1, 2)]
+    """
+    pairs: Pairs = []
+    for new in range(n_before, n_before + n_new):
+        others = np.arange(new)
+        if (new + 1) * new > PAIR_BUDGET:
+            others = random.permutation(others)[: max(1, PAIR_BUDGET // (2 * (new + 1)))]
+        for other in np.sort(others).tolist():
+            pairs += [(new, other), (other, new)]
+    return pairs
+
+
+def longer(table: Table, n_rows: int, random: np.random.RandomState) -> Table:
+    """Return a table with random patterns before the last one, that of missing values."""
+    n_new = n_rows - len(table)
+    if n_new == 0:
+        return table
+    patterns = _core.symbol_patterns(n_new, table.shape[1], int(random.randint(2**31 - 1)))
+    return np.vstack([table[:-1], patterns, table[-1:]])
+
+
+def grow(
+    model: BaseSDNN, new: Mapping[str, Coding], changed: Mapping[int, Coding], most_columns: int
+) -> bool:
+    """Give a trained model new inputs, and inputs codings with more categories.
+
+    The new weights are 0, so that predictions stay as they are. The codings are fitted, those of
+    ``changed`` are with missing values. Return False, and change nothing, if the code would have
+    more columns than ``most_columns``.
+    """
+    network, before = model.network_, model.network_.input_code
+    n_before, n_units = len(before.codings), before.n_units
+    random = np.random.RandomState((model._weight_seed + n_before) % 2**32)
+    added = pairs_of_new(n_before, len(new), random)
+    pairs = [*before.pairs, *added]
+    if len(pairs) * n_units > most_columns:
+        return False
+    codings = [changed.get(index, coding) for index, coding in enumerate(before.codings)]
+    codings += new.values()
+    model._require_memory(network.n_units, 1, n_units, codings, pairs)
+    tables: dict[int, Table] = {}  # by identity: pairs share them
+
+    def of(table: Table, index: int) -> Table:
+        if id(table) not in tables:
+            tables[id(table)] = longer(table, codings[index].size, random)
+        return tables[id(table)]
+
+    modified = [of(table, mu) for (mu, _), table in zip(before.pairs, before.modified, strict=True)]
+    modifiers = [
+        np.ones((codings[nu].size, n_units), np.int8) if mu == nu else of(table, nu)
+        for (mu, nu), table in zip(before.pairs, before.modifiers, strict=True)
+    ]
+    patterns = {nu: table for (_, nu), table in zip(before.pairs, modifiers, strict=True)}
+    patterns |= {mu: table for (mu, _), table in zip(before.pairs, modified, strict=True)}
+    for index, coding in enumerate(new.values(), start=n_before):
+        patterns[index] = coding.patterns(n_units, int(random.randint(2**31 - 1)))
+    for mu, nu in added:
+        modified.append(patterns[mu])
+        order = random.permutation(n_units)
+        modifiers.append(np.ascontiguousarray(patterns[nu][:, order]))
+    code = InputCode(codings, pairs, modified, modifiers)
+    weights = np.zeros((network.n_units, code.core.n_columns), dtype=np.int32)
+    weights[:, : before.core.n_columns] = network.weights
+    model.network_ = Network(code, network.n_units, weights=weights, thresholds=network.thresholds)
+    model._earlier = ()
+    note_inputs(model, list(new), codings)
+    return True
+
+
+def note_inputs(model: BaseSDNN, names: Sequence[str], codings: Sequence[Coding]) -> None:
+    """Add features to the attributes and parameters of a model."""
+    known: list[str] = model.feature_names_in_.tolist()
+    model.feature_names_in_ = np.array([*known, *names], dtype=object)
+    model.n_features_in_ = len(codings)
+    model.coding = [
+        (coding, [name]) for name, coding in zip(model.feature_names_in_, codings, strict=True)
+    ]
