@@ -52,7 +52,8 @@ def grow(
     """
     network, before = model.network_, model.network_.input_code
     n_before, n_units = len(before.codings), before.n_units
-    random = np.random.RandomState((model._weight_seed + n_before) % 2**32)
+    n_patterns = sum(coding.size for coding in before.codings)  # other ones in the next growth
+    random = np.random.RandomState((model._weight_seed + n_patterns) % 2**32)
     added = pairs_of_new(n_before, len(new), random)
     pairs = [*before.pairs, *added]
     if len(pairs) * n_units > most_columns:

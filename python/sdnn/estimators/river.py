@@ -35,7 +35,7 @@ def cleaned(x: Mapping[Any, Any]) -> dict[str, Any]:
     """Return a sample with strings as names and None for missing values."""
     sample = {str(name): value for name, value in x.items()}
     if len(sample) < len(x):
-        raise ValueError(f"the names of features must differ as text, got {shown(list(x))}")
+        raise ValueError(f"x must have names that differ as text, got {shown(list(x))}")
     for name, value in sample.items():
         if type(value) is str or (type(value) is float and math.isfinite(value)):
             continue
@@ -47,8 +47,8 @@ def cleaned(x: Mapping[Any, Any]) -> dict[str, Any]:
         except (OverflowError, TypeError, ValueError):
             is_finite = False
         if not is_finite:
-            expected = "be finite numbers, words, or None where they are missing"
-            raise ValueError(f"the values of x must {expected}, got {shown(value)} for {name!r}")
+            expected = "finite numbers, words, or None where they are missing"
+            raise ValueError(f"x must have {expected}, got {shown(value)} for {name!r}")
     return sample
 
 
@@ -230,10 +230,12 @@ class Waiting:
 
     def _begin(self) -> None:
         """Learn ranges, categories, classes and weights from the last samples."""
-        come = dict.fromkeys(
+        counts = collections.Counter(
             name for x in self.samples for name in sorted(x) if x[name] is not None
         )
-        names = sorted(list(come)[:MOST_FEATURES])  # whatever the order of the dictionaries
+        fewest = min(FEWEST, max(1, len(self.samples) // 20))
+        often = [name for name, count in counts.items() if count >= fewest]
+        names = sorted(often[:MOST_FEATURES])  # whatever the order of the dictionaries
         if not names:
             return
         self.reads, self.categories = {}, {}

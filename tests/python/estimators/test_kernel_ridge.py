@@ -1,6 +1,7 @@
 """Ridge regression and classification with the analytic kernel."""
 
 import pickle
+import time
 import tracemalloc
 
 import numpy as np
@@ -248,3 +249,13 @@ def test_targets_whose_squares_overflow_are_refused():
     model = SDNNKernelRidge().fit(samples, 1e139 * samples[:, 0])
     assert np.isfinite(model.predict(samples)).all()
     assert model.score(samples, 1e139 * samples[:, 0]) > 0.9
+
+
+@pytest.mark.parametrize("coding", ["random-inverse", "with-missing", "anchor", "circular"])
+def test_time_grows_with_columns_at_most_in_proportion(coding):
+    wide = np.random.RandomState(0).uniform(size=(40, 500))
+    begin = time.process_time()
+    SDNNKernelRidge(coding).fit(wide, wide[:, 0]).predict(wide)
+    assert time.process_time() - begin < 2
+    few = SDNNKernelRidge(coding).fit(wide[:, :2], wide[:, 0])
+    assert len({id(matrix) for matrix in few.kernel_._correlations}) == 1

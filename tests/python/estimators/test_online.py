@@ -12,7 +12,7 @@ from refusals import refuses
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import Circular, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators import OutOfRangeWarning
-from sdnn.estimators.network import FEW_SAMPLES, Network
+from sdnn.estimators.network import FEW_SAMPLES, FEW_TO_PREDICT, Network
 from sdnn.estimators.training import presented
 
 RANDOM = np.random.RandomState(0)
@@ -56,6 +56,19 @@ def test_one_at_a_time_has_the_bits_of_partial_fit(named):
     singly = [one.predict_one(row if named else x) for row, x in zip(ROWS, X, strict=True)]
     np.testing.assert_array_equal(singly, one.predict(frame))
     assert isinstance(singly[0], float)
+
+
+PREDICTING = [regressor, classifier, lambda: classifier(scheme="one_vs_one")]
+
+
+@pytest.mark.parametrize("kind", PREDICTING, ids=["regressor", "classifier", "one_vs_one"])
+def test_few_rows_have_the_bits_of_many(kind):
+    model = kind().fit(X, LABELS // 2)
+    expected = model.predict(X)
+    for n_rows in (1, 1, 1, 2, 9, 1, FEW_TO_PREDICT, FEW_TO_PREDICT + 1, 64, 65):
+        np.testing.assert_array_equal(model.predict(X[:n_rows]), expected[:n_rows])
+    assert len(model._networks_for(1)) > 1
+    assert all(network.predicts_in_bytes(1) for network in model._networks_for(1))
 
 
 @pytest.mark.parametrize("scheme", ["one_vs_rest", "one_vs_one"])
@@ -303,23 +316,96 @@ def test_names_of_river_streams_may_be_numbers():
     assert np.isfinite(model.predict_one(dict(enumerate(X[0]))))
 
 
-@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-@pytest.mark.parametrize("kind", ["regressor", "classifier"])
-def test_a_river_stream_goes_on_after_a_sample_that_cannot_be_learned(kind):
-    pytest.importorskip("river")
-    from sdnn.estimators.river import RiverClassifier, RiverRegressor
+BAD_SAMPLES = [{"a": float("inf")}, {"a": [1.0]}, {"a": 10**400}, {1: 0.5, "1": 0.5}]
 
-    model, targets = {
-        "regressor": (RiverRegressor(SDNNRegressor(**OPTIONS), grace_period=20), Y.tolist()),
-        "classifier": (RiverClassifier(SDNNClassifier(**OPTIONS), 20), LABELS.tolist()),
-    }[kind]
-    for number, (row, target) in enumerate(zip(ROWS[:50], targets, strict=False)):
-        if number == 19:
-            refuses("NaN", model.learn_one, row, target)
-        else:
-            model.learn_one({**row, "b": float("nan")} if number == 5 else row, target)
-    assert model.fitted is not None
-    assert model.predict_one(ROWS[0]) is not None
+
+def river_models(**options):
+    river = pytest.importorskip("sdnn.estimators.river")
+    regressor = SDNNRegressor(**OPTIONS, out_of_range="widen")
+    return [
+        river.RiverRegressor(regressor, **options),
+        river.RiverClassifier(SDNNClassifier(**OPTIONS), **options),
+    ]
+
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+@pytest.mark.parametrize("n_before", [0, 19, 40])
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_sample_that_cannot_be_learned_is_refused_alone(number, n_before):
+    model, other = (river_models(grace_period=20)[number] for _ in range(2))
+    targets = [Y.tolist(), LABELS.tolist()][number]
+    for row, target in zip(ROWS[:n_before], targets, strict=False):
+        model.learn_one(row, target)
+        other.learn_one(row, target)
+    for bad in BAD_SAMPLES:
+        refuses("x", model.learn_one, bad, targets[0])
+    for bad in (None, float("nan"), *([] if number else ["word"])):
+        refuses("y", model.learn_one, ROWS[0], bad)
+    for row, target in zip(ROWS[n_before:60], targets[n_before:], strict=False):
+        model.learn_one(row, target)
+        other.learn_one(row, target)
+    same(model.fitted, other.fitted)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("number", [0, 1])
+def test_rivers_checks_of_estimators_pass(number):
+    model = river_models()[number]
+    for check in pytest.importorskip("river.checks").yield_checks(model):
+        check(model.clone())
+
+
+def late_stream(n_samples):
+    """Numbers, of which one may be missing, words, and from sample 400 on more of both."""
+    random = np.random.RandomState(3)
+    for number in range(n_samples):
+        a, b, late = random.uniform(size=3).tolist()
+        x = {"a": a, "b": None if b < 0.1 else b, "word": "uv"[b > 0.5], "flag": a > 0.5}
+        if number >= 400:
+            x |= {"late": late, "word": random.choice(["u", "v", "w"]).item()}
+        yield x, a + x.get("late", 0.0) + 2 * (x["word"] == "w")
+
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+@pytest.mark.parametrize("n_pattern_units", [40, None, 2000])  # the last begins anew
+def test_features_and_categories_of_river_streams_may_come_late(n_pattern_units):
+    model, other = (river_models()[0] for _ in range(2))
+    errors = []
+    for one in (model, other):
+        one.model.set_params(n_pattern_units=n_pattern_units)
+        for x, y in late_stream(900):
+            errors.append(abs(one.predict_one(x) - y))
+            one.learn_one(x if one is model else dict(reversed(x.items())), y)
+    assert errors[:900] == errors[900:]
+    assert set(model.fitted.feature_names_in_) == {"a", "b", "flag", "late", "word"}
+    assert np.mean(errors[:900][-200:]) < 0.25
+    for x in ({}, {"late": 0.5}, {**ROWS[0], "new": 1}, {"word": "x", "a": "y", "late": pd.NA}):
+        predicted = model.predict_one(x)
+        model.learn_one(x, 1.0)
+        assert np.isfinite(predicted)
+        assert pickle.loads(pickle.dumps(model)).predict_one(x) == model.predict_one(x)
+
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+def test_growing_changes_no_prediction_and_survives_files(tmp_path):
+    pytest.importorskip("river")
+    from sdnn.estimators.growth import grow
+
+    model = river_models()[0]
+    for x, y in late_stream(300):
+        model.learn_one(x, y)
+    rows = [{**x, "flag": float(x["flag"])} for x, _ in late_stream(50)]
+    before = [model.fitted.predict_one(x) for x in rows]
+    names = model.fitted.feature_names_in_.tolist()
+    words = model.fitted.codings_[names.index("word")]
+    more = WithMissing(base=Symbolic(categories=(*words.base.categories, "w")))
+    new = {"new": WithMissing(base=UNIT).fit(X[:, 0], 40)}
+    assert not grow(model.fitted, new, {names.index("word"): more}, 100)
+    assert grow(model.fitted, new, {names.index("word"): more}, 2**20)
+    assert [model.fitted.predict_one(x) for x in rows] == before
+    model.fitted.learn_one({"new": 0.5, "word": "w"}, 0.5)
+    model.fitted.save(tmp_path / "grown.safetensors")
+    same(SDNNRegressor.load(tmp_path / "grown.safetensors"), model.fitted)
 
 
 def test_labels_of_equal_number_are_predicted_in_their_order():
@@ -330,24 +416,6 @@ def test_labels_of_equal_number_are_predicted_in_their_order():
     for row, label in zip(ROWS, ["red", "green", "blue", "blue", "green", "red"], strict=False):
         model.learn_one(row, label)
     assert model.predict_one(ROWS[0]) == "red"
-
-
-@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_features_of_river_streams_may_come_and_go():
-    pytest.importorskip("river")
-    from sdnn.estimators.river import RiverRegressor
-
-    with_gaps = RiverRegressor(SDNNRegressor("with-missing", **OPTIONS), grace_period=20)
-    without = RiverRegressor(SDNNRegressor(**OPTIONS), grace_period=20)
-    for number, (row, y) in enumerate(zip(ROWS[:60], Y, strict=False)):
-        sample = {name: row[name] for name in NAMES if number % 5 or name != "c"}
-        with_gaps.learn_one(sample, y)
-        if number < 20 or "c" in sample:
-            without.learn_one(row, y)
-    lacking = {name: ROWS[0][name] for name in "abd"}
-    assert with_gaps.predict_one(lacking) == with_gaps.predict_one({**lacking, "c": None})
-    for use in (without.predict_one, lambda x: without.learn_one(x, 0.5)):
-        refuses("x", use, lacking)
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
@@ -370,22 +438,6 @@ def test_ranges_of_a_river_stream_are_followed():
     assert np.mean(errors[True][-500:]) < 0.5 * np.mean(errors[False][-500:])
 
 
-@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_the_order_of_names_in_a_river_stream_does_not_matter():
-    pytest.importorskip("river")
-    from sdnn.estimators.river import RiverRegressor
-
-    one, other = (
-        RiverRegressor(SDNNRegressor("with-missing", **OPTIONS), grace_period=20) for _ in range(2)
-    )
-    for row, y in zip(ROWS[:40], Y, strict=False):
-        one.learn_one(row, y)
-        other.learn_one(dict(reversed(row.items())), y)
-    assert one.predict_one(ROWS[50]) == other.predict_one(dict(reversed(ROWS[50].items())))
-    assert one.predict_one({**ROWS[50], "a": None}) == other.predict_one({**ROWS[50], "a": None})
-    refuses("names", one.learn_one, {1: 0.5, "1": 0.5}, 0.5)
-
-
 def test_classes_of_a_river_stream_may_come_late():
     pytest.importorskip("river")
     from sdnn.estimators.river import RiverClassifier
@@ -403,7 +455,7 @@ def test_classes_of_a_river_stream_may_come_late():
     assert set(model.predict_proba_one(ROWS[0])) == {"low", "middle", "high"}
     for label in (3, 2.5, None):
         refuses("y", model.learn_one, ROWS[0], label)
-    refuses("x", model.learn_one, {"other": 1.0}, "highest")
+    refuses("x", model.learn_one, {"other": [1.0]}, "highest")
     assert len(model.fitted.classes_) == 3  # none is added by an error
     numbers = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=20)
     for row, label in zip(ROWS[:30], LABELS, strict=False):

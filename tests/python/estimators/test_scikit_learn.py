@@ -1,6 +1,7 @@
 """The estimators keep scikit-learn's rules."""
 
 import dataclasses
+import inspect
 import pickle
 import subprocess
 import sys
@@ -260,9 +261,16 @@ def test_parameters_are_kept_as_they_were_given(estimator):
 
 
 def test_docstrings_name_every_parameter(estimator):
-    documented = estimator.__doc__.partition("Attributes\n")[0]
+    documented = inspect.getdoc(estimator).partition("Attributes\n")[0]
     for name in estimator.get_params(deep=False):
         assert documented.count(f"\n{name} : ") == 1, name
+
+
+@pytest.mark.parametrize("docstring", [None, "My estimator."])
+def test_subclasses_need_no_docstring(estimator, docstring):
+    mine = type("Mine", (type(estimator),), {"__doc__": docstring})
+    assert mine.__doc__ == docstring
+    assert mine().get_params() == type(estimator)().get_params()
 
 
 def test_it_works_where_scikit_learn_puts_it(estimator):
