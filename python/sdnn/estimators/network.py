@@ -89,24 +89,26 @@ class InputCode:
 
     @functools.cached_property
     def _even(self) -> tuple[Any, ...] | None:
-        """Return inputs in pairs, ranges and numbers of bins, if all bins have equal width."""
+        """Return inputs in pairs, ranges, half widths and numbers of bins, if all bins are even."""
         codings = [present(self.codings[index]) for index in self.used]
         ranges = [coding.even_range() for coding in codings]
-        if any(ends is None or not ends[0] / 2 < ends[1] / 2 for ends in ranges):
+        if any(ends is None for ends in ranges):
             return None
         every = self.used == list(range(len(self.codings)))
         low, high = np.array(ranges, dtype=np.float64).T
+        half_width = high / 2 - low / 2  # 0 for a column that had one value only
+        half_width[half_width == 0] = 1
         sizes = np.array([coding.size for coding in codings], dtype=np.int32)
-        return slice(None) if every else np.array(self.used), low, high, sizes
+        return slice(None) if every else np.array(self.used), low, high, half_width, sizes
 
     def bins_of_row(self, row: Array) -> Ints:
         """Return the bins of one sample; equal-width bins are found together, which is faster."""
         if self._even is None or row.dtype != np.float64:
             return self.bins(row[None])
-        used, low, high, sizes = self._even
+        used, low, high, half_width, sizes = self._even
         values = row[used]
         inside = np.minimum(np.maximum(values, low), high)
-        where = (inside / 2 - low / 2) / (high / 2 - low / 2)  # as in `sdnn.coding.numeric`
+        where = (inside / 2 - low / 2) / half_width  # as in `sdnn.coding.numeric`
         is_missing = values != values
         where[is_missing] = 0
         bins: Ints = np.minimum((where * sizes).astype(np.int32), sizes - 1)
