@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,14 +63,16 @@ def grow(
     model._require_memory(network.n_units, 1, n_units, codings, pairs)
     tables: dict[int, Table] = {}  # by identity: pairs share them
 
-    def of(table: Table, index: int) -> Table:
+    def lengthened(table: Table, index: int) -> Table:
         if id(table) not in tables:
             tables[id(table)] = longer(table, codings[index].size, random)
         return tables[id(table)]
 
-    modified = [of(table, mu) for (mu, _), table in zip(before.pairs, before.modified, strict=True)]
+    modified = [
+        lengthened(table, mu) for (mu, _), table in zip(before.pairs, before.modified, strict=True)
+    ]
     modifiers = [
-        np.ones((codings[nu].size, n_units), np.int8) if mu == nu else of(table, nu)
+        np.ones((codings[nu].size, n_units), np.int8) if mu == nu else lengthened(table, nu)
         for (mu, nu), table in zip(before.pairs, before.modifiers, strict=True)
     ]
     patterns = {nu: table for (_, nu), table in zip(before.pairs, modifiers, strict=True)}
@@ -84,17 +86,12 @@ def grow(
     code = InputCode(codings, pairs, modified, modifiers)
     weights = np.zeros((network.n_units, code.core.n_columns), dtype=np.int32)
     weights[:, : before.core.n_columns] = network.weights
-    model.network_ = Network(code, network.n_units, weights=weights, thresholds=network.thresholds)
-    model._earlier = ()
-    note_inputs(model, list(new), codings)
+    names = [*model.feature_names_in_.tolist(), *new]
+    work = model._scratch()
+    work.network_ = Network(code, network.n_units, weights=weights, thresholds=network.thresholds)
+    work._earlier = ()
+    work.feature_names_in_ = np.array(names, dtype=object)
+    work.n_features_in_ = len(names)
+    work.coding = [(coding, [name]) for coding, name in zip(codings, names, strict=True)]
+    model.__dict__ = work.__dict__
     return True
-
-
-def note_inputs(model: BaseSDNN, names: Sequence[str], codings: Sequence[Coding]) -> None:
-    """Add features to the attributes and parameters of a model."""
-    known: list[str] = model.feature_names_in_.tolist()
-    model.feature_names_in_ = np.array([*known, *names], dtype=object)
-    model.n_features_in_ = len(codings)
-    model.coding = [
-        (coding, [name]) for name, coding in zip(model.feature_names_in_, codings, strict=True)
-    ]

@@ -141,7 +141,7 @@ class FollowedRanges:
 class Waiting:
     """Collects the first samples, from which ranges, categories and classes are learned.
 
-    Later features and categories are learned from the last samples, once they have come in some.
+    Later features and categories are learned from the last samples, once several have them.
     """
 
     usual: Any  # the model where none is given
@@ -289,52 +289,60 @@ class Waiting:
         if n_last < max(self.grace_period, min(self.n_learned // 10, REMEMBERED)):
             return
         self.n_before_news = None
-        counts = collections.Counter(
-            (name, None if name not in self.reads else self.reads[name](value))
-            for x in self.samples
-            for name, value in x.items()
-            if self._is_new(name, value)
-        )
-        often = [item for item, n in counts.items() if n >= FEWEST]
-        new = sorted(name for name, _ in often if name not in self.reads)
-        new = new[: MOST_FEATURES - len(self.reads)] if isinstance(self.model.pairs, str) else []
-        changed: dict[int, Coding] = {}
-        for index, (name, coding) in enumerate(
-            zip(list(self.reads), self.fitted.codings_, strict=True)
-        ):
-            more = sorted(
-                (value for other, value in often if other == name),
-                key=lambda value: (isinstance(value, str), value),
-            )
-            if more:
-                base: Any = present(coding)
-                known = (*base.categories, *more)[:MOST_CATEGORIES]
-                base = dataclasses.replace(base, categories=known)
-                changed[index] = dataclasses.replace(coding, base=base)
+        new, changed = self._frequent_news()
         if not (new or changed):
             return
         before = self.reads.copy(), self.categories.copy()
         try:
-            self._grow(new, changed, n_last)
+            has_grown = self._grow(new, changed)
         except BaseException:
             self.reads, self.categories = before
             raise
+        if has_grown:
+            for x, y in list(zip(self.samples, self.targets, strict=True))[-n_last:]:
+                self._learn(self._sample(x), y)
 
-    def _grow(self, new: list[str], changed: Mapping[int, Coding], n_last: int) -> None:
-        """Learn new features and categories from the last samples, or begin anew with these."""
-        unfitted = self._codings([*self.reads, *new], new)
+    def _frequent_news(self) -> tuple[list[str], dict[int, Coding]]:
+        """Return new features, and the codings of others with new categories, by their numbers.
+
+        They are in several of the last samples.
+        """
+        counts = collections.Counter(
+            (name, self.reads[name](value) if name in self.reads else None)
+            for x in self.samples
+            for name, value in x.items()
+            if self._is_new(name, value)
+        )
+        often = [news for news, count in counts.items() if count >= FEWEST]
+        new: list[str] = []
+        if isinstance(self.model.pairs, str):  # listed pairs have none of new features
+            new = sorted(name for name, _ in often if name not in self.reads)
+        changed: dict[int, Coding] = {}
+        for index, name in enumerate(self.reads):
+            categories = [category for other, category in often if other == name]
+            if categories:
+                categories.sort(key=lambda category: (isinstance(category, str), category))
+                coding: Any = self.fitted.codings_[index]
+                every = (*coding.base.categories, *categories)[:MOST_CATEGORIES]
+                base = dataclasses.replace(coding.base, categories=every)
+                changed[index] = dataclasses.replace(coding, base=base)
+        return new[: MOST_FEATURES - len(self.reads)], changed
+
+    def _grow(self, new: list[str], changed: Mapping[int, Coding]) -> bool:
+        """Add features and categories; return False where the model begins anew instead."""
+        names = list(self.reads)
+        unfitted = self._codings([*names, *new], new)
         frame = self._frame()[new]
         n_units = self.fitted.network_.input_code.n_units
         codings = self.fitted._fit_codings(unfitted, frame.to_numpy(dtype=object), n_units)
         added = dict(zip(new, codings, strict=True))
         if not grow(self.fitted, added, changed, self.most_columns):
             self._begin()
-            return
+            return False
         self._follow(unfitted, codings, frame)
         for index, coding in changed.items():
-            self.categories[list(self.reads)[index]] = set(cast(Any, present(coding)).categories)
-        for x, y in list(zip(self.samples, self.targets, strict=True))[-n_last:]:
-            self._learn(self._sample(x), y)
+            self.categories[names[index]] = set(cast(Any, coding).base.categories)
+        return True
 
 
 class RiverRegressor(Waiting, base.Regressor):
