@@ -212,11 +212,15 @@ class Waiting:
         codings: list[Coding] = []
         for name in new:
             coding = chosen[name]
-            self.reads[name] = number if present(coding).is_numeric else unchanged
-            if self.reads[name] is number and any(
-                isinstance(x.get(name), str) and number(x[name]) is None for x in self.samples
-            ):
+            values = [value for x in self.samples if (value := x.get(name)) is not None]
+            n_texts = sum(isinstance(value, str) for value in values)
+            if not present(coding).is_numeric:
+                is_mixed = coding.learns and 0 < n_texts < len(values)
+                self.reads[name] = str if is_mixed else unchanged
+            elif n_texts and any(number(value) is None for value in values):
                 coding, self.reads[name] = Symbolic(), str
+            else:
+                self.reads[name] = number
             codings.append(coding if isinstance(coding, WithMissing) else WithMissing(base=coding))
         return codings
 
