@@ -51,7 +51,8 @@ def pattern_key(coding: Coding) -> Hashable:
     """Return what the correlations of a fitted coding depend on: all but its range or categories.
 
     >>> from sdnn.coding import Symbolic
-    >>> pattern_key(Symbolic(categories="ab")) == pattern_key(Symbolic(categories="cd"))
+    >>> letters, numbers = Symbolic(categories=("a", "b")), Symbolic(categories=(1, 2))
+    >>> pattern_key(letters) == pattern_key(numbers)
     True
     """
     if type(coding) not in CODINGS.values():
