@@ -402,7 +402,7 @@ class ParallelPerceptron {
     }
   }
 
-  static constexpr std::size_t kFewQueries = 8;  // for which no narrow weights are made
+  static constexpr std::size_t kFewQueries = 8;      // for which no narrow weights are made
   static constexpr std::size_t kChangesPerWord = 4;  // from which pair by pair is quicker
   static constexpr std::size_t kSweptAtOnce = std::size_t{1} << 32;
   static constexpr std::size_t kAddedAtOnce = std::size_t{1} << 36;  // of which most are skipped
