@@ -21,6 +21,7 @@ from sdnn._core import (
     SDNNCConfig as SDNNCConfig,
     SensorConfig as SensorConfig,
 )
+from sdnn.arguments import explains_names
 
 
 class Field(NamedTuple):
@@ -66,6 +67,7 @@ def _complete(kind: Any) -> None:
     kind.__dataclass_fields__ = vars(like)["__dataclass_fields__"]
     kind.__annotations__ = like.__annotations__
     kind.__signature__ = inspect.signature(like).replace(return_annotation=inspect.Signature.empty)
+    explains_names()(kind)
 
 
 (WARM_UP,) = fields_of(Controller)

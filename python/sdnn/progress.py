@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import time
 from collections.abc import Hashable
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -12,12 +16,33 @@ if TYPE_CHECKING:
 
 _SPEED_SECONDS = 60.0
 """Time over which the speed is averaged for the time left."""
+_NOTEBOOK_SECONDS = 0.25
+"""Time between two changes of a notebook's output."""
+
+
+def is_shown() -> bool:
+    """Return whether bars are seen: on a terminal, unless it cannot move its cursor, or a notebook.
+
+    A log, a pipe and a captured standard error show none.
+    """
+    if sys.stderr is not None and sys.stderr.isatty():
+        return os.environ.get("TERM", "") not in ("dumb", "unknown")
+    return "IPython" in sys.modules and _console().is_jupyter
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    return Console(stderr=True)
 
 
 class ProgressBars:
-    """Shows a bar for each task on a terminal, and nothing elsewhere; a context manager."""
+    """Shows a bar for each task on a terminal or in a notebook, and nothing elsewhere.
 
-    def __init__(self, console: Console) -> None:
+    A context manager. By default bars are on standard error.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
         from rich.progress import (
             BarColumn,
             Progress,
@@ -26,6 +51,10 @@ class ProgressBars:
             TimeRemainingColumn,
         )
 
+        console = _console() if console is None else console
+        self._is_notebook = console.is_jupyter
+        self._output: Any = None  # of a notebook, where rich would need ipywidgets
+        self._due = 0.0
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -34,17 +63,32 @@ class ProgressBars:
             TimeRemainingColumn(compact=True),
             console=console,
             transient=True,
-            disable=not console.is_terminal,
+            disable=not console.is_terminal or self._is_notebook,
             speed_estimate_period=_SPEED_SECONDS,
         )
         self._tasks: dict[Hashable, TaskID] = {}
 
     def __enter__(self) -> Self:
         self._progress.start()
+        self._draw()
         return self
 
     def __exit__(self, *_error: object) -> None:
         self._progress.stop()
+        self._due = 0.0
+        self._draw()
+
+    def _draw(self) -> None:
+        """Change the output of a notebook, where it is time."""
+        now = time.monotonic()
+        if not self._is_notebook or now < self._due:
+            return
+        self._due = now + _NOTEBOOK_SECONDS
+        if self._output is None:
+            self._output = import_module("IPython.display").DisplayHandle()
+            self._output.display(self._progress, include=["text/html"])
+        else:
+            self._output.update(self._progress, include=["text/html"])
 
     def add(self, key: Hashable, title: str, total: int | None) -> None:
         """Open the bar of a task, if it is not there."""
@@ -55,6 +99,7 @@ class ProgressBars:
         """Move a bar; ``description`` is another title, ``news`` the text behind it."""
         if key in self._tasks:
             self._progress.update(self._tasks[key], completed=done, **fields)
+            self._draw()
 
     def remove(self, key: Hashable) -> None:
         """Remove a bar."""

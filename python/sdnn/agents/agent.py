@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 
 from sdnn.agents.base import Approximator, BaseAgent, Learning
 from sdnn.agents.batches import unbatched
+from sdnn.agents.callbacks import ProgressBarCallback, listed
 from sdnn.agents.episode import Transition
+from sdnn.agents.names import explained
 from sdnn.agents.training import Training, TrainingResult
 from sdnn.arguments import argument_error, blamed, flag, require, reward_of, shown, whole
+from sdnn.progress import is_shown
 
 if TYPE_CHECKING:
     from sdnn.agents.callbacks import Callback
@@ -30,8 +33,9 @@ class Agent(BaseAgent[Approximator, Learning]):
     Parameters
     ----------
     observation_space : gymnasium.Space
-        Any that Gymnasium flattens to a vector: Box, Dict, Tuple, Discrete, ...
-    action_space : gymnasium.Space
+        Any that Gymnasium flattens to a vector: Box, Dict, Tuple, Discrete, ... Or the environment,
+        whose two spaces are taken: `SDNNSarsa(env)`.
+    action_space : gymnasium.Space, optional
         Box with finite bounds, Discrete, MultiDiscrete or MultiBinary.
     approximator, learning : optional
         Settings of the agent's parts; sizes are taken from the spaces.
@@ -113,14 +117,9 @@ class Agent(BaseAgent[Approximator, Learning]):
             raise ValueError(f"observation must not hold NaN, got {vector}")
         return vector
 
-    def learn(
-        self,
-        transition: Transition | None = None,
-        environment: int = 0,
-        *,
-        total_timesteps: Any = None,
-    ) -> None:
-        """Learn one transition; ``total_timesteps`` is refused: `train` runs a whole training.
+    @explained
+    def learn(self, transition: Transition, environment: int = 0) -> None:
+        """Learn one transition; `train` runs a whole training.
 
         Any action of the space can be learned, not only that of the last `act` (except by
         `FuzzyQLearning`); of a ``Box`` the nearest one is. A terminated transition begins no
@@ -137,14 +136,12 @@ class Agent(BaseAgent[Approximator, Learning]):
             If a weight would leave its range. Earlier transitions, or other dimensions of the
             action, may have been learned: load a checkpoint.
         """
-        self._check_environment(environment)
-        if total_timesteps is not None:
-            given = shown(total_timesteps)
-            raise TypeError(
-                f"total_timesteps must be None, got {given}: train(env, steps=...) learns so long"
-            )
         if not isinstance(transition, Transition):
-            raise TypeError(f"transition must be a Transition, got {shown(transition)}")
+            raise TypeError(
+                f"transition must be a Transition, got {shown(transition)}: train(env, steps=...)"
+                " learns in an environment"
+            )
+        self._check_environment(environment)
         observation, action, reward, next_observation, terminated, next_mask = transition
         self._controller.learn(
             self._observations.vector("observation", observation),
@@ -224,41 +221,40 @@ class Agent(BaseAgent[Approximator, Learning]):
                 raise
             raise argument_error("action_masks", problem) from error
 
+    @explained
     def train(
         self,
         env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any],
-        *,
         steps: int | None = None,
+        *,
         episodes: int | None = None,
         seed: int | None = None,
         callbacks: Iterable[Callback] = (),
-        progress: bool = False,
+        progress: bool | None = None,
         evaluate_every: int | None = None,
         evaluation_env: gym.Env[Any, Any] | None = None,
         evaluation_episodes: int = 10,
     ) -> TrainingResult:
         """Learn in an environment, or in all of a vector; see `sdnn.agents.Training`.
 
-        With ``progress`` a line on a terminal shows how far it is. Without ``seed``, episodes
-        follow from the agent's, and a second call has other ones. Scheduled settings such as
-        ``final_learning_rate`` run through their schedule in each call.
+        With ``progress`` a bar in a terminal or notebook shows how far it is, by default where the
+        training takes longer than 5 s. Without ``seed``, episodes follow from the agent's, and a
+        second call has other ones. Scheduled settings such as ``final_learning_rate`` run through
+        their schedule in each call.
 
         Examples
         --------
         >>> import gymnasium as gym
         >>> from sdnn.agents import SDNNQLearning
         >>> env = gym.make("CartPole-v1")
-        >>> agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)
+        >>> agent = SDNNQLearning(env, seed=1)
         >>> result = agent.train(env, steps=200)
         >>> result.n_steps
         200
         """
-        if flag("progress", progress):
-            from rich.console import Console
-
-            from sdnn.agents.callbacks import ProgressBarCallback
-
-            callbacks = [*callbacks, ProgressBarCallback(Console(stderr=True), "learning")]
+        if progress is None or flag("progress", progress):
+            bar = ProgressBarCallback("learning", seconds=0.0 if progress else None)
+            callbacks = [*listed(callbacks), *([bar] if is_shown() else [])]
         training = Training(
             self,
             env,

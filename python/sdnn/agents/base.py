@@ -15,6 +15,13 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents.adapters import Statistics, read_statistics
+from sdnn.agents.matching import (
+    Observed,
+    require_same_variables,
+    require_unbatched,
+    spaces_of,
+)
+from sdnn.agents.names import explained
 from sdnn.agents.scaling import Scaling
 from sdnn.agents.spaces import (
     Actions,
@@ -24,7 +31,6 @@ from sdnn.agents.spaces import (
     Ranges,
     action_space_of,
     observation_space_of,
-    require_unbatched,
     space_data,
     space_of,
     space_of_error,
@@ -79,11 +85,14 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
     _tables: Sequence[NDArray[np.int8]] = ()
     _scaling: Scaling | None = None
     _next_episode = 0  # of `train` without a seed
+    has_bounds = True
+    """Whether its spaces are those of an environment: else it was made in C++, of ranges."""
 
+    @explained
     def __init__(
         self,
-        observation_space: gym.Space[Any],
-        action_space: gym.Space[Any],
+        observation_space: Observed,
+        action_space: gym.Space[Any] | None = None,
         *,
         approximator: Approximator | None = None,
         learning: Learning | None = None,
@@ -94,10 +103,11 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         inputs: Inputs = "all",
         warm_up_steps: int = WARM_UP.default,
     ) -> None:
-        self._take_spaces(observation_space, action_space)
-        require_unbatched(observation_space, action_space)
+        observations, actions = spaces_of(observation_space, action_space)
+        self._take_spaces(observations, actions)
+        require_unbatched(observations, actions)
         try:
-            space_data(observation_space)  # what could not be saved had better not be learned
+            space_data(observations)  # what could not be saved had better not be learned
         except TypeError as error:
             raise TypeError(f"observation_space {error}") from None
         self._take_settings(
@@ -113,10 +123,27 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         self._make(tables=list(self._tables))
 
     def _take_spaces(self, observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
-        self.observation_space = observations
-        self.action_space = actions
         self._observations = Observations(observations)
         self._actions = Actions(actions)
+
+    @property
+    def observation_space(self) -> gym.Space[Any]:
+        """The space of the observations, whose bounds environments must have.
+
+        May be set to one with other bounds, where the units are the same: ranges stay.
+        """
+        return self._observations.space
+
+    @observation_space.setter
+    def observation_space(self, space: gym.Space[Any]) -> None:
+        observations = Observations(space)
+        require_same_variables(self.observation_space, space)
+        self._observations, self.has_bounds = observations, True
+
+    @property
+    def action_space(self) -> gym.Space[Any]:
+        """The space of the actions."""
+        return self._actions.space
 
     def _take_settings(self, approximator: Any, learning: Any, seed: Any, steps: Any) -> None:
         for name, part in (("approximator", approximator), ("learning", learning)):
@@ -249,6 +276,7 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         write_file(path_of("path", path), "agent", self.state(), self.description())
 
     @classmethod
+    @explained
     def load(cls, path: str | Path) -> Self:
         """Read an agent that `save` wrote.
 
@@ -267,6 +295,9 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
             more["wrappers"] = msgspec.to_builtins(self.wrappers)
         if self._next_episode:
             more["next_episode"] = self._next_episode
+        if self.has_bounds:
+            more["observation_space"] = space_data(self.observation_space)
+            more["action_space"] = space_data(self.action_space)
         return {
             "class": type(self).__name__,
             "kind": self.kind,
@@ -276,8 +307,6 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
             "observation": values_of(self._observation),
             "action": values_of(self._action),
             "warm_up_steps": self._warm_up_steps,
-            "observation_space": space_data(self.observation_space),
-            "action_space": space_data(self.action_space),
             **more,
         }
 
@@ -297,6 +326,7 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         else:  # it was made in C++
             observations = observation_space_of(agent._observation)
             actions = action_space_of(agent._action)
+            agent.has_bounds = False
         agent._take_spaces(observations, actions)
         agent._take_settings(
             cls.approximator_type(**description["approximator"]),
@@ -355,6 +385,7 @@ def read_agent(path: Path, *kinds: str) -> tuple[Any, Description, Arrays]:
         raise ValueError(f"{path} is damaged: {error}") from error
 
 
+@explained
 def load_agent(path: str | Path) -> Agent[Any, Any]:
     """Read an agent of any kind that `Agent.save` wrote; see `Agent.load`."""
     agent: Agent[Any, Any] = read_agent(path_of("path", path), "agent", "training")[0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from sdnn.agents.training import Training
 
 MOST_BYTES_OF_ROWS = 2**32
+SHOWN_AFTER = 5.0
+"""Seconds of a training after which its bar appears."""
 
 Row: TypeAlias = Mapping[str, Any]
 """An episode (``kind``, ``step``, ``episode``, ``return``, ``length``, ``terminated``, and with
@@ -227,22 +230,36 @@ class Schedule(Callback):
 
 
 class ProgressBarCallback(Callback):
-    """Shows the bar of one training, with its last returns and evaluation."""
+    """Shows the bar of one training, with its last returns and evaluation.
+
+    It appears after some seconds of a training, by default `SHOWN_AFTER`.
+    """
 
     step_interval = 64  # an update costs more than a step
 
-    def __init__(self, console: Console, title: str) -> None:
-        self._bars = ProgressBars(console)
-        self._title = title
+    def __init__(
+        self, title: str, *, seconds: float | None = None, console: Console | None = None
+    ) -> None:
+        self._title, self._console = title, console
+        self._seconds = SHOWN_AFTER if seconds is None else seconds
+        self._bars: ProgressBars | None = None
         self._returns: deque[float] = deque(maxlen=20)
         self._evaluation = ""
 
     def on_start(self, training: Training) -> None:
-        """Open the bar."""
-        total = training.steps if training.steps is not None else training.episodes
-        self._bars.add(self, self._title, total)
-        self._bars.update(self, _done(training))
-        self._bars.__enter__()
+        """Open the bar, where it need not wait."""
+        self._due = time.monotonic() + self._seconds
+        self._open(training)
+
+    def _open(self, training: Training) -> ProgressBars | None:
+        """Return the bar, opened where it is time; None before."""
+        if self._bars is None and time.monotonic() >= self._due:
+            self._bars = ProgressBars(self._console)
+            total = training.steps if training.steps is not None else training.episodes
+            self._bars.add(self, self._title, total)
+            self._bars.update(self, _done(training))
+            self._bars.__enter__()
+        return self._bars
 
     def on_row(self, training: Training, row: Row) -> None:
         """Remember what is new."""
@@ -253,12 +270,16 @@ class ProgressBarCallback(Callback):
 
     def on_step(self, training: Training) -> None:
         """Move the bar."""
-        news = f"return {median(self._returns):.4g}" if self._returns else ""
-        self._bars.update(self, _done(training), news=news + self._evaluation)
+        if (bars := self._open(training)) is not None:
+            news = f"return {median(self._returns):.4g}" if self._returns else ""
+            bars.update(self, _done(training), news=news + self._evaluation)
 
     def on_end(self, training: Training) -> None:
         """Remove the bar."""
-        self._bars.__exit__()
+        if self._bars is not None:
+            self._bars.update(self, _done(training))
+            self._bars.__exit__()
+            self._bars = None
 
 
 class TensorBoard(Callback):

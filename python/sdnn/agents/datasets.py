@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sdnn.agents.agent import Agent
 from sdnn.agents.episode import Transition
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
+from sdnn.agents.names import explained
 from sdnn.arguments import (
     argument_error,
     array_of,
@@ -45,6 +46,7 @@ _Logged: TypeAlias = tuple[str, Transition, bool]
 """Where a transition is, the transition, and whether its episode was truncated after it."""
 
 
+@explained
 def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> int:
     """Learn logged transitions in their order; they are read one by one, so memory stays small.
 

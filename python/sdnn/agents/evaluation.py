@@ -23,7 +23,8 @@ from sdnn.agents.adapters import (
     step_env,
 )
 from sdnn.agents.episode import EVALUATION, episode_seed
-from sdnn.agents.spaces import require_same_kind
+from sdnn.agents.matching import require_same_kind
+from sdnn.agents.names import explained
 from sdnn.arguments import has_methods, require, seed_of, whole
 from sdnn.display import Displayed
 
@@ -78,6 +79,7 @@ class Evaluation(Displayed):
         }
 
 
+@explained
 def evaluate(
     agent: Acts,
     env: gym.Env[Any, Any],

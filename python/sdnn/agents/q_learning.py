@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn import _core
 from sdnn.agents.agent import Agent
 from sdnn.agents.base import Approximator, Learning
+from sdnn.agents.matching import Observed
+from sdnn.agents.names import explained
 from sdnn.agents.spaces import AnglePairs, Inputs, Ranges
 from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.arguments import choice, real, whole
@@ -167,10 +169,11 @@ class CodedAgent(ValueAgent[Approximator, Learning], abc.ABC, Generic[Approximat
 
     presets: ClassVar[Mapping[str, Preset]]
 
+    @explained
     def __init__(
         self,
-        observation_space: gym.Space[Any],
-        action_space: gym.Space[Any],
+        observation_space: Observed,
+        action_space: gym.Space[Any] | None = None,
         *,
         approximator: Approximator | None = None,
         learning: Learning | None = None,

@@ -40,7 +40,7 @@ class Observations:
     """
 
     def __init__(self, space: gym.Space[Any]) -> None:
-        self._space = space
+        self.space = space
         self._shape = space.shape if isinstance(space, gym.spaces.Box) else None
         self._low, self._high = flat_bounds(space)
         self.n_variables = self._low.size
@@ -74,7 +74,7 @@ class Observations:
             angles=angles,
             angle_pairs=pairs,
             find_angle_pairs=isinstance(angle_pairs, str) and angle_pairs == "find",
-            symbols=list(_symbols_of(self._space)),
+            symbols=list(_symbols_of(self.space)),
             relevant_only=is_list or inputs == "relevant",
             inputs=() if isinstance(inputs, str) else inputs,
         )
@@ -83,10 +83,10 @@ class Observations:
         """Return the variables of an observation, in any shape; ValueError if it is none."""
         if self._shape is None:
             try:
-                _check_parts(self._space, observation)
-                return np.asarray(gym.spaces.flatten(self._space, observation), np.float64)
+                _check_parts(self.space, observation)
+                return np.asarray(gym.spaces.flatten(self.space, observation), np.float64)
             except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-                problem = f"must be of {self._space}, got {shown(observation)}"
+                problem = f"must be of {self.space}, got {shown(observation)}"
                 raise argument_error(name, problem) from error
         is_plain = type(observation) is np.ndarray and observation.dtype.kind in "fiub"
         values = observation if is_plain else array_of(name, observation)
@@ -196,9 +196,9 @@ class Actions:
     """
 
     def __init__(self, space: gym.Space[Any]) -> None:
-        self._space = space
+        self.space = space
         self.is_box = isinstance(space, gym.spaces.Box)
-        wholes = _wholes(space)
+        wholes = wholes_of(space)
         self.n_actions = [last - first + 1 for first, last in wholes or ()]
         if isinstance(space, gym.spaces.Box):
             low, high = np.ravel(space.low), np.ravel(space.high)
@@ -210,7 +210,7 @@ class Actions:
                 f" got {type(space).__name__}"
             )
         if not np.isfinite([low, high]).all():
-            problem = f"must have finite bounds, got {_line(space)}"
+            problem = f"must have finite bounds, got {in_a_line(space)}"
             remedy = (
                 "gymnasium.wrappers.TransformAction(env, lambda action: action,"
                 " gymnasium.spaces.Box(low, high)) gives it such"
@@ -267,7 +267,7 @@ class Actions:
         try:
             return array_of("action", action)
         except ValueError:
-            raise ValueError(f"action must be in {self._space}, got {shown(action)}") from None
+            raise ValueError(f"action must be in {self.space}, got {shown(action)}") from None
 
 
 def space_of_error(error: ValueError, observations: Observations, actions: Actions) -> str:
@@ -289,88 +289,7 @@ def space_of_error(error: ValueError, observations: Observations, actions: Actio
     return ", ".join(found if argument else ())
 
 
-def require_unbatched(observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
-    """Check that spaces are not the batched ones of a vector environment; ValueError if they are.
-
-    These are a Box with rows of equal bounds, one for each environment, and as many actions.
-    """
-    n = observations.shape[0] if observations.shape else 0
-    is_batched = _has_equal_rows(observations) and (
-        _has_equal_rows(actions)
-        or (isinstance(actions, gym.spaces.MultiDiscrete) and len(set(actions.nvec.flat)) == 1)
-    )
-    if is_batched and actions.shape is not None and actions.shape[0] == n:
-        raise ValueError(
-            "observation_space and action_space must be those of one environment, got those of"
-            f" {n}: a vector has them as single_observation_space and single_action_space; where"
-            " rows are no environments, gymnasium.wrappers.FlattenObservation flattens them"
-        )
-
-
-def _has_equal_rows(space: gym.Space[Any]) -> bool:
-    if not isinstance(space, gym.spaces.Box) or len(space.shape) < 2:
-        return False
-    return bool((space.low == space.low[:1]).all() and (space.high == space.high[:1]).all())
-
-
-def require_same_kind(agent: Any, env: Any) -> None:
-    """Check that an agent can learn in an environment, or in each of a vector.
-
-    Observations must be possible in the agent's space, but for bounds; there must be as many
-    actions. Where the agent's run scaled its observations, the environment must scale them, too.
-    An environment without spaces is not checked.
-
-    Raises
-    ------
-    ValueError
-        If it does not fit.
-    """
-    scaling = getattr(agent, "scaling", None)
-    if scaling is not None and not _is_unit(_space_of(env, "observation_space")):
-        raise ValueError(
-            "env must give observations scaled to [0, 1], as the agent's run did"
-            f" ({scaling.words() or 'from which ranges is not known'}): UnitSensors(env,"
-            " *agent.scaling.ends) of sdnn.environments, or Run.open(folder).config.environment"
-            " of sdnn.runs"
-        )
-    for name, fits in (("observation_space", _can_observe), ("action_space", _acts_alike)):
-        own, found = getattr(agent, name, None), _space_of(env, name)
-        if own is not None and found is not None and not fits(own, found):
-            raise ValueError(f"env must have the agent's {name}, {_line(own)}, got {_line(found)}")
-
-
-def _space_of(env: Any, name: str) -> Any:
-    return getattr(env, f"single_{name}", getattr(env, name, None))
-
-
-def _is_unit(space: Any) -> bool:
-    if not isinstance(space, gym.spaces.Box):
-        return space is None
-    return bool((space.low >= 0.0).all() and (space.high <= 1.0).all())
-
-
-def _can_observe(own: gym.Space[Any], found: gym.Space[Any]) -> bool:
-    if isinstance(own, gym.spaces.Dict) and isinstance(found, gym.spaces.Dict):
-        return own.keys() == found.keys() and all(_can_observe(own[key], found[key]) for key in own)
-    if isinstance(own, gym.spaces.Tuple) and isinstance(found, gym.spaces.Tuple):
-        return len(own) == len(found) and all(map(_can_observe, own, found))
-    found_wholes, own_wholes = _wholes(found), _wholes(own)
-    if isinstance(own, gym.spaces.Box):
-        has_numbers = isinstance(found, gym.spaces.Box) or found_wholes is not None
-        return has_numbers and own.shape == found.shape
-    if own.shape != found.shape or found_wholes is None or own_wholes is None:
-        return False
-    pairs = zip(found_wholes, own_wholes, strict=True)
-    return all(mine[0] <= one[0] and one[1] <= mine[1] for one, mine in pairs)
-
-
-def _acts_alike(own: gym.Space[Any], found: gym.Space[Any]) -> bool:
-    if isinstance(own, gym.spaces.Box) and isinstance(found, gym.spaces.Box):
-        return own.low.size == found.low.size
-    return _wholes(own) is not None and _wholes(own) == _wholes(found)
-
-
-def _wholes(space: gym.Space[Any]) -> list[tuple[int, int]] | None:
+def wholes_of(space: gym.Space[Any]) -> list[tuple[int, int]] | None:
     """Return the first and the last whole number of each dimension; None for other spaces."""
     if isinstance(space, gym.spaces.Discrete):
         return [(int(space.start), int(space.start) + int(space.n) - 1)]
@@ -382,7 +301,8 @@ def _wholes(space: gym.Space[Any]) -> list[tuple[int, int]] | None:
     return None
 
 
-def _line(space: gym.Space[Any]) -> str:
+def in_a_line(space: gym.Space[Any]) -> str:
+    """Return a space in one line, for a message."""
     return " ".join(str(space).split())
 
 

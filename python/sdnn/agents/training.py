@@ -25,7 +25,8 @@ from sdnn.agents.base import SavedTraining, read_training, write_training
 from sdnn.agents.callbacks import listed, listeners
 from sdnn.agents.episode import Episodes, Learner
 from sdnn.agents.evaluation import evaluate
-from sdnn.agents.spaces import require_same_kind
+from sdnn.agents.matching import require_same_kind
+from sdnn.agents.names import explained
 from sdnn.arguments import flag, has_methods, path_of, require, shown, whole
 from sdnn.display import Displayed
 from sdnn.interrupts import Interrupts
@@ -138,12 +139,13 @@ class Training:
     500
     """
 
+    @explained
     def __init__(
         self,
         agent: Learner,
         env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any],
-        *,
         steps: int | None = None,
+        *,
         episodes: int | None = None,
         seed: int | None = 0,
         first_episode: int = 0,
@@ -302,6 +304,7 @@ class Training:
         write_training(path_of("path", path), self.agent, saved)
 
     @classmethod
+    @explained
     def load(
         cls,
         path: str | Path,

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from sdnn.cli.bench import bench
-from sdnn.cli.common import exit_interrupted
+from sdnn.cli.common import exit_interrupted, explained_option
 from sdnn.cli.evaluate import evaluate
 from sdnn.cli.export import export
 from sdnn.cli.plot import plot
@@ -64,6 +64,8 @@ class _Commands(click.Group):
         """
         try:
             return super().invoke(ctx)
+        except click.NoSuchOption as error:
+            raise explained_option(error) from None
         except KeyboardInterrupt:
             exit_interrupted("Interrupted.")
         except OSError as error:

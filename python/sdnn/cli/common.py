@@ -15,6 +15,9 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from sdnn.arguments import advice
+from sdnn.progress import is_shown
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -67,6 +70,26 @@ def option_of(key: str) -> str:
     if key.startswith("environment.ranges"):
         return " ".join(["--range", *key.split(".")[2:]])
     return "ENV_ID" if key in ("environment", "environment.id") else f"--set {key}"
+
+
+def explained_option(error: click.NoSuchOption) -> click.UsageError:
+    """Return the error about an unknown option with the option or the key it may mean."""
+    context = error.ctx
+    options = {} if context is None else {
+        name.lstrip("-").replace("-", "_"): name
+        for parameter in context.command.params
+        for name in (*parameter.opts, *parameter.secondary_opts)
+        if name.startswith("--")
+    }  # fmt: skip
+    elsewhere = {}
+    if "set" in options:
+        from sdnn.runs.settings import KEYS_BY_NAME
+
+        elsewhere = {name: option_of(key) for name, key in KEYS_BY_NAME.items()}
+        elsewhere = {n: f"{o}=..." if o.startswith("--set") else o for n, o in elsewhere.items()}
+        elsewhere["environment"] = "the argument ENV_ID"
+    words = advice(error.option_name, options.values(), elsewhere | options)
+    return click.UsageError(f"No such option: {error.option_name}: {words}", context)
 
 
 def option_words(error: ConfigError) -> str:
@@ -197,12 +220,10 @@ def train_run(
 ) -> None:
     """Train a run, with a line of progress on a terminal, and print the result."""
     callbacks = []
-    if sys.stderr.isatty():
-        from rich.console import Console
-
+    if is_shown():
         from sdnn.agents.callbacks import ProgressBarCallback
 
-        callbacks.append(ProgressBarCallback(Console(stderr=True), run.spec.task))
+        callbacks.append(ProgressBarCallback(run.spec.task, seconds=0.0))
     outcome = run.train(
         steps=steps, episodes=episodes, callbacks=callbacks, repeat_episodes=repeat_episodes
     )

@@ -12,7 +12,7 @@ from sklearn.utils.metaestimators import available_if
 from sklearn.utils.multiclass import _ovr_decision_function, unique_labels
 
 from sdnn import _core
-from sdnn.arguments import require, shown
+from sdnn.arguments import explains_names, require, shown
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.fitted import mean_of
 from sdnn.estimators.inputs import Array, Floats, Ints, check_labels, class_labels
@@ -28,6 +28,7 @@ STEEPNESS = 6.0  # of the softmax of scores
 Self = TypeVar("Self", bound="SDNNClassifier")
 
 
+@explains_names()
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class SDNNClassifier(ClassifierMixin, BaseSDNN):
     """Classification by a selective desensitization neural network, exact and online.

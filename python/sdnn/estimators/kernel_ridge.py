@@ -17,7 +17,7 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
-from sdnn.arguments import real
+from sdnn.arguments import explains_names, real
 from sdnn.coding import Coding
 from sdnn.estimators.inputs import (
     Array,
@@ -156,6 +156,7 @@ class BaseKernelRidge(CodedInputs):
         return outputs
 
 
+@explains_names()
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
     """Kernel ridge regression with the network's kernel, as for infinitely many units.
@@ -227,6 +228,7 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
         return outputs[:, 0] if self._flat else outputs
 
 
+@explains_names()
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
     """Classification by kernel ridge with the network's kernel, on one-hot targets.

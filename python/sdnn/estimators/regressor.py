@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sdnn.arguments import require, shown
+from sdnn.arguments import explains_names, require, shown
 from sdnn.estimators.base import BaseSDNN, OutOfRangeWarning
 from sdnn.estimators.fitted import mean_of
 from sdnn.estimators.inputs import Array, CodedRegressor, Floats, Ints
@@ -22,6 +22,7 @@ FURTHEST = 1e300  # largest end of an output range, so that its width is finite
 Self = TypeVar("Self", bound="SDNNRegressor")
 
 
+@explains_names()
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class SDNNRegressor(CodedRegressor, BaseSDNN):
     """Regression by a selective desensitization neural network, exact and online.

@@ -32,8 +32,8 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.agents.callbacks import Row
+from sdnn.agents.matching import require_same_kind
 from sdnn.agents.q_learning import ValueAgent
-from sdnn.agents.spaces import require_same_kind
 from sdnn.display import Displayed
 from sdnn.files import lock, open_to_append, remove_abandoned_files, write_whole
 from sdnn.interrupts import Interrupts

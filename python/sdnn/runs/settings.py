@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import copy
 import dataclasses
-import difflib
 import functools
 import inspect
 import itertools
@@ -21,7 +20,8 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from sdnn.arguments import blamed, shown
+from sdnn.agents.registry import AGENTS
+from sdnn.arguments import advice, blamed, shown
 from sdnn.config import WARM_UP, ProtocolConfig, fields_of
 from sdnn.runs.errors import ConfigError
 
@@ -159,19 +159,6 @@ def _problem(possible: Iterable[Any], text: str) -> str:
     return f"must be {expected[:1].lower() + expected[1:]}"
 
 
-def possible_words(word: str, possible: Iterable[str]) -> str:
-    """List what is possible, the most similar to a word first.
-
-    Examples
-    --------
-    >>> possible_words("discont", ("epsilon", "discount"))
-    'possible: discount, epsilon'
-    """
-    known = tuple(possible)
-    near = difflib.get_close_matches(word, known, n=3, cutoff=0.5)
-    return "possible: " + (", ".join([*near, *(w for w in known if w not in near)]) or "none")
-
-
 def check_names(values: Any, possible: Iterable[str], where: str = "", hint: str = "") -> None:
     """Check that a table has no other keys than the possible ones; ConfigError if it has."""
     if not isinstance(values, Mapping):
@@ -179,7 +166,7 @@ def check_names(values: Any, possible: Iterable[str], where: str = "", hint: str
     known = tuple(possible)
     for name in values:
         if name not in known:
-            words = possible_words(str(name), known)
+            words = advice(str(name), known, KEYS_BY_NAME)
             raise ConfigError(_path(where, name), f"unknown key; {words}{hint}")
 
 
@@ -323,6 +310,21 @@ class OutputSpec(Settings, frozen=True):
     tensorboard: bool = False
     """Write the numbers for TensorBoard, too."""
 
+
+_TABLES: dict[str, tuple[Any, ...]] = {
+    "approximator": tuple(entry.approximator for entry in AGENTS.values()),
+    "learning": tuple(entry.learning for entry in AGENTS.values()),
+    "agent": (AgentSpec,), "protocol": (ProtocolSpec,), "budget": (BudgetSpec,),
+    "output": (OutputSpec,),
+}  # fmt: skip
+
+KEYS_BY_NAME = {"environment": "environment", "agent": "agent", "seed": "seed"} | {
+    name: f"{table}.{name}"
+    for table, kinds in _TABLES.items()
+    for kind in kinds
+    for name in names_of(kind)
+}
+"""The keys of a specification, with dots between tables, by their last names."""
 
 _REPLACED = {
     "budget.steps": "budget.episodes",

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from msgspec import Meta
 
 from sdnn.agents.registry import default_agent, labels, split_label
+from sdnn.arguments import advice
 from sdnn.runs.config_file import ConfigFile
 from sdnn.runs.environment import find_module, search_folder
 from sdnn.runs.errors import ConfigError
@@ -26,7 +27,6 @@ from sdnn.runs.settings import (
     check_names,
     checked,
     overridden,
-    possible_words,
     read,
 )
 from sdnn.runs.spec import RunSpec
@@ -122,7 +122,7 @@ class StudyFile(Study):
         default = next((name for name in (DEFAULT, BASE) if name in known), known[0])
         reference = default if header.reference is None else header.reference
         if reference not in known:
-            words = f"no variant {reference!r}; {possible_words(reference, known)}"
+            words = f"no variant {reference!r}; {advice(reference, known)}"
             raise self.file.error(("study", "reference"), words)
         variants = tuple(sorted(variants, key=lambda one: one.id != reference))
         pairs = [
@@ -148,7 +148,7 @@ class StudyFile(Study):
         self.cases, self.variants = cases, variants
         for name in only:
             if name not in known:
-                raise ValueError(f"no variant {name!r}; {possible_words(name, known)}")
+                raise ValueError(f"no variant {name!r}; {advice(name, known)}")
         self.pairs = tuple(pair for pair in self.pairs if not only or pair[1] in only)
 
     def additions(self, comparison: Comparison) -> Addition:
@@ -252,7 +252,7 @@ class StudyFile(Study):
     def _read_agents(self) -> Iterator[tuple[str, Layer]]:
         for agent in self._table("agents"):
             if agent not in labels():
-                words = possible_words(agent, labels())
+                words = advice(agent, labels())
                 raise self.file.error(("agents", agent), f"no such agent; {words}")
             layer = self._layer(("agents", agent), self._table("agents", agent))
             if ("agent", "name") in layer:
@@ -268,7 +268,7 @@ class StudyFile(Study):
                 raise self.file.error(
                     ("study", "cases", number),
                     f"no case {case_id!r}: neither a table [cases.{case_id}] nor a case of the"
-                    f" paper; {possible_words(case_id, known)}",
+                    f" paper; {advice(case_id, known)}",
                 )
         ids = tables if listed is None else listed
         for case_id in tables:
@@ -315,7 +315,7 @@ class StudyFile(Study):
             only = checked(tuple[str, ...], table.pop("only", ()), dotted((*where, "only")))
             for number, case_id in enumerate(only):
                 if case_id not in known:
-                    words = f"no case {case_id!r}; {possible_words(case_id, known)}"
+                    words = f"no case {case_id!r}; {advice(case_id, known)}"
                     raise self.file.error((*where, "only", number), words)
             check_names(of_cases, only or known, dotted((*where, "cases")))
             in_cases = {

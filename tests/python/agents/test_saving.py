@@ -358,7 +358,7 @@ def test_a_file_is_whole_or_not_there(saved, tmp_path):
     refuses("agent", agent.save, path, error=FileNotFoundError)
     agent.save(tmp_path / "agent")
     before = (tmp_path / "agent").read_bytes()
-    agent.observation_space = gym.spaces.Graph(PLANE, None)
+    agent._observations.space = gym.spaces.Graph(PLANE, None)
     refuses("Graph", agent.save, tmp_path / "agent", error=TypeError)
     assert (tmp_path / "agent").read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == ["agent"]
