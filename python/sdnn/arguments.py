@@ -250,7 +250,7 @@ _MEANINGS: Mapping[tuple[str, ...], tuple[str, ...]] = {
     ("gamma", "discount_factor", "discount_rate"): ("discount",),
     ("alpha", "lr", "eta", "eta0", "step_size", "learning_rate_init"): (
         "learning_rate", "learning_coefficient", "correction_share"),
-    ("learning_rate",): ("correction_share",),
+    ("learning_rate",): ("learning_coefficient", "correction_share"),
     ("gae_lambda", "lam", "lambda_", "lamda", "trace_lambda"): ("trace_decay",),
     ("eps", "start_e", "epsilon_start", "initial_epsilon", "exploration_initial_eps",
      "exploration_rate"): ("epsilon",),
@@ -326,8 +326,8 @@ def advice(
     hints += map(elsewhere.__getitem__, difflib.get_close_matches(name, elsewhere, 1, 0.8))
     sentence = next((meaning for meaning in meanings if " " in meaning), "")
     hint = f"did you mean {hints[0]}? " if hints else f"{sentence}; " if sentence else ""
-    listed = ", ".join(dict.fromkeys([*near, *known])) or "none"
-    return f"{hint}possible: {listed}"
+    listed = ", ".join(dict.fromkeys([*near, *known]))
+    return f"{hint}possible: {listed}" if known else hint.strip("; ")
 
 
 def explains_names(

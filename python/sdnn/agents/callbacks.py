@@ -196,7 +196,7 @@ class Schedule(Callback):
     >>> import gymnasium as gym
     >>> from sdnn.agents import Schedule, SDNNQLearning
     >>> env = gym.make("MountainCarContinuous-v0")
-    >>> agent = SDNNQLearning(env.observation_space, env.action_space)
+    >>> agent = SDNNQLearning(env)
     >>> halves = Schedule(epsilon=lambda progress: 0.2 if progress < 0.5 else 0.0)
     >>> agent.train(env, steps=100, callbacks=[halves]).n_steps
     100

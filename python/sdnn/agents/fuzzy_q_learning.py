@@ -32,7 +32,7 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     >>> import gymnasium as gym, sdnn
     >>> from sdnn.agents import FuzzyQLearning
     >>> env = gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0")
-    >>> agent = FuzzyQLearning(env.observation_space, env.action_space, seed=1)
+    >>> agent = FuzzyQLearning(env, seed=1)
     >>> agent.train(env, steps=3).n_steps
     3
     >>> agent.n_rules

@@ -230,7 +230,7 @@ warm_up_steps
     >>> import gymnasium as gym, sdnn
     >>> from sdnn.agents import SDNNQLearning, Transition
     >>> env = gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0")
-    >>> agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)
+    >>> agent = SDNNQLearning(env, seed=1)
     >>> observation, _ = env.reset(seed=1)
     >>> agent.begin_episode()
     >>> for _ in range(3):
@@ -303,7 +303,7 @@ class RBFQLearning(ValueAgent[RBFNetworkConfig, QLearningConfig]):
     >>> import gymnasium as gym, sdnn
     >>> from sdnn.agents import RBFQLearning
     >>> env = gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0")
-    >>> agent = RBFQLearning(env.observation_space, env.action_space, seed=1)
+    >>> agent = RBFQLearning(env, seed=1)
     >>> agent.train(env, steps=3).n_steps
     3
     >>> observation, _ = env.reset(seed=1)

@@ -46,7 +46,7 @@ class SDNNSarsa(CodedAgent[LinearSDNNConfig, SarsaConfig]):
     >>> import gymnasium as gym
     >>> from sdnn.agents import SDNNSarsa
     >>> env = gym.make("CartPole-v1")
-    >>> agent = SDNNSarsa(env.observation_space, env.action_space, seed=1)
+    >>> agent = SDNNSarsa(env, seed=1)
     >>> result = agent.train(env, steps=1500, seed=1)
     >>> agent.q_values(env.reset(seed=2)[0]).shape
     (2,)

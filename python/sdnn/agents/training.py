@@ -129,12 +129,12 @@ class Training:
     >>> import gymnasium as gym
     >>> from sdnn.agents import SDNNQLearning, Training
     >>> env = gym.make("MountainCarContinuous-v0")
-    >>> agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)
+    >>> agent = SDNNQLearning(env, seed=1)
     >>> training = Training(agent, env, steps=500)
     >>> training.run().n_steps
     500
     >>> envs = gym.make_vec("Pendulum-v1", num_envs=4, vectorization_mode="sync")
-    >>> agent = SDNNQLearning(envs.single_observation_space, envs.single_action_space, seed=1)
+    >>> agent = SDNNQLearning(envs, seed=1)
     >>> agent.train(envs, steps=500).n_steps
     500
     """

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sdnn.arguments import advice
 from sdnn.cli.common import (
     KEYS,
     OLD_FILE,
@@ -177,6 +178,8 @@ def train(
 
 def _given(env_id: str | None, options: dict[str, Any]) -> dict[str, Any]:
     """Return the values of the options by their keys; UsageError if two options set the same."""
+    from sdnn.runs.settings import KEYS_BY_NAME
+
     given = given_values(options)
     by_option = {key: (option_of(key), value) for key, value in given.items()}
 
@@ -200,7 +203,8 @@ def _given(env_id: str | None, options: dict[str, Any]) -> dict[str, Any]:
             give(f"--range {name}", f"environment.ranges.{name}", ends)
     for name, text in named_values("--set", options["settings"]):
         if "." not in name:
-            raise click.UsageError(f"--set {name}: must be TABLE.NAME, such as learning.discount")
+            example = advice(name, (), KEYS_BY_NAME) or "such as learning.discount"
+            raise click.UsageError(f"--set {name}: must be TABLE.NAME; {example}")
         give(f"--set {name}", name, value_of(text))
     both = [by_option[key][0] for key in ("budget.steps", "budget.episodes") if key in given]
     if len(both) == 2:

@@ -166,8 +166,9 @@ def check_names(values: Any, possible: Iterable[str], where: str = "", hint: str
     known = tuple(possible)
     for name in values:
         if name not in known:
-            words = advice(str(name), known, KEYS_BY_NAME)
-            raise ConfigError(_path(where, name), f"unknown key; {words}{hint}")
+            path = _path(where, name)
+            others = {last: key for last, key in KEYS_BY_NAME.items() if not path.endswith(key)}
+            raise ConfigError(path, f"unknown key; {advice(str(name), known, others)}{hint}")
 
 
 def read(kind: type[AnySettings], values: Any, where: str = "") -> AnySettings:

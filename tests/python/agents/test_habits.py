@@ -1,18 +1,24 @@
 """Users of Stable-Baselines3 find what they look for; agents and results show what they are."""
 
+import inspect
+import re
+
 import gymnasium as gym
 import numpy as np
 import pytest
 
 from refusals import refuses
+from sdnn import SDNNRegressor
 from sdnn.agents import (
     Callback,
+    SarsaConfig,
     SaveBestAgent,
     SDNNSarsa,
     StopTrainingOnNoImprovement,
     Training,
     Transition,
     evaluate,
+    learn_from,
     load_agent,
 )
 
@@ -64,11 +70,47 @@ def test_predict_takes_batches_of_observations_in_parts(kind):
     refuses("observation", agent.predict, uneven)
 
 
-def test_learn_for_so_many_steps_is_told_of_train(trained):
-    with pytest.raises(
-        TypeError, match=r"total_timesteps must be None, got 1000: train\(env, steps"
-    ):
-        trained[0].learn(total_timesteps=1000)
+CALLS = {
+    SDNNSarsa: {
+        "policy": "approximator", "gamma": "learning=SarsaConfig(discount=...)", "env": "(env)",
+        "learning_rate": "SarsaConfig(learning_rate=...)", "learning_starts": "mean warm_up_steps",
+        "buffer_size": "omit it", "verbose": "train(env, progress=...)",
+    },
+    SDNNSarsa.learn: {"total_timesteps": "train(env, steps=...)"},
+    SDNNSarsa.train: {
+        "total_timesteps": "mean steps", "callback": "mean callbacks", "seeed": "mean seed",
+        "progress_bar": "mean progress",
+    },
+    Training: {"eval_env": "mean evaluation_env"},
+    evaluate: {"n_eval_episodes": "mean episodes"},
+    learn_from: {"n_epochs": "mean epochs"},
+    load_agent: {"env": "SDNNSarsa(env)"},
+    SarsaConfig: {"gamma": "mean discount"},
+    SDNNRegressor: {"epochs": "mean max_iter"},
+}  # fmt: skip
+"""Names that functions do not have, and what the error must have."""
+
+
+@pytest.mark.parametrize("function", CALLS, ids=str)
+def test_names_from_habit_are_explained(trained, function):
+    for name, hint in CALLS[function].items():
+        with pytest.raises(TypeError, match=f"^{name} .*{re.escape(hint)}") as refused:
+            function(*trained[:1], **{name: 1})
+        assert refused.value.argument == name
+
+
+def test_what_is_given_by_position(trained):
+    agent, env, _ = trained
+    assert agent.train(env, 20).n_steps == 20
+    envs = gym.make_vec("CartPole-v1", num_envs=2)
+    expected = SDNNSarsa(env.observation_space, env.action_space).description()
+    assert [SDNNSarsa(given).description() for given in (env, envs)] == [expected] * 2
+    refuses("gymnasium.make", SDNNSarsa, "CartPole-v1", error=TypeError)
+    refuses("SDNNSarsa", SDNNSarsa, error=TypeError)
+    refuses("action_space", SDNNSarsa, env.observation_space, error=TypeError)
+    refuses("steps", agent.learn, 200, error=TypeError)
+    refuses("steps", agent.train, env, steps="many")
+    assert "observation_space" in inspect.signature(SDNNSarsa).parameters
 
 
 def test_a_seed_that_is_none_is_drawn_and_kept():

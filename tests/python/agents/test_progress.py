@@ -17,7 +17,7 @@ def test_a_line_on_a_terminal_and_nothing_elsewhere(is_terminal, goal):
     agent = RBFQLearning(env.observation_space, env.action_space)
     text = StringIO()
     console = Console(file=text, force_terminal=is_terminal, width=120)
-    callbacks = [ProgressBarCallback(console, "Drifting")]
+    callbacks = [ProgressBarCallback("Drifting", seconds=0.0, console=console)]
     training = Training(
         agent,
         env,
@@ -38,3 +38,18 @@ def test_train_shows_it_where_it_is_asked_for(capsys):
     agent = RBFQLearning(env.observation_space, env.action_space)
     assert agent.train(env, steps=100, progress=True).n_steps == 100
     assert capsys.readouterr().out == ""
+
+
+def test_a_notebook_shows_it_where_a_training_is_long():
+    nbclient, nbformat = map(pytest.importorskip, ("nbclient", "nbformat"))
+    source = """
+import gymnasium as gym
+from sdnn.agents import RBFQLearning, callbacks
+callbacks.SHOWN_AFTER, env = {limit}, gym.make("Pendulum-v1")
+RBFQLearning(env).train(env, 500)"""
+    for limit, n_outputs in ((0.01, 2), (60.0, 1)):
+        cell = nbformat.v4.new_code_cell(source.format(limit=limit))
+        notebook = nbformat.v4.new_notebook(cells=[cell])
+        nbclient.NotebookClient(notebook, kernel_name="python3").execute()
+        assert len(cell.outputs) == n_outputs, cell.outputs
+        assert ("100%" in str(cell.outputs)) == (n_outputs == 2)

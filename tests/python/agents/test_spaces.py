@@ -22,9 +22,16 @@ class Spaces:
 
 
 OBSERVED = [
-    (PLANE, Box(-np.inf, 3.0, (2,), np.float64), True),
-    (PLANE, MultiDiscrete([4, 4]), True),
-    (PLANE, MultiBinary(2), True),
+    (PLANE, Box(-1.0, 1.0, (2,), np.float16), True),
+    (PLANE, Box(-1.0, 1.000001, (2,), np.float64), True),
+    (PLANE, Box(-1, 1, (2,), np.int64), True),
+    (PLANE, Box(-1.0, 1.001, (2,)), False),
+    (PLANE, Box(-np.inf, 3.0, (2,), np.float64), False),
+    (Box(-np.inf, np.inf, (2,)), PLANE, False),
+    (Box(np.finfo(np.float32).min, np.inf, (2,)), Box(-np.inf, np.inf, (2,), np.float64), True),
+    (PLANE, MultiDiscrete([4, 4]), False),
+    (Box(0, 1, (2,)), MultiBinary(2), True),
+    (Dict(a=PLANE), Dict(a=Box(-2.0, 2.0, (2,))), False),
     (Box(0.0, 4.0, ()), Discrete(5), True),
     (PLANE, Box(-1.0, 1.0, (3,)), False),
     (PLANE, Box(-1.0, 1.0, (2, 1)), False),
@@ -43,7 +50,8 @@ OBSERVED = [
     (Tuple((Discrete(2),)), Tuple((Discrete(2), PLANE)), False),
 ]
 ACTED = [
-    (PLANE, Box(-5.0, 1.0, (2, 1), np.float64), True),
+    (PLANE, Box(-1.0, 1.0, (2, 1), np.float64), True),
+    (PLANE, Box(-5.0, 1.0, (2,)), False),
     (PLANE, Box(-1.0, 1.0, (1,)), False),
     (PLANE, MultiBinary(2), False),
     (Discrete(3), Discrete(3, seed=1), True),
@@ -81,6 +89,20 @@ def test_long_spaces_are_told_in_a_line():
     with pytest.raises(ValueError, match="observation_space") as caught:
         require_same_kind(Spaces(wide), Spaces(PLANE))
     assert "\n" not in str(caught.value)
+
+
+def test_other_bounds_are_named_and_can_be_overruled(tmp_path):
+    agent = RBFQLearning(Tuple((Discrete(2), Box(-1, 1, (9,)))), Discrete(2))
+    high = np.array([1, 57.3] + [1] * 7, np.float32)
+    env = Spaces(Tuple((Discrete(2), Box(-high, high))), Discrete(2))
+    with pytest.raises(ValueError, match=r"variable 1 of \[1\] \(-57.3 to 57.3 instead of -1"):
+        require_same_kind(agent, env)
+    refuses("observation_space", setattr, agent, "observation_space", PLANE)
+    agent.observation_space = env.observation_space
+    agent.save(tmp_path / "agent")
+    for one in (agent, load_agent(tmp_path / "agent")):
+        require_same_kind(one, env)
+        assert one.observation_range[1][-1] == 1.0
 
 
 class Colour(enum.Enum):

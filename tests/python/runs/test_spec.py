@@ -78,7 +78,7 @@ def test_the_hash_is_that_of_what_fixes_the_rows():
 @pytest.mark.parametrize(
     ("values", "key", "words"),
     [
-        ({"sed": 1}, "sed", "unknown key; possible: seed"),
+        ({"sed": 1}, "sed", "unknown key; did you mean seed?"),
         ({"seed": -1}, "seed", "at least 0, got -1"),
         ({"seed": 2**64}, "seed", "at most"),
         ({"environment": {"noise": 1}}, "environment.id", "must be given"),
@@ -92,7 +92,9 @@ def test_the_hash_is_that_of_what_fixes_the_rows():
         ({"agent": {"name": "rbf", "preset": "paper"}}, "agent.preset", "omitted"),
         ({"agent": {"angles": [-1]}}, "agent.angles[0]", "at least 0"),
         ({"learning": 5}, "learning", "must be a table"),
-        ({"learning": {"discont": 1}}, "learning.discont", "unknown key; possible: discount"),
+        ({"budget": {"total_timesteps": 1}}, "budget.total_timesteps", "did you mean steps?"),
+        ({"agent": {"gamma": 1}}, "agent.gamma", "did you mean learning.discount?"),
+        ({"learning": {"discont": 1}}, "learning.discont", "unknown key; did you mean discount?"),
         ({"learning": {"discount": "x"}}, "learning.discount", "a number, got 'x'"),
         ({"learning": {"tie_rule": "x"}}, "learning.tie_rule", "one of 'uniform', 'lowest'"),
         ({"lerning": {"discount": 1}}, "lerning", "possible: learning"),

@@ -302,8 +302,8 @@ def test_what_own_settings_refuse_is_told_with_its_place(study, tmp_path, error)
 WRONG = {
     "toml": ("[base]\nlearning.discount 2\n", 2, "must be TOML"),
     "table": ("base = 2\n", 1, "base: must be a table, got 2"),
-    "top": ("[base]\n\n[axis]\n", 3, "axis: unknown key; possible: axes,"),
-    "study key": ("[study]\nseeds = 3\n", 2, "study.seeds: unknown key; possible: seed,"),
+    "top": ("[base]\n\n[axis]\n", 3, "axis: unknown key; did you mean axes?"),
+    "study key": ("[study]\nseeds = 3\n", 2, "study.seeds: unknown key; did you mean seed?"),
     "study value": ("[study]\ntrials = 'x'\n", 2, "study.trials: must be a whole number, got 'x'"),
     "trials": ("[study]\ntrials = 0\n", 2, "study.trials: must be a whole number of at least"),
     "too many trials": (
@@ -323,7 +323,7 @@ WRONG = {
     "case": (
         "[study]\ncases = [\n 's4',\n 's5-nois',\n]\n", 2,
         "study.cases[1]: no case 's5-nois': neither a table [cases.s5-nois] nor a case of the"
-        " paper; possible: s5-noise,",
+        " paper; did you mean s5-noise?",
     ),
     "unlisted case": (
         "[study]\ncases = ['s4']\n[cases.x]\n", 3,
@@ -340,7 +340,7 @@ WRONG = {
     ),
     "reference": (
         "[study]\nreference = 'slo'\n[cases.s4]\n[variants.slow]\n[variants.b]\n", 2,
-        "study.reference: no variant 'slo'; possible: slow, b",
+        "study.reference: no variant 'slo'; did you mean slow? possible: slow, b",
     ),
     "import": (
         "[study]\nimports = ['json',\n'not_there_at_all']\n", 2,
@@ -365,15 +365,15 @@ WRONG = {
     ),
     "section": (
         "[cases.s4]\n[base]\n\nlerning.discount = 0.5\n", 4,
-        "base.lerning.discount: unknown key; possible: learning,",
+        "base.lerning.discount: unknown key; did you mean learning?",
     ),
     "setting": (
         "[cases.s4]\n[base]\nlearning = { epsilon = 0.1, discont = 2 }\n", 3,
-        "base.learning.discont: unknown key; possible: discount,",
+        "base.learning.discont: unknown key; did you mean discount?",
     ),
     "setting of another agent": (
         "[cases.s4]\n[base]\nlearning.learning_rate = 0.1\n[variants.f]\nagent = 'fuzzy'\n", 3,
-        "base.learning.learning_rate: unknown key; possible: learning_coefficient,",
+        "base.learning.learning_rate: unknown key; did you mean learning_coefficient?",
     ),
     "no table": ("[cases.s4]\n[base]\nlearning = 3\n", 3, "base.learning: must be a table"),
     "float": (
