@@ -27,7 +27,7 @@ def test_the_page_shows_the_studies_as_they_are(name):
 @pytest.mark.parametrize(
     "name",
     [
-        "toml", "runs.engine", "runs.environment", "agents.registry", "runs.settings",
+        "toml", "runs.engine", "runs.environment", "agents.registry", "arguments",
         "runs.spec", "runs.report", "runs.results", "pages", "statistics",
     ],
 )  # fmt: skip

@@ -34,7 +34,7 @@ _OLD_API = (
 
 def require_single(name: str, env: Any) -> None:
     """Check that a value is one environment; TypeError that names the argument."""
-    has_methods(name, env, "a Gymnasium environment", "reset", "step")
+    has_methods(name, env, "an environment, as of gymnasium.make(id)", "reset", "step")
     if isinstance(env, gym.vector.VectorEnv):
         raise TypeError(
             f"{name} must be a single environment, got a vector of them, {type(env).__name__}"

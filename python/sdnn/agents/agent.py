@@ -78,6 +78,7 @@ class Agent(BaseAgent[Approximator, Learning]):
         self._check_environment(environment)
         self._controller.begin_episode(environment)
 
+    @explained
     def act(
         self, observation: Any, explore: bool = True, environment: int = 0, mask: Any = None
     ) -> Any:
@@ -174,6 +175,7 @@ class Agent(BaseAgent[Approximator, Learning]):
         parts = self._controller, self._observations.rows, actions.elements, actions.mask
         return parts if own == [Agent.act, Agent.learn] else None
 
+    @explained
     def predict(
         self,
         observation: Any,

@@ -26,7 +26,7 @@ def _elsewhere(agent: Any) -> Mapping[str, str]:
         for field in fields_of(kind):
             meaning = field.doc.partition(".")[0]
             inner = f"{part}={kind.__name__}({field.name}=...)"
-            places[field.name] = f"{agent_class.__name__}(env, {inner}), {meaning}:"
+            places[field.name] = f"{agent_class.__name__}(env, {inner}) ({meaning})"
     for name in inspect.signature(agent_class).parameters:
         places.setdefault(name, f"{agent_class.__name__}(env, {name}=...)")
     return places

@@ -158,7 +158,7 @@ class Training:
         reset_options: Callable[[int], Mapping[str, Any]] | None = None,
     ) -> None:
         has_methods("agent", agent, "an agent", "act", "learn", "begin_episode")
-        has_methods("env", env, "a Gymnasium environment", "reset", "step")
+        has_methods("env", env, "an environment, as of gymnasium.make(id)", "reset", "step")
         if evaluation_env is not None:
             require_single("evaluation_env", evaluation_env)
             if evaluation_env is env:

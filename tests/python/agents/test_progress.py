@@ -42,14 +42,11 @@ def test_train_shows_it_where_it_is_asked_for(capsys):
 
 def test_a_notebook_shows_it_where_a_training_is_long():
     nbclient, nbformat = map(pytest.importorskip, ("nbclient", "nbformat"))
-    source = """
-import gymnasium as gym
-from sdnn.agents import RBFQLearning, callbacks
-callbacks.SHOWN_AFTER, env = {limit}, gym.make("Pendulum-v1")
+    source = """import gymnasium as gym; from sdnn.agents import RBFQLearning, callbacks
+callbacks.SHOWN_AFTER, env = {}, gym.make("Pendulum-v1")
 RBFQLearning(env).train(env, 500)"""
     for limit, n_outputs in ((0.01, 2), (60.0, 1)):
-        cell = nbformat.v4.new_code_cell(source.format(limit=limit))
+        cell = nbformat.v4.new_code_cell(source.format(limit))
         notebook = nbformat.v4.new_notebook(cells=[cell])
         nbclient.NotebookClient(notebook, kernel_name="python3").execute()
-        assert len(cell.outputs) == n_outputs, cell.outputs
-        assert ("100%" in str(cell.outputs)) == (n_outputs == 2)
+        assert (len(cell.outputs), "100%" in str(cell.outputs)) == (n_outputs, n_outputs == 2)

@@ -121,7 +121,7 @@ def test_wrappers_that_have_seen_nothing_are_warned_of_by_name():
 def unbounded(env):
     """Return an environment with the bounds of one whose observations are normalized."""
     space = wrapped(NormalizeObservation).observation_space
-    return gym.wrappers.TransformObservation(env, lambda observation: observation, space)
+    return gym.wrappers.TransformObservation(env, lambda seen: seen, space)
 
 
 @pytest.mark.parametrize("learns_in", [0, 1])

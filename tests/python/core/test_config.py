@@ -78,7 +78,7 @@ def test_a_class_is_frozen_keyword_only_and_documented(kind):
         kind(first.default)
     with pytest.raises(AttributeError):
         setattr(kind(), first.name, first.default)
-    refuses("field", kind, nothing=1, error=TypeError)
+    refuses("nothing", kind, nothing=1, error=TypeError)
     names = [field.name for field in fields_of(kind)]
     assert list(inspect.signature(kind).parameters) == names
     assert [field.name for field in dataclasses.fields(kind)] == names

@@ -485,7 +485,7 @@ def arguments(agent, parameters):
         "learning_rate": None,
         "scaling": None,
         "epsilon": None,
-        "total_timesteps": None,
+        "observation_space": agent.observation_space,
         "state": None,
         "episode_start": None,
         "deterministic": True,

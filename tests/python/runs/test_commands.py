@@ -431,12 +431,8 @@ def test_several_environments_are_learned_in(invoke):
         (["CartPole-v1", "--set", "learning.discount"], "--set must be NAME=VALUE"),
         (["CartPole-v1", "--set", "discount=1"], "--set discount: must be TABLE.NAME"),
         (["CartPole-v1", "--set", "learning.discont=1"], "--set learning.discont: unknown"),
-        (
-            ["CartPole-v1", "--set", "gamma=1"],
-            "--set gamma: must be TABLE.NAME; did you mean learn",
-        ),
+        (["CartPole-v1", "--set", "gamma=1"], "did you mean learning.discount?"),
         (["CartPole-v1", "--gamma", "1"], "--gamma: did you mean --set learning.discount=...?"),
-        (["CartPole-v1", "--total-timesteps", "1"], "did you mean --steps?"),
         (["CartPole-v1", "--set", "a.b=1"], "--set a: unknown key"),
         (["CartPole-v1", "--set", "learning.discount=x"], "--set learning.discount: must be a"),
         (["CartPole-v1", "--set", "learning.discount=2"], "--set learning.discount: must"),
