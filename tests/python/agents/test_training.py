@@ -346,6 +346,11 @@ def test_what_several_learned_before_one_failed_is_kept(has_own_resets, tmp_path
     with pytest.raises(TimeoutError):
         training.run()
     careful = gym.vector.SyncVectorEnv([FailsOnce] * 2)
+    if has_own_resets:  # the observations of the other vector, not normalized
+        space = env.single_observation_space
+        careful = gym.wrappers.vector.TransformObservation(
+            careful, np.asarray, env.observation_space, space
+        )
     loaded = Training.load(path, careful, repeat_episodes=not has_own_resets)
     assert loaded.n_steps == training.n_steps == 64
     training.run()
