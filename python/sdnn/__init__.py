@@ -49,4 +49,14 @@ if TYPE_CHECKING:
         set_instruction_set as set_instruction_set,
     )
 
-__getattr__, __dir__, __all__ = attach(globals())
+__getattr__, __dir__, __all__ = attach(
+    __name__,
+    {
+        "sdnn": (
+            "agents approximators benchmarks coding environments estimators export kernel "
+            "reproduction runs"
+        ),
+        "sdnn.estimators": "SDNNClassifier SDNNKernelClassifier SDNNKernelRidge SDNNRegressor",
+        "sdnn.machine": "instruction_set set_instruction_set",
+    },
+)

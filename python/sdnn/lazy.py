@@ -2,39 +2,32 @@
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
 
 def attach(
-    namespace: dict[str, Any],
+    package: str, names: Mapping[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """Make ``__getattr__``, ``__dir__`` and ``__all__`` of a package from its imports.
+    """Make ``__getattr__``, ``__dir__`` and ``__all__`` of a package.
 
-    What a package imports under ``if TYPE_CHECKING:`` is thus written once, for type checkers,
-    for readers and for loading: ``from sdnn.module import Name as Name``, which type checkers take
-    for a public name. ``namespace`` is the package's ``globals()``.
+    ``names`` has the names of each module, with spaces between them; those of the package are its
+    modules. Type checkers see the same names by imports under ``if TYPE_CHECKING:``.
 
     Examples
     --------
-    >>> import sdnn
-    >>> load, names, public = attach(vars(sdnn))
-    >>> load("coding").__name__, "SDNNRegressor" in names(), "SDNNRegressor" in public
-    ('sdnn.coding', True, True)
+    >>> load, names, public = attach("sdnn", {"sdnn": "coding", "sdnn.estimators": "SDNNRegressor"})
+    >>> load("coding").__name__, names(), public
+    ('sdnn.coding', ['SDNNRegressor', 'coding'], ['SDNNRegressor', 'coding'])
     """
-    package = namespace["__name__"]
-    with open(namespace["__file__"], encoding="utf-8") as source:
-        blocks = [node for node in ast.parse(source.read()).body if isinstance(node, ast.If)]
-    imports = [node for block in blocks for node in block.body if isinstance(node, ast.ImportFrom)]
-    homes = {name.name: str(node.module) for node in imports for name in node.names}
+    modules = {name: module for module, listed in names.items() for name in listed.split()}
 
     def load(name: str) -> Any:
-        if name not in homes:
+        if name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        if homes[name] == package:  # a module of the package
+        if modules[name] == package:
             return import_module(f"{package}.{name}")
-        return getattr(import_module(homes[name]), name)
+        return getattr(import_module(modules[name]), name)
 
-    return load, lambda: sorted({*namespace, *homes}), sorted(homes)
+    return load, lambda: sorted(modules), sorted(modules)

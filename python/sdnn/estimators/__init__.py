@@ -23,15 +23,27 @@ if TYPE_CHECKING:
     from sdnn.estimators.outliers import OutlierWarning as OutlierWarning
     from sdnn.estimators.regressor import SDNNRegressor as SDNNRegressor
 
-_load, __dir__, __all__ = attach(globals())
+_load, __dir__, __all__ = attach(
+    __name__,
+    {
+        "sdnn.estimators.base": "OutOfRangeWarning",
+        "sdnn.estimators.classifier": "SDNNClassifier",
+        "sdnn.estimators.kernel_ridge": "SDNNKernelClassifier SDNNKernelRidge",
+        "sdnn.estimators.libsdnn": "read_model_file read_parameter_file",
+        "sdnn.estimators.outliers": "OutlierWarning",
+        "sdnn.estimators.regressor": "SDNNRegressor",
+    },
+)
 
 
 def __getattr__(name: str) -> Any:
     try:
         return _load(name)
     except ModuleNotFoundError as error:
-        if error.name is None or error.name.partition(".")[0] == "sdnn":
+        module = (error.name or "sdnn").partition(".")[0]
+        if module == "sdnn":
             raise
+        package = {"sklearn": "scikit-learn"}.get(module, module)
         raise ModuleNotFoundError(
-            f"{name} needs scikit-learn: pip install scikit-learn", name=error.name
+            f"{name} needs {package}: pip install {package}", name=error.name
         ) from error

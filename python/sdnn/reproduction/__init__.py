@@ -29,4 +29,13 @@ if TYPE_CHECKING:
         plan_trials as plan_trials,
     )
 
-__getattr__, __dir__, __all__ = attach(globals())
+__getattr__, __dir__, __all__ = attach(
+    __name__,
+    {
+        "sdnn.reproduction.cases": "EXPERIMENTS Case Experiment select_experiments",
+        "sdnn.reproduction.claims": "CLAIMS Claim judge_claims",
+        "sdnn.reproduction.cost": "CostConfig CostRecord",
+        "sdnn.reproduction.figures": "draw_cost draw_experiment",
+        "sdnn.reproduction.reproduce": "PaperStudy case_spec plan_trials",
+    },
+)

@@ -61,4 +61,23 @@ if TYPE_CHECKING:
     )
     from sdnn.statistics import Estimate as Estimate
 
-__getattr__, __dir__, __all__ = attach(globals())
+__getattr__, __dir__, __all__ = attach(
+    __name__,
+    {
+        "sdnn.agents.registry": "AGENTS AgentEntry agent_entry register",
+        "sdnn.runs.dask_executor": "DaskExecutor",
+        "sdnn.runs.engine": "Executor Observer PlannedTrial ThreadExecutor run_trials trial_seed",
+        "sdnn.runs.environment": "EnvironmentSpec",
+        "sdnn.runs.errors": (
+            "ClusterError ConfigError PlotUnavailableError RunError RunTerminatedError StoreError"
+            " WorkerLostError"
+        ),
+        "sdnn.runs.results": "CaseResult measure",
+        "sdnn.runs.run": "Goal Run RunEvaluation RunOutcome",
+        "sdnn.runs.settings": "AgentSpec BudgetSpec OutputSpec ProtocolSpec",
+        "sdnn.runs.spec": "RunSpec",
+        "sdnn.runs.store": "ResultStore",
+        "sdnn.runs.trial": "Trial TrialKey TrialRecord TrialRows",
+        "sdnn.statistics": "Estimate",
+    },
+)

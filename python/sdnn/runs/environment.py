@@ -22,7 +22,7 @@ from sdnn.bounds import flat_bounds
 from sdnn.environments import ActionMasks, NoisySensors, RedundantSensors, UnitSensors
 from sdnn.environments.sensors import in_own_units
 from sdnn.runs.errors import ConfigError, RunError
-from sdnn.runs.settings import Settings
+from sdnn.runs.settings import Settings, doc
 
 ALL = "all"
 """The key of the range of all variables that have no other."""
@@ -44,28 +44,52 @@ class EnvironmentSpec(Settings, frozen=True):
     to [0, 1]; values outside their ranges saturate. Without, the agent gets them as they are.
     """
 
-    id: Annotated[str, Meta(min_length=1)]
-    """What `gymnasium.make` is given: `Pendulum-v1`, or `module:namespace/Name-v0`, for which the
-    module is imported first.
-    """
-    kwargs: dict[str, Any] = msgspec.field(default_factory=dict)
-    """Arguments of the environment, and of `gymnasium.make`, such as `max_episode_steps`."""
-    ranges: dict[str, tuple[float, float]] = msgspec.field(default_factory=dict)
-    """(low, high) of observed variables by their numbers, from 0; `all`: of all others. By default
-    the bounds of the observation space.
-    """
-    noise: Annotated[float, Meta(ge=0)] = 0.0
-    """Standard deviation of Gaussian noise on every variable, in parts of its range."""
-    redundant: Annotated[int, Meta(ge=0, le=1000)] = 0
-    """Means of neighbouring variables to append to the observation, before the noise: of 0 and 1,
-    of 1 and 2, ..., of the last and 0, and so on in a circle.
-    """
-    action_masks: bool = False
-    """Whether agents take only the actions that `info["action_mask"]` allows, as Taxi's does."""
-    own_units: bool = False
-    """Whether noisy and redundant variables are given in the variables' own units, not scaled to
-    [0, 1]; a redundant one is the mean of two in [-1, 1].
-    """
+    id: Annotated[
+        str,
+        Meta(min_length=1),
+        doc(
+            "What `gymnasium.make` is given: `Pendulum-v1`, or `module:namespace/Name-v0`, "
+            "for which the module is imported first."
+        ),
+    ]
+    kwargs: Annotated[
+        dict[str, Any],
+        doc("Arguments of the environment, and of `gymnasium.make`, such as `max_episode_steps`."),
+    ] = msgspec.field(default_factory=dict)
+    ranges: Annotated[
+        dict[str, tuple[float, float]],
+        doc(
+            "(low, high) of observed variables by their numbers, from 0; `all`: of all "
+            "others. By default the bounds of the observation space."
+        ),
+    ] = msgspec.field(default_factory=dict)
+    noise: Annotated[
+        float,
+        Meta(ge=0),
+        doc("Standard deviation of Gaussian noise on every variable, in parts of its range."),
+    ] = 0.0
+    redundant: Annotated[
+        int,
+        Meta(ge=0, le=1000),
+        doc(
+            "Means of neighbouring variables to append to the observation, before the noise: "
+            "of 0 and 1, of 1 and 2, ..., of the last and 0, and so on in a circle."
+        ),
+    ] = 0
+    action_masks: Annotated[
+        bool,
+        doc(
+            'Whether agents take only the actions that `info["action_mask"]` allows, as '
+            "Taxi's does."
+        ),
+    ] = False
+    own_units: Annotated[
+        bool,
+        doc(
+            "Whether noisy and redundant variables are given in the variables' own units, not"
+            " scaled to [0, 1]; a redundant one is the mean of two in [-1, 1]."
+        ),
+    ] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

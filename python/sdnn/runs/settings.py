@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import ast
 import copy
 import dataclasses
 import functools
-import inspect
-import itertools
 import math
-import sys
 import types
 import typing
 from collections.abc import Iterable, Iterator, Mapping
@@ -48,10 +44,15 @@ _WORDS = {
 """Words for those of msgspec's messages."""
 
 
+def doc(text: str) -> Meta:
+    """Return the annotation of a setting that describes it."""
+    return Meta(description=text)
+
+
 class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A table of settings: frozen, checked when it is made.
 
-    A subclass declares each setting as a field: its type with bounds, its default and a docstring.
+    A subclass declares each setting as a field: its type with bounds and `doc`, and its default.
     Constructor, files, command-line options, JSON Schema and the documentation follow.
     Tables in it may be given as settings or as mappings. A `ConfigError`, whose ``key`` names the
     field, says that a value is of another type or out of its range.
@@ -79,28 +80,9 @@ def _kinds_of(kind: type[Any]) -> Mapping[str, Any]:
     return {name: hints.get(name, Any) for name in names_of(kind)}
 
 
-@functools.cache
-def _docstrings(module: str) -> Mapping[tuple[str, str], str]:
-    """Return the docstrings of the fields in a module's classes, by the names of both."""
-    tree = ast.parse(inspect.getsource(sys.modules[module]))
-    return {
-        (kind.name, field.target.id): " ".join(below.value.value.split())
-        for kind in tree.body
-        if isinstance(kind, ast.ClassDef)
-        for field, below in itertools.pairwise(kind.body)
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
-        if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
-        if isinstance(below.value.value, str)
-    }
-
-
 def schemas_of(*kinds: Any) -> dict[str, Any]:
     """Return the JSON Schemas of classes and of those in them, by name, as ``#/$defs/`` refers."""
     _, schemas = msgspec.json.schema_components(kinds, ref_template="#/$defs/{name}")
-    for kind in Settings.__subclasses__():
-        for name, found in schemas.get(kind.__name__, {}).get("properties", {}).items():
-            if text := _docstrings(kind.__module__).get((kind.__name__, name)):
-                found["description"] = text
     return schemas
 
 
@@ -229,51 +211,76 @@ _CORE = {field.name: field for field in fields_of(ProtocolConfig)}
 class AgentSpec(Settings, frozen=True):
     """Agent that learns."""
 
-    name: str | None = None
-    """The agent: `sdnn-linear`, `sdnn-c`, `rbf`, `fuzzy`, or one that was registered. By default
-    `sdnn-linear`.
-    """
-    preset: str | None = None
-    """Named settings: `general`, the default, or `paper`; of `sdnn-c` also `robust` or `small`.
-    `rbf` and `fuzzy` have none.
-    """
-    observation_range: Literal["adaptive"] | None = None
-    """`adaptive`: ranges of the observed variables come from a warm-up."""
-    angles: tuple[Index, ...] = ()
-    """Observed variables, from 0, that are angles: their ranges wrap around."""
-    angle_pairs: Literal["none", "find"] | tuple[tuple[Index, Index], ...] | None = None
-    """Which cosines and sines of an angle become one input: pairs of observed variables, from 0, or
-    those that the warm-up finds. By default `none`; of `sdnn-linear`, `find`, unless observations
-    are scaled.
-    """
-    inputs: Literal["all", "relevant"] | tuple[Index, ...] | None = None
-    """Which observed variables are inputs: `all`; those that the warm-up finds `relevant`; or a
-    list, from 0, of some that are inputs in any case, beside the relevant ones. By default `all`;
-    of `sdnn-linear`, `relevant`.
-    """
+    name: Annotated[
+        str | None,
+        doc(
+            "The agent: `sdnn-linear`, `sdnn-c`, `rbf`, `fuzzy`, or one that was registered. "
+            "By default `sdnn-linear`."
+        ),
+    ] = None
+    preset: Annotated[
+        str | None,
+        doc(
+            "Named settings: `general`, the default, or `paper`; of `sdnn-c` also `robust` or"
+            " `small`. `rbf` and `fuzzy` have none."
+        ),
+    ] = None
+    observation_range: Annotated[
+        Literal["adaptive"] | None,
+        doc("`adaptive`: ranges of the observed variables come from a warm-up."),
+    ] = None
+    angles: Annotated[
+        tuple[Index, ...],
+        doc("Observed variables, from 0, that are angles: their ranges wrap around."),
+    ] = ()
+    angle_pairs: Annotated[
+        Literal["none", "find"] | tuple[tuple[Index, Index], ...] | None,
+        doc(
+            "Which cosines and sines of an angle become one input: pairs of observed "
+            "variables, from 0, or those that the warm-up finds. By default `none`; of `sdnn-"
+            "linear`, `find`, unless observations are scaled."
+        ),
+    ] = None
+    inputs: Annotated[
+        Literal["all", "relevant"] | tuple[Index, ...] | None,
+        doc(
+            "Which observed variables are inputs: `all`; those that the warm-up finds "
+            "`relevant`; or a list, from 0, of some that are inputs in any case, beside the "
+            "relevant ones. By default `all`; of `sdnn-linear`, `relevant`."
+        ),
+    ] = None
     warm_up_steps: Annotated[
         Annotated[int, Meta(ge=int(WARM_UP.low), le=int(WARM_UP.high))],
-        Meta(description=WARM_UP.doc),
+        doc(WARM_UP.doc),
     ] = WARM_UP.default
 
 
 class ProtocolSpec(Settings, frozen=True):
     """Schedule of learning and evaluation."""
 
-    n_envs: Annotated[int, Meta(ge=1, le=4096)] = 1
-    """Environments to learn in, in turn; steps are counted over all."""
-    evaluate_every: Annotated[int, Meta(ge=0, le=2**53)] | None = None
-    """Steps between evaluations; 0: none. By default 10,000, or none if `evaluate_every_episodes`
-    is given.
-    """
-    evaluate_every_episodes: Count | None = None
-    """Learning episodes between evaluations, instead of steps."""
-    evaluation_episodes: Annotated[int, Meta(ge=1, le=10**9)] | None = None
-    """Greedy episodes in each evaluation. By default 10."""
-    limit_bootstraps: Annotated[bool, Meta(description=_CORE["limit_bootstraps"].doc)] = _CORE[
+    n_envs: Annotated[
+        int,
+        Meta(ge=1, le=4096),
+        doc("Environments to learn in, in turn; steps are counted over all."),
+    ] = 1
+    evaluate_every: Annotated[
+        Annotated[int, Meta(ge=0, le=2**53)] | None,
+        doc(
+            "Steps between evaluations; 0: none. By default 10,000, or none if "
+            "`evaluate_every_episodes` is given."
+        ),
+    ] = None
+    evaluate_every_episodes: Annotated[
+        Count | None, doc("Learning episodes between evaluations, instead of steps.")
+    ] = None
+    evaluation_episodes: Annotated[
+        Annotated[int, Meta(ge=1, le=10**9)] | None,
+        doc("Greedy episodes in each evaluation. By default 10."),
+    ] = None
+    limit_bootstraps: Annotated[bool, doc(_CORE["limit_bootstraps"].doc)] = _CORE[
         "limit_bootstraps"
     ].default
-    noisy_evaluations: Annotated[bool, Meta(description=_CORE["noisy_evaluations"].doc)] = _CORE[
+    noisy_evaluations: Annotated[bool, doc(_CORE["noisy_evaluations"].doc)] = _CORE[
         "noisy_evaluations"
     ].default
 
@@ -288,12 +295,15 @@ class ProtocolSpec(Settings, frozen=True):
 class BudgetSpec(Settings, frozen=True):
     """Length of the learning."""
 
-    steps: Count | None = None
-    """Steps to learn. By default 200,000, or none if `episodes` is given."""
-    episodes: Annotated[int, Meta(ge=1, le=2**30)] | None = None
-    """Episodes to learn, instead of steps."""
-    target_return: float | None = None
-    """Stop when an evaluation has this mean return."""
+    steps: Annotated[
+        Count | None, doc("Steps to learn. By default 200,000, or none if `episodes` is given.")
+    ] = None
+    episodes: Annotated[
+        Annotated[int, Meta(ge=1, le=2**30)] | None, doc("Episodes to learn, instead of steps.")
+    ] = None
+    target_return: Annotated[float | None, doc("Stop when an evaluation has this mean return.")] = (
+        None
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -304,12 +314,11 @@ class BudgetSpec(Settings, frozen=True):
 class OutputSpec(Settings, frozen=True):
     """Output besides the rows; it changes none of them."""
 
-    checkpoint_every: Count = 10_000
-    """Steps between checkpoints."""
-    keep_best: bool = False
-    """Keep the agent of the best evaluation, as ``best.safetensors``."""
-    tensorboard: bool = False
-    """Write the numbers for TensorBoard, too."""
+    checkpoint_every: Annotated[Count, doc("Steps between checkpoints.")] = 10_000
+    keep_best: Annotated[
+        bool, doc("Keep the agent of the best evaluation, as ``best.safetensors``.")
+    ] = False
+    tensorboard: Annotated[bool, doc("Write the numbers for TensorBoard, too.")] = False
 
 
 _TABLES: dict[str, tuple[Any, ...]] = {

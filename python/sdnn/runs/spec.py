@@ -45,6 +45,7 @@ from sdnn.runs.settings import (
     ProtocolSpec,
     Settings,
     changed,
+    doc,
     names_of,
     read,
 )
@@ -88,28 +89,20 @@ class RunSpec(Settings, frozen=True):
     0.2
     """
 
-    environment: EnvironmentSpec | None = None
-    """A Gymnasium environment; by default the task is the paper's acrobot."""
-    acrobot: Any = None
-    """Physics, goal and reward of the acrobot."""
-    goal: Any = None
-    """How the acrobot's goal tightens."""
-    sensors: Any = None
-    """What is observed of the acrobot, and how noisily."""
-    agent: AgentSpec = AgentSpec()
-    """Who learns."""
-    approximator: Any = None
-    """What the agent learns with."""
-    learning: Any = None
-    """How the agent learns and explores."""
-    protocol: ProtocolSpec = ProtocolSpec()
-    """How it is evaluated."""
-    budget: BudgetSpec = BudgetSpec()
-    """How long it learns."""
-    seed: Annotated[int, Meta(ge=0)] = 0
-    """Root of all seeds, at most 2**64 - 1."""
-    output: OutputSpec = OutputSpec()
-    """What is written besides the rows."""
+    environment: Annotated[
+        EnvironmentSpec | None,
+        doc("A Gymnasium environment; by default the task is the paper's acrobot."),
+    ] = None
+    acrobot: Annotated[Any, doc("Physics, goal and reward of the acrobot.")] = None
+    goal: Annotated[Any, doc("How the acrobot's goal tightens.")] = None
+    sensors: Annotated[Any, doc("What is observed of the acrobot, and how noisily.")] = None
+    agent: Annotated[AgentSpec, doc("Who learns.")] = AgentSpec()
+    approximator: Annotated[Any, doc("What the agent learns with.")] = None
+    learning: Annotated[Any, doc("How the agent learns and explores.")] = None
+    protocol: Annotated[ProtocolSpec, doc("How it is evaluated.")] = ProtocolSpec()
+    budget: Annotated[BudgetSpec, doc("How long it learns.")] = BudgetSpec()
+    seed: Annotated[int, Meta(ge=0), doc("Root of all seeds, at most 2**64 - 1.")] = 0
+    output: Annotated[OutputSpec, doc("What is written besides the rows.")] = OutputSpec()
 
     def __post_init__(self) -> None:
         for name, key in SHORTHANDS.items():

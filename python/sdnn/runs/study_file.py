@@ -26,6 +26,7 @@ from sdnn.runs.settings import (
     Settings,
     check_names,
     checked,
+    doc,
     overridden,
     read,
 )
@@ -53,23 +54,33 @@ _NAMED_VALUES = (("environment", "kwargs"), ("environment", "ranges"))
 class StudyHeader(Settings, frozen=True):
     """Title of a study, number of trials and what is compared."""
 
-    title: str | None = None
-    """For a reader. By default the file's name."""
-    trials: Annotated[int, Meta(ge=1)] = 10
-    """Trials of each variant in each case."""
-    seed: Annotated[int, Meta(ge=0)] = 0
-    """Root of all seeds; that of a trial follows from it, the case's name and the trial's number.
-    """
-    cases: tuple[str, ...] | None = None
-    """Names of cases: the paper's, or those of `[cases]`. By default all of `[cases]`; without
-    these, the environment of `[base]`.
-    """
-    reference: str | None = None
-    """The variant that others are compared with. By default `default` or `base` if there is one,
-    else the first.
-    """
-    imports: tuple[str, ...] = ()
-    """Modules to import, which may register agents and environments."""
+    title: Annotated[str | None, doc("For a reader. By default the file's name.")] = None
+    trials: Annotated[int, Meta(ge=1), doc("Trials of each variant in each case.")] = 10
+    seed: Annotated[
+        int,
+        Meta(ge=0),
+        doc(
+            "Root of all seeds; that of a trial follows from it, the case's name and the "
+            "trial's number."
+        ),
+    ] = 0
+    cases: Annotated[
+        tuple[str, ...] | None,
+        doc(
+            "Names of cases: the paper's, or those of `[cases]`. By default all of `[cases]`;"
+            " without these, the environment of `[base]`."
+        ),
+    ] = None
+    reference: Annotated[
+        str | None,
+        doc(
+            "The variant that others are compared with. By default `default` or `base` if "
+            "there is one, else the first."
+        ),
+    ] = None
+    imports: Annotated[
+        tuple[str, ...], doc("Modules to import, which may register agents and environments.")
+    ] = ()
 
 
 class KnownCase(NamedTuple):

@@ -1,13 +1,18 @@
 """Packages that load their names when they are first used."""
 
+import ast
+import compileall
 import doctest
 import importlib
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from sdnn import lazy
+import sdnn
+from sdnn import _core, lazy
 
 PACKAGES = ("sdnn", "sdnn.estimators", "sdnn.reproduction", "sdnn.runs")
 
@@ -17,7 +22,10 @@ def test_every_public_name_is_there(name):
     package = importlib.import_module(name)
     for public in package.__all__:
         assert getattr(package, public) is not None, public
-    assert set(package.__all__) <= set(dir(package))
+    tree = ast.parse(Path(package.__file__).read_text("utf-8"))
+    block = next(node for node in tree.body if isinstance(node, ast.If))
+    for_type_checkers = {name.name for node in block.body for name in node.names}
+    assert set(package.__all__) == set(dir(package)) == for_type_checkers
     with pytest.raises(AttributeError, match="nothing"):
         package.nothing  # noqa: B018
 
@@ -32,5 +40,20 @@ def test_importing_the_package_loads_nothing_large():
     assert done.stdout == "set()\n"
 
 
+def test_an_installation_without_sources_works(tmp_path):
+    folder = Path(sdnn.__file__).parent
+    shutil.copytree(folder, tmp_path / "sdnn", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(_core.__file__, tmp_path / "sdnn")
+    compileall.compile_dir(tmp_path / "sdnn", quiet=1, legacy=True)
+    for source in (tmp_path / "sdnn").rglob("*.py"):
+        source.unlink()
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
+    code += "sys.meta_path[:] = sys.meta_path[-3:]  # not an editable installation's\n"
+    code += "import sdnn, sdnn.runs, sdnn.reproduction; assert sdnn.__file__.endswith('.pyc')\n"
+    code += "print(sdnn.runs.RunSpec().seed, sdnn.SDNNRegressor(), sdnn.SDNNKernelRidge())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout == "0 SDNNRegressor() SDNNKernelRidge()\n", done.stderr
+
+
 def test_docstrings():
-    assert doctest.testmod(lazy) == (0, 3)
+    assert doctest.testmod(lazy) == (0, 2)
