@@ -18,6 +18,7 @@ nox.options.error_on_missing_interpreters = True
 
 ROOT = Path(__file__).parent
 JOBS = str(os.cpu_count() or 1)
+CPP_PRESETS = "gcc clang sanitize tsan assertions aarch64 libcxx arm32".split()
 
 
 def quick(**options):
@@ -85,10 +86,16 @@ def cpp(session):
 
 
 @weekly(name="cpp-builds")
-@nox.parametrize("preset", ["gcc", "clang", "sanitize", "tsan", "assertions", "aarch64"])
+@nox.parametrize("preset", CPP_PRESETS)
 def cpp_builds(session, preset):
     """Build and run the C++ tests as users compile them, under sanitizers, and for Arm."""
     run_cpp_tests(session, preset)
+
+
+@weekly(name="cpp-wasm")
+def cpp_wasm(session):
+    """Compile every header alone for WebAssembly."""
+    cmake_build(session, "wasm")
 
 
 def run_cpp_tests(session, preset):

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <numeric>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "sdnn/core/state.hpp"
@@ -70,6 +71,7 @@ TEST(Random, BelowIsUniformAndBounded) {
   for (const int count : counts) chi_square += (count - 10000.0) * (count - 10000.0) / 10000.0;
   EXPECT_LT(chi_square, 27.9);  // 6 degrees of freedom, p = 1e-4
   for (int i = 0; i < 100; ++i) EXPECT_EQ(random.below(1), 0u);
+  static_assert(std::is_same_v<decltype(random.below(std::size_t{7})), std::size_t>);
   const std::uint64_t huge = (std::uint64_t{1} << 63) + 1;  // about half the draws are rejected
   for (int i = 0; i < 100; ++i) EXPECT_LT(random.below(huge), huge);
 }

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
-#include <thread>
 #include <utility>
 
 #include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/threads.hpp"
 
 namespace sdnn::agents {
 
@@ -33,6 +33,7 @@ class FixedRate {
   using Clock = std::function<double()>;
   using Sleep = std::function<void(double)>;
 
+#if SDNN_HAS_THREADS
   /// Throws std::invalid_argument unless `hz` is in [1e-3, 1e6].
   explicit FixedRate(double hz)
       : FixedRate(
@@ -44,6 +45,7 @@ class FixedRate {
             [](double seconds) {
               std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
             }) {}
+#endif
   /// With another clock, which must never go back.
   FixedRate(double hz, Clock clock, Sleep sleep)
       : hz_(hz), clock_(std::move(clock)), sleep_(std::move(sleep)) {

@@ -104,6 +104,8 @@ class NStepBuffer {
       archive.expect(actions.size() == n * n_dimensions, "actions", "those of every reward");
       const auto is_unit = [](double x) { return x >= 0.0 && x <= 1.0; };
       const auto is_finite = [](double x) { return std::isfinite(x); };
+      const auto is_index = [](std::int64_t a) { return std::in_range<std::size_t>(a); };
+      archive.expect(std::ranges::all_of(actions, is_index), "actions", "of actions");
       archive.expect(std::ranges::all_of(rewards, is_finite), "rewards", "finite");
       archive.expect(std::ranges::all_of(states, is_unit), "states", "in [0, 1]");
       archive.expect(std::ranges::all_of(self.next_state_, is_unit), "next_state", "in [0, 1]");

@@ -152,7 +152,7 @@ class ReturnRange {
     if (returns_.size() < kMostReturns) {
       returns_.push_back(clipped(value));
     } else {
-      returns_[oldest_] = clipped(value);
+      returns_[static_cast<std::size_t>(oldest_)] = clipped(value);
       oldest_ = (oldest_ + 1) % kMostReturns;
     }
   }

@@ -107,9 +107,12 @@ inline void select_units(std::span<const std::int32_t> potentials, int deficit,
   const auto n_subsets = static_cast<std::size_t>(std::abs(deficit));
   assert(n_subsets <= potentials.size());
   const detail::DistanceOf of(deficit < 0);
+  const auto begin_of = [&](std::uint64_t i) {  // in 64 bits, where no product overflows
+    return static_cast<std::size_t>(i * potentials.size() / n_subsets);
+  };
   for (std::size_t i = 0; i < n_subsets; ++i) {
-    const std::size_t begin = i * potentials.size() / n_subsets;
-    const std::size_t end = (i + 1) * potentials.size() / n_subsets;
+    const std::size_t begin = begin_of(i);
+    const std::size_t end = begin_of(i + 1);
     const std::size_t unit = begin + nearest_unit(potentials.data() + begin, end - begin, of);
     if (unit != end) selected.push_back(static_cast<std::uint32_t>(unit));
   }

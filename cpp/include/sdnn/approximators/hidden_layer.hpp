@@ -50,8 +50,9 @@ class HiddenLayer {
     weight_limit_ =
         static_cast<std::int32_t>(std::min<std::size_t>(kWeightLimit, kThresholdLimit / n_columns));
     n_blocks_ = core::round_up(n_units, kBlockUnits) / kBlockUnits;
-    bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * block_bytes());
-    high_bytes_ = core::AlignedBuffer<std::int8_t>(n_blocks_ * block_bytes());
+    const std::size_t n_bytes = core::checked_product(n_blocks_, block_bytes());
+    bytes_ = core::AlignedBuffer<std::int8_t>(n_bytes);
+    high_bytes_ = core::AlignedBuffer<std::int8_t>(n_bytes);
     high_columns_.assign(n_blocks_, ColumnSet(n_columns));
     may_have_high_.assign(n_units, 0);
     thresholds_.assign(n_units, 0);

@@ -180,8 +180,9 @@ inline PatternTable correlation_matrix_patterns(int n_units, std::span<const dou
   }
   const auto units = static_cast<std::size_t>(n_units);
   detail::CorrelationSearch search(correlations, n_bins, units);
-  const std::size_t affordable = 400'000'000 / (units * n_bins * n_bins) + 1;
-  const std::size_t n_proposals = units * std::min<std::size_t>(20, affordable);
+  const std::uint64_t affordable = 400'000'000 / (std::uint64_t{n_bins} * n_bins * units) + 1;
+  const std::size_t n_proposals =
+      units * static_cast<std::size_t>(std::min<std::uint64_t>(20, affordable));
   for (std::size_t i = 0; i < n_bins; ++i) {
     search.begin(i, random);
     search.propose(n_proposals, i, random, [i] { return i; });

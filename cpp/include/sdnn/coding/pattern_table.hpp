@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "sdnn/core/bit_layer.hpp"
+#include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/random.hpp"
@@ -37,7 +38,7 @@ class PatternTable {
       : n_bins_(n_bins), n_units_(n_units), n_words_(core::n_bit_words(n_units)) {
     core::require_in_range("n_bins", n_bins, 1, std::size_t{1} << 30);
     core::require_in_range("n_units", n_units, 1, std::size_t{1} << 24);
-    words_.resize(n_bins_ * n_words_);
+    words_.resize(core::checked_product(n_bins_, n_words_));
   }
 
   /// Patterns from signs, bin by bin.

@@ -124,8 +124,9 @@ class SelectiveDesensitization {
       note_input(pairs_[p].modified, *modified_[p]);
       note_input(pairs_[p].modifier, *modifiers_[p]);
     }
-    core::require(n_columns() <= (std::size_t{1} << 30), "n_pairs * n_units", "at most 2^30",
-                  n_columns());
+    const std::uint64_t n_columns = std::uint64_t{n_pairs()} * n_units();
+    core::require(n_columns <= (std::uint64_t{1} << 30), "n_pairs * n_units", "at most 2^30",
+                  n_columns);
     std::size_t most_on = 0;
     for (std::size_t p = 0; p < pairs_.size(); ++p) {
       modified_at_.push_back({modified_[p]->words(), pairs_[p].modified});

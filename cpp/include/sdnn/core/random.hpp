@@ -4,9 +4,11 @@
 #include <array>
 #include <bit>
 #include <cassert>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 #include "sdnn/core/detail/interruption.hpp"
@@ -71,12 +73,14 @@ class Random {
   double uniform() noexcept { return static_cast<double>(bits() >> 11) * 0x1.0p-53; }
 
   /// An integer in [0, n), exactly uniform (rejection). Requires n > 0.
-  std::uint64_t below(std::uint64_t n) noexcept {
+  template <std::integral Integer>
+  std::make_unsigned_t<Integer> below(Integer n) noexcept {
     assert(n > 0);
-    const std::uint64_t rejected = (0 - n) % n;  // 2^64 mod n
+    const auto size = static_cast<std::uint64_t>(n);
+    const std::uint64_t rejected = (0 - size) % size;  // 2^64 mod n
     std::uint64_t drawn = bits();
     while (drawn < rejected) drawn = bits();
-    return drawn % n;
+    return static_cast<std::make_unsigned_t<Integer>>(drawn % size);
   }
 
   /// A standard normal number; always consumes one draw.
@@ -94,7 +98,7 @@ class Random {
     constexpr std::size_t kItemsPerPoint = std::size_t{1} << 16;
     for (std::size_t i = items.size(); i > 1; --i) {
       if (i % kItemsPerPoint == 0) interruption_point();
-      std::swap(items[i - 1], items[static_cast<std::size_t>(below(i))]);
+      std::swap(items[i - 1], items[below(i)]);
     }
   }
 

@@ -11,6 +11,7 @@
 #include <exception>
 #include <filesystem>
 #include <initializer_list>
+#include <limits>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -67,7 +68,9 @@ inline nlohmann::json parse_json(std::string_view text) {
 namespace detail {
 
 inline constexpr std::uint64_t kLongestHeader = 100'000'000;
-inline constexpr std::uint64_t kLargestFile = std::uint64_t{1} << 34;
+// 16 GiB, or as much as can be addressed.
+inline constexpr std::uint64_t kLargestFile =
+    std::min<std::uint64_t>(std::uint64_t{1} << 34, std::numeric_limits<std::ptrdiff_t>::max());
 
 /// Place of a tensor's bytes among all bytes.
 struct TensorPlace {
@@ -108,6 +111,7 @@ inline TensorPlace tensor_place(const std::string& name, const nlohmann::json& e
   for (const auto& entry_of_shape : shape) {
     const auto extent = entry_of_shape.get<std::uint64_t>();
     expect(is_empty || size <= n_bytes / extent, "is not as large as its shape");
+    expect(std::in_range<std::size_t>(extent), "has a shape beyond the address space");
     if (!is_empty) size *= extent;
     place.shape.push_back(static_cast<std::size_t>(extent));
   }

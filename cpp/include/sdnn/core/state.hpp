@@ -265,7 +265,8 @@ class StateReader {
       expect(extent == 0 || size <= tensor.bytes.size() / extent, name, "as large as its shape");
       size *= extent;
     }
-    expect(size * sizeof(T) == tensor.bytes.size(), name, "as large as its shape");
+    expect(size == tensor.bytes.size() / sizeof(T) && tensor.bytes.size() % sizeof(T) == 0, name,
+           "as large as its shape");
     read_.insert(&tensor);
     return tensor;
   }

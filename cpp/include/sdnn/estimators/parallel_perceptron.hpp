@@ -11,7 +11,6 @@
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -21,6 +20,7 @@
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/detail/on_demand.hpp"
+#include "sdnn/core/detail/threads.hpp"
 #include "sdnn/core/errors.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/estimators/detail/pair_walk.hpp"
@@ -366,8 +366,10 @@ class ParallelPerceptron {
   }
 
   /// Queries of a thread between two checks for an interruption: a tenth of a second of additions.
-  std::size_t most_at_once(std::size_t n_added) const noexcept {
-    return std::clamp<std::size_t>(n_added / (code_->n_slots() * n_padded_units()), 64, 4096);
+  std::size_t most_at_once(std::uint64_t n_added) const noexcept {
+    const std::uint64_t n_added_per_query = std::uint64_t{code_->n_slots()} * n_padded_units();
+    return static_cast<std::size_t>(
+        std::clamp<std::uint64_t>(n_added / n_added_per_query, 64, 4096));
   }
 
   /// Calls work(begin, end) for parts of up to `most` queries, n_threads of them at a time. Throws
@@ -376,7 +378,9 @@ class ParallelPerceptron {
   static void in_parts(std::size_t n_queries, std::size_t most, int n_threads, const Work& work) {
     const auto n_parts = std::min(static_cast<std::size_t>(n_threads), (n_queries + 255) / 256);
     const std::size_t n_rounds = n_queries == 0 ? 0 : (n_queries - 1) / (most * n_parts) + 1;
-    const auto begin_of = [&](std::size_t k) { return k * n_queries / (n_rounds * n_parts); };
+    const auto begin_of = [&](std::uint64_t k) {
+      return static_cast<std::size_t>(k * n_queries / (n_rounds * n_parts));
+    };
     std::vector<std::exception_ptr> errors(n_parts);
     for (std::size_t k = 0; k < n_rounds * n_parts; k += n_parts) {
       core::interruption_point();
@@ -392,8 +396,8 @@ class ParallelPerceptron {
 #endif
       };
       {
-        std::vector<std::jthread> threads;  // joined at the end of the scope
-        for (std::size_t part = 1; part < n_parts; ++part) threads.emplace_back(try_part, part);
+        core::Threads threads;  // joined at the end of the scope
+        for (std::size_t part = 1; part < n_parts; ++part) threads.start(try_part, part);
         try_part(0);
       }
       for (const std::exception_ptr& error : errors) {
@@ -404,8 +408,9 @@ class ParallelPerceptron {
 
   static constexpr std::size_t kFewQueries = 8;      // for which no narrow weights are made
   static constexpr std::size_t kChangesPerWord = 4;  // from which pair by pair is quicker
-  static constexpr std::size_t kSweptAtOnce = std::size_t{1} << 32;
-  static constexpr std::size_t kAddedAtOnce = std::size_t{1} << 36;  // of which most are skipped
+  static constexpr std::uint64_t kSweptAtOnce = std::uint64_t{1} << 32;
+  static constexpr std::uint64_t kAddedAtOnce = std::uint64_t{1}
+                                                << 36;  // of which most are skipped
 
   std::shared_ptr<const Code> code_;
   WeightTiles<std::int32_t> weights_;

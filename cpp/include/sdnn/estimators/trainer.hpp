@@ -64,7 +64,7 @@ class Trainer {
   ParallelPerceptron& layer() noexcept { return *layer_; }
   TrainingForm form() const noexcept { return form_; }
   /// The most bytes that the form takes beside the layer.
-  std::size_t memory() const noexcept { return memory_; }
+  std::uint64_t memory() const noexcept { return memory_; }
   std::size_t n_samples() const noexcept { return n_samples_; }
 
   /// Presents samples in the given order. Throws std::invalid_argument for an index out of range,
@@ -133,7 +133,7 @@ class Trainer {
   Rule rule_;
   std::size_t n_samples_ = 0;
   TrainingForm form_ = TrainingForm::plain;
-  std::size_t memory_ = 0;
+  std::uint64_t memory_ = 0;
   std::size_t headroom_ = 0;  // presentations that cannot overflow
   std::unique_ptr<Training> training_;
 };

@@ -68,10 +68,10 @@ decltype(auto) with_product_type(const coding::SelectiveDesensitization& code,
 
 /// Bytes that a form needs beside the layer and the samples' bins; at most 1 % less than it takes.
 /// If `keeps_plans`, block training keeps what does not change of its blocks.
-inline std::size_t form_memory(TrainingForm form, std::size_t n_units,
-                               const coding::SelectiveDesensitization& code, std::size_t n_samples,
-                               bool keeps_plans = false) {
-  return with_product_type(code, [&]<class Product>() -> std::size_t {
+inline std::uint64_t form_memory(TrainingForm form, std::size_t n_units,
+                                 const coding::SelectiveDesensitization& code,
+                                 std::size_t n_samples, bool keeps_plans = false) {
+  return with_product_type(code, [&]<class Product>() -> std::uint64_t {
     switch (form) {
       case TrainingForm::dual:
         return DualTraining<Product>::bytes(n_units, code, n_samples);
@@ -104,12 +104,12 @@ inline TrainingForm choose_form(TrainingForm form, std::size_t n_units,
     }
     return form;
   }
-  const std::size_t padded_units = core::round_up(n_units, kTileStep);
-  const std::size_t row_factor = memory(TrainingForm::dual) > (std::size_t{32} << 20) ? 3 : 1;
-  const std::size_t block_cost = code.n_slots() / 8 * (padded_units / 16) + code.n_slots();
-  const std::size_t before = n_samples * code.n_words() * 2 / 7 + block_cost / 2;
-  const std::size_t dual_cost = row_factor * n_samples / 2 + n_units +
-                                before / std::clamp<std::size_t>(n_epochs, 1, kExpectedEpochs);
+  const std::uint64_t padded_units = core::round_up(n_units, kTileStep);
+  const std::uint64_t row_factor = memory(TrainingForm::dual) > (std::size_t{32} << 20) ? 3 : 1;
+  const std::uint64_t block_cost = code.n_slots() / 8 * (padded_units / 16) + code.n_slots();
+  const std::uint64_t before = std::uint64_t{n_samples} * code.n_words() * 2 / 7 + block_cost / 2;
+  const std::uint64_t dual_cost = row_factor * n_samples / 2 + n_units +
+                                  before / std::clamp<std::size_t>(n_epochs, 1, kExpectedEpochs);
   if (dual_cost <= block_cost && memory(TrainingForm::dual) <= memory_limit) {
     return TrainingForm::dual;
   }

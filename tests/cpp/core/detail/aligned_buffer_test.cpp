@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <new>
 
 namespace sdnn::core {
 namespace {
@@ -20,6 +21,13 @@ TEST(AlignedBuffer, IsZeroedAlignedAndCopiedByValue) {
     EXPECT_EQ(moved[size - 1], 8);
   }
   EXPECT_EQ(AlignedBuffer<std::int8_t>().size(), 0U);
+}
+
+TEST(AlignedBuffer, RefusesSizesThatWouldWrap) {
+  EXPECT_THROW(AlignedBuffer<std::int32_t>(SIZE_MAX / 4), std::bad_alloc);
+  EXPECT_EQ(checked_product(SIZE_MAX / 3, 3), SIZE_MAX);
+  EXPECT_THROW(checked_product(SIZE_MAX / 3 + 1, 3), std::bad_alloc);
+  EXPECT_EQ(checked_product(0, SIZE_MAX), 0U);
 }
 
 TEST(AlignedBuffer, RoundsUp) {

@@ -18,6 +18,7 @@ struct Numbers {
   int count = 1;
   std::optional<double> last = {};
   std::vector<int> sizes = {};
+  std::vector<bool> flags = {true, false};  // proxies instead of items
 
   static constexpr auto fields() noexcept {
     return std::tuple(field("share", &Numbers::share, "", within(0, 1)),
@@ -25,7 +26,8 @@ struct Numbers {
                       field("any", &Numbers::any, ""),
                       field("count", &Numbers::count, "", at_least(1)),
                       field("last", &Numbers::last, "", above(0)),
-                      field("sizes", &Numbers::sizes, "", within(0, 1 << 20)));
+                      field("sizes", &Numbers::sizes, "", within(0, 1 << 20)),
+                      field("flags", &Numbers::flags, ""));
   }
 };
 

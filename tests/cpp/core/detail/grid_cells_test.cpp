@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
 
 namespace {
@@ -25,7 +27,8 @@ TEST(GridCells, IsThePower) {
   EXPECT_EQ(grid_cells("n", "cells", 9, 6, 84, kAnything), 531441U);
   EXPECT_EQ(grid_cells("n", "cells", 4, 7, 8, kAnything), 16384U);
   EXPECT_EQ(grid_cells("n", "cells", 5, 0, 1, kAnything), 1U);
-  EXPECT_EQ(grid_cells("n", "cells", 2, 63, 1, kAnything), std::size_t{1} << 63);
+  EXPECT_EQ(grid_cells("n", "cells", 2, 8 * sizeof(std::size_t) - 1, 1, kAnything),
+            SIZE_MAX / 2 + 1);
 }
 
 TEST(GridCells, TheLimitIsTheLargestAllowed) {
@@ -46,6 +49,14 @@ TEST(GridCells, WhatCannotBeCountedIsRefusedUnderAnyLimit) {
             "n_sets must be smaller: a table of 9^40 rules needs 2^64 bytes or more, but "
             "max_table_bytes is "
             "18446744073709551615");
+}
+
+TEST(GridCells, NoMoreThanCanBeAddressed) {
+  EXPECT_EQ(message(2, 33, 1, kAnything),
+            sizeof(std::size_t) > 4 ? "no error"
+                                    : "n_sets must be smaller: a table of 2^33 = 8589934592 rules "
+                                      "needs 8589934592 bytes, but at most 4294967295 can be "
+                                      "addressed");
 }
 
 TEST(RequireTableBytes, SaysWhatToReduce) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "sdnn/agents/actions.hpp"
@@ -54,7 +55,10 @@ class TakenActions {
     archive.numbers("indices", indices);
     if constexpr (Archive::kReads) {
       const std::size_t n = self.n_dimensions_;
-      archive.expect(indices.size() == environments.size() * n, "indices", "of actions");
+      const auto is_index = [](std::int64_t i) { return std::in_range<std::size_t>(i); };
+      archive.expect(
+          indices.size() == environments.size() * n && std::ranges::all_of(indices, is_index),
+          "indices", "of actions");
       self.taken_.clear();
       for (std::size_t k = 0; k < environments.size(); ++k) {
         const auto last = static_cast<std::int64_t>(self.taken_.size()) - 1;

@@ -37,7 +37,8 @@ class CodedSamples {
     const std::uint64_t* const active = words_.data() + 2 * t * n_words_;
     return {active, active + n_words_};
   }
-  static std::size_t bytes(const SelectiveDesensitization& code, std::size_t n_samples) noexcept {
+  static std::uint64_t bytes(const SelectiveDesensitization& code,
+                             std::uint64_t n_samples) noexcept {
     return 2 * sizeof(std::uint64_t) * padded_words(code) * n_samples;
   }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdlib>
+#include <limits>
 #include <new>
 #include <span>
 #include <type_traits>
@@ -21,6 +22,14 @@ constexpr std::size_t round_up(std::size_t n, std::size_t multiple) noexcept {
   return (n + multiple - 1) / multiple * multiple;
 }
 
+/// The number of items in so many rows. Throws std::bad_alloc if a size cannot hold it.
+inline std::size_t checked_product(std::size_t n_rows, std::size_t n_columns) {
+  if (n_rows != 0 && n_columns > std::numeric_limits<std::size_t>::max() / n_rows) {
+    fail(std::bad_alloc());
+  }
+  return n_rows * n_columns;
+}
+
 /// `size` zero-initialized items, aligned to a cache line; copied by value.
 ///
 /// Throws std::bad_alloc if the memory cannot be had. Pages that are never written cost no memory
@@ -33,6 +42,8 @@ class AlignedBuffer {
   AlignedBuffer() = default;
   explicit AlignedBuffer(std::size_t size) : size_(size) {
     if (size == 0) return;
+    constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max() - kCacheLine;
+    if (size > kMost / sizeof(Item)) fail(std::bad_alloc());
     // calloc leaves large blocks untouched; one more cache line makes room to align inside it.
     block_ = std::calloc(size * sizeof(Item) + kCacheLine, 1);
     if (block_ == nullptr) fail(std::bad_alloc());

@@ -51,7 +51,8 @@ void check_bounds(const char* name, const Value& value, const Bounds& bounds) {
   } else if constexpr (requires { value.has_value(); }) {
     if (value) check_bounds(name, *value, bounds);
   } else {
-    for (const auto& item : value) check_bounds(name, item, bounds);
+    // By type, because the items of a std::vector<bool> are proxies.
+    for (const typename Value::value_type& item : value) check_bounds(name, item, bounds);
   }
 }
 

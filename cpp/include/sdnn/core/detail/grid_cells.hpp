@@ -24,25 +24,42 @@ inline constexpr std::uint64_t kDefaultMaxTableBytes = std::uint64_t{1} << 30;
   fail(SizeError(std::string(first), message.str()));
 }
 
+/// A limit, as far as bytes can be addressed.
+constexpr std::uint64_t addressable(std::uint64_t most) noexcept {
+  constexpr std::uint64_t kAddressable = std::numeric_limits<std::size_t>::max();
+  return most < kAddressable ? most : kAddressable;
+}
+
+/// Ends the message with the limit that is exceeded: the address space if `fits_table`.
+[[noreturn]] inline void fail_for_limit(std::string_view sizes, std::ostringstream& message,
+                                        bool fits_table, std::uint64_t max_table_bytes) {
+  if (fits_table) {
+    message << "at most " << addressable(max_table_bytes) << " can be addressed";
+  } else {
+    message << "max_table_bytes is " << max_table_bytes;
+  }
+  fail_for_size(sizes, message);
+}
+
 /// Throws SizeError "<sizes> must be smaller: <what> need <bytes> bytes, but
 /// max_table_bytes is ..." if they are more. To be asked before memory is; a double, which no
 /// product overflows.
 inline void require_table_bytes(std::string_view sizes, std::string_view what, double bytes,
                                 std::uint64_t max_table_bytes) {
-  if (bytes <= static_cast<double>(max_table_bytes)) return;
+  if (bytes <= static_cast<double>(addressable(max_table_bytes))) return;
   std::ostringstream message;
   message << sizes << " must be smaller: " << what << " need " << std::fixed << std::setprecision(0)
-          << bytes << " bytes, but max_table_bytes is " << max_table_bytes;
-  fail_for_size(sizes, message);
+          << bytes << " bytes, but ";
+  fail_for_limit(sizes, message, bytes <= static_cast<double>(max_table_bytes), max_table_bytes);
 }
 
 /// The same where no setting allows more: "... bytes, but at most <most> are allowed".
 inline void require_bytes(std::string_view sizes, std::string_view what, double bytes,
                           std::uint64_t most) {
-  if (bytes <= static_cast<double>(most)) return;
+  if (bytes <= static_cast<double>(addressable(most))) return;
   std::ostringstream message;
   message << sizes << " must be smaller: " << what << " need " << std::fixed << std::setprecision(0)
-          << bytes << " bytes, but at most " << most << " are allowed";
+          << bytes << " bytes, but at most " << addressable(most) << " are allowed";
   fail_for_size(sizes, message);
 }
 
@@ -55,15 +72,18 @@ inline void require_bytes(std::string_view sizes, std::string_view what, double 
 inline std::size_t grid_cells(std::string_view sizes, std::string_view cells,
                               std::size_t n_per_dimension, std::size_t n_dimensions,
                               std::size_t bytes_per_cell, std::uint64_t max_table_bytes) {
-  constexpr auto kMost = std::numeric_limits<std::size_t>::max();
-  std::size_t n = 1;
+  constexpr auto kMost = std::numeric_limits<std::uint64_t>::max();
+  std::uint64_t n = 1;
   bool countable = true;
   for (std::size_t i = 0; i < n_dimensions && countable; ++i) {
     countable = n <= kMost / n_per_dimension;
     if (countable) n *= n_per_dimension;
   }
   const bool sized = countable && n <= kMost / bytes_per_cell;
-  if (sized && n * bytes_per_cell <= max_table_bytes) return n;
+  const bool fits_table = sized && n * bytes_per_cell <= max_table_bytes;
+  if (fits_table && n * bytes_per_cell == addressable(n * bytes_per_cell)) {
+    return static_cast<std::size_t>(n);
+  }
 
   std::ostringstream message;
   message << sizes << " must be smaller: a table of " << n_per_dimension << '^' << n_dimensions;
@@ -74,8 +94,8 @@ inline std::size_t grid_cells(std::string_view sizes, std::string_view cells,
   } else {
     message << "2^64 bytes or more";
   }
-  message << ", but max_table_bytes is " << max_table_bytes;
-  fail_for_size(sizes, message);
+  message << ", but ";
+  fail_for_limit(sizes, message, fits_table, max_table_bytes);
 }
 
 }  // namespace sdnn::core

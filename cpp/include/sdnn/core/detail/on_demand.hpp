@@ -2,7 +2,8 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
+
+#include "sdnn/core/detail/threads.hpp"
 
 namespace sdnn::core {
 
@@ -23,7 +24,9 @@ class OnDemand {
   /// The constant; `make()` computes it where there is none yet.
   template <class Make>
   std::shared_ptr<const T> get(const Make& make) const {
+#if SDNN_HAS_THREADS
     const std::lock_guard lock(mutex_);
+#endif
     if (!made_) made_ = std::make_shared<const T>(make());
     return made_;
   }
@@ -32,7 +35,7 @@ class OnDemand {
   void reset() noexcept { made_.reset(); }
 
  private:
-  mutable std::mutex mutex_;
+  mutable Mutex mutex_;
   mutable std::shared_ptr<const T> made_;
 };
 

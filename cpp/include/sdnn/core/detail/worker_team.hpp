@@ -4,18 +4,20 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <thread>
-#include <vector>
+
+#include "sdnn/core/detail/threads.hpp"
 
 namespace sdnn::core {
 
-/// `n_threads` threads, the caller's among them, that run one function at a time.
+/// `n_threads` threads, the caller's among them, that run one function at a time. Where the
+/// standard library has no threads, the caller alone.
 ///
 /// Starting a thread costs more than a block of training; waking one that waits does not. Not to be
 /// used from several threads at once.
 class WorkerTeam {
  public:
   explicit WorkerTeam(std::size_t n_threads) {
+#if SDNN_HAS_THREADS
     struct EndsWaiting {  // should no more threads be had, those that wait already must end
       WorkerTeam& team;
       bool has_all = false;
@@ -24,9 +26,13 @@ class WorkerTeam {
       }
     } waiting{*this};
     for (std::size_t part = 1; part < n_threads; ++part) {
-      threads_.emplace_back([this, part] { serve(part); });
+      threads_.start([this](std::size_t own_part) { serve(own_part); }, part);
+      ++n_others_;
     }
     waiting.has_all = true;
+#else
+    (void)n_threads;
+#endif
   }
   WorkerTeam(const WorkerTeam&) = delete;
   WorkerTeam& operator=(const WorkerTeam&) = delete;
@@ -35,16 +41,16 @@ class WorkerTeam {
     start();
   }
 
-  std::size_t size() const noexcept { return threads_.size() + 1; }
+  std::size_t size() const noexcept { return n_others_ + 1; }
 
   /// Calls work(part) for part = 0 .. size() - 1, each in a thread of its own, and waits for all.
   /// `work` must not throw.
   template <class Work>
   void run(const Work& work) {
-    if (threads_.empty()) return work(std::size_t{0});
+    if (n_others_ == 0) return work(std::size_t{0});
     work_ = &work;
     call_ = [](const void* what, std::size_t part) { (*static_cast<const Work*>(what))(part); };
-    n_busy_.store(threads_.size(), std::memory_order_relaxed);
+    n_busy_.store(n_others_, std::memory_order_relaxed);
     start();
     work(std::size_t{0});
     for (std::size_t busy = n_busy_.load(); busy != 0; busy = n_busy_.load()) n_busy_.wait(busy);
@@ -54,8 +60,10 @@ class WorkerTeam {
   template <class Work>
   void run_over(std::size_t n, const Work& work) {
     run([&](std::size_t part) {
-      const std::size_t end = (part + 1) * n / size();
-      for (std::size_t i = part * n / size(); i < end; ++i) work(i);
+      const auto begin_of = [&](std::uint64_t k) {
+        return static_cast<std::size_t>(k * n / size());
+      };
+      for (std::size_t i = begin_of(part); i < begin_of(part + 1); ++i) work(i);
     });
   }
 
@@ -79,7 +87,10 @@ class WorkerTeam {
   void (*call_)(const void*, std::size_t) = nullptr;
   std::atomic<std::uint64_t> round_{0};
   std::atomic<std::size_t> n_busy_{0};
-  std::vector<std::jthread> threads_;  // last: joined before the rest goes
+  std::size_t n_others_ = 0;
+#if SDNN_HAS_THREADS
+  Threads threads_;  // last: joined before the rest goes
+#endif
 };
 
 }  // namespace sdnn::core

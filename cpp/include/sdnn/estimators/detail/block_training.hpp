@@ -81,13 +81,13 @@ class BlockTraining {
   }
 
   /// Bytes beside the layer and the samples' bins; at most 1 % less than it takes.
-  static std::size_t bytes(std::size_t n_units, const coding::SelectiveDesensitization& code,
-                           std::size_t n_samples, bool keeps_plans) noexcept {
-    const std::size_t n_padded = core::round_up(n_units, kTileStep);
-    const std::size_t n_words = words_for(code);
+  static std::uint64_t bytes(std::size_t n_units, const coding::SelectiveDesensitization& code,
+                             std::size_t n_samples, bool keeps_plans) noexcept {
+    const std::uint64_t n_padded = core::round_up(n_units, kTileStep);
+    const std::uint64_t n_words = words_for(code);
     const std::size_t n_chunks = pair_chunks(code).size();
     const std::size_t size = keeps_plans ? kLargeBlock : kSmallBlock;
-    const auto plan_bytes = [&](std::size_t n) {
+    const auto plan_bytes = [&](std::uint64_t n) {
       return sizeof(Product) * n * size + CodeWalk::bytes(n, n_chunks, code.max_active());
     };
     return Wide::bytes(n_padded, n_words)                // weights_, or half of it

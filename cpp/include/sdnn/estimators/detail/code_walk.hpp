@@ -46,7 +46,7 @@ class ChunkedWeights {
                    [](Other weight) { return static_cast<Weight>(weight); });
   }
 
-  static std::size_t bytes(std::size_t n_padded_units, std::size_t n_words) noexcept {
+  static std::uint64_t bytes(std::uint64_t n_padded_units, std::uint64_t n_words) noexcept {
     return sizeof(Weight) * n_padded_units * 64 * n_words;
   }
 
@@ -130,8 +130,8 @@ struct CodeWalk {
   /// The most samples that places can tell apart.
   static constexpr std::size_t kMostSamples = std::size_t{1} << 16;
   /// The most bytes that the walks of all chunks of n_samples codes take.
-  static std::size_t bytes(std::size_t n_samples, std::size_t n_chunks,
-                           std::size_t most_active) noexcept {
+  static std::uint64_t bytes(std::uint64_t n_samples, std::uint64_t n_chunks,
+                             std::uint64_t most_active) noexcept {
     return n_samples * (most_active + n_chunks * (sizeof(Step) + sizeof(std::uint16_t)));
   }
 };

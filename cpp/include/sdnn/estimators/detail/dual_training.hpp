@@ -88,14 +88,14 @@ class DualTraining {
   }
 
   /// Bytes beside the layer and the samples' bins; at most 1 % less than it takes.
-  static std::size_t bytes(std::size_t n_units, const coding::SelectiveDesensitization& code,
-                           std::size_t n_samples) noexcept {
-    const std::size_t n_padded = core::round_up(n_units, kTileStep);
-    const std::size_t row_size = row_size_for(n_samples);
+  static std::uint64_t bytes(std::size_t n_units, const coding::SelectiveDesensitization& code,
+                             std::size_t n_samples) noexcept {
+    const std::uint64_t n_padded = core::round_up(n_units, kTileStep);
+    const std::uint64_t row_size = row_size_for(n_samples);
     return coding::CodedSamples::bytes(code, n_samples)    // coded_
-           + sizeof(Product) * n_samples * row_size        // products_
-           + sizeof(std::int32_t) * n_units * row_size     // potentials_
-           + sizeof(std::int16_t) * n_samples * n_padded   // coefficients_
+           + sizeof(Product) * row_size * n_samples        // products_
+           + sizeof(std::int32_t) * row_size * n_units     // potentials_
+           + sizeof(std::int16_t) * n_padded * n_samples   // coefficients_
            + PresentationWindow::bytes(n_padded, kWindow)  // window_
            + sizeof(Product) * kWindow * kWindow;          // gathered_
   }

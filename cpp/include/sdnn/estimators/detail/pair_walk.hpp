@@ -79,7 +79,7 @@ class PairWalks {
         const std::int32_t bin = bins[s * inputs_.size() + i];
         input.bins.push_back(bin);
         input.strips.push_back(
-            static_cast<std::uint32_t>(static_cast<std::size_t>(bin) * n_strips / n_bins));
+            static_cast<std::uint32_t>(static_cast<std::uint64_t>(bin) * n_strips / n_bins));
         ++input.begins[input.strips[s] + 1];
         ++places[static_cast<std::size_t>(bin) + 1];
       }
@@ -164,7 +164,7 @@ class ChunkSums {
         rows_(kChunkColumns * kMostUnits<Weight>),
         sums_(n_chunks_ * n_samples * kMostUnits<Weight>) {}
 
-  static constexpr std::size_t bytes(std::size_t n_samples) noexcept {
+  static constexpr std::uint64_t bytes(std::uint64_t n_samples) noexcept {
     return sizeof(Weight) * kMostUnits<Weight> * (kChunkColumns + kMostChunks * n_samples);
   }
 

@@ -42,7 +42,7 @@ class PresentationWindow {
         by_unit_(n_padded_units * stride_),
         by_sample_(kAtOnce * n_padded_units) {}
 
-  static std::size_t bytes(std::size_t n_padded_units, std::size_t capacity) noexcept {
+  static std::uint64_t bytes(std::uint64_t n_padded_units, std::size_t capacity) noexcept {
     return sizeof(std::int32_t) * n_padded_units *
            (core::round_up(capacity, kAtOnce) + 2 * kAtOnce);
   }

@@ -138,7 +138,7 @@ class WeightTiles {
   WeightTiles(std::size_t n_units, std::size_t n_slots)
       : n_units_(n_units),
         n_slots_(n_slots),
-        weights_(core::round_up(n_units, kTileStep) * n_slots) {}
+        weights_(core::checked_product(core::round_up(n_units, kTileStep), n_slots)) {}
 
   /// A copy in another type. The weights must fit.
   template <class Other>
