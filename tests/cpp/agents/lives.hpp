@@ -85,7 +85,7 @@ class World {
 template <class Make>
 void expect_that_a_life_can_be_cut(const Make& make, std::size_t n_environments = 1) {
   using Agent = decltype(make());
-  constexpr std::uint64_t kTicks = 400;
+  constexpr std::size_t kTicks = 400;
   Agent whole = make();
   whole.set_n_environments(n_environments);
   std::vector<World<Agent>> worlds;
@@ -95,7 +95,7 @@ void expect_that_a_life_can_be_cut(const Make& make, std::size_t n_environments 
     std::vector<World<Agent>> worlds;
   };
   std::vector<Cut> cuts;
-  for (std::uint64_t t = 0; t < kTicks; ++t) {
+  for (std::size_t t = 0; t < kTicks; ++t) {
     cuts.push_back({core::state_of(whole), worlds});
     worlds[t % n_environments].tick(whole);
   }
@@ -103,12 +103,12 @@ void expect_that_a_life_can_be_cut(const Make& make, std::size_t n_environments 
   core::Random random(11, core::Stream::weights);
   on_every_instruction_set([&](auto) {
     for (int i = 0; i < 120; ++i) {
-      const std::uint64_t at = random.below(kTicks);
+      const std::size_t at = random.below(kTicks);
       Agent resumed = make();
       core::restore(resumed, cuts[at].state);
       ASSERT_EQ(core::state_of(resumed), cuts[at].state) << at;
       std::vector<World<Agent>> rest = cuts[at].worlds;
-      for (std::uint64_t t = at; t < kTicks; ++t) rest[t % n_environments].tick(resumed);
+      for (std::size_t t = at; t < kTicks; ++t) rest[t % n_environments].tick(resumed);
       ASSERT_EQ(core::state_of(resumed), end) << at;
     }
   });

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 namespace sdnn::testing {
@@ -21,18 +22,27 @@ class WithWorkspace : public Q {
   }
   template <class Action>
   double value(std::span<const double> state, const Action& action) {
-    return Q::value(state, workspace_, action);
+    return Q::value(state, workspace_, index_of(action));
   }
   template <class Action>
   void update(std::span<const double> state, const Action& action, double target,
               double rate = 1.0) {
-    Q::update(state, workspace_, action, target, rate);
+    Q::update(state, workspace_, index_of(action), target, rate);
   }
   void warm_caches() { Q::warm_caches(workspace_); }
 
   const typename Q::Workspace& own_workspace() const { return workspace_; }
 
  private:
+  template <class Action>
+  static decltype(auto) index_of(const Action& action) {
+    if constexpr (std::is_integral_v<Action>) {
+      return static_cast<std::size_t>(action);
+    } else {
+      return (action);
+    }
+  }
+
   typename Q::Workspace workspace_ = Q::workspace();
 };
 

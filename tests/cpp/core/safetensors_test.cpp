@@ -38,7 +38,8 @@ const std::string kData =
 /// Reads from a text as from a file.
 auto reader_of(const std::string& file) {
   return [&file](std::uint64_t begin, std::span<std::byte> into) {
-    std::ranges::copy(std::as_bytes(std::span(file)).subspan(begin, into.size()), into.begin());
+    const auto bytes = std::as_bytes(std::span(file));
+    std::ranges::copy(bytes.subspan(static_cast<std::size_t>(begin), into.size()), into.begin());
   };
 }
 

@@ -87,7 +87,7 @@ std::shared_ptr<const ParallelPerceptron::Code> code_of_three(std::size_t n_unit
 }
 
 TEST(ParallelPerceptron, BlocksAndSinglesAgree) {
-  for (const std::size_t n_units : {42, 130}) {
+  for (const std::size_t n_units : {42U, 130U}) {
     for (const int range : {3, 400, 100000}) {  // sums of 16 bits, and of 32
       const ParallelPerceptron layer(code_of_three(n_units), 100, 5, range);
       core::Random random(7, core::Stream::exploration);
@@ -136,7 +136,7 @@ TEST(ParallelPerceptron, ThrowsWhatAThreadThrows) {
   const std::vector<std::int32_t> weights(6);
   const ParallelPerceptron layer(small_code(), 2, weights, std::vector<std::int32_t>(2));
   const std::vector<std::int32_t> bins(2000);
-  for (const std::size_t query : {0, 999, 1999}) {
+  for (const std::size_t query : {0U, 999U, 1999U}) {
     const auto consume = [&](std::size_t asked, const std::int32_t*) {
       if (asked == query) throw std::bad_alloc();
     };

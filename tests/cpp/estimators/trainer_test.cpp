@@ -77,7 +77,7 @@ TEST(Trainer, RefusesBadArgumentsAndKeepsTheLayer) {
   auto fewer = problem;
   fewer.targets.resize(fewer.targets.size() - fewer.n_groups);
   EXPECT_THROW(testing::trainer_for(fewer, layer, TrainingForm::plain), std::invalid_argument);
-  for (const std::size_t factor : {2, 100}) {  // a rule for more units would read beyond them
+  for (const std::size_t factor : {2U, 100U}) {  // a rule for more units would read beyond them
     auto other = problem;
     other.n_units *= factor;
     EXPECT_THROW(testing::trainer_for(other, layer, TrainingForm::plain), std::invalid_argument);

@@ -33,7 +33,7 @@ Rows random_rows(std::size_t n, std::uint64_t seed) {
 }
 
 TEST(LinearRows, SumsOfTheLargestWeightsAreExactOnEveryInstructionSet) {
-  for (const std::size_t n : {64, 192, 256, 320, 1024}) {
+  for (const std::size_t n : {64U, 192U, 256U, 320U, 1024U}) {
     Rows rows = random_rows(n, n);
     std::int64_t expected = 0;
     for (std::size_t j = 0; j < n; ++j) {
@@ -121,7 +121,7 @@ TEST(LinearRows, ATraceEndsAtZeroAndIsNeverBeyondItsLimit) {
 }
 
 TEST(LinearRows, AStepIsTheSameOnEveryInstructionSet) {
-  for (const std::size_t n : {64, 320}) {
+  for (const std::size_t n : {64U, 320U}) {
     for (std::uint64_t seed = 0; seed < 20; ++seed) {
       core::Random random(seed, core::Stream::rounding);
       const RowStep step{.decay = static_cast<std::int32_t>(random.below(kDecayOne + 1)),

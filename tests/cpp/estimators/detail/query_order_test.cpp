@@ -26,7 +26,7 @@ TEST(QueryOrder, HilbertsCurveVisitsEveryPointByStepsOfOne) {
         point.push_back(static_cast<std::uint32_t>(rest % side));
       }
       auto axes = point;
-      const auto index = estimators::detail::hilbert_index(axes, n_bits);
+      const auto index = static_cast<std::size_t>(estimators::detail::hilbert_index(axes, n_bits));
       ASSERT_LT(index, n_points);
       ASSERT_TRUE(at[index].empty());
       at[index] = point;
