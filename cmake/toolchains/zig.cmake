@@ -17,11 +17,14 @@ set(CMAKE_CXX_ARCHIVE_CREATE "<CMAKE_AR> ar qc <TARGET> <OBJECTS>")
 set(CMAKE_CXX_ARCHIVE_FINISH "")
 set(CMAKE_CXX_COMPILER_LAUNCHER "")  # zig has its own cache
 
-# A package of the host in /usr/include would bring the host's C library along.
-find_path(sdnn_nlohmann nlohmann/json.hpp PATHS /usr/include NO_CACHE REQUIRED NO_DEFAULT_PATH)
+# The host's package is in /usr/include, which would bring the headers of the host's C library along.
 set(nlohmann_json_DIR "${CMAKE_BINARY_DIR}/nlohmann")
 file(WRITE "${nlohmann_json_DIR}/nlohmann_jsonConfig.cmake" [[
 file(CREATE_LINK "/usr/include/nlohmann" "${CMAKE_CURRENT_LIST_DIR}/include/nlohmann" SYMBOLIC)
 add_library(nlohmann_json::nlohmann_json INTERFACE IMPORTED GLOBAL)
 target_include_directories(nlohmann_json::nlohmann_json SYSTEM INTERFACE "${CMAKE_CURRENT_LIST_DIR}/include")
+]])
+file(WRITE "${nlohmann_json_DIR}/nlohmann_jsonConfigVersion.cmake" [[
+set(PACKAGE_VERSION 3.9)  # at least: that of Debian and Ubuntu is newer
+set(PACKAGE_VERSION_COMPATIBLE TRUE)
 ]])

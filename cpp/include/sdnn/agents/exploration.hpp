@@ -136,7 +136,7 @@ class Exploration {
   EpsilonGreedy policy_;
   core::Random repetitions_;
   int max_action_repeat_;
-  int start_steps_;
+  [[maybe_unused]] int start_steps_;  ///< which only templates read
   int n_random_left_;  ///< steps that will still be random
   int n_ended_ = 0;    ///< episodes that terminated, kMostEnded at most
 };
