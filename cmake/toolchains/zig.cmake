@@ -20,6 +20,7 @@ set(CMAKE_CXX_COMPILER_LAUNCHER "")  # zig has its own cache
 # The host's package is in /usr/include, which would bring the headers of the host's C library along.
 set(nlohmann_json_DIR "${CMAKE_BINARY_DIR}/nlohmann")
 file(WRITE "${nlohmann_json_DIR}/nlohmann_jsonConfig.cmake" [[
+file(MAKE_DIRECTORY "${CMAKE_CURRENT_LIST_DIR}/include")
 file(CREATE_LINK "/usr/include/nlohmann" "${CMAKE_CURRENT_LIST_DIR}/include/nlohmann" SYMBOLIC)
 add_library(nlohmann_json::nlohmann_json INTERFACE IMPORTED GLOBAL)
 target_include_directories(nlohmann_json::nlohmann_json SYSTEM INTERFACE "${CMAKE_CURRENT_LIST_DIR}/include")

@@ -137,8 +137,8 @@ class Exploration {
   core::Random repetitions_;
   int max_action_repeat_;
   [[maybe_unused]] int start_steps_;  ///< which only templates read
-  int n_random_left_;  ///< steps that will still be random
-  int n_ended_ = 0;    ///< episodes that terminated, kMostEnded at most
+  int n_random_left_;                 ///< steps that will still be random
+  int n_ended_ = 0;                   ///< episodes that terminated, kMostEnded at most
 };
 
 }  // namespace sdnn::agents

@@ -95,7 +95,7 @@ class TakenActions {
 
   static constexpr std::int64_t kMostEnvironments = 1 << 14;
 
-  std::size_t n_dimensions_;
+  [[maybe_unused]] std::size_t n_dimensions_;
   std::vector<Taken> taken_;
 };
 
