@@ -18,7 +18,7 @@ nox.options.error_on_missing_interpreters = True
 
 ROOT = Path(__file__).parent
 JOBS = str(os.cpu_count() or 1)
-CPP_PRESETS = "gcc clang sanitize tsan assertions aarch64 libcxx arm32".split()
+CPP_PRESETS = ["gcc", "clang", "sanitize", "tsan", "assertions", "aarch64", "libcxx", "arm32"]
 
 
 def quick(**options):
