@@ -303,7 +303,7 @@ void bind_controller(py::module_& module) {
           "refused_reward", [](const Controller& self) { return self.reward_scale().refused(); },
           "The first reward that was too large to be learned, and its number from 1; or None")
       .def_property_readonly(
-          "reward_size", [](const Controller& self) { return self.reward_scale().present_size(); },
+          "reward_size", [](const Controller& self) { return self.reward_scale().size(); },
           "The largest recent reward is 2 to this power, or up to twice that; or None")
       .def_property(
           "reward_scale",

@@ -1,7 +1,6 @@
 """Let agents learn in random spaces with random settings: python tests/robustness/soak.py.
 
-``nox -s soak`` runs it under sanitizers. A fault is told with the number of its life, which
-``--first NUMBER --lives 1`` repeats.
+``nox -s soak`` runs it under sanitizers. ``--first NUMBER --lives 1`` repeats a life that failed.
 """
 
 import argparse

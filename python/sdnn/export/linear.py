@@ -201,7 +201,7 @@ class LearnerWriter(Learner, LinearWriter):
     def ram_bytes(self, sizes: dict[str, Any]) -> int:
         """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
         code = 8 + 4 * self.n_inputs + sizes["bytes_of_column"] * sizes["most_columns"]
-        n_bytes: int = 8 * 3 + 16 + 32 * 4 + 4 * (2 + self.averages) * sizes["n_weights"] + 4 * 10
+        n_bytes: int = 8 * 3 + 24 + 32 * 4 + 4 * (2 + self.averages) * sizes["n_weights"] + 4 * 10
         n_bytes += 4 * (2 * self.n_dimensions + self.n_inputs) + 2 * (-(-code // 4) * 4)
         n_bytes += 3 + int(sizes["n_rows"])
         return -(-n_bytes // 8) * 8

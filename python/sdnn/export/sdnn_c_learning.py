@@ -278,7 +278,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
         n_steps = self.agent.learning.n_steps
         columns = -(-shape["bytes_of_column"] * shape["most_columns"] // 4) * 4
         one_state = 8 + 4 * self.n_inputs + columns + 4 + 4 * self.n_units
-        n_bytes = 5 * 32 + 16 + 5 * 8 + (n_steps + 1) * one_state + 12 * n_steps
+        n_bytes = 5 * 32 + 24 + 5 * 8 + (n_steps + 1) * one_state + 12 * n_steps
         n_bytes += 4 * self.n_words + 4 * self.n_units
         n_bytes += 4 * (10 + self.n_inputs + self.n_observed)
         if self.adapts:

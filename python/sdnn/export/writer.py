@@ -29,6 +29,7 @@ SCALE_FIELDS = [
     (f"{SCALE}.n_rewards", "<u8"),
     (f"{SCALE}.size", "<i4"),
     (f"{SCALE}.size_in_window", "<i4"),
+    (f"{SCALE}.headroom", "<i4"),
 ]
 MOST_WEIGHTS = 2**26  # some hundred megabytes of text
 
@@ -261,6 +262,7 @@ class Learner(Writer):
             "state": state,
             "size": c_number(state[f"{SCALE}.size"]),
             "size_in_window": c_number(state[f"{SCALE}.size_in_window"]),
+            "headroom": state[f"{SCALE}.headroom"],
             "ties": "draw" if self.agent.learning.tie_rule == "uniform" else self.ties(),
             "image_bytes": self.layout().itemsize + 4,
             "image_magic": f"0x{self.magic:08x}",

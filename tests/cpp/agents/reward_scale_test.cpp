@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <optional>
+#include <vector>
 
 #include "sdnn/agents/sarsa.hpp"
 #include "sdnn/approximators/linear_sdnn.hpp"
@@ -10,20 +11,26 @@
 namespace sdnn::agents {
 namespace {
 
-// 2^17 is 17 powers of two above 1; each refusal brings it 4 nearer.
+// 2^40 is 40 powers of two above 1; the headroom is 16, and 4 more after each refusal.
 TEST(RewardScale, RefusesWhatIsFarBeyondUntilItRecurs) {
   RewardScale scale;
   EXPECT_TRUE(scale.accepts(0.0));
   EXPECT_FALSE(scale.size());
-  for (const double reward : {1.0, -1.5, 65536.0}) EXPECT_TRUE(scale.accepts(reward));
-  RewardScale other = scale;
-  EXPECT_EQ(scale.size(), 16);
-  for (int n_refused = 0; n_refused < 2; ++n_refused) EXPECT_FALSE(scale.accepts(-0x1p40));
-  EXPECT_EQ(scale.size(), 24);
+  for (const double reward : {1.0, -1.5}) EXPECT_TRUE(scale.accepts(reward));
+  EXPECT_EQ(scale.size(), 0);
+  for (int n_refused = 0; n_refused < 6; ++n_refused) EXPECT_FALSE(scale.accepts(-0x1p40));
+  EXPECT_EQ(scale.size(), 0);
   EXPECT_TRUE(scale.accepts(-0x1p40));
+  EXPECT_EQ(scale.size(), 40);
   EXPECT_EQ(scale.refused()->first, -0x1p40);
-  EXPECT_EQ(scale.refused()->second, 5U);
-  EXPECT_FALSE(other.refused());
+  EXPECT_EQ(scale.refused()->second, 4U);
+  EXPECT_TRUE(RewardScale().accepts(0x1p1000));
+}
+
+TEST(RewardScale, BeginsWithWhatIsCommon) {
+  RewardScale scale(std::vector<double>{0.0, 0x1p90, 1.0, -1.0, 0.0, 0.5});
+  EXPECT_EQ(scale.size(), 0);
+  EXPECT_FALSE(scale.accepts(0x1p90));
 }
 
 // From 40 to 16 above the largest reward of a window, which is 0, less a quarter, and so on.

@@ -231,6 +231,8 @@ class Controller : public WithRates<Controller> {
     if (terminated) next_mask = {};
     actions_.require_mask("next_mask", next_mask);
     core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
+    core::require(environment < n_environments(), "environment", "of those that there are",
+                  environment);
     if (warm_up_) {
       observations_.require_numbers("observation", observation);
       actions_.require_action(action);
@@ -383,6 +385,7 @@ class Controller : public WithRates<Controller> {
     observations_ = std::move(fitted);
     fit();
     const WarmUp warm_up = std::move(*warm_up_);
+    reward_scale_ = RewardScale(warm_up.rewards());
     warm_up_.reset();
     set_n_environments(warm_up.n_in_all());
     if (is_fuzzy(approximator_)) {

@@ -109,7 +109,7 @@ class Observations {
   std::span<const double> high() const noexcept { return ranges_.high; }
   std::span<const ObservedInput> inputs() const noexcept { return inputs_; }
   std::size_t n_inputs() const noexcept { return inputs_.size(); }
-  /// Whether inputs are to be chosen by relevance. Of two both are kept, and of one a copy is made.
+  /// Whether inputs are to be chosen by relevance: never from one, which is given twice, or two.
   bool has_choice() const {
     return config_.relevant_only && inputs_with(pairs_).size() > kAlwaysKept;
   }

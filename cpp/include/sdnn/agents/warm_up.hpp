@@ -58,6 +58,8 @@ class WarmUp {
     return n;
   }
   std::size_t size() const noexcept { return rewards_.size(); }
+  /// Rewards of all transitions, shape (size,).
+  std::span<const double> rewards() const noexcept { return rewards_; }
   bool is_over() const {
     return size() >= n_steps_ && std::ranges::none_of(episodes_, &Episode::acted);
   }

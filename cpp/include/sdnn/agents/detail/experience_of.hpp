@@ -21,7 +21,7 @@ inline RandomExperience experience_of(const Observations& fitted, const WarmUp& 
   std::ranges::stable_sort(order, {}, [&](auto t) { return transitions.step(t).environment; });
   RandomExperience experience{.n_inputs = fitted.n_inputs(), .circular = fitted.circular()};
   experience.actions.resize(n_dimensions);
-  RewardScale scale;
+  RewardScale scale(transitions.rewards());
   std::vector<double> state(fitted.n_inputs());
   for (std::size_t k = 0; k < order.size(); ++k) {
     const WarmUp::Step step = transitions.step(order[k]);
