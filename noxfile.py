@@ -1,12 +1,13 @@
 """Checks beyond the tests of the Python package, each a session: ``nox -s style``, ``nox -l``.
 
-Sessions run in the environment that nox itself runs in: ``pip install ".[test]"`` first.
+Sessions run in the environment that nox itself runs in: ``pip install ".[dev]"`` first.
 ``nox`` alone runs the quick ones, as continuous integration does; ``nox -t weekly`` the others.
 """
 
 import os
 import re
 import shutil
+import subprocess
 import sys
 import sysconfig
 from pathlib import Path
@@ -117,6 +118,45 @@ def docs_weekly(session):
     pytest(session, "tests/docs/test_pages.py", "-k", "long_blocks")
 
 
+SHORT_TESTS = (
+    "core/test_config.py", "core/test_lazy.py", "estimators/test_files.py",
+    "estimators/test_online.py", "estimators/test_scikit_learn.py", "agents/test_saving.py",
+    "agents/test_habits.py", "runs/test_run.py", "runs/test_spec.py",
+)  # fmt: skip
+
+
+@quick()
+def newest(session):
+    """Run some tests on the newest Python that is here, with the newest of all dependencies."""
+    test_with(session, interpreters()[-1], "highest", *SHORT_TESTS)
+
+
+@weekly()
+@nox.parametrize("resolution", ["lowest-direct", "highest"])
+def versions(session, resolution):
+    """Run all tests on the oldest and the newest Python, with the oldest and newest packages."""
+    test_with(session, interpreters()[-1 if resolution == "highest" else 0], resolution, "")
+
+
+def interpreters():
+    """Return the supported Pythons that are here, the oldest first."""
+    names = (shutil.which(f"python3.{minor}") for minor in range(11, 15))
+    works = {name: name and subprocess.run([name, "-c", ""], capture_output=True) for name in names}
+    return [name for name, run in works.items() if run and run.returncode == 0] or [sys.executable]
+
+
+def test_with(session, interpreter, resolution, *tests):
+    """Install the package and its tests in an environment of another Python, and run tests."""
+    python_of = Path(session.create_tmp(), resolution, "bin", "python")
+    uv = [sys.executable, "-m", "uv"]
+    session.run(*uv, "venv", "--clear", f"--python={interpreter}", python_of.parents[1])
+    launcher = {"CMAKE_CXX_COMPILER_LAUNCHER": "ccache"} if shutil.which("ccache") else {}
+    install = [*uv, "pip", "install", "-q", f"--python={python_of}", f"--resolution={resolution}"]
+    session.run(*install, "--reinstall-package=sdnn-learn", ".[test]", env=launcher)
+    paths = [str(Path("tests", "python", name)) for name in tests]
+    session.run(python_of, "-m", "pytest", "-q", *paths, *session.posargs, external=True)
+
+
 @weekly()
 def cluster(session):
     """Run trials on a Dask cluster whose parts are killed and frozen."""
@@ -137,7 +177,7 @@ def soak(session):
 
 @weekly(name="soak-weekly")
 def soak_weekly(session):
-    """Do the same for long."""
+    """Run 2,000 random lives under sanitizers."""
     run_soak(session, "--lives", "2000")
 
 

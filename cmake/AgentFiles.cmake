@@ -1,5 +1,5 @@
 # sdnn::agent_files is sdnn::sdnn and nlohmann/json, which the headers of saved agents include
-# (core/safetensors.hpp, agents/agent_file.hpp): there if that library is. sdnn::saved_agent is the
+# (core/safetensors.hpp, agents/agent_file.hpp). sdnn::saved_agent is the
 # library behind agents/saved_agent.hpp, compiled with the first program that is linked to it.
 find_package(nlohmann_json 3.9 CONFIG QUIET)
 if(TARGET nlohmann_json::nlohmann_json AND NOT TARGET sdnn::agent_files)
@@ -14,6 +14,11 @@ if(TARGET nlohmann_json::nlohmann_json AND NOT TARGET sdnn::agent_files)
     target_link_libraries(sdnn_saved_agent PUBLIC sdnn::sdnn PRIVATE sdnn::agent_files)
     add_library(sdnn::saved_agent ALIAS sdnn_saved_agent)
   endif()
-elseif(NOT TARGET nlohmann_json::nlohmann_json AND NOT sdnn_FIND_QUIETLY)
-  message(STATUS "sdnn::agent_files is left out: no nlohmann/json (apt install nlohmann-json3-dev)")
+elseif(NOT TARGET nlohmann_json::nlohmann_json)
+  # Whoever links to them reads why there is nothing: CMake shows an expression that it cannot evaluate.
+  foreach(sdnn_target sdnn::agent_files sdnn::saved_agent)
+    add_library(${sdnn_target} INTERFACE IMPORTED GLOBAL)
+    set_property(TARGET ${sdnn_target} PROPERTY INTERFACE_LINK_LIBRARIES
+      "$<${sdnn_target} needs nlohmann/json: apt install nlohmann-json3-dev>")
+  endforeach()
 endif()

@@ -1,9 +1,12 @@
+import functools
 import importlib.util
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -30,14 +33,30 @@ def skip_unless_ci():
     return _skip
 
 
+PACKAGES = {"clang": "clang libclang-rt-dev", "clang++": "clang libclang-rt-dev"}
+"""What to install for a tool whose package has another name."""
+
+
+@functools.cache
+def _links(compiler, options):
+    """Return whether a compiler makes a program with these options."""
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder, "main.c")
+        source.write_text("int main(void) { return 0; }\n")
+        command = [compiler, *options, source, "-o", Path(folder, "main")]
+        return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
 @pytest.fixture(scope="session")
 def needs(skip_unless_ci):
-    """Skips where a tool is missing."""
+    """Skips where a tool is missing, or a compiler makes no program with the options."""
 
-    def _needs(*tools):
+    def _needs(*tools, options=()):
         for tool in tools:
-            if shutil.which(tool) is None:
-                skip_unless_ci(f"needs {tool}")
+            is_compiler = re.search(r"(cc|clang|\+\+)$", tool)
+            if shutil.which(tool) is None or (is_compiler and not _links(tool, tuple(options))):
+                words = " ".join((tool, *options))
+                skip_unless_ci(f"needs {words}: apt install {PACKAGES.get(tool, tool)}")
 
     return _needs
 

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor
-
-    from typing_extensions import Self
+    from typing import Self
 
 
 class Interrupts:

@@ -10,9 +10,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from typing import Self
+
     from rich.console import Console
     from rich.progress import TaskID
-    from typing_extensions import Self
 
 _SPEED_SECONDS = 60.0
 """Time over which the speed is averaged for the time left."""

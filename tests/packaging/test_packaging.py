@@ -103,11 +103,18 @@ def test_the_cpp_example_builds_against_the_installed_package(cmake, configure, 
     assert Path(found).resolve() == Path(folder).resolve()
 
 
-def test_a_missing_json_library_is_named(configure, tmp_path):
-    none = "-DCMAKE_DISABLE_FIND_PACKAGE_nlohmann_json=ON"
-    done = configure(ROOT, tmp_path / "library", none)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "nlohmann-json3-dev" in done.stdout
+def test_a_missing_json_library_is_named_to_those_who_need_it(configure, tmp_path):
+    (tmp_path / "main.cpp").write_text("int main() {}\n")
+    for target, fits in (("sdnn::sdnn", True), ("sdnn::saved_agent", False)):
+        (tmp_path / "CMakeLists.txt").write_text(
+            "cmake_minimum_required(VERSION 3.21)\nproject(robot LANGUAGES CXX)\n"
+            f"add_subdirectory({ROOT.as_posix()} sdnn)\nadd_executable(robot main.cpp)\n"
+            f"target_link_libraries(robot PRIVATE {target})\n"
+        )
+        none = "-DCMAKE_DISABLE_FIND_PACKAGE_nlohmann_json=ON"
+        done = configure(tmp_path, tmp_path / "build", none)
+        assert (done.returncode == 0) == fits, done.stdout + done.stderr
+        assert ("apt install nlohmann-json3-dev" in done.stderr) != fits
 
 
 def test_eigen_is_found_in_the_python_that_the_shell_would_start(

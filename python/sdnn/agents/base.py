@@ -50,7 +50,7 @@ from sdnn.display import Displayed
 from sdnn.files import Arrays, Description, read_file, write_file
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
+    from typing import Self
 
     from sdnn.agents.agent import Agent
 

@@ -32,7 +32,7 @@ from sdnn.display import Displayed
 from sdnn.interrupts import Interrupts
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
+    from typing import Self
 
     from sdnn.agents.callbacks import Callback, Row
 

@@ -6,7 +6,6 @@ gives the same rows, submits as many trials as those have threads, and collects 
 
 from __future__ import annotations
 
-import asyncio
 import importlib.util
 import json
 import logging
@@ -137,7 +136,7 @@ class DaskExecutor:
                 return
             try:
                 yield from _Run(self, client, planned).messages(stop)
-            except (OSError, asyncio.TimeoutError) as error:
+            except (TimeoutError, OSError) as error:
                 raise self.failure(f"lost the scheduler at {self.scheduler}: {error}") from error
             finally:
                 client.close(timeout=CONNECT_SECONDS)

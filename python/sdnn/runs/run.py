@@ -54,7 +54,7 @@ from sdnn.runs.trial import (
 )
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
+    from typing import Self
 
 CONFIG = "config.json"
 LOCK = ".lock"

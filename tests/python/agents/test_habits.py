@@ -88,7 +88,7 @@ CALLS = {
 """Names that functions do not have, and what the error must have."""
 
 
-@pytest.mark.parametrize("function", CALLS, ids=str)
+@pytest.mark.parametrize("function", CALLS, ids=lambda call: call.__qualname__)
 def test_names_from_habit_are_explained(trained, function):
     for name, hint in CALLS[function].items():
         with pytest.raises(TypeError, match=f"^{name} .*{re.escape(hint)}") as refused:

@@ -45,7 +45,7 @@ def test_a_notebook_shows_it_where_a_training_is_long():
     source = """import gymnasium as gym; from sdnn.agents import RBFQLearning, callbacks
 callbacks.SHOWN_AFTER, env = {}, gym.make("Pendulum-v1")
 RBFQLearning(env).train(env, 500)"""
-    for limit, n_outputs in ((0.01, 2), (60.0, 1)):
+    for limit, n_outputs in ((0.0, 2), (60.0, 1)):
         cell = nbformat.v4.new_code_cell(source.format(limit))
         notebook = nbformat.v4.new_notebook(cells=[cell])
         nbclient.NotebookClient(notebook, kernel_name="python3").execute()

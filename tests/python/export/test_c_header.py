@@ -120,7 +120,8 @@ def test_the_angle_of_a_pair_is_in_the_agents_bin(needs, tmp_path):
 
 def test_what_the_library_refuses_is_defined(needs, tmp_path):
     """NaN is the lowest; an angle of NaN or infinity is 0. Conversions of NaN would be caught."""
-    needs("clang")
+    caught = ("-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all")
+    needs("clang", options=caught)
     for name, agent in (("pairs", agents()["pairs"]), ("symbols", symbols_agent())):
         (tmp_path / f"{name}.h").write_text(c_header(agent, name).text)
     source = """
@@ -140,7 +141,6 @@ def test_what_the_library_refuses_is_defined(needs, tmp_path):
         }
     """
     (tmp_path / "bins.c").write_text(source + "\n")
-    caught = ("-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all")
     run("clang", *STRICT, *caught, tmp_path / "bins.c", "-o", tmp_path / "bins")
     numbers = [math.nan, math.inf, -math.inf, 0.5]
     points = list(itertools.product(numbers, repeat=3))
