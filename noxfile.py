@@ -7,7 +7,6 @@ Sessions run in the environment that nox itself runs in: ``pip install ".[dev]"`
 import os
 import re
 import shutil
-import subprocess
 import sys
 import sysconfig
 from pathlib import Path
@@ -139,10 +138,12 @@ def versions(session, resolution):
 
 
 def interpreters():
-    """Return the supported Pythons that are here, the oldest first."""
-    names = (shutil.which(f"python3.{minor}") for minor in range(11, 15))
-    works = {name: name and subprocess.run([name, "-c", ""], capture_output=True) for name in names}
-    return [name for name, run in works.items() if run and run.returncode == 0] or [sys.executable]
+    """Return the supported Pythons on the path and of pyenv, the oldest first."""
+    pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
+    folders = [*map(str, pyenv.glob("versions/*/bin")), os.environ["PATH"]]
+    names = (f"python3.{minor}" for minor in range(11, 15))
+    paths = (shutil.which(name, path=os.pathsep.join(folders)) for name in names)
+    return list(filter(None, paths))
 
 
 def test_with(session, interpreter, resolution, *tests):
