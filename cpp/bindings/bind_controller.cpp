@@ -253,6 +253,19 @@ void bind_controller(py::module_& module) {
           py::arg("observation"), py::arg("action"), py::arg("reward"), py::arg("next_observation"),
           py::arg("terminated"), py::arg("environment") = 0, py::arg("next_mask") = py::none())
       .def(
+          "check",
+          [](const Controller& self, const ArrayArgument<double>& observation,
+             const ArrayArgument<double>& action, double reward,
+             const ArrayArgument<double>& next_observation, bool terminated,
+             std::size_t environment, const MaskArgument& next_mask) {
+            self.check(bindings::flat(observation), bindings::flat(action), reward,
+                       bindings::flat(next_observation), terminated, environment,
+                       mask_of(next_mask));
+          },
+          py::arg("observation"), py::arg("action"), py::arg("reward"), py::arg("next_observation"),
+          py::arg("terminated"), py::arg("environment") = 0, py::arg("next_mask") = py::none(),
+          "Raises what learn would; changes nothing")
+      .def(
           "act_each",
           [](Controller& self, const ArrayArgument<double>& observations,
              const py::list& environments, const MaskArgument& masks) {

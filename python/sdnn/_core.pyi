@@ -2118,6 +2118,10 @@ class Controller:
         ...
     def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
+    def check(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0, next_mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> None:
+        """
+        Raises what learn would; changes nothing
+        """
     def learn(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0, next_mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> None:
         ...
     def learn_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], actions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rewards: list, next_observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: list, environments: list, progress: list, next_masks: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> int:

@@ -16,6 +16,7 @@ LEAST = {
     "mutation_cells": N_MUTATIONS,
     "damage_cells": 120,
     "single_input_cells": 32,
+    "log_cells": 90,
 }
 """Cells that a row must have, so that none is empty; others 700."""
 

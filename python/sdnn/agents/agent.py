@@ -143,8 +143,19 @@ class Agent(BaseAgent[Approximator, Learning]):
                 " learns in an environment"
             )
         self._check_environment(environment)
+        self._controller.learn(*self._parts_of(transition, environment))
+        self.warn_of_refused_reward()
+
+    def check(self, transition: Transition) -> None:
+        """Raise what `learn` would for a transition that cannot be learned; learn nothing."""
+        self._controller.check(*self._parts_of(transition, 0))
+
+    def _parts_of(self, transition: Any, environment: int) -> tuple[Any, ...]:
+        """Return a transition as the core takes it; TypeError or ValueError if it is none."""
+        if not isinstance(transition, Transition):
+            raise TypeError(f"transition must be a Transition, got {shown(transition)}")
         observation, action, reward, next_observation, terminated, next_mask = transition
-        self._controller.learn(
+        return (
             self._observations.vector("observation", observation),
             self._actions.numbers(action),
             reward_of(reward),
@@ -153,7 +164,6 @@ class Agent(BaseAgent[Approximator, Learning]):
             environment,
             self._actions.mask("next_mask", next_mask),
         )
-        self.warn_of_refused_reward()
 
     def warn_of_refused_reward(self) -> None:
         """Warn once if a reward was too large to be learned, as the glitch of a sensor is."""

@@ -2,34 +2,19 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 
-from numpy.typing import NDArray
+import gymnasium as gym
+import numpy as np
 
 from sdnn.agents.agent import Agent
 from sdnn.agents.episode import Transition
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
+from sdnn.agents.logs import Logged, reader_of
 from sdnn.agents.names import explained
-from sdnn.arguments import (
-    argument_error,
-    array_of,
-    flag,
-    is_of_class,
-    path_of,
-    require,
-    shown,
-    whole,
-)
-from sdnn.files import open_regular
-
-_MOST_BYTES = 2**20
-"""Of a line of a file: so much memory is used, whatever the file."""
-
-_ARRAYS = ("observations", "actions", "rewards", "next_observations", "terminations")
-_KEYS = Transition._fields[:-1]  # the last one is optional
+from sdnn.arguments import is_of_class, require, whole
 
 
 class MinariDataset(Protocol):
@@ -39,16 +24,13 @@ class MinariDataset(Protocol):
         """Yield episodes with observations, actions, rewards, terminations and truncations."""
 
 
-Dataset: TypeAlias = str | Path | Mapping[str, Any] | Iterable[Transition] | MinariDataset
+Dataset: TypeAlias = str | Path | Mapping[str, Any] | Iterable[Any] | MinariDataset
 """Logged transitions; see `learn_from`."""
-
-_Logged: TypeAlias = tuple[str, Transition, bool]
-"""Where a transition is, the transition, and whether its episode was truncated after it."""
 
 
 @explained
 def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> int:
-    """Learn logged transitions in their order; they are read one by one, so memory stays small.
+    """Learn logged transitions in their order. All of them are checked before any is learned.
 
     An agent without ranges takes its warm-up from the first transitions. ``agent.progress`` stays
     as it is.
@@ -58,11 +40,17 @@ def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> 
     agent : Agent
         Any but `FuzzyQLearning`, which can learn its own actions only. `SDNNSarsa` with
         ``SarsaConfig(bootstrap="sarsa")`` learns the values of the policy that acted.
-    dataset : path, mapping, MinariDataset or iterable of Transition
-        A file of JSON lines, each an object with the fields of `Transition` and, if its episode was
-        cut off after it, ``"truncated": true``. Arrays of n rows each by their names,
-        ``observations``, ``actions``, ``rewards``, ``next_observations``, ``terminations`` and
-        perhaps ``truncations``. A dataset of Minari. Or transitions.
+    dataset : path, mapping, table, MinariDataset or iterable
+        A file ``.csv`` with a line of names, or of JSON lines, each a transition; both are read
+        line by line. Arrays of n rows, or columns of a table of pandas, by their names:
+        ``observations``, ``actions``, ``rewards``, ``terminations`` and ``truncations`` (flags,
+        also as 0 and 1), and ``next_observations``. Without these, rows follow each other, and
+        where an episode is cut off its last step is not learned. Names of D4RL, imitation and
+        Stable-Baselines3 (``obs``, ``terminals``, ``timeouts``, ``dones``, ...) and columns such
+        as ``observation_0`` are read, too. Or transitions: `Transition`, mappings, or tuples of
+        observation, action, reward, next observation, terminated and perhaps truncated. Or
+        episodes, also a dataset of Minari: objects or mappings with one observation more than
+        rewards.
     epochs : int
         How often the dataset is learned.
 
@@ -74,7 +62,8 @@ def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> 
     Raises
     ------
     TypeError, ValueError
-        If an argument, a line or a transition is not usable; what came before it is learned.
+        If an argument or a transition is not usable; names episode and row, and nothing is
+        learned.
     OSError
         If the file cannot be read.
 
@@ -90,98 +79,37 @@ def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> 
     expected = "be an Agent that learns any action, not FuzzyQLearning"
     require(learns_any, "agent", expected, agent, TypeError)
     epochs = whole("epochs", epochs, 1, 2**31)
-    read = _reader(dataset)
-    is_once = isinstance(dataset, Iterator)
-    require(epochs == 1 or not is_once, "epochs", "be 1 for an iterator", epochs)
-    n = 0
-    for _ in range(epochs):
+    read = reader_of(dataset)
+    n = _checked_length(agent, read())
+    for _ in range(epochs if n > 0 else 0):
         agent.begin_episode()
-        for place, transition, truncated in read():
-            try:
-                agent.learn(transition)
-                ends = flag("truncated", truncated) or transition.terminated
-            except (TypeError, ValueError) as error:
-                raise type(error)(f"dataset, {place}: {error}") from error
-            n += 1
-            if ends:
+        for logged in read():
+            transition = _with_action(agent, logged.transition)
+            agent.learn(transition)
+            if logged.truncated or transition.terminated:
                 agent.begin_episode()
         agent.begin_episode()  # learns what still waits
-        if n == 0:  # nor will there be anything in the next epochs
-            break
+    return n * (epochs if n > 0 else 0)
+
+
+def _checked_length(agent: Agent[Any, Any], log: Iterator[Logged]) -> int:
+    """Return the number of transitions; the error of one that cannot be learned has its place."""
+    n = n_episodes = 0
+    for place, transition, truncated in log:
+        try:
+            agent.check(_with_action(agent, transition))
+        except (TypeError, ValueError) as error:
+            episode = "" if place.startswith("episode") else f"episode {n_episodes}, "
+            raise type(error)(f"dataset, {episode}{place}: {error}") from error
+        n += 1
+        n_episodes += truncated or transition.terminated
     return n
 
 
-def _reader(dataset: Any) -> Callable[[], Iterator[_Logged]]:
-    if isinstance(dataset, str | Path):
-        return lambda: _lines(path_of("dataset", dataset))
-    if isinstance(dataset, Mapping):
-        arrays = _arrays_of(dataset)
-        return lambda: _rows(arrays)
-    if callable(getattr(dataset, "iterate_episodes", None)):
-        return lambda: _episodes(dataset)
-    if isinstance(dataset, Iterable):
-        return lambda: ((f"transition {i}", one, False) for i, one in enumerate(dataset))
-    expected = "must be a path, arrays by name, a Minari dataset or transitions"
-    raise argument_error("dataset", f"{expected}, got {shown(dataset)}", TypeError)
-
-
-def _lines(path: Path) -> Iterator[_Logged]:
-    with open_regular(path, 2**62) as file:
-        number = 0
-        while line := file.readline(_MOST_BYTES + 1):
-            number += 1
-            if len(line) > _MOST_BYTES:
-                raise ValueError(f"dataset, line {number}: must be of at most {_MOST_BYTES} bytes")
-            try:
-                values = json.loads(line)
-            except (ValueError, RecursionError) as error:
-                problem = f"must be a JSON object, got {shown(line[:40])}"
-                raise ValueError(f"dataset, line {number}: {problem}") from error
-            if not isinstance(values, dict) or not _has(values, _KEYS, "truncated", "next_mask"):
-                perhaps = "perhaps truncated and next_mask"
-                problem = f"must have {', '.join(_KEYS)}, {perhaps}, got {shown(values)}"
-                raise ValueError(f"dataset, line {number}: {problem}")
-            truncated = values.pop("truncated", False)
-            yield f"line {number}", Transition(**values), truncated
-
-
-def _has(values: Mapping[str, Any], names: tuple[str, ...], *more: str) -> bool:
-    return set(names) <= set(values) <= {*names, *more}
-
-
-def _arrays_of(values: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    """Return the arrays, of which files mapped to memory are not read yet."""
-    expected = f"have {', '.join(_ARRAYS)}, perhaps truncations"
-    require(_has(values, _ARRAYS, "truncations"), "dataset", expected, [*values])
-    arrays = {name: array_of(f"dataset[{name!r}]", one) for name, one in values.items()}
-    lengths = {name: len(one) if one.ndim else 0 for name, one in arrays.items()}
-    require(len(set(lengths.values())) == 1, "dataset", "be of arrays of one length", lengths)
-    return arrays
-
-
-def _rows(arrays: Mapping[str, NDArray[Any]]) -> Iterator[_Logged]:
-    truncations = arrays.get("truncations")
-    for i in range(len(arrays["rewards"])):
-        row = (arrays[name][i] for name in _ARRAYS)
-        yield f"row {i}", Transition(*row), truncations is not None and truncations[i]
-
-
-def _episodes(dataset: Any) -> Iterator[_Logged]:
-    for number, episode in enumerate(dataset.iterate_episodes()):
-        last = len(episode.rewards) - 1
-        for t, reward in enumerate(episode.rewards):
-            transition = Transition(
-                _at(episode.observations, t),
-                _at(episode.actions, t),
-                reward,
-                _at(episode.observations, t + 1),
-                episode.terminations[t],
-            )
-            yield f"episode {number}, step {t}", transition, t == last
-
-
-def _at(values: Any, t: int) -> Any:
-    """Return number t of an array, or of each in dictionaries and tuples, as Gymnasium's spaces."""
-    if isinstance(values, dict):
-        return {name: _at(part, t) for name, part in values.items()}
-    return tuple(_at(part, t) for part in values) if isinstance(values, tuple) else values[t]
+def _with_action(agent: Agent[Any, Any], transition: Transition) -> Transition:
+    """Return a transition whose action, if it is a whole number in a float or an array, is one."""
+    if not isinstance(agent.action_space, gym.spaces.Discrete) or type(transition.action) is int:
+        return transition
+    number = np.asarray(transition.action)
+    is_whole = number.size == 1 and number.dtype.kind in "iuf" and float(number.item()).is_integer()
+    return transition._replace(action=int(number.item())) if is_whole else transition

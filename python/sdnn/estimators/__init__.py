@@ -43,7 +43,7 @@ def __getattr__(name: str) -> Any:
         module = (error.name or "sdnn").partition(".")[0]
         if module == "sdnn":
             raise
-        package = {"sklearn": "scikit-learn"}.get(module, module)
+        package = "scikit-learn" if module in ("sklearn", "joblib") else module
         raise ModuleNotFoundError(
             f"{name} needs {package}: pip install {package}", name=error.name
         ) from error

@@ -7,6 +7,7 @@ import bad_inputs
 import bad_options
 import core_cells
 import damaged_files
+import logged_data
 import mutated_files
 import public_cells
 import random_lives
@@ -24,6 +25,7 @@ MATRICES = {
         *((bad_inputs.file_cells, kind) for kind in AGENTS),
         (bad_inputs.loop_cells,),
         (random_lives.single_input_cells,),
+        (logged_data.log_cells,),
     ],
     "core": [(core_cells.never_made_cells,), (core_cells.argument_cells,)],
     "classes": [

@@ -252,6 +252,23 @@ class Controller : public WithRates<Controller> {
     if (latest_ && latest_->learn(step)) add_inputs();
   }
 
+  /// Throws what learn would for a transition that cannot be learned; changes nothing.
+  void check(std::span<const double> observation, std::span<const double> action, double reward,
+             std::span<const double> next_observation, bool terminated, std::size_t environment,
+             ActionMask next_mask) const {
+    actions_.require_mask("next_mask", terminated ? ActionMask() : next_mask);
+    core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
+    core::require(environment < n_environments(), "environment", "of those that there are",
+                  environment);
+    observations_.require_numbers("observation", observation);
+    actions_.require_action(action);
+    observations_.require_numbers("next_observation", next_observation);
+    if (is_warming_up()) return;
+    std::vector<double> state(observations_.n_inputs());
+    observations_.scale(observation, state);
+    observations_.scale(next_observation, state, "next_observation");
+  }
+
   /// The state that the agent has for an observation. Valid until the next call. Throws as act.
   std::span<const double> state_of(std::span<const double> observation) {
     observations_.scale(observation, state_);

@@ -1,0 +1,306 @@
+"""Forms in which people have logged transitions, read as `Transition` with their places."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sdnn.agents.episode import Transition
+from sdnn.arguments import advice, argument_error, array_of, path_of, require, shown
+from sdnn.files import open_regular
+
+_MOST_BYTES = 2**20
+"""Of a line of a file: so much memory is used, whatever the file."""
+
+NAMES: Mapping[str, tuple[str, ...]] = {
+    "observations": ("observation", "obs", "states", "state"),
+    "actions": ("action", "acts", "act"),
+    "rewards": ("reward", "rews", "rew"),
+    "next_observations": ("next_observation", "next_obs", "next_states", "next_state"),
+    "terminations": ("terminated", "terminals", "terminal", "dones", "done"),
+    "truncations": ("truncated", "timeouts", "timeout"),
+    "next_masks": ("next_mask",),
+}
+"""Names of columns, and others that stand for them: of D4RL, imitation and Stable-Baselines3."""
+
+_COLUMN_OF = {other: name for name, others in NAMES.items() for other in (name, *others)}
+_IGNORED = re.compile(r"(infos?|metadata|id|seed|total_steps)\b")
+_NUMBERED = re.compile(r"(.+?)[_.\[](\d+)\]?")
+_ARRAYS = ("observations", "actions", "rewards")
+_Columns = dict[str, Any]
+
+
+class Logged(NamedTuple):
+    """A transition, its place in the log, and whether its episode was cut off after it."""
+
+    place: str
+    transition: Transition
+    truncated: bool
+
+
+def reader_of(dataset: Any) -> Callable[[], Iterator[Logged]]:
+    """Return a function that reads a dataset from its beginning; see `learn_from`.
+
+    TypeError or ValueError for what is no dataset.
+    """
+    if isinstance(dataset, str | Path):
+        path = path_of("dataset", dataset)
+        return lambda: _table_lines(path) if path.suffix.lower() == ".csv" else _json_lines(path)
+    if isinstance(dataset, Mapping):
+        columns = _columns_of(dataset)
+        return lambda: _rows(columns, "row")
+    if hasattr(dataset, "columns") and hasattr(dataset, "iloc"):  # a table of pandas
+        columns = _columns_of({str(name): dataset[name].to_numpy() for name in dataset.columns})
+        return lambda: _rows(columns, "row")
+    if callable(getattr(dataset, "iterate_episodes", None)):
+        return lambda: _items(dataset.iterate_episodes())
+    if isinstance(dataset, Iterable):
+        items = [*dataset] if isinstance(dataset, Iterator) else dataset
+        return lambda: _items(items)
+    expected = "must be a path, arrays by name, a table, a Minari dataset, transitions or episodes"
+    raise argument_error("dataset", f"{expected}, got {shown(dataset)}", TypeError)
+
+
+def _json_lines(path: Path) -> Iterator[Logged]:
+    for number, line in _lines(path):
+        try:
+            values = json.loads(line)
+        except (ValueError, RecursionError) as error:
+            problem = f"must be a JSON object, got {shown(line[:40])}"
+            raise ValueError(f"dataset, line {number}: {problem}") from error
+        require(isinstance(values, dict), f"dataset, line {number}", "be a JSON object", values)
+        yield _transition(values, f"line {number}")
+
+
+def _table_lines(path: Path) -> Iterator[Logged]:
+    """Read a file of comma-separated values, whose first line has the names."""
+    names: list[str] = []
+    before: dict[str, Any] | None = None
+    for number, line in _lines(path):
+        try:
+            cells = next(csv.reader(io.StringIO(line.decode())), [])
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise ValueError(f"dataset, line {number}: must be text, got {shown(line)}") from error
+        if not names:
+            names = [cell.strip() for cell in cells]
+            continue
+        expected = f"have {len(names)} cells, as many as there are names"
+        require(len(cells) == len(names), f"dataset, line {number}", expected, cells)
+        values = {name: [_cell(cell)] for name, cell in zip(names, cells, strict=True)}
+        columns = _columns_of(values, f"dataset, line {number}")
+        row = {name: column[0] for name, column in columns.items() if name != "_n_rows"}
+        if "next_observations" in row:
+            yield _logged(row, f"line {number}")
+            continue
+        if before is not None and not _is_cut(before):
+            before["next_observations"] = row["observations"]
+            yield _logged(before, f"line {number - 1}")
+        before = row
+        if _flag("terminations", before.get("terminations", False)):
+            before["next_observations"] = row["observations"]
+            yield _logged(before, f"line {number}")
+            before = None
+
+
+def _is_cut(row: Mapping[str, Any]) -> bool:
+    return _flag("truncations", row.get("truncations", False))
+
+
+def _cell(text: str) -> Any:
+    word = text.strip()
+    if word.lower() in ("true", "false"):
+        return word.lower() == "true"
+    try:
+        return float(word)
+    except ValueError:
+        return word
+
+
+def _lines(path: Path) -> Iterator[tuple[int, bytes]]:
+    with open_regular(path, 2**62) as file:
+        number = 0
+        while line := file.readline(_MOST_BYTES + 1):
+            number += 1
+            if len(line) > _MOST_BYTES:
+                raise ValueError(f"dataset, line {number}: must be of at most {_MOST_BYTES} bytes")
+            yield number, line
+
+
+def _items(items: Iterable[Any]) -> Iterator[Logged]:
+    """Read transitions or episodes, whatever each of them is."""
+    for number, item in enumerate(items):
+        if isinstance(item, Transition):
+            yield Logged(f"transition {number}", item, False)
+        elif isinstance(item, tuple | list) and len(item) in (5, 6):
+            yield _logged(dict(zip(_ROW, item, strict=False)), f"transition {number}")
+        else:
+            values = _fields_of(item)
+            if values is None:
+                expected = "be a Transition, a mapping, or an episode with observations"
+                raise argument_error(f"transition {number}", f"must {expected}, got {shown(item)}",
+                                     TypeError)  # fmt: skip
+            if np.ndim(_value(values, "rewards", ())) == 0:
+                yield _transition(values, f"transition {number}")
+            else:
+                columns = _columns_of(values, f"dataset, episode {number}", is_episode=True)
+                yield from _rows(columns, f"episode {number}, step", is_episode=True)
+
+
+_ROW = ("observations", "actions", "rewards", "next_observations", "terminations", "truncations")
+
+
+def _fields_of(item: Any) -> dict[str, Any] | None:
+    """Return the columns of a mapping or of an object with attributes of such names."""
+    if isinstance(item, Mapping):
+        return dict(item)
+    named = {name: getattr(item, name) for name in _COLUMN_OF if hasattr(item, name)}
+    has_all = all(_value(named, name) is not None for name in ("observations", "rewards"))
+    return named if has_all else None
+
+
+def _value(values: Mapping[str, Any], name: str, default: Any = None) -> Any:
+    return next((values[other] for other in (name, *NAMES[name]) if other in values), default)
+
+
+def _transition(values: Mapping[str, Any], place: str) -> Logged:
+    """Read a mapping of one transition."""
+    row = {}
+    for name, value in values.items():
+        if _IGNORED.match(name):
+            continue
+        column = _COLUMN_OF.get(name)
+        require(column, f"dataset, {place}", f"have no {name!r}: {advice(name, NAMES)}", [*values])
+        require(column not in row, f"dataset, {place}", f"have {column} once", [*values])
+        row[str(column)] = value
+    missing = [name for name in _ROW[:4] if name not in row]
+    require(not missing, f"dataset, {place}", f"have {', '.join(missing)}", [*values])
+    return _logged(row, place)
+
+
+def _logged(row: Mapping[str, Any], place: str) -> Logged:
+    try:
+        terminated = _flag("terminated", row.get("terminations", False))
+        truncated = _flag("truncated", row.get("truncations", False))
+    except ValueError as error:
+        raise ValueError(f"dataset, {place}: {error}") from error
+    is_end = terminated and not truncated
+    observation, action, reward, following = (row[name] for name in _ROW[:4])
+    mask = row.get("next_masks")
+    transition = Transition(observation, action, reward, following, is_end, mask)
+    return Logged(place, transition, truncated)
+
+
+def _flag(name: str, value: Any) -> bool:
+    """Read True or False of any library, or 1 or 0."""
+    number = np.asarray(value)
+    is_flag = number.size == 1 and number.dtype.kind in "biuf" and number.item() in (0, 1)
+    require(is_flag, name, "be True or False, or 1 or 0", value)
+    return bool(number.item())
+
+
+def _columns_of(
+    values: Mapping[str, Any], where: str = "dataset", *, is_episode: bool = False
+) -> _Columns:
+    """Return arrays of n rows each by their usual names; ``observations`` may have one more.
+
+    Columns such as ``observation_0`` are put together. Files mapped to memory are not read yet.
+    """
+    columns: _Columns = {}
+    parts: dict[str, dict[int, Any]] = {}
+    for name, column in values.items():
+        if column is None or _IGNORED.match(str(name)):
+            continue
+        numbered = _NUMBERED.fullmatch(str(name))
+        whole = _COLUMN_OF.get(str(name))
+        part = _COLUMN_OF.get(numbered[1]) if numbered and whole is None else None
+        if part is not None and numbered is not None:
+            parts.setdefault(part, {})[int(numbered[2])] = array_of(f"{where}[{name!r}]", column)
+        elif whole is not None:
+            require(whole not in columns, where, f"have {whole} once", [*values])
+            columns[whole] = _column(f"{where}[{name!r}]", column)
+        else:
+            raise argument_error(
+                where, f"must have no {name!r}: {advice(str(name), NAMES)}; got {[*values]}"
+            )
+    for name, numbers in parts.items():
+        expected = f"have columns of {name} numbered from 0"
+        require([*sorted(numbers)] == [*range(len(numbers))], where, expected, sorted(numbers))
+        columns[name] = np.stack([numbers[i] for i in range(len(numbers))], axis=-1)
+    missing = [name for name in _ARRAYS if name not in columns]
+    require(not missing, where, f"have {', '.join(missing)}", [*values])
+    n = _length(columns["rewards"])
+    lengths = {name: _length(column) for name, column in columns.items()}
+    one_more = ("observations",) if "next_observations" not in columns else ()
+    expected = f"have {n} rows of each, as of rewards" + " (of observations one more)" * bool(
+        one_more
+    )
+    fits = all(m == n or (name in one_more and m == n + 1) for name, m in lengths.items())
+    require(fits, where, expected, lengths)
+    if is_episode and one_more:
+        is_whole = lengths["observations"] == n + 1
+        require(is_whole, where, f"have {n + 1} observations for {n} rewards", lengths)
+    return {**columns, "_n_rows": n}
+
+
+def _column(name: str, column: Any) -> Any:
+    if isinstance(column, Mapping):
+        return {key: _column(f"{name}[{key!r}]", part) for key, part in column.items()}
+    if isinstance(column, tuple) and column and np.ndim(column[0]) > 0:
+        return tuple(_column(f"{name}[{i}]", part) for i, part in enumerate(column))
+    if getattr(getattr(column, "dtype", None), "kind", "") == "O" or _is_of_mappings(column):
+        return list(column)  # whose items the agent reads
+    return array_of(name, column)
+
+
+def _is_of_mappings(column: Any) -> bool:
+    return isinstance(column, list) and bool(column) and isinstance(column[0], Mapping)
+
+
+def _length(column: Any) -> int:
+    if isinstance(column, Mapping | tuple):
+        parts = column.values() if isinstance(column, Mapping) else column
+        return min((_length(part) for part in parts), default=0)
+    return len(column) if np.ndim(column) or isinstance(column, list) else 0
+
+
+def _rows(columns: _Columns, place: str, *, is_episode: bool = False) -> Iterator[Logged]:
+    """Read rows of arrays. Without next observations they are those of the next row.
+
+    The last step of an episode that was cut off has none then, and is left out.
+    """
+    n = columns["_n_rows"]
+    observations, following = columns["observations"], columns.get("next_observations")
+    n_observations = _length(observations)
+    for i in range(n):
+        row = {
+            name: _at(column, i) for name, column in columns.items()
+            if name not in ("_n_rows", "observations", "next_observations")
+        }  # fmt: skip
+        row["observations"] = _at(observations, i)
+        is_last = is_episode and i == n - 1
+        ends = _flag("terminations", row.get("terminations", False))
+        is_cut = _flag("truncations", row.get("truncations", False)) or (is_last and not ends)
+        row["truncations"] = is_cut
+        if following is not None:
+            row["next_observations"] = _at(following, i)
+        elif i + 1 < n_observations and (is_episode or not (is_cut or ends)):
+            row["next_observations"] = _at(observations, i + 1)
+        elif ends:
+            row["next_observations"] = row["observations"]  # whose value is not asked for
+        else:
+            continue
+        yield _logged(row, f"{place} {i}")
+
+
+def _at(values: Any, t: int) -> Any:
+    """Return number t of an array, or of each in dictionaries and tuples, as Gymnasium's spaces."""
+    if isinstance(values, Mapping):
+        return {name: _at(part, t) for name, part in values.items()}
+    return tuple(_at(part, t) for part in values) if isinstance(values, tuple) else values[t]
