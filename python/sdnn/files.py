@@ -246,6 +246,8 @@ def remove_abandoned_files(folder: Path) -> None:
 
 FORMAT = 1
 MAX_BYTES = 2**34
+MOST_EMPTY_ARRAYS = 1024
+"""Arrays that a file may have beyond one for two bytes of all of them."""
 
 _BEGINNING = b'{"__metadata__":{"sdnn":"{\\"checksum\\":\\"'
 """Start of the header, which follows 8 bytes that hold its length."""
@@ -300,8 +302,12 @@ def read_file(path: Path, *kinds: str) -> tuple[Description, Arrays]:
         data = file.read(os.fstat(file.fileno()).st_size)
     if data[_CHECKSUM] != _checksum(memoryview(data)):
         raise ValueError(f"{path} is damaged: its checksum does not fit its content")
+    end = 8 + int.from_bytes(data[:8], "little")
+    n_arrays, n_bytes = data.count(b'"dtype"', 8, end), max(len(data) - end, 0)
+    if n_arrays > MOST_EMPTY_ARRAYS + n_bytes // 2:
+        raise ValueError(f"{path} is damaged: it has {n_arrays} arrays in {n_bytes} bytes")
     try:
-        header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+        header = json.loads(data[8:end])
         about = json.loads(header["__metadata__"]["sdnn"])
         number, kind, version = (about[key] for key in ("format", "kind", "version"))
         description = dict(about["description"])

@@ -123,6 +123,7 @@ class Run(Displayed):
         place = Path(folder)
         if (place / CONFIG).exists():
             raise RunError(f"{place} holds a run already: {resume_command(place)} continues it")
+        remove_abandoned_files(place)
         if place.exists() and (not place.is_dir() or any(place.iterdir())):
             raise RunError(f"{place} is there already, and no run: take another folder")
         cls(place, spec).check()

@@ -9,19 +9,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
+import shutil
 import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
 from sdnn.files import is_there, open_regular
+from sdnn.runs.connection import connect, foreign_journal, has_rows, is_hot
 from sdnn.runs.errors import StoreError
 from sdnn.runs.spec import HASH_DIGITS
 from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows
@@ -30,13 +32,10 @@ STORE_NAME = "results.sqlite"
 SCHEMA_VERSION = 6
 APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 """Marks a SQLite file as ours (SQLite's header field of that name)."""
-BUSY_SECONDS = 60.0
-"""Seconds to wait for another process that writes the same file."""
 MOST_BYTES = 2**37
 """Largest file; SQLite's check of it needs a bit for each page."""
-MOST_BYTES_OF_VALUE = 2**24
-"""Longest text in the file."""
 
+MOST_MEASUREMENTS = 10**5  # a report has some hundreds
 _SCHEMA = files("sdnn.runs").joinpath("schema.sql").read_text("utf-8")
 
 _KEY = "case_id = ? AND agent = ? AND trial = ? AND seed = ? AND config_hash = ?"
@@ -94,16 +93,48 @@ class ResultStore:
         with _as_store_error(self.path):
             if not read_only:
                 folder.mkdir(parents=True, exist_ok=True)
+            recovered = self._recovered()
+            if recovered is not None:
+                if read_only:
+                    self._connection = recovered
+                    if not _objects(recovered):
+                        self._prepare(True)
+                    return
+                recovered.close()
+                with closing(connect(self.path)) as connection:
+                    connection.execute("PRAGMA user_version").fetchone()  # which rolls back
             is_new = _inspect(self.path)
             if read_only and not is_new:
-                self._connection = _connect(self.path, read_only=True)
+                self._connection = connect(self.path, read_only=True)
                 return
-            self._connection = _connect(None if read_only else self.path)
+            self._connection = connect(None if read_only else self.path)
             try:
                 self._prepare(is_new)
             except BaseException:
                 self._connection.close()
                 raise
+
+    def _recovered(self) -> sqlite3.Connection | None:
+        """Return a copy in memory without the transaction that a killed process left, if it did."""
+        journal, log = (self.path.with_name(self.path.name + end) for end in ("-journal", "-wal"))
+        if is_there(log):
+            raise sqlite3.DatabaseError(f"there is a log of another program, {log.name}")
+        if not is_there(journal) or not is_hot(self.path, journal):
+            return None
+        recovered = connect(None)
+        with TemporaryDirectory() as folder:
+            for path in (self.path, journal):
+                shutil.copyfile(path, Path(folder, path.name))
+            place = Path(folder, self.path.name)
+            try:
+                with closing(connect(place)) as connection:
+                    connection.backup(recovered)
+                is_lost = _inspect(place) and has_rows(self.path)
+            except (sqlite3.DatabaseError, StoreError) as error:
+                raise foreign_journal(journal) from error
+        if is_lost:
+            raise foreign_journal(journal)
+        return recovered
 
     def _prepare(self, is_new: bool) -> None:
         connection = self._connection
@@ -320,14 +351,16 @@ class ResultStore:
             )
 
     def measurements(self, kind: str) -> dict[str, Any]:
-        """Return the contents of all measurements of a kind, by their keys, which are sorted."""
+        """Return the contents of all measurements of a kind, by their sorted keys."""
         with _as_store_error(self.path):
+            (n,) = self._connection.execute("SELECT count(*) FROM measurements").fetchone()
+            if n > MOST_MEASUREMENTS:
+                raise StoreError(f"{self.path} holds {n} measurements, over {MOST_MEASUREMENTS}")
             read = self._read("measurements", _MEASUREMENT_COLUMNS, "ORDER BY kind, key")
             for *values, crc in zip(*read, strict=True):
                 if crc != _crc(tuple(values)):
-                    words = f"measurements, kind {values[0]}, key {values[1]}"
-                    problem = "a value does not fit its checksum, crc"
-                    raise StoreError(f"{self.path} is damaged: {words}: {problem}")
+                    words = f"measurements, kind {values[0]}, key {values[1]}: a value does not fit"
+                    raise StoreError(f"{self.path} is damaged: {words} its checksum, crc")
             rows = zip(*read[:3], strict=True)
             return {key: json.loads(content) for of, key, content in rows if of == kind}
 
@@ -374,16 +407,8 @@ def _as_store_error(path: Path) -> Iterator[None]:
 def _inspect(path: Path) -> bool:
     """Return whether the file has yet to be made; refuse damaged and foreign ones.
 
-    The file is opened for reading only: what is not ours stays as it is, to the byte. Only what a
-    killed process left half written is rolled back first, by SQLite's own journal.
+    It stays as it is, to the byte.
     """
-    journal, log = (path.with_name(path.name + end) for end in ("-journal", "-wal"))
-    if is_there(log):
-        raise sqlite3.DatabaseError(f"there is a log of another program, {log.name}")
-    if is_there(journal):
-        _require_own(journal)
-        with closing(_connect(path)) as connection:
-            connection.execute("PRAGMA user_version").fetchone()
     if not is_there(path) or path.stat().st_size == 0:
         return True
     with open_regular(path, MOST_BYTES) as file:
@@ -392,7 +417,7 @@ def _inspect(path: Path) -> bool:
         raise sqlite3.DatabaseError("no SQLite file")
     if header[18:] != b"\1\1":
         raise sqlite3.DatabaseError("a SQLite file of another journal mode")
-    with closing(_connect(path, read_only=True)) as connection:
+    with closing(connect(path, read_only=True)) as connection:
         application_id = connection.execute("PRAGMA application_id").fetchone()[0]
         version = connection.execute("PRAGMA user_version").fetchone()[0]
         objects = _objects(connection)
@@ -415,19 +440,6 @@ def _inspect(path: Path) -> bool:
         return False
 
 
-def _require_own(journal: Path) -> None:
-    """Refuse a journal that names another file, which SQLite would remove; ours never do."""
-    # Another process may have finished with it.
-    with suppress(FileNotFoundError), journal.open("rb") as file:
-        file.seek(max(0, file.seek(0, os.SEEK_END) - len(_MAGIC_OF_JOURNAL)))
-        if file.read() == _MAGIC_OF_JOURNAL:
-            raise sqlite3.DatabaseError(f"{journal.name} is a journal of another program")
-
-
-_MAGIC_OF_JOURNAL = bytes.fromhex("d9d505f920a163d7")
-"""A journal begins with it, and ends with it if it names another file."""
-
-
 def _objects(connection: sqlite3.Connection) -> set[tuple[str | None, ...]]:
     found = connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master")
     return set(found.fetchall())
@@ -438,20 +450,3 @@ def _own_objects() -> set[tuple[str | None, ...]]:
     with closing(sqlite3.connect(":memory:")) as connection:
         connection.executescript(_SCHEMA)
         return _objects(connection)
-
-
-def _connect(path: Path | None, *, read_only: bool = False) -> sqlite3.Connection:
-    """Open a file, or a database in memory, in which nothing but its data counts."""
-    place = ":memory:"
-    if path is not None:
-        place = f"{path.absolute().as_uri()}?mode={'ro' if read_only else 'rwc'}"
-    connection = sqlite3.connect(place, uri=path is not None, timeout=BUSY_SECONDS)
-    for setting in (
-        "trusted_schema = OFF", "cell_size_check = ON", "mmap_size = 0",
-        f"query_only = {int(read_only)}",
-    ):  # fmt: skip
-        connection.execute(f"PRAGMA {setting}")
-    if hasattr(connection, "setlimit"):  # since Python 3.11
-        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES_OF_VALUE)
-        connection.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
-    return connection

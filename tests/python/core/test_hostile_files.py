@@ -48,9 +48,9 @@ def make_store(folder):
         return store.path
 
 
-def content_of(folder):
+def content_of(folder, **options):
     """Everything that a store gives."""
-    with ResultStore(folder) as store:
+    with ResultStore(folder, **options) as store:
         records = store.load()
         return (
             [
@@ -205,6 +205,23 @@ def test_a_journal_of_a_store_rolls_back_and_removes_no_other_file(tmp_path):
         with pytest.raises(StoreError, match="journal"):
             ResultStore(tmp_path, read_only=read_only)
     assert victim.read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize("read_only", [True, False])
+def test_reading_changes_no_byte_whatever_the_journal(tmp_path, read_only):
+    path = make_store(tmp_path)
+    expected, before = content_of(tmp_path), path.read_bytes()
+    journal = path.with_name(f"{path.name}-journal")
+    head = bytes.fromhex("d9d505f920a163d7") + struct.pack(">5I", 0, 1, 0, 512, 4096)
+    journal.write_bytes(head.ljust(512, b"\0"))  # of a file that was empty
+    with pytest.raises(StoreError, match="move it away"):
+        ResultStore(tmp_path, read_only=read_only)
+    assert path.read_bytes() == before
+    journal.unlink()
+    hot_journal(path)
+    half_written = path.read_bytes(), journal.read_bytes()
+    assert content_of(tmp_path, read_only=read_only) == expected
+    assert ((path.read_bytes(), journal.exists()) == (half_written[0], True)) == read_only
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a system of POSIX")

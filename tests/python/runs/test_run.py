@@ -15,6 +15,7 @@ import drifting_env  # noqa: F401
 from refusals import refuses
 from run_specs import run_spec
 from sdnn.agents import Callback, Training, load_agent
+from sdnn.files import lock
 from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunError, RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrialRows
@@ -62,6 +63,17 @@ def whole(tmp_path_factory):
         return found
 
     return _whole
+
+
+def test_a_run_is_made_where_a_killed_one_has_left_its_first_file(tmp_path):
+    left = tmp_path / "config.json.0123456789abcdef.partial"
+    left.touch()
+    assert Run.create(tmp_path, CONFIG).folder == tmp_path
+    assert not left.exists()
+    (tmp_path / "other").mkdir()
+    with open(tmp_path / "other" / left.name, "wb") as file:  # of a process that is not killed
+        assert lock(file.fileno())
+        refuses("other", Run.create, tmp_path / "other", CONFIG, error=RunError)
 
 
 class StopAt(Callback):

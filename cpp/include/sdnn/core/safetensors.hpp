@@ -72,6 +72,15 @@ inline constexpr std::uint64_t kLongestHeader = 100'000'000;
 inline constexpr std::uint64_t kLargestFile =
     std::min<std::uint64_t>(std::uint64_t{1} << 34, std::numeric_limits<std::ptrdiff_t>::max());
 
+// Tensors that a file may have beyond one for two bytes of all of them.
+inline constexpr std::uint64_t kMostEmptyTensors = 1024;
+
+inline std::size_t count_of(std::string_view text, std::string_view part) {
+  std::size_t n = 0;
+  for (auto at = text.find(part); at != text.npos; at = text.find(part, at + part.size())) ++n;
+  return n;
+}
+
 /// Place of a tensor's bytes among all bytes.
 struct TensorPlace {
   TensorType type;
@@ -139,8 +148,12 @@ Safetensors parse_safetensors(std::uint64_t size, const Read& read) {
   std::string text(static_cast<std::size_t>(header_size), ' ');
   read(sizeof(header_size), std::as_writable_bytes(std::span(text)));
   expect_of_file(text.starts_with('{'), "is no safetensors file: its header is no JSON object");
-  const nlohmann::json header = parse_json(text);
   const std::uint64_t n_bytes = n_left - header_size;
+  const std::size_t n_tensors = count_of(text, "\"dtype\"");
+  expect_of_file(
+      n_tensors <= kMostEmptyTensors + n_bytes / 2,
+      "has " + std::to_string(n_tensors) + " tensors in so many bytes: " + std::to_string(n_bytes));
+  const nlohmann::json header = parse_json(text);
   Safetensors content;
   std::vector<std::pair<TensorPlace, std::string>> places;
   for (const auto& [name, entry] : header.items()) {
