@@ -35,6 +35,7 @@ from sdnn.estimators.training import (
     presented,
     run_epochs,
     sample_weights,
+    without_absent,
 )
 
 MOST_EPOCHS = 30  # by default
@@ -98,6 +99,10 @@ class BaseSDNN(Fitted, CodedInputs):
     def _validation_score(self, bins: Ints, targets: Array, weights: Floats | None) -> float:
         """Return the network's score; larger is better."""
 
+    def _conditional(self, bins: Ints, targets: Array, weights: Floats | None) -> Array:
+        """Return targets as they are learned where samples have the same code."""
+        return targets
+
     def _presentations(self, targets: Array, weights: Floats | None) -> Floats | None:
         """Return the mean number of presentations per epoch of each sample; None for once."""
         return weights
@@ -112,7 +117,7 @@ class BaseSDNN(Fitted, CodedInputs):
             Several outputs for the regressor only.
         sample_weight : array_like, shape (n_samples,), optional
             Mean number of presentations of each sample per epoch, by default 1. If none reaches 1,
-            they are scaled to a mean of 1.
+            they are scaled to a mean of 1. Samples of weight 0 count as absent.
 
         Raises
         ------
@@ -131,6 +136,7 @@ class BaseSDNN(Fitted, CodedInputs):
         # Not by scikit-learn's _fit_context: an interrupt could leave its global setting changed.
         self._validate_params()
         resumes = bool(self.warm_start) and hasattr(self, "network_")
+        X, y, sample_weight = without_absent(X, y, sample_weight)
         table, given = self._check_samples(X, y, reset=not resumes, in_fit=True)
         weights = sample_weights(sample_weight, len(table))
         if resumes:
@@ -139,6 +145,7 @@ class BaseSDNN(Fitted, CodedInputs):
             pairs = self._select_pairs(X, table, given, weights)
             random = self._begin(X, table, given, pairs, self._n_networks(len(table)))
         targets = self._targets(given, at_once=True)
+        self.__dict__.pop("_has_outliers", None)
         bins = self.network_.input_code.bins(table)
         held, kept = self._split(random, len(table))
         held_bins, held_targets = bins[held], targets[held]
@@ -157,7 +164,8 @@ class BaseSDNN(Fitted, CodedInputs):
                 rows = random.permutation(rows)
             # Few epochs are what the block form suits, which keeps what does not change of blocks.
             n_epochs = min(max_iter, 2) if in_blocks else max_iter
-            trainer = self._trainer(bins[rows], targets[rows], n_epochs)
+            learned = self._conditional(bins[rows], targets[rows], part)
+            trainer = self._trainer(bins[rows], learned, n_epochs)
             return trainer, run_epochs(
                 self, trainer, n_samples, max_iter, random, scored, times, n_averaged, in_blocks
             )
@@ -188,6 +196,7 @@ class BaseSDNN(Fitted, CodedInputs):
         first = not hasattr(self, "network_")
         if first:
             self._validate_params()
+        X, y, sample_weight = without_absent(X, y, sample_weight)
         table, given = work._check_samples(X, y, reset=first)
         if first:
             work._begin(X, table, given if classes is None else classes)
@@ -201,7 +210,9 @@ class BaseSDNN(Fitted, CodedInputs):
             work._n_weighted += len(table)
             table, given = table[rows], given[rows]
         if len(table):
-            work._learn(work.network_.input_code.bins(table), work._targets(given))
+            bins, targets = work.network_.input_code.bins(table), work._targets(given)
+            work.__dict__.pop("_has_outliers", None)
+            work._learn(bins, targets)
         self.__dict__ = work.__dict__
         return self
 
@@ -358,7 +369,7 @@ class BaseSDNN(Fitted, CodedInputs):
             return
         if self.out_of_range == "error":
             raise ValueError(f"X has {first}, but out_of_range is 'error'")
-        if self.n_inputs_out_of_range_ == 0:
+        if self.n_inputs_out_of_range_ == 0 and not self._has_outliers:
             message = f"X has {first}: values beyond a range are clipped"
             warn_caller(message, OutOfRangeWarning)
         self.n_inputs_out_of_range_ += n_outside

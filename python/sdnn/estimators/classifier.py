@@ -45,8 +45,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         object of `sdnn.coding`; for all inputs, or for columns given as to scikit-learn's
         ColumnTransformer (other inputs have "random-inverse"). Columns of a data frame of type
         "category" are symbols, which may be missing, unless a list or an object codes them.
-    ranges : {"all", "robust"}, default="all"
-        Whether learned ranges reach to outliers, with an `OutlierWarning`, or leave them out.
+    ranges : {"auto", "all", "robust"}, default="auto"
+        Whether learned ranges leave out outliers; "auto" those farthest away, with an
+        `OutlierWarning`.
     n_pattern_units : int, optional
         Units per pattern, even. None divides about 16,000 columns among the pairs.
     pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"

@@ -7,6 +7,7 @@ import contextlib
 import dataclasses
 import datetime
 import itertools
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from numbers import Number
 from typing import Any, TypeVar
@@ -20,7 +21,7 @@ from sklearn.utils.validation import validate_data
 
 from sdnn.arguments import require, shown
 from sdnn.coding import Coding, RandomInverse, Symbolic, WithMissing, coding_named
-from sdnn.coding.symbols import missing_as_nan
+from sdnn.coding.symbols import is_missing, missing_as_nan
 from sdnn.estimators.outliers import OutlierWarning, numbers_to_range, usual_range, warn_caller
 from sdnn.estimators.parameters import parameter, words
 
@@ -30,6 +31,7 @@ Array = NDArray[Any]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Self = TypeVar("Self", bound="CodedInputs")
+MOST_BEYOND = 30.0  # outliers that are kept, in widths of the range of the others
 PAIR_BUDGET = 500  # pairs that are formed by default
 WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
 DATES = (datetime.date, datetime.time, datetime.timedelta, np.datetime64, np.timedelta64)
@@ -174,6 +176,15 @@ def codings_of_columns(
     return [found.get(index) or RandomInverse() for index in range(n_inputs)]
 
 
+def lacking(coding: Coding, column: Array) -> Coding:
+    """Return the coding of a column: with a pattern for missing numbers, if it lacks some."""
+    if not coding.is_numeric:
+        return coding
+    is_float = column.dtype == np.float64
+    lacks = np.isnan(column).any() if is_float else any(map(is_missing, column.tolist()))
+    return WithMissing(base=coding) if lacks else coding
+
+
 def input_pairs(pairs: Any, names: Sequence[str] | None, n_inputs: int, seed: int = 0) -> Pairs:
     """Return the pairs (modified, modifier) of features; (mu, mu) is mu's plain pattern.
 
@@ -243,15 +254,50 @@ def refuse_dates(X: Any) -> None:
             raise ValueError(f"X has dates or times in column {name!r}: {DATES_HINT}")
 
 
-def first_of_words(X: Any) -> Any:
-    """Return the name or number of the first column that cannot be numbers."""
+def first_of_words(X: Any) -> tuple[Any, list[Any]]:
+    """Return the name or number of the first column that cannot be numbers, and its values."""
     names = list(X.columns) if hasattr(X, "columns") else itertools.count()
     for name, column in zip(names, np.asarray(X).T, strict=False):
         try:
             column.astype(np.float64)
         except (TypeError, ValueError):
-            return name
-    return None
+            return name, column.tolist()
+    return None, []
+
+
+def hint_about(values: Iterable[Any]) -> str:
+    """Return what to do about a column of words, if they look like numbers written otherwise.
+
+    >>> hint_about(["19,1", "20,5"])
+    "these are numbers with a decimal comma: pandas.read_csv(..., decimal=',') reads them"
+    >>> hint_about(["1", "?"])
+    "'?' marks missing values: replace it by NaN, as pandas.read_csv(..., na_values='?') does"
+    """
+    texts = {value.strip() for value in values if isinstance(value, str)}
+    numbers = {text for text in texts if _PLAIN.fullmatch(text)}
+    others = sorted(texts - numbers)
+    for mark in others:
+        rest = [text for text in others if text != mark]
+        if mark.lower() in _MARKS and all(text.lower() in _MARKS for text in rest):
+            is_mark = f"pandas.read_csv(..., na_values={mark!r}) does"
+            return f"{mark!r} marks missing values: replace it by NaN, as {is_mark}"
+    if others and all(_THOUSANDS.fullmatch(text) for text in others):
+        return "these are numbers with thousands separators: pandas.read_csv(..., thousands=',')"
+    if others and all(_COMMA.fullmatch(text) for text in others):
+        words = "pandas.read_csv(..., decimal=',') reads them"
+        return f"these are numbers with a decimal comma: {words}"
+    units = {found[1] for text in others if (found := _UNIT.fullmatch(text))}
+    if len(units) == 1 and all(_UNIT.fullmatch(text) for text in others):
+        (unit,) = units
+        return f"these are numbers with the unit {unit!r}: remove it, and give numbers"
+    return WORDS_HINT
+
+
+_PLAIN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
+_COMMA = re.compile(r"[+-]?\d{1,3}(\.?\d{3})*,\d+|[+-]?\d*,\d+")
+_UNIT = re.compile(r"[+-]?\d+(?:[.,]\d+)?\s*([^\d\s.,+-]{1,8})")
+_MARKS = {"", "?", "-", "--", ".", "na", "n/a", "#n/a", "nan", "null", "none", "missing", "unknown"}
 
 
 def as_it_came(X: Any) -> Any:
@@ -272,12 +318,15 @@ class CodedInputs(BaseEstimator):
     """Validation of samples for estimators with a parameter ``coding``."""
 
     coding: Any = parameter("random-inverse", str, Coding, list, tuple, kw_only=False)
-    ranges: str = parameter("all", words("all", "robust"))
+    ranges: str = parameter("auto", words("auto", "all", "robust"))
 
     @property
     def _parameter_constraints(self) -> dict[str, list[Any]]:
         declared = [one for one in dataclasses.fields(self) if "constraints" in one.metadata]
         return {one.name: one.metadata["constraints"] for one in declared}
+
+    _has_outliers = False
+    """Whether values were left out of a range that was learned."""
 
     def set_params(self: Self, **params: Any) -> Self:
         """Set parameters; ``coding__length_scale`` and the like replace fields of codings.
@@ -302,6 +351,12 @@ class CodedInputs(BaseEstimator):
                     params |= {prefix + name: getattr(one, name) for name in field_names(one)}
         return params
 
+    def __sklearn_tags__(self) -> Any:
+        """Declare that numbers may be missing."""
+        tags = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = True
+        return tags
+
     @abc.abstractmethod
     def _fitted_codings(self) -> Sequence[Coding]:
         """Return the fitted coding of each input, none before `fit`."""
@@ -320,25 +375,36 @@ class CodedInputs(BaseEstimator):
             numeric = numeric and not of_categories(X)
         else:
             numeric = numeric and all(coding.is_numeric for coding in self._fitted_codings())
-        checks: dict[str, Any] = (
-            {"dtype": np.float64} if numeric else {"dtype": None, "ensure_all_finite": False}
-        )
+        # `_finite` looks for numbers that are not finite, as missing ones have a pattern.
+        checks: dict[str, Any] = {"dtype": np.float64 if numeric else None}
+        checks["ensure_all_finite"] = "allow-nan" if numeric else False
         try:
             return validate_data(self, X if numeric else as_it_came(X), y, **checks, **options)
         except ValueError as error:
             if "could not convert string" in str(error) and np.asarray(X).dtype.kind in "OSU":
-                raise ValueError(f"{error} in column {first_of_words(X)!r}; {WORDS_HINT}") from None
+                name, column = first_of_words(X)
+                raise ValueError(f"{error} in column {name!r}; {hint_about(column)}") from None
             raise
 
     def _finite(self, table: Array, codings: Sequence[Coding]) -> Array:
-        """Check the numbers of a table that also holds words."""
-        for index, coding in enumerate(codings):
-            if table.dtype != np.float64 and coding.is_numeric:
-                try:
-                    numbers = np.asarray(table[:, index], dtype=np.float64)
-                except (TypeError, ValueError) as error:  # pandas.NA is of no type
-                    raise ValueError(f"{error} in column {index}; {WORDS_HINT}") from None
-                assert_all_finite(numbers, input_name="X")
+        """Check the numbers of a table, of which only some columns may lack values."""
+        if table.dtype == np.float64 and np.isfinite(table).all():
+            return table
+        names = self._feature_names() or range(len(codings))
+        for index, (name, coding) in enumerate(zip(names, codings, strict=True)):
+            if not coding.is_numeric:
+                continue
+            try:
+                numbers = np.asarray(table[:, index], dtype=np.float64)
+            except (TypeError, ValueError) as error:  # pandas.NA is of no type
+                hint = hint_about(table[:, index].tolist())
+                raise ValueError(f"{error} in column {name!r}; {hint}") from None
+            if np.isnan(numbers).any():
+                raise ValueError(
+                    f"X contains NaN in column {name!r}, which lacked no value in fit: fill it in,"
+                    f" or fit with coding=[('with-missing', [{name!r}])]"
+                )
+            assert_all_finite(numbers, input_name="X")
         return table
 
     def _feature_names(self) -> list[str] | None:
@@ -348,6 +414,7 @@ class CodedInputs(BaseEstimator):
     def _codings(self, X: Any, table: Array) -> list[Coding]:
         """Return the unfitted coding of each input, and check the table's numbers."""
         codings = codings_of_columns(self.coding, self._feature_names(), table.shape[1], X)
+        codings = [lacking(coding, table[:, index]) for index, coding in enumerate(codings)]
         if any(coding.learns for coding in codings):
             self._need_two(table, "ranges and categories that are not given")
         self._finite(table, codings)
@@ -369,18 +436,26 @@ class CodedInputs(BaseEstimator):
         return fitted
 
     def _range(self, name: str, values: Floats) -> tuple[float, float]:
-        """Return the range of values, without outliers if ``ranges`` says so; else warn of them."""
+        """Return the range of values, without outliers if ``ranges`` says so.
+
+        "auto" keeps those of heavy tails, up to 30 times the width of the others away.
+        """
         usual = usual_range(values)
         ends = float(values.min()), float(values.max())
-        if self.ranges == "robust" or usual == ends:
+        if usual == ends or self.ranges == "all":
+            return ends
+        if self.ranges == "robust":
             return usual
+        beyond = max(ends[1] - usual[1], usual[0] - ends[0])
+        is_left_out = beyond > MOST_BEYOND * (usual[1] - usual[0])
         value = ends[1] if ends[1] > usual[1] else ends[0]
-        warn_caller(
-            f"{name} has {value}, far from the other values, which are within {list(usual)}: "
-            "the range of all is too wide to tell those apart; ranges='robust' leaves it out",
-            OutlierWarning,
-        )
-        return ends
+        then = "the range of all is too wide to tell those apart; ranges='robust' leaves it out"
+        if is_left_out:
+            then = "it is left out of the range, and clipped; ranges='all' takes it in"
+        others = f"far from the other values, which are within {list(usual)}"
+        warn_caller(f"{name} has {value}, {others}: {then}", OutlierWarning)
+        self._has_outliers = self._has_outliers or is_left_out
+        return usual if is_left_out else ends
 
     def _need_two(self, samples: Array, what: str) -> None:
         """Raise ValueError, in scikit-learn's words, for a single sample."""

@@ -37,7 +37,7 @@ from sdnn.estimators.leave_one_out import (
     solve,
 )
 from sdnn.estimators.parameters import parameter, wholes, words
-from sdnn.estimators.training import class_weights, sample_weights
+from sdnn.estimators.training import class_weights, sample_weights, without_absent
 from sdnn.kernel import N_UNITS, AnalyticKernel
 
 AUTO = words("auto")
@@ -85,7 +85,8 @@ class BaseKernelRidge(CodedInputs):
         """
         self._validate_params()
         work = self._scratch()
-        work._fit(X, y, sample_weight)
+        work._fit(*without_absent(X, y, sample_weight))
+        work.__dict__.pop("_has_outliers", None)
         self.__dict__ = work.__dict__
         return self
 
@@ -94,13 +95,9 @@ class BaseKernelRidge(CodedInputs):
         """Check the samples and learn from them."""
 
     @staticmethod
-    def _counted(table: Array, y: Array, sample_weight: Any) -> tuple[Array, Array, Floats]:
-        """Return the samples of weights above 0, and these weights."""
-        counts = sample_weights(sample_weight, len(table))
-        if counts is None:
-            return table, y, np.ones(len(table))
-        used = counts > 0
-        return table[used], y[used], counts[used]
+    def _counts_of(sample_weight: Any, n_samples: int) -> Floats:
+        counts = sample_weights(sample_weight, n_samples)
+        return np.ones(n_samples) if counts is None else counts
 
     def _solve(
         self, X: Any, table: Array, targets: Floats, counts: Floats, factors: Floats | None = None
@@ -167,9 +164,9 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
     ----------
     coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
         As for `SDNNRegressor`.
-    ranges : {"all", "robust"}, default="all"
-        Whether learned ranges reach to outliers, with an `OutlierWarning`, or leave them out;
-        "robust" also clips targets.
+    ranges : {"auto", "all", "robust"}, default="auto"
+        Whether learned ranges leave out outliers, and clip targets; "auto" those farthest away,
+        with an `OutlierWarning`.
     alpha : float or "auto", default="auto"
         Strength of the penalty, above 0. "auto" takes the one with the smallest error when each
         sample is left out, by a closed formula.
@@ -217,7 +214,7 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         table, targets = self._validated_numbers(X, y, reset=True)
-        table, targets, counts = self._counted(table, targets, sample_weight)
+        counts = self._counts_of(sample_weight, len(table))
         self._flat = targets.ndim == 1
         targets = targets.reshape(len(table), -1)
         self._solve(X, table, targets.clip(*self._ranges_of(targets)), counts)
@@ -239,9 +236,9 @@ class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
     ----------
     coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
         As for `SDNNRegressor`.
-    ranges : {"all", "robust"}, default="all"
-        Whether learned ranges reach to outliers, with an `OutlierWarning`, or leave them out;
-        "robust" also clips targets.
+    ranges : {"auto", "all", "robust"}, default="auto"
+        Whether learned ranges leave out outliers, and clip targets; "auto" those farthest away,
+        with an `OutlierWarning`.
     alpha : float or "auto", default="auto"
         Strength of the penalty, above 0. "auto" takes the one with the smallest error when each
         sample is left out, by a closed formula.
@@ -297,7 +294,7 @@ class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         table, labels = self._validated(X, y, reset=True)
         check_labels(labels)
-        table, labels, counts = self._counted(table, labels, sample_weight)
+        counts = self._counts_of(sample_weight, len(table))
         self.classes_: Array = class_labels(labels)
         one_hot = (labels[:, None] == self.classes_).astype(np.float64)
         of_classes = class_weights(self.class_weight, labels)

@@ -39,8 +39,9 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         object of `sdnn.coding`; for all inputs, or for columns given as to scikit-learn's
         ColumnTransformer (other inputs have "random-inverse"). Columns of a data frame of type
         "category" are symbols, which may be missing, unless a list or an object codes them.
-    ranges : {"all", "robust"}, default="all"
-        Whether learned ranges reach to outliers, with an `OutlierWarning`, or leave them out.
+    ranges : {"auto", "all", "robust"}, default="auto"
+        Whether learned ranges leave out outliers; "auto" those farthest away, with an
+        `OutlierWarning`.
     n_pattern_units : int, optional
         Units per pattern, even. None divides about 16,000 columns among the pairs.
     pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
@@ -217,6 +218,20 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
                 f"y must have as many outputs as before, {self.n_outputs_}, got {n_outputs}"
             )
 
+    def _conditional(self, bins: Ints, targets: Floats, weights: Floats | None) -> Floats:
+        """Return the mean target of the samples with each code, which all of them learn.
+
+        Otherwise the network would follow the noise of the last one presented.
+        """
+        codes, of_samples = np.unique(bins, axis=0, return_inverse=True)
+        if len(codes) == len(bins):
+            return targets
+        of_samples = of_samples.reshape(-1)
+        counts = np.bincount(of_samples, weights)
+        weighted = targets if weights is None else targets * weights[:, None]
+        means = [np.bincount(of_samples, part) / counts for part in weighted.T]
+        return np.ascontiguousarray(np.stack(means, axis=1)[of_samples])
+
     def _rule_arguments(self, targets: Floats) -> tuple[Any, ...]:
         return targets, self.correction_share
 
@@ -277,7 +292,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         ends = f"{targets[row, output]}, beyond output_range_ [{low[output]}, {high[output]}]"
         if self.out_of_range == "error":
             raise ValueError(f"y has {ends}, but out_of_range is 'error'")
-        if self.n_outputs_out_of_range_ == 0:
+        if self.n_outputs_out_of_range_ == 0 and not self._has_outliers:
             then = "are clipped" if self.out_of_range == "clip" else "widen it"
             warn_caller(f"y has {ends}: values beyond the range {then}", OutOfRangeWarning)
         if self.out_of_range == "clip" or at_once:

@@ -10,7 +10,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from sklearn.utils import _safe_indexing
 from sklearn.utils.class_weight import compute_sample_weight
+from sklearn.utils.validation import _num_samples
 
 from sdnn import _core
 from sdnn.arguments import require, shown
@@ -74,6 +76,22 @@ def sample_weights(
     if each.sum() > MOST_PRESENTED:
         raise ValueError(f"{name} must sum to at most {MOST_PRESENTED}, got {each.sum():.4g}")
     return each
+
+
+def without_absent(X: Any, y: Any, sample_weight: Any) -> tuple[Any, Any, Any]:
+    """Return samples, targets and weights without the samples of weight 0: they are absent."""
+    try:
+        n_samples = _num_samples(X)
+        fits = _num_samples(y) == n_samples
+    except TypeError:  # which validation explains
+        fits = False
+    if sample_weight is None or not fits:
+        return X, y, sample_weight
+    weights = sample_weights(sample_weight, n_samples)
+    if weights is None or weights.all():
+        return X, y, weights
+    rows = np.flatnonzero(weights)
+    return _safe_indexing(X, rows), _safe_indexing(y, rows), weights[rows]
 
 
 def class_weights(class_weight: Any, labels: Array) -> Floats | None:

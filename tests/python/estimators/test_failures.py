@@ -120,7 +120,7 @@ def test_refused_samples_change_nothing(kind):
     model.fit(X, y)
     before = state_of(model)
     bad = X.copy()
-    bad[5, 1] = np.nan
+    bad[5, 1] = np.inf
     for refused in (
         lambda: model.fit(bad, y),
         lambda: model.partial_fit(bad, y),
