@@ -16,7 +16,7 @@ from watched_cells import failures
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--first", type=int, default=0, help="number of the first life")
-    parser.add_argument("--lives", type=int, default=150)
+    parser.add_argument("--lives", type=int, default=60)
     options = parser.parse_args()
     n_lives, faults = failures(soak_cells, options.first, options.lives)
     print(*faults, f"{n_lives} lives, {len(faults)} faults", sep="\n")

@@ -22,6 +22,7 @@
 #include "sdnn/agents/range_use.hpp"
 #include "sdnn/agents/relevance.hpp"
 #include "sdnn/agents/return_range.hpp"
+#include "sdnn/agents/reward_scale.hpp"
 #include "sdnn/agents/sarsa.hpp"
 #include "sdnn/agents/sarsa_config.hpp"
 #include "sdnn/agents/schedule_config.hpp"

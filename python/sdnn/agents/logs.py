@@ -7,6 +7,7 @@ import io
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,7 +31,6 @@ NAMES: Mapping[str, tuple[str, ...]] = {
 }
 """Names of columns, and others that stand for them: of D4RL, imitation and Stable-Baselines3."""
 
-_COLUMN_OF = {other: name for name, others in NAMES.items() for other in (name, *others)}
 _IGNORED = re.compile(r"(infos?|metadata|id|seed|total_steps)\b")
 _NUMBERED = re.compile(r"(.+?)[_.\[](\d+)\]?")
 _ARRAYS = ("observations", "actions", "rewards")
@@ -43,6 +43,12 @@ class Logged(NamedTuple):
     place: str
     transition: Transition
     truncated: bool
+
+
+@cache
+def _column_of() -> dict[str, str]:
+    """Return the usual name for each name."""
+    return {other: name for name, others in NAMES.items() for other in (name, *others)}
 
 
 def reader_of(dataset: Any) -> Callable[[], Iterator[Logged]]:
@@ -160,7 +166,7 @@ def _fields_of(item: Any) -> dict[str, Any] | None:
     """Return the columns of a mapping or of an object with attributes of such names."""
     if isinstance(item, Mapping):
         return dict(item)
-    named = {name: getattr(item, name) for name in _COLUMN_OF if hasattr(item, name)}
+    named = {name: getattr(item, name) for name in _column_of() if hasattr(item, name)}
     has_all = all(_value(named, name) is not None for name in ("observations", "rewards"))
     return named if has_all else None
 
@@ -175,7 +181,7 @@ def _transition(values: Mapping[str, Any], place: str) -> Logged:
     for name, value in values.items():
         if _IGNORED.match(name):
             continue
-        column = _COLUMN_OF.get(name)
+        column = _column_of().get(name)
         require(column, f"dataset, {place}", f"have no {name!r}: {advice(name, NAMES)}", [*values])
         require(column not in row, f"dataset, {place}", f"have {column} once", [*values])
         row[str(column)] = value
@@ -218,8 +224,8 @@ def _columns_of(
         if column is None or _IGNORED.match(str(name)):
             continue
         numbered = _NUMBERED.fullmatch(str(name))
-        whole = _COLUMN_OF.get(str(name))
-        part = _COLUMN_OF.get(numbered[1]) if numbered and whole is None else None
+        whole = _column_of().get(str(name))
+        part = _column_of().get(numbered[1]) if numbered and whole is None else None
         if part is not None and numbered is not None:
             parts.setdefault(part, {})[int(numbered[2])] = array_of(f"{where}[{name!r}]", column)
         elif whole is not None:

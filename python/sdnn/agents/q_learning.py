@@ -77,12 +77,11 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         """
         return self._require_warm().agent
 
-    @property
-    def reward_scale(self) -> dict[str, Any]:
-        """How large rewards are, numbers by name; see cpp/include/sdnn/agents/reward_scale.hpp."""
+    def _reward_scale(self) -> dict[str, Any]:
+        """Return how large rewards are; see cpp/include/sdnn/agents/reward_scale.hpp."""
         return dict(self._require_warm().reward_scale)
 
-    def restore(self, state: dict[str, Any], reward_scale: dict[str, Any]) -> None:
+    def _restore(self, state: dict[str, Any], reward_scale: dict[str, Any]) -> None:
         """Restore the state of `core`, and how large rewards are; ValueError if they do not fit."""
         controller = self._require_warm()
         before = controller.reward_scale

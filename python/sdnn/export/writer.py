@@ -225,7 +225,7 @@ class Learner(Writer):
 
     def state(self) -> dict[str, Any]:
         """Return the core's state, and the scale of rewards, with all of its numbers."""
-        scale = {"size": NONE, "size_in_window": NONE, **self.agent.reward_scale}
+        scale = {"size": NONE, "size_in_window": NONE, **self.agent._reward_scale()}
         return {**self.core.state(), **{f"{SCALE}.{name}": n for name, n in scale.items()}}
 
     def image(self) -> bytes:
@@ -250,7 +250,7 @@ class Learner(Writer):
         names = [name for name in image.dtype.names or () if name.startswith(SCALE)]
         kept = {name: np.array(image[name]) for name in names if image[name] != NONE}
         scale = {name.removeprefix(f"{SCALE}."): number for name, number in kept.items()}
-        self.agent.restore(state, scale)
+        self.agent._restore(state, scale)
 
     def seeds(self, state: dict[str, Any]) -> NDArray[np.uint64]:
         """Return the states of the random generators, shape (n_streams, 4)."""

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/core/detail/floating_point.hpp"
+
 namespace sdnn::agents {
 
 /// Follows the size of rewards in powers of two, and refuses a reward that is far beyond it, as the
