@@ -121,20 +121,6 @@ def test_many_actions_are_told_apart():
 
 
 @pytest.mark.parametrize(
-    "action", [[0.0], [0.0, 5.0], [np.nan, 0.0], "left", None, [[0.0, 0.0, 0.0]], [1j, 0.0]]
-)
-def test_what_is_no_action_is_refused(action):
-    agent = agent_of(FLOATS)
-    refuses("action", agent.learn, Transition(HERE, action, 0.0, HERE, False))
-
-
-@pytest.mark.parametrize("action", [[0.5, 0], [2, 0], [-1, 0], [True], 5e-324])
-def test_what_is_no_whole_action_is_refused(action):
-    agent = agent_of(gym.spaces.MultiDiscrete([2, 4]), 0)
-    refuses("action", agent.learn, Transition(HERE, action, 0.0, HERE, False))
-
-
-@pytest.mark.parametrize(
     ("space", "error"),
     [
         (gym.spaces.Text(3), TypeError),

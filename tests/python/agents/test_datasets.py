@@ -67,30 +67,6 @@ def same_weights(one, other):
         np.testing.assert_array_equal(values, other.state()[name])
 
 
-def test_all_forms_of_a_dataset_are_learned_alike(tmp_path):
-    by_hand = new_agent()
-    for _ in range(2):
-        by_hand.begin_episode()
-        for one, cut in transitions():
-            by_hand.learn(one)
-            if one.terminated or cut:
-                by_hand.begin_episode()
-    np.savez(tmp_path / "log.npz", **arrays())
-    with np.load(tmp_path / "log.npz") as packed:
-        forms = [
-            lines(tmp_path / "log.jsonl"),
-            str(tmp_path / "log.jsonl"),
-            arrays(),
-            dict(packed),
-            SimpleNamespace(iterate_episodes=logged),
-            [one for one, _ in transitions()],
-        ]
-    for form in forms:
-        agent = new_agent()
-        assert learn_from(agent, form, epochs=2) == 80
-        same_weights(agent, by_hand)
-
-
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_a_dataset_of_minari(tmp_path, monkeypatch):
     minari = pytest.importorskip("minari")

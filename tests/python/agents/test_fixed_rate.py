@@ -1,11 +1,9 @@
 """Loops at a fixed rate; the rules of the ticks are tested in C++."""
 
-import math
 import time
 
 import pytest
 
-from refusals import refuses
 from sdnn.agents import FixedRate
 
 
@@ -60,13 +58,3 @@ def test_it_keeps_time_by_the_real_clock():
         if tick >= 10:
             break
     assert time.monotonic() - began >= 10 / 200.0
-
-
-@pytest.mark.parametrize("bad", [0.0, -1.0, 1e-4, 2e6, math.nan, math.inf, "fast", None, True])
-def test_impossible_rates_are_named(bad):
-    refuses("hz", FixedRate, bad)
-
-
-@pytest.mark.parametrize("name", ["clock", "sleep"])
-def test_clock_and_sleep_are_functions(name):
-    refuses(name, FixedRate, 50.0, error=TypeError, **{name: 5})

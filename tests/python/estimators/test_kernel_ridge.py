@@ -226,23 +226,6 @@ def test_a_failed_fit_leaves_the_old_model(monkeypatch):
     assert pickle.dumps(model) == before
 
 
-@pytest.mark.parametrize(
-    ("parameters", "error"),
-    [
-        ({"alpha": 0}, "'alpha'"),
-        ({"alpha": np.inf}, "'alpha'"),
-        ({"alpha": "much"}, "'alpha'"),
-        ({"degree": 4}, "'degree'"),
-        ({"max_components": 1}, "'max_components'"),
-        ({"pairs": [(0, 9)]}, "9"),
-        ({"pairs": "budget"}, "pairs"),
-        ({"coding": "unheard"}, "coding"),
-    ],
-)
-def test_impossible_parameters_are_named(parameters, error):
-    refuses(error, SDNNKernelRidge(**parameters).fit, X, Y)
-
-
 def test_targets_whose_squares_overflow_are_refused():
     samples = np.random.default_rng(0).random((40, 3))
     refuses("y", SDNNKernelRidge().fit, samples, 8e307 * samples[:, 0])

@@ -198,15 +198,6 @@ def test_bad_rows_are_named(bad):
     refuses("x", model.predict_one, bad)
 
 
-def test_bad_targets_are_named():
-    model = regressor()
-    for bad in (np.nan, "word", None, [[1.0]]):
-        refuses("y", model.learn_one, X[0], bad)
-    refuses("classes", classifier().learn_one, X[0], 1)
-    refuses("[7]", classifier().learn_one, X[0], 7, classes=[0, 1])
-    refuses("mapping", model.learn_one, {1: 0.5}, 0.5)
-
-
 def test_values_beyond_a_range_are_counted_and_said_once():
     model = regressor().fit(X, Y)
     with pytest.warns(OutOfRangeWarning, match="column 2"):
