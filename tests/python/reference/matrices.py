@@ -7,6 +7,7 @@ import bad_inputs
 import bad_options
 import core_cells
 import damaged_files
+import incomplete_samples
 import logged_data
 import mutated_files
 import public_cells
@@ -35,6 +36,8 @@ MATRICES = {
         (public_cells.environment_cells,),
         (public_cells.experiment_cells,),
         (public_cells.function_cells,),
+        (incomplete_samples.weight_cells,),
+        (incomplete_samples.missing_cells,),
     ],
     "commands": [(bad_options.command_cells, name) for name in bad_options.COMMANDS],
     "files": [
