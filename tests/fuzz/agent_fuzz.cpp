@@ -20,6 +20,13 @@ using namespace sdnn;
 constexpr std::uint64_t kMostBytes = 1 << 20;
 
 template <class Agent>
+void save_and_restore(Agent& agent) {
+  const core::State saved = core::state_of(agent);
+  core::restore(agent, saved);
+  fuzz::expect(core::state_of(agent) == saved, "a restored state differs");
+}
+
+template <class Agent>
 void use(Agent& agent, FuzzedDataProvider& input) {
   const std::size_t n_inputs = agent.n_inputs();
   agent.begin_episode();
@@ -32,12 +39,9 @@ void use(Agent& agent, FuzzedDataProvider& input) {
       case 1:
         agent.begin_episode();
         break;
-      case 2: {  // saved and restored
-        const core::State saved = core::state_of(agent);
-        core::restore(agent, saved);
-        fuzz::expect(core::state_of(agent) == saved, "a restored state differs");
+      case 2:
+        save_and_restore(agent);
         break;
-      }
       default: {
         const auto next = fuzz::any_doubles(input, n_inputs, 0.0, 1.0);
         const double reward = fuzz::any_double(input, -10.0, 10.0);
@@ -46,6 +50,12 @@ void use(Agent& agent, FuzzedDataProvider& input) {
           const auto action = agent.act(state, true);
           agent.learn(state, action, reward, next, terminated);
         });
+        if constexpr (requires { agent.refine_unit(0, 0); }) {
+          const int size = input.ConsumeIntegralInRange(-1100, 1100);
+          if (input.ConsumeBool())
+            agent.refine_unit(size, size + input.ConsumeIntegralInRange(0, 9));
+        }
+        if (reward != 0.0 && std::abs(std::log2(std::abs(reward))) > 30.0) save_and_restore(agent);
       }
     }
   }
