@@ -273,30 +273,34 @@ def hint_about(values: Iterable[Any]) -> str:
     >>> hint_about(["1", "?"])
     "'?' marks missing values: replace it by NaN, as pandas.read_csv(..., na_values='?') does"
     """
-    texts = {value.strip() for value in values if isinstance(value, str)}
-    numbers = {text for text in texts if _PLAIN.fullmatch(text)}
-    others = sorted(texts - numbers)
-    for mark in others:
-        rest = [text for text in others if text != mark]
-        if mark.lower() in _MARKS and all(text.lower() in _MARKS for text in rest):
-            is_mark = f"pandas.read_csv(..., na_values={mark!r}) does"
-            return f"{mark!r} marks missing values: replace it by NaN, as {is_mark}"
-    if others and all(_THOUSANDS.fullmatch(text) for text in others):
-        return "these are numbers with thousands separators: pandas.read_csv(..., thousands=',')"
-    if others and all(_COMMA.fullmatch(text) for text in others):
-        words = "pandas.read_csv(..., decimal=',') reads them"
-        return f"these are numbers with a decimal comma: {words}"
-    units = {found[1] for text in others if (found := _UNIT.fullmatch(text))}
-    if len(units) == 1 and all(_UNIT.fullmatch(text) for text in others):
-        (unit,) = units
-        return f"these are numbers with the unit {unit!r}: remove it, and give numbers"
-    return WORDS_HINT
+    texts = sorted({value.strip() for value in values if isinstance(value, str)})
+    marks = [text for text in texts if text.lower() in _MARKS]
+    others = [text for text in texts if text not in marks and not _PLAIN.fullmatch(text)]
+    hints = []
+    units = {found[1] or found[2] for text in others if (found := _UNIT.fullmatch(text))}
+    separators = {found[1] for text in others if (found := _THOUSANDS.fullmatch(text))}
+    if len(separators) == 1 and all(map(_THOUSANDS.fullmatch, others)):
+        thousands = f"pandas.read_csv(..., thousands={separators.pop()!r}) reads them"
+        hints.append(f"these are numbers with thousands separators: {thousands}")
+    elif others and all(map(_COMMA.fullmatch, others)):
+        comma = "pandas.read_csv(..., decimal=',') reads them"
+        hints.append(f"these are numbers with a decimal comma: {comma}")
+    elif len(units) == 1 and all(map(_UNIT.fullmatch, others)):
+        hints.append(
+            f"these are numbers with the unit {units.pop()!r}: remove it, and give numbers"
+        )
+    elif others:
+        return WORDS_HINT
+    for mark in marks:
+        is_mark = f"pandas.read_csv(..., na_values={mark!r}) does"
+        hints.append(f"{mark!r} marks missing values: replace it by NaN, as {is_mark}")
+    return "; ".join(hints) or WORDS_HINT
 
 
 _PLAIN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
-_THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}([,' \xa0\u202f])\d{3}(\1\d{3})*(\.\d*)?")
 _COMMA = re.compile(r"[+-]?\d{1,3}(\.?\d{3})*,\d+|[+-]?\d*,\d+")
-_UNIT = re.compile(r"[+-]?\d+(?:[.,]\d+)?\s*([^\d\s.,+-]{1,8})")
+_UNIT = re.compile(r"[+-]?\d+(?:[.,]\d+)?\s*([^\d\s.,+-]{1,8})|([$€£¥])\s*\d+(?:[.,]\d+)?")
 _MARKS = {"", "?", "-", "--", ".", "na", "n/a", "#n/a", "nan", "null", "none", "missing", "unknown"}
 
 
