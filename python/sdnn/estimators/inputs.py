@@ -6,8 +6,6 @@ import abc
 import contextlib
 import dataclasses
 import datetime
-import itertools
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from numbers import Number
 from typing import Any, TypeVar
@@ -22,6 +20,7 @@ from sklearn.utils.validation import validate_data
 from sdnn.arguments import require, shown
 from sdnn.coding import Coding, RandomInverse, Symbolic, WithMissing, coding_named
 from sdnn.coding.symbols import is_missing, missing_as_nan
+from sdnn.estimators.hints import first_of_words, hint_about
 from sdnn.estimators.outliers import OutlierWarning, numbers_to_range, usual_range, warn_caller
 from sdnn.estimators.parameters import parameter, words
 
@@ -33,7 +32,6 @@ Ints = NDArray[np.int32]
 Self = TypeVar("Self", bound="CodedInputs")
 MOST_BEYOND = 30.0  # outliers that are kept, in widths of the range of the others
 PAIR_BUDGET = 500  # pairs that are formed by default
-WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
 DATES = (datetime.date, datetime.time, datetime.timedelta, np.datetime64, np.timedelta64)
 DATES_HINT = "give numbers for it, such as the hour with coding=[(Circular(period=24), columns)]"
 
@@ -252,56 +250,6 @@ def refuse_dates(X: Any) -> None:
     for name, value in zip(names, rows[0] if len(rows) else (), strict=False):
         if isinstance(value, DATES) or hasattr(value, "to_timestamp"):  # a period of pandas
             raise ValueError(f"X has dates or times in column {name!r}: {DATES_HINT}")
-
-
-def first_of_words(X: Any) -> tuple[Any, list[Any]]:
-    """Return the name or number of the first column that cannot be numbers, and its values."""
-    names = list(X.columns) if hasattr(X, "columns") else itertools.count()
-    for name, column in zip(names, np.asarray(X).T, strict=False):
-        try:
-            column.astype(np.float64)
-        except (TypeError, ValueError):
-            return name, column.tolist()
-    return None, []
-
-
-def hint_about(values: Iterable[Any]) -> str:
-    """Return what to do about a column of words, if they look like numbers written otherwise.
-
-    >>> hint_about(["19,1", "20,5"])
-    "these are numbers with a decimal comma: pandas.read_csv(..., decimal=',') reads them"
-    >>> hint_about(["1", "?"])
-    "'?' marks missing values: replace it by NaN, as pandas.read_csv(..., na_values='?') does"
-    """
-    texts = sorted({value.strip() for value in values if isinstance(value, str)})
-    marks = [text for text in texts if text.lower() in _MARKS]
-    others = [text for text in texts if text not in marks and not _PLAIN.fullmatch(text)]
-    hints = []
-    units = {found[1] or found[2] for text in others if (found := _UNIT.fullmatch(text))}
-    separators = {found[1] for text in others if (found := _THOUSANDS.fullmatch(text))}
-    if len(separators) == 1 and all(map(_THOUSANDS.fullmatch, others)):
-        thousands = f"pandas.read_csv(..., thousands={separators.pop()!r}) reads them"
-        hints.append(f"these are numbers with thousands separators: {thousands}")
-    elif others and all(map(_COMMA.fullmatch, others)):
-        comma = "pandas.read_csv(..., decimal=',') reads them"
-        hints.append(f"these are numbers with a decimal comma: {comma}")
-    elif len(units) == 1 and all(map(_UNIT.fullmatch, others)):
-        hints.append(
-            f"these are numbers with the unit {units.pop()!r}: remove it, and give numbers"
-        )
-    elif others:
-        return WORDS_HINT
-    for mark in marks:
-        is_mark = f"pandas.read_csv(..., na_values={mark!r}) does"
-        hints.append(f"{mark!r} marks missing values: replace it by NaN, as {is_mark}")
-    return "; ".join(hints) or WORDS_HINT
-
-
-_PLAIN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}([,' \xa0\u202f])\d{3}(\1\d{3})*(\.\d*)?")
-_COMMA = re.compile(r"[+-]?\d{1,3}(\.?\d{3})*,\d+|[+-]?\d*,\d+")
-_UNIT = re.compile(r"[+-]?\d+(?:[.,]\d+)?\s*([^\d\s.,+-]{1,8})|([$€£¥])\s*\d+(?:[.,]\d+)?")
-_MARKS = {"", "?", "-", "--", ".", "na", "n/a", "#n/a", "nan", "null", "none", "missing", "unknown"}
 
 
 def as_it_came(X: Any) -> Any:
