@@ -33,7 +33,8 @@ def skip_unless_ci():
     return _skip
 
 
-PACKAGES = {"clang": "clang libclang-rt-dev", "clang++": "clang libclang-rt-dev"}
+PACKAGES = dict.fromkeys(("clang", "clang++"), "clang libclang-rt-dev")
+PACKAGES |= dict.fromkeys(("nm", "objdump"), "binutils")
 """What to install for a tool whose package has another name."""
 
 

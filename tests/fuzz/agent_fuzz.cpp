@@ -1,5 +1,6 @@
 // Any configuration of an agent, then any states, actions, rewards and parameters: values stay in
 // their range, and a refused call changes nothing that a copy of the agent would do otherwise.
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -29,6 +30,7 @@ void save_and_restore(Agent& agent) {
 template <class Agent>
 void use(Agent& agent, FuzzedDataProvider& input) {
   const std::size_t n_inputs = agent.n_inputs();
+  double pending = 0.0;
   agent.begin_episode();
   while (input.remaining_bytes() > 0) {
     const auto state = fuzz::any_doubles(input, n_inputs, 0.0, 1.0);
@@ -46,12 +48,14 @@ void use(Agent& agent, FuzzedDataProvider& input) {
         const auto next = fuzz::any_doubles(input, n_inputs, 0.0, 1.0);
         const double reward = fuzz::any_double(input, -10.0, 10.0);
         const bool terminated = input.ConsumeBool();
-        fuzz::accepted([&] {
+        const bool is_learned = fuzz::accepted([&] {
           const auto action = agent.act(state, true);
           agent.learn(state, action, reward, next, terminated);
         });
-        if constexpr (requires { agent.refine_unit(0, 0); }) {
-          const int size = input.ConsumeIntegralInRange(-1100, 1100);
+        if (is_learned) pending = reward;
+        if constexpr (requires { agent.refine_unit(0, 0); }) {  // sizes are not below the last one
+          const int least = pending == 0.0 ? -1100 : std::ilogb(pending);
+          const int size = std::max(least, input.ConsumeIntegralInRange(-1100, 1100));
           if (input.ConsumeBool())
             agent.refine_unit(size, size + input.ConsumeIntegralInRange(0, 9));
         }

@@ -79,7 +79,8 @@ def test_symbols_are_readings_of_one_and_zero(target, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["pairs", "several"])
-def test_the_integer_path_needs_no_library_and_no_floating_point(name, target, tmp_path):
+def test_the_integer_path_needs_no_library_and_no_floating_point(name, target, needs, tmp_path):
+    needs("nm", "objdump")
     check_integer_path(name, target, tmp_path)
 
 
