@@ -260,7 +260,7 @@ inline void change(std::span<const Field> fields, const pybind11::kwargs& change
   const py::dict known = dictionary_of(fields);
   for (const auto& [name, value] : changes) {
     if (known.contains(name)) continue;
-    const auto word = name.cast<std::string>();
+    const auto word = escaped_text_of(name);
     throw ArgumentTypeError(word, word + " is not a field: they are " +
                                       py::str(", ").attr("join")(known).cast<std::string>());
   }

@@ -72,9 +72,10 @@ bool has_other_threads() {
 /// The action of act without `explore`, after the warm-up. Other threads run meanwhile, and may
 /// read the same controller.
 std::span<const double> best_action(agents::Controller& controller,
-                                    std::span<const double> observation, agents::ActionMask mask) {
+                                    std::span<const double> observation, std::size_t environment,
+                                    agents::ActionMask mask) {
   const agents::Controller& read = controller;
-  const auto variables = bindings::copied(observation);
+  const auto variables = bindings::copied(controller.hold(observation, environment));
   auto& workspace = bindings::workspace_of(read);
   std::visit(
       [&](const auto& agent) {
@@ -227,6 +228,8 @@ void bind_controller(py::module_& module) {
             self.begin_episode(environment);
           },
           py::arg("environment") = 0)
+      .def("begin_greedy_episode", &Controller::begin_greedy_episode, py::arg("environment") = 0,
+           "The next acts without `explore` hold no earlier readings")
       .def(
           "act",
           [array_of](Controller& self, const ArrayArgument<double>& observation, bool explore,
@@ -234,7 +237,7 @@ void bind_controller(py::module_& module) {
             const auto variables = bindings::flat(observation);
             const bool is_reader = !explore && has_other_threads() && !self.is_warming_up() &&
                                    environment < self.n_environments();
-            return array_of(is_reader ? best_action(self, variables, mask_of(mask))
+            return array_of(is_reader ? best_action(self, variables, environment, mask_of(mask))
                                       : self.act(variables, explore, environment, mask_of(mask)));
           },
           py::arg("observation"), py::arg("explore") = true, py::arg("environment") = 0,

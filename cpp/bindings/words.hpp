@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <string>
 #include <string_view>
 #include <type_traits>
 
@@ -19,6 +20,11 @@ inline std::string_view text_of(pybind11::handle text) {
   if (data != nullptr) return {data, static_cast<std::size_t>(size)};
   PyErr_Clear();
   return {};
+}
+
+/// A Python text with escapes in place of what UTF-8 does not have.
+inline std::string escaped_text_of(pybind11::handle text) {
+  return text.attr("encode")("utf-8", "backslashreplace").cast<std::string>();
 }
 
 }  // namespace sdnn::bindings

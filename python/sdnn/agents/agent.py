@@ -57,6 +57,11 @@ class Agent(BaseAgent[Approximator, Learning]):
         relevant.
     warm_up_steps : int
         Transitions of the warm-up, where there is one.
+    missing : {"error", "hold", "code"}
+        Whether an observation with readings that are NaN, infinite or masked is refused, the
+        variable's last reading in its environment's episode replaces them (before the first one,
+        the middle of its range, of a symbol the first one), or each input has a pattern for them
+        (SDNN agents only; an angle is missing if one of its pair is).
 
     Raises
     ------
@@ -77,6 +82,10 @@ class Agent(BaseAgent[Approximator, Learning]):
         """
         self._check_environment(environment)
         self._controller.begin_episode(environment)
+
+    def begin_greedy_episode(self) -> None:
+        """Note that the next acts without ``explore`` are of another episode: `evaluate` does."""
+        self._controller.begin_greedy_episode()
 
     @explained
     def act(
@@ -99,7 +108,8 @@ class Agent(BaseAgent[Approximator, Learning]):
         Raises
         ------
         TypeError, ValueError
-            If an argument is not usable, such as an observation that holds NaN.
+            If an argument is not usable, such as an observation that holds NaN; see
+            ``missing``.
         """
         explore = flag("explore", explore)
         self._check_environment(environment)
@@ -111,12 +121,14 @@ class Agent(BaseAgent[Approximator, Learning]):
     def flat_observation(self, observation: Any) -> NDArray[np.float64]:
         """Return the observed variables as a vector, shape (n_variables,), in their own units.
 
-        ValueError if the observation has another shape or holds NaN.
+        Missing readings are NaN. ValueError if the observation has another shape, or holds some
+        that the agent refuses.
         """
         vector: NDArray[np.float64] = self._observations.rows("observation", [observation])[0]
-        if np.isnan(vector).any():
-            raise ValueError(f"observation must not hold NaN, got {vector}")
-        return vector
+        is_read = np.isfinite(vector)
+        if self._observation.missing == "error":
+            require(is_read.all(), "observation", "be finite", vector)
+        return np.where(is_read, vector, np.nan)
 
     @explained
     def learn(self, transition: Transition, environment: int = 0) -> None:

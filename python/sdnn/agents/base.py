@@ -27,6 +27,7 @@ from sdnn.agents.spaces import (
     Actions,
     AnglePairs,
     Inputs,
+    Missing,
     Observations,
     Ranges,
     action_space_of,
@@ -102,6 +103,7 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         angle_pairs: AnglePairs = "none",
         inputs: Inputs = "all",
         warm_up_steps: int = WARM_UP.default,
+        missing: Missing = "error",
     ) -> None:
         observations, actions = spaces_of(observation_space, action_space)
         self._take_spaces(observations, actions)
@@ -117,7 +119,12 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
             warm_up_steps,
         )
         self._observation = self._observations.config(
-            observation_range, angles, angle_pairs, inputs, narrows=self.narrows_ranges
+            observation_range,
+            angles,
+            angle_pairs,
+            inputs,
+            missing=missing,
+            narrows=self.narrows_ranges,
         )
         self._action = self._actions.config
         self._make(tables=list(self._tables))
@@ -457,9 +464,10 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
     """Read an agent and its training; errors as of `read_agent`."""
     agent, description, arrays = read_agent(path, "training")
 
+    takes_missing = agent._observation.missing != "error"
+
     def array(name: str) -> NDArray[Any]:
-        # Infinite numbers may be observed: they saturate.
-        if name not in arrays or np.isnan(arrays[name]).any():
+        if name not in arrays or not (takes_missing or np.isfinite(arrays[name]).all()):
             raise ValueError(f"{path} is damaged: {name} must be there, of numbers")
         return arrays[name]
 

@@ -411,7 +411,7 @@ class Episodes:
         for i, then in enumerate(saved):
             if then is not None:
                 found = self.rounds.flat(self._latest[i])
-                if not np.array_equal(found, then.observation):
+                if not np.array_equal(found, then.observation, equal_nan=True):
                     raise UnrepeatedEpisodeError(
                         "env must repeat the episode in which the training was saved: the same"
                         f" seed and actions led to {found}, not to {then.observation}. One of"

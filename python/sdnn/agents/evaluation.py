@@ -167,6 +167,8 @@ def greedy_episode(
     with fixed(env, getattr(agent, "wrappers", ())):
         observation, info = reset_env(env, own, options)
         has_masks = has_action_masks(env)
+        if hasattr(agent, "begin_greedy_episode"):
+            agent.begin_greedy_episode()
         n_steps, total, terminated, truncated = 0, 0.0, False, False
 
         def unusable(problem: object) -> UnusableStepError:

@@ -16,7 +16,7 @@ from sdnn.agents.agent import Agent
 from sdnn.agents.base import Approximator, Learning
 from sdnn.agents.matching import Observed
 from sdnn.agents.names import explained
-from sdnn.agents.spaces import AnglePairs, Inputs, Ranges
+from sdnn.agents.spaces import AnglePairs, Inputs, Missing, Ranges
 from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.arguments import choice, real, whole
 from sdnn.config import WARM_UP, QLearningConfig, RBFNetworkConfig, SDNNCConfig
@@ -184,6 +184,7 @@ class CodedAgent(ValueAgent[Approximator, Learning], abc.ABC, Generic[Approximat
         angle_pairs: AnglePairs | None = None,
         inputs: Inputs | None = None,
         warm_up_steps: int = WARM_UP.default,
+        missing: Missing = "error",
     ) -> None:
         chosen = choice("preset", preset, self.presets)
         self._tables = () if tables is None else pattern_tables(tables)
@@ -198,6 +199,7 @@ class CodedAgent(ValueAgent[Approximator, Learning], abc.ABC, Generic[Approximat
             angle_pairs=chosen.angle_pairs if angle_pairs is None else angle_pairs,
             inputs=chosen.inputs if inputs is None else inputs,
             warm_up_steps=warm_up_steps,
+            missing=missing,
         )
 
 
@@ -212,7 +214,7 @@ class SDNNQLearning(CodedAgent[SDNNCConfig, QLearningConfig]):
     Parameters
     ----------
     observation_space, action_space, seed, observation_range, angles, angle_pairs, inputs, \
-warm_up_steps
+warm_up_steps, missing
         See `Agent`.
     approximator : SDNNCConfig, optional
         ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces.

@@ -26,7 +26,7 @@ class SDNNSarsa(CodedAgent[LinearSDNNConfig, SarsaConfig]):
 
     Parameters
     ----------
-    observation_space, action_space, seed, observation_range, angles, warm_up_steps
+    observation_space, action_space, seed, observation_range, angles, warm_up_steps, missing
         See `Agent`.
     angle_pairs, inputs
         See `Agent`; by default ``"find"`` and ``"relevant"``, with the preset ``"paper"``

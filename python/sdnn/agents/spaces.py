@@ -22,6 +22,9 @@ AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
 Ranges: TypeAlias = Literal["adaptive"] | tuple[ArrayLike, ArrayLike]
 """Lowest and highest values, a number for all variables or one for each; or adaptive ones."""
 
+Missing: TypeAlias = Literal["error", "hold", "code"]
+"""What becomes of missing readings."""
+
 _MANY_VARIABLES = 16
 
 
@@ -54,6 +57,7 @@ class Observations:
         angle_pairs: AnglePairs,
         inputs: Inputs,
         *,
+        missing: Missing = "error",
         narrows: bool = False,
     ) -> _core.ObservationConfig:
         """Return the core's settings for these arguments of `sdnn.agents.Agent`."""
@@ -77,19 +81,23 @@ class Observations:
             symbols=list(_symbols_of(self.space)),
             relevant_only=is_list or inputs == "relevant",
             inputs=() if isinstance(inputs, str) else inputs,
+            missing=missing,
         )
 
     def vector(self, name: str, observation: Any) -> NDArray[Any]:
-        """Return the variables of an observation, in any shape; ValueError if it is none."""
+        """Return the variables of an observation, in any shape; ValueError if it is none.
+
+        Masked ones are NaN.
+        """
         if self._shape is None:
             try:
-                _check_parts(self.space, observation)
-                return np.asarray(gym.spaces.flatten(self.space, observation), np.float64)
+                parts = list(_flat_parts(self.space, observation))
+                return np.concatenate(parts).astype(np.float64, copy=False)
             except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
                 problem = f"must be of {self.space}, got {shown(observation)}"
                 raise argument_error(name, problem) from error
         is_plain = type(observation) is np.ndarray and observation.dtype.kind in "fiub"
-        values = observation if is_plain else array_of(name, observation)
+        values = observation if is_plain else _readings(name, observation)
         if values.shape != self._shape:
             raise ValueError(f"{name} must have shape {self._shape}, got {values.shape}")
         return values
@@ -104,27 +112,59 @@ class Observations:
         return rows if rows.ndim == 2 else rows.reshape(-1, self.n_variables)
 
 
-def _check_parts(space: gym.Space[Any], observation: Any) -> None:
-    """Refuse what Gymnasium flattens to something else: ValueError, or what looking raises."""
+def has_mask(observation: Any) -> bool:
+    """Return whether an observation, or a part of it, is a masked array."""
+    if isinstance(observation, Mapping):
+        return any(map(has_mask, observation.values()))
+    if isinstance(observation, list | tuple):
+        return any(map(has_mask, observation))
+    return isinstance(observation, np.ma.MaskedArray)
+
+
+def _readings(name: str, values: Any, kinds: str = "fiub") -> NDArray[Any]:
+    """Return numbers as an array, with NaN for masked ones; ValueError for others."""
+    if not has_mask(values):
+        return array_of(name, values, kinds)
+    masked = np.ma.array(values)
+    require(masked.dtype.kind in "fiub", name, "be numbers", values)
+    return masked.astype(np.float64).filled(np.nan)
+
+
+def _flat_parts(space: gym.Space[Any], observation: Any) -> Iterator[NDArray[Any]]:
+    """Yield the variables of each part as Gymnasium flattens them; of missing symbols NaN.
+
+    ValueError, or what looking raises, for an observation that is not of the space.
+    """
     if isinstance(space, gym.spaces.Dict):
         for key, part in space.spaces.items():
-            _check_parts(part, observation[key])
+            yield from _flat_parts(part, observation[key])
     elif isinstance(space, gym.spaces.Tuple):
-        for part, one in zip(space.spaces, observation, strict=True):
-            _check_parts(part, one)
-    elif isinstance(space, gym.spaces.Discrete):
-        number = array_of("a part", observation, "iub")
-        if number.shape != () or not 0 <= number - space.start < space.n:
+        for part, item in zip(space.spaces, observation, strict=True):
+            yield from _flat_parts(part, item)
+    elif isinstance(space, gym.spaces.Discrete | gym.spaces.MultiDiscrete):
+        values = _readings("a part", observation)
+        if values.shape != space.shape:
+            raise ValueError(f"must have shape {space.shape}")
+        is_read = np.isfinite(values)
+        if is_read.all() and values.dtype.kind == "f":
+            raise ValueError("must be whole numbers")
+        sizes = space.n if isinstance(space, gym.spaces.Discrete) else space.nvec
+        steps = np.where(is_read, values, space.start) - space.start
+        if not ((steps >= 0) & (steps < sizes) & (steps == np.floor(steps))).all():
             raise ValueError(f"must be in {space}")
-    elif isinstance(space, gym.spaces.MultiDiscrete):
-        steps = array_of("a part", observation, "iub") - space.start
-        if steps.shape != space.shape or not ((steps >= 0) & (steps < space.nvec)).all():
-            raise ValueError(f"must be in {space}")
-    elif (
-        isinstance(space, gym.spaces.Box | gym.spaces.MultiBinary)
-        and array_of("a part", observation).shape != space.shape
-    ):
-        raise ValueError(f"must have shape {space.shape}")
+        triples = zip(np.ravel(steps), np.ravel(is_read), np.ravel(sizes), strict=True)
+        for step, was_read, size in triples:
+            one_hot = np.zeros(size) if was_read else np.full(size, np.nan)
+            if was_read:
+                one_hot[int(step)] = 1.0
+            yield one_hot
+    else:
+        values = _readings("a part", observation)
+        if values.shape != space.shape:
+            raise ValueError(f"must have shape {space.shape}")
+        is_whole = np.dtype(space.dtype).kind in "iub" and np.isfinite(values).all()
+        is_cast = is_whole or np.dtype(space.dtype).kind == "f"
+        yield (values.astype(space.dtype) if is_cast else values).reshape(-1)
 
 
 def _symbols_of(space: gym.Space[Any], first: int = 0) -> Iterator[tuple[int, int]]:

@@ -21,6 +21,7 @@ from sdnn.agents.adapters import (
     reset_env,
     step_env,
 )
+from sdnn.agents.spaces import has_mask
 from sdnn.arguments import array_of
 
 
@@ -77,6 +78,8 @@ class _Listed(EnvironmentAdapter):
             rows = np.array(seen)
             if rows.dtype == space.dtype:
                 return rows
+        if any(map(has_mask, seen)):
+            return seen  # arrays of the vector have no mask
         batch: Any = create_empty_array(space, len(seen))
         try:
             return _listed(self._env, concatenate(space, seen, batch))

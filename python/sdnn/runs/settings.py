@@ -253,6 +253,14 @@ class AgentSpec(Settings, frozen=True):
         Annotated[int, Meta(ge=int(WARM_UP.low), le=int(WARM_UP.high))],
         doc(WARM_UP.doc),
     ] = WARM_UP.default
+    missing: Annotated[
+        Literal["error", "hold", "code"],
+        doc(
+            "Readings that are NaN, infinite or masked: `error` refuses them, `hold` uses the "
+            "variable's last reading, `code` has a pattern for them in each input (`sdnn-linear` "
+            "and `sdnn-c`)."
+        ),
+    ] = "error"
 
 
 class ProtocolSpec(Settings, frozen=True):

@@ -64,7 +64,7 @@ _ALWAYS = ("id", "name", "preset", "steps", "episodes")
 ACROBOT = {"acrobot": AcrobotConfig, "goal": GoalScheduleConfig, "sensors": SensorConfig}
 """Tables of the paper's task, which a specification without an environment has."""
 
-_OF_SPACES = ("observation_range", "angles", "angle_pairs", "inputs", "warm_up_steps")
+_OF_SPACES = ("observation_range", "angles", "angle_pairs", "inputs", "warm_up_steps", "missing")
 """Settings of agents in environments."""
 
 _UNUSED = AgentSpec(angle_pairs="none", inputs="all")
@@ -435,6 +435,8 @@ class RunSpec(Settings, frozen=True):
         # As in trials from before there was a choice.
         if values["agent"]["inputs"] == "all":
             del values["agent"]["inputs"]
+        if values["agent"]["missing"] == "error":
+            del values["agent"]["missing"]
         if values.get("approximator", {}).get("weight_limit") == 0:
             del values["approximator"]["weight_limit"]
         if not values.get("environment", {}).get("action_masks", True):

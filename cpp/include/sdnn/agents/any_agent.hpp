@@ -154,11 +154,12 @@ AnyAgent make_q_learning(Config config, const QLearningConfig& learning,
 
 /// Makes an agent with so many actions in each dimension, and, with SDNN-C and actions of one
 /// dimension, patterns of its own for each input. With a linear readout `n_first` inputs may have
-/// come first; see LinearSDNN. Throws as the parts do.
+/// come first; see LinearSDNN. Where there are no tables, each input may have a pattern for missing
+/// readings beside the others, of symbols the last one. Throws as the parts do.
 inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearningConfig& learning,
                            const std::vector<std::size_t>& n_actions, std::uint64_t seed,
                            const std::vector<coding::PatternTable>& tables = {},
-                           std::size_t n_first = 0) {
+                           std::size_t n_first = 0, bool codes_missing = false) {
   using namespace approximators;
   const bool fits = is_fuzzy(config)    ? std::holds_alternative<FuzzyQLearningConfig>(learning)
                     : is_linear(config) ? std::holds_alternative<SarsaConfig>(learning)
@@ -177,8 +178,11 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
     return VectorFuzzyQLearning(of_dimension, n_actions.size(), rule, seed);
   }
   if (const auto* const linear = std::get_if<LinearSDNNConfig>(&config)) {
-    return Sarsa(tables.empty() ? LinearSDNN(*linear, n_actions, seed, n_first)
-                                : LinearSDNN(*linear, n_actions, tables, seed),
+    const auto books = [&, config = with_pattern_units(*linear)] {
+      if (!tables.empty()) return tables;
+      return codes_missing ? code_books_with_missing(config, seed) : code_books_of(config, seed);
+    };
+    return Sarsa(LinearSDNN(*linear, n_actions, books(), seed, tables.empty() ? n_first : 0),
                  std::get<SarsaConfig>(learning), seed);
   }
   const auto& rule = std::get<QLearningConfig>(learning);
@@ -188,9 +192,11 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
         [](const RBFNetworkConfig& one, std::uint64_t) { return RBFNetwork(one); });
   }
   return detail::make_q_learning(std::get<SDNNCConfig>(config), rule, n_actions, seed,
-                                 [&tables](const SDNNCConfig& one, std::uint64_t seed_of_part) {
-                                   return tables.empty() ? SDNNC(one, seed_of_part)
-                                                         : SDNNC(one, tables, seed_of_part);
+                                 [&](const SDNNCConfig& one, std::uint64_t seed_of_part) {
+                                   if (!tables.empty()) return SDNNC(one, tables, seed_of_part);
+                                   if (!codes_missing) return SDNNC(one, seed_of_part);
+                                   return SDNNC(one, code_books_with_missing(one, seed_of_part),
+                                                seed_of_part);
                                  });
 }
 

@@ -22,6 +22,7 @@
 #include "sdnn/agents/detail/saved_tables.hpp"
 #include "sdnn/agents/detail/taken_actions.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/last_readings.hpp"
 #include "sdnn/agents/latest_transitions.hpp"
 #include "sdnn/agents/observations.hpp"
 #include "sdnn/agents/range_use.hpp"
@@ -32,7 +33,6 @@
 #include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/pattern_table.hpp"
-#include "sdnn/coding/symbol_patterns.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/identity.hpp"
@@ -54,7 +54,7 @@ class Controller : public WithRates<Controller> {
   /// What one reader owns, once the warm-up is over: for that controller and what it becomes.
   struct Workspace {
     AnyWorkspace agent;
-    std::vector<double> state, action;
+    std::vector<double> state, action, held;
     std::vector<std::size_t> indices;
   };
 
@@ -124,6 +124,7 @@ class Controller : public WithRates<Controller> {
       if (latest_) latest_->set_n_environments(n);
     }
     taken_.forget_from(n);
+    readings_.forget_from(n);
   }
   std::size_t n_environments() const {
     if (warm_up_) return warm_up_->n_environments();
@@ -135,21 +136,28 @@ class Controller : public WithRates<Controller> {
     if (warm_up_) {
       warm_up_->begin_episode(environment);
     } else {
-      std::visit([environment](auto& agent) { agent.begin_episode(environment); }, *agent_);
-      if (latest_) latest_->begin_episode(environment);
+      begin_learned_episode(environment);
     }
+    readings_.forget(environment);
+  }
+  /// The next acts without `explore` are those of another episode: none of its sensors was read.
+  void begin_greedy_episode(std::size_t environment = 0) {
+    require_environment(environment);
+    readings_.forget_greedy(environment);
   }
 
   /// The action to take; without `explore` a best one. The span is valid until the next act.
   /// Where actions are discrete, `mask` may allow some of them only. Shapes: observation
   /// (n_variables,), the action (n_dimensions,). Throws std::invalid_argument naming a number that
   /// has no state (see ObservationScale) or a mask that does not fit, or if there is no such
-  /// environment; then nothing has changed.
+  /// environment; then nothing has changed. With Missing::hold last readings are noted, of greedy
+  /// episodes apart.
   std::span<const double> act(std::span<const double> observation, bool explore = true,
                               std::size_t environment = 0, ActionMask mask = {}) {
     actions_.require_mask("mask", mask);
+    const auto held = readings_.filled(observation, environment, !explore, held_);
     if (warm_up_) {
-      observations_.require_numbers("observation", observation);
+      observations_.require_readings("observation", observation);
       const auto draw = [&](core::Pcg64& random, std::vector<double>& action) {
         actions_.draw(random, action, mask);
       };
@@ -157,9 +165,10 @@ class Controller : public WithRates<Controller> {
         return actions_.allows_drawn(action, mask);
       };
       actions_.take(warm_up_->act(draw, is_allowed, explore, environment), action_, indices_);
+      readings_.note(held_, environment, !explore);
       return action_;
     }
-    observations_.scale(observation, state_);
+    observations_.scale(held, state_);
     std::visit(
         [&](auto& agent) {
           actions_.take(agents::act(agent, state_, explore, environment, mask), action_, indices_);
@@ -168,24 +177,28 @@ class Controller : public WithRates<Controller> {
     if (explore && !is_fuzzy(approximator_)) {
       taken_.note(environment, action_, indices_);
     }
+    readings_.note(held_, environment, !explore);
     return action_;
   }
 
   /// For a reader. Requires that the warm-up is over.
   Workspace workspace() const {
     return {std::visit([](const auto& agent) { return AnyWorkspace(agent.workspace()); }, *agent_),
-            std::vector<double>(state_.size()), std::vector<double>(n_dimensions()),
+            std::vector<double>(state_.size()),
+            std::vector<double>(n_dimensions()),
+            {},
             std::vector<std::size_t>(n_dimensions())};
   }
   /// A number that no other controller has.
   std::uint64_t identity() const noexcept { return identity_.number(); }
 
   /// The action of act without `explore`; `ties` decides between several best ones. Valid until
-  /// the workspace is used again. Requires that the warm-up is over. Throws as act.
+  /// the workspace is used again. Requires that the warm-up is over. Missing readings are the last
+  /// ones noted in environment 0, and none is noted. Throws as act.
   std::span<const double> best_action(std::span<const double> observation, Workspace& workspace,
                                       core::Random& ties, ActionMask mask = {}) const {
     actions_.require_mask("mask", mask);
-    observations_.scale(observation, workspace.state);
+    observations_.scale(readings_.filled(observation, 0, true, workspace.held), workspace.state);
     std::visit(
         [&](const auto& agent) {
           auto& own = own_workspace(agent, workspace);
@@ -196,11 +209,19 @@ class Controller : public WithRates<Controller> {
     return workspace.action;
   }
 
+  /// The observation with missing readings as act without `explore` has them, which it notes. Valid
+  /// until the next call.
+  std::span<const double> hold(std::span<const double> observation, std::size_t environment) {
+    const auto held = readings_.filled(observation, environment, true, held_);
+    if (held.size() == n_variables()) readings_.note(held_, environment, true);
+    return held;
+  }
+
   /// The two steps of act without `explore`: `read` takes the time and is for many threads;
   /// `best_of` gives the action, of those that `mask` allows, for the observation that was read
   /// last.
   void read(std::span<const double> observation, Workspace& workspace) const {
-    observations_.scale(observation, workspace.state);
+    observations_.scale(readings_.filled(observation, 0, true, workspace.held), workspace.state);
     std::visit(
         [&](const auto& agent) { agent.read(workspace.state, own_workspace(agent, workspace)); },
         *agent_);
@@ -231,21 +252,23 @@ class Controller : public WithRates<Controller> {
     if (terminated) next_mask = {};
     actions_.require_mask("next_mask", next_mask);
     core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
-    core::require(environment < n_environments(), "environment", "of those that there are",
-                  environment);
+    require_environment(environment);
+    const auto held = readings_.filled(observation, next_observation, environment);
     if (warm_up_) {
-      observations_.require_numbers("observation", observation);
+      observations_.require_readings("observation", observation);
       actions_.require_action(action);
-      observations_.require_numbers("next_observation", next_observation);
+      observations_.require_readings("next_observation", next_observation);
       warm_up_->learn({false, environment, observation, action, reward, next_observation,
                        terminated, next_mask});
+      readings_.note_step(environment);
       if (warm_up_->is_over()) end_warm_up();
       return;
     }
-    observations_.scale(observation, state_);
+    observations_.scale(held.observation, state_);
     find_indices(action, environment);
-    observations_.scale(next_observation, next_state_, "next_observation");
+    observations_.scale(held.next_observation, next_state_, "next_observation");
     learn_scaled(reward, terminated, environment, next_mask);
+    readings_.note_step(environment);
     notes_.note(observation);
     const WarmUp::Step step{false,  environment,      observation, action,
                             reward, next_observation, terminated};
@@ -271,7 +294,7 @@ class Controller : public WithRates<Controller> {
 
   /// The state that the agent has for an observation. Valid until the next call. Throws as act.
   std::span<const double> state_of(std::span<const double> observation) {
-    observations_.scale(observation, state_);
+    observations_.scale(readings_.filled(observation, 0, true, held_), state_);
     return state_;
   }
 
@@ -299,6 +322,7 @@ class Controller : public WithRates<Controller> {
       archive.part("reward_scale", self.reward_scale_);
     }
     archive.part("taken", self.taken_);
+    if (self.readings_.is_held()) archive.part("readings", self.readings_);
     if constexpr (Archive::kReads) self.end_reading(archive);
   }
 
@@ -313,9 +337,11 @@ class Controller : public WithRates<Controller> {
       : config_(std::move(config)),
         tables_(std::move(tables)),
         approximator_(config_.approximator),
-        observations_(config_.observation, is_sdnn(approximator_), is_sdnn(approximator_) ? 2 : 1),
+        observations_(config_.observation, is_sdnn(approximator_), is_sdnn(approximator_) ? 2 : 1,
+                      detail::n_bins_of_inputs(approximator_, tables_)),
         actions_(config_.action, n_actions_in_box(approximator_)),
         notes_(n_variables()),
+        readings_(observations_.last_readings()),
         taken_(n_dimensions()) {
     core::check_fields(config_);
     action_.resize(n_dimensions());
@@ -330,14 +356,12 @@ class Controller : public WithRates<Controller> {
   /// Makes the agent: all ranges are known. Of a state that is read, sizes are compared first.
   void fit(const core::StateReader* reader = nullptr) {
     approximator_ = detail::approximator_of(config_, observations_, actions_, tables_);
-    std::vector<coding::PatternTable> tables = tables_;
-    if (detail::is_table(config_, observations_, tables_))
-      tables.assign(2, coding::one_hot_patterns(observations_.n_states()));
+    const auto tables = detail::tables_of(config_, observations_, approximator_, tables_);
     if (reader != nullptr) {
       expect_sizes(*reader, approximator_, actions_.n_actions(), !tables.empty());
     }
     agent_.emplace(make_agent(approximator_, config_.learning, actions_.n_actions(), config_.seed,
-                              tables, n_first_inputs()));
+                              tables, n_first_inputs(), observations_.codes_missing()));
     if (auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&approximator_)) {
       if (n_dimensions() == 1) sdnn->n_actions = static_cast<int>(actions_.n_actions().front());
     }
@@ -364,6 +388,16 @@ class Controller : public WithRates<Controller> {
   template <class Agent>
   static typename Agent::Workspace& own_workspace(const Agent&, Workspace& workspace) {
     return std::get<typename Agent::Workspace>(workspace.agent);
+  }
+
+  void require_environment(std::size_t environment) const {
+    core::require(environment < n_environments(), "environment", "of those that there are",
+                  environment);
+  }
+
+  void begin_learned_episode(std::size_t environment) {
+    std::visit([environment](auto& agent) { agent.begin_episode(environment); }, *agent_);
+    if (latest_) latest_->begin_episode(environment);
   }
 
   /// Finds the indices of an action: those of the last exploring act where it is the same one. A
@@ -406,9 +440,10 @@ class Controller : public WithRates<Controller> {
     warm_up_.reset();
     set_n_environments(warm_up.n_in_all());
     if (is_fuzzy(approximator_)) {
-      for (std::size_t i = 0; i < n_environments(); ++i) begin_episode(i);
+      for (std::size_t i = 0; i < n_environments(); ++i) begin_learned_episode(i);
     } else {
-      for (std::size_t t = 0; t < warm_up.size(); ++t) relive(warm_up.step(t));
+      LastReadings readings = observations_.last_readings();
+      for (std::size_t t = 0; t < warm_up.size(); ++t) relive(warm_up.step(t), readings);
     }
     set_n_environments(warm_up.n_environments());
     watch();
@@ -447,10 +482,16 @@ class Controller : public WithRates<Controller> {
     identity_ = core::Identity();  // readers have workspaces for fewer inputs
   }
 
-  void relive(const WarmUp::Step& step) {
-    if (step.begins) begin_episode(step.environment);
-    observations_.scale(step.observation, state_);
-    observations_.scale(step.next_observation, next_state_, "next_observation");
+  /// Learns a transition of the warm-up, after which there were these readings.
+  void relive(const WarmUp::Step& step, LastReadings& readings) {
+    if (step.begins) {
+      begin_learned_episode(step.environment);
+      readings.forget(step.environment);
+    }
+    const auto held = readings.filled(step.observation, step.next_observation, step.environment);
+    readings.note_step(step.environment);
+    observations_.scale(held.observation, state_);
+    observations_.scale(held.next_observation, next_state_, "next_observation");
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
       indices_[d] = actions_.index_of(step.action[d], d);
     }
@@ -490,13 +531,12 @@ class Controller : public WithRates<Controller> {
       rates_.progress = progress();
       return;
     }
-    const auto is_number = [](double x) { return !std::isnan(x); };
     const auto can_be_learned = [&](const WarmUp::Step& step) {
       actions_.require_action(step.action);
       actions_.require_mask("next_masks", step.next_mask);
-      return std::abs(step.reward) <= kLargestReward &&
-             std::ranges::all_of(step.observation, is_number) &&
-             std::ranges::all_of(step.next_observation, is_number);
+      observations_.require_readings("observation", step.observation);
+      observations_.require_readings("next_observation", step.next_observation);
+      return std::abs(step.reward) <= kLargestReward;
     };
     const auto is_action = [this](const auto& kept) { return actions_.can_be_drawn(kept); };
     archive.taking("warm_up.actions", [&] {
@@ -511,10 +551,11 @@ class Controller : public WithRates<Controller> {
   Observations observations_;
   Actions actions_;
   RangeNotes notes_;
+  LastReadings readings_;
   std::optional<WarmUp> warm_up_;
   std::optional<AnyAgent> agent_;            ///< once the warm-up is over
   std::optional<LatestTransitions> latest_;  ///< where inputs that are left out can be added
-  std::vector<double> state_, next_state_, action_;
+  std::vector<double> held_, state_, next_state_, action_;
   std::vector<std::size_t> indices_;
   detail::TakenActions taken_;
   RewardScale reward_scale_;

@@ -2,17 +2,30 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/elementary.hpp"
 
 namespace sdnn::agents {
+
+/// What a missing reading, which is NaN or infinite, becomes.
+enum class Missing {
+  error,  ///< it is refused
+  hold,   ///< the variable's last reading; before the first one the middle of its range
+  code,   ///< a pattern that each input has for missing readings
+};
+constexpr std::array<std::string_view, 3> words_of(Missing) noexcept {
+  return {"error", "hold", "code"};
+}
 
 /// What an input of an agent is made of; its value where x is what is observed:
 ///
@@ -32,13 +45,23 @@ struct ObservedInput {
 };
 
 /// Scales what is observed, with a range for each observed variable.
+///
+/// With Missing::hold a missing variable is in the middle of its range, and a symbol of which a
+/// variable is missing is the first one. With Missing::code an input that has n bins has one more,
+/// for missing readings, and values are the middles of n + 1 bins; an input is missing if one of
+/// its variables is.
 class ObservationScale {
  public:
-  /// Shapes: low and high (n_observed,). Throws std::invalid_argument naming what does not
-  /// fit.
+  /// Shapes: low and high (n_observed,), n_bins (n_inputs,) with Missing::code. Throws
+  /// std::invalid_argument naming what does not fit.
   ObservationScale(std::vector<double> low, std::vector<double> high,
-                   std::vector<ObservedInput> inputs)
-      : low_(std::move(low)), high_(std::move(high)), inputs_(std::move(inputs)) {
+                   std::vector<ObservedInput> inputs, Missing missing = Missing::error,
+                   std::vector<std::size_t> n_bins = {})
+      : low_(std::move(low)),
+        high_(std::move(high)),
+        inputs_(std::move(inputs)),
+        missing_(missing),
+        n_bins_(std::move(n_bins)) {
     core::require(low_.size() == high_.size(), "observation.high", "as long as observation.low",
                   high_.size());
     for (std::size_t i = 0; i < low_.size(); ++i) {
@@ -47,35 +70,43 @@ class ObservationScale {
                     "finite and greater than observation.low", high_[i]);
     }
     for (std::size_t k = 0; k < inputs_.size(); ++k) check(k);
-    has_angles_ = std::ranges::any_of(inputs_, [](const ObservedInput& input) {
-      return input.kind == ObservedKind::angle || input.kind == ObservedKind::circular;
-    });
+    core::require(missing_ != Missing::code || n_bins_.size() == n_inputs(), "n_bins",
+                  "one number for each input", n_bins_.size());
   }
 
   std::size_t n_observed() const noexcept { return low_.size(); }
   std::size_t n_inputs() const noexcept { return inputs_.size(); }
 
   /// Shapes: observation (n_observed,), state (n_inputs,). Throws std::invalid_argument naming the
-  /// number of the observation, called `name`, that has no state: none may be NaN, nor infinite
-  /// where there are angles. A variable that is infinite is at an end of its range.
+  /// number of the observation, called `name`, that has no state: with Missing::error all must be
+  /// finite.
   void operator()(std::span<const double> observation, std::span<double> state,
                   const char* name = "observation") const {
     if (observation.size() != n_observed()) {
       core::require(false, name, std::to_string(n_observed()) + " numbers", observation.size());
     }
-    for (std::size_t i = 0; i < observation.size(); ++i) {
-      if (can_scale(observation[i])) continue;
-      core::require(false, name + ("[" + std::to_string(i) + "]"),
-                    has_angles_ ? "finite, as there are angles" : "a number", observation[i]);
+    if (missing_ == Missing::error) {
+      require_present(name, observation);
+      for (std::size_t k = 0; k < inputs_.size(); ++k) state[k] = value(inputs_[k], observation);
+    } else {
+      for (std::size_t k = 0; k < inputs_.size(); ++k) {
+        state[k] =
+            missing_ == Missing::code ? coded(k, observation) : held(inputs_[k], observation);
+      }
     }
-    for (std::size_t k = 0; k < inputs_.size(); ++k) state[k] = value(inputs_[k], observation);
+  }
+
+  /// Throws std::invalid_argument naming the first missing reading.
+  static void require_present(const char* name, std::span<const double> observation) {
+    for (std::size_t i = 0; i < observation.size(); ++i) {
+      if (std::isfinite(observation[i])) continue;
+      core::require(false, name + ("[" + std::to_string(i) + "]"),
+                    "finite (agents with missing='hold' or missing='code' take missing readings)",
+                    observation[i]);
+    }
   }
 
  private:
-  bool can_scale(double x) const noexcept {
-    return has_angles_ ? std::isfinite(x) : !std::isnan(x);
-  }
-
   void check(std::size_t k) const {
     const ObservedInput& input = inputs_[k];
     const std::string name = "observation.inputs[" + std::to_string(k) + "]";
@@ -92,10 +123,43 @@ class ObservationScale {
     }
   }
 
+  /// Whether a variable of the input is missing.
+  static bool is_missing(const ObservedInput& input, std::span<const double> observation) noexcept {
+    if (input.kind == ObservedKind::symbol) {
+      const auto one_hot = observation.subspan(input.first, input.second);
+      return !std::ranges::all_of(one_hot, [](double x) { return std::isfinite(x); });
+    }
+    return !std::isfinite(observation[input.first]) ||
+           (input.kind == ObservedKind::angle && !std::isfinite(observation[input.second]));
+  }
+
+  double coded(std::size_t k, std::span<const double> observation) const noexcept {
+    const std::size_t n = n_bins_[k];
+    const std::size_t bin =
+        is_missing(inputs_[k], observation)
+            ? n
+            : static_cast<std::size_t>(coding::bin_of(value(inputs_[k], observation), n));
+    return (static_cast<double>(bin) + 0.5) / static_cast<double>(n + 1);
+  }
+
+  double held(const ObservedInput& input, std::span<const double> observation) const noexcept {
+    if (!is_missing(input, observation)) return value(input, observation);
+    if (input.kind == ObservedKind::symbol) return 0.5 / static_cast<double>(input.second);
+    if (input.kind != ObservedKind::angle) return 0.5;
+    const auto reading = [&](std::size_t i) {
+      return std::isfinite(observation[i]) ? observation[i] : (low_[i] + high_[i]) / 2.0;
+    };
+    return angle(reading(input.first), reading(input.second));
+  }
+
+  static double angle(double cosine, double sine) noexcept {
+    return (core::atan2(sine, cosine) + core::kPi) / core::kTwoPi;
+  }
+
   double value(const ObservedInput& input, std::span<const double> observation) const noexcept {
     const std::size_t i = input.first;
     if (input.kind == ObservedKind::angle) {
-      return (core::atan2(observation[input.second], observation[i]) + core::kPi) / core::kTwoPi;
+      return angle(observation[i], observation[input.second]);
     }
     if (input.kind == ObservedKind::symbol) {
       const auto one_hot = observation.subspan(i, input.second);
@@ -109,7 +173,8 @@ class ObservationScale {
 
   std::vector<double> low_, high_;
   std::vector<ObservedInput> inputs_;
-  bool has_angles_ = false;
+  Missing missing_;
+  std::vector<std::size_t> n_bins_;  ///< of each input, without that of missing readings
 };
 
 }  // namespace sdnn::agents

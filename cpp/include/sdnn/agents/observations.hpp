@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/agents/last_readings.hpp"
 #include "sdnn/agents/observation_scale.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
@@ -32,6 +33,7 @@ struct ObservationConfig {
   std::vector<std::vector<int>> symbols = {};
   bool relevant_only = false;
   std::vector<int> inputs = {};
+  Missing missing = Missing::error;
 
   static constexpr auto fields() noexcept {
     return std::tuple(
@@ -55,7 +57,10 @@ struct ObservationConfig {
         core::field("relevant_only", &ObservationConfig::relevant_only,
                     "Whether inputs that have nothing to do with rewards or actions, "
                     "as the warm-up finds, are left out."),
-        core::field("inputs", &ObservationConfig::inputs, "Variables that are never left out."));
+        core::field("inputs", &ObservationConfig::inputs, "Variables that are never left out."),
+        core::field("missing", &ObservationConfig::missing,
+                    "Whether readings that are NaN or infinite are refused, the last reading is "
+                    "used instead, or each input has a pattern for them."));
   }
   bool operator==(const ObservationConfig&) const = default;
 };
@@ -71,9 +76,13 @@ struct ObservationConfig {
 class Observations {
  public:
   /// Symbols are inputs of their own where the approximator codes symbols; it gets `least_inputs`
-  /// inputs at least, the last one repeated. Throws std::invalid_argument naming the field.
-  Observations(ObservationConfig config, bool codes_symbols, std::size_t least_inputs)
-      : config_(std::move(config)), least_inputs_(least_inputs) {
+  /// inputs at least, the last one repeated. With Missing::code `n_bins` are those of each input
+  /// that is no symbol, or of all. Throws std::invalid_argument naming the field.
+  Observations(ObservationConfig config, bool codes_symbols, std::size_t least_inputs,
+               std::vector<std::size_t> n_bins)
+      : config_(std::move(config)), least_inputs_(least_inputs), n_bins_(std::move(n_bins)) {
+    core::require(codes_symbols || !codes_missing(), "missing",
+                  "'error' or 'hold': these agents have no patterns of inputs", "code");
     core::require(!config_.low.empty(), "observation.low", "of one variable at least", 0);
     core::require(config_.high.size() == n_variables(), "observation.high",
                   "as long as observation.low", config_.high.size());
@@ -125,16 +134,24 @@ class Observations {
   std::vector<int> n_symbols() const {
     std::vector<int> n_symbols;
     for (const ObservedInput& input : inputs_) {
-      n_symbols.push_back(input.kind == ObservedKind::symbol ? static_cast<int>(input.second) : 0);
+      const int n = static_cast<int>(input.second) + (codes_missing() ? 1 : 0);
+      n_symbols.push_back(input.kind == ObservedKind::symbol ? n : 0);
     }
     return n_symbols;
   }
+  /// The readings of episodes that have not begun.
+  LastReadings last_readings() const {
+    return {config_.missing == Missing::hold, n_variables(), config_.symbols};
+  }
+  /// Whether each input has a pattern for missing readings; a symbol's is its last one.
+  bool codes_missing() const noexcept { return config_.missing == Missing::code; }
 
   /// How many states there are where an observation is one symbol; else 0.
   std::size_t n_states() const noexcept {
     const bool is_symbol =
         !config_.symbols.empty() && index(config_.symbols.front()[1]) == n_variables();
-    return is_symbol ? n_variables() : 0;
+    if (!is_symbol) return 0;
+    return codes_missing() ? n_variables() + 1 : n_variables();
   }
 
   /// Shapes: observation (n_variables,), state (n_inputs,). Throws std::invalid_argument naming the
@@ -157,19 +174,17 @@ class Observations {
     return required;
   }
 
-  /// Throws std::invalid_argument unless these are numbers for all variables.
-  void require_numbers(const char* name, std::span<const double> values) const {
+  /// Throws std::invalid_argument unless these are readings of all variables.
+  void require_readings(const char* name, std::span<const double> values) const {
     if (values.size() != n_variables()) {
       core::require(false, name, std::to_string(n_variables()) + " numbers", values.size());
     }
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (!std::isnan(values[i])) continue;
-      core::require(false, name + ("[" + std::to_string(i) + "]"), "a number", values[i]);
-    }
+    if (config_.missing == Missing::error) ObservationScale::require_present(name, values);
   }
 
-  /// Takes unknown ranges and pairs from observations. Shape: (n, n_variables), row by row: the
-  /// first half what was observed before steps, the second what was observed after them. Throws
+  /// Takes unknown ranges and pairs from the readings that are not missing. Shape:
+  /// (n, n_variables), row by row: the first half what was observed before steps, the second what
+  /// was observed after them. A variable without any has the range of one that is always 0. Throws
   /// std::invalid_argument where there is no range, and then nothing has changed.
   void fit(std::span<const double> seen) {
     const auto pairs = config_.find_angle_pairs ? pairs_in(seen) : config_.angle_pairs;
@@ -369,8 +384,30 @@ class Observations {
 
   std::vector<double> column(std::span<const double> seen, std::size_t i) const {
     std::vector<double> values;
-    for (; i < seen.size(); i += n_variables()) values.push_back(seen[i]);
+    for (; i < seen.size(); i += n_variables()) {
+      if (std::isfinite(seen[i])) values.push_back(seen[i]);
+    }
+    if (values.empty()) values.push_back(0.0);
     return values;
+  }
+
+  /// Two variables where both were read, before a step and after it: halves as those of `seen`.
+  std::pair<std::vector<double>, std::vector<double>> columns(std::span<const double> seen,
+                                                              std::size_t i, std::size_t j) const {
+    const std::size_t n = n_variables();
+    const std::size_t half = seen.size() / n / 2 * n;
+    const auto is_read = [&](std::size_t row) {
+      return std::isfinite(seen[row + i]) && std::isfinite(seen[row + j]);
+    };
+    std::pair<std::vector<double>, std::vector<double>> columns;
+    for (const std::size_t first : {std::size_t{0}, half}) {
+      for (std::size_t row = 0; row < half; row += n) {
+        if (!is_read(row) || !is_read(half + row)) continue;
+        columns.first.push_back(seen[first + row + i]);
+        columns.second.push_back(seen[first + row + j]);
+      }
+    }
+    return columns;
   }
 
   bool may_find_pairs() const {
@@ -386,7 +423,7 @@ class Observations {
     Pairs pairs;
     for (std::size_t i = 0; i + 1 < n_variables(); ++i) {
       if (roles_[i] != Role::number || roles_[i + 1] != Role::number) continue;
-      const auto cosines = column(seen, i), sines = column(seen, i + 1);
+      const auto [cosines, sines] = columns(seen, i, i + 1);
       if (!is_on_circle(cosines, sines) && !is_around_circle(cosines, sines)) continue;
       pairs.push_back({static_cast<int>(i), static_cast<int>(i + 1)});
       ++i;
@@ -395,6 +432,7 @@ class Observations {
   }
 
   static bool is_on_circle(const std::vector<double>& cosines, const std::vector<double>& sines) {
+    if (cosines.empty()) return false;
     for (std::size_t t = 0; t < cosines.size(); ++t) {
       const double distance = cosines[t] * cosines[t] + sines[t] * sines[t] - 1.0;
       if (!(std::abs(distance) < kNearCircle)) return false;
@@ -466,12 +504,18 @@ class Observations {
 
   void take_inputs(std::vector<ObservedInput> inputs) {
     while (!inputs.empty() && inputs.size() < least_inputs_) inputs.push_back(inputs.back());
-    scale_.emplace(ranges_.low, ranges_.high, inputs);
+    std::vector<std::size_t> n_bins;
+    for (std::size_t k = 0; k < inputs.size() && codes_missing(); ++k) {
+      const std::size_t of_number = n_bins_[std::min(k, n_bins_.size() - 1)];
+      n_bins.push_back(inputs[k].kind == ObservedKind::symbol ? inputs[k].second : of_number);
+    }
+    scale_.emplace(ranges_.low, ranges_.high, inputs, config_.missing, std::move(n_bins));
     inputs_ = std::move(inputs);
   }
 
   ObservationConfig config_;
   std::size_t least_inputs_;
+  std::vector<std::size_t> n_bins_;
   std::vector<Role> roles_;  ///< as the configuration has them
   bool needs_fit_ = false;
   Ranges ranges_;

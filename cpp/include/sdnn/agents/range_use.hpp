@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -45,8 +46,6 @@ class RangeNotes {
   /// Of each variable; none for parts of angles and symbols, and before there are enough notes.
   std::vector<std::optional<RangeUse>> use(const Observations& observations) const {
     std::vector<std::optional<RangeUse>> use(n_variables_);
-    const std::size_t n = notes_.size() / n_variables_;
-    if (n < kRare) return use;
     for (const ObservedInput& input : observations.inputs()) {
       if (input.kind != ObservedKind::variable) continue;
       const std::size_t i = input.first;
@@ -54,9 +53,12 @@ class RangeNotes {
       std::vector<double> noted;
       std::size_t n_beyond = 0;
       for (std::size_t k = i; k < notes_.size(); k += n_variables_) {
+        if (!std::isfinite(notes_[k])) continue;  // missing
         if (notes_[k] < low || notes_[k] > high) ++n_beyond;
         noted.push_back(std::clamp(notes_[k], low, high));
       }
+      const std::size_t n = noted.size();
+      if (n < kRare) continue;
       std::ranges::sort(noted);
       const std::size_t n_rare = n / kRare;
       use[i] = {(noted[n - 1 - n_rare] - noted[n_rare]) / (high - low),

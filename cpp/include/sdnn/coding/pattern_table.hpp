@@ -111,4 +111,15 @@ inline void fill_random(PatternTable& table, std::size_t bin, bool balanced, cor
   for (std::size_t k = 0; k < order.size() / 2; ++k) table.set(bin, order[k]);
 }
 
+/// The table with a random pattern more, after the others.
+inline PatternTable with_random_pattern(const PatternTable& table, bool balanced,
+                                        core::Random& random) {
+  PatternTable longer(table.n_bins() + 1, table.n_units());
+  for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
+    table[bin].for_each_set([&](std::size_t k) { longer.set(bin, k); });
+  }
+  fill_random(longer, table.n_bins(), balanced, random);
+  return longer;
+}
+
 }  // namespace sdnn::coding

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -11,8 +12,10 @@
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller_config.hpp"
 #include "sdnn/agents/observations.hpp"
+#include "sdnn/approximators/detail/state_wiring.hpp"
 #include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/coding/symbol_patterns.hpp"
 #include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::agents::detail {
@@ -26,6 +29,45 @@ inline bool is_table(const ControllerConfig& config, const Observations& observa
   const std::size_t n = observations.n_states();
   return linear != nullptr && linear->n_pattern_units == 0 && tables.empty() && n >= 2 &&
          n <= kMostStates;
+}
+
+/// How many bins an input that is no symbol has; with tables, each input. None without codes.
+inline std::vector<std::size_t> n_bins_of_inputs(const AnyApproximatorConfig& approximator,
+                                                 const std::vector<coding::PatternTable>& tables) {
+  std::vector<std::size_t> n_bins;
+  for (const coding::PatternTable& table : tables) n_bins.push_back(table.n_bins());
+  std::visit(
+      [&n_bins](const auto& config) {
+        if constexpr (requires { config.n_anchor_patterns; }) {
+          if (!n_bins.empty()) return;
+          const auto n_anchors = static_cast<std::size_t>(std::max(config.n_anchor_patterns, 2));
+          const auto n_portions = static_cast<std::size_t>(std::max(config.n_interpolated, 0)) + 1;
+          n_bins.push_back((n_anchors - 1) * n_portions);
+        }
+      },
+      approximator);
+  return n_bins;
+}
+
+/// The patterns of each input where they do not follow from the approximator, which is filled in:
+/// a table of states, or those that were passed, with one more for missing readings.
+inline std::vector<coding::PatternTable> tables_of(const ControllerConfig& config,
+                                                   const Observations& observations,
+                                                   const AnyApproximatorConfig& approximator,
+                                                   std::vector<coding::PatternTable> tables) {
+  if (is_table(config, observations, tables)) {
+    return {2, coding::one_hot_patterns(observations.n_states())};
+  }
+  if (!observations.codes_missing()) return tables;
+  return std::visit(
+      [&](const auto& coded) {
+        if constexpr (requires { coded.balanced_anchors; }) {
+          return approximators::with_missing_patterns(coded, std::move(tables), {}, config.seed);
+        } else {
+          return tables;
+        }
+      },
+      approximator);
 }
 
 /// The approximator with the sizes, circles and symbols of a task whose ranges are known. Throws
@@ -59,7 +101,8 @@ inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
         own.n_pattern_units = approximators::with_pattern_units(first).n_pattern_units;
       }
       for (std::size_t i = 0; i < std::min(tables.size(), n_symbols.size()); ++i) {
-        const auto n = static_cast<std::size_t>(n_symbols[i]);
+        auto n = static_cast<std::size_t>(n_symbols[i]);
+        if (n > 0 && observations.codes_missing()) --n;
         core::require(n == 0 || tables[i].n_bins() == n, "tables[" + std::to_string(i) + "]",
                       "of a row for each of " + std::to_string(n) + " symbols", tables[i].n_bins());
       }

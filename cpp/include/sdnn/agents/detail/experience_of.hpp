@@ -6,6 +6,7 @@
 #include <numeric>
 #include <vector>
 
+#include "sdnn/agents/last_readings.hpp"
 #include "sdnn/agents/observations.hpp"
 #include "sdnn/agents/relevance.hpp"
 #include "sdnn/agents/reward_scale.hpp"
@@ -22,12 +23,17 @@ inline RandomExperience experience_of(const Observations& fitted, const WarmUp& 
   RandomExperience experience{.n_inputs = fitted.n_inputs(), .circular = fitted.circular()};
   experience.actions.resize(n_dimensions);
   RewardScale scale(transitions.rewards());
+  LastReadings readings = fitted.last_readings();
   std::vector<double> state(fitted.n_inputs());
   for (std::size_t k = 0; k < order.size(); ++k) {
     const WarmUp::Step step = transitions.step(order[k]);
-    fitted.scale(step.observation, state);
+    if (step.begins) readings.forget(step.environment);
+    const auto [observation, next_observation] =
+        readings.filled(step.observation, step.next_observation, step.environment);
+    readings.note_step(step.environment);
+    fitted.scale(observation, state);
     experience.states.insert(experience.states.end(), state.begin(), state.end());
-    fitted.scale(step.next_observation, state, "next_observation");
+    fitted.scale(next_observation, state, "next_observation");
     experience.next_states.insert(experience.next_states.end(), state.begin(), state.end());
     for (std::size_t d = 0; d < n_dimensions; ++d) {
       experience.actions[d].push_back(step.action[d]);

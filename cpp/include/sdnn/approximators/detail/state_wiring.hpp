@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -65,6 +66,27 @@ std::vector<coding::PatternTable> code_books_of(const Config& config, std::uint6
                                                    random));
   }
   return tables;
+}
+
+/// Tables with a pattern more for missing readings, but those of `symbols`, which have one.
+template <class Config>
+std::vector<coding::PatternTable> with_missing_patterns(const Config& config,
+                                                        std::vector<coding::PatternTable> tables,
+                                                        std::span<const int> symbols,
+                                                        std::uint64_t seed) {
+  constexpr std::size_t kFirstStream = 1024;  // those before are of the inputs' other patterns
+  for (std::size_t mu = 0; mu < tables.size(); ++mu) {
+    if (mu < symbols.size() && symbols[mu] > 0) continue;
+    core::Random random(seed, core::Stream::code_books, kFirstStream + mu);
+    tables[mu] = coding::with_random_pattern(tables[mu], config.balanced_anchors, random);
+  }
+  return tables;
+}
+/// The patterns of every input, with one for missing readings; of a symbol it is the last one.
+template <class Config>
+std::vector<coding::PatternTable> code_books_with_missing(const Config& config,
+                                                          std::uint64_t seed) {
+  return with_missing_patterns(config, code_books_of(config, seed), config.n_symbols, seed);
 }
 
 /// The strides of the code, ascending: so many at random.

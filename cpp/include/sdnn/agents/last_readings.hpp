@@ -1,0 +1,146 @@
+/// The last readings of an agent's sensors, where missing ones are replaced by them.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sdnn/agents/episodes.hpp"
+
+namespace sdnn::agents {
+
+/// The last readings in the present episode of each environment.
+///
+/// Greedy episodes may run beside those that are learned: they have last readings apart, which
+/// begin with those that are learned and are forgotten when one of these is noted.
+class LastReadings {
+ public:
+  /// An observation and the next one.
+  struct Step {
+    std::span<const double> observation, next_observation;
+  };
+
+  /// Without `is_held` all observations stay as they are. Of `symbols`, first variables and how
+  /// many there are, all variables are missing if one is.
+  LastReadings(bool is_held, std::size_t n_variables, std::vector<std::vector<int>> symbols)
+      : is_held_(is_held), n_variables_(n_variables), symbols_(std::move(symbols)) {}
+
+  /// Whether missing readings are replaced by the last ones.
+  bool is_held() const noexcept { return is_held_; }
+
+  /// An observation with the last readings in place of missing ones, which stay NaN where there is
+  /// none, in `room`; one of another size as it is. Shape: (n_variables,).
+  std::span<const double> filled(std::span<const double> observation, std::size_t environment,
+                                 bool is_greedy, std::vector<double>& room) const {
+    return filled(observation, readings(environment, is_greedy), room);
+  }
+  /// Those of a transition that is learned. Valid until the next call.
+  Step filled(std::span<const double> observation, std::span<const double> next_observation,
+              std::size_t environment) {
+    const auto before = filled(observation, environment, false, held_);
+    return {before, filled(next_observation, before, next_held_)};
+  }
+
+  /// Notes what `filled` gave last: an observation in `room`, or those of a transition.
+  void note(const std::vector<double>& room, std::size_t environment, bool is_greedy) {
+    if (!is_held_) return;
+    if (last_.size() <= environment) last_.resize(environment + 1);
+    (is_greedy ? last_[environment].greedy : last_[environment].learned) = room;
+    if (!is_greedy) last_[environment].greedy.clear();
+  }
+  void note_step(std::size_t environment) { note(next_held_, environment, false); }
+
+  /// Forgets the readings of an environment, or those of greedy episodes only.
+  void forget(std::size_t environment) {
+    if (environment < last_.size()) last_[environment] = {};
+  }
+  void forget_greedy(std::size_t environment) {
+    note(std::vector<double>(n_variables_, kNone), environment, true);
+  }
+  /// Forgets environments from this one on: others may come later.
+  void forget_from(std::size_t environment) {
+    if (last_.size() > environment) last_.resize(environment);
+  }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    serialize(self, archive, "learned", &Environment::learned);
+    serialize(self, archive, "greedy", &Environment::greedy);
+  }
+
+ private:
+  struct Environment {
+    std::vector<double> learned, greedy;  ///< empty: none
+  };
+
+  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+  std::span<const double> readings(std::size_t environment, bool is_greedy) const noexcept {
+    if (environment >= last_.size()) return {};
+    const Environment& last = last_[environment];
+    return is_greedy && !last.greedy.empty() ? last.greedy : last.learned;
+  }
+
+  std::span<const double> filled(std::span<const double> observation, std::span<const double> last,
+                                 std::vector<double>& room) const {
+    if (!is_held_ || observation.size() != n_variables_) return observation;
+    const auto last_of = [this, last](std::size_t i) {
+      return last.size() == n_variables_ ? last[i] : kNone;
+    };
+    room.assign(observation.begin(), observation.end());
+    for (std::size_t i = 0; i < room.size(); ++i) {
+      if (!std::isfinite(room[i])) room[i] = last_of(i);
+    }
+    for (const auto& symbol : symbols_) {
+      const auto first = static_cast<std::size_t>(symbol[0]);
+      const auto n = static_cast<std::size_t>(symbol[1]);
+      const auto is_read = [](double x) { return std::isfinite(x); };
+      if (std::ranges::all_of(observation.subspan(first, n), is_read)) continue;
+      for (std::size_t i = first; i < first + n; ++i) room[i] = last_of(i);
+    }
+    return room;
+  }
+
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive, const std::string& name,
+                        std::vector<double> Environment::* member) {
+    std::vector<std::int32_t> environments;
+    std::vector<double> values;
+    for (std::size_t i = 0; i < self.last_.size(); ++i) {
+      const std::vector<double>& last = self.last_[i].*member;
+      if (last.empty()) continue;
+      environments.push_back(static_cast<std::int32_t>(i));
+      values.insert(values.end(), last.begin(), last.end());
+    }
+    archive.numbers(name + ".environments", environments);
+    archive.numbers(name, values);
+    if constexpr (Archive::kReads) {
+      const std::size_t n = self.n_variables_;
+      archive.expect(values.size() == environments.size() * n, name, "one for each variable");
+      for (Environment& environment : self.last_) (environment.*member).clear();
+      for (std::size_t k = 0; k < environments.size(); ++k) {
+        const auto i = static_cast<std::size_t>(environments[k]);
+        archive.expect(environments[k] >= 0 && i < Episodes<int>::kMost, name,
+                       "of numbers of environments");
+        if (self.last_.size() <= i) self.last_.resize(i + 1);
+        const auto first = values.begin() + static_cast<std::ptrdiff_t>(k * n);
+        (self.last_[i].*member).assign(first, first + static_cast<std::ptrdiff_t>(n));
+      }
+    }
+  }
+
+  bool is_held_;
+  std::size_t n_variables_;
+  std::vector<std::vector<int>> symbols_;
+  std::vector<Environment> last_;
+  std::vector<double> held_, next_held_;
+};
+
+}  // namespace sdnn::agents
