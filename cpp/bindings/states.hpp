@@ -13,6 +13,7 @@
 
 #include "objects.hpp"
 #include "sdnn/core/state.hpp"
+#include "words.hpp"
 
 namespace sdnn::bindings {
 
@@ -38,7 +39,7 @@ inline pybind11::dict arrays_of(const core::State& state) {
 inline core::State state_from(const pybind11::dict& arrays) {
   core::State state;
   for (const auto& [key, value] : arrays) {
-    const auto name = pybind11::cast<std::string>(key);
+    const auto name = escaped_text_of(key);
     const auto array =
         pybind11::array::ensure(value, pybind11::array::c_style);  // nothing is converted
     core::Tensor tensor;

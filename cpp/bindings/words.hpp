@@ -24,7 +24,7 @@ inline std::string_view text_of(pybind11::handle text) {
 
 /// A Python text with escapes in place of what UTF-8 does not have.
 inline std::string escaped_text_of(pybind11::handle text) {
-  return text.attr("encode")("utf-8", "backslashreplace").cast<std::string>();
+  return pybind11::str(text).attr("encode")("utf-8", "backslashreplace").cast<std::string>();
 }
 
 }  // namespace sdnn::bindings

@@ -126,7 +126,7 @@ class Agent(BaseAgent[Approximator, Learning]):
         """
         vector: NDArray[np.float64] = self._observations.rows("observation", [observation])[0]
         is_read = np.isfinite(vector)
-        if self._observation.missing == "error":
+        if self.missing == "error":
             require(is_read.all(), "observation", "be finite", vector)
         return np.where(is_read, vector, np.nan)
 

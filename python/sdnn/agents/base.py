@@ -211,6 +211,11 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         return self._controller.inputs
 
     @property
+    def missing(self) -> str:
+        """The treatment of missing readings: ``"error"``, ``"hold"`` or ``"code"``."""
+        return self._observation.missing
+
+    @property
     def progress(self) -> float:
         """The part of the learning that is done, in [0, 1]; ``train`` sets it.
 
@@ -464,7 +469,7 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
     """Read an agent and its training; errors as of `read_agent`."""
     agent, description, arrays = read_agent(path, "training")
 
-    takes_missing = agent._observation.missing != "error"
+    takes_missing = agent.missing != "error"
 
     def array(name: str) -> NDArray[Any]:
         if name not in arrays or not (takes_missing or np.isfinite(arrays[name]).all()):

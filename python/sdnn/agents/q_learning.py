@@ -136,7 +136,8 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         -------
         dict
             ``left_out``: numbers of the observed variables that are in no input, as neither rewards
-            nor actions have to do with them; ``share_of_range``: for each observed variable the
+            nor actions have to do with them; ``fitted``: those whose ranges the warm-up fitted;
+            ``share_of_range``: for each observed variable the
             part of its range that nine tenths of the last 2,048 observations or so were in (a small
             one: ranges are too wide); ``share_beyond_range``: how often it was outside (a large
             one: too narrow). Both are None for angles, symbols and variables that are left out, and
@@ -153,8 +154,11 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         for kind, variables in controller.inputs:
             first, last = variables[0], variables[-1]
             inside.update(range(first, first + last) if kind == "symbol" else variables)
+        ranges = zip(*controller.ranges, strict=True)
+        declared = list(zip(self._observation.low, self._observation.high, strict=True))
         return {
             "left_out": [i for i in range(len(use)) if i not in inside],
+            "fitted": [i for i, ends in enumerate(ranges) if ends != declared[i]],
             "share_of_range": [one and one[0] for one in use],
             "share_beyond_range": [one and one[1] for one in use],
         }

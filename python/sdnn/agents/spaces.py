@@ -127,6 +127,8 @@ def _readings(name: str, values: Any, kinds: str = "fiub") -> NDArray[Any]:
         return array_of(name, values, kinds)
     masked = np.ma.array(values)
     require(masked.dtype.kind in "fiub", name, "be numbers", values)
+    if not np.ma.is_masked(masked):
+        return masked.data
     return masked.astype(np.float64).filled(np.nan)
 
 

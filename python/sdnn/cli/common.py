@@ -243,6 +243,7 @@ def outcome_text(run: Run, outcome: RunOutcome) -> str:
     within: list[int] = []
     if report is not None and not outcome.is_solved:  # else what does not suit does no harm
         within = _where(report["share_of_range"], lambda share: 0.0 < share < 0.1)
+        within = [i for i in within if i not in report["fitted"]]
         beyond = _where(report["share_beyond_range"], lambda share: share > 0.1)
     return rendered(
         "outcome.txt.jinja",

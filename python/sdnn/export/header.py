@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sdnn.agents import Agent, SDNNQLearning, SDNNSarsa
-from sdnn.arguments import argument_error, flag, path_of, shown
+from sdnn.arguments import argument_error, flag, path_of, require, shown
 from sdnn.export.linear import LearnerWriter, LinearWriter
 from sdnn.export.sdnn_c import SDNNCWriter
 from sdnn.export.sdnn_c_learning import SDNNCLearner
@@ -107,7 +107,12 @@ def c_header(
 
 
 def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool) -> Any:
-    """Return the writer of an agent's header, a `Learner` if it learns; TypeError for others."""
+    """Return the writer of an agent's header, a `Learner` if it learns; TypeError for others.
+
+    ValueError for an agent that takes missing readings.
+    """
+    expected = "have missing='error': a C header has no other treatment of missing readings"
+    require(getattr(agent, "missing", "error") == "error", "agent", expected, agent)
     if isinstance(agent, SDNNQLearning):
         return (SDNNCLearner if learns else SDNNCWriter)(agent, name, fraction_bits)
     if isinstance(agent, SDNNSarsa):

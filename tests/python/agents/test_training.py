@@ -188,9 +188,9 @@ BROKEN = [
     ({"reward": np.inf}, "step 3", "got inf"),
     ({"reward": 10**400}, "step 3", "reward"),
     ({"reward": "much"}, "step 3", "reward"),
-    ({"seen": np.array([np.nan])}, "step 3", "observation[0] must be a number"),
+    ({"seen": np.array([np.nan])}, "step 3", "observation[0] must be finite"),
     ({"seen": np.zeros(2)}, "step 3", "observation"),
-    ({"first": np.array([np.nan])}, "the reset", "observation[0] must be a number"),
+    ({"first": np.array([np.nan])}, "the reset", "observation[0] must be finite"),
 ]
 
 
@@ -584,7 +584,8 @@ def test_an_unbounded_environment_is_warmed_up_and_learned(tmp_path):
         assert states_equal(whole.agent, again.agent)
 
 
-def test_a_training_goes_on_from_an_observation_that_is_infinite(tmp_path):
+@pytest.mark.parametrize("missing", ["hold", "code"])
+def test_a_training_goes_on_from_an_observation_that_is_missing(missing, tmp_path):
     class Echo(Corridor):
         """Nothing comes back from ahead where the corridor goes on, as of a sonar."""
 
@@ -594,9 +595,7 @@ def test_a_training_goes_on_from_an_observation_that_is_infinite(tmp_path):
             return np.array([np.inf if self._at == 1 else self._at])
 
     def begun(callbacks=()):
-        agent = SDNNQLearning(
-            Echo.observation_space, Echo.action_space, approximator=SMALL, observation_range=(0, 4)
-        )
+        agent = SDNNQLearning(Echo(), approximator=SMALL, observation_range=(0, 4), missing=missing)
         return Training(agent, Echo(), steps=60, callbacks=callbacks)
 
     whole = begun()

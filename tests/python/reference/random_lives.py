@@ -18,6 +18,9 @@ from sdnn.agents import (
     SarsaConfig,
     SDNNQLearning,
     SDNNSarsa,
+    Transition,
+    evaluate,
+    learn_from,
     load_agent,
 )
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
@@ -40,16 +43,28 @@ REWARDS = (0.0, 1.0, -1.0, 1e-3, 1e12, 1e30, -1e300, 1e300, 5e-324, -5e-324)
 class Walk(gym.Env):
     """Random walks in any space; the first action moves the first number."""
 
-    def __init__(self, space, actions, seed, *, has_angle=False, has_glitches=False):
+    def __init__(self, space, actions, seed, *, has_angle=False, has_glitches=False, lost=0.0):
         self.observation_space, self.action_space = space, actions
         self.random, self.n, self.has_angle = np.random.default_rng(seed), 0, has_angle
-        self.has_glitches, self.x = has_glitches, 0.0
+        self.has_glitches, self.lost, self.x = has_glitches, lost, 0.0
 
     def _filled(self, space):
         if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
             parts = space.spaces.items() if isinstance(space, gym.spaces.Dict) else enumerate(space)
             filled = {name: self._filled(part) for name, part in parts}
             return filled if isinstance(space, gym.spaces.Dict) else tuple(filled.values())
+        return self._without_lost(self._values(space))
+
+    def _without_lost(self, values):
+        if self.lost == 0.0:
+            return values
+        is_lost = self.random.random(np.shape(values)) < self.lost
+        if self.random.random() < 0.5:
+            return np.ma.array(values, mask=is_lost)
+        lost = np.where(is_lost, self.random.choice([np.nan, INF, -INF]), values)
+        return lost if is_lost.any() else values
+
+    def _values(self, space):
         if not isinstance(space, gym.spaces.Box):
             space.seed(int(self.random.integers(2**31)))
             return space.sample()
@@ -158,7 +173,7 @@ def live(agent, env, warm_up_steps, n_steps):
             same.save("other.safetensors")
             if Path("one.safetensors").read_bytes() != Path("other.safetensors").read_bytes():
                 return "files of an agent and of the loaded one differ"
-    state = agent._controller.state()
+    state = {k: x for k, x in agent._controller.state().items() if not k.startswith("readings.")}
     if agent._controller.is_warming_up:
         return "the warm-up does not end"
     numbers = [values for values in state.values() if values.dtype.kind == "f"]
@@ -184,6 +199,54 @@ def _single_cell(agent_class, name, space):
     return run
 
 
+ENTRIES = {
+    "act": lambda agent, x, y, env: agent.act(x),
+    "greedy act": lambda agent, x, y, env: agent.act(x, explore=False),
+    "predict": lambda agent, x, y, env: agent.predict(x),
+    "values": lambda agent, x, y, env: getattr(agent, "q_values", agent._state)(x),
+    "learn": lambda agent, x, y, env: agent.learn(Transition(x, agent.act(x), 1.0, y, False)),
+    "learn next": lambda agent, x, y, env: agent.learn(Transition(y, agent.act(y), 1.0, x, False)),
+    "evaluate": lambda agent, x, y, env: evaluate(agent, env, 1),
+    "train": lambda agent, x, y, env: agent.train(env, 300),
+    "vector": lambda agent, x, y, env: agent.train(
+        gym.vector.SyncVectorEnv(
+            [lambda: env, lambda: Walk(env.observation_space, env.action_space, 2, lost=0.3)]
+        ),
+        300,
+    ),
+    "log": lambda agent, x, y, env: learn_from(agent, [Transition(y, agent.act(y), 1.0, x, True)]),
+}
+
+
+def missing_cells():
+    """Missing readings are refused by name, or held or coded, at every entry."""
+    for agent_class in AGENTS:
+        coded = agent_class in (SDNNSarsa, SDNNQLearning)
+        for missing in ("error", "hold", "code") if coded else ("error", "hold"):
+            for name in ("bounded", "unbounded", "angle", "symbol", "Dict"):
+                for entry in ENTRIES if agent_class is not FuzzyQLearning else [*ENTRIES][:-1]:
+                    label = f"{agent_class.__name__} {missing} {name} {entry}"
+                    yield label, _missing_cell(agent_class, missing, SINGLE_INPUTS[name], entry)
+
+
+def _missing_cell(agent_class, missing, space, entry):
+    def run():
+        random = np.random.default_rng(0)
+        actions = random_actions(random, agent_class)
+        env, lost = (Walk(space, actions, 1, lost=share) for share in (0.3, 1.0))
+        settings = random_settings(random, agent_class) | {"warm_up_steps": 2, "missing": missing}
+        agent = agent_class(space, actions, seed=1, **settings)
+        if entry in ("values", "log"):
+            agent.train(Walk(space, actions, 1), 50)
+        try:
+            ENTRIES[entry](agent, lost.reset(seed=1)[0], Walk(space, actions, 1).reset()[0], env)
+        except ValueError as error:
+            return "" if missing == "error" and "missing='hold'" in str(error) else str(error)
+        return "not refused" if missing == "error" else ""
+
+    return run
+
+
 def soak_cells(first, n):
     """Random lives with the numbers ``first`` to ``first + n - 1``."""
     for number in range(first, first + n):
@@ -201,10 +264,14 @@ def _soak_cell(number):
         options = {"has_angle": has_angle, "has_glitches": bool(random.random() < 0.3)}
         n_environments = int(random.choice([1, 1, 1, 3]))
         envs = [Walk(space, actions, number + i, **options) for i in range(n_environments)]
+        settings = random_settings(random, agent_class)
+        modes = ["error", "hold"] + ["code"] * (agent_class in (SDNNSarsa, SDNNQLearning))
+        settings["missing"] = str(random.choice(modes))
+        for env in envs:
+            env.lost = 0.0 if settings["missing"] == "error" else float(random.choice([0.1, 0.6]))
         env = envs[0]
         if n_environments > 1:
             env = gym.vector.SyncVectorEnv([lambda made=made: made for made in envs])
-        settings = random_settings(random, agent_class)
         agent = agent_class(space, actions, seed=number, **settings)
         return live(
             agent,

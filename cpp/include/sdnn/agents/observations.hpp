@@ -79,9 +79,9 @@ class Observations {
   /// inputs at least, the last one repeated. With Missing::code `n_bins` are those of each input
   /// that is no symbol, or of all. Throws std::invalid_argument naming the field.
   Observations(ObservationConfig config, bool codes_symbols, std::size_t least_inputs,
-               std::vector<std::size_t> n_bins)
+               std::vector<std::size_t> n_bins = {})
       : config_(std::move(config)), least_inputs_(least_inputs), n_bins_(std::move(n_bins)) {
-    core::require(codes_symbols || !codes_missing(), "missing",
+    core::require(!codes_missing() || (codes_symbols && !n_bins_.empty()), "missing",
                   "'error' or 'hold': these agents have no patterns of inputs", "code");
     core::require(!config_.low.empty(), "observation.low", "of one variable at least", 0);
     core::require(config_.high.size() == n_variables(), "observation.high",
