@@ -125,11 +125,13 @@ def _readings(name: str, values: Any, kinds: str = "fiub") -> NDArray[Any]:
     """Return numbers as an array, with NaN for masked ones; ValueError for others."""
     if not has_mask(values):
         return array_of(name, values, kinds)
-    masked = np.ma.array(values)
+    masked: Any = np.ma.array(values)
     require(masked.dtype.kind in "fiub", name, "be numbers", values)
-    if not np.ma.is_masked(masked):
-        return masked.data
-    return masked.astype(np.float64).filled(np.nan)
+    is_complete = not np.ma.is_masked(masked)
+    readings: NDArray[Any] = (
+        masked.data if is_complete else masked.astype(np.float64).filled(np.nan)
+    )
+    return readings
 
 
 def _flat_parts(space: gym.Space[Any], observation: Any) -> Iterator[NDArray[Any]]:

@@ -33,7 +33,8 @@ def test_held_readings_are_the_last_of_their_variable_environment_and_episode(ag
     agent = agent_of(agent_class, "hold")
     agent.n_environments = 2
     never, last = state(agent, LOST), state(agent, READ | {"a": np.array([0.0, 0.5])})
-    assert never[:2] == [0.5, 0.375] and never[-1] == 0.5
+    assert never[:2] == [0.5, 0.375]
+    assert never[-1] == 0.5
     action = agent.act(READ)
     assert state(agent, LOST) == last
     agent.learn(Transition(READ, action, 1.0, READ | {"b": 2}, False))
@@ -63,7 +64,8 @@ def test_coded_readings_have_a_pattern_that_nothing_else_has(agent_class):
     for _ in range(60):
         agent.learn(Transition(LOST, agent.act(LOST), 1.0, LOST, True))
         agent.learn(Transition(READ, agent.act(READ), -1.0, READ, True))
-    assert agent.q_values(LOST).max() > 0.8 and agent.q_values(READ).min() < -0.8
+    assert agent.q_values(LOST).max() > 0.8
+    assert agent.q_values(READ).min() < -0.8
 
 
 def test_an_angle_is_missing_if_one_of_its_pair_is():

@@ -219,9 +219,9 @@ class Controller : public WithRates<Controller> {
 
   /// The two steps of act without `explore`: `read` takes the time and is for many threads;
   /// `best_of` gives the action, of those that `mask` allows, for the observation that was read
-  /// last.
+  /// last. With Missing::hold it is what `hold` returned.
   void read(std::span<const double> observation, Workspace& workspace) const {
-    observations_.scale(readings_.filled(observation, 0, true, workspace.held), workspace.state);
+    observations_.scale(observation, workspace.state);
     std::visit(
         [&](const auto& agent) { agent.read(workspace.state, own_workspace(agent, workspace)); },
         *agent_);
