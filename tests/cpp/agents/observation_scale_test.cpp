@@ -76,10 +76,18 @@ TEST(ObservationScale, GivesStatesWhateverIsObserved) {
   }
 }
 
-TEST(ObservationScale, InfinityIsAnEndOfARangeButNoAngle) {
-  const ObservationScale plain({0.0, -1.0}, {1.0, 1.0},
-                               {{ObservedKind::variable, 1, 0}, {ObservedKind::variable, 0, 0}});
-  EXPECT_EQ(scaled(plain, {testing::kInfinity, -testing::kInfinity}), (Numbers{0.0, 1.0}));
+TEST(ObservationScale, MissingReadingsAreRefusedHeldOrCoded) {
+  const auto scale = [](Missing missing) {
+    return ObservationScale({0.0, -1.0}, {1.0, 1.0},
+                            {{ObservedKind::variable, 1, 0}, {ObservedKind::variable, 0, 0}},
+                            missing, {3, 7});
+  };
+  const ObservationScale plain = scale(Missing::error);
+  const Numbers missing{testing::kInfinity, testing::kNaN};
+  EXPECT_THROW(scaled(plain, missing), std::invalid_argument);
+  EXPECT_EQ(scaled(scale(Missing::hold), missing), (Numbers{0.5, 0.5}));
+  EXPECT_EQ(scaled(scale(Missing::code), missing), (Numbers{3.5 / 4.0, 7.5 / 8.0}));
+  EXPECT_EQ(scaled(scale(Missing::code), {1.0, -0.9}), (Numbers{0.5 / 4.0, 6.5 / 8.0}));
   EXPECT_FALSE(std::signbit(scaled(plain, {-0.0, 0.0})[1]));
   const ObservationScale angles = scale_of_angles();
   for (const double bad : {testing::kNaN, testing::kInfinity}) {

@@ -64,12 +64,11 @@ TEST(Observations, AreFittedWithAQuarterMoreAtEachEnd) {
   EXPECT_EQ(low_of(fitted(half_known, {0.0, 0.4, 4.0, 0.6})), (Numbers{-1.0, 0.0}));
 }
 
-TEST(Observations, ThatAreInfiniteGiveFiniteRanges) {
+TEST(Observations, ThatAreMissingGiveNoRanges) {
   const double end = testing::kInfinity;
-  const auto observations = fitted(unbounded(2), {0.0, end, end, end});
-  for (const double x : {observations.high()[0], observations.low()[1], observations.high()[1]}) {
-    EXPECT_TRUE(std::isfinite(x));
-  }
+  const auto observations = fitted(unbounded(2), {0.0, end, 4.0, testing::kNaN, end, -end});
+  EXPECT_EQ(low_of(observations), (Numbers{-1.0, -0.25}));
+  EXPECT_EQ(high_of(observations), (Numbers{5.0, 0.25}));
 }
 
 TEST(Observations, AdaptiveRangesLeaveOutWhatIsRareAndStayWithinTheFixedOnes) {
@@ -85,7 +84,7 @@ TEST(Observations, AdaptiveRangesLeaveOutWhatIsRareAndStayWithinTheFixedOnes) {
     seen.push_back(is_first ? -90.0 + t : is_last ? 70.0 + t : 2.0 + 4.0 * part);
     seen.push_back(0.1 * t);             // a quarter more is over the ends
     seen.push_back(t == 0 ? 1.0 : 0.0);  // hardly moves
-    seen.push_back(is_first ? -1e9 : is_last ? testing::kInfinity : 8.0 * part);
+    seen.push_back(is_first ? -1e9 : is_last ? 1e9 : 8.0 * part);
     seen.push_back(0.1);                 // an angle
     seen.push_back(t < 20 ? 0.0 : 3.0);  // beyond its bounds
   }
