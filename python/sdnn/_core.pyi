@@ -1963,6 +1963,8 @@ class ObservationConfig:
         Whether inputs that have nothing to do with rewards or actions, as the warm-up finds, are left out.
     inputs : tuple[int, ...]
         Variables that are never left out.
+    missing : {'error', 'hold', 'code'}
+        Whether readings that are NaN or infinite are refused, the last reading is used instead, or each input has a pattern for them.
     
     Raises
     ------
@@ -1977,7 +1979,7 @@ class ObservationConfig:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., narrowed: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., relevant_only: bool = ..., inputs: collections.abc.Sequence[int] = ...) -> None:
+    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., narrowed: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., relevant_only: bool = ..., inputs: collections.abc.Sequence[int] = ..., missing: typing.Literal['error', 'hold', 'code'] = ...) -> None:
         ...
     def __replace__(self, **changes: typing.Any) -> ObservationConfig:
         ...
@@ -2023,6 +2025,11 @@ class ObservationConfig:
     def low(self) -> tuple[float | None, ...]:
         """
         Lowest value of each variable; none: not known.
+        """
+    @property
+    def missing(self) -> typing.Literal['error', 'hold', 'code']:
+        """
+        Whether readings that are NaN or infinite are refused, the last reading is used instead, or each input has a pattern for them.
         """
     @property
     def narrowed(self) -> bool:
@@ -2118,6 +2125,10 @@ class Controller:
         ...
     def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
+    def begin_greedy_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        """
+        The next acts without `explore` hold no earlier readings
+        """
     def check(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0, next_mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> None:
         """
         Raises what learn would; changes nothing

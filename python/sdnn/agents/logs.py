@@ -262,6 +262,8 @@ def _column(name: str, column: Any) -> Any:
         return tuple(_column(f"{name}[{i}]", part) for i, part in enumerate(column))
     if getattr(getattr(column, "dtype", None), "kind", "") == "O" or _is_of_mappings(column):
         return list(column)  # whose items the agent reads
+    if isinstance(column, np.ma.MaskedArray):  # missing readings, as the agent takes them
+        return list(column) if np.ma.is_masked(column) else column.data
     return array_of(name, column)
 
 

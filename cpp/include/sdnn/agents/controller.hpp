@@ -281,11 +281,10 @@ class Controller : public WithRates<Controller> {
              ActionMask next_mask) const {
     actions_.require_mask("next_mask", terminated ? ActionMask() : next_mask);
     core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
-    core::require(environment < n_environments(), "environment", "of those that there are",
-                  environment);
-    observations_.require_numbers("observation", observation);
+    require_environment(environment);
+    observations_.require_readings("observation", observation);
     actions_.require_action(action);
-    observations_.require_numbers("next_observation", next_observation);
+    observations_.require_readings("next_observation", next_observation);
     if (is_warming_up()) return;
     std::vector<double> state(observations_.n_inputs());
     observations_.scale(observation, state);
