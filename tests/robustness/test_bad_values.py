@@ -17,7 +17,7 @@ LEAST = {
     "damage_cells": 120,
     "single_input_cells": 32,
     "log_cells": 90,
-    "missing_cells": 490,
+    "missing_reading_cells": 490,
 }
 """Cells that a row must have, so that none is empty; others 700."""
 

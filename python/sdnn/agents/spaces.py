@@ -112,18 +112,20 @@ class Observations:
         return rows if rows.ndim == 2 else rows.reshape(-1, self.n_variables)
 
 
-def has_mask(observation: Any) -> bool:
-    """Return whether an observation, or a part of it, is a masked array."""
-    if isinstance(observation, Mapping):
-        return any(map(has_mask, observation.values()))
-    if isinstance(observation, list | tuple):
-        return any(map(has_mask, observation))
-    return isinstance(observation, np.ma.MaskedArray)
+def has_mask(space: gym.Space[Any], observation: Any) -> bool:
+    """Return whether an observation of a space, or a part of it, is a masked array."""
+    if isinstance(space, gym.spaces.Dict) and isinstance(observation, Mapping):
+        return any(has_mask(part, observation.get(key)) for key, part in space.spaces.items())
+    if isinstance(space, gym.spaces.Tuple) and isinstance(observation, tuple):
+        return any(map(has_mask, space.spaces, observation))
+    rows = observation if isinstance(observation, list | tuple) else [observation]
+    return any(isinstance(row, np.ma.MaskedArray) for row in rows)
 
 
 def _readings(name: str, values: Any, kinds: str = "fiub") -> NDArray[Any]:
     """Return numbers as an array, with NaN for masked ones; ValueError for others."""
-    if not has_mask(values):
+    rows = values if isinstance(values, list | tuple) else [values]
+    if not any(isinstance(row, np.ma.MaskedArray) for row in rows):
         return array_of(name, values, kinds)
     masked: Any = np.ma.array(values)
     require(masked.dtype.kind in "fiub", name, "be numbers", values)

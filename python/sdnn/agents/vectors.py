@@ -78,7 +78,7 @@ class _Listed(EnvironmentAdapter):
             rows = np.array(seen)
             if rows.dtype == space.dtype:
                 return rows
-        if any(map(has_mask, seen)):
+        if any(has_mask(space, one) for one in seen):
             return seen  # arrays of the vector have no mask
         batch: Any = create_empty_array(space, len(seen))
         try:

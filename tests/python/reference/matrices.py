@@ -27,7 +27,7 @@ MATRICES = {
         (bad_inputs.loop_cells,),
         (random_lives.single_input_cells,),
         (logged_data.log_cells,),
-        (random_lives.missing_cells,),
+        (random_lives.missing_reading_cells,),
     ],
     "core": [(core_cells.never_made_cells,), (core_cells.argument_cells,)],
     "classes": [

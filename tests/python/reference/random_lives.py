@@ -218,7 +218,7 @@ ENTRIES = {
 }
 
 
-def missing_cells():
+def missing_reading_cells():
     """Missing readings are refused by name, or held or coded, at every entry."""
     for agent_class in AGENTS:
         coded = agent_class in (SDNNSarsa, SDNNQLearning)

@@ -101,7 +101,7 @@ class ObservationScale {
     for (std::size_t i = 0; i < observation.size(); ++i) {
       if (std::isfinite(observation[i])) continue;
       core::require(false, name + ("[" + std::to_string(i) + "]"),
-                    "finite (agents with missing='hold' or missing='code' take missing readings)",
+                    "finite and not masked (agents with missing='hold' or 'code' take such)",
                     observation[i]);
     }
   }
