@@ -35,7 +35,7 @@ class RewardScale {
     }
     if (sizes.empty()) return;
     std::ranges::sort(sizes);
-    size_ = sizes[sizes.size() * 3 / 4];
+    size_ = sizes[(sizes.size() - 1) * 3 / 4];
   }
 
   /// Notes a reward. Returns whether it is to be learned. Requires a finite number.
