@@ -150,8 +150,8 @@ def _items(items: Iterable[Any]) -> Iterator[Logged]:
             values = _fields_of(item)
             if values is None:
                 expected = "be a Transition, a mapping, or an episode with observations"
-                raise argument_error(f"transition {number}", f"must {expected}, got {shown(item)}",
-                                     TypeError)  # fmt: skip
+                raise argument_error(f"dataset, transition {number}",
+                                     f"must {expected}, got {shown(item)}", TypeError)  # fmt: skip
             if np.ndim(_value(values, "rewards", ())) == 0:
                 yield _transition(values, f"transition {number}")
             else:
