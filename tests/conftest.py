@@ -35,7 +35,7 @@ def skip_unless_ci():
 
 PACKAGES = dict.fromkeys(("clang", "clang++"), "clang libclang-rt-dev")
 PACKAGES |= dict.fromkeys(("nm", "objdump"), "binutils")
-"""What to install for a tool whose package has another name."""
+"""The package to install for a tool, where its name differs."""
 
 
 @functools.cache

@@ -149,11 +149,6 @@ class Agent(BaseAgent[Approximator, Learning]):
             If a weight would leave its range. Earlier transitions, or other dimensions of the
             action, may have been learned: load a checkpoint.
         """
-        if not isinstance(transition, Transition):
-            raise TypeError(
-                f"transition must be a Transition, got {shown(transition)}: train(env, steps=...)"
-                " learns in an environment"
-            )
         self._check_environment(environment)
         self._controller.learn(*self._parts_of(transition, environment))
         self.warn_of_refused_reward()
@@ -165,7 +160,10 @@ class Agent(BaseAgent[Approximator, Learning]):
     def _parts_of(self, transition: Any, environment: int) -> tuple[Any, ...]:
         """Return a transition as the core takes it; TypeError or ValueError if it is none."""
         if not isinstance(transition, Transition):
-            raise TypeError(f"transition must be a Transition, got {shown(transition)}")
+            raise TypeError(
+                f"transition must be a Transition, got {shown(transition)}: train(env, steps=...)"
+                " learns in an environment"
+            )
         observation, action, reward, next_observation, terminated, next_mask = transition
         return (
             self._observations.vector("observation", observation),

@@ -81,7 +81,9 @@ def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> 
     epochs = whole("epochs", epochs, 1, 2**31)
     read = reader_of(dataset)
     n = _checked_length(agent, read())
-    for _ in range(epochs if n > 0 else 0):
+    if n == 0:
+        return 0
+    for _ in range(epochs):
         agent.begin_episode()
         for logged in read():
             transition = _with_action(agent, logged.transition)
@@ -89,7 +91,7 @@ def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> 
             if logged.truncated or transition.terminated:
                 agent.begin_episode()
         agent.begin_episode()  # learns what still waits
-    return n * (epochs if n > 0 else 0)
+    return n * epochs
 
 
 def _checked_length(agent: Agent[Any, Any], log: Iterator[Logged]) -> int:

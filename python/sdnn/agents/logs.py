@@ -18,7 +18,7 @@ from sdnn.arguments import advice, argument_error, array_of, path_of, require, s
 from sdnn.files import open_regular
 
 _MOST_BYTES = 2**20
-"""Of a line of a file: so much memory is used, whatever the file."""
+"""The longest line of a file that is read, so that memory stays bounded."""
 
 NAMES: Mapping[str, tuple[str, ...]] = {
     "observations": ("observation", "obs", "states", "state"),

@@ -23,7 +23,7 @@ Ranges: TypeAlias = Literal["adaptive"] | tuple[ArrayLike, ArrayLike]
 """Lowest and highest values, a number for all variables or one for each; or adaptive ones."""
 
 Missing: TypeAlias = Literal["error", "hold", "code"]
-"""What becomes of missing readings."""
+"""The treatment of missing readings."""
 
 _MANY_VARIABLES = 16
 

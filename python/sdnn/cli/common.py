@@ -88,8 +88,8 @@ def explained_option(error: click.NoSuchOption) -> click.UsageError:
         elsewhere = {name: option_of(key) for name, key in KEYS_BY_NAME.items()}
         elsewhere = {n: f"{o}=..." if o.startswith("--set") else o for n, o in elsewhere.items()}
         elsewhere["environment"] = "the argument ENV_ID"
-    words = advice(error.option_name, options.values(), elsewhere | options)
-    return click.UsageError(f"No such option: {error.option_name}: {words}", context)
+    hint = advice(error.option_name, options.values(), elsewhere | options)
+    return click.UsageError(f"No such option: {error.option_name}: {hint}", context)
 
 
 def option_words(error: ConfigError) -> str:

@@ -1,4 +1,4 @@
-"""What to do about columns of words that look like numbers written otherwise."""
+"""Advice on columns of words that look like numbers in another notation."""
 
 from __future__ import annotations
 

@@ -359,8 +359,10 @@ class ResultStore:
             read = self._read("measurements", _MEASUREMENT_COLUMNS, "ORDER BY kind, key")
             for *values, crc in zip(*read, strict=True):
                 if crc != _crc(tuple(values)):
-                    words = f"measurements, kind {values[0]}, key {values[1]}: a value does not fit"
-                    raise StoreError(f"{self.path} is damaged: {words} its checksum, crc")
+                    row = f"measurements, kind {values[0]}, key {values[1]}"
+                    raise StoreError(
+                        f"{self.path} is damaged: {row}: a value does not fit its checksum, crc"
+                    )
             rows = zip(*read[:3], strict=True)
             return {key: json.loads(content) for of, key, content in rows if of == kind}
 

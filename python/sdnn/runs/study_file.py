@@ -133,8 +133,8 @@ class StudyFile(Study):
         default = next((name for name in (DEFAULT, BASE) if name in known), known[0])
         reference = default if header.reference is None else header.reference
         if reference not in known:
-            words = f"no variant {reference!r}; {advice(reference, known)}"
-            raise self.file.error(("study", "reference"), words)
+            problem = f"no variant {reference!r}; {advice(reference, known)}"
+            raise self.file.error(("study", "reference"), problem)
         variants = tuple(sorted(variants, key=lambda one: one.id != reference))
         pairs = [
             pair
@@ -263,8 +263,8 @@ class StudyFile(Study):
     def _read_agents(self) -> Iterator[tuple[str, Layer]]:
         for agent in self._table("agents"):
             if agent not in labels():
-                words = advice(agent, labels())
-                raise self.file.error(("agents", agent), f"no such agent; {words}")
+                hint = advice(agent, labels())
+                raise self.file.error(("agents", agent), f"no such agent; {hint}")
             layer = self._layer(("agents", agent), self._table("agents", agent))
             if ("agent", "name") in layer:
                 place = layer["agent", "name"].where
@@ -326,8 +326,8 @@ class StudyFile(Study):
             only = checked(tuple[str, ...], table.pop("only", ()), dotted((*where, "only")))
             for number, case_id in enumerate(only):
                 if case_id not in known:
-                    words = f"no case {case_id!r}; {advice(case_id, known)}"
-                    raise self.file.error((*where, "only", number), words)
+                    problem = f"no case {case_id!r}; {advice(case_id, known)}"
+                    raise self.file.error((*where, "only", number), problem)
             check_names(of_cases, only or known, dotted((*where, "cases")))
             in_cases = {
                 case_id: self._layer(

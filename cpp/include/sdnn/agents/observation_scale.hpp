@@ -17,7 +17,7 @@
 
 namespace sdnn::agents {
 
-/// What a missing reading, which is NaN or infinite, becomes.
+/// Selects what replaces a missing reading, which is NaN or infinite.
 enum class Missing {
   error,  ///< it is refused
   hold,   ///< the variable's last reading; before the first one the middle of its range
