@@ -1,6 +1,6 @@
 """How long a step of training takes in Python, and what of it is the environment and the core.
 
-    python bench/training_steps.py [--tasks CartPole-v1 ...] [--agents sdnn-linear ...]
+    python bench/training_steps.py [--tasks CartPole-v1 ...] [--agents q-lambda ...]
 
 In turn, a hundred rounds or so each: a training, the environment alone with random actions, and the
 calls of the core that act and learn, minus such calls for no environment. Of each the quickest
@@ -21,9 +21,9 @@ import numpy as np
 from page import markdown
 
 import sdnn.environments  # noqa: F401  (registers the acrobot)
-from sdnn.agents import SDNNQLearning, SDNNSarsa, Training
+from sdnn.agents import SDNNQLambda, SDNNQLearning, Training
 
-AGENTS = {kind.kind: kind for kind in (SDNNSarsa, SDNNQLearning)}
+AGENTS = {kind.kind: kind for kind in (SDNNQLambda, SDNNQLearning)}
 HEADER = ("task", "agent", "environments", "training", "environment", "core", "beside", "ratio")
 SECONDS = 2e-3
 ROUNDS = 100

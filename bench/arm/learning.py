@@ -27,7 +27,7 @@ HERE = Path(__file__).parent
 EPISODES = 100
 COUNTED = (2000, 4000)
 """Steps of two runs whose instructions are compared."""
-AGENTS = ("sdnn-linear", "sdnn-c")
+AGENTS = ("q-lambda", "sdnn-c")
 ARM = "arm-linux-gnueabihf-gcc"
 CHIP = ("-mthumb", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 
@@ -46,7 +46,7 @@ class Task:
     def agent(self, seed, kind, ram_bytes=None):
         """Make the agent, which has learned nothing."""
         high = np.array(self.high)
-        given = {"approximator": self.approximator} if kind == "sdnn-linear" else {}
+        given = {"approximator": self.approximator} if kind == "q-lambda" else {}
         space = gym.spaces.Box(-high, high, dtype=np.float64)
         return new_agent(
             space,
@@ -105,7 +105,7 @@ def sizes(folder, task, *more):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("task", nargs="?", choices=TASKS, default="cartpole")
-    parser.add_argument("--agent", choices=AGENTS, default="sdnn-linear")
+    parser.add_argument("--agent", choices=AGENTS, default="q-lambda")
     parser.add_argument("--ram", type=int, help="Bytes that SDNN-C may take.")
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--emulate", action="store_true", help="Train in the emulator.")

@@ -14,7 +14,7 @@ from tasks import GOALS, TASKS, parts_of
 from sdnn.runs.study import Study
 from sdnn.statistics import estimate_median
 
-OURS = "sdnn-linear"
+OURS = "q-lambda"
 STEPS = (10_000, 20_000, 50_000, 100_000, 200_000)
 NOTABLE = 0.02
 """A difference worth telling, in parts of the way from random actions to a solved task."""

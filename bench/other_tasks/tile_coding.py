@@ -129,7 +129,7 @@ def code_of(space, settings: TilesConfig):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SarsaConfig:
+class QLambdaConfig:
     """Settings of the learning."""
 
     step_size: float = 0.5
@@ -248,7 +248,7 @@ def correct(weights, recent, last, now, n_steps, changes):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SwiftConfig(SarsaConfig):
+class SwiftConfig(QLambdaConfig):
     """Settings of Swift-Sarsa; the step size is each weight's at the start."""
 
     step_size: float = 1e-2
@@ -374,7 +374,7 @@ def begin(numbers, eligible, n_eligible, active, largest_rate, decay):
 
 
 for name, title, learning, agent in (
-    ("tiles", "Sarsa(lambda), tile coding", SarsaConfig, TileCodingSarsa),
+    ("tiles", "Sarsa(lambda), tile coding", QLambdaConfig, TileCodingSarsa),
     ("swift-sarsa", "Swift-Sarsa, tile coding", SwiftConfig, SwiftSarsa),
 ):
     register(

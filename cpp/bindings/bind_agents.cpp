@@ -21,8 +21,8 @@
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/observation_scale.hpp"
 #include "sdnn/agents/presets.hpp"
+#include "sdnn/agents/q_lambda.hpp"
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/agents/sarsa.hpp"
 #include "sdnn/agents/vector_fuzzy_q_learning.hpp"
 #include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
@@ -36,9 +36,9 @@ namespace py = pybind11;
 using namespace sdnn;
 using agents::FuzzyQLearning;
 using agents::FuzzyQLearningConfig;
+using agents::QLambda;
+using agents::QLambdaConfig;
 using agents::QLearningConfig;
-using agents::Sarsa;
-using agents::SarsaConfig;
 using agents::VectorFuzzyQLearning;
 using approximators::FuzzyRules;
 using approximators::FuzzyRulesConfig;
@@ -139,7 +139,7 @@ void def_q_learning(py::class_<Agent>& agent, const QValues& q_values) {
   def_agent(agent);
 }
 
-py::array_t<double> q_values_of_readout(const Sarsa& agent, const ArrayArgument<double>& state,
+py::array_t<double> q_values_of_readout(const QLambda& agent, const ArrayArgument<double>& state,
                                         std::size_t dimension) {
   const LinearSDNN& readout = agent.action_value();
   core::require(dimension < readout.n_dimensions(), "dimension",
@@ -233,9 +233,9 @@ void bind_agents(py::module_& module) {
   def_schedule(bindings::bind_config<QLearningConfig>(
       module, "QLearningConfig",
       "The parameters of Q-learning; the defaults are the paper's (section 4.2)."));
-  def_schedule(bindings::bind_config<SarsaConfig>(
-      module, "SarsaConfig",
-      "The parameters of Sarsa(lambda) and Q(lambda) with a linear readout of the SDNN code."));
+  def_schedule(bindings::bind_config<QLambdaConfig>(
+      module, "QLambdaConfig",
+      "The parameters of Q(lambda) and Sarsa(lambda) with a linear readout of the SDNN code."));
   bindings::bind_config<FuzzyQLearningConfig>(
       module, "FuzzyQLearningConfig",
       "The parameters of fuzzy Q-learning; the defaults are the paper's (section 4.3).");
@@ -251,16 +251,17 @@ void bind_agents(py::module_& module) {
       },
       "Named settings of Q-learning with SDNN-C: titles, settings of approximator and learning");
   module.def(
-      "linear_presets",
+      "q_lambda_presets",
       [] {
-        py::typing::Dict<py::str, py::typing::Tuple<py::str, LinearSDNNConfig, SarsaConfig>> found;
+        py::typing::Dict<py::str, py::typing::Tuple<py::str, LinearSDNNConfig, QLambdaConfig>>
+            found;
         for (const auto& [name, title, preset] :
-             agents::linear_presets(LinearSDNNConfig{}.n_inputs)) {
+             agents::q_lambda_presets(LinearSDNNConfig{}.n_inputs)) {
           found[name] = py::make_tuple(title, preset.approximator, preset.learning);
         }
         return found;
       },
-      "The same of Sarsa with a linear readout");
+      "The presets of Q(lambda), by name");
 
   py::class_<agents::FixedRate>(module, "FixedRate", "Waits for ticks at a fixed rate")
       .def(py::init<double, agents::FixedRate::Clock, agents::FixedRate::Sleep>(), py::arg("hz"),
@@ -325,22 +326,23 @@ void bind_agents(py::module_& module) {
           },
           py::arg("dimension"), py::return_value_policy::reference_internal);
   def_fuzzy(vector_fuzzy_agent);
-  py::class_<Sarsa> sarsa(module, "Sarsa", "Sarsa(lambda) with a linear readout of the SDNN code");
-  sarsa
+  py::class_<QLambda> q_lambda(module, "QLambda",
+                               "Q(lambda) with a linear readout of the SDNN code");
+  q_lambda
       .def(py::init([](const LinearSDNNConfig& approximator,
-                       const std::vector<std::size_t>& n_actions, const SarsaConfig& learning,
+                       const std::vector<std::size_t>& n_actions, const QLambdaConfig& learning,
                        std::uint64_t seed, const std::vector<ArrayArgument<std::int8_t>>& tables) {
-             return Sarsa(tables.empty() ? LinearSDNN(approximator, n_actions, seed)
-                                         : LinearSDNN(approximator, n_actions,
-                                                      bindings::tables_of(tables), seed),
-                          learning, seed);
+             return QLambda(tables.empty() ? LinearSDNN(approximator, n_actions, seed)
+                                           : LinearSDNN(approximator, n_actions,
+                                                        bindings::tables_of(tables), seed),
+                            learning, seed);
            }),
            py::kw_only(), py::arg("approximator"), py::arg("n_actions"), py::arg("learning"),
            py::arg("seed"), py::arg("tables") = std::vector<ArrayArgument<std::int8_t>>())
       .def_property_readonly(
-          "action_value", [](Sarsa& self) -> LinearSDNN& { return self.action_value(); },
+          "action_value", [](QLambda& self) -> LinearSDNN& { return self.action_value(); },
           py::return_value_policy::reference_internal)
-      .def_property_readonly("final_epsilon", &Sarsa::final_epsilon, "Where epsilon goes")
-      .def_property_readonly("n_learned", &Sarsa::n_learned, "Transitions that were learned");
-  def_q_learning(sarsa, &q_values_of_readout);
+      .def_property_readonly("final_epsilon", &QLambda::final_epsilon, "Where epsilon goes")
+      .def_property_readonly("n_learned", &QLambda::n_learned, "Transitions that were learned");
+  def_q_learning(q_lambda, &q_values_of_readout);
 }

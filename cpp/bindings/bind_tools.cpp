@@ -4,8 +4,8 @@
 #include "bind_config.hpp"
 #include "bindings.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/q_lambda.hpp"
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/agents/sarsa.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/linear_sdnn.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
@@ -147,8 +147,8 @@ QLearning<SDNNC> sdnn_agent(const SDNNCConfig& approximator, const QLearningConf
   return {SDNNC(approximator, seed), learning, seed};
 }
 
-agents::Sarsa linear_agent(const approximators::LinearSDNNConfig& approximator,
-                           const agents::SarsaConfig& learning, std::uint64_t seed) {
+agents::QLambda q_lambda_agent(const approximators::LinearSDNNConfig& approximator,
+                               const agents::QLambdaConfig& learning, std::uint64_t seed) {
   const std::size_t n_actions[] = {static_cast<std::size_t>(approximator.n_actions)};
   return {approximators::LinearSDNN(approximator, n_actions, seed), learning, seed};
 }
@@ -167,8 +167,8 @@ void bind_trials(py::module_& module) {
             &agent_with<QLearning<RBFNetwork>, RBFNetwork, RBFNetworkConfig, QLearningConfig>);
 
   def_trial(module, "LinearAcrobotTrial",
-            "Sarsa with a linear readout of the SDNN code learns the acrobot swing-up",
-            &linear_agent);
+            "Q(lambda) with a linear readout of the SDNN code learns the acrobot swing-up",
+            &q_lambda_agent);
 
   using PlainRBFAgent = QLearning<PlainRBFNetwork>;
   py::class_<PlainRBFAgent>(module, "PlainRBFQLearning",

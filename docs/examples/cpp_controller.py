@@ -16,10 +16,10 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 
-from sdnn.agents import SDNNSarsa, evaluate
+from sdnn.agents import SDNNQLambda, evaluate
 
 env = gym.make("MountainCarContinuous-v0")
-agent = SDNNSarsa(env.observation_space, env.action_space, seed=1)
+agent = SDNNQLambda(env.observation_space, env.action_space, seed=1)
 agent.train(env, steps=60_000)
 print(f"mean return in Python: {evaluate(agent, env, episodes=20).mean_return:.0f} (90 solves it)")
 

@@ -1370,9 +1370,9 @@ class QLearningConfig:
         """
         Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that follows the returns of late (`adaptive`): rare ones are clipped, and time limits end no return. An RBF network has no range. Not in the paper.
         """
-class SarsaConfig:
+class QLambdaConfig:
     """
-    The parameters of Sarsa(lambda) and Q(lambda) with a linear readout of the SDNN code.
+    The parameters of Q(lambda) and Sarsa(lambda) with a linear readout of the SDNN code.
     
     Parameters
     ----------
@@ -1424,7 +1424,7 @@ class SarsaConfig:
         ...
     def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., trace_decay: float = ..., bootstrap: typing.Literal['sarsa', 'q_learning'] = ..., traces: typing.Literal['dutch', 'replacing'] = ..., schedule_steps: int = ..., max_action_repeat: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., start_steps: int = ...) -> None:
         ...
-    def __replace__(self, **changes: typing.Any) -> SarsaConfig:
+    def __replace__(self, **changes: typing.Any) -> QLambdaConfig:
         ...
     def __repr__(self) -> str:
         ...
@@ -1434,7 +1434,7 @@ class SarsaConfig:
         ...
     def learning_rate_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
         ...
-    def replace(self, **changes: typing.Any) -> SarsaConfig:
+    def replace(self, **changes: typing.Any) -> QLambdaConfig:
         """
         Return a copy with other values of some fields.
         """
@@ -1880,11 +1880,11 @@ class VectorFuzzyQLearning:
     @property
     def n_environments(self) -> int:
         ...
-class Sarsa:
+class QLambda:
     """
-    Sarsa(lambda) with a linear readout of the SDNN code
+    Q(lambda) with a linear readout of the SDNN code
     """
-    def __init__(self, *, approximator: LinearSDNNConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: SarsaConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = []) -> None:
+    def __init__(self, *, approximator: LinearSDNNConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: QLambdaConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = []) -> None:
         ...
     def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[int]:
         ...
@@ -2111,7 +2111,7 @@ class Controller:
     An agent in the units of its task
     """
     fields: typing.ClassVar[tuple] = (('warm_up_steps', 'int', 1000, 'Random steps before learning, where ranges are not known.', 2.0, 10000000.0, False))
-    def __init__(self, *, approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig, learning: QLearningConfig | FuzzyQLearningConfig | SarsaConfig, seed: typing.SupportsInt | typing.SupportsIndex, observation: ObservationConfig, action: ActionConfig, warm_up_steps: typing.SupportsInt | typing.SupportsIndex = 1000, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = [], state: dict | None = None) -> None:
+    def __init__(self, *, approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig, learning: QLearningConfig | FuzzyQLearningConfig | QLambdaConfig, seed: typing.SupportsInt | typing.SupportsIndex, observation: ObservationConfig, action: ActionConfig, warm_up_steps: typing.SupportsInt | typing.SupportsIndex = 1000, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = [], state: dict | None = None) -> None:
         """
         New, or as it was when `state` was taken
         """
@@ -2385,14 +2385,14 @@ class RBFAcrobotTrial:
         ...
 class LinearAcrobotTrial:
     """
-    Sarsa with a linear readout of the SDNN code learns the acrobot swing-up
+    Q(lambda) with a linear readout of the SDNN code learns the acrobot swing-up
     """
     @staticmethod
     def advance_together(trials: tuple[LinearAcrobotTrial, ...], n_decisions: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         Lets each of several trials make n more decisions, or come to its end
         """
-    def __init__(self, *, approximator: LinearSDNNConfig, learning: SarsaConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, approximator: LinearSDNNConfig, learning: QLambdaConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
@@ -2403,7 +2403,7 @@ class LinearAcrobotTrial:
         Columns of the test episodes so far
         """
     @property
-    def agent(self) -> Sarsa:
+    def agent(self) -> QLambda:
         """
         The agent at work: asking for values changes nothing that follows
         """
@@ -2520,10 +2520,6 @@ def libsdnn_weights(n_units: typing.SupportsInt | typing.SupportsIndex, n_column
     """
     LIBSDNN's first (weights, thresholds)
     """
-def linear_presets() -> dict[str, tuple[str, LinearSDNNConfig, SarsaConfig]]:
-    """
-    The same of Sarsa with a linear readout
-    """
 def log(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
 def n_units_for(scheme: str, n_classes: typing.SupportsInt | typing.SupportsIndex) -> int:
@@ -2535,6 +2531,10 @@ def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) 
 def presets() -> dict[str, tuple[str, SDNNCConfig, QLearningConfig]]:
     """
     Named settings of Q-learning with SDNN-C: titles, settings of approximator and learning
+    """
+def q_lambda_presets() -> dict[str, tuple[str, LinearSDNNConfig, QLambdaConfig]]:
+    """
+    The presets of Q(lambda), by name
     """
 def random_inverse_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_bins: typing.SupportsInt | typing.SupportsIndex, n_flipped: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
     ...
@@ -2568,7 +2568,7 @@ def time_agent_steps(agent: RBFQLearning, n_repetitions: typing.SupportsInt | ty
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """
 @typing.overload
-def time_agent_steps(agent: Sarsa, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+def time_agent_steps(agent: QLambda, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """

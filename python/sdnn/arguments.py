@@ -244,7 +244,7 @@ def has_methods(name: str, value: Any, what: str, *methods: str) -> None:
 _NO_BATCHES = "each transition or sample is learned by itself: omit it"
 _NO_GRADIENT = "there is no gradient descent: omit it"
 _NO_POLICY = "there is no policy network: approximator and learning hold the settings"
-_FIRST = "the environment comes first: SDNNSarsa(env), train(env, steps=...), evaluate(agent, env)"
+_FIRST = "the environment is first: SDNNQLambda(env), train(env, steps=...), evaluate(agent, env)"
 
 _MEANINGS: Mapping[tuple[str, ...], tuple[str, ...]] = {
     ("gamma", "discount_factor", "discount_rate"): ("discount",),

@@ -15,9 +15,9 @@ from sdnn._core import (
     GoalScheduleConfig as GoalScheduleConfig,
     LinearSDNNConfig as LinearSDNNConfig,
     ProtocolConfig as ProtocolConfig,
+    QLambdaConfig as QLambdaConfig,
     QLearningConfig as QLearningConfig,
     RBFNetworkConfig as RBFNetworkConfig,
-    SarsaConfig as SarsaConfig,
     SDNNCConfig as SDNNCConfig,
     SensorConfig as SensorConfig,
 )

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from sdnn.agents import PRESETS
+from sdnn.agents import SDNNQLearning
 from sdnn.cli import main
 
 FOLDER = Path(__file__).parents[2] / "docs" / "how-to"
@@ -23,7 +23,7 @@ def test_the_table_of_presets_is_right():
     assert len(rows) == 13
     for section, name, *cells in rows:
         for preset, cell in zip(("general", "robust", "paper"), cells, strict=True):
-            chosen = PRESETS[preset]
+            chosen = SDNNQLearning.presets[preset]
             value = getattr(getattr(chosen, section), name)
             final = getattr(getattr(chosen, section), f"final_{name}", None)
             if name == "q_low":

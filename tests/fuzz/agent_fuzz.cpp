@@ -7,8 +7,8 @@
 
 #include "input.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/q_lambda.hpp"
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/agents/sarsa.hpp"
 #include "sdnn/approximators/linear_sdnn.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
@@ -120,11 +120,11 @@ void linear(FuzzedDataProvider& input) {
                                          .averaging_interval = 2};
   fuzz::change(config, input);
   config.max_table_bytes = kMostBytes;
-  agents::SarsaConfig learning;
+  agents::QLambdaConfig learning;
   fuzz::change(learning, input);
   std::vector<std::size_t> n_actions(input.ConsumeIntegralInRange<std::size_t>(1, 2));
   for (auto& n : n_actions) n = input.ConsumeIntegralInRange<std::size_t>(1, 9);
-  agents::Sarsa agent(approximators::LinearSDNN(config, n_actions, 1), learning, 1);
+  agents::QLambda agent(approximators::LinearSDNN(config, n_actions, 1), learning, 1);
   use(agent, input);
   auto workspace = agent.workspace();
   const std::vector<double> state(agent.n_inputs(), 0.5);

@@ -26,7 +26,14 @@ from agent_files import SMALL
 from checksums import BEFORE, with_checksum
 from made_records import make_record
 from mutated_files import Reader, with_other_bytes, with_other_contents, written
-from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, SDNNSarsa, Training, load_agent
+from sdnn.agents import (
+    FuzzyQLearning,
+    RBFQLearning,
+    SDNNQLambda,
+    SDNNQLearning,
+    Training,
+    load_agent,
+)
 from sdnn.agents.adapters import read_statistics
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig
 from sdnn.runs import ResultStore, StoreError, TrialRows
@@ -64,7 +71,7 @@ def made_agents():
         SDNNQLearning(BOX, BOX, approximator=SMALL),
         RBFQLearning(BOX, GEAR, approximator=bases),
         FuzzyQLearning(BOX, BOX, approximator=rules),
-        SDNNSarsa(BOX, GEAR, approximator=linear),
+        SDNNQLambda(BOX, GEAR, approximator=linear),
     )
 
 

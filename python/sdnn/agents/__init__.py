@@ -18,15 +18,13 @@ from sdnn.agents.episode import Transition, UnrepeatedEpisodeError
 from sdnn.agents.evaluation import Evaluation, evaluate
 from sdnn.agents.fixed_rate import FixedRate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
-from sdnn.agents.q_learning import PRESETS, Preset, RBFQLearning, SDNNQLearning
-from sdnn.agents.sarsa import LINEAR_PRESETS, SDNNSarsa
+from sdnn.agents.q_lambda import SDNNQLambda
+from sdnn.agents.q_learning import Preset, RBFQLearning, SDNNQLearning
 from sdnn.agents.scaling import Scaling
 from sdnn.agents.training import Training, TrainingResult
-from sdnn.config import FuzzyQLearningConfig, QLearningConfig, SarsaConfig
+from sdnn.config import FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
 
 __all__ = [
-    "LINEAR_PRESETS",
-    "PRESETS",
     "Agent",
     "Callback",
     "CheckpointCallback",
@@ -36,11 +34,11 @@ __all__ = [
     "FuzzyQLearningConfig",
     "JSONLines",
     "Preset",
+    "QLambdaConfig",
     "QLearningConfig",
     "RBFQLearning",
+    "SDNNQLambda",
     "SDNNQLearning",
-    "SDNNSarsa",
-    "SarsaConfig",
     "SaveBestAgent",
     "Scaling",
     "Schedule",

@@ -34,7 +34,7 @@ class Agent(BaseAgent[Approximator, Learning]):
     ----------
     observation_space : gymnasium.Space
         Any that Gymnasium flattens to a vector: Box, Dict, Tuple, Discrete, ... Or the environment,
-        whose two spaces are taken: `SDNNSarsa(env)`.
+        whose two spaces are taken: `SDNNQLambda(env)`.
     action_space : gymnasium.Space, optional
         Box with finite bounds, Discrete, MultiDiscrete or MultiBinary.
     approximator, learning : optional
@@ -43,7 +43,7 @@ class Agent(BaseAgent[Approximator, Learning]):
         The root of every random stream of the agent. None: drawn, and kept as ``agent.seed``.
     observation_range : (low, high) or "adaptive", optional
         Two numbers, or two for each observed variable; values outside are clipped. By default the
-        bounds of the space, and what the warm-up sees where these are infinite or, in `SDNNSarsa`
+        bounds of the space, and what the warm-up sees where these are infinite or, in `SDNNQLambda`
         with at most four inputs, more than twice as wide. ``"adaptive"``: what the warm-up sees of
         all variables but angles, without a twentieth at each end.
     angles : sequence of int

@@ -38,8 +38,8 @@ def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> 
     Parameters
     ----------
     agent : Agent
-        Any but `FuzzyQLearning`, which can learn its own actions only. `SDNNSarsa` with
-        ``SarsaConfig(bootstrap="sarsa")`` learns the values of the policy that acted.
+        Any but `FuzzyQLearning`, which can learn its own actions only. `SDNNQLambda` with
+        ``QLambdaConfig(bootstrap="sarsa")`` learns the values of the policy that acted.
     dataset : path, mapping, table, MinariDataset or iterable
         A file ``.csv`` with a line of names, or of JSON lines, each a transition; both are read
         line by line. Arrays of n rows, or columns of a table of pandas, by their names:
@@ -70,8 +70,8 @@ def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> 
     Examples
     --------
     >>> import gymnasium as gym
-    >>> from sdnn.agents import SDNNSarsa, Transition, learn_from
-    >>> agent = SDNNSarsa(gym.spaces.Box(0, 1, (1,)), gym.spaces.Discrete(2))
+    >>> from sdnn.agents import SDNNQLambda, Transition, learn_from
+    >>> agent = SDNNQLambda(gym.spaces.Box(0, 1, (1,)), gym.spaces.Discrete(2))
     >>> learn_from(agent, [Transition([0.2], 1, 1.0, [0.3], True)], epochs=3)
     3
     """

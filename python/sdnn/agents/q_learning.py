@@ -39,10 +39,6 @@ def presets_of(listed: Mapping[str, Any], **more: Mapping[str, Any]) -> Mapping[
     )
 
 
-PRESETS = presets_of(_core.presets())
-"""Settings by name: ``"paper"``, ``"general"``, ``"robust"`` and ``"small"``."""
-
-
 class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, Learning]):
     """An agent that learns the values of actions, with any approximator."""
 
@@ -228,7 +224,7 @@ warm_up_steps, missing
         have several dimensions.
     preset : {"general", "small", "robust", "paper"}
         Settings where none are given: for any task, the same with a network for small processors,
-        those that stay steady in the paper's task, or the paper's; see `sdnn.agents.PRESETS`.
+        those that stay steady in the paper's task, or the paper's; see `presets`.
 
     Examples
     --------
@@ -250,7 +246,8 @@ warm_up_steps, missing
     kind = "sdnn-c"
     approximator_type = SDNNCConfig
     learning_type = QLearningConfig
-    presets = PRESETS
+    presets = presets_of(_core.presets())
+    """Settings by name: ``"paper"``, ``"general"``, ``"robust"`` and ``"small"``."""
 
     def learning_report(self) -> dict[str, Any]:
         """Return statistics of learning so far, to find settings that cannot work.

@@ -16,12 +16,12 @@ from typing import Any
 from sdnn import _core
 from sdnn.agents.episode import Learner
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
-from sdnn.agents.q_learning import PRESETS, Preset, RBFQLearning, SDNNQLearning
-from sdnn.agents.sarsa import LINEAR_PRESETS, SDNNSarsa
+from sdnn.agents.q_lambda import SDNNQLambda
+from sdnn.agents.q_learning import Preset, RBFQLearning, SDNNQLearning
 from sdnn.agents.training import Training
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.arguments import argument_error, shown
-from sdnn.config import FuzzyQLearningConfig, QLearningConfig, SarsaConfig
+from sdnn.config import FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,8 +112,8 @@ def labels() -> tuple[str, ...]:
 
 
 def default_agent(*, on_acrobot: bool) -> str:
-    """Return who learns where no agent is named: the paper's in its task, else the linear one."""
-    return "sdnn-c" if on_acrobot else "sdnn-linear"
+    """Return who learns where no agent is named: the paper's in its task, else Q(lambda)."""
+    return "sdnn-c" if on_acrobot else "q-lambda"
 
 
 def split_label(label: str) -> tuple[str, str | None]:
@@ -167,7 +167,7 @@ for _entry in (
         agent=SDNNQLearning,
         core_trial=_core.AcrobotTrial,
         table_bytes=lambda net: net.n_pattern_units * net.n_pairs * net.n_hidden_units,
-        presets=PRESETS,
+        presets=SDNNQLearning.presets,
     ),
     AgentEntry(
         id="fuzzy",
@@ -190,13 +190,13 @@ for _entry in (
         table_bytes=lambda network: 8 * network.n_bases ** (network.n_inputs + 1),
     ),
     AgentEntry(
-        id="sdnn-linear",
-        title="SDNN, linear",
+        id="q-lambda",
+        title="SDNNQLambda",
         approximator=LinearSDNNConfig,
-        learning=SarsaConfig,
-        agent=SDNNSarsa,
+        learning=QLambdaConfig,
+        agent=SDNNQLambda,
         core_trial=_core.LinearAcrobotTrial,
-        presets=LINEAR_PRESETS,
+        presets=SDNNQLambda.presets,
     ),
 ):
     register(_entry)

@@ -48,7 +48,7 @@ _LARGEST = 2**31  # of readings
 @click.option(
     "--learning",
     is_flag=True,
-    help="The header has the agent itself, which continues to learn. For the agents sdnn-linear,"
+    help="The header has the agent itself, which continues to learn. For the agents q-lambda,"
     " and sdnn-c with approximator.averaging_interval=0 and approximator.weight_limit=127.",
 )
 @click.option(
@@ -74,8 +74,8 @@ _LARGEST = 2**31  # of readings
 @click.option(
     "--agent",
     "kind",
-    type=click.Choice(["sdnn-linear", "sdnn-c"]),
-    help="With --new: which agent.  [default: sdnn-linear]",
+    type=click.Choice(["q-lambda", "sdnn-c"]),
+    help="With --new: which agent.  [default: q-lambda]",
 )
 @click.option(
     "--ram",
@@ -232,7 +232,7 @@ def _new_agent(
                 " learning.discount"
             )
         tables[table][key] = value_of(text)
-    kind = kind or "sdnn-linear"
+    kind = kind or "q-lambda"
     parts = {name: changed(new_settings(kind)[name], tables[name], name) for name in tables}
     low, high = np.array(ends).T
     try:

@@ -28,9 +28,9 @@ class ActionMasks(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorAr
     Examples
     --------
     >>> import gymnasium as gym
-    >>> from sdnn.agents import SDNNSarsa
+    >>> from sdnn.agents import SDNNQLambda
     >>> env = ActionMasks(gym.make("Taxi-v4"))
-    >>> agent = SDNNSarsa(env.observation_space, env.action_space, seed=1)
+    >>> agent = SDNNQLambda(env.observation_space, env.action_space, seed=1)
     >>> agent.train(env, steps=300).n_steps
     300
     """

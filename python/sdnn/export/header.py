@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from sdnn.agents import Agent, SDNNQLearning, SDNNSarsa
+from sdnn.agents import Agent, SDNNQLambda, SDNNQLearning
 from sdnn.arguments import argument_error, flag, path_of, require, shown
 from sdnn.export.linear import LearnerWriter, LinearWriter
 from sdnn.export.sdnn_c import SDNNCWriter
@@ -59,7 +59,7 @@ def c_header(
 
     Parameters
     ----------
-    agent : SDNNQLearning or SDNNSarsa
+    agent : SDNNQLearning or SDNNQLambda
         With known ranges of its observations.
     name : str
         Prefix of all names in the header.
@@ -115,6 +115,6 @@ def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool)
     require(getattr(agent, "missing", "error") == "error", "agent", expected, agent)
     if isinstance(agent, SDNNQLearning):
         return (SDNNCLearner if learns else SDNNCWriter)(agent, name, fraction_bits)
-    if isinstance(agent, SDNNSarsa):
+    if isinstance(agent, SDNNQLambda):
         return (LearnerWriter if learns else LinearWriter)(agent, name, fraction_bits)
-    raise TypeError(f"agent must be an SDNNQLearning or SDNNSarsa, got {shown(agent)}")
+    raise TypeError(f"agent must be an SDNNQLearning or SDNNQLambda, got {shown(agent)}")

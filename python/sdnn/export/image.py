@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import zlib
 
-from sdnn.agents import SDNNQLearning, SDNNSarsa
+from sdnn.agents import SDNNQLambda, SDNNQLearning
 from sdnn.arguments import require
 from sdnn.export.header import writer_of
 
 
-def save_image(agent: SDNNQLearning | SDNNSarsa) -> bytes:
+def save_image(agent: SDNNQLearning | SDNNQLambda) -> bytes:
     """Return what an agent has learned, as ``NAME_load`` of its header with ``learning`` reads it.
 
     The present episode is not part of it: its last transition may still have to be learned.
@@ -18,7 +18,7 @@ def save_image(agent: SDNNQLearning | SDNNSarsa) -> bytes:
     return image
 
 
-def load_image(agent: SDNNQLearning | SDNNSarsa, image: bytes) -> None:
+def load_image(agent: SDNNQLearning | SDNNQLambda, image: bytes) -> None:
     """Give an agent the state that ``NAME_save`` of its header wrote; an episode begins.
 
     Raises

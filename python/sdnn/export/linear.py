@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents import SDNNSarsa
+from sdnn.agents import SDNNQLambda
 from sdnn.export.code import Code
 from sdnn.export.tables import Tables
 from sdnn.export.writer import NONE, SCALE_FIELDS, CHeader, Learner, Writer, require_few_weights
@@ -20,9 +20,9 @@ _MOST_TOLERANCE = 2**62  # in units: above any difference of values
 
 
 class LinearWriter(Writer):
-    """Makes the header of an `SDNNSarsa` agent's greedy policy."""
+    """Makes the header of an `SDNNQLambda` agent's greedy policy."""
 
-    agent: SDNNSarsa
+    agent: SDNNQLambda
 
     def network(self) -> Any:
         """Return the readout."""
@@ -102,7 +102,7 @@ class LinearWriter(Writer):
 
 
 class LearnerWriter(Learner, LinearWriter):
-    """Makes the header of an `SDNNSarsa` agent that learns."""
+    """Makes the header of an `SDNNQLambda` agent that learns."""
 
     magic = 0x4C4E4453  # "SDNL"
     streams = ("policy.exploration", "policy.ties", "policy.evaluation_ties", "repetitions")

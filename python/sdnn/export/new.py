@@ -9,29 +9,29 @@ from typing import Any
 
 import gymnasium as gym
 
-from sdnn.agents import LINEAR_PRESETS, PRESETS, SDNNQLearning, SDNNSarsa
+from sdnn.agents import SDNNQLambda, SDNNQLearning
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.arguments import argument_error, choice, shown, whole
 from sdnn.export.header import c_header
 from sdnn.export.sdnn_c_learning import MOST_WEIGHT
 
 NewConfig = LinearSDNNConfig | SDNNCConfig
-_KINDS: dict[str, type[SDNNSarsa] | type[SDNNQLearning]] = {
-    "sdnn-linear": SDNNSarsa,
+_KINDS: dict[str, type[SDNNQLambda] | type[SDNNQLearning]] = {
+    "q-lambda": SDNNQLambda,
     "sdnn-c": SDNNQLearning,
 }
-_RAM_BYTES = {"sdnn-linear": 20_000, "sdnn-c": 60_000}
+_RAM_BYTES = {"q-lambda": 20_000, "sdnn-c": 60_000}
 
 
 def new_agent(
     observation_space: gym.Space[Any],
     action_space: gym.Space[Any],
     *,
-    kind: str = "sdnn-linear",
+    kind: str = "q-lambda",
     ram_bytes: int | None = None,
     approximator: NewConfig | None = None,
     **options: Any,
-) -> SDNNSarsa | SDNNQLearning:
+) -> SDNNQLambda | SDNNQLearning:
     """Return an agent that has learned nothing, as large as the memory of a processor allows.
 
     All of its sensors are inputs from the beginning, so it needs no warm-up; `c_header` with
@@ -41,21 +41,21 @@ def new_agent(
     ----------
     observation_space, action_space
         See `Agent`. Every range must be finite, or given as ``observation_range``.
-    kind : {"sdnn-linear", "sdnn-c"}
+    kind : {"q-lambda", "sdnn-c"}
     ram_bytes : int, optional
         Most bytes that the agent may take in C; by default 20,000, or 60,000 for ``"sdnn-c"``, and
-        whatever it takes for a given number of ``n_pattern_units`` of the linear agent.
+        whatever it takes for a given number of ``n_pattern_units`` of Q(lambda).
     approximator : LinearSDNNConfig or SDNNCConfig, optional
-        The linear agent gets as many ``n_pattern_units`` as fit, 32 to 768, unless there is a
+        Q(lambda) gets as many ``n_pattern_units`` as fit, 32 to 768, unless there is a
         number of them. SDNN-C gets the units given, by default those of its preset ``small``, or
         fewer if they do not fit.
     **options
-        Other arguments of `SDNNSarsa` or `SDNNQLearning`: ``seed``, ``learning``, ``angles``, ...
+        Other arguments of `SDNNQLambda` or `SDNNQLearning`: ``seed``, ``learning``, ``angles``, ...
 
     Raises
     ------
     ValueError
-        If no agent for these spaces is so small; from `SDNNSarsa` or `SDNNQLearning`.
+        If no agent for these spaces is so small; from `SDNNQLambda` or `SDNNQLearning`.
     RuntimeError
         If a range is not known.
 
@@ -77,7 +77,7 @@ def new_agent(
             f"approximator must have the type {expected} for {kind}, got {shown(config)}"
         )
 
-    def made(size: Any) -> SDNNSarsa | SDNNQLearning:
+    def made(size: Any) -> SDNNQLambda | SDNNQLearning:
         return agent_type(observation_space, action_space, **{**given, "approximator": size})
 
     def needed(size: Any) -> int:
@@ -98,7 +98,8 @@ def new_agent(
 
 def new_settings(kind: str) -> dict[str, Any]:
     """Return the settings that a new agent begins with, ``approximator`` and ``learning``."""
-    preset = LINEAR_PRESETS["general"] if kind == "sdnn-linear" else PRESETS["small"]
+    agent_class, name = _KINDS[kind], "general" if kind == "q-lambda" else "small"
+    preset = agent_class.presets[name]
     config = preset.approximator
     if isinstance(config, SDNNCConfig):
         config = replace(config, averaging_interval=0, weight_limit=MOST_WEIGHT)

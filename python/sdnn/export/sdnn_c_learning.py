@@ -37,7 +37,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
             raise argument_error(
                 "action_space",
                 "must have one dimension for an SDNNQLearning that learns in C, got"
-                f" {agent.n_dimensions}: SDNNSarsa (sdnn-linear) learns with more",
+                f" {agent.n_dimensions}: SDNNQLambda (q-lambda) learns with more",
             )
         super().__init__(agent, name, fraction_bits)
         self._check_settings()

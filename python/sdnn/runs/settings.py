@@ -214,8 +214,8 @@ class AgentSpec(Settings, frozen=True):
     name: Annotated[
         str | None,
         doc(
-            "The agent: `sdnn-linear`, `sdnn-c`, `rbf`, `fuzzy`, or one that was registered. "
-            "By default `sdnn-linear`."
+            "The agent: `q-lambda`, `sdnn-c`, `rbf`, `fuzzy`, or one that was registered. "
+            "By default `q-lambda`."
         ),
     ] = None
     preset: Annotated[
@@ -246,7 +246,7 @@ class AgentSpec(Settings, frozen=True):
         doc(
             "Which observed variables are inputs: `all`; those that the warm-up finds "
             "`relevant`; or a list, from 0, of some that are inputs in any case, beside the "
-            "relevant ones. By default `all`; of `sdnn-linear`, `relevant`."
+            "relevant ones. By default `all`; of `q-lambda`, `relevant`."
         ),
     ] = None
     warm_up_steps: Annotated[
@@ -257,7 +257,7 @@ class AgentSpec(Settings, frozen=True):
         Literal["error", "hold", "code"],
         doc(
             "Readings that are NaN, infinite or masked: `error` refuses them, `hold` uses the "
-            "variable's last reading, `code` has a pattern for them in each input (`sdnn-linear` "
+            "variable's last reading, `code` has a pattern for them in each input (`q-lambda` "
             "and `sdnn-c`)."
         ),
     ] = "error"

@@ -84,7 +84,7 @@ class RunSpec(Settings, frozen=True):
     --------
     >>> spec = RunSpec(environment=EnvironmentSpec(id="CartPole-v1"), seed=3)
     >>> spec.budget.steps, spec.agent.name, spec.agent.preset
-    (200000, 'sdnn-linear', 'general')
+    (200000, 'q-lambda', 'general')
     >>> RunSpec(learning={"epsilon": 0.2}).learning.epsilon
     0.2
     """

@@ -156,8 +156,7 @@ TEST(AgentFile, SaysWhatDoesNotFit) {
     content.description[json::json_pointer(pointer)] = value;
     return error_of(content);
   };
-  EXPECT_EQ(with("/kind", "sarsa"),
-            "kind must be sdnn-c, rbf, fuzzy or sdnn-linear, got \"sarsa\"");
+  EXPECT_EQ(with("/kind", "sarsa"), "kind must be sdnn-c, rbf, fuzzy or q-lambda, got \"sarsa\"");
   EXPECT_EQ(with("/seed", -1), "seed must be a whole number of 0 or more, got -1");
   EXPECT_EQ(with("/approximator", 3), "approximator must be an object, got 3");
   EXPECT_EQ(with("/approximator/n_scales", 3), "approximator.n_scales is not known");
@@ -194,7 +193,7 @@ TEST(AgentFile, LivesAsInPython) {
   const testing::Folder folder;
   for (const std::string name :
        {"sdnn", "sdnn-vector", "sdnn-discrete", "sdnn-symbols", "sdnn-pairs", "sdnn-warm-up",
-        "linear", "linear-vector", "rbf", "fuzzy", "fuzzy-vector"}) {
+        "q-lambda", "q-lambda-vector", "rbf", "fuzzy", "fuzzy-vector"}) {
     SCOPED_TRACE(name);
     const std::filesystem::path data(SDNN_TEST_DATA "/agents");
     std::ifstream lives(data / (name + ".json"));

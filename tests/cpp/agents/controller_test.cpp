@@ -279,7 +279,7 @@ TEST(Controller, AFuzzyOneLearnsItsLastActionOnly) {
 }
 
 TEST(Controller, TakesAllowedActionsOnly) {
-  ControllerConfig config = with(LinearSDNNConfig{}, SarsaConfig{});
+  ControllerConfig config = with(LinearSDNNConfig{}, QLambdaConfig{});
   config.action = {.low = {-1.0, 0.0}, .high = {1.0, 3.0}, .discrete = true};
   for (const auto& made : {config, with_warm_up(config)}) {
     Controller controller(made);
@@ -413,7 +413,7 @@ class LateTask {
  public:
   static ControllerConfig config() {
     return {.approximator = LinearSDNNConfig{.n_anchor_patterns = 4, .n_interpolated = 6},
-            .learning = SarsaConfig{.policy = {.epsilon = 0.3}},
+            .learning = QLambdaConfig{.policy = {.epsilon = 0.3}},
             .seed = 3,
             .observation = {.low = std::vector<std::optional<double>>(5, 0.0),
                             .high = std::vector<std::optional<double>>(5, 1.0),

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "sdnn/agents/sarsa.hpp"
+#include "sdnn/agents/q_lambda.hpp"
 #include "sdnn/approximators/linear_sdnn.hpp"
 
 namespace sdnn::agents {
@@ -51,8 +51,8 @@ TEST(RewardScale, ForgetsASizeThatNoRewardReaches) {
 }
 
 // The first reward of 2^60 has 31 bits, so that 1 is none; the smaller unit clips its value.
-TEST(Sarsa, RefinesItsUnitForSmallerRewards) {
-  Sarsa agent({{.n_inputs = 2, .n_pattern_units = 40}, std::vector<std::size_t>{3}, 1}, {}, 1);
+TEST(QLambda, RefinesItsUnitForSmallerRewards) {
+  QLambda agent({{.n_inputs = 2, .n_pattern_units = 40}, std::vector<std::size_t>{3}, 1}, {}, 1);
   const std::vector<double> state{0.3, 0.6};
   const auto value = [&](std::size_t action) {
     auto workspace = agent.workspace();

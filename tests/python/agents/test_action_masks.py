@@ -9,10 +9,10 @@ import pytest
 from sdnn.agents import (
     Callback,
     FuzzyQLearning,
+    QLambdaConfig,
     QLearningConfig,
-    SarsaConfig,
+    SDNNQLambda,
     SDNNQLearning,
-    SDNNSarsa,
     Training,
     Transition,
     UnusableStepError,
@@ -23,7 +23,7 @@ from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.environments import ActionMasks
 
 SMALL = SDNNCConfig(n_hidden_units=60, n_active_units=20, n_pattern_units=20)
-AGENTS = [SDNNSarsa, SDNNQLearning]
+AGENTS = [SDNNQLambda, SDNNQLearning]
 SPACES = {
     "discrete": gym.spaces.Discrete(5, start=-1),
     "several": gym.spaces.MultiDiscrete([3, 4]),
@@ -105,12 +105,12 @@ def test_vectors_of_every_mode_learn_the_same(actions, mode):
         own = gym.vector.SyncVectorEnv(
             [lambda: new_env(actions)] * n, autoreset_mode=gym.vector.AutoresetMode[mode]
         )
-        agent = new_agent(SDNNSarsa, own)
+        agent = new_agent(SDNNQLambda, own)
         agent.train(own, steps=200)
         return agent
 
     same_state(trained(3, mode), trained(3, "NEXT_STEP"))
-    single = new_agent(SDNNSarsa, new_env(actions))
+    single = new_agent(SDNNQLambda, new_env(actions))
     single.train(new_env(actions), steps=200)
     same_state(trained(1, mode), single)
 
@@ -125,7 +125,7 @@ def test_vectors_that_reset_themselves_take_allowed_actions(monkeypatch):
 
     for mode in ("NEXT_STEP", "SAME_STEP"):
         env = own(mode)
-        agent = new_agent(SDNNSarsa, env)
+        agent = new_agent(SDNNQLambda, env)
         assert agent.train(env, steps=200).n_steps == 200
 
 
@@ -148,7 +148,7 @@ def test_a_mask_that_allows_all_changes_nothing(kind):
 @pytest.mark.parametrize("kind", AGENTS)
 def test_targets_bootstrap_from_allowed_actions_only(kind):
     here, after = np.array([-0.9, -0.9]), np.array([0.9, 0.9])
-    own = {SDNNSarsa: SarsaConfig, SDNNQLearning: QLearningConfig}[kind]
+    own = {SDNNQLambda: QLambdaConfig, SDNNQLearning: QLearningConfig}[kind]
     settings = {"value_range": "fixed"} if kind is SDNNQLearning else {"schedule_steps": 0}
     learning = own(discount=0.5, learning_rate=1.0, final_learning_rate=None, **settings)
     agent = new_agent(kind, Masked(), learning=learning)
@@ -179,7 +179,7 @@ def test_targets_bootstrap_from_allowed_actions_only(kind):
 @pytest.mark.parametrize(("at", "n"), [(33, None), (100, None), (20, 3)])
 def test_a_training_is_resumed_exactly(kind, actions, unbounded, at, n, tmp_path):
     more = {"n_steps": 3} if kind is SDNNQLearning else {"bootstrap": "sarsa"}
-    learning = {SDNNSarsa: SarsaConfig, SDNNQLearning: QLearningConfig}[kind](**more)
+    learning = {SDNNQLambda: QLambdaConfig, SDNNQLearning: QLearningConfig}[kind](**more)
 
     def own_env():
         if n is None:
@@ -212,7 +212,7 @@ class StopAt(Callback):
 
 
 def test_logged_masks_are_learned(tmp_path):
-    agents = [new_agent(SDNNSarsa, Masked()) for _ in range(2)]
+    agents = [new_agent(SDNNQLambda, Masked()) for _ in range(2)]
     steps = [Transition([0.1, 0.2], 1, 1.0, [0.3, 0.4], False, [1, 0, 0, 1, 0])] * 3
     learn_from(agents[0], steps)
     with (tmp_path / "log.jsonl").open("w") as file:
@@ -228,7 +228,7 @@ def test_logged_masks_are_learned(tmp_path):
     ids=str,
 )
 def test_masks_that_do_not_fit_are_refused(mask):
-    agent = new_agent(SDNNSarsa, Masked())
+    agent = new_agent(SDNNQLambda, Masked())
     before = agent.state()
     with pytest.raises(ValueError, match=r"^mask "):
         agent.act([0.0, 0.0], mask=mask)
@@ -240,13 +240,13 @@ def test_masks_that_do_not_fit_are_refused(mask):
 
 @pytest.mark.parametrize("mask", [([1, 0, 0, 0], [0, 0, 1]), [[1, 0, 0]], ([1, 0, 0], 1), [1] * 6])
 def test_masks_of_several_dimensions_that_do_not_fit_are_refused(mask):
-    agent = new_agent(SDNNSarsa, Masked("several"))
+    agent = new_agent(SDNNQLambda, Masked("several"))
     with pytest.raises(ValueError, match=r"^mask "):
         agent.act([0.0, 0.0], mask=mask)
 
 
 def test_forms_of_a_mask():
-    agent = new_agent(SDNNSarsa, Masked("several"))
+    agent = new_agent(SDNNQLambda, Masked("several"))
     parts = [0, 1, 0], [0, 0, 0, 1]
     for mask in (
         parts,
@@ -264,7 +264,7 @@ def test_forms_of_a_mask():
 
 def test_boxes_have_no_masks():
     spaces = gym.spaces.Box(-1, 1, (2,)), gym.spaces.Box(-1, 1, (1,))
-    for kind in (SDNNSarsa, FuzzyQLearning):
+    for kind in (SDNNQLambda, FuzzyQLearning):
         agent = kind(*spaces)
         with pytest.raises(ValueError, match=r"^mask must be None"):
             agent.act(np.zeros(2), mask=[1, 0, 1])
@@ -293,7 +293,7 @@ def forgetful():
 
 def test_masks_of_environments_that_do_not_fit_are_named():
     env = ActionMasks(gym.make("CartPole-v1"))  # has none
-    agent = SDNNSarsa(env.observation_space, env.action_space)
+    agent = SDNNQLambda(env.observation_space, env.action_space)
     with pytest.raises(UnusableStepError, match="action_mask"):
         agent.train(env, steps=3)
     with pytest.raises(UnusableStepError, match="action_mask"):
@@ -301,8 +301,8 @@ def test_masks_of_environments_that_do_not_fit_are_named():
     for masked in (forgetful, gym.vector.SyncVectorEnv([forgetful, forgetful])):
         env = masked if masked is not forgetful else forgetful()
         with pytest.raises(UnusableStepError, match="action_mask"):
-            new_agent(SDNNSarsa, env).train(env, steps=40)
+            new_agent(SDNNQLambda, env).train(env, steps=40)
     long = ActionMasks(Masked(), lambda env: [1] * 6)
     for masked in (long, gym.vector.SyncVectorEnv([lambda: long])):
         with pytest.raises(UnusableStepError, match="action_mask"):
-            new_agent(SDNNSarsa, masked).train(masked, steps=3)
+            new_agent(SDNNQLambda, masked).train(masked, steps=3)

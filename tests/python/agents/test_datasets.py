@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from refusals import refuses
-from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNSarsa, Transition, learn_from
+from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLambda, Transition, learn_from
 from sdnn.approximators import LinearSDNNConfig
 
 PLACE = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
@@ -20,7 +20,7 @@ SMALL = LinearSDNNConfig(n_pattern_units=20, n_anchor_patterns=4, n_interpolated
 
 def new_agent(space=PLACE, **options):
     given = {"inputs": "all", "angle_pairs": "none"} | options
-    return SDNNSarsa(space, BUTTONS, approximator=SMALL, seed=1, **given)
+    return SDNNQLambda(space, BUTTONS, approximator=SMALL, seed=1, **given)
 
 
 def logged(seed=1, n_episodes=4, length=10):
@@ -147,7 +147,7 @@ def test_a_long_line_is_not_read_whole(tmp_path):
 
 
 def test_a_dataset_without_transitions_ends_at_once():
-    agent = SDNNSarsa(gym.spaces.Box(0.0, 1.0, (2,)), gym.spaces.Discrete(2))
+    agent = SDNNQLambda(gym.spaces.Box(0.0, 1.0, (2,)), gym.spaces.Discrete(2))
     assert learn_from(agent, (), epochs=2**31) == 0
 
 

@@ -11,9 +11,9 @@ from refusals import refuses
 from sdnn import SDNNRegressor
 from sdnn.agents import (
     Callback,
-    SarsaConfig,
+    QLambdaConfig,
     SaveBestAgent,
-    SDNNSarsa,
+    SDNNQLambda,
     StopTrainingOnNoImprovement,
     Training,
     Transition,
@@ -26,7 +26,7 @@ from sdnn.agents import (
 @pytest.fixture(scope="module")
 def trained():
     env = gym.make("CartPole-v1")
-    agent = SDNNSarsa(env.observation_space, env.action_space, seed=1)
+    agent = SDNNQLambda(env.observation_space, env.action_space, seed=1)
     return agent, env, agent.train(env, steps=1.5e3)
 
 
@@ -44,11 +44,11 @@ def test_predict_takes_one_observation_or_several(trained):
 
 def test_predict_of_listed_states_and_of_boxes():
     lake = gym.make("FrozenLake-v1")
-    agent = SDNNSarsa(lake.observation_space, lake.action_space)
+    agent = SDNNQLambda(lake.observation_space, lake.action_space)
     assert agent.predict(np.array([0, 3, 5]))[0].shape == (3,)
     assert agent.predict(3)[0] in lake.action_space
     swing = gym.make("Pendulum-v1")
-    agent = SDNNSarsa(swing.observation_space, swing.action_space)
+    agent = SDNNQLambda(swing.observation_space, swing.action_space)
     assert agent.predict(np.zeros((4, 3), np.float32))[0].shape == (4, 1)
     assert agent.predict(np.zeros(3, np.float32))[0].shape == (1,)
 
@@ -57,7 +57,7 @@ def test_predict_of_listed_states_and_of_boxes():
 def test_predict_takes_batches_of_observations_in_parts(kind):
     parts = gym.spaces.Box(-1, 1, (2,)), gym.spaces.Discrete(3)
     space = kind(dict(zip("ab", parts, strict=True))) if kind is gym.spaces.Dict else kind(parts)
-    agent = SDNNSarsa(space, gym.spaces.Discrete(9), inputs="all", angle_pairs="none")
+    agent = SDNNQLambda(space, gym.spaces.Discrete(9), inputs="all", angle_pairs="none")
     space.seed(1)
     several = [space.sample() for _ in range(4)]
     for one in several:
@@ -71,19 +71,19 @@ def test_predict_takes_batches_of_observations_in_parts(kind):
 
 
 CALLS = {
-    SDNNSarsa: {
-        "policy": "approximator", "gamma": "learning=SarsaConfig(discount=...)", "env": "(env)",
-        "learning_rate": "SarsaConfig(learning_rate=...)", "learning_starts": "mean warm_up_steps",
-        "buffer_size": "omit it", "verbose": "train(env, progress=...)",
+    SDNNQLambda: {
+        "policy": "approximator", "gamma": "learning=QLambdaConfig(discount=...)", "env": "(env)",
+        "learning_rate": "QLambdaConfig(learning_rate=...)", "buffer_size": "omit it",
+        "learning_starts": "mean warm_up_steps", "verbose": "train(env, progress=...)",
     },
-    SDNNSarsa.learn: {"total_timesteps": "train(env, steps=...)"},
-    SDNNSarsa.train: {
+    SDNNQLambda.learn: {"total_timesteps": "train(env, steps=...)"},
+    SDNNQLambda.train: {
         "total_timesteps": "mean steps", "callback": "mean callbacks", "seeed": "mean seed",
         "progress_bar": "mean progress",
     },
     Training: {"eval_env": "mean evaluation_env"}, evaluate: {"n_eval_episodes": "mean episodes"},
-    learn_from: {"n_epochs": "mean epochs"}, load_agent: {"env": "SDNNSarsa(env)"},
-    SarsaConfig: {"gamma": "mean discount"}, SDNNRegressor: {"epochs": "mean max_iter"},
+    learn_from: {"n_epochs": "mean epochs"}, load_agent: {"env": "SDNNQLambda(env)"},
+    QLambdaConfig: {"gamma": "mean discount"}, SDNNRegressor: {"epochs": "mean max_iter"},
 }  # fmt: skip
 """Names that functions do not have, and what the error must have."""
 
@@ -100,20 +100,20 @@ def test_what_is_given_by_position(trained):
     agent, env, _ = trained
     assert agent.train(env, 20).n_steps == 20
     envs = gym.make_vec("CartPole-v1", num_envs=2)
-    expected = SDNNSarsa(env.observation_space, env.action_space).description()
-    assert [SDNNSarsa(given).description() for given in (env, envs)] == [expected] * 2
-    refuses("gymnasium.make", SDNNSarsa, "CartPole-v1", error=TypeError)
-    refuses("SDNNSarsa", SDNNSarsa, error=TypeError)
-    refuses("action_space", SDNNSarsa, env.observation_space, error=TypeError)
+    expected = SDNNQLambda(env.observation_space, env.action_space).description()
+    assert [SDNNQLambda(given).description() for given in (env, envs)] == [expected] * 2
+    refuses("gymnasium.make", SDNNQLambda, "CartPole-v1", error=TypeError)
+    refuses("SDNNQLambda", SDNNQLambda, error=TypeError)
+    refuses("action_space", SDNNQLambda, env.observation_space, error=TypeError)
     refuses("steps", agent.learn, 200, error=TypeError)
     assert trained[2].n_steps == 1500  # of a whole float
     refuses("steps", agent.train, env, steps=1500.5)
-    assert "observation_space" in inspect.signature(SDNNSarsa).parameters
+    assert "observation_space" in inspect.signature(SDNNQLambda).parameters
 
 
 def test_a_seed_that_is_none_is_drawn_and_kept():
     env = gym.make("CartPole-v1")
-    first, second = (SDNNSarsa(env.observation_space, env.action_space, seed=None) for _ in "ab")
+    first, second = (SDNNQLambda(env.observation_space, env.action_space, seed=None) for _ in "ab")
     assert first.seed != second.seed
 
 
@@ -147,7 +147,7 @@ class Means(Callback):
 
 def run(tmp_path, means, *callbacks):
     env = gym.make("CartPole-v1")
-    agent = SDNNSarsa(
+    agent = SDNNQLambda(
         env.observation_space, env.action_space, inputs="all", angle_pairs="none",
         observation_range=(-3.0, 3.0), seed=2,
     )  # fmt: skip
@@ -175,7 +175,7 @@ def test_the_agent_of_the_best_evaluation_is_kept(tmp_path):
     note = Note()
     run(tmp_path, [1.0, 3.0, 2.0, 3.0, 4.0, 0.0], SaveBestAgent(path), note)
     assert [steps for steps, _ in note.saved] == [10, 20, 50]
-    assert isinstance(load_agent(path), SDNNSarsa)
+    assert isinstance(load_agent(path), SDNNQLambda)
 
 
 def test_a_training_without_improvement_stops(tmp_path):
@@ -199,7 +199,7 @@ def test_a_step_interval_is_at_least_one(trained, interval):
 
 def test_methods_that_are_replaced_are_called_in_trainings():
     env = gym.make("CartPole-v1")
-    agent = SDNNSarsa(env.observation_space, env.action_space)
+    agent = SDNNQLambda(env.observation_space, env.action_space)
     seen, learn = [], agent.learn
     agent.learn = lambda transition: (seen.append(transition), learn(transition))
     agent.train(env, steps=5)

@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, SDNNSarsa, Transition, evaluate
+from sdnn.agents import (
+    FuzzyQLearning,
+    RBFQLearning,
+    SDNNQLambda,
+    SDNNQLearning,
+    Transition,
+    evaluate,
+)
 from sdnn.export import c_header
 
 SPACE = gym.spaces.Dict(
@@ -19,7 +26,7 @@ LOST = {"a": np.ma.array([9.0, 0.5], mask=[True, False]), "b": np.nan, "c": np.a
 
 
 def agent_of(agent_class, missing, space=SPACE, **options):
-    if agent_class is SDNNSarsa:
+    if agent_class is SDNNQLambda:
         options = {"inputs": "all", "angle_pairs": "none", **options}
     return agent_class(space, BOX, missing=missing, seed=1, **options)
 
@@ -28,7 +35,7 @@ def state(agent, observation):
     return agent._state(observation).tolist()
 
 
-@pytest.mark.parametrize("agent_class", [SDNNSarsa, SDNNQLearning, RBFQLearning])
+@pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNQLearning, RBFQLearning])
 def test_held_readings_are_the_last_of_their_variable_environment_and_episode(agent_class):
     agent = agent_of(agent_class, "hold")
     agent.n_environments = 2
@@ -52,7 +59,7 @@ def test_held_readings_are_the_last_of_their_variable_environment_and_episode(ag
     assert state(agent, LOST) == never
 
 
-@pytest.mark.parametrize("agent_class", [SDNNSarsa, SDNNQLearning])
+@pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNQLearning])
 def test_coded_readings_have_a_pattern_that_nothing_else_has(agent_class):
     plain, agent = agent_of(agent_class, "error"), agent_of(agent_class, "code")
     core, plain_core = agent.core.action_value, plain.core.action_value
@@ -70,29 +77,29 @@ def test_coded_readings_have_a_pattern_that_nothing_else_has(agent_class):
 
 def test_an_angle_is_missing_if_one_of_its_pair_is():
     space = gym.spaces.Box(-1.0, 1.0, (3,))
-    agent = agent_of(SDNNSarsa, "code", space, angle_pairs=[(0, 1)])
+    agent = agent_of(SDNNQLambda, "code", space, angle_pairs=[(0, 1)])
     states = [state(agent, x) for x in ([np.nan, 1, 0], [0, np.inf, 0], [np.nan, np.nan, 0])]
     assert states == [states[0]] * 3
-    agent = agent_of(SDNNSarsa, "hold", space, angle_pairs=[(0, 1)])
+    agent = agent_of(SDNNQLambda, "hold", space, angle_pairs=[(0, 1)])
     agent.act([0.0, 1.0, 0.0])
     assert state(agent, [1.0, np.nan, 0.0])[0] == 0.625
 
 
 def test_refusals_name_the_remedy():
     for bad in (LOST, READ | {"a": np.array([0.0, np.inf])}):
-        refuses("observation", agent_of(SDNNSarsa, "error").act, bad)
+        refuses("observation", agent_of(SDNNQLambda, "error").act, bad)
     for agent_class in (RBFQLearning, FuzzyQLearning):
         refuses("'hold'", agent_of, agent_class, "code")
-    refuses("missing", agent_of, SDNNSarsa, "drop")
+    refuses("missing", agent_of, SDNNQLambda, "drop")
     for missing in ("hold", "code"):
-        refuses("missing='error'", c_header, agent_of(SDNNSarsa, missing), "robot")
+        refuses("missing='error'", c_header, agent_of(SDNNQLambda, missing), "robot")
 
 
 @pytest.mark.parametrize("missing", ["hold", "code"])
 def test_ranges_and_angles_are_found_among_the_readings_that_are_there(missing):
     space, random = gym.spaces.Box(-np.inf, np.inf, (4,), np.float64), np.random.default_rng(3)
     options = {"missing": missing, "inputs": "all", "warm_up_steps": 400, "seed": 1}
-    agents = [SDNNSarsa(space, BOX, **options) for _ in range(2)]
+    agents = [SDNNQLambda(space, BOX, **options) for _ in range(2)]
     for angle in random.uniform(-3, 3, 400):
         x = np.array([np.cos(angle), np.sin(angle), 5.0 * random.integers(-1, 2), np.nan])
         for agent, lost in zip(agents, (False, random.random(4) < 0.2), strict=True):

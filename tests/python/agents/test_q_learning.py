@@ -10,7 +10,7 @@ import sdnn_q_learning as page
 from handed_over import transcribe
 from refusals import refuses
 from sdnn import _core
-from sdnn.agents import PRESETS, QLearningConfig, SDNNQLearning, Transition
+from sdnn.agents import QLearningConfig, SDNNQLearning, Transition
 from sdnn.approximators import SDNNCConfig
 from sdnn.coding import Circular
 
@@ -249,7 +249,7 @@ def test_an_evaluated_action_is_not_the_one_taken():
 def test_the_configurations_are_those_used():
     agent = small_agent()
     assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=91)
-    assert agent.learning == PRESETS["general"].learning
+    assert agent.learning == SDNNQLearning.presets["general"].learning
     assert agent.core.action_value.n_actions == 91
     agent = small_agent(BUTTONS)
     assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=4)
@@ -267,7 +267,7 @@ def test_a_preset_is_used_where_nothing_is_given():
         OBSERVATIONS, TORQUES, learning=QLearningConfig(discount=0.5), preset="robust"
     )
     assert (given.n_actions, given.learning) == (61, QLearningConfig(discount=0.5))
-    for name, chosen in PRESETS.items():
+    for name, chosen in SDNNQLearning.presets.items():
         agent = SDNNQLearning(OBSERVATIONS, TORQUES, preset=name)
         assert agent.learning == chosen.learning
     refuses("preset", SDNNQLearning, OBSERVATIONS, TORQUES, preset="best")

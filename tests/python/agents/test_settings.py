@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn.agents import SarsaConfig, SDNNSarsa, Transition
+from sdnn.agents import QLambdaConfig, SDNNQLambda, Transition
 from sdnn.agents.registry import AGENTS
 from sdnn.config import fields_of
 
@@ -21,7 +21,7 @@ FIRST = {
     "sdnn-c": (CODE | NETWORK | {"initial_weights": "uniform"}, RATES),
     "fuzzy": ({"n_sets": 3, "n_actions": 5}, POLICY),
     "rbf": ({"n_bases": 3, "n_actions": 5}, RATES),
-    "sdnn-linear": (CODE, RATES | {"schedule_steps": 0}),
+    "q-lambda": (CODE, RATES | {"schedule_steps": 0}),
 }
 """Settings of which one at a time is changed: small, and such that the others matter."""
 
@@ -113,7 +113,7 @@ def test_every_setting_has_an_effect(name, n_dimensions):
 def test_what_belongs_to_the_progress_is_refused_where_nothing_follows_it():
     def agent(**learning):
         space = gym.spaces.Box(-1.0, 1.0, (3,), np.float64)
-        return SDNNSarsa(space, gym.spaces.Discrete(2), learning=SarsaConfig(**learning))
+        return SDNNQLambda(space, gym.spaces.Discrete(2), learning=QLambdaConfig(**learning))
 
     refuses("schedule", agent, schedule="exponential", final_epsilon=0.1)
     refuses("exploration_fraction", agent, exploration_fraction=0.5)

@@ -130,7 +130,7 @@ def test_tables_by_hand(scripts):
         return {"steps": steps, "mean_return": returns, "cpu_seconds": [1.0] * 3, "bytes": 2048}
 
     found = {
-        ("CartPole", "sdnn-linear"): [trial(20.0, 30.0, 480.0), trial(1.0, 2.0, 470.0)],
+        ("CartPole", "q-lambda"): [trial(20.0, 30.0, 480.0), trial(1.0, 2.0, 470.0)],
         ("CartPole", "tiles"): [trial(500.0, 500.0, 490.0)],
     }
     tables = scripts.report.tables(scripts.study, found)
@@ -141,7 +141,7 @@ def test_tables_by_hand(scripts):
     assert loss.endswith("| 490 (1 seed) | 475 (2 seeds) | 3 % |")
     assert "| 475 (2) |" in tables["at the end"]
     assert "| **490** (1) |" in tables["at the end"]
-    assert "| SDNNSarsa | 20 | 2 |" in tables["costs"]
+    assert "| SDNNQLambda | 20 | 2 |" in tables["costs"]
     along = scripts.report.along_the_way(scripts.study, found)
     assert "| 10.5" not in along
     assert "| 2 | 10 | 16 | 475 |" in along

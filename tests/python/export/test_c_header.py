@@ -32,12 +32,11 @@ from c_policies import (
 )
 from refusals import refuses
 from sdnn.agents import (
-    PRESETS,
     FuzzyQLearning,
+    QLambdaConfig,
     RBFQLearning,
-    SarsaConfig,
+    SDNNQLambda,
     SDNNQLearning,
-    SDNNSarsa,
     Transition,
 )
 from sdnn.export import c_header, export_c_header
@@ -68,8 +67,8 @@ def test_the_actions_are_the_agents(name, target, tmp_path):
 )
 def test_the_tolerance_of_ties_is_in_units_of_values(reward, tie_tolerance, expected):
     """A reward of 1 is that of two weights of 23 bits: a unit is 2^-23."""
-    rule = SarsaConfig(tie_rule="lowest", tie_tolerance=tie_tolerance)
-    agent = SDNNSarsa(Discrete(2), Discrete(2), learning=rule)
+    rule = QLambdaConfig(tie_rule="lowest", tie_tolerance=tie_tolerance)
+    agent = SDNNQLambda(Discrete(2), Discrete(2), learning=rule)
     agent.learn(Transition(0, 1, reward, 1, terminated=True))
     assert f"return policy_best(sums, 2{expected});" in c_header(agent, "policy").text
 
@@ -213,7 +212,7 @@ def test_the_example_balances_as_the_agent_does(needs, tmp_path):
     agent = SDNNQLearning(
         env.observation_space,
         env.action_space,
-        approximator=replace(PRESETS["small"].approximator, n_pattern_units=40),
+        approximator=replace(SDNNQLearning.presets["small"].approximator, n_pattern_units=40),
         learning=learning(tie_rule="middle"),
         seed=1,
     )

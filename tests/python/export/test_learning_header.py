@@ -27,7 +27,7 @@ from c_learners import (
 )
 from c_policies import STRICT, TARGETS, box, run
 from refusals import refuses
-from sdnn.agents import RBFQLearning, SarsaConfig, SDNNQLearning, SDNNSarsa, Transition
+from sdnn.agents import QLambdaConfig, RBFQLearning, SDNNQLambda, SDNNQLearning, Transition
 from sdnn.export import c_header, load_image, save_image
 
 SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all")
@@ -129,7 +129,7 @@ def test_images_of_extreme_numbers_are_refused_or_learn(make, target, tmp_path):
             image[place : place + n_bytes] = random.choice(words).tobytes()[:n_bytes]
         if random.random() < 0.3:  # weights
             most = [b"\xff\xff\x7f\x00", b"\x01\x00\x80\xff"]
-            weights = most if isinstance(agent, SDNNSarsa) else [b"\xff", b"\x01"]
+            weights = most if isinstance(agent, SDNNQLambda) else [b"\xff", b"\x01"]
             one = weights[random.integers(2)]
             half = len(image) // 8 * 4
             image[-4 - half : -4] = one * (half // len(one))
@@ -141,14 +141,14 @@ def test_images_of_extreme_numbers_are_refused_or_learn(make, target, tmp_path):
 
 def test_the_largest_weights_stay_in_range(target, tmp_path):
     """A weight of 2^24 - 1, which an image of the largest weights leads to, is halved to 2^23."""
-    learning = SarsaConfig(
+    learning = QLambdaConfig(
         schedule_steps=0,
         final_learning_rate=None,
         traces="replacing",
         epsilon=0.0,
         tie_rule="lowest",
     )
-    agent = SDNNSarsa(gym.spaces.Discrete(9), gym.spaces.Discrete(4), learning=learning)
+    agent = SDNNQLambda(gym.spaces.Discrete(9), gym.spaces.Discrete(4), learning=learning)
     state = agent.core.state()
     state["action_value.weights"][:] = 2**23 - 1
     state["action_value.exponent"] = np.array(-10, np.int32)
@@ -227,7 +227,7 @@ def test_what_is_no_image_of_the_agent_changes_nothing(make):
     refuses("image", load_image, sarsa(), image)
     refuses("image", load_image, paper_rule(), image)
     config = replace(SMALL, averaging_interval=8)
-    stranger = SDNNSarsa(
+    stranger = SDNNQLambda(
         box(1.0, 2.0, 3.0), gym.spaces.Discrete(3, start=-1), seed=1, approximator=config,
         inputs="all", angle_pairs=[],
     )  # fmt: skip

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from refusals import refuses
-from sdnn.agents import LINEAR_PRESETS, PRESETS, SDNNSarsa
+from sdnn.agents import SDNNQLambda, SDNNQLearning
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.cli import main
 from sdnn.export import c_header, new_agent
@@ -50,11 +50,11 @@ def test_a_network_is_the_largest_that_fits(ram_bytes, n_hidden):
 
 
 def test_a_network_is_as_large_as_given_and_learns_at_once():
-    given = PRESETS["small"].approximator
+    given = SDNNQLearning.presets["small"].approximator
     config = replace(given, n_pattern_units=16, averaging_interval=0, weight_limit=127)
     agent = new_agent(SPACE, TWO, kind="sdnn-c", ram_bytes=10**6, approximator=config)
     assert agent.approximator.n_pattern_units == 16
-    assert agent.learning == PRESETS["small"].learning
+    assert agent.learning == SDNNQLearning.presets["small"].learning
     assert "first_weights" not in c_header(agent, "agent", learning=True).text  # drawn on the chip
 
 
@@ -79,7 +79,7 @@ def test_what_does_not_fit_or_has_no_range_is_refused():
     larger = LinearSDNNConfig(n_pattern_units=512)
     refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=20_000, approximator=larger)
     refuses("kind", new_agent, SPACE, TWO, kind="rbf")
-    for kind, config in (("sdnn-linear", SDNNCConfig()), ("sdnn-c", LinearSDNNConfig())):
+    for kind, config in (("q-lambda", SDNNCConfig()), ("sdnn-c", LinearSDNNConfig())):
         given = {"kind": kind, "approximator": config}
         refuses("approximator", new_agent, SPACE, TWO, **given, error=TypeError)
     unknown = gym.spaces.Box(-np.inf, np.inf, (2,))
@@ -92,7 +92,7 @@ def test_the_command_makes_the_same_agent(export, tmp_path):
     settings = ("--set", "learning.discount=0.9", "--set", "approximator.n_actions=5")
     done = export("--new", *GIVEN, "--actions", "-1:1", "--ram", 9000, "--seed", 7, *settings)
     assert done.exit_code == 0, done.output
-    preset = LINEAR_PRESETS["general"]
+    preset = SDNNQLambda.presets["general"]
     agent = new_agent(
         SPACE, gym.spaces.Box(-1.0, 1.0, (1,), np.float64), ram_bytes=9000, seed=7, angles=[1],
         approximator=replace(preset.approximator, n_actions=5),
@@ -107,7 +107,7 @@ def test_the_command_makes_the_same_network(export, tmp_path):
     settings = ("--set", "approximator.n_actions=3", "--set", "learning.discount=0.9")
     done = export("--new", *GIVEN, "--actions", "-1:1", "--agent", "sdnn-c", *settings)
     assert done.exit_code == 0, done.output
-    small = PRESETS["small"]
+    small = SDNNQLearning.presets["small"]
     config = replace(small.approximator, n_actions=3, averaging_interval=0, weight_limit=127)
     agent = new_agent(
         SPACE, gym.spaces.Box(-1.0, 1.0, (1,), np.float64), kind="sdnn-c", angles=[1],
@@ -173,7 +173,7 @@ def test_bad_words_are_refused_by_their_option(words, named, export, tmp_path):
 
 
 def test_a_run_and_a_new_agent_exclude_each_other(export):
-    SDNNSarsa(SPACE, TWO, inputs="all", angle_pairs=[]).save("one.safetensors")
+    SDNNQLambda(SPACE, TWO, inputs="all", angle_pairs=[]).save("one.safetensors")
     for words, named in (
         ((), "RUN"),
         (("one.safetensors", "--new", *GIVEN, "--actions", 2), "omit one.safetensors"),

@@ -16,12 +16,12 @@ from sdnn import SDNNRegressor
 from sdnn.agents import (
     FuzzyQLearning,
     FuzzyQLearningConfig,
+    QLambdaConfig,
     QLearningConfig,
     RBFQLearning,
-    SarsaConfig,
     Scaling,
+    SDNNQLambda,
     SDNNQLearning,
-    SDNNSarsa,
     Training,
     Transition,
 )
@@ -69,21 +69,21 @@ def agents():
         "sdnn-symbols": SDNNQLearning,
         "sdnn-pairs": SDNNQLearning,
         "sdnn-warm-up": SDNNQLearning,
-        "linear": SDNNSarsa,
-        "linear-vector": SDNNSarsa,
+        "q-lambda": SDNNQLambda,
+        "q-lambda-vector": SDNNQLambda,
         "rbf": RBFQLearning,
         "fuzzy": FuzzyQLearning,
         "fuzzy-vector": FuzzyQLearning,
     }
     two = gym.spaces.Box(np.array([0.0, -1.0]), np.array([1.0, 1.0]), dtype=np.float64)
     spaces = {
-        "linear-vector": two,
+        "q-lambda-vector": two,
         "sdnn-vector": two,
         "fuzzy-vector": two,
         "sdnn-discrete": gym.spaces.Discrete(3, start=4),
     }
     rules = {"approximator": FuzzyRulesConfig(n_sets=3, n_actions=4), "learning": fuzzy}
-    linear = {
+    q_lambda = {
         "approximator": LinearSDNNConfig(
             n_pattern_units=20,
             n_anchor_patterns=4,
@@ -91,11 +91,11 @@ def agents():
             n_actions=5,
             averaging_interval=3,
         ),
-        "learning": SarsaConfig(epsilon=0.3, schedule_steps=50, max_action_repeat=6),
+        "learning": QLambdaConfig(epsilon=0.3, schedule_steps=50, max_action_repeat=6),
     }
     settings = {
-        "linear": linear | {"inputs": "relevant"},
-        "linear-vector": linear | {"inputs": "all"},
+        "q-lambda": q_lambda | {"inputs": "relevant"},
+        "q-lambda-vector": q_lambda | {"inputs": "all"},
         "rbf": {"approximator": RBFNetworkConfig(n_bases=3, n_actions=7), "learning": LEARNING},
         "sdnn-pairs": {"approximator": replace(SMALL, max_pairs=3), "learning": LEARNING},
         "fuzzy": rules,

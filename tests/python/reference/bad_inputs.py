@@ -18,11 +18,11 @@ import sdnn.agents as agents
 from sdnn.agents import (
     FuzzyQLearning,
     FuzzyQLearningConfig,
+    QLambdaConfig,
     QLearningConfig,
     RBFQLearning,
-    SarsaConfig,
+    SDNNQLambda,
     SDNNQLearning,
-    SDNNSarsa,
     Training,
     Transition,
     load_agent,
@@ -154,9 +154,9 @@ SETTINGS = {
         ),
         QLearningConfig(n_steps=2, value_range="adaptive", n_greedy_steps=0),
     ),
-    SDNNSarsa: (
+    SDNNQLambda: (
         LinearSDNNConfig(n_pattern_units=20, n_anchor_patterns=4, n_interpolated=6),
-        SarsaConfig(schedule_steps=20),
+        QLambdaConfig(schedule_steps=20),
     ),
     RBFQLearning: (RBFNetworkConfig(n_actions=5), QLearningConfig(n_greedy_steps=0)),
     FuzzyQLearning: (
@@ -208,7 +208,7 @@ def make_agent(kind, **options):
     approximator, learning = SETTINGS[cls]
     given = {"observation_space": PLANE, "action_space": TORQUE, "seed": 3}
     given |= {"approximator": approximator, "learning": learning}
-    if cls is SDNNSarsa and "warm_up_steps" not in CASES[comma + case]:  # no warm-up by default
+    if cls is SDNNQLambda and "warm_up_steps" not in CASES[comma + case]:  # no warm-up by default
         given |= {"inputs": "all", "angle_pairs": "none"}
     agent = cls(**{**given, **CASES[comma + case], **options})
     return agent

@@ -9,7 +9,7 @@ import numpy as np
 
 from bare_processors import BARE_TARGETS, STDIO
 from c_policies import STRICT, box, run
-from sdnn.agents import PRESETS, SarsaConfig, SDNNQLearning, SDNNSarsa, Transition
+from sdnn.agents import QLambdaConfig, SDNNQLambda, SDNNQLearning, Transition
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.export import export_c_header, load_image, save_image
 
@@ -21,53 +21,53 @@ NETWORK = SDNNCConfig(
 
 def discrete():
     """Three inputs: groups in twos alone; defaults of learning."""
-    return SDNNSarsa(box(1.0, 2.0, 3.0), gym.spaces.Discrete(3, start=-1), seed=1, **_with(SMALL))
+    return SDNNQLambda(box(1.0, 2.0, 3.0), gym.spaces.Discrete(3, start=-1), seed=1, **_with(SMALL))
 
 
 def sarsa():
     """Sarsa with replacing traces, no average, four inputs: groups in twos and left over."""
-    learning = SarsaConfig(
+    learning = QLambdaConfig(
         bootstrap="sarsa", traces="replacing", epsilon=0.4, tie_rule="middle", tie_tolerance=3.7,
         n_greedy_steps=3, max_action_repeat=1,
     )  # fmt: skip
     config = replace(SMALL, averaging_interval=0)
     spaces = box(1.0, 2.0, 3.0, 0.25), gym.spaces.Discrete(4)
-    return SDNNSarsa(*spaces, seed=2, learning=learning, **_with(config))
+    return SDNNQLambda(*spaces, seed=2, learning=learning, **_with(config))
 
 
 def dutch():
     """True-online Sarsa, windows of a box, an angle, random actions at the beginning."""
-    learning = SarsaConfig(
+    learning = QLambdaConfig(
         bootstrap="sarsa", trace_decay=1.0, discount=0.8, start_steps=50, max_action_repeat=9,
         schedule_steps=100, tie_rule="lowest", epsilon=0.9, final_epsilon=0.3,
     )  # fmt: skip
     config = replace(SMALL, n_actions=9, action_window=4)
     given = _with(config) | {"angle_pairs": [(0, 1)]}
-    return SDNNSarsa(box(1.0, 1.0, 8.0), box(2.0), seed=3, learning=learning, **given)
+    return SDNNQLambda(box(1.0, 1.0, 8.0), box(2.0), seed=3, learning=learning, **given)
 
 
 def several():
     """Two dimensions, two inputs: groups left over alone; rates without a schedule."""
-    learning = SarsaConfig(schedule_steps=0, learning_rate=0.3, epsilon=0.3, tie_tolerance=0.4)
+    learning = QLambdaConfig(schedule_steps=0, learning_rate=0.3, epsilon=0.3, tie_tolerance=0.4)
     spaces = box(1.0, 2.0), gym.spaces.MultiDiscrete([3, 5])
-    return SDNNSarsa(*spaces, seed=4, learning=learning, **_with(SMALL))
+    return SDNNQLambda(*spaces, seed=4, learning=learning, **_with(SMALL))
 
 
 def circular():
     """An angle, a wide pattern and few pairs of many inputs."""
     config = replace(SMALL, n_pattern_units=70, max_pairs=10)
     spaces = box(np.pi, 2.0, 1.0, 1.0, 1.0), gym.spaces.Discrete(2)
-    return SDNNSarsa(*spaces, angles=[0], seed=5, **_with(config))
+    return SDNNQLambda(*spaces, angles=[0], seed=5, **_with(config))
 
 
 def states():
     """A table of listed states."""
-    return SDNNSarsa(gym.spaces.Discrete(9), gym.spaces.Discrete(4), seed=6)
+    return SDNNQLambda(gym.spaces.Discrete(9), gym.spaces.Discrete(4), seed=6)
 
 
 def network():
     """SDNN-C as recommended: five-step targets, a range that follows the returns."""
-    learning = replace(PRESETS["small"].learning, epsilon=0.1, start_steps=20)
+    learning = replace(SDNNQLearning.presets["small"].learning, epsilon=0.1, start_steps=20)
     config = replace(NETWORK, n_hidden_units=90)
     return SDNNQLearning(
         box(1.0, 2.0, 3.0, 0.25), gym.spaces.Discrete(2, start=-1), seed=7,
@@ -77,7 +77,7 @@ def network():
 
 def paper_rule():
     """SDNN-C as in the paper, one step and a fixed range, with three inputs and torques."""
-    learning = replace(PRESETS["paper"].learning, tie_rule="middle", epsilon=0.2)
+    learning = replace(SDNNQLearning.presets["paper"].learning, tie_rule="middle", epsilon=0.2)
     config = replace(NETWORK, rounding="random", lattice=2)
     return SDNNQLearning(
         box(1.0, 1.0, 8.0), box(2.0), seed=8, approximator=config, learning=learning
@@ -86,7 +86,8 @@ def paper_rule():
 
 def small_steps():
     """Rounding away, an angle, two inputs, a range from 0 to 1, few weights fit."""
-    learning = replace(PRESETS["paper"].learning, learning_rate=0.3, tie_rule="lowest", n_steps=3)
+    paper = SDNNQLearning.presets["paper"].learning
+    learning = replace(paper, learning_rate=0.3, tie_rule="lowest", n_steps=3)
     config = replace(
         NETWORK,
         rounding="away",
@@ -108,7 +109,7 @@ def few_pairs():
         NETWORK, max_pairs=10, initial_weights="uniform", initial_weight_limit=3.0,
         n_pattern_units=70,
     )  # fmt: skip
-    learning = replace(PRESETS["small"].learning, discount=0.9, max_action_repeat=1)
+    learning = replace(SDNNQLearning.presets["small"].learning, discount=0.9, max_action_repeat=1)
     return SDNNQLearning(
         box(1.0, 2.0, 1.0, 1.0, 1.0), gym.spaces.Discrete(4), seed=10,
         approximator=config, learning=learning,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import gymnasium as gym
 import numpy as np
 
-from sdnn.agents import PRESETS, SarsaConfig, SDNNQLearning, SDNNSarsa, Transition
+from sdnn.agents import QLambdaConfig, SDNNQLambda, SDNNQLearning, Transition
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.coding import RandomInverse
 from sdnn.export import c_header, export_c_header
@@ -63,7 +63,7 @@ def learned(agent, n_steps=300, seed=1):
 
 
 def learning(**changes):
-    return replace(PRESETS["general"].learning, **changes)
+    return replace(SDNNQLearning.presets["general"].learning, **changes)
 
 
 def box(*sizes):
@@ -156,21 +156,21 @@ def partners_agent():
 
 def linear_agent():
     """A linear readout: windows of torques, an average, groups in twos and left over."""
-    return SDNNSarsa(
+    return SDNNQLambda(
         box(1.0, 2.0, 3.0, 1.0), box(2.0), seed=9, angle_pairs=[], inputs="all",
         approximator=LinearSDNNConfig(
             n_pattern_units=40, n_actions=9, action_window=3, averaging_interval=20
         ),
-        learning=SarsaConfig(tie_rule="lowest"),
+        learning=QLambdaConfig(tie_rule="lowest"),
     )  # fmt: skip
 
 
 def linear_vector_agent():
     """Two dimensions, ties within a tolerance."""
-    return SDNNSarsa(
+    return SDNNQLambda(
         box(2.0, 3.0), gym.spaces.MultiDiscrete([3, 4]), seed=10, angle_pairs=[], inputs="all",
         approximator=LinearSDNNConfig(n_pattern_units=40, averaging_interval=0),
-        learning=SarsaConfig(tie_rule="middle", tie_tolerance=0.3),
+        learning=QLambdaConfig(tie_rule="middle", tie_tolerance=0.3),
     )  # fmt: skip
 
 

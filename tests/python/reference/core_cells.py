@@ -100,13 +100,13 @@ GOOD = {
         "seed": 1,
     },
     "LinearSDNN": lambda: {"config": linear_config(), "n_actions": [3, 4], "seed": 1},
-    "Sarsa": lambda: {
-        "approximator": linear_config(), "n_actions": [3, 4], "learning": core.SarsaConfig(),
+    "QLambda": lambda: {
+        "approximator": linear_config(), "n_actions": [3, 4], "learning": core.QLambdaConfig(),
         "seed": 1, "tables": [],
     },
     "LinearAcrobotTrial": lambda: {
         "approximator": linear_config(n_inputs=4), **trial_settings(),
-        "learning": core.SarsaConfig(),
+        "learning": core.QLambdaConfig(),
     },
     "FuzzyQLearning": lambda: {
         "approximator": core.FuzzyRulesConfig(), "learning": learning(core.FuzzyQLearningConfig),

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import gymnasium as gym
 import numpy as np
 
-from sdnn.agents import SDNNSarsa, Transition, learn_from
+from sdnn.agents import SDNNQLambda, Transition, learn_from
 from sdnn.approximators import LinearSDNNConfig
 
 SPACE, BUTTONS = gym.spaces.Box(-1.0, 1.0, (2,), np.float64), gym.spaces.Discrete(3)
@@ -19,7 +19,7 @@ LENGTH, N_EPISODES = 6, 3
 def new_agent():
     config = LinearSDNNConfig(n_pattern_units=20, n_anchor_patterns=4, n_interpolated=6)
     options = {"inputs": "all", "angle_pairs": "none"}
-    return SDNNSarsa(SPACE, BUTTONS, approximator=config, seed=1, **options)
+    return SDNNQLambda(SPACE, BUTTONS, approximator=config, seed=1, **options)
 
 
 def arrays():

@@ -12,7 +12,7 @@ import numpy as np
 import core_cells
 from bad_inputs import BAD, judged, parameters_of
 from sdnn import kernel
-from sdnn.agents import SDNNSarsa
+from sdnn.agents import SDNNQLambda
 from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
 from sdnn.environments import (
     AcrobotConfig,
@@ -261,7 +261,7 @@ GOOD = {
     "path": lambda: "agent",
     "plan": lambda: (),
     "quick": lambda: True,
-    "kind": lambda: "sdnn-linear",
+    "kind": lambda: "q-lambda",
     "ram_bytes": lambda: 20_000,
     "records": lambda: (),
     "reference": lambda: (),
@@ -294,7 +294,7 @@ NAMED = {"word": "experiment", "label": "agent", "n_episodes": "episodes", "name
 def tiny_agent():
     spaces = gym.spaces.Box(0.0, 1.0, (2,)), gym.spaces.Discrete(2)
     config = core_cells.linear_config()
-    return SDNNSarsa(*spaces, approximator=config, angle_pairs="none", inputs="all")
+    return SDNNQLambda(*spaces, approximator=config, angle_pairs="none", inputs="all")
 
 
 def public_functions():

@@ -13,11 +13,11 @@ import numpy as np
 from sdnn.agents import (
     FuzzyQLearning,
     FuzzyQLearningConfig,
+    QLambdaConfig,
     QLearningConfig,
     RBFQLearning,
-    SarsaConfig,
+    SDNNQLambda,
     SDNNQLearning,
-    SDNNSarsa,
     Transition,
     evaluate,
     learn_from,
@@ -25,7 +25,7 @@ from sdnn.agents import (
 )
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 
-AGENTS = (SDNNSarsa, SDNNQLearning, RBFQLearning, FuzzyQLearning)
+AGENTS = (SDNNQLambda, SDNNQLearning, RBFQLearning, FuzzyQLearning)
 INF = np.inf
 SINGLE_INPUTS = {
     "bounded": gym.spaces.Box(-1.0, 1.0, (1,)),
@@ -126,8 +126,8 @@ def random_settings(random, agent_class):
         "observation_range": random.choice([None, "adaptive"]),
         "warm_up_steps": int(random.choice([2, 50, 120, 200])),
     }
-    if agent_class is SDNNSarsa:
-        learning = SarsaConfig(
+    if agent_class is SDNNQLambda:
+        learning = QLambdaConfig(
             discount=float(random.choice([0.0, 0.9, 0.99, 1.0])),
             bootstrap=str(random.choice(["sarsa", "q_learning"])),
             traces=str(random.choice(["dutch", "replacing"])),
@@ -221,7 +221,7 @@ ENTRIES = {
 def missing_reading_cells():
     """Missing readings are refused by name, or held or coded, at every entry."""
     for agent_class in AGENTS:
-        coded = agent_class in (SDNNSarsa, SDNNQLearning)
+        coded = agent_class in (SDNNQLambda, SDNNQLearning)
         for missing in ("error", "hold", "code") if coded else ("error", "hold"):
             for name in ("bounded", "unbounded", "angle", "symbol", "Dict"):
                 for entry in ENTRIES if agent_class is not FuzzyQLearning else [*ENTRIES][:-1]:
@@ -259,13 +259,13 @@ def _soak_cell(number):
         agent_class = AGENTS[random.choice(4, p=[0.6, 0.2, 0.1, 0.1])]
         space, has_angle = random_space(random)
         if agent_class in (RBFQLearning, FuzzyQLearning) and gym.spaces.flatdim(space) > 4:
-            agent_class = SDNNSarsa
+            agent_class = SDNNQLambda
         actions = random_actions(random, agent_class)
         options = {"has_angle": has_angle, "has_glitches": bool(random.random() < 0.3)}
         n_environments = int(random.choice([1, 1, 1, 3]))
         envs = [Walk(space, actions, number + i, **options) for i in range(n_environments)]
         settings = random_settings(random, agent_class)
-        modes = ["error", "hold"] + ["code"] * (agent_class in (SDNNSarsa, SDNNQLearning))
+        modes = ["error", "hold"] + ["code"] * (agent_class in (SDNNQLambda, SDNNQLearning))
         settings["missing"] = str(random.choice(modes))
         for env in envs:
             env.lost = 0.0 if settings["missing"] == "error" else float(random.choice([0.1, 0.6]))
@@ -277,7 +277,7 @@ def _soak_cell(number):
             agent,
             env,
             settings["warm_up_steps"],
-            int(random.choice([300, 900, 5000], p=[0.5, 0.45, 0.05])),
+            int(random.choice([300, 900, 3000], p=[0.5, 0.45, 0.05])),
         )
 
     return run

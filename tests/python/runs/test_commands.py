@@ -129,7 +129,7 @@ def test_export_writes_a_c_header_of_a_run_or_an_agents_file(invoke, tmp_path):
 
 
 def test_export_writes_an_agent_that_learns(invoke):
-    linear = ("--agent", "sdnn-linear", *SHORT[:6], *SMALL[-2:], "--out", "one")
+    linear = ("--agent", "q-lambda", *SHORT[:6], *SMALL[-2:], "--out", "one")
     assert invoke("train", DRIFTING, *linear).exit_code == 0
     done = invoke("export", "one", "--c-header", "drift.h", "--learning")
     assert done.exit_code == 0, done.output
@@ -144,7 +144,7 @@ def test_export_writes_an_agent_that_learns(invoke):
 
 
 def test_an_agent_that_needs_masks_is_not_exported(invoke, tmp_path):
-    words = ("--agent", "sdnn-linear", "--steps", 60, "--evaluate-every", 0, "--out", "one")
+    words = ("--agent", "q-lambda", "--steps", 60, "--evaluate-every", 0, "--out", "one")
     masks = ("--set", "environment.action_masks=true")
     assert invoke("train", "Taxi-v4", *words, *masks).exit_code == 0
     done = invoke("export", "one", "--c-header", "a.h")
@@ -778,7 +778,7 @@ def test_values_that_are_too_coarse_are_named(invoke):
 
 
 def test_observations_that_are_left_out_are_named(invoke):
-    options = ["--agent", "sdnn-linear", "--steps", 1001, "--evaluate-every", 0]
+    options = ["--agent", "q-lambda", "--steps", 1001, "--evaluate-every", 0]
     done = invoke("train", "drifting_env:tests/Crowded-v0", *options, "--out", "one", "--json")
     left_out = json.loads(done.stdout)["learning_report"]["left_out"]
     assert len(left_out) >= 3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn.agents import LINEAR_PRESETS, FuzzyQLearning, RBFQLearning, SDNNQLearning, Training
+from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLambda, SDNNQLearning, Training
 from sdnn.agents.registry import AGENTS, agent_entry, register
 from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
 from sdnn.runs import (
@@ -52,16 +52,14 @@ def test_a_specification_survives_json_and_pickle(spec):
 def test_defaults_follow_from_the_task():
     acrobot, environment = RunSpec(), RunSpec(environment=CART_POLE)
     assert (acrobot.agent.preset, environment.agent.preset) == ("paper", "general")
-    assert (acrobot.label, environment.label) == ("sdnn-c", "sdnn-linear-general")
+    assert (acrobot.label, environment.label) == ("sdnn-c", "q-lambda-general")
     assert (acrobot.budget.episodes, acrobot.budget.steps) == (15_000, None)
     assert (environment.budget.episodes, environment.budget.steps) == (None, 200_000)
     assert acrobot.protocol.evaluate_every_episodes == 10
     assert environment.protocol.evaluate_every == 10_000
-    assert environment.learning == LINEAR_PRESETS["general"].learning
+    assert environment.learning == SDNNQLambda.presets["general"].learning
     assert RunSpec(sensors={"n_sensors": 6}).approximator == SDNNCConfig(n_inputs=6)
-    assert (
-        RunSpec.from_values({"environment": "CartPole-v1", "agent": "sdnn-linear"}) == environment
-    )
+    assert RunSpec.from_values({"environment": "CartPole-v1", "agent": "q-lambda"}) == environment
 
 
 def test_the_hash_is_that_of_what_fixes_the_rows():
@@ -191,7 +189,7 @@ def test_inputs_are_chosen_in_a_run(inputs):
 )
 def test_what_an_agent_finds_follows_from_its_preset(preset, noise, given, found):
     environment = EnvironmentSpec(id="Pendulum-v1", noise=noise)
-    agent = AgentSpec(name="sdnn-linear", preset=preset, **given)
+    agent = AgentSpec(name="q-lambda", preset=preset, **given)
     spec = RunSpec(environment=environment, agent=agent)
     assert (spec.agent.angle_pairs, spec.agent.inputs) == found
     assert RunSpec.from_values(spec.values()) == spec
@@ -199,7 +197,7 @@ def test_what_an_agent_finds_follows_from_its_preset(preset, noise, given, found
 
 
 def test_the_paper_s_task_has_all_its_inputs():
-    spec = RunSpec(agent=AgentSpec(name="sdnn-linear", preset="general"))
+    spec = RunSpec(agent=AgentSpec(name="q-lambda", preset="general"))
     assert (spec.agent.angle_pairs, spec.agent.inputs) == ("none", "all")
     assert spec.make_agent(spec.make_env()).approximator.n_inputs == 4
 
@@ -245,7 +243,7 @@ def test_ranges_are_given_or_seen():
 def test_given_ranges_are_not_narrowed(noise):
     environment = EnvironmentSpec(id="CartPole-v1", noise=noise)
     given = {str(i): (-100.0, 100.0) for i in range(4)}
-    spec = RunSpec(environment=environment.replace(ranges=given), agent="sdnn-linear")
+    spec = RunSpec(environment=environment.replace(ranges=given), agent="q-lambda")
     env = spec.environment.make()
     agent = spec.make_agent(env)
     agent.train(env, steps=spec.agent.warm_up_steps)

@@ -189,7 +189,7 @@ protocol.evaluate_every_episodes = 10
     config = configs(found)["Pendulum-v1", "base"]
     assert config.environment.id == "Pendulum-v1"
     assert (config.budget.episodes, config.protocol.evaluate_every_episodes) == (20, 10)
-    assert config.label == "sdnn-linear-general"
+    assert config.label == "q-lambda-general"
 
 
 RANGES = "environment.ranges.1 = [-4, 4]\nenvironment.ranges.3 = [-4, 4]\n"

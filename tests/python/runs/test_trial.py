@@ -7,7 +7,7 @@ import pytest
 
 from refusals import refuses
 from sdnn import _core
-from sdnn.agents import PRESETS
+from sdnn.agents import SDNNQLearning
 from sdnn.agents.registry import labels, title_of
 from sdnn.reproduction import Case, case_spec
 from sdnn.runs import (
@@ -56,8 +56,8 @@ def python_trial(spec, monkeypatch):
         "sdnn-c-small",
         "fuzzy",
         "rbf",
-        "sdnn-linear",
-        "sdnn-linear-general",
+        "q-lambda",
+        "q-lambda-general",
     ],
 )
 @pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
@@ -125,9 +125,9 @@ def entry_of(agent_id):
 
 def test_an_agent_may_have_other_settings_than_the_defaults():
     spec = spec_of("sdnn-c-robust", n_sensors=5)
-    assert spec.approximator == replace(PRESETS["robust"].approximator, n_inputs=5)
-    assert spec.learning == PRESETS["robust"].learning
-    assert spec_of("sdnn-c").learning == PRESETS["paper"].learning
+    assert spec.approximator == replace(SDNNQLearning.presets["robust"].approximator, n_inputs=5)
+    assert spec.learning == SDNNQLearning.presets["robust"].learning
+    assert spec_of("sdnn-c").learning == SDNNQLearning.presets["paper"].learning
 
 
 def test_asking_a_trials_agent_for_values_changes_nothing_that_follows():
@@ -149,12 +149,12 @@ def test_ids_are_registered_once():
 
 
 def test_agents_are_looked_up_by_word():
-    words = ["sdnn-c", "fuzzy", "rbf", "sdnn-linear", "sdnn-c-general", "sdnn-c-robust"]
-    words += ["sdnn-c-small", "sdnn-linear-general"]
+    words = ["sdnn-c", "fuzzy", "rbf", "q-lambda", "sdnn-c-general", "sdnn-c-robust"]
+    words += ["sdnn-c-small", "q-lambda-general"]
     assert list(labels()) == words
     assert [title_of(word) for word in words] == [
-        "SDNN-C", "FQL", "RBFN", "SDNN, linear", "SDNN-C, general", "SDNN-C, robust",
-        "SDNN-C, small", "SDNN, linear, general",
+        "SDNN-C", "FQL", "RBFN", "SDNNQLambda", "SDNN-C, general", "SDNN-C, robust",
+        "SDNN-C, small", "SDNNQLambda, general",
     ]  # fmt: skip
     assert all(agent_entry(name) is entry for name, entry in AGENTS.items())
     assert agent_entry("sdnn-c-small") is AGENTS["sdnn-c"]

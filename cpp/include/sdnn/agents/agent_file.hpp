@@ -22,8 +22,8 @@
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/q_lambda_config.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
-#include "sdnn/agents/sarsa_config.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
@@ -173,7 +173,7 @@ struct AgentKind {
 inline constexpr std::array<AgentKind, 4> kAgentKinds{{{"sdnn-c", "SDNNQLearning"},
                                                        {"rbf", "RBFQLearning"},
                                                        {"fuzzy", "FuzzyQLearning"},
-                                                       {"sdnn-linear", "SDNNSarsa"}}};
+                                                       {"q-lambda", "SDNNQLambda"}}};
 
 /// The settings of a controller in a file's description.
 inline ControllerConfig controller_config_in(const nlohmann::json& description) {
@@ -203,12 +203,12 @@ inline ControllerConfig controller_config_in(const nlohmann::json& description) 
           config_from_json<approximators::LinearSDNNConfig>(approximator, "approximator");
       break;
     default:
-      refuse("kind", "sdnn-c, rbf, fuzzy or sdnn-linear", name);
+      refuse("kind", "sdnn-c, rbf, fuzzy or q-lambda", name);
   }
   if (is_fuzzy(config.approximator)) {
     config.learning = config_from_json<FuzzyQLearningConfig>(learning, "learning");
   } else if (is_linear(config.approximator)) {
-    config.learning = config_from_json<SarsaConfig>(learning, "learning");
+    config.learning = config_from_json<QLambdaConfig>(learning, "learning");
   } else {
     config.learning = config_from_json<QLearningConfig>(learning, "learning");
   }

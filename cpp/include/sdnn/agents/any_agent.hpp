@@ -15,10 +15,10 @@
 
 #include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/q_lambda.hpp"
+#include "sdnn/agents/q_lambda_config.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
-#include "sdnn/agents/sarsa.hpp"
-#include "sdnn/agents/sarsa_config.hpp"
 #include "sdnn/agents/vector_fuzzy_q_learning.hpp"
 #include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
@@ -39,7 +39,7 @@ using AnyAgent = std::variant<QLearning<approximators::SDNNC>,
                               QLearning<approximators::Decoupled<approximators::SDNNC>>,
                               QLearning<approximators::RBFNetwork>,
                               QLearning<approximators::Decoupled<approximators::RBFNetwork>>,
-                              FuzzyQLearning, VectorFuzzyQLearning, Sarsa>;
+                              FuzzyQLearning, VectorFuzzyQLearning, QLambda>;
 
 /// What one reader of such an agent needs.
 template <class Agents>
@@ -54,7 +54,7 @@ using AnyWorkspace = WorkspacesOf<AnyAgent>::type;
 using AnyApproximatorConfig =
     std::variant<approximators::SDNNCConfig, approximators::RBFNetworkConfig,
                  approximators::FuzzyRulesConfig, approximators::LinearSDNNConfig>;
-using AnyLearningConfig = std::variant<QLearningConfig, FuzzyQLearningConfig, SarsaConfig>;
+using AnyLearningConfig = std::variant<QLearningConfig, FuzzyQLearningConfig, QLambdaConfig>;
 
 /// Whether it is one of the two that learn by fuzzy rules.
 template <class Agent>
@@ -162,10 +162,10 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
                            std::size_t n_first = 0, bool codes_missing = false) {
   using namespace approximators;
   const bool fits = is_fuzzy(config)    ? std::holds_alternative<FuzzyQLearningConfig>(learning)
-                    : is_linear(config) ? std::holds_alternative<SarsaConfig>(learning)
+                    : is_linear(config) ? std::holds_alternative<QLambdaConfig>(learning)
                                         : std::holds_alternative<QLearningConfig>(learning);
   core::require(fits, "learning",
-                "FuzzyQLearningConfig with fuzzy rules, SarsaConfig with a linear readout, else "
+                "FuzzyQLearningConfig with fuzzy rules, QLambdaConfig with a linear readout, else "
                 "QLearningConfig",
                 "another one");
   core::require(tables.empty() || is_linear(config) || (is_sdnn(config) && n_actions.size() == 1),
@@ -182,8 +182,8 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
       if (!tables.empty()) return tables;
       return codes_missing ? code_books_with_missing(config, seed) : code_books_of(config, seed);
     };
-    return Sarsa(LinearSDNN(*linear, n_actions, books(), seed, tables.empty() ? n_first : 0),
-                 std::get<SarsaConfig>(learning), seed);
+    return QLambda(LinearSDNN(*linear, n_actions, books(), seed, tables.empty() ? n_first : 0),
+                   std::get<QLambdaConfig>(learning), seed);
   }
   const auto& rule = std::get<QLearningConfig>(learning);
   if (const auto* const rbf = std::get_if<RBFNetworkConfig>(&config)) {

@@ -475,9 +475,9 @@ class Controller : public WithRates<Controller> {
     latest_->forget();
     if (found == kept) return;
     observations_.keep(found);
-    auto before = std::move(std::get<Sarsa>(*agent_));
+    auto before = std::move(std::get<QLambda>(*agent_));
     fit();
-    std::get<Sarsa>(*agent_).continue_from(std::move(before));
+    std::get<QLambda>(*agent_).continue_from(std::move(before));
     identity_ = core::Identity();  // readers have workspaces for fewer inputs
   }
 
@@ -508,7 +508,7 @@ class Controller : public WithRates<Controller> {
                   next_mask);
     const auto size_in_window = scale.end_window();
     reward_scale_ = scale;
-    if (auto* const linear = std::get_if<Sarsa>(&*agent_); linear != nullptr && size_in_window) {
+    if (auto* const linear = std::get_if<QLambda>(&*agent_); linear != nullptr && size_in_window) {
       linear->refine_unit(*size_in_window, *scale.size());
     }
   }

@@ -3,8 +3,8 @@
 
 #include <array>
 
+#include "sdnn/agents/q_lambda_config.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
-#include "sdnn/agents/sarsa_config.hpp"
 #include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 
@@ -73,20 +73,20 @@ inline std::array<NamedPreset, 4> presets(int n_inputs) {
             small_preset(n_inputs)}}};
 }
 
-/// Settings of Sarsa with a linear readout that belong together.
-struct LinearPreset {
+/// Settings of Q(lambda) with a linear readout that belong together.
+struct QLambdaPreset {
   approximators::LinearSDNNConfig approximator = {};
-  SarsaConfig learning = {};
+  QLambdaConfig learning = {};
 };
-struct NamedLinearPreset {
+struct NamedQLambdaPreset {
   const char* name;
   const char* title;
-  LinearPreset preset;
+  QLambdaPreset preset;
 };
 
 /// The paper's rule and rates, one-step Q-learning with alpha 0.5, in the paper's task: 61 torques
 /// that share no units, and patterns of 200 units.
-inline LinearPreset paper_linear_preset(int n_inputs) {
+inline QLambdaPreset paper_q_lambda_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs,
                            .n_pattern_units = 200,
                            .n_actions = 61,
@@ -103,13 +103,13 @@ inline LinearPreset paper_linear_preset(int n_inputs) {
 }
 
 /// The defaults: for any task.
-inline LinearPreset general_linear_preset(int n_inputs) {
+inline QLambdaPreset general_q_lambda_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs}};
 }
 
-inline std::array<NamedLinearPreset, 2> linear_presets(int n_inputs) {
-  return {{{"paper", "the paper's rule, in the paper's task", paper_linear_preset(n_inputs)},
-           {"general", "as recommended for any task", general_linear_preset(n_inputs)}}};
+inline std::array<NamedQLambdaPreset, 2> q_lambda_presets(int n_inputs) {
+  return {{{"paper", "the paper's rule, in the paper's task", paper_q_lambda_preset(n_inputs)},
+           {"general", "as recommended for any task", general_q_lambda_preset(n_inputs)}}};
 }
 
 }  // namespace sdnn::agents

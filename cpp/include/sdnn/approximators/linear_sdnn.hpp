@@ -123,7 +123,7 @@ class LinearSDNN {
     std::vector<bool> live_;  ///< rows that are not all 0
   };
 
-  /// Rates of a step of learning; see SarsaConfig.
+  /// Rates of a step of learning; see QLambdaConfig.
   struct Step {
     std::int64_t error = 0;       ///< in units: what the trace is multiplied by
     std::int64_t correction = 0;  ///< in units: what the code is multiplied by

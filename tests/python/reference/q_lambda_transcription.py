@@ -1,4 +1,4 @@
-"""Sarsa(lambda) with a linear readout, written again in Python's integers, slowly and plainly."""
+"""Q(lambda) and Sarsa(lambda) with a linear readout, written again in Python's integers, slowly and plainly."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def clipped(x: int, limit: int) -> int:
     return max(-limit, min(limit, x))
 
 
-class Sarsa:
+class QLambda:
     """One environment; `code(state)` gives the code's -1, 0 and +1, shape (n_columns,)."""
 
     def __init__(self, code: Any, n_actions: list[int], window: int, learning: Any) -> None:

@@ -1,4 +1,4 @@
-/// The parameters of Sarsa(lambda) and Q(lambda).
+/// The parameters of Q(lambda) and Sarsa(lambda).
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ constexpr std::array<std::string_view, 2> words_of(TraceKind) noexcept {
 
 /// The agent's parameters; the defaults are those we recommend for any task. They were chosen with
 /// seeds from 1000 on; docs/evidence/benchmarks.md has the tasks.
-struct SarsaConfig {
+struct QLambdaConfig {
   double learning_rate = 1.0;
   double discount = 0.99;
   EpsilonGreedyConfig policy = {.epsilon = 0.05, .n_greedy_steps = 0};
@@ -49,30 +49,30 @@ struct SarsaConfig {
 
   static constexpr auto fields() noexcept {
     return std::tuple_cat(
-        learning_fields<SarsaConfig>(),
+        learning_fields<QLambdaConfig>(),
         std::tuple(
-            core::field("trace_decay", &SarsaConfig::trace_decay,
+            core::field("trace_decay", &QLambdaConfig::trace_decay,
                         "lambda: what remains of a trace after a step, beside the discount. 0: "
                         "one-step targets.",
                         core::within(0, 1)),
-            core::field("bootstrap", &SarsaConfig::bootstrap,
+            core::field("bootstrap", &QLambdaConfig::bootstrap,
                         "What targets bootstrap from: `sarsa`: the value of the next action; "
                         "`q_learning`: the best value, and traces end where a worse action is "
                         "taken (Watkins)."),
-            core::field("traces", &SarsaConfig::traces,
+            core::field("traces", &QLambdaConfig::traces,
                         "What a trace becomes in a state that returns: `dutch`: such that learning "
                         "equals the forward view at every step (true online), in one environment; "
                         "`replacing`: as if it were the first time, always so in several."),
             core::field(
-                "schedule_steps", &SarsaConfig::schedule_steps,
+                "schedule_steps", &QLambdaConfig::schedule_steps,
                 "Steps after which alpha and epsilon have gone half of the way to their "
                 "final values: after t steps they have gone t / (t + schedule_steps) of "
                 "it, whatever the planned end; epsilon goes to 0 by default, but stays where "
                 "observations are discrete alone. With 0 they follow the agent's progress.",
                 core::within(0, 1 << 30))),
-        schedule_fields<SarsaConfig>());
+        schedule_fields<QLambdaConfig>());
   }
-  bool operator==(const SarsaConfig&) const = default;
+  bool operator==(const QLambdaConfig&) const = default;
 };
 
 }  // namespace sdnn::agents

@@ -1,4 +1,4 @@
-"""Sarsa with a linear readout of the SDNN code, for any Gymnasium environment."""
+"""Q(lambda) with a linear readout of the SDNN code, for any Gymnasium environment."""
 
 from __future__ import annotations
 
@@ -6,15 +6,10 @@ from typing import Any
 
 from sdnn import _core
 from sdnn.agents.q_learning import CodedAgent, presets_of
-from sdnn.config import LinearSDNNConfig, SarsaConfig
-
-LINEAR_PRESETS = presets_of(
-    _core.linear_presets(), general={"angle_pairs": "find", "inputs": "relevant"}
-)
-"""Settings by name: ``"general"`` and ``"paper"``."""
+from sdnn.config import LinearSDNNConfig, QLambdaConfig
 
 
-class SDNNSarsa(CodedAgent[LinearSDNNConfig, SarsaConfig]):
+class SDNNQLambda(CodedAgent[LinearSDNNConfig, QLambdaConfig]):
     """An agent that learns Q(s, a) linear in the SDNN code, by true-online traces.
 
     Values have no range that must be chosen, nothing depends on a planned end of the training, and
@@ -34,29 +29,32 @@ class SDNNSarsa(CodedAgent[LinearSDNNConfig, SarsaConfig]):
         Inputs that matter later are added after 2, 4, 8, ... times ``warm_up_steps``.
     approximator : LinearSDNNConfig, optional
         ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces.
-    learning : SarsaConfig, optional
+    learning : QLambdaConfig, optional
     tables : sequence of array_like, shape (n_bins, n_pattern_units), optional
         Patterns for each input, of any coding; see `sdnn.approximators.SDNNC`.
     preset : {"general", "paper"}
         Settings where none are given: for any task, or the paper's rule in the paper's task; see
-        `sdnn.agents.LINEAR_PRESETS`.
+        `presets`.
 
     Examples
     --------
     >>> import gymnasium as gym
-    >>> from sdnn.agents import SDNNSarsa
+    >>> from sdnn.agents import SDNNQLambda
     >>> env = gym.make("CartPole-v1")
-    >>> agent = SDNNSarsa(env, seed=1)
+    >>> agent = SDNNQLambda(env, seed=1)
     >>> result = agent.train(env, steps=1500, seed=1)
     >>> agent.q_values(env.reset(seed=2)[0]).shape
     (2,)
     """
 
-    kind = "sdnn-linear"
+    kind = "q-lambda"
     narrows_ranges = True
     approximator_type = LinearSDNNConfig
-    learning_type = SarsaConfig
-    presets = LINEAR_PRESETS
+    learning_type = QLambdaConfig
+    presets = presets_of(
+        _core.q_lambda_presets(), general={"angle_pairs": "find", "inputs": "relevant"}
+    )
+    """Settings by name: ``"general"`` and ``"paper"``."""
 
     def learning_report(self) -> dict[str, Any]:
         """Return statistics of learning so far, to find settings that cannot work.

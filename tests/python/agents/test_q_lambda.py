@@ -1,4 +1,4 @@
-"""Sarsa with a linear readout: equal to its transcription, and what users meet."""
+"""Q(lambda) with a linear readout: equal to its transcription, and what users meet."""
 
 import copy
 
@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from sarsa_transcription import Sarsa
+from q_lambda_transcription import QLambda
 from sdnn import _core
-from sdnn.agents import RBFQLearning, SarsaConfig, SDNNSarsa, Transition, evaluate, load_agent
+from sdnn.agents import QLambdaConfig, RBFQLearning, SDNNQLambda, Transition, evaluate, load_agent
 from sdnn.approximators import LinearSDNNConfig
 
 SMALL = {
@@ -60,13 +60,13 @@ def test_weights_are_those_of_the_transcription(
         "epsilon": 0.0,
         "final_epsilon": 0.0,
     }
-    agent = _core.Sarsa(
+    agent = _core.QLambda(
         approximator=LinearSDNNConfig(**SMALL, action_window=window),
         n_actions=n_actions,
-        learning=SarsaConfig(**learning),
+        learning=QLambdaConfig(**learning),
         seed=seed,
     )
-    slow = Sarsa(agent.action_value.code, n_actions, window, {**learning, "n_inputs": 2})
+    slow = QLambda(agent.action_value.code, n_actions, window, {**learning, "n_inputs": 2})
     for state, action, reward, next_state, end in life(seed, 25, n_actions, scale):
         # Acting keeps sums for learning.
         assert slow.value(state, agent.act(state)) == slow.best_value(state)
@@ -79,10 +79,10 @@ def test_weights_are_those_of_the_transcription(
 
 
 def test_a_full_step_corrects_the_whole_error_of_a_new_state():
-    agent = _core.Sarsa(
+    agent = _core.QLambda(
         approximator=LinearSDNNConfig(n_inputs=2, n_actions=3),
         n_actions=[3],
-        learning=SarsaConfig(learning_rate=1.0, final_learning_rate=1.0),
+        learning=QLambdaConfig(learning_rate=1.0, final_learning_rate=1.0),
         seed=1,
     )
     agent.learn([0.3, 0.7], [1], 5.0, [0.4, 0.7], True)
@@ -92,7 +92,7 @@ def test_a_full_step_corrects_the_whole_error_of_a_new_state():
 
 def test_listed_states_have_a_table(tmp_path):
     space = gym.spaces.Discrete(5, start=3)
-    agent = SDNNSarsa(space, gym.spaces.Discrete(2), seed=1)
+    agent = SDNNQLambda(space, gym.spaces.Discrete(2), seed=1)
     for state, reward in ((3, 2.0), (7, -5.0)):
         agent.learn(Transition(state, 1, reward, 4, terminated=True))
     agent.save(tmp_path / "agent.safetensors")
@@ -107,8 +107,8 @@ def test_listed_states_have_a_table(tmp_path):
     [("lowest", 0.0, 3), ("lowest", 0.25, 1), ("middle", 0.25, 2), ("lowest", 0.35, 0)],
 )
 def test_values_within_the_tolerance_tie(tie_rule, tie_tolerance, expected):
-    learning = SarsaConfig(epsilon=0.0, tie_rule=tie_rule, tie_tolerance=tie_tolerance)
-    agent = SDNNSarsa(gym.spaces.Discrete(2), gym.spaces.Discrete(4), learning=learning)
+    learning = QLambdaConfig(epsilon=0.0, tie_rule=tie_rule, tie_tolerance=tie_tolerance)
+    agent = SDNNQLambda(gym.spaces.Discrete(2), gym.spaces.Discrete(4), learning=learning)
     for action, reward in enumerate([0.7, 0.8, 0.9, 1.0]):
         agent.learn(Transition(0, action, reward, 1, terminated=True))
     np.testing.assert_allclose(agent.q_values(0), [0.7, 0.8, 0.9, 1.0], atol=0.01)
@@ -117,7 +117,7 @@ def test_values_within_the_tolerance_tie(tie_rule, tie_tolerance, expected):
 
 @pytest.mark.parametrize(("n_states", "n_units"), [(1, 0), (2000, 0), (5, 40)])
 def test_too_many_states_or_given_units_have_patterns(n_states, n_units):
-    agent = SDNNSarsa(
+    agent = SDNNQLambda(
         gym.spaces.Discrete(n_states), gym.spaces.Discrete(2), seed=1,
         approximator=LinearSDNNConfig(n_pattern_units=n_units),
     )  # fmt: skip
@@ -131,15 +131,15 @@ def test_too_many_states_or_given_units_have_patterns(n_states, n_units):
 )
 def test_units_are_enough_for_patterns_to_differ_but_fewer_where_inputs_are_many(n_inputs, n_units):
     space = gym.spaces.Box(-1.0, 1.0, (n_inputs,), np.float64)
-    agent = SDNNSarsa(space, gym.spaces.Discrete(2), inputs="all", angle_pairs="none")
+    agent = SDNNQLambda(space, gym.spaces.Discrete(2), inputs="all", angle_pairs="none")
     assert agent.approximator.n_pattern_units == n_units
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])
 def test_the_scale_of_rewards_changes_nothing_but_the_scale_of_values(scale):
     def values(scale):
-        agent = _core.Sarsa(
-            approximator=LinearSDNNConfig(**SMALL), n_actions=[3], learning=SarsaConfig(), seed=1
+        agent = _core.QLambda(
+            approximator=LinearSDNNConfig(**SMALL), n_actions=[3], learning=QLambdaConfig(), seed=1
         )
         for state, action, reward, next_state, end in life(3, 200, [3], 2.0):
             agent.learn(state, action, reward * scale, next_state, end == "terminal")
@@ -150,10 +150,10 @@ def test_the_scale_of_rewards_changes_nothing_but_the_scale_of_values(scale):
 
 
 def test_one_enormous_reward_costs_resolution_and_nothing_else():
-    agent = _core.Sarsa(
+    agent = _core.QLambda(
         approximator=LinearSDNNConfig(n_inputs=2),
         n_actions=[2],
-        learning=SarsaConfig(final_learning_rate=1.0, trace_decay=0.0),
+        learning=QLambdaConfig(final_learning_rate=1.0, trace_decay=0.0),
         seed=1,
     )
     agent.learn([0.1, 0.1], [0], -1e6, [0.2, 0.1], True)
@@ -167,14 +167,14 @@ def test_a_saved_agent_continues_to_the_same_bits(tmp_path, learned):
     env = gym.make("CartPole-v1")
 
     def agent_of(steps):
-        agent = SDNNSarsa(env.observation_space, env.action_space, seed=3, warm_up_steps=50)
+        agent = SDNNQLambda(env.observation_space, env.action_space, seed=3, warm_up_steps=50)
         agent.train(env, steps=steps, seed=5)
         return agent
 
     agent = (
         agent_of(learned)
         if learned
-        else SDNNSarsa(env.observation_space, env.action_space, seed=3, warm_up_steps=50)
+        else SDNNQLambda(env.observation_space, env.action_space, seed=3, warm_up_steps=50)
     )
     agent.save(tmp_path / "agent.safetensors")
     loaded = load_agent(tmp_path / "agent.safetensors")
@@ -195,7 +195,7 @@ def test_a_saved_agent_continues_to_the_same_bits(tmp_path, learned):
 
 def test_cartpole_is_learned_in_a_few_thousand_steps():
     env = gym.make("CartPole-v1")
-    agent = SDNNSarsa(env.observation_space, env.action_space, seed=1)
+    agent = SDNNQLambda(env.observation_space, env.action_space, seed=1)
     agent.train(env, steps=20_000, seed=1)
     assert evaluate(agent, gym.make("CartPole-v1"), episodes=10, seed=7).mean_return > 300
 
@@ -214,7 +214,7 @@ def test_every_space_of_actions(space):
     observations = gym.spaces.Dict(
         {"x": gym.spaces.Box(-1.0, 1.0, (1,)), "k": gym.spaces.Discrete(3)}
     )
-    agent = SDNNSarsa(observations, space, approximator=LinearSDNNConfig(action_window=2))
+    agent = SDNNQLambda(observations, space, approximator=LinearSDNNConfig(action_window=2))
     observations.seed(1)
     observation = observations.sample()
     for step in range(60):
@@ -237,13 +237,13 @@ def test_every_space_of_actions(space):
     ],
 )
 def test_a_warm_up_is_only_where_there_is_a_choice(space, is_searched):
-    assert SDNNSarsa(space, gym.spaces.Discrete(2)).is_warming_up == is_searched
-    assert not SDNNSarsa(space, gym.spaces.Discrete(2), preset="paper").is_warming_up
+    assert SDNNQLambda(space, gym.spaces.Discrete(2)).is_warming_up == is_searched
+    assert not SDNNQLambda(space, gym.spaces.Discrete(2), preset="paper").is_warming_up
 
 
 def test_angles_are_found_by_default():
     env = gym.make("Pendulum-v1")
-    agent = SDNNSarsa(env.observation_space, env.action_space, seed=1)
+    agent = SDNNQLambda(env.observation_space, env.action_space, seed=1)
     agent.train(env, steps=1001, seed=1)
     assert agent.inputs == [("angle", [0, 1]), ("variable", [2])]
 
@@ -264,7 +264,7 @@ def changing_task(seed, n_steps):
 @pytest.mark.parametrize("inputs", [[2], [1, 3]])
 def test_inputs_that_matter_later_are_added(inputs, tmp_path):
     unit, three = gym.spaces.Box(0.0, 1.0, (5,), np.float64), gym.spaces.Discrete(3)
-    agent = SDNNSarsa(unit, three, angle_pairs="none", inputs=inputs, warm_up_steps=400, seed=2)
+    agent = SDNNQLambda(unit, three, angle_pairs="none", inputs=inputs, warm_up_steps=400, seed=2)
     same = copy.deepcopy(agent)
     numbers = []
     for t, transition in enumerate(changing_task(1, 1700)):
@@ -301,7 +301,7 @@ def test_a_network_keeps_the_inputs_of_its_warm_up():
 
 
 def test_a_glitch_of_the_reward_is_not_learned_and_the_unit_is_reported():
-    agent, same = (SDNNSarsa(gym.spaces.Discrete(2), gym.spaces.Discrete(2)) for _ in range(2))
+    agent, same = (SDNNQLambda(gym.spaces.Discrete(2), gym.spaces.Discrete(2)) for _ in range(2))
     assert agent.learning_report()["value_unit"] is None
     for step in range(3000):
         if step == 1000:

@@ -1,4 +1,4 @@
-#include "sdnn/agents/sarsa.hpp"
+#include "sdnn/agents/q_lambda.hpp"
 
 #include <gtest/gtest.h>
 
@@ -21,8 +21,8 @@ using approximators::LinearSDNN;
 using approximators::LinearSDNNConfig;
 using State = std::vector<double>;
 
-Sarsa agent_of(const SarsaConfig& config, std::vector<std::size_t> n_actions = {3}, int window = 1,
-               std::uint64_t seed = 1) {
+QLambda agent_of(const QLambdaConfig& config, std::vector<std::size_t> n_actions = {3},
+                 int window = 1, std::uint64_t seed = 1) {
   return {
       LinearSDNN(
           {.n_inputs = 2, .n_pattern_units = 40, .action_window = window, .averaging_interval = 3},
@@ -30,13 +30,13 @@ Sarsa agent_of(const SarsaConfig& config, std::vector<std::size_t> n_actions = {
       config, seed};
 }
 
-double q(const Sarsa& agent, const State& state, std::size_t action) {
+double q(const QLambda& agent, const State& state, std::size_t action) {
   auto workspace = agent.workspace();
   return agent.values(state, workspace)[action];
 }
 
 /// Steps of a random walk, in `n_environments` in turn.
-void live(Sarsa& agent, int n_steps, std::uint64_t seed) {
+void live(QLambda& agent, int n_steps, std::uint64_t seed) {
   core::Random random(seed, core::Stream::useless_inputs);
   State state{random.uniform(), random.uniform()};
   for (int step = 0; step < n_steps; ++step) {
@@ -50,12 +50,12 @@ void live(Sarsa& agent, int n_steps, std::uint64_t seed) {
 }
 
 // gamma = 1/2, alpha = 1, no trace: the value of what follows halves.
-TEST(Sarsa, OneStepTargetsByHand) {
-  Sarsa agent = agent_of({.learning_rate = 1.0,
-                          .discount = 0.5,
-                          .trace_decay = 0.0,
-                          .bootstrap = Bootstrap::sarsa,
-                          .final_learning_rate = {}});
+TEST(QLambda, OneStepTargetsByHand) {
+  QLambda agent = agent_of({.learning_rate = 1.0,
+                            .discount = 0.5,
+                            .trace_decay = 0.0,
+                            .bootstrap = Bootstrap::sarsa,
+                            .final_learning_rate = {}});
   const State a{0.1, 0.1}, b{0.9, 0.9};
   agent.learn(b, {2}, 8.0, b, true);
   EXPECT_NEAR(q(agent, b, 2), 8.0, 1e-3);
@@ -65,11 +65,11 @@ TEST(Sarsa, OneStepTargetsByHand) {
   EXPECT_NEAR(q(agent, a, 0), 5.0, 0.5);
 }
 
-TEST(Sarsa, ALimitBootstrapsFromTheBestValueATerminalStateDoesNot) {
-  const SarsaConfig config{.discount = 1.0, .trace_decay = 0.0, .final_learning_rate = {}};
+TEST(QLambda, ALimitBootstrapsFromTheBestValueATerminalStateDoesNot) {
+  const QLambdaConfig config{.discount = 1.0, .trace_decay = 0.0, .final_learning_rate = {}};
   const State a{0.1, 0.1}, b{0.9, 0.9};
   for (const bool terminated : {false, true}) {
-    Sarsa agent = agent_of(config);
+    QLambda agent = agent_of(config);
     agent.learn(b, {1}, 4.0, b, true);
     agent.learn(a, {0}, 1.0, b, terminated);
     agent.begin_episode();
@@ -77,10 +77,10 @@ TEST(Sarsa, ALimitBootstrapsFromTheBestValueATerminalStateDoesNot) {
   }
 }
 
-TEST(Sarsa, ATraceCarriesARewardBack) {
+TEST(QLambda, ATraceCarriesARewardBack) {
   const State a{0.1, 0.1}, b{0.5, 0.5}, c{0.9, 0.9};
   const auto value_of_first = [&](double trace_decay) {
-    Sarsa agent = agent_of({.trace_decay = trace_decay, .final_learning_rate = {}});
+    QLambda agent = agent_of({.trace_decay = trace_decay, .final_learning_rate = {}});
     agent.learn(a, {0}, 0.0, b, false);
     agent.learn(b, {1}, 0.0, c, false);
     agent.learn(c, {2}, 1.0, c, true);
@@ -90,12 +90,12 @@ TEST(Sarsa, ATraceCarriesARewardBack) {
   EXPECT_NEAR(value_of_first(0.9), 0.99 * 0.99 * 0.9 * 0.9, 0.15);
 }
 
-TEST(Sarsa, RatesHaveGoneHalfOfTheWayAfterScheduleSteps) {
-  Sarsa agent = agent_of({.learning_rate = 1.0,
-                          .policy = {.epsilon = 0.5, .n_greedy_steps = 0},
-                          .schedule_steps = 100,
-                          .final_learning_rate = 0.5,
-                          .final_epsilon = 0.25});
+TEST(QLambda, RatesHaveGoneHalfOfTheWayAfterScheduleSteps) {
+  QLambda agent = agent_of({.learning_rate = 1.0,
+                            .policy = {.epsilon = 0.5, .n_greedy_steps = 0},
+                            .schedule_steps = 100,
+                            .final_learning_rate = 0.5,
+                            .final_epsilon = 0.25});
   EXPECT_EQ(agent.learning_rate(), 1.0);
   live(agent, 100, 1);
   EXPECT_EQ(agent.learning_rate(), 0.75);
@@ -106,7 +106,7 @@ TEST(Sarsa, RatesHaveGoneHalfOfTheWayAfterScheduleSteps) {
   EXPECT_EQ(agent.learning_rate(), 0.75);
 }
 
-SarsaConfig with_tolerance(double tolerance) {
+QLambdaConfig with_tolerance(double tolerance) {
   return {.policy = {.epsilon = 0.0,
                      .n_greedy_steps = 0,
                      .tie_rule = TieRule::lowest,
@@ -115,10 +115,10 @@ SarsaConfig with_tolerance(double tolerance) {
 }
 
 // Rewards of 1 and 0.8 tie within 0.25, of 1 and 0.7 do not, whatever a unit of values is.
-TEST(Sarsa, TheToleranceOfTiesIsInValues) {
+TEST(QLambda, TheToleranceOfTiesIsInValues) {
   const State a{0.1, 0.1};
   for (const double scale : {1.0, 1e-300, 1e250}) {
-    Sarsa agent = agent_of(with_tolerance(0.25 * scale));
+    QLambda agent = agent_of(with_tolerance(0.25 * scale));
     const auto first_after = [&](double reward) {
       agent.learn(a, {0}, reward * scale, a, true);
       EXPECT_NEAR(q(agent, a, 0) / scale, reward, 0.01);
@@ -138,15 +138,15 @@ TEST(Sarsa, TheToleranceOfTiesIsInValues) {
   }
 }
 
-TEST(Sarsa, ActionsThatAreNotAllowedNeverTie) {
+TEST(QLambda, ActionsThatAreNotAllowedNeverTie) {
   const State a{0.1, 0.1};
-  Sarsa agent = agent_of(with_tolerance(1e308));
+  QLambda agent = agent_of(with_tolerance(1e308));
   agent.learn(a, {2}, 1e-300, a, true);
   EXPECT_EQ(agent.act(a, true, 0, std::vector<std::uint8_t>{0, 1, 1}).front(), 1U);
 }
 
-TEST(Sarsa, RefusesMasksThatDoNotFit) {
-  Sarsa agent = agent_of({}, {3, 2});
+TEST(QLambda, RefusesMasksThatDoNotFit) {
+  QLambda agent = agent_of({}, {3, 2});
   auto workspace = agent.workspace();
   core::Random ties(1, core::Stream::ties);
   const State state{0.25, 0.75};
@@ -162,29 +162,30 @@ TEST(Sarsa, RefusesMasksThatDoNotFit) {
   EXPECT_EQ(agent.best_action(state, workspace, ties, only), (std::vector<std::size_t>{2, 0}));
 }
 
-TEST(Sarsa, EpsilonGoesToZeroButStaysWhereStatesAreSymbolsAlone) {
-  const SarsaConfig config{.policy = {.epsilon = 0.5, .n_greedy_steps = 0}, .schedule_steps = 100};
+TEST(QLambda, EpsilonGoesToZeroButStaysWhereStatesAreSymbolsAlone) {
+  const QLambdaConfig config{.policy = {.epsilon = 0.5, .n_greedy_steps = 0},
+                             .schedule_steps = 100};
   EXPECT_EQ(agent_of(config).final_epsilon(), 0.0);
   const std::vector<std::size_t> n_actions{3};
-  const auto with_symbols = [&](std::vector<int> n_symbols, SarsaConfig learning) {
-    return Sarsa(LinearSDNN({.n_inputs = 2, .n_symbols = std::move(n_symbols)}, n_actions, 1),
-                 learning, 1);
+  const auto with_symbols = [&](std::vector<int> n_symbols, QLambdaConfig learning) {
+    return QLambda(LinearSDNN({.n_inputs = 2, .n_symbols = std::move(n_symbols)}, n_actions, 1),
+                   learning, 1);
   };
   EXPECT_EQ(with_symbols({4, 0}, config).final_epsilon(), 0.0);
-  Sarsa agent = with_symbols({4, 3}, config);
+  QLambda agent = with_symbols({4, 3}, config);
   EXPECT_EQ(agent.final_epsilon(), 0.5);
   live(agent, 100, 1);
   EXPECT_EQ(agent.epsilon(), 0.5);
-  SarsaConfig given = config;
+  QLambdaConfig given = config;
   given.final_epsilon = 0.25;
   EXPECT_EQ(with_symbols({4, 3}, given).final_epsilon(), 0.25);
 }
 
-TEST(Sarsa, LearnsTheSameOnEveryInstructionSet) {
+TEST(QLambda, LearnsTheSameOnEveryInstructionSet) {
   for (const auto traces : {TraceKind::dutch, TraceKind::replacing}) {
     std::vector<std::vector<std::int32_t>> learned;
     testing::on_every_instruction_set([&](auto) {
-      Sarsa agent = agent_of({.traces = traces}, {5, 2}, 2);
+      QLambda agent = agent_of({.traces = traces}, {5, 2}, 2);
       live(agent, 300, 2);
       const auto weights = agent.action_value().weights();
       learned.emplace_back(weights.begin(), weights.end());
@@ -193,11 +194,11 @@ TEST(Sarsa, LearnsTheSameOnEveryInstructionSet) {
   }
 }
 
-TEST(Sarsa, ItsStateResumesExactly) {
+TEST(QLambda, ItsStateResumesExactly) {
   for (const int n_steps : {0, 1, 57, 200}) {
-    Sarsa agent = agent_of({.max_action_repeat = 5}, {3, 2}, 3);
+    QLambda agent = agent_of({.max_action_repeat = 5}, {3, 2}, 3);
     live(agent, n_steps, 3);
-    Sarsa other = agent_of({.max_action_repeat = 5}, {3, 2}, 3);
+    QLambda other = agent_of({.max_action_repeat = 5}, {3, 2}, 3);
     core::restore(other, core::state_of(agent));
     EXPECT_EQ(core::state_of(other), core::state_of(agent));
     live(agent, 100, 4);
@@ -207,14 +208,14 @@ TEST(Sarsa, ItsStateResumesExactly) {
 }
 
 /// Steps that the longest one lasted after so many ends.
-int longest_action(Sarsa agent, int n_ended) {
+int longest_action(QLambda agent, int n_ended) {
   const State state{0.5, 0.5};
   for (int i = 0; i < n_ended; ++i) agent.learn(state, {0, 0}, 0.0, state, true);
   agent.set_epsilon(1.0);
-  Sarsa::Action last;
+  QLambda::Action last;
   int longest = 0, n = 0;
   for (int i = 0; i < 5000; ++i) {
-    const Sarsa::Action action = agent.act(state);
+    const QLambda::Action action = agent.act(state);
     n = action == last ? n + 1 : 1;  // the next one is another
     last = action;
     longest = std::max(longest, n);
@@ -222,7 +223,7 @@ int longest_action(Sarsa agent, int n_ended) {
   return longest;
 }
 
-TEST(Sarsa, EndsMakeRandomActionsShorter) {
+TEST(QLambda, EndsMakeRandomActionsShorter) {
   const std::vector<std::size_t> many{250, 250};
   const auto agent = [&](int longest) { return agent_of({.max_action_repeat = longest}, many); };
   EXPECT_EQ(longest_action(agent(100), 0), 100);
@@ -231,7 +232,7 @@ TEST(Sarsa, EndsMakeRandomActionsShorter) {
   EXPECT_EQ(longest_action(agent(100), 7), 5);
   EXPECT_EQ(longest_action(agent(100), 40), 5);
   EXPECT_EQ(longest_action(agent(3), 7), 3);
-  Sarsa ended = agent(100);
+  QLambda ended = agent(100);
   for (int i = 0; i < 40; ++i) ended.learn({{0.5, 0.5}}, {0, 0}, 0.0, {{0.5, 0.5}}, true);
   const core::State good = core::state_of(ended);
   for (const int bad : {-1, 21}) {
@@ -240,8 +241,8 @@ TEST(Sarsa, EndsMakeRandomActionsShorter) {
   }
 }
 
-TEST(Sarsa, EnvironmentsHaveTracesOfTheirOwn) {
-  Sarsa together = agent_of({});
+TEST(QLambda, EnvironmentsHaveTracesOfTheirOwn) {
+  QLambda together = agent_of({});
   together.set_n_environments(2);
   const State a{0.1, 0.1}, b{0.5, 0.5};
   together.learn(a, {0}, 0.0, b, false, 0);
@@ -251,9 +252,9 @@ TEST(Sarsa, EnvironmentsHaveTracesOfTheirOwn) {
   EXPECT_THROW(together.learn(a, {0}, 0.0, b, false, 1), std::invalid_argument);
 }
 
-TEST(Sarsa, TracesAreReplacingInSeveralEnvironments) {
+TEST(QLambda, TracesAreReplacingInSeveralEnvironments) {
   const auto state_after = [](TraceKind traces, std::size_t n_environments) {
-    Sarsa agent = agent_of({.traces = traces});
+    QLambda agent = agent_of({.traces = traces});
     agent.set_n_environments(n_environments);
     core::Random random(1, core::Stream::useless_inputs);
     State state{0.5, 0.5};
@@ -268,8 +269,8 @@ TEST(Sarsa, TracesAreReplacingInSeveralEnvironments) {
   EXPECT_NE(state_after(TraceKind::dutch, 1), state_after(TraceKind::replacing, 1));
 }
 
-TEST(Sarsa, RefusesWhatCannotBeLearnedAndLearnsNothing) {
-  Sarsa agent = agent_of({});
+TEST(QLambda, RefusesWhatCannotBeLearnedAndLearnsNothing) {
+  QLambda agent = agent_of({});
   const State a{0.1, 0.1};
   const core::State before = core::state_of(agent);
   EXPECT_THROW(agent.learn({{0.1}}, {0}, 0.0, a, false), std::invalid_argument);

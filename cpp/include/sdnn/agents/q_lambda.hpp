@@ -1,4 +1,4 @@
-/// Sarsa(lambda) and Q(lambda) with a linear readout of the SDNN code, in integers.
+/// Q(lambda) and Sarsa(lambda) with a linear readout of the SDNN code, in integers.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 #include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/exploration.hpp"
-#include "sdnn/agents/sarsa_config.hpp"
+#include "sdnn/agents/q_lambda_config.hpp"
 #include "sdnn/agents/schedule_config.hpp"
 #include "sdnn/approximators/detail/linear_rows.hpp"
 #include "sdnn/approximators/linear_sdnn.hpp"
@@ -52,7 +52,7 @@ namespace sdnn::agents {
 /// An agent may learn in several environments at once, numbered from 0: each has a trace of its
 /// own, a replacing one where there are several: Q - Q_old would hold what the others corrected,
 /// and dutch traces would carry it further.
-class Sarsa : public WithRates<Sarsa> {
+class QLambda : public WithRates<QLambda> {
  public:
   using Readout = approximators::LinearSDNN;
   using Action = std::vector<std::size_t>;
@@ -65,7 +65,7 @@ class Sarsa : public WithRates<Sarsa> {
   };
 
   /// Throws std::invalid_argument naming the field that is out of range.
-  Sarsa(Readout action_value, const SarsaConfig& config, std::uint64_t seed)
+  QLambda(Readout action_value, const QLambdaConfig& config, std::uint64_t seed)
       : config_(checked_schedule(config)),
         action_value_(std::move(action_value)),
         exploration_(config, seed),
@@ -74,7 +74,7 @@ class Sarsa : public WithRates<Sarsa> {
     apply_rates();
   }
 
-  const SarsaConfig& config() const noexcept { return config_; }
+  const QLambdaConfig& config() const noexcept { return config_; }
   Readout& action_value() noexcept { return action_value_; }
   const Readout& action_value() const noexcept { return action_value_; }
 
@@ -232,7 +232,7 @@ class Sarsa : public WithRates<Sarsa> {
 
   /// Takes over what an agent with fewer inputs has learned; see LinearSDNN. In each environment
   /// the transition that waits is learned, and the trace ends.
-  void continue_from(Sarsa fewer) {
+  void continue_from(QLambda fewer) {
     for (std::size_t i = 0; i < fewer.n_environments(); ++i) {
       if (fewer.episodes_.of(i).waits) fewer.finish_at_end(fewer.episodes_.of(i));
     }
@@ -252,7 +252,7 @@ class Sarsa : public WithRates<Sarsa> {
   static void serialize(Self& self, Archive& archive) {
     archive.part("action_value", self.action_value_);
     Exploration::serialize(self.exploration_, archive);
-    Sarsa::serialize_rates(self, archive);
+    QLambda::serialize_rates(self, archive);
     archive.number("n_learned", self.n_learned_);
     Episodes<Episode>::serialize(
         self.episodes_, archive, [&self] { return self.new_episode(); },
@@ -265,7 +265,7 @@ class Sarsa : public WithRates<Sarsa> {
   }
 
  private:
-  friend class WithRates<Sarsa>;
+  friend class WithRates<QLambda>;
 
   static constexpr double kLargestReward = 1e300;
   static constexpr double kMostTolerance = 0x1p62;  ///< in units: above any difference of values
@@ -510,7 +510,7 @@ class Sarsa : public WithRates<Sarsa> {
                                           .is_dutch = is_dutch}));
   }
 
-  SarsaConfig config_;
+  QLambdaConfig config_;
   Readout action_value_;
   Exploration exploration_;
   std::int64_t n_learned_ = 0;
