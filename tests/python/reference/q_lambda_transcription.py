@@ -1,4 +1,4 @@
-"""Q(lambda) and Sarsa(lambda) with a linear readout, written again in Python's integers, slowly and plainly."""
+"""Q(lambda) and Sarsa(lambda) with a linear readout, again in integers of Python, slowly."""
 
 from __future__ import annotations
 
