@@ -4,6 +4,7 @@ A life trains through the warm-up and all choices of inputs, is saved and loaded
 both agents continue alike.
 """
 
+import re
 import warnings
 from pathlib import Path
 
@@ -173,10 +174,11 @@ def live(agent, env, warm_up_steps, n_steps):
             same.save("other.safetensors")
             if Path("one.safetensors").read_bytes() != Path("other.safetensors").read_bytes():
                 return "files of an agent and of the loaded one differ"
-    state = {k: x for k, x in agent._controller.state().items() if not k.startswith("readings.")}
     if agent._controller.is_warming_up:
         return "the warm-up does not end"
-    numbers = [values for values in state.values() if values.dtype.kind == "f"]
+    state = agent._controller.state().items()
+    learned = (values for name, values in state if not re.search("^readings|observations$", name))
+    numbers = [values for values in learned if values.dtype.kind == "f"]
     return "" if all(np.isfinite(values).all() for values in numbers) else "values are not finite"
 
 
