@@ -15,8 +15,8 @@ from measured import measure_missing, measured, options
 from sdnn import _core
 from sdnn.approximators import SDNNCConfig
 from sdnn.benchmarks.measurements import Effort, in_turns, measure_decisions, spread
-from sdnn.files import write_whole
-from sdnn.plots import png_bytes
+from sdnn.reports.plots import png_bytes
+from sdnn.support.files import write_whole
 
 KIND = "cost of inputs"
 N_INPUTS = range(2, 11)

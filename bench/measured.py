@@ -31,7 +31,6 @@ from packed_store import pack, unpack
 from rich.console import Console
 
 import sdnn
-from sdnn.files import write_whole
 from sdnn.runs.engine import (
     Advanced,
     Executor,
@@ -42,6 +41,7 @@ from sdnn.runs.engine import (
     run_trials,
 )
 from sdnn.runs.store import STORE_NAME, ResultStore
+from sdnn.support.files import write_whole
 
 EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
 PACKED = "benchmarks.npz.xz"

@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.files import write_whole
 from sdnn.runs.errors import StoreError
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows
+from sdnn.support.files import write_whole
 
 FIELDS = ("key", "config", "version", "n_decisions", "seconds", "finished_at")
 COUNTERS = ("number", "part", "episode", "step", "environment")

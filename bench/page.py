@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sdnn.files import write_whole
-from sdnn.statistics import Estimate
+from sdnn.reports.statistics import Estimate
+from sdnn.support.files import write_whole
 
 END = "<!-- end of table -->"
 

@@ -17,7 +17,7 @@ from typing import Any
 from page import markdown, show
 
 from sdnn.benchmarks.report import describe_run, tables, time_words
-from sdnn.pages import Table
+from sdnn.reports.pages import Table
 
 EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
 PAGE = EVIDENCE / "performance.md"

@@ -15,8 +15,8 @@ from measured import options
 from page import markdown
 from studies import Curves, curves, run_study
 
+from sdnn.reports.statistics import estimate_median
 from sdnn.runs.study_file import StudyFile
-from sdnn.statistics import estimate_median
 
 KIND = "vector environments"
 STUDY = Path(__file__).with_suffix(".toml")

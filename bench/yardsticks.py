@@ -31,7 +31,7 @@ from sdnn.benchmarks.measurements import (  # noqa: E402
     run_benchmarks,
     spread,
 )
-from sdnn.machine import available_instruction_sets  # noqa: E402
+from sdnn.support.machine import available_instruction_sets  # noqa: E402
 
 CACHE_FOLDER = Path("/sys/devices/system/cpu/cpu0/cache")
 MULTIPLES = {"K": 2**10, "M": 2**20, "G": 2**30}

@@ -22,7 +22,7 @@ from sklearn.svm import SVC, SVR
 
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import RandomInverse
-from sdnn.kernel import AnalyticKernel
+from sdnn.coding.kernel import AnalyticKernel
 
 INNER_FOLDS = 3
 

@@ -30,8 +30,8 @@ from sklearn.model_selection import RepeatedKFold, RepeatedStratifiedKFold
 
 from sdnn import SDNNRegressor, _core
 from sdnn.coding import RandomInverse
-from sdnn.files import write_whole
-from sdnn.plots import png_bytes
+from sdnn.reports.plots import png_bytes
+from sdnn.support.files import write_whole
 
 ONCE = (
     "kernel ridge, analytic SDNN kernel", "SVR (RBF)", "Gaussian process (Matern 3/2)",

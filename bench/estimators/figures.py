@@ -10,8 +10,7 @@ from demonstration import BLANKS, N_TRAINING, errors, lattice, target, training_
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from sdnn import kernel
-from sdnn.coding import Anchor, Circular, RandomInverse
+from sdnn.coding import Anchor, Circular, RandomInverse, kernel
 
 COLORS = {
     "SDNN (ours)": ("#1f5a96", "o"),

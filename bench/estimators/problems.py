@@ -52,8 +52,8 @@ from sklearn.neural_network import MLPClassifier, MLPRegressor
 from sklearn.svm import SVC, SVR
 
 from sdnn import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
-from sdnn.files import write_whole
-from sdnn.plots import png_bytes
+from sdnn.reports.plots import png_bytes
+from sdnn.support.files import write_whole
 
 KIND = "problems"
 N_TRAINING = 500

@@ -29,8 +29,8 @@ from stream_data import CLASSIFICATION, REGRESSION, samples
 
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.estimators.river import RiverClassifier, RiverRegressor
-from sdnn.files import write_whole
-from sdnn.plots import png_bytes
+from sdnn.reports.plots import png_bytes
+from sdnn.support.files import write_whole
 
 KIND = "streams"
 N_WINDOWS = 20

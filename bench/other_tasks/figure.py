@@ -8,10 +8,10 @@ import numpy as np
 from studies import Curves
 from tasks import TASKS
 
-from sdnn.files import write_whole
-from sdnn.plots import png_bytes
+from sdnn.reports.plots import png_bytes
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.study import Study
+from sdnn.support.files import write_whole
 
 
 def draw(study: Study, found: Curves, path: Path) -> None:

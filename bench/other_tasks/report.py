@@ -11,8 +11,8 @@ from page import interval, markdown
 from studies import Curves
 from tasks import GOALS, TASKS, parts_of
 
+from sdnn.reports.statistics import estimate_median
 from sdnn.runs.study import Study
-from sdnn.statistics import estimate_median
 
 OURS = "q-lambda"
 STEPS = (10_000, 20_000, 50_000, 100_000, 200_000)

@@ -87,7 +87,7 @@ class ArgumentTypeError : public core::ArgumentError {
 
 /// The representation of any value, for a message.
 inline std::string shown(pybind11::handle value) {
-  return pybind11::module_::import("sdnn.arguments").attr("shown")(value).cast<std::string>();
+  return pybind11::module_::import("sdnn.support.arguments").attr("shown")(value).cast<std::string>();
 }
 
 /// Whether it is True or False, of Python or NumPy.

@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from sdnn.agents.registry import title_of
-from sdnn.files import write_whole
-from sdnn.plots import png_bytes
+from sdnn.reports.plots import png_bytes
 from sdnn.reproduction.report import ClaimStudy
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.results import SHARE_STABLE, final_share_solved
 from sdnn.runs.store import ResultStore
 from sdnn.runs.study import Study
+from sdnn.support.files import write_whole
 
 STUDY = Path(__file__).with_name("noise-surface.toml")
 

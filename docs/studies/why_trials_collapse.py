@@ -20,12 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.files import write_whole
 from sdnn.reproduction.cases import EXPERIMENTS
 from sdnn.reproduction.reproduce import case_spec
 from sdnn.runs.engine import trial_seed
 from sdnn.runs.results import episode_of_collapse
 from sdnn.runs.spec import RunSpec
+from sdnn.support.files import write_whole
 
 CASE = next(case for case in EXPERIMENTS[1].cases if case.id == "s4-noise")
 N_TRIALS = 10
@@ -379,7 +379,7 @@ def table(kept: Kept, n_trials: int) -> Iterator[str]:
 
 def main() -> None:
     """Measure and draw."""
-    from sdnn.plots import png_bytes
+    from sdnn.reports.plots import png_bytes
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=Path("docs/explanation"), help="of the figures")

@@ -14,12 +14,12 @@ import argparse
 from collections.abc import Iterable
 from pathlib import Path
 
-from sdnn.files import csv_bytes
 from sdnn.reproduction import case_spec, plan_trials
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES
 from sdnn.reproduction.claims import FILE_NAME, HEADER, reference_results
 from sdnn.runs import CaseResult, ResultStore, measure
 from sdnn.runs.results import STEP_MEASURES
+from sdnn.support.files import csv_bytes
 
 FILE = Path(__file__).parents[2] / "python" / "sdnn" / "reproduction" / FILE_NAME
 

@@ -7,7 +7,7 @@ Packages, from the network up (each is imported when first used):
 - ``sdnn.SDNNRegressor``, ``sdnn.SDNNClassifier``: the network as scikit-learn estimators;
   ``sdnn.SDNNKernelRidge``, ``sdnn.SDNNKernelClassifier``: ridge regression with its kernel
   (package ``sdnn.estimators``, needs ``sdnn[sklearn]``)
-- ``sdnn.coding``: how inputs become patterns; ``sdnn.kernel``: what generalizes to what
+- ``sdnn.coding``: how inputs become patterns; ``sdnn.coding.kernel``: the kernel of the code
 - ``sdnn.environments``: the acrobot swing-up, redundant and noisy sensors
 - ``sdnn.export``: trained agents as C headers, also as the command ``sdnn export``
 - ``sdnn.reproduction``: the paper's experiments, also as the command ``sdnn reproduce``
@@ -23,7 +23,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sdnn._core import __version__ as __version__
-from sdnn.lazy import attach
+from sdnn.support.lazy import attach
 
 if TYPE_CHECKING:
     from sdnn import (
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
         environments as environments,
         estimators as estimators,
         export as export,
-        kernel as kernel,
         reproduction as reproduction,
         runs as runs,
     )
@@ -44,7 +43,7 @@ if TYPE_CHECKING:
         SDNNKernelRidge as SDNNKernelRidge,
         SDNNRegressor as SDNNRegressor,
     )
-    from sdnn.machine import (
+    from sdnn.support.machine import (
         instruction_set as instruction_set,
         set_instruction_set as set_instruction_set,
     )
@@ -53,10 +52,10 @@ __getattr__, __dir__, __all__ = attach(
     __name__,
     {
         "sdnn": (
-            "agents approximators benchmarks coding environments estimators export kernel "
+            "agents approximators benchmarks coding environments estimators export "
             "reproduction runs"
         ),
         "sdnn.estimators": "SDNNClassifier SDNNKernelClassifier SDNNKernelRidge SDNNRegressor",
-        "sdnn.machine": "instruction_set set_instruction_set",
+        "sdnn.support.machine": "instruction_set set_instruction_set",
     },
 )

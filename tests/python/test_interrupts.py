@@ -9,7 +9,7 @@ import pytest
 
 from refusals import refuses
 from sdnn.agents import Callback, CheckpointCallback, JSONLines, SDNNQLearning, Training
-from sdnn.interrupts import Interrupts, stay_interrupts, thread_pool
+from sdnn.support.interrupts import Interrupts, stay_interrupts, thread_pool
 
 
 @pytest.fixture(autouse=True)

@@ -6,13 +6,13 @@ import pytest
 
 from sdnn.agents import RBFQLearning, Transition
 from sdnn.coding import RandomInverse
+from sdnn.coding.kernel import AnalyticKernel
 from sdnn.environments import (
     AcrobotSwingUpVectorEnv,
     NoisySensors,
     RedundantSensors,
     UnitSensors,
 )
-from sdnn.kernel import AnalyticKernel
 from sdnn.runs import RunSpec, trial_seed
 from sdnn.runs.settings import checked
 

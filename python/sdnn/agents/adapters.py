@@ -19,7 +19,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.arguments import flag, has_methods, reward_of, shown
+from sdnn.support.arguments import flag, has_methods, reward_of, shown
 
 Seeds: TypeAlias = Mapping[int, int | None]
 Options: TypeAlias = dict[str, Any] | None

@@ -16,8 +16,8 @@ from sdnn.agents.callbacks import ProgressBarCallback, listed
 from sdnn.agents.episode import Transition
 from sdnn.agents.names import explained
 from sdnn.agents.training import Training, TrainingResult
-from sdnn.arguments import argument_error, blamed, flag, require, reward_of, shown, whole
-from sdnn.progress import is_shown
+from sdnn.support.arguments import argument_error, blamed, flag, require, reward_of, shown, whole
+from sdnn.support.progress import is_shown
 
 if TYPE_CHECKING:
     from sdnn.agents.callbacks import Callback

@@ -36,7 +36,8 @@ from sdnn.agents.spaces import (
     space_of,
     space_of_error,
 )
-from sdnn.arguments import (
+from sdnn.config import WARM_UP, values_of
+from sdnn.support.arguments import (
     argument_error,
     blamed,
     is_of_class,
@@ -46,9 +47,8 @@ from sdnn.arguments import (
     seed_of,
     whole,
 )
-from sdnn.config import WARM_UP, values_of
-from sdnn.display import Displayed
-from sdnn.files import Arrays, Description, read_file, write_file
+from sdnn.support.display import Displayed
+from sdnn.support.files import Arrays, Description, read_file, write_file
 
 if TYPE_CHECKING:
     from typing import Self

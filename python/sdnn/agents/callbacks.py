@@ -11,9 +11,9 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from sdnn.arguments import has_methods, path_of, real, require, shown, whole
-from sdnn.files import naming, open_to_append, read_bytes, write_whole
-from sdnn.progress import ProgressBars
+from sdnn.support.arguments import has_methods, path_of, real, require, shown, whole
+from sdnn.support.files import naming, open_to_append, read_bytes, write_whole
+from sdnn.support.progress import ProgressBars
 
 if TYPE_CHECKING:
     from rich.console import Console

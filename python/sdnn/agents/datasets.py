@@ -14,7 +14,7 @@ from sdnn.agents.episode import Transition
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.logs import Logged, reader_of
 from sdnn.agents.names import explained
-from sdnn.arguments import is_of_class, require, whole
+from sdnn.support.arguments import is_of_class, require, whole
 
 
 class MinariDataset(Protocol):

@@ -25,8 +25,8 @@ from sdnn.agents.adapters import (
 from sdnn.agents.episode import EVALUATION, episode_seed
 from sdnn.agents.matching import require_same_kind
 from sdnn.agents.names import explained
-from sdnn.arguments import has_methods, require, seed_of, whole
-from sdnn.display import Displayed
+from sdnn.support.arguments import has_methods, require, seed_of, whole
+from sdnn.support.display import Displayed
 
 _LONG = 100_000
 """Warn after this many steps in one episode."""

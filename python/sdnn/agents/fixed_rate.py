@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from sdnn import _core
-from sdnn.arguments import real, require
+from sdnn.support.arguments import real, require
 
 
 class FixedRate(_core.FixedRate):

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn.agents.agent import Agent
-from sdnn.arguments import whole
 from sdnn.config import FuzzyQLearningConfig, FuzzyRulesConfig
+from sdnn.support.arguments import whole
 
 
 class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):

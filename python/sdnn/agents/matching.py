@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.spaces import in_a_line, wholes_of
-from sdnn.arguments import require
-from sdnn.bounds import with_infinities
+from sdnn.support.arguments import require
+from sdnn.support.bounds import with_infinities
 
 Observed: TypeAlias = gym.Space[Any] | gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]
 """An observation space, or an environment that has one."""

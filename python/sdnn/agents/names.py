@@ -6,8 +6,8 @@ import inspect
 from collections.abc import Mapping
 from typing import Any
 
-from sdnn.arguments import explains_names
 from sdnn.config import fields_of
+from sdnn.support.arguments import explains_names
 
 _OF_TRAIN = (
     "steps", "episodes", "callbacks", "progress", "evaluate_every", "evaluation_env",

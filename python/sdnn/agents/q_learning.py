@@ -18,8 +18,8 @@ from sdnn.agents.matching import Observed
 from sdnn.agents.names import explained
 from sdnn.agents.spaces import AnglePairs, Inputs, Missing, Ranges
 from sdnn.approximators.sdnn_c import pattern_tables
-from sdnn.arguments import choice, real, whole
 from sdnn.config import WARM_UP, QLearningConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.support.arguments import choice, real, whole
 
 
 class Preset(NamedTuple):

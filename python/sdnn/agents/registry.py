@@ -20,8 +20,8 @@ from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.agents.q_learning import Preset, RBFQLearning, SDNNQLearning
 from sdnn.agents.training import Training
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.arguments import argument_error, shown
 from sdnn.config import FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
+from sdnn.support.arguments import argument_error, shown
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.arguments import real, require, whole
+from sdnn.support.arguments import real, require, whole
 
 
 def neighbours(n_variables: int, n_redundant: int) -> Iterator[tuple[int, int]]:

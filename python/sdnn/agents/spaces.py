@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import argument_error, array_of, blamed, require, shown
-from sdnn.bounds import flat_bounds, with_infinities
+from sdnn.support.arguments import argument_error, array_of, blamed, require, shown
+from sdnn.support.bounds import flat_bounds, with_infinities
 
 Inputs: TypeAlias = Literal["all", "relevant"] | Sequence[int]
 """The inputs of a state; a list of variables is used in any case, beside the relevant ones."""

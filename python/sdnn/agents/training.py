@@ -27,9 +27,9 @@ from sdnn.agents.episode import Episodes, Learner
 from sdnn.agents.evaluation import evaluate
 from sdnn.agents.matching import require_same_kind
 from sdnn.agents.names import explained
-from sdnn.arguments import flag, has_methods, path_of, require, shown, whole
-from sdnn.display import Displayed
-from sdnn.interrupts import Interrupts
+from sdnn.support.arguments import flag, has_methods, path_of, require, shown, whole
+from sdnn.support.display import Displayed
+from sdnn.support.interrupts import Interrupts
 
 if TYPE_CHECKING:
     from typing import Self

@@ -22,7 +22,7 @@ from sdnn.agents.adapters import (
     step_env,
 )
 from sdnn.agents.spaces import has_mask
-from sdnn.arguments import array_of
+from sdnn.support.arguments import array_of
 
 
 def vector_adapter(env: gym.vector.VectorEnv[Any, Any, Any]) -> EnvironmentAdapter:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import array_of, seed_of, shown
 from sdnn.config import SDNNCConfig
+from sdnn.support.arguments import array_of, seed_of, shown
 
 
 def pattern_tables(tables: Sequence[ArrayLike]) -> list[NDArray[np.int8]]:

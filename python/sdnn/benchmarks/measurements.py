@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.interrupts import thread_pool
-from sdnn.machine import (
+from sdnn.support.interrupts import thread_pool
+from sdnn.support.machine import (
     available_instruction_sets,
     instruction_set,
     n_cores,

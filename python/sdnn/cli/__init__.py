@@ -24,7 +24,7 @@ __all__ = ["main"]
 
 def _check_instruction_set() -> None:
     """Name the environment variable if it is wrong, before something else is blamed for it."""
-    from sdnn.machine import instruction_set
+    from sdnn.support.machine import instruction_set
 
     try:
         instruction_set()
@@ -34,7 +34,7 @@ def _check_instruction_set() -> None:
 
 def _print_version(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
     if value:
-        from sdnn.machine import build
+        from sdnn.support.machine import build
 
         _check_instruction_set()
         for name, found in build().items():

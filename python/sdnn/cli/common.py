@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from sdnn.arguments import advice
-from sdnn.progress import is_shown
+from sdnn.support.arguments import advice
+from sdnn.support.progress import is_shown
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -338,7 +338,7 @@ def _print_report(
 
 def _print_forecast(study: Study, out: Path, jobs: int, *, as_json: bool) -> None:
     """Print what is still to be run and how long that takes."""
-    from sdnn.pages import duration_words
+    from sdnn.reports.pages import duration_words
     from sdnn.runs.forecast import forecast
 
     found = forecast(study, out, jobs)

@@ -128,7 +128,7 @@ def export(
       --range -3.5:3.5 --actions 2 --c-header pole.h
     """  # noqa: D301
     from sdnn.export import c_header
-    from sdnn.files import write_whole
+    from sdnn.support.files import write_whole
 
     _check_together(source, new, options)
     learning = learning or new
@@ -217,10 +217,10 @@ def _new_agent(
     import gymnasium as gym
     import numpy as np
 
-    from sdnn.arguments import blamed
     from sdnn.export import new_agent
     from sdnn.export.new import new_settings
     from sdnn.runs.settings import changed
+    from sdnn.support.arguments import blamed
 
     ends = [(-math.pi, math.pi) if one == "angle" else _ends("--range", one) for one in ranges]
     tables: dict[str, dict[str, Any]] = {"approximator": {}, "learning": {}}
@@ -289,7 +289,7 @@ def _ends(option: str, text: str) -> tuple[float, float]:
 
 def _usage_error(error: ValueError, is_named: bool) -> click.ClickException:
     """Return an error about an argument as one about its option."""
-    from sdnn.arguments import blamed
+    from sdnn.support.arguments import blamed
 
     name, problem = blamed(error)
     if name == "name" and not is_named:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sdnn.arguments import advice
 from sdnn.cli.common import (
     KEYS,
     OLD_FILE,
@@ -22,6 +21,7 @@ from sdnn.cli.common import (
     train_run,
     value_of,
 )
+from sdnn.support.arguments import advice
 
 if TYPE_CHECKING:
     from sdnn.runs import ConfigError, RunSpec

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.arguments import shown
+from sdnn.support.arguments import shown
 
 Value = TypeVar("Value")
 

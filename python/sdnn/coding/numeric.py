@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.arguments import array_of, one_of, real, require, shown, whole
 from sdnn.coding.base import Coding, known
+from sdnn.support.arguments import array_of, one_of, real, require, shown, whole
 
 MAX_BINS = 65535
 FINE = 1000  # bins; more make no visible difference

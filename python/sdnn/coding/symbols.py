@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.arguments import array_of, one_of, require, seed_of, shown
 from sdnn.coding.base import Coding, known
 from sdnn.coding.numeric import RandomInverse
+from sdnn.support.arguments import array_of, one_of, require, seed_of, shown
 
 Category = str | float | int | bool
 

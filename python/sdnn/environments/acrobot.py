@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import array_of, choice, one_of, real, require
 from sdnn.config import AcrobotConfig
 from sdnn.environments.picture import AcrobotMotion, AcrobotPicture
+from sdnn.support.arguments import array_of, choice, one_of, real, require
 
 if TYPE_CHECKING:
     from gymnasium.core import RenderFrame

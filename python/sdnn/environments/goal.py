@@ -9,8 +9,8 @@ import gymnasium as gym
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.arguments import whole
 from sdnn.config import GoalScheduleConfig
+from sdnn.support.arguments import whole
 
 
 class GoalSchedule:

@@ -7,7 +7,7 @@ from typing import Any
 
 import gymnasium as gym
 
-from sdnn.arguments import has_methods, shown
+from sdnn.support.arguments import has_methods, shown
 
 
 class ActionMasks(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import array_of, choice, one_of, require, seed_of
-from sdnn.bounds import with_infinities
 from sdnn.config import SensorConfig
+from sdnn.support.arguments import array_of, choice, one_of, require, seed_of
+from sdnn.support.bounds import with_infinities
 
 Observation = NDArray[Any]
 Env = gym.Env[Observation, Any]

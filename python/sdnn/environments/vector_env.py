@@ -11,10 +11,10 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.arguments import array_of, one_of, require, whole
 from sdnn.config import AcrobotConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.picture import AcrobotPicture
+from sdnn.support.arguments import array_of, one_of, require, whole
 
 
 class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDArray[Any]]):

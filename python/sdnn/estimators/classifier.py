@@ -12,13 +12,13 @@ from sklearn.utils.metaestimators import available_if
 from sklearn.utils.multiclass import _ovr_decision_function, unique_labels
 
 from sdnn import _core
-from sdnn.arguments import explains_names, require, shown
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.fitted import mean_of
 from sdnn.estimators.inputs import Array, Floats, Ints, check_labels, class_labels
 from sdnn.estimators.network import Network
 from sdnn.estimators.parameters import SHARE, parameter, wholes, words
 from sdnn.estimators.training import class_weights, sample_weights, weighted_mean
+from sdnn.support.arguments import explains_names, require, shown
 
 UNITS_EACH = 60
 MOST_UNITS = 1200

@@ -13,12 +13,12 @@ from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from sdnn import _core
-from sdnn.arguments import seed_of, whole
 from sdnn.coding import Coding, WithMissing, from_dict, to_dict
 from sdnn.coding.symbols import Categorical
 from sdnn.estimators.inputs import Array, Floats, Ints, coding_entries
 from sdnn.estimators.network import InputCode, Network, code_bytes
-from sdnn.files import Arrays, Description, read_file, write_file
+from sdnn.support.arguments import seed_of, whole
+from sdnn.support.files import Arrays, Description, read_file, write_file
 
 Self = TypeVar("Self", bound="Fitted")
 

@@ -17,12 +17,12 @@ from sklearn.utils import assert_all_finite
 from sklearn.utils.multiclass import check_classification_targets, unique_labels
 from sklearn.utils.validation import validate_data
 
-from sdnn.arguments import require, shown
 from sdnn.coding import Coding, RandomInverse, Symbolic, WithMissing, coding_named
 from sdnn.coding.symbols import is_missing, missing_as_nan
 from sdnn.estimators.hints import first_of_words, hint_about
 from sdnn.estimators.outliers import OutlierWarning, numbers_to_range, usual_range, warn_caller
 from sdnn.estimators.parameters import parameter, words
+from sdnn.support.arguments import require, shown
 
 Columns = int | str | slice | Sequence[int] | Sequence[str] | Sequence[bool] | Callable[[Any], Any]
 Pairs = list[tuple[int, int]]

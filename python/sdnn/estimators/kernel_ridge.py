@@ -17,8 +17,8 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
-from sdnn.arguments import explains_names, real
 from sdnn.coding import Coding
+from sdnn.coding.kernel import N_UNITS, AnalyticKernel
 from sdnn.estimators.inputs import (
     Array,
     CodedInputs,
@@ -38,7 +38,7 @@ from sdnn.estimators.leave_one_out import (
 )
 from sdnn.estimators.parameters import parameter, wholes, words
 from sdnn.estimators.training import class_weights, sample_weights, without_absent
-from sdnn.kernel import N_UNITS, AnalyticKernel
+from sdnn.support.arguments import explains_names, real
 
 AUTO = words("auto")
 DEGREES = (1, 2, 3)

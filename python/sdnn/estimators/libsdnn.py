@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sdnn import _core
-from sdnn.arguments import path_of, shown
-from sdnn.files import read_bytes
+from sdnn.support.arguments import path_of, shown
+from sdnn.support.files import read_bytes
 
 Library = Literal["msvc", "libstdc++"]
 

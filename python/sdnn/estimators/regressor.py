@@ -8,13 +8,13 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sdnn.arguments import explains_names, require, shown
 from sdnn.estimators.base import BaseSDNN, OutOfRangeWarning
 from sdnn.estimators.fitted import mean_of
 from sdnn.estimators.inputs import Array, CodedRegressor, Floats, Ints
 from sdnn.estimators.outliers import warn_caller
 from sdnn.estimators.parameters import parameter, wholes, words
 from sdnn.estimators.training import weighted_mean
+from sdnn.support.arguments import explains_names, require, shown
 
 MARGIN = 0.2  # that a learned output range adds on either side
 FURTHEST = 1e300  # largest end of an output range, so that its width is finite

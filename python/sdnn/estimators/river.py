@@ -14,7 +14,6 @@ import pandas as pd
 from river import base
 from sklearn.base import clone
 
-from sdnn.arguments import flag, require, shown, whole
 from sdnn.coding import Coding, Symbolic, WithMissing
 from sdnn.coding.symbols import is_missing
 from sdnn.estimators.classifier import SDNNClassifier
@@ -23,6 +22,7 @@ from sdnn.estimators.inputs import Floats, coding_entries, codings_of_columns
 from sdnn.estimators.network import COLUMN_BUDGET, present
 from sdnn.estimators.outliers import numbers_to_range
 from sdnn.estimators.regressor import SDNNRegressor
+from sdnn.support.arguments import flag, require, shown, whole
 
 WINDOW = 500  # samples whose range is followed
 REMEMBERED = 1000  # last samples, from which new features and categories are learned

@@ -15,9 +15,9 @@ from sklearn.utils.class_weight import compute_sample_weight
 from sklearn.utils.validation import _num_samples
 
 from sdnn import _core
-from sdnn.arguments import require, shown
 from sdnn.estimators.inputs import Array, Floats, Ints
 from sdnn.estimators.network import Network
+from sdnn.support.arguments import require, shown
 
 LARGE_SAMPLE = 5000
 """Samples above which one epoch alone changes much, and blocks are shuffled instead of samples."""

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from sdnn.agents import Agent, SDNNQLambda, SDNNQLearning
-from sdnn.arguments import argument_error, flag, path_of, require, shown
 from sdnn.export.linear import LearnerWriter, LinearWriter
 from sdnn.export.sdnn_c import SDNNCWriter
 from sdnn.export.sdnn_c_learning import SDNNCLearner
 from sdnn.export.writer import CHeader
-from sdnn.files import write_whole
+from sdnn.support.arguments import argument_error, flag, path_of, require, shown
+from sdnn.support.files import write_whole
 
 _LARGEST_NAME = 40
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import zlib
 
 from sdnn.agents import SDNNQLambda, SDNNQLearning
-from sdnn.arguments import require
 from sdnn.export.header import writer_of
+from sdnn.support.arguments import require
 
 
 def save_image(agent: SDNNQLearning | SDNNQLambda) -> bytes:

@@ -11,9 +11,9 @@ import gymnasium as gym
 
 from sdnn.agents import SDNNQLambda, SDNNQLearning
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
-from sdnn.arguments import argument_error, choice, shown, whole
 from sdnn.export.header import c_header
 from sdnn.export.sdnn_c_learning import MOST_WEIGHT
+from sdnn.support.arguments import argument_error, choice, shown, whole
 
 NewConfig = LinearSDNNConfig | SDNNCConfig
 _KINDS: dict[str, type[SDNNQLambda] | type[SDNNQLearning]] = {

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents import SDNNQLearning
-from sdnn.arguments import argument_error
 from sdnn.export.code import Code
 from sdnn.export.tables import Tables, joined, weight_words
 from sdnn.export.writer import CHeader, Writer, require_few_weights
+from sdnn.support.arguments import argument_error
 
 MOST_UNITS = 65535  # whose numbers fit 16 bits
 _BYTES_OF_NETWORK = 40  # a struct of eight pointers and two sizes, where pointers have 32 bits

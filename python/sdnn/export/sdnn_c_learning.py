@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents import SDNNQLearning
-from sdnn.arguments import argument_error, whole
 from sdnn.export.code import Code
 from sdnn.export.sdnn_c import SDNNCWriter
 from sdnn.export.tables import Tables, weight_words
 from sdnn.export.writer import MOST_FRACTION_BITS, SCALE_FIELDS, CHeader, Learner
+from sdnn.support.arguments import argument_error, whole
 
 _WEIGHTS_STREAM = 3  # see cpp/include/sdnn/core/random.hpp
 _MOST_RETURNS = 256

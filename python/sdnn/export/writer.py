@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from sdnn._core import __version__
 from sdnn.agents.q_learning import CodedAgent
-from sdnn.arguments import argument_error, whole
 from sdnn.export.tables import Input, Tables, by_dimension, conversions, joined, table_lines
+from sdnn.support.arguments import argument_error, whole
 
 _DEFAULT_FRACTION_BITS = 16
 MOST_FRACTION_BITS = 30

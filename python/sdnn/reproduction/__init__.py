@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sdnn.lazy import attach
+from sdnn.support.lazy import attach
 
 if TYPE_CHECKING:
     from sdnn.reproduction.cases import (

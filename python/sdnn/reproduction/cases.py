@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from sdnn.arguments import one_of
+from sdnn.support.arguments import one_of
 
 PAPER_TRIALS = 10  # per case; fewer support no conclusion
 PAPER_EPISODES = 15_000  # learning episodes per trial

@@ -35,10 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.registry import title_of
-from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
-from sdnn.reproduction.cost import SERIES, CostConfig, CostRecord
-from sdnn.runs.results import STEP_MEASURES, CaseResult, MeasureName, TrialMeasures, on_equal_terms
-from sdnn.statistics import (
+from sdnn.reports.statistics import (
     BOOTSTRAP_SEED,
     Estimate,
     FloatArray,
@@ -46,6 +43,9 @@ from sdnn.statistics import (
     json_number,
     tails,
 )
+from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
+from sdnn.reproduction.cost import SERIES, CostConfig, CostRecord
+from sdnn.runs.results import STEP_MEASURES, CaseResult, MeasureName, TrialMeasures, on_equal_terms
 
 N_DRAWS = 10_000
 _N_RESAMPLES, _N_DRAWS_OF_EACH = 200, 250

@@ -16,10 +16,11 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from sdnn import _core, machine
+from sdnn import _core
 from sdnn.agents.registry import AGENTS, split_label
 from sdnn.runs.engine import Counted, Observer
 from sdnn.runs.store import ResultStore
+from sdnn.support import machine
 
 SEED = 1
 KIND = "cost"  # of these measurements in a result file

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sdnn.plots import FAINT, INK, color_of, label, new_figure, style
+from sdnn.reports.plots import FAINT, INK, color_of, label, new_figure, style
 from sdnn.reproduction.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.reproduction.cost import SERIES, CostRecord
 from sdnn.runs.figures import SMOOTHED_TESTS, agent_colors, draw_steps

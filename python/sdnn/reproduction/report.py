@@ -13,7 +13,7 @@ import numpy as np
 
 from sdnn import _core
 from sdnn.agents.registry import title_of
-from sdnn.pages import Page, Section, Table, plain_number
+from sdnn.reports.pages import Page, Section, Table, plain_number
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.reproduction.claims import (
     ALWAYS,

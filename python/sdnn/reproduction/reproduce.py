@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from sdnn.agents.registry import split_label, title_of
-from sdnn.arguments import one_of, whole
 from sdnn.config import SensorConfig
-from sdnn.files import csv_bytes
-from sdnn.plots import figure_bytes
+from sdnn.reports.plots import figure_bytes
 from sdnn.reproduction import cost
 from sdnn.reproduction.cases import (
     COST,
@@ -36,6 +34,8 @@ from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Layer, Study, StudyCase, StudyVariant
 from sdnn.runs.sweep import Comparison
 from sdnn.runs.trial import ROW_HEADER, trial_rows
+from sdnn.support.arguments import one_of, whole
+from sdnn.support.files import csv_bytes
 
 QUICK_TRIALS = 2
 QUICK_EPISODES = 300

@@ -10,7 +10,7 @@ evaluations), ``checkpoint.safetensors`` (where it is resumed) and, once it is f
 
 from typing import TYPE_CHECKING
 
-from sdnn.lazy import attach
+from sdnn.support.lazy import attach
 
 if TYPE_CHECKING:
     from sdnn.agents.registry import (
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         agent_entry as agent_entry,
         register as register,
     )
+    from sdnn.reports.statistics import Estimate as Estimate
     from sdnn.runs.dask_executor import DaskExecutor as DaskExecutor
     from sdnn.runs.engine import (
         Executor as Executor,
@@ -59,7 +60,6 @@ if TYPE_CHECKING:
         TrialRecord as TrialRecord,
         TrialRows as TrialRows,
     )
-    from sdnn.statistics import Estimate as Estimate
 
 __getattr__, __dir__, __all__ = attach(
     __name__,
@@ -78,6 +78,6 @@ __getattr__, __dir__, __all__ = attach(
         "sdnn.runs.spec": "RunSpec",
         "sdnn.runs.store": "ResultStore",
         "sdnn.runs.trial": "Trial TrialKey TrialRecord TrialRows",
-        "sdnn.statistics": "Estimate",
+        "sdnn.reports.statistics": "Estimate",
     },
 )

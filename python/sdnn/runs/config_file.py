@@ -11,10 +11,10 @@ from typing import Any
 
 import msgspec
 
-from sdnn.files import read_bytes
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.spec import RunSpec
-from sdnn.toml import TOO_DEEP, KeyPath, deep_key, dotted, line_of, parse_toml
+from sdnn.support.files import read_bytes
+from sdnn.support.toml import TOO_DEEP, KeyPath, deep_key, dotted, line_of, parse_toml
 
 FORMAT = "sdnn-run-2"
 """Format of the configuration in a run's folder."""

@@ -7,7 +7,7 @@ import sqlite3
 from contextlib import closing, suppress
 from pathlib import Path
 
-from sdnn.files import is_there
+from sdnn.support.files import is_there
 
 BUSY_SECONDS = 60.0
 """Seconds to wait for another process that writes the same file."""

@@ -13,11 +13,11 @@ from typing import Any, Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.files import csv_bytes, write_whole
-from sdnn.interrupts import stay_interrupts
 from sdnn.runs.errors import RunError
 from sdnn.runs.figures import draw_curves
 from sdnn.runs.run import Run
+from sdnn.support.files import csv_bytes, write_whole
+from sdnn.support.interrupts import stay_interrupts
 
 WINDOW = 20
 """Episodes in the running median of the returns, or all so far where they are fewer."""

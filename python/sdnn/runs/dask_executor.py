@@ -20,12 +20,12 @@ from threading import Event
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sdnn import _core
-from sdnn.arguments import require
-from sdnn.files import read_bytes
 from sdnn.runs.config_file import MOST_BYTES
 from sdnn.runs.engine import Advanced, Failed, Finished, Message, Noted, PlannedTrial, run_to_end
 from sdnn.runs.errors import ClusterError, WorkerLostError
 from sdnn.runs.trial import TrialRecord, opened, rows_of
+from sdnn.support.arguments import require
+from sdnn.support.files import read_bytes
 
 if TYPE_CHECKING:
     from distributed import Client, Future

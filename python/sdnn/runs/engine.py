@@ -21,13 +21,13 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from sdnn.agents.registry import title_of
-from sdnn.arguments import shown, whole
-from sdnn.interrupts import Interrupts, thread_pool
-from sdnn.machine import instruction_set, n_cores
-from sdnn.progress import ProgressBars
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrainingTrial, Trial, TrialKey, TrialRecord, opened, rows_of
+from sdnn.support.arguments import shown, whole
+from sdnn.support.interrupts import Interrupts, thread_pool
+from sdnn.support.machine import instruction_set, n_cores
+from sdnn.support.progress import ProgressBars
 
 CHUNK_SECONDS = 0.1
 """A trial reports about this often; it is also how long an interruption waits."""

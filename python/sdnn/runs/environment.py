@@ -17,12 +17,12 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from sdnn.agents.scaling import Scaling, neighbours
-from sdnn.arguments import shown
-from sdnn.bounds import flat_bounds
 from sdnn.environments import ActionMasks, NoisySensors, RedundantSensors, UnitSensors
 from sdnn.environments.sensors import in_own_units
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.settings import Settings, doc
+from sdnn.support.arguments import shown
+from sdnn.support.bounds import flat_bounds
 
 ALL = "all"
 """The key of the range of all variables that have no other."""

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.registry import labels, title_of
-from sdnn.plots import FAINT, INK, color_of, label, new_figure, style
+from sdnn.reports.plots import FAINT, INK, color_of, label, new_figure, style
+from sdnn.reports.statistics import estimate_mean, running_median
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.results import CaseResult, MeasureName
-from sdnn.statistics import estimate_mean, running_median
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,12 +6,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-from sdnn.machine import n_cores
 from sdnn.runs.engine import PlannedTrial
 from sdnn.runs.errors import RunError
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Study
 from sdnn.runs.trial import TrialKey, opened
+from sdnn.support.machine import n_cores
 
 PROBE_SECONDS = 0.3  # processor time of a probe, about
 

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from sdnn.agents import UnusableStepError
 from sdnn.agents.evaluation import greedy_episode
-from sdnn.files import whole_file
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
 from sdnn.runs.spec import RunSpec
+from sdnn.support.files import whole_file
 
 SUFFIXES = (".gif", ".mp4")
 

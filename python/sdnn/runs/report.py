@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sdnn import machine
-from sdnn.files import write_whole
-from sdnn.pages import Page, Section, duration_words, plain_number
+from sdnn.reports.pages import Page, Section, duration_words, plain_number
+from sdnn.reports.statistics import CONFIDENCE, Estimate
 from sdnn.runs.engine import TrialsOutcome
 from sdnn.runs.errors import PlotUnavailableError
 from sdnn.runs.results import MEASURES, RETURN_MEASURES, CaseResult, MeasureName
-from sdnn.statistics import CONFIDENCE, Estimate
+from sdnn.support import machine
+from sdnn.support.files import write_whole
 
 if TYPE_CHECKING:
     from sdnn.runs.trial import TrialRecord

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
+from sdnn.reports.statistics import Estimate, FloatArray, estimate_median, json_number
 from sdnn.runs.trial import TrialRecord, TrialRows
-from sdnn.statistics import Estimate, FloatArray, estimate_median, json_number
 
 MeasureName = Literal[
     "episodes_to_learn",

@@ -17,9 +17,9 @@ import numpy as np
 from msgspec import Meta
 
 from sdnn.agents.registry import AGENTS
-from sdnn.arguments import advice, blamed, shown
 from sdnn.config import WARM_UP, ProtocolConfig, fields_of
 from sdnn.runs.errors import ConfigError
+from sdnn.support.arguments import advice, blamed, shown
 
 AnySettings = TypeVar("AnySettings", bound="Settings")
 

@@ -23,8 +23,6 @@ from sdnn.agents.registry import (
     label_of,
     split_label,
 )
-from sdnn.arguments import blamed, is_of_class, shown
-from sdnn.bounds import flat_bounds
 from sdnn.config import ProtocolConfig
 from sdnn.environments import (
     AcrobotConfig,
@@ -50,6 +48,8 @@ from sdnn.runs.settings import (
     read,
 )
 from sdnn.runs.trial import TrainingTrial, Trial, training_trial
+from sdnn.support.arguments import blamed, is_of_class, shown
+from sdnn.support.bounds import flat_bounds
 
 HASH_DIGITS = 16
 """Hexadecimal digits kept of a specification's SHA-256: 64 bits."""

@@ -22,11 +22,11 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
-from sdnn.files import is_there, open_regular
 from sdnn.runs.connection import connect, foreign_journal, has_rows, is_hot
 from sdnn.runs.errors import StoreError
 from sdnn.runs.spec import HASH_DIGITS
 from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows
+from sdnn.support.files import is_there, open_regular
 
 STORE_NAME = "results.sqlite"
 SCHEMA_VERSION = 6

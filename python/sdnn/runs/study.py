@@ -12,7 +12,7 @@ from sdnn.runs.errors import ConfigError
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrialKey, opened
-from sdnn.toml import KeyPath
+from sdnn.support.toml import KeyPath
 
 if TYPE_CHECKING:
     from sdnn.runs.report import Content

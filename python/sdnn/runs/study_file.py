@@ -16,7 +16,6 @@ from typing import Annotated, Any, Literal, NamedTuple
 from msgspec import Meta
 
 from sdnn.agents.registry import default_agent, labels, split_label
-from sdnn.arguments import advice
 from sdnn.runs.config_file import ConfigFile
 from sdnn.runs.environment import find_module, search_folder
 from sdnn.runs.errors import ConfigError
@@ -34,7 +33,8 @@ from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.study import Layer, Setting, Study, StudyCase, StudyVariant
 from sdnn.runs.sweep import Addition, Comparison, study_content
-from sdnn.toml import KeyPath, dotted
+from sdnn.support.arguments import advice
+from sdnn.support.toml import KeyPath, dotted
 
 DEFAULT = "default"
 """The variant that others are compared with unless the file names another, if there is one."""

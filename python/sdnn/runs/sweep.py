@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents.registry import title_of
-from sdnn.files import csv_pieces, gzip_pieces, remove_abandoned_files
-from sdnn.pages import Page, Section, Table
-from sdnn.plots import figure_bytes
+from sdnn.reports.pages import Page, Section, Table
+from sdnn.reports.plots import figure_bytes
+from sdnn.reports.statistics import Estimate, estimate_mean
 from sdnn.runs.engine import Executor, Observer, run_trials
 from sdnn.runs.figures import draw_study
 from sdnn.runs.report import (
@@ -45,7 +45,7 @@ from sdnn.runs.results import (
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Combination, Pair, Study, StudyCase, StudyVariant
 from sdnn.runs.trial import ROW_HEADER, TrialRecord, records_digest, trial_rows
-from sdnn.statistics import Estimate, estimate_mean
+from sdnn.support.files import csv_pieces, gzip_pieces, remove_abandoned_files
 
 MIN_TRIALS_TO_DIFFER = 6
 """Fewer paired trials are all on one side by chance more often than once in twenty times."""

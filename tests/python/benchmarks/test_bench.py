@@ -15,7 +15,7 @@ from refusals import refuses
 from sdnn import _core
 from sdnn.benchmarks import measurements, report
 from sdnn.cli import main
-from sdnn.machine import available_instruction_sets, instruction_set
+from sdnn.support.machine import available_instruction_sets, instruction_set
 
 ROOT = Path(__file__).parents[3]
 
@@ -159,7 +159,7 @@ def test_times_of_the_core_are_nanoseconds_per_repetition():
 
 
 def test_machines_that_tell_nothing(tmp_path, monkeypatch, yardsticks):
-    monkeypatch.setattr("sdnn.machine._PROCESSOR_FILE", tmp_path / "none")
+    monkeypatch.setattr("sdnn.support.machine._PROCESSOR_FILE", tmp_path / "none")
     assert measurements.describe_machine()["processor"]
     assert yardsticks.caches(tmp_path / "none") == {}
 

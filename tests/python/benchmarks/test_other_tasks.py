@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from measurements_for_tests import squared
-from sdnn.statistics import Estimate
+from sdnn.reports.statistics import Estimate
 
 EVIDENCE = Path(__file__).parents[3] / "docs" / "evidence"
 BENCH = Path(__file__).parents[3] / "bench"

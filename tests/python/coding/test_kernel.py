@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn import SDNNRegressor, kernel
-from sdnn.coding import Anchor, Circular, RandomInverse, Symbolic, WithMissing
+from sdnn import SDNNRegressor
+from sdnn.coding import Anchor, Circular, RandomInverse, Symbolic, WithMissing, kernel
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (12, 3))
@@ -99,7 +99,7 @@ DOCUMENTED = (
     "sdnn.estimators.network",
     "sdnn.estimators.regressor",
     "sdnn.estimators.training",
-    "sdnn.kernel",
+    "sdnn.coding.kernel",
 )
 
 

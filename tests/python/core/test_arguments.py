@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn import arguments
 from sdnn.agents import RBFQLearning, SDNNQLearning
 from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
+from sdnn.support import arguments
 
 BOX = gym.spaces.Box(-1.0, 1.0, (4,))
 

@@ -13,9 +13,10 @@ import agent_files
 import sdnn
 from checksums import with_checksum
 from refusals import refuses
-from sdnn import SDNNRegressor, files
+from sdnn import SDNNRegressor
 from sdnn.agents import SDNNQLearning, Training, load_agent
-from sdnn.files import read_file, write_file
+from sdnn.support import files
+from sdnn.support.files import read_file, write_file
 
 KINDS = ("agent", "training", "estimator")
 ARRAYS = {

@@ -14,12 +14,12 @@ import pytest
 
 from made_records import hash_of, make_record
 from sdnn.agents import load_agent
-from sdnn.files import write_file, write_whole
 from sdnn.runs import EnvironmentSpec, ResultStore, Run, RunSpec, StoreError, TrialRows
 from sdnn.runs.curves import curves_of, write_curves
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import tensorboard_in
 from sdnn.runs.store import STORE_NAME
+from sdnn.support.files import write_file, write_whole
 
 RUN = RunSpec(
     environment=EnvironmentSpec(id="Pendulum-v1"),
@@ -318,7 +318,7 @@ def test_links_that_would_be_written_to_are_refused(tmp_path, name):
 TRUNCATED = """
 import sys
 from pathlib import Path
-from sdnn import files
+from sdnn.support import files
 
 path, real = Path(sys.argv[1]), files.os.fstat
 

@@ -8,8 +8,9 @@ import pytest
 
 import sdnn
 from refusals import refuses
-from sdnn import _core, machine
-from sdnn.machine import (
+from sdnn import _core
+from sdnn.support import machine
+from sdnn.support.machine import (
     available_instruction_sets,
     instruction_set,
     set_instruction_set,

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 import sdnn
-from sdnn import _core, lazy
+from sdnn import _core
+from sdnn.support import lazy
 
 PACKAGES = ("sdnn", "sdnn.estimators", "sdnn.reproduction", "sdnn.runs")
 

@@ -1,7 +1,7 @@
 import os
 import platform
 
-from sdnn import machine
+from sdnn.support import machine
 
 
 def test_the_processor_has_the_name_that_the_system_gives(tmp_path, monkeypatch):

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from refusals import refuses
-from sdnn import files
-from sdnn.files import (
+from sdnn.support import files
+from sdnn.support.files import (
     PARTIAL_SUFFIX,
     csv_bytes,
     csv_pieces,
@@ -23,7 +23,7 @@ from sdnn.files import (
 WRITE_SLOWLY = """
 import sys, time
 from pathlib import Path
-from sdnn.files import whole_file
+from sdnn.support.files import whole_file
 
 with whole_file(Path(sys.argv[1])) as file:
     file.write(b"half")

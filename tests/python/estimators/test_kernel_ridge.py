@@ -14,7 +14,7 @@ from sklearn.utils.estimator_checks import check_estimator
 from refusals import refuses
 from sdnn import SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.coding import Circular, RandomInverse
-from sdnn.kernel import N_UNITS, AnalyticKernel
+from sdnn.coding.kernel import N_UNITS, AnalyticKernel
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (120, 4))

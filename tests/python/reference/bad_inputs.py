@@ -28,8 +28,8 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.arguments import shown
-from sdnn.files import read_file, write_file
+from sdnn.support.arguments import shown
+from sdnn.support.files import read_file, write_file
 
 TYPED = (TypeError, ValueError, OverflowError, OSError)
 

@@ -17,9 +17,9 @@ from checksums import with_checksum
 from mutated_files import READERS as OTHERS, Reader, contents_of, written
 from sdnn.agents import JSONLines, SDNNQLearning, Training
 from sdnn.estimators import libsdnn
-from sdnn.files import read_file, write_file
 from sdnn.runs import Run
 from sdnn.runs.errors import RunError
+from sdnn.support.files import read_file, write_file
 
 MOST_SECONDS = 5.0
 MOST_BYTES = 2**28

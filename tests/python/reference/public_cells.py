@@ -11,9 +11,16 @@ import numpy as np
 
 import core_cells
 from bad_inputs import BAD, judged, parameters_of
-from sdnn import kernel
 from sdnn.agents import SDNNQLambda
-from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
+from sdnn.coding import (
+    Anchor,
+    Circular,
+    CorrelationMatrix,
+    RandomInverse,
+    Symbolic,
+    WithMissing,
+    kernel,
+)
 from sdnn.environments import (
     AcrobotConfig,
     AcrobotSwingUpEnv,
@@ -38,7 +45,15 @@ from sdnn.runs import (
     agent_entry,
 )
 
-ROOMS = ("agents", "approximators", "coding", "environments", "estimators", "reproduction", "runs")
+PACKAGES = (
+    "agents",
+    "approximators",
+    "coding",
+    "environments",
+    "estimators",
+    "reproduction",
+    "runs",
+)
 
 SAMPLES = np.random.default_rng(1).uniform(0, 1, (12, 2))
 NUMBERS, LABELS = SAMPLES.sum(axis=1), np.arange(12) % 3
@@ -64,8 +79,8 @@ IN_OTHER_WORDS = {("random_state", "list of huge")}
 
 
 def public_classes():
-    for room in ROOMS:
-        module = importlib.import_module(f"sdnn.{room}")
+    for package in PACKAGES:
+        module = importlib.import_module(f"sdnn.{package}")
         for name in module.__all__:
             value = getattr(module, name)
             if inspect.isclass(value) and value.__new__ is object.__new__:
@@ -298,7 +313,12 @@ def tiny_agent():
 
 
 def public_functions():
-    for module in (*(f"sdnn.{room}" for room in ROOMS), "sdnn", "sdnn.kernel", "sdnn.export"):
+    for module in (
+        *(f"sdnn.{package}" for package in PACKAGES),
+        "sdnn",
+        "sdnn.coding.kernel",
+        "sdnn.export",
+    ):
         for name in importlib.import_module(module).__all__:
             value = getattr(importlib.import_module(module), name)
             if inspect.isfunction(value) and name not in ELSEWHERE:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn import _core, machine
+from sdnn import _core
 from sdnn.reproduction import CostConfig, draw_cost
 from sdnn.reproduction.cost import (
     QUICK_COST,
@@ -20,6 +20,7 @@ from sdnn.reproduction.cost import (
 from sdnn.reproduction.report import cost_table
 from sdnn.runs import ResultStore, StoreError
 from sdnn.runs.trial import records_digest
+from sdnn.support import machine
 
 SMALL = CostConfig(n_inputs=(3, 2), n_rounds=3, round_seconds=0.001)
 

@@ -12,7 +12,8 @@ import pytest
 from rich.console import Console
 
 from refusals import refuses
-from sdnn.plots import figure_bytes
+from sdnn.reports.plots import figure_bytes
+from sdnn.reports.statistics import Estimate, running_median
 from sdnn.reproduction import PaperStudy, draw_experiment, plan_trials, select_experiments
 from sdnn.reproduction.report import Report
 from sdnn.runs import AGENTS, PlotUnavailableError, ResultStore, measure
@@ -21,7 +22,6 @@ from sdnn.runs.figures import SMOOTHED_TESTS, agent_colors
 from sdnn.runs.report import describe_call, format_estimate
 from sdnn.runs.sweep import run_study
 from sdnn.runs.trial import ROW_HEADER, records_digest, trial_rows
-from sdnn.statistics import Estimate, running_median
 
 (EXPERIMENT,) = select_experiments("a")
 PICTURES = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
@@ -246,7 +246,7 @@ def test_row_files_hold_every_test_episode_once(report, results):
 
 def test_page_is_one_file_with_everything(report, monkeypatch):
     outcome = TrialsOutcome(n_planned=6, n_reused=0, n_run=6, failures=(), interrupted=False)
-    monkeypatch.setattr("sdnn.machine.description", lambda: "a <machine>")
+    monkeypatch.setattr("sdnn.support.machine.description", lambda: "a <machine>")
     page = report.page(PICTURES)
     html = page.to_html(describe_call(outcome, 61, ()))
     assert html.startswith("<!doctype html>")

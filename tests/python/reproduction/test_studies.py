@@ -6,14 +6,14 @@ import math
 import numpy as np
 import pytest
 
-from sdnn.plots import figure_bytes
+from sdnn.reports.plots import figure_bytes
+from sdnn.reports.statistics import Estimate
 from sdnn.reproduction.claims import Verdict
 from sdnn.reproduction.report import judge_variants
 from sdnn.runs.figures import draw_study
 from sdnn.runs.report import format_estimate
 from sdnn.runs.sweep import compare, study_json, study_page
 from sdnn.runs.trial import TrialRecord, TrialRows
-from sdnn.statistics import Estimate
 
 
 def record(study, case, variant, number, steps, returns=None, interval=10):

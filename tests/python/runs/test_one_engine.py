@@ -57,7 +57,7 @@ def test_one_store_knows_sqlite():
 def test_one_display_draws_progress():
     drawn = modules_with(imports("rich.progress"))
     # The estimators' bars are the epochs of `verbose`, in notebooks and logs, too.
-    assert drawn - {"estimators/training"} == {"progress"}
+    assert drawn - {"estimators/training"} == {"support/progress"}
 
 
 def test_one_name_for_each_agent():

@@ -15,10 +15,10 @@ import drifting_env  # noqa: F401
 from refusals import refuses
 from run_specs import run_spec
 from sdnn.agents import Callback, Training, load_agent
-from sdnn.files import lock
 from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunError, RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrialRows
+from sdnn.support.files import lock
 
 SMALL = {
     "approximator": {"n_hidden_units": 60, "n_active_units": 20, "n_pattern_units": 20},
@@ -275,7 +275,9 @@ def test_two_processes_do_not_train_one_run(tmp_path, monkeypatch):
     assert b"process" in other.stderr
     assert not run.rows()
     assert run.train(steps=20).n_steps == 20
-    monkeypatch.setattr("sdnn.files.lock_descriptor", _no_locks)  # as in some folders of networks
+    monkeypatch.setattr(
+        "sdnn.support.files.lock_descriptor", _no_locks
+    )  # as in some folders of networks
     assert run.train(steps=40).n_steps == 40
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn.statistics import (
+from sdnn.reports.statistics import (
     Estimate,
     estimate_contrast,
     estimate_mean,

@@ -1,5 +1,5 @@
 /// The one file format of agents, trainings and estimators, which Python reads and writes too
-/// (python/sdnn/files.py says how it is made). Needs the library nlohmann/json.
+/// (python/sdnn/support/files.py says how it is made). Needs the library nlohmann/json.
 #pragma once
 
 #include <algorithm>

@@ -9,7 +9,7 @@ from __future__ import annotations
 from io import BytesIO
 from typing import TYPE_CHECKING, Literal
 
-from sdnn.interrupts import stay_interrupts
+from sdnn.support.interrupts import stay_interrupts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,7 +6,7 @@ pairs, where rho is the correlation of the patterns of two values. A plain patte
 and counts twice.
 
 >>> import numpy as np
->>> from sdnn import kernel
+>>> from sdnn.coding import kernel
 >>> from sdnn.coding import RandomInverse
 >>> one = kernel.AnalyticKernel(RandomInverse(length_scale=0.2, low=0.0, high=1.0), n_inputs=2)
 >>> one(np.array([[0.5, 0.5]]), np.array([[0.5, 0.5], [0.7, 0.5], [0.7, 0.9]])).round(2)
@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sdnn.arguments import array_of, require, seed_of, shown, whole
 from sdnn.coding import Coding, coding_named
 from sdnn.coding.base import CODINGS
+from sdnn.support.arguments import array_of, require, seed_of, shown, whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.arguments import shown
+from sdnn.support.arguments import shown
 
 _MOST_VARIABLES = 2**20
 _LEAST_INTEGER_BYTES = 4

@@ -120,7 +120,7 @@ class Page:
         from jinja2 import Environment, PackageLoader, StrictUndefined
 
         environment = Environment(
-            loader=PackageLoader("sdnn", "."), autoescape=".html." in name,
+            loader=PackageLoader("sdnn.reports", "."), autoescape=".html." in name,
             undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
             keep_trailing_newline=True,
         )  # fmt: skip

@@ -12,7 +12,7 @@ import os
 from pathlib import Path
 
 from sdnn import _core
-from sdnn.arguments import require
+from sdnn.support.arguments import require
 
 _PROCESSOR_FILE = Path("/proc/cpuinfo")
 

@@ -1,0 +1,1 @@
+"""Helpers that know nothing of learning: arguments, files, interrupts, display, progress."""
