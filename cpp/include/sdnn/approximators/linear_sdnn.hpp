@@ -16,6 +16,8 @@
 #include <vector>
 
 #include "sdnn/approximators/detail/linear_rows.hpp"
+#include "sdnn/approximators/detail/linear_workspace.hpp"
+#include "sdnn/approximators/detail/more_inputs.hpp"
 #include "sdnn/approximators/detail/state_wiring.hpp"
 #include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/coding/action_code.hpp"
@@ -34,7 +36,7 @@ namespace sdnn::approximators {
 /// Everything is an integer. A value counts *units* of 2^exponent; weights have the same unit. The
 /// exponent follows the rewards: the first one that is not 0 has 31 bits, and when a weight would
 /// need more than 23 bits, or a value more than 33, all are halved and the exponent grows by one.
-/// Who learns may make units smaller again (refine_unit). So there is no range of values to be
+/// The agent may make units smaller again (refine_unit). So there is no range of values to be
 /// chosen, and sums are exact in any order.
 ///
 /// The code is the paired one of StateCode, whose inner products are half of those of x_SD: a
@@ -44,84 +46,9 @@ namespace sdnn::approximators {
 /// and 5; not in the paper.
 class LinearSDNN {
  public:
-  /// The code of a state, in the form that rows of weights are multiplied by.
-  class Code {
-   public:
-    /// Columns that are not 0.
-    std::int32_t n_active() const noexcept { return n_active_; }
-    /// -1, 0 or +1 for each column.
-    std::vector<std::int8_t> signs() const {
-      std::vector<std::int8_t> signs(active_.size());
-      for (std::size_t j = 0; j < signs.size(); ++j) {
-        signs[j] = static_cast<std::int8_t>(times_code(1, active_[j], negative_[j]));
-      }
-      return signs;
-    }
-
-   private:
-    friend class LinearSDNN;
-    CodeMasks masks() const noexcept { return {active_.data(), negative_.data()}; }
-
-    std::vector<std::int32_t> active_, negative_;
-    std::int32_t n_active_ = 0;
-  };
-
-  /// State of one user who reads the model: a state, its code, and the sums of rows over it, each
-  /// computed anew when its weights have changed.
-  class Workspace {
-   public:
-    const Code& code() const noexcept { return code_; }
-
-   private:
-    friend class LinearSDNN;
-    Code code_;
-    std::vector<coding::Bin> bins_, new_bins_;
-    std::vector<std::uint64_t> words_;
-    std::vector<std::int64_t> row_sums_;
-    std::vector<std::uint64_t> versions_;  ///< of the rows that were summed; 0: none
-    std::vector<std::int64_t> sums_;       ///< of the actions of a dimension
-  };
-
-  /// State of one stream of experience: the weights that had a part in earlier values.
-  class Trace {
-   public:
-    void clear() noexcept {
-      for (std::size_t row = 0; row < live_.size(); ++row) {
-        if (live_[row]) std::fill_n(&values_[row * n_columns_], n_columns_, 0);
-        live_[row] = false;
-      }
-    }
-
-    /// Lists what is remembered; see core/state.hpp.
-    template <class Self, class Archive>
-    static void serialize(Self& self, Archive& archive) {
-      std::vector<std::int32_t> values;  // none where there is no trace
-      if (std::ranges::find(self.live_, true) != self.live_.end()) values = self.values_;
-      archive.numbers("values", values);
-      if constexpr (Archive::kReads) {
-        archive.expect(values.empty() || values.size() == self.values_.size(), "values",
-                       "empty or one for each weight");
-        archive.expect(std::ranges::all_of(
-                           values, [](std::int32_t z) { return std::abs(z) <= kLargestTrace; }),
-                       "values", "in their range");
-        values.resize(self.values_.size());
-        self.values_ = std::move(values);
-        for (std::size_t row = 0; row < self.live_.size(); ++row) {
-          const auto* const first = &self.values_[row * self.n_columns_];
-          self.live_[row] = std::any_of(first, first + self.n_columns_, [](auto z) { return z; });
-        }
-      }
-    }
-
-   private:
-    friend class LinearSDNN;
-    Trace(std::size_t n_rows, std::size_t n_columns)
-        : n_columns_(n_columns), values_(n_rows * n_columns), live_(n_rows) {}
-
-    std::size_t n_columns_;
-    std::vector<std::int32_t> values_;
-    std::vector<bool> live_;  ///< rows that are not all 0
-  };
+  using Code = LinearCode;
+  using Workspace = LinearWorkspace;
+  using Trace = LinearTrace;
 
   /// Rates of a step of learning; see QLambdaConfig.
   struct Step {
@@ -202,8 +129,8 @@ class LinearSDNN {
     workspace.bins_.clear();
     read_next(state, workspace);
   }
-  /// The same where the workspace has read this model last: a state with the same code keeps the
-  /// sums of rows that have not changed.
+  /// Reads a state where the workspace has read this model last: a state with the same code keeps
+  /// the sums of rows that have not changed.
   void read_next(std::span<const double> state, Workspace& workspace) const {
     code_->bins_of(state, workspace.new_bins_);
     if (workspace.bins_ == workspace.new_bins_) return;
@@ -242,7 +169,7 @@ class LinearSDNN {
     return {workspace.sums_.data(), dimension.n_actions};
   }
 
-  /// The same as numbers, Q_d(state, a). Shapes: state (l,), out (n_actions(d),).
+  /// Q_d(state, a) as numbers. Shapes: state (l,), out (n_actions(d),).
   void values(std::span<const double> state, Workspace& workspace, std::span<double> out,
               std::size_t d = 0, bool averaged = false) const {
     assert(out.size() == n_actions(d));
@@ -271,9 +198,9 @@ class LinearSDNN {
     return total;
   }
 
-  /// A number in units, rounded to the nearest, halves up. The first one that is not 0 decides how
-  /// large a unit is; a larger one may make units larger. Returns how often they were doubled.
-  /// Requires a finite number of at most 1e300 in size.
+  /// Makes the unit fit a number. The first number that is not 0 decides how large a unit is; a
+  /// larger one may make units larger. Returns how often the unit was doubled. Requires a finite
+  /// number of at most 1e300 in size.
   int fit_unit(double number) {
     if (number == 0.0) return 0;
     if (!exponent_) exponent_ = std::max(std::ilogb(number) - 30, kLeastExponent);
@@ -281,6 +208,7 @@ class LinearSDNN {
     while (std::abs(std::ldexp(number, -*exponent_)) >= kLargestReward) double_unit();
     return *exponent_ - before;
   }
+  /// A number in units, rounded to the nearest, halves up.
   std::int64_t units_of(double number) const noexcept {
     if (!exponent_) return 0;
     return static_cast<std::int64_t>(std::floor(std::ldexp(number, -*exponent_) + 0.5));
@@ -290,7 +218,7 @@ class LinearSDNN {
     return std::clamp(std::ldexp(static_cast<double>(units), exponent_.value_or(0)), -kMost, kMost);
   }
 
-  /// Twice as large a unit: weights are halved, halves up. Who keeps values halves them likewise.
+  /// Doubles the unit: weights are halved, halves up. The caller halves the values that it keeps.
   void double_unit() noexcept {
     assert(exponent_);
     ++*exponent_;
@@ -306,7 +234,7 @@ class LinearSDNN {
     return kWeightBits - static_cast<int>(std::bit_width(used));
   }
   /// Makes the unit 2^n times smaller: weights are multiplied by 2^n, and clipped where they have
-  /// no room. Whoever keeps values multiplies them likewise. Returns n, or less where the unit
+  /// no room. The caller multiplies the values that it keeps. Returns n, or less where the unit
   /// would become too small for a number.
   int refine_unit(int n) noexcept {
     assert(exponent_ && n >= 0);
@@ -399,8 +327,8 @@ class LinearSDNN {
   /// inputs that were added. Both have as many actions, units and first inputs, and all pairs.
   void continue_from(const LinearSDNN& fewer) {
     assert(fewer.n_rows_ == n_rows_ && fewer.n_inputs() <= n_inputs());
-    copy_weights(fewer, fewer.weights_, weights_);
-    if (config_.averaging_interval > 0) copy_weights(fewer, fewer.averaged_, averaged_);
+    copy_to_more_inputs(*fewer.code_, fewer.weights_, *code_, weights_);
+    copy_to_more_inputs(*fewer.code_, fewer.averaged_, *code_, averaged_);
     exponent_ = fewer.exponent_;
     n_steps_ = fewer.n_steps_;
     n_snapshots_ = fewer.n_snapshots_;
@@ -438,21 +366,10 @@ class LinearSDNN {
     std::size_t first_row;
   };
 
-  static constexpr int kWeightBits = 23;
-  static constexpr std::int32_t kLargestWeight = 1 << kWeightBits;
   static constexpr std::int32_t kLeastExponent = -1074;  // that of the least number
   static constexpr std::int64_t kLargestValue = std::int64_t{1} << 33;
   static constexpr double kLargestReward = 4294967296.0;
   static constexpr std::int64_t kLargestError = (std::int64_t{1} << 34) - 1;
-
-  static std::uint32_t size_bits(std::int32_t weight) noexcept {
-    return static_cast<std::uint32_t>(weight ^ (weight >> 31));
-  }
-  static std::int32_t multiplied(std::int32_t weight, int n) noexcept {
-    constexpr std::int64_t kMost = kLargestWeight - 1;
-    return static_cast<std::int32_t>(
-        std::clamp(std::int64_t{weight} << std::min(n, kWeightBits), -kMost, kMost));
-  }
 
   std::size_t window() const noexcept { return static_cast<std::size_t>(config_.action_window); }
 
@@ -478,34 +395,6 @@ class LinearSDNN {
       }
       row_sums(rows, n, workspace.code_.masks(), n_slots(), sums);
       for (std::size_t i = 0; i < n; ++i) workspace.row_sums_[places[i]] = sums[i];
-    }
-  }
-
-  /// In the paired code the groups of one modifier are halves of sums and differences, but for the
-  /// last one where their number is odd: with one more it is a sum of two such halves.
-  void copy_weights(const LinearSDNN& fewer, const std::vector<std::int32_t>& from,
-                    std::vector<std::int32_t>& to) const {
-    const std::size_t n_columns = n_slots() / code_->n_groups();
-    const std::size_t n_before = fewer.code_->n_partners(), n_now = code_->n_partners();
-    const std::size_t paired_before = n_before / 2 * 2, paired_now = n_now / 2 * 2;
-    const auto copy = [&](std::size_t row, std::size_t group, std::size_t group_now) {
-      std::copy_n(&from[row * fewer.n_slots() + group * n_columns], n_columns,
-                  &to[row * n_slots() + group_now * n_columns]);
-    };
-    for (std::size_t row = 0; row < n_rows_; ++row) {
-      for (std::size_t nu = 0; nu < fewer.n_inputs(); ++nu) {
-        for (std::size_t k = 0; k < paired_before; ++k) {
-          copy(row, nu * paired_before + k, nu * paired_now + k);
-        }
-        if (paired_before == n_before) continue;
-        const std::size_t last = fewer.n_inputs() * paired_before + nu;
-        if (paired_now > paired_before) {
-          copy(row, last, nu * paired_now + paired_before);
-          copy(row, last, nu * paired_now + paired_before + 1);
-        } else {
-          copy(row, last, n_inputs() * paired_now + nu);
-        }
-      }
     }
   }
 

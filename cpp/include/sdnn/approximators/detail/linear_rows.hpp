@@ -54,6 +54,21 @@ constexpr Number halved(Number units) noexcept {
   return (units + 1) >> 1;
 }
 
+/// Weights are below 2^23 in size.
+inline constexpr int kWeightBits = 23;
+inline constexpr std::int32_t kLargestWeight = 1 << kWeightBits;
+
+/// Bits that a weight's size has.
+constexpr std::uint32_t size_bits(std::int32_t weight) noexcept {
+  return static_cast<std::uint32_t>(weight ^ (weight >> 31));
+}
+/// weight * 2^n, clipped to the range of weights.
+constexpr std::int32_t multiplied(std::int32_t weight, int n) noexcept {
+  constexpr std::int64_t kMost = kLargestWeight - 1;
+  return static_cast<std::int32_t>(
+      std::clamp(std::int64_t{weight} << std::min(n, kWeightBits), -kMost, kMost));
+}
+
 namespace detail {
 
 /// Rows that are summed in one pass over the code.
