@@ -27,8 +27,8 @@ def test_the_page_shows_the_studies_as_they_are(name):
 @pytest.mark.parametrize(
     "name",
     [
-        "toml", "runs.engine", "runs.environment", "agents.registry", "arguments",
-        "runs.spec", "runs.report", "runs.results", "pages", "statistics",
+        "support.toml", "runs.engine", "runs.environment", "agents.registry", "support.arguments",
+        "runs.spec", "runs.report", "runs.results", "reports.pages", "reports.statistics",
     ],
 )  # fmt: skip
 def test_examples_in_docstrings(name):
