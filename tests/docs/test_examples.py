@@ -8,12 +8,19 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gymnasium as gym
+import numpy as np
 import pytest
+import sdnn_q_lambda
+
+from sdnn.agents import SDNNQLambda, Transition
 
 FOLDER = Path(__file__).parents[2] / "docs" / "examples"
 MAKER = FOLDER / "make_notebooks.py"
 PAGE = FOLDER / "sdnn_q_learning.py"
-SCRIPTS = sorted(path for path in FOLDER.glob("*.py") if path not in (MAKER, PAGE))
+Q_LAMBDA = FOLDER / "sdnn_q_lambda.py"
+PAGES = (PAGE, Q_LAMBDA)
+SCRIPTS = sorted(path for path in FOLDER.glob("*.py") if path not in (MAKER, *PAGES))
 
 
 def run(script, folder, *options):
@@ -41,6 +48,54 @@ def test_the_page_learns_with_the_settings_of_its_options(tmp_path):
     options = ["--episodes", "3", "--n-inputs", "5", "--noise", "0.02"]
     lines = run(PAGE, tmp_path, *options).splitlines()
     assert [line.split(":")[0] for line in lines] == ["episode 1", "episode 2", "episode 3"]
+
+
+def test_the_page_of_q_lambda_trains_from_the_command_line(tmp_path):
+    options = ["--env-id", "MountainCarContinuous-v0", "--steps", "1000"]
+    assert run(Q_LAMBDA, tmp_path, *options).startswith("step 999: return -")
+
+
+class Recorded(gym.Wrapper):
+    """Keeps observations after resets, and actions with transitions after steps."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.history = []
+
+    def reset(self, **options):
+        observation, info = super().reset(**options)
+        self.history.append((observation,))
+        return observation, info
+
+    def step(self, action):
+        outcome = super().step(action)
+        self.history.append((action, *outcome[:4]))
+        return outcome
+
+
+@pytest.mark.parametrize(
+    ("env_id", "n_steps"), [("CartPole-v1", 3000), ("Pendulum-v1", 600), ("Acrobot-v1", 600)]
+)
+def test_the_page_of_q_lambda_has_the_weights_of_the_library(env_id, n_steps):
+    env = Recorded(gym.make(env_id))
+    page = sdnn_q_lambda.train(env, sdnn_q_lambda.Settings(steps=n_steps, seed=7), str)
+    space = env.observation_space
+    ranges = tuple(np.clip(bound.astype(float), -3, 3) for bound in (space.low, space.high))
+    options = {"observation_range": ranges, "inputs": "all", "angle_pairs": "none"}
+    agent = SDNNQLambda(env, seed=7, **options)
+    for action, *outcome in env.history:
+        if not outcome:
+            agent.begin_episode()
+            observation = action
+            continue
+        np.testing.assert_array_equal(agent.act(observation), action)
+        agent.learn(Transition(observation, action, outcome[1], outcome[0], outcome[2]))
+        observation = outcome[0]
+    state = agent.state()
+    for name, numbers in (("weights", page.weights), ("averaged_weights", page.average)):
+        np.testing.assert_array_equal(state[f"agent.action_value.{name}"], numbers)
+    assert state["agent.action_value.exponent"] == page.exponent
+    assert np.abs(page.weights).max() > 2**20, "something was learned"
 
 
 def test_cited_sections_of_the_method_are_there():
@@ -106,7 +161,7 @@ def test_every_example_is_tested_and_listed():
     tested = re.findall(r'FOLDER / "(\w+\.py)"', Path(__file__).read_text())
     listed = re.findall(r"^\| \[(\w+\.py)\]", (FOLDER / "README.md").read_text(), re.MULTILINE)
     tested.remove(MAKER.name)
-    assert sorted(tested) == sorted(listed) == sorted(path.name for path in (*SCRIPTS, PAGE))
+    assert sorted(tested) == sorted(listed) == sorted(path.name for path in (*SCRIPTS, *PAGES))
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from q_lambda_transcription import QLambda
+from q_lambda_transcription import Code, QLambda
 from sdnn import _core
 from sdnn.agents import QLambdaConfig, RBFQLearning, SDNNQLambda, Transition, evaluate, load_agent
 from sdnn.approximators import LinearSDNNConfig
@@ -66,10 +66,11 @@ def test_weights_are_those_of_the_transcription(
         learning=QLambdaConfig(**learning),
         seed=seed,
     )
-    slow = QLambda(agent.action_value.code, n_actions, window, {**learning, "n_inputs": 2})
+    slow = QLambda(Code(agent.action_value.code, 2), n_actions, window, learning)
     for state, action, reward, next_state, end in life(seed, 25, n_actions, scale):
         # Acting keeps sums for learning.
-        assert slow.value(state, agent.act(state)) == slow.best_value(state)
+        x = slow.code(state)
+        assert slow.value(x, agent.act(state)) == slow.best_value(x)
         for one in (agent, slow):
             one.learn(state, action, reward, next_state, end == "terminal")
             if end == "limit":
