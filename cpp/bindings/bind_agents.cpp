@@ -52,7 +52,7 @@ using bindings::ArrayArgument;
 
 namespace {
 
-/// What all agents have in common.
+/// Binds the members that all agents have.
 template <class Agent>
 void def_agent(py::class_<Agent>& agent) {
   using Action = decltype(std::declval<Agent&>().act({}));
@@ -123,7 +123,7 @@ py::array_t<double> q_values(const Agent& agent, const ArrayArgument<double>& st
   return out;
 }
 
-/// What agents that learn by Q-learning have in common.
+/// Binds the members of agents that learn by Q-learning.
 template <class Agent, class QValues>
 void def_q_learning(py::class_<Agent>& agent, const QValues& q_values) {
   agent.def("set_progress", &Agent::set_progress, py::arg("progress"))
@@ -152,7 +152,7 @@ py::array_t<double> q_values_of_readout(const QLambda& agent, const ArrayArgumen
   return out;
 }
 
-/// What agents that learn by fuzzy rules have in common.
+/// Binds the members of agents that learn by fuzzy rules.
 template <class Agent>
 void def_fuzzy(py::class_<Agent>& agent) {
   agent.def("last_action", &Agent::last_action, py::arg("environment") = 0)

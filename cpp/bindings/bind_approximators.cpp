@@ -29,7 +29,7 @@ using bindings::ArrayArgument;
 
 namespace {
 
-/// What can be read of the code of a network's states.
+/// Binds the read access to the code of a network's states.
 template <class Network>
 void bind_code(py::class_<Network>& network) {
   network
@@ -121,7 +121,7 @@ py::array_t<double> output_values(const SDNNC& network) {
   return out;
 }
 
-/// What all networks that give Q(s, a) for every action have in common.
+/// Binds the members of all networks that give Q(s, a) for every action.
 template <class Network>
 py::class_<Network> bind_network(py::module_& module, const char* name, const char* doc) {
   return py::class_<Network>(module, name, doc)

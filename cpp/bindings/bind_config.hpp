@@ -57,7 +57,7 @@ std::string hint_of() {
   }
 }
 
-/// What a value must be, for a reader.
+/// Describes the type of a value for error messages.
 template <class Value>
 std::string expected_words() {
   if constexpr (kIsOptional<Value>) {
@@ -101,7 +101,7 @@ inline bool is_truth(pybind11::handle value) {
 
 struct Field;
 
-/// What Python needs to know of a type of values.
+/// The description of a type of values that Python needs.
 struct ValueType {
   std::string (*hint)();
   std::string (*expected)();

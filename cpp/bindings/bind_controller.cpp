@@ -52,7 +52,7 @@ void wait_for_readers_of(agents::Controller& controller) {
   std::visit([](auto& agent) { bindings::wait_for_readers(agent); }, controller.agent());
 }
 
-/// What an agent has in each dimension.
+/// Returns the parts of an agent, one for each dimension.
 template <class Agent>
 auto parts_of(const Agent& agent) {
   if constexpr (requires { agent.part(0); }) {
@@ -93,7 +93,7 @@ using MaskArgument = std::optional<ArrayArgument<std::uint8_t>>;
 agents::ActionMask mask_of(const MaskArgument& mask) {
   return mask ? bindings::flat(*mask) : agents::ActionMask();
 }
-/// That of one environment, where each has a row.
+/// Returns the mask of an environment, where each has a row.
 agents::ActionMask mask_of(const MaskArgument& masks, const char* name, std::size_t environment) {
   if (!masks) return {};
   const auto rows = bindings::matrix(*masks, name);

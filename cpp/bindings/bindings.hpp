@@ -1,4 +1,4 @@
-/// What every binding file shares: one function per package.
+/// The functions that bind the packages, one for each.
 #pragma once
 
 #include <pybind11/pybind11.h>

@@ -9,7 +9,7 @@
 
 namespace {
 
-/// What compiled the extension.
+/// Returns the name and version of the compiler.
 std::string compiler() {
 #if defined(_MSC_VER)
   return "MSVC " + std::to_string(_MSC_FULL_VER);

@@ -42,14 +42,14 @@ struct Use {
   const std::byte* end;
   bool changes;
 
-  /// Of an object with all that it holds in itself; const ones are not changed.
+  /// Describes the use of an object with its members; const ones are not changed.
   template <class Object>
   static Use of(const void* owner, Object& object) noexcept {
     const auto* const begin = reinterpret_cast<const std::byte*>(&object);
     return {owner, begin, begin + sizeof(Object), !std::is_const_v<Object>};
   }
 
-  /// Of parts that an object holds elsewhere.
+  /// Describes the use of parts that an object holds elsewhere.
   template <class Part>
   static Use of(const void* owner, const std::span<Part>& parts) noexcept {
     const auto bytes = std::as_bytes(parts);
@@ -108,7 +108,7 @@ class WithoutGIL {
   /// Throws std::runtime_error if another thread's call is in the way.
   template <class... Object>
   explicit WithoutGIL(Object&... objects) : uses_(this, {Use::of(this, objects)...}) {}
-  /// The same for a number of objects that is not known before.
+  /// Releases the lock for a number of objects that is known only at run time.
   template <class Object>
   explicit WithoutGIL(const std::vector<Object*>& objects) : uses_(this, of_all(objects)) {}
   WithoutGIL(const WithoutGIL&) = delete;
