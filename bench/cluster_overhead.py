@@ -1,4 +1,4 @@
-"""What a cluster costs the driver for each trial, beside the trial itself.
+"""Measure the driver's overhead for each trial on a cluster.
 
     python bench/cluster_overhead.py
 

@@ -147,7 +147,7 @@ def opened(folder: Path) -> Iterator[ResultStore]:
 
 @dataclass(frozen=True)
 class Measure:
-    """What is done for a key, as the engine sees a specification."""
+    """A measurement for a key, in the place of the engine's specification."""
 
     measure: Callable[..., Mapping[str, Any]]
     length: int = 1

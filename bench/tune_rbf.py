@@ -49,7 +49,7 @@ REPORT_SEEDS = tuple(trial_seed(0, "rbf-4", number) for number in range(10))
 
 
 class Setting(NamedTuple):
-    """What is varied."""
+    """The settings that are varied."""
 
     n_bases: int = 4
     width: float = 0.5
@@ -90,7 +90,7 @@ def settings_of(stage: str, best: Setting) -> list[Setting]:
 
 
 def measure(stage: str, *key: Any) -> dict[str, Any]:
-    """One trial."""
+    """Run a trial."""
     *values, seed = key
     setting = Setting(*values)
     spec = RunSpec(

@@ -1,4 +1,4 @@
-"""What several environments at once do to learning: a table of docs/how-to/agents.md.
+"""Compare learning in several environments at once: a table of docs/how-to/agents.md.
 
     python bench/vector_environments.py [--seeds 10] [--only WORD ...] [--jobs 2] [--redraw]
 

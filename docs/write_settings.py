@@ -24,9 +24,9 @@ A study without an environment is about the paper's acrobot: the agent is `sdnn-
 """
 ASSUMPTION = re.compile(r" An assumption\b.*| \(section [^)]*\)")
 NOT_IN_THE_PAPER = re.compile(r" Not in the paper[^.:]*(?:\.|: (\w))")
-"""What the paper has and leaves open is in docs/evidence/assumptions.md."""
+"""A remark that the page omits: docs/evidence/assumptions.md has the paper's settings."""
 MOST_WORDS = 24
-"""Of several sentences on a setting; the others are left to `sdnn train --schema`."""
+"""The limit for several sentences on a setting; `sdnn train --schema` has the others."""
 
 
 def page() -> str:

@@ -72,7 +72,7 @@ class Lists {
     }
   }
 
-  /// Of one state after the other.
+  /// Returns the columns of the next state.
   const coding::SignedColumns& next() { return columns_[next_++ % kStates]; }
 
  private:

@@ -1,4 +1,4 @@
-// What an agent asks of the network: values of new and remembered states, learning steps.
+// The calls that an agent makes: values of new and remembered states, learning steps.
 #include <benchmark/benchmark.h>
 
 #include <cstddef>

@@ -34,7 +34,7 @@ CHIP = ("-mthumb", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 
 @dataclass(frozen=True)
 class Task:
-    """What the agent knows of a task: its sensors' ranges and its actions."""
+    """The ranges of a task's sensors, and its actions."""
 
     high: tuple[float, ...]
     actions: gym.Space
@@ -87,7 +87,7 @@ def program(path, task, compiler, *options):
 
 
 def output(*command):
-    """What a program prints, and what its emulator counts."""
+    """Return the output of a program, and that of its emulator."""
     words = [str(word) for word in command]
     done = subprocess.run(words, capture_output=True, text=True, check=True)
     return done.stdout.strip(), done.stderr

@@ -71,7 +71,7 @@ void inner_product(int n) {
   for (int i = 0; i < n; ++i) tools::keep(coding::inner_product(one, other, kWords));
 }
 
-/// One decision interval of 64 acrobots.
+/// Steps 64 acrobots through a decision interval.
 void acrobots(int n) {
   constexpr std::size_t kAcrobots = 64;
   environments::AcrobotBatch batch({}, kAcrobots);

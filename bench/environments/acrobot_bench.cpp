@@ -1,4 +1,4 @@
-// One decision of the acrobot: 50 Runge-Kutta steps.
+// A decision of the acrobot: 50 Runge-Kutta steps.
 #include <benchmark/benchmark.h>
 
 #include "sdnn/core/random.hpp"

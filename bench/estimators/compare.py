@@ -85,7 +85,7 @@ def demonstration_keys(n_seeds):
 
 
 def demonstration(name, seed):
-    """One training sample, the full lattice."""
+    """Fit one training sample and predict the full lattice."""
     X = training_points(2000, seed=0)
     if name in FIXED:
         model, n_parts = ours(FIXED[name], 300, seed), 1

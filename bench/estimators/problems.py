@@ -281,7 +281,7 @@ def measure(problem, name, seed):
     return {"score": round(model.score(X_test, y_test), 5), "fit_s": spent, "coverage": covered}
 
 
-# What is drawn of the measurements.
+# Figures and tables of the measurements.
 
 
 def scores(found, problem, model, what="score"):

@@ -70,7 +70,7 @@ class Perceptron:
 
 
 class PerceptronOfClasses(Perceptron):
-    """The same for labels, all of which it knows beforehand."""
+    """A perceptron for labels, all of which it knows beforehand."""
 
     def __init__(self, seed):
         super().__init__(seed)
@@ -145,7 +145,7 @@ def measure(stream, name, seed):
     return {what: round(float(1 - errors.mean()), 5), "us": round(us, 1), "windows": windows}
 
 
-# What is drawn of the measurements.
+# Figures and tables of the measurements.
 
 
 def complete(rows):

@@ -19,7 +19,7 @@ STEPS = (10_000, 20_000, 50_000, 100_000, 200_000)
 NOTABLE = 0.02
 """A difference worth telling, in parts of the way from random actions to a solved task."""
 N_SEEDS = 10
-"""Of a whole cell; where there are fewer the table says how many."""
+"""Number of seeds in a complete cell; the table shows the number in others."""
 
 Trials = Sequence[Mapping[str, Any]]
 

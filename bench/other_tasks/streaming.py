@@ -25,7 +25,7 @@ KAPPA_ACTOR, KAPPA_CRITIC = 3.0, 2.0
 N_UNITS, SPARSITY, SLOPE = 128, 0.9, 0.01
 N_UNITS_Q, KAPPA_Q = 32, 2.0
 EPSILON, FINAL_EPSILON, EXPLORATION = 1.0, 0.01, 0.05
-"""Of stream Q: chance of a random action at first, at last, and the share of a training between."""
+"""Stream Q's first and final epsilon, and the share of the training in which it falls."""
 LAYER_EPSILON, MOMENTS_EPSILON = 1e-5, 1e-8
 
 
@@ -194,7 +194,7 @@ class StreamingConfig:
 
 
 class Streaming:
-    """What both have: a step is learned when it is known whether the episode ended with it."""
+    """A base that learns a step when it is known whether the episode ended with it."""
 
     def __init__(self, observation_space, seed, networks) -> None:
         self._space = observation_space

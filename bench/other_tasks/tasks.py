@@ -1,4 +1,4 @@
-"""What solves the tasks of study.toml, and two tasks of our own with two torques."""
+"""Goals for the tasks of study.toml, and two tasks of our own with two torques."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ CLEAN = "clean"
 
 
 class Goal(NamedTuple):
-    """What the agent with defaults is to reach: a return after steps, in a share of the seeds."""
+    """A return that the default agent is to reach after some steps, in a share of the seeds."""
 
     steps: int
     at_least: float

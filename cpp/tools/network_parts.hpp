@@ -41,7 +41,7 @@ class NetworkParts {
         [this](int) { network_.values(state_, workspace_, values_); });
   }
 
-  /// The same at a state the network was asked about just before.
+  /// Times all values of a state that the network has read just before.
   Times time_remembered_values(int n_repetitions) {
     return time_each(
         n_repetitions, [this](int) { recall_new_state(); },

@@ -10,7 +10,7 @@
 
 namespace sdnn::tools {
 
-/// One duration per repetition, in nanoseconds of std::chrono::steady_clock.
+/// A duration for each repetition, in nanoseconds of std::chrono::steady_clock.
 using Times = std::vector<std::int64_t>;
 
 /// The most repetitions of one call.
@@ -50,7 +50,7 @@ Times time_each(int n_repetitions, Prepare&& prepare, Timed&& timed) {
   return times;
 }
 
-/// The same without anything to prepare.
+/// Times calls that need no preparation.
 template <class Timed>
 Times time_each(int n_repetitions, Timed&& timed) {
   return time_each(n_repetitions, [](int) {}, timed);

@@ -1,4 +1,4 @@
-/// One trial: an agent meets the acrobot, by the paper's protocol, without Python in the loop.
+/// A trial by the paper's protocol: an agent in the acrobot, without Python in the loop.
 #pragma once
 
 #include <algorithm>
@@ -117,7 +117,7 @@ class AcrobotTrial {
     advance(n_episodes, [] {});
   }
 
-  /// The same, calling `after_decision()` after every decision, of test episodes too.
+  /// Advances and calls `after_decision()` after every decision, of test episodes too.
   template <class AfterDecision>
   void advance(int n_episodes, AfterDecision&& after_decision) {
     core::require_in_range("n_episodes", n_episodes, 0, 1 << 30);

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = {"README.md": "index.md"} | {
     name: name for name in ("REPRODUCTION.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")
 }
-"""Of the root, and where they are on the site."""
+"""Pages of the repository's root, and their paths on the site."""
 
 _LINK = re.compile(r"(?<=\]\()(?!https?:|mailto:|#)([^)#\s]*)(#[^)\s]*)?(?=\))")
 

@@ -46,7 +46,7 @@ def spec_of(agent: str) -> RunSpec:
 
 
 class Inspector:
-    """What can be asked of an agent at work without changing what it does."""
+    """Measurements of a training agent that do not change it."""
 
     def __init__(self, spec: RunSpec) -> None:
         self._acrobot_config = spec.acrobot

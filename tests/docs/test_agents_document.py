@@ -1,4 +1,4 @@
-"""What the pages on agents say is true."""
+"""Statements of the pages on agents hold."""
 
 import re
 from pathlib import Path

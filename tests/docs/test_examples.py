@@ -24,7 +24,7 @@ SCRIPTS = sorted(path for path in FOLDER.glob("*.py") if path not in (MAKER, *PA
 
 
 def run(script, folder, *options):
-    """What a script prints."""
+    """Return the output of a script."""
     done = subprocess.run(
         [sys.executable, "-W", "ignore", script, *options],
         cwd=folder,

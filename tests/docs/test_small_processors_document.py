@@ -1,4 +1,4 @@
-"""What docs/how-to/small-processors.md says is true."""
+"""Statements of docs/how-to/small-processors.md hold."""
 
 import re
 from pathlib import Path

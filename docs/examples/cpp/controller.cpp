@@ -21,7 +21,7 @@ namespace {
 using namespace sdnn;
 constexpr double kSpeed = 9.0;  // rad/s that the controller tells apart
 
-// What the robot's own sensors would say: two angles and two speeds.
+// Returns the readings of the robot's sensors: two angles and two speeds.
 std::array<double, 4> observe(const environments::Acrobot& acrobot) {
   const auto& state = acrobot.state();
   return {state[0], state[1], state[2], state[3]};
