@@ -134,7 +134,3 @@ def test_many_actions_are_told_apart():
 )
 def test_impossible_spaces_are_named(space, error):
     refuses("action_space", agent_of, space, error=error)
-
-
-def test_continuous_actions_need_a_box():
-    refuses("action_space", FuzzyQLearning, PLANE, gym.spaces.Discrete(3), error=TypeError)

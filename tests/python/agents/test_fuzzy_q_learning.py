@@ -76,18 +76,6 @@ def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
 # The Python faces.
 
 
-@pytest.mark.parametrize(
-    ("observations", "actions", "error", "message"),
-    [
-        (LISTS, TORQUES, TypeError, "observation_space"),
-        (OBSERVATIONS, BUTTONS, TypeError, "action_space"),
-        (gym.spaces.Box(0, 1, (9,)), TORQUES, ValueError, "387420489"),
-    ],
-)
-def test_spaces_that_do_not_fit_are_named(observations, actions, error, message):
-    refuses(message, FuzzyQLearning, observations, actions, error=error)
-
-
 def test_actions_are_elements_of_the_space():
     agent = FuzzyQLearning(OBSERVATIONS, TORQUES, seed=1)
     assert agent.n_rules == 729

@@ -153,25 +153,6 @@ def test_spaces_are_flattened_as_gymnasium_does(space):
         assert np.array_equal(vector.reshape(-1), gym.spaces.flatten(space, element))
 
 
-@pytest.mark.parametrize(
-    ("options", "name"),
-    [
-        ({"observation_range": (1.0, 0.0)}, "observation_range"),
-        ({"observation_range": ([1.0], [2.0, 3.0, 4.0])}, "observation_range"),
-        ({"observation_range": 3.0}, "observation_range"),
-        ({"observation_range": "all"}, "observation_range"),
-        ({"observation_range": ("a", "b")}, "observation_range"),
-        ({"angles": [2]}, "angles"),
-        ({"angles": ["x"]}, "angles"),
-        ({"angle_pairs": "all"}, "angle_pairs"),
-        ({"angle_pairs": [(0, 1, 2)]}, "angle_pairs"),
-        ({"angle_pairs": [(0, 7)]}, "angle_pairs"),
-    ],
-)
-def test_impossible_arguments_are_named(options, name):
-    refuses(name, sdnn_agent, BOX, error=(TypeError, ValueError), **options)
-
-
 def test_a_space_without_a_range_names_a_remedy():
     constant = gym.spaces.Box(np.array([0.0, 1.0]), np.array([1.0, 1.0]), dtype=np.float64)
     refuses("observation_space", config, constant)
@@ -252,9 +233,3 @@ def test_any_variable_of_a_symbol_or_an_angle_keeps_it():
     for _ in range(100):
         agent.learn(Transition(noise(), 0, 0.0, noise(), False))
     assert agent.inputs == [("symbol", [0, 3]), ("angle", [3, 4])]
-
-
-@pytest.mark.parametrize("inputs", ["some", [4], [-1], [0.5], 3, [[0]], None])
-def test_inputs_are_all_relevant_or_variables(inputs):
-    spaces = gym.spaces.Box(-1, 1, (4,)), BUTTONS
-    refuses("inputs", RBFQLearning, *spaces, inputs=inputs, error=(TypeError, ValueError))

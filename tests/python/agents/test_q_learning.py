@@ -147,21 +147,6 @@ def test_one_transition_by_hand():
 # The Python face.
 
 
-@pytest.mark.parametrize(
-    ("observations", "actions", "error", "message"),
-    [
-        (LISTS, TORQUES, TypeError, "observation_space"),
-        (gym.spaces.Box(0, 1, (0,)), TORQUES, ValueError, "observation_space"),
-        (gym.spaces.Box(0, 0, (2,)), TORQUES, ValueError, "observation_space"),
-        (OBSERVATIONS, gym.spaces.Text(2), TypeError, "action_space"),
-        (OBSERVATIONS, gym.spaces.Box(0, np.inf, (1,)), ValueError, "action_space"),
-        (OBSERVATIONS, gym.spaces.Discrete(92), ValueError, "n_actions"),
-    ],
-)
-def test_spaces_that_do_not_fit_are_named(observations, actions, error, message):
-    refuses(message, SDNNQLearning, observations, actions, approximator=SMALL, error=error)
-
-
 def test_a_box_of_actions_is_cut_evenly():
     agent = small_agent()
     assert agent.n_actions == 91

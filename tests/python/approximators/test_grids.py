@@ -102,12 +102,3 @@ def test_the_exponential_of_the_core_is_the_one_of_numpy_up_to_rounding():
 def test_tables_that_are_too_large_are_refused():
     refuses("32543321076", _core.FuzzyRules, FuzzyRulesConfig(n_inputs=9))
     refuses("2147483648", _core.RBFNetwork, RBFNetworkConfig(n_inputs=13))
-
-
-@pytest.mark.parametrize("size", [1, 3])
-def test_bad_states_are_named(size):
-    rules = _core.FuzzyRules(_core.FuzzyRulesConfig(n_inputs=2))
-    net = _core.RBFNetwork(_core.RBFNetworkConfig(n_inputs=2))
-    for use in (rules.fire, net.values):
-        refuses("state", use, np.zeros(size))
-        refuses("state[1]", use, np.array([0.0, 1.5]))

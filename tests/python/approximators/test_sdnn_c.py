@@ -311,30 +311,6 @@ def test_c_scales_weights_and_changes_no_decision():
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"n_active_units": 901}, "n_active_units"),
-        ({"n_inputs": 1}, "n_inputs"),
-        ({"circular": (True,)}, "circular"),
-        ({"max_pairs": -1}, "max_pairs"),
-        ({"n_symbols": (0, 3)}, "n_symbols"),
-        ({"n_symbols": (0, 0, -3, 0)}, "n_symbols"),
-        ({"u_low": -1}, "u_low"),
-        ({"initial_weights": "large"}, "initial_weights"),
-        ({"n_pattern_units": 70000}, "n_pattern_units"),
-        ({"initial_weights": "uniform", "initial_weight_limit": 1e300}, "initial_weight_limit"),
-    ],
-)
-def test_impossible_configurations_are_named(change, message):
-    refuses(message, lambda: SDNNC(SDNNCConfig(**change)))
-
-
-@pytest.mark.parametrize("seed", [-1, 2**64, 0.5, "1"])
-def test_impossible_seeds(seed):
-    refuses("seed", SDNNC, SDNNCConfig(**SMALL), seed=seed)
-
-
-@pytest.mark.parametrize(
     ("state", "message"),
     [
         ([0.1, np.nan, 0.2], "state[1]"),
@@ -356,17 +332,6 @@ def test_bad_states_are_named_and_change_nothing(state, message):
     ):
         refuses(message, use)
     assert np.array_equal(network.weights(), before)
-
-
-def test_bad_actions_and_targets_are_named():
-    network = SDNNC(SDNNCConfig(**SMALL), seed=1)
-    state = [0.1, 0.2, 0.3]
-    refuses("action", network.value, state, 91)
-    refuses("target", network.update, state, 0, np.nan)
-    with pytest.raises(TypeError):
-        network.value(state, -1)
-    with pytest.raises((TypeError, ValueError)):
-        network.values(["a", "b", "c"])
 
 
 @pytest.mark.parametrize(
