@@ -146,8 +146,9 @@ class RBFNetwork {
   ///
   /// Throws std::invalid_argument for a state of wrong size or outside [0, 1].
   void values(std::span<const double> state, Workspace& workspace, std::span<double> out) const {
-    core::require(out.size() == n_actions(), "out", std::to_string(n_actions()) + " values",
-                  out.size());
+    if (out.size() != n_actions()) {  // only then does the message cost memory
+      core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
+    }
     const Eigen::ArrayXd& mixed = mix(state, workspace);
     Eigen::Map<Eigen::ArrayXd> q(out.data(), action_bases_.rows());
     q.setZero();
@@ -156,8 +157,9 @@ class RBFNetwork {
 
   /// Q(state, action). Throws like values, and std::invalid_argument for an action out of range.
   double value(std::span<const double> state, Workspace& workspace, std::size_t action) const {
-    core::require(action < n_actions(), "action", "less than " + std::to_string(n_actions()),
-                  action);
+    if (action >= n_actions()) {
+      core::require(false, "action", "less than " + std::to_string(n_actions()), action);
+    }
     const Eigen::ArrayXd& mixed = mix(state, workspace);
     const auto bases = action_bases_.row(index(action));
     double q = 0.0;
