@@ -34,11 +34,11 @@ from sdnn.agents import (
     Training,
     load_agent,
 )
-from sdnn.agents.adapters import read_statistics
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig
 from sdnn.runs import ResultStore, StoreError, TrialRows
 from sdnn.runs.spec import HASH_DIGITS
 from sdnn.runs.trial import ROW
+from sdnn.training.statistics import read_statistics
 
 BOX = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
 GEAR = gym.spaces.Discrete(3)

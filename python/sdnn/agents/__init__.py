@@ -1,10 +1,15 @@
 """Agents: ``agent.train(env, steps=...)``, or ``act(observation)`` and ``learn(transition)``."""
 
-from sdnn.agents.adapters import UnusableStepError
 from sdnn.agents.agent import Agent
 from sdnn.agents.base import load_agent
-from sdnn.agents.callbacks import (
-    Callback,
+from sdnn.agents.datasets import learn_from
+from sdnn.agents.fixed_rate import FixedRate
+from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
+from sdnn.agents.q_lambda import SDNNQLambda
+from sdnn.agents.q_learning import Preset, RBFQLearning, SDNNQLearning
+from sdnn.agents.scaling import Scaling
+from sdnn.config import FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
+from sdnn.training.callbacks import (
     CheckpointCallback,
     JSONLines,
     SaveBestAgent,
@@ -13,16 +18,11 @@ from sdnn.agents.callbacks import (
     StopTrainingOnRewardThreshold,
     TensorBoard,
 )
-from sdnn.agents.datasets import learn_from
-from sdnn.agents.episode import Transition, UnrepeatedEpisodeError
-from sdnn.agents.evaluation import Evaluation, evaluate
-from sdnn.agents.fixed_rate import FixedRate
-from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
-from sdnn.agents.q_lambda import SDNNQLambda
-from sdnn.agents.q_learning import Preset, RBFQLearning, SDNNQLearning
-from sdnn.agents.scaling import Scaling
-from sdnn.agents.training import Training, TrainingResult
-from sdnn.config import FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
+from sdnn.training.episodes import UnrepeatedEpisodeError
+from sdnn.training.evaluation import Evaluation, evaluate
+from sdnn.training.learners import Transition
+from sdnn.training.steps import UnusableStepError
+from sdnn.training.training import Callback, Training, TrainingResult
 
 __all__ = [
     "Agent",

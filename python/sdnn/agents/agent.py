@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -12,15 +12,12 @@ from numpy.typing import NDArray
 
 from sdnn.agents.base import Approximator, BaseAgent, Learning
 from sdnn.agents.batches import unbatched
-from sdnn.agents.callbacks import ProgressBarCallback, listed
-from sdnn.agents.episode import Transition
-from sdnn.agents.names import explained
-from sdnn.agents.training import Training, TrainingResult
 from sdnn.support.arguments import argument_error, blamed, flag, require, reward_of, shown, whole
 from sdnn.support.progress import is_shown
-
-if TYPE_CHECKING:
-    from sdnn.agents.callbacks import Callback
+from sdnn.training.callbacks import ProgressBarCallback
+from sdnn.training.learners import Transition
+from sdnn.training.names import explained
+from sdnn.training.training import Callback, Training, TrainingResult, listed
 
 
 class Agent(BaseAgent[Approximator, Learning]):

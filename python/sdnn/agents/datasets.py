@@ -10,11 +10,11 @@ import gymnasium as gym
 import numpy as np
 
 from sdnn.agents.agent import Agent
-from sdnn.agents.episode import Transition
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.logs import Logged, reader_of
-from sdnn.agents.names import explained
 from sdnn.support.arguments import is_of_class, require, whole
+from sdnn.training.learners import Transition
+from sdnn.training.names import explained
 
 
 class MinariDataset(Protocol):

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sdnn.agents.episode import Transition
 from sdnn.support.arguments import advice, argument_error, array_of, path_of, require, shown
 from sdnn.support.files import open_regular
+from sdnn.training.learners import Transition
 
 _MOST_BYTES = 2**20
 """The longest line of a file that is read, so that memory stays bounded."""

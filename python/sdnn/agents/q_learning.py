@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn import _core
 from sdnn.agents.agent import Agent
 from sdnn.agents.base import Approximator, Learning
-from sdnn.agents.matching import Observed
-from sdnn.agents.names import explained
-from sdnn.agents.spaces import AnglePairs, Inputs, Missing, Ranges
 from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.config import WARM_UP, QLearningConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.environments.matching import Observed
+from sdnn.environments.spaces import AnglePairs, Inputs, Missing, Ranges
 from sdnn.support.arguments import choice, real, whole
+from sdnn.training.names import explained
 
 
 class Preset(NamedTuple):

@@ -14,14 +14,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sdnn import _core
-from sdnn.agents.episode import Learner
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.agents.q_learning import Preset, RBFQLearning, SDNNQLearning
-from sdnn.agents.training import Training
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.config import FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
 from sdnn.support.arguments import argument_error, shown
+from sdnn.training.learners import Learner
+from sdnn.training.training import Training
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -221,7 +221,7 @@ def train_run(
     """Train a run, with a line of progress on a terminal, and print the result."""
     callbacks = []
     if is_shown():
-        from sdnn.agents.callbacks import ProgressBarCallback
+        from sdnn.training.callbacks import ProgressBarCallback
 
         callbacks.append(ProgressBarCallback(run.spec.task, seconds=0.0))
     outcome = run.train(

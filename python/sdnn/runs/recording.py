@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents import UnusableStepError
-from sdnn.agents.evaluation import greedy_episode
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
 from sdnn.runs.spec import RunSpec
 from sdnn.support.files import whole_file
+from sdnn.training.evaluation import greedy_episode
 
 SUFFIXES = (".gif", ".mp4")
 

@@ -31,9 +31,8 @@ from sdnn.agents import (
     evaluate,
     load_agent,
 )
-from sdnn.agents.callbacks import Row
-from sdnn.agents.matching import require_same_kind
 from sdnn.agents.q_learning import ValueAgent
+from sdnn.environments.matching import require_same_kind
 from sdnn.runs.config_file import FORMAT, ConfigFile, read_spec
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
@@ -52,6 +51,7 @@ from sdnn.support.display import Displayed
 from sdnn.support.files import lock, open_to_append, remove_abandoned_files, write_whole
 from sdnn.support.interrupts import Interrupts
 from sdnn.support.machine import instruction_set
+from sdnn.training.loop import Row
 
 if TYPE_CHECKING:
     from typing import Self

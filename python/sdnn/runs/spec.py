@@ -13,7 +13,6 @@ import msgspec
 from msgspec import Meta
 
 from sdnn.agents import Agent, Preset
-from sdnn.agents.episode import Learner
 from sdnn.agents.q_learning import CodedAgent
 from sdnn.agents.registry import (
     AGENTS,
@@ -50,6 +49,7 @@ from sdnn.runs.settings import (
 from sdnn.runs.trial import TrainingTrial, Trial, training_trial
 from sdnn.support.arguments import blamed, is_of_class, shown
 from sdnn.support.bounds import flat_bounds
+from sdnn.training.learners import Learner
 
 HASH_DIGITS = 16
 """Hexadecimal digits kept of a specification's SHA-256: 64 bits."""

@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn._core import __version__
 from sdnn.agents import Callback, Evaluation, StopTrainingOnRewardThreshold, Training
-from sdnn.agents.callbacks import Row
 from sdnn.runs.errors import ConfigError
 from sdnn.support.arguments import whole
+from sdnn.training.loop import Row
 
 if TYPE_CHECKING:
     from sdnn.runs.spec import RunSpec

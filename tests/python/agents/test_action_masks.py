@@ -116,7 +116,7 @@ def test_vectors_of_every_mode_learn_the_same(actions, mode):
 
 
 def test_vectors_that_reset_themselves_take_allowed_actions(monkeypatch):
-    monkeypatch.setattr("sdnn.agents.vectors._resets_each", lambda env: False)
+    monkeypatch.setattr("sdnn.training.vectors._resets_each", lambda env: False)
 
     def own(mode):
         return gym.vector.SyncVectorEnv(

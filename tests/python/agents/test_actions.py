@@ -6,8 +6,8 @@ import pytest
 
 from refusals import refuses
 from sdnn.agents import FuzzyQLearning, QLearningConfig, SDNNQLearning, Transition
-from sdnn.agents.spaces import Actions
 from sdnn.approximators import SDNNCConfig
+from sdnn.environments.spaces import Actions
 
 FLOATS = gym.spaces.Box(np.array([-1.0, 0.0], np.float32), np.array([1.0, 0.1], np.float32))
 PLANE = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)

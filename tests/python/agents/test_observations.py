@@ -6,8 +6,8 @@ import pytest
 
 from refusals import refuses
 from sdnn.agents import RBFQLearning, SDNNQLearning, Transition, load_agent
-from sdnn.agents.spaces import Observations
 from sdnn.approximators import SDNNCConfig
+from sdnn.environments.spaces import Observations
 from sdnn.support.bounds import flat_bounds
 
 BOX = gym.spaces.Box(np.array([-1.0, 0.0]), np.array([3.0, 10.0]), dtype=np.float64)

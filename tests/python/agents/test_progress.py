@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from sdnn.agents import RBFQLearning, Training
-from sdnn.agents.callbacks import ProgressBarCallback
+from sdnn.training.callbacks import ProgressBarCallback
 
 
 @pytest.mark.parametrize("is_terminal", [True, False])
@@ -42,7 +42,7 @@ def test_train_shows_it_where_it_is_asked_for(capsys):
 
 def test_a_notebook_shows_it_where_a_training_is_long():
     nbclient, nbformat = map(pytest.importorskip, ("nbclient", "nbformat"))
-    source = """import gymnasium as gym; from sdnn.agents import RBFQLearning, callbacks
+    source = """import gymnasium as gym; from sdnn.agents import RBFQLearning; from sdnn.training import callbacks
 callbacks.SHOWN_AFTER, env = {}, gym.make("Pendulum-v1")
 RBFQLearning(env).train(env, 500)"""
     for limit, n_outputs in ((0.0, 2), (60.0, 1)):

@@ -20,8 +20,8 @@ from sdnn.agents import (
     Transition,
     UnrepeatedEpisodeError,
 )
-from sdnn.agents.episode import episode_seed
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.training.episodes import episode_seed
 from stopped_training import Stop, states_equal
 
 AutoresetMode = gym.vector.AutoresetMode

@@ -10,9 +10,9 @@ from PIL import Image
 import drifting_env
 from refusals import refuses
 from run_specs import run_spec
-from sdnn.agents.episode import EVALUATION, episode_seed
 from sdnn.runs import EnvironmentSpec, Run, RunError
 from sdnn.runs.recording import record
+from sdnn.training.episodes import EVALUATION, episode_seed
 
 
 @pytest.fixture(scope="module")

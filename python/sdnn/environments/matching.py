@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents.spaces import in_a_line, wholes_of
+from sdnn.environments.spaces import in_a_line, wholes_of
 from sdnn.support.arguments import require
 from sdnn.support.bounds import with_infinities
 

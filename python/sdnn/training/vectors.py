@@ -10,19 +10,10 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 
-from sdnn.agents.adapters import (
-    EnvironmentAdapter,
-    OneEnvironment,
-    Options,
-    Seeds,
-    UnusableStepError,
-    has_action_masks,
-    mask_in,
-    reset_env,
-    step_env,
-)
-from sdnn.agents.spaces import has_mask
+from sdnn.environments.spaces import has_mask
 from sdnn.support.arguments import array_of
+from sdnn.training.environments import EnvironmentAdapter, OneEnvironment, Options, Seeds
+from sdnn.training.steps import UnusableStepError, has_action_masks, mask_in, reset_env, step_env
 
 
 def vector_adapter(env: gym.vector.VectorEnv[Any, Any, Any]) -> EnvironmentAdapter:

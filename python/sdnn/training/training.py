@@ -1,11 +1,9 @@
-"""The training loop: an agent learns in an environment, can be stopped anywhere and resumed."""
+"""Trainings: their arguments, results and files, around the loop."""
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Generator, Iterable, Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,27 +12,19 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents.adapters import (
-    UnusableStepError,
-    require_single,
-    share_statistics,
-    statistics_of,
-    take_statistics,
-)
-from sdnn.agents.base import SavedTraining, read_training, write_training
-from sdnn.agents.callbacks import listed, listeners
-from sdnn.agents.episode import Episodes, Learner
-from sdnn.agents.evaluation import evaluate
-from sdnn.agents.matching import require_same_kind
-from sdnn.agents.names import explained
+from sdnn.environments.matching import require_same_kind
 from sdnn.support.arguments import flag, has_methods, path_of, require, shown, whole
 from sdnn.support.display import Displayed
-from sdnn.support.interrupts import Interrupts
+from sdnn.training.episodes import Episodes, adapter_for
+from sdnn.training.files import SavedTraining, read_training, write_training
+from sdnn.training.learners import Learner, each_learner
+from sdnn.training.loop import Row, TrainingLoop
+from sdnn.training.names import explained
+from sdnn.training.statistics import share_statistics, take_statistics
+from sdnn.training.steps import require_single
 
 if TYPE_CHECKING:
     from typing import Self
-
-    from sdnn.agents.callbacks import Callback, Row
 
 _SETTINGS = (
     "seed", "evaluate_every", "evaluate_every_episodes", "evaluation_episodes", "limit_bootstraps"
@@ -74,7 +64,40 @@ class TrainingResult(Displayed):
         return {**facts, "last evaluation": last[0]}
 
 
-class Training:
+class Callback:
+    """The base of callbacks: every method does nothing unless overridden.
+
+    A callback stops the training by ``training.stop()``.
+    """
+
+    step_interval: int = 1
+    """``on_step`` is called where the number of steps is a multiple of it."""
+
+    def on_start(self, training: Training) -> None:
+        """Before the first step, also of a training that is resumed."""
+
+    def on_step(self, training: Training) -> None:
+        """After every learned step, or every ``step_interval`` of them."""
+
+    def on_row(self, training: Training, row: Row) -> None:
+        """After an episode (``row["kind"] == "episode"``) and an evaluation (``"evaluation"``)."""
+
+    def on_end(self, training: Training) -> None:
+        """After the last step, also of a training that was interrupted."""
+
+
+def listed(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
+    """Check callbacks, of any class that has the methods; TypeError."""
+    try:
+        checked = tuple(callbacks)
+    except TypeError:
+        raise TypeError(f"callbacks must be a list of callbacks, got {shown(callbacks)}") from None
+    for callback in checked:
+        has_methods("callbacks", callback, "callbacks", "on_start", "on_step", "on_row", "on_end")
+    return checked
+
+
+class Training(TrainingLoop):
     """An agent that learns in an environment for a number of steps or episodes.
 
     Every episode resets the environment with a seed of its own. A training is therefore resumed
@@ -104,7 +127,7 @@ class Training:
         The number of the first episode: the ``next_episode`` of an earlier training with the same
         seed, so as not to meet the same episodes again.
     callbacks
-        See `sdnn.agents.callbacks`.
+        See `sdnn.training.callbacks`.
     evaluate_every, evaluate_every_episodes
         Steps, or learned episodes, between two evaluations; both None: none.
     evaluation_env
@@ -194,17 +217,15 @@ class Training:
         expected = "be a function or None"
         require(is_function, "reset_options", expected, reset_options, TypeError)
         self.reset_options = reset_options
-        self.n_steps = self.n_episodes = self.n_rows = 0
-        self.evaluations: list[tuple[int, float]] = []
-        """Steps and mean returns of all evaluations so far, also of those before it was loaded."""
-        self.rows: list[Row] = []
-        """Rows since it was begun, or last loaded."""
-        self._episodes = Episodes(env, agent, self.seed, first, self._options, self._unusable)
+        self.evaluations = []
+        self.rows = []
+        adapter = adapter_for(env)
+        self._learner = each_learner(agent, adapter.n_environments)
+        self._episodes = Episodes(
+            env, adapter, self._learner, self.seed, first, self._options, self._unusable
+        )
         if reset_options is not None and self.n_environments > 1:
             raise ValueError("reset_options must be None for a vector environment")
-        self._stops = False
-        self.is_within_step = False
-        """Whether an error left a step half done, which cannot be saved."""
 
     @property
     def n_environments(self) -> int:
@@ -215,18 +236,6 @@ class Training:
     def next_episode(self) -> int:
         """The number of an episode that has not begun, nor any after it."""
         return self._episodes.next_number
-
-    @property
-    def is_finished(self) -> bool:
-        """Whether all steps or episodes are done."""
-        if self.steps is not None:
-            return self.n_steps >= self.steps
-        assert self.episodes is not None
-        return self.n_episodes >= self.episodes
-
-    def stop(self) -> None:
-        """Stop after the present step, or before the first one of the next `run`."""
-        self._stops = True
 
     def run(self) -> TrainingResult:
         """Learn until all is done, a callback stops, or the user interrupts.
@@ -251,46 +260,6 @@ class Training:
             rows=tuple(self.rows),
             is_finished=self.is_finished,
         )
-
-    def pieces(self, seconds: float) -> Generator[None, None, None]:
-        """Learn as `run` does, in pieces of about ``seconds`` each.
-
-        Closing the generator between two pieces stops the training there, like `stop`.
-        """
-        if self.is_within_step:
-            raise RuntimeError("a training that was left within a step cannot be resumed: load it")
-        with Interrupts(self.stop) as interrupts, ExitStack() as stack:
-            stack.callback(setattr, self, "_stops", False)
-            stack.callback(self._keep_statistics)
-            stack.callback(self._warn_of_refused_reward)
-            for callback in self.callbacks:
-                callback.on_start(self)
-                stack.callback(callback.on_end, self)
-            if self._lacks_evaluation:
-                self._tell([self._evaluation()])
-            n_now = getattr(self.agent, "n_environments", 1)
-            if n_now != self.n_environments and not self.is_finished:
-                self.agent.n_environments = self.n_environments
-            self._listeners = listeners(self.callbacks)
-            self._set_next_call()
-            due = time.monotonic() + seconds
-            while not (self.is_finished or self._stops):
-                self.is_within_step = True
-                try:
-                    last = self._learn_steps()
-                except Exception:
-                    self._episodes.leave()
-                    self.is_within_step = False
-                    raise
-                failure = self._note_steps(last)
-                self.is_within_step = False
-                if failure is not None:
-                    raise failure
-                if time.monotonic() >= due:
-                    yield
-                    due = time.monotonic() + seconds
-        if interrupts.received is not None:
-            raise KeyboardInterrupt
 
     def save(self, path: str | Path) -> None:
         """Write agent and training in one file for `load`; OSError if it cannot be written."""
@@ -358,14 +327,13 @@ class Training:
             training._episodes.repeat(saved.present)
         return training
 
-    def _warn_of_refused_reward(self) -> None:
-        if hasattr(self.agent, "warn_of_refused_reward"):
-            self.agent.warn_of_refused_reward()
-
-    def _keep_statistics(self) -> None:
-        """Let the agent keep what the wrappers of its environment have learned."""
-        if hasattr(self.agent, "wrappers"):
-            self.agent.wrappers = statistics_of(self._episodes.wrappers)
+    def _find_listeners(self) -> list[tuple[int, Callback]]:
+        """Return the callbacks that are called after steps, each with its interval; ValueError."""
+        return [
+            (whole("step_interval", getattr(callback, "step_interval", 1), 1, 2**53), callback)
+            for callback in self.callbacks
+            if getattr(callback.on_step, "__func__", None) is not Callback.on_step
+        ]
 
     def _options(self, episode: int) -> dict[str, Any] | None:
         if self.reset_options is None:
@@ -374,117 +342,6 @@ class Training:
         is_mapping = isinstance(options, Mapping)
         require(is_mapping, "reset_options", "return a mapping", options, TypeError)
         return dict(options)
-
-    def _unusable(self, error: Exception, environment: int | None) -> UnusableStepError:
-        """Return the error that names step and episode, in an environment or in any."""
-        where = ""
-        episode = self._episodes.present[environment or 0]
-        if episode is not None and (environment is not None or self.n_environments == 1):
-            where = f"step {episode.n_steps}" if episode.n_steps else "the reset"
-            whose = f" in environment {environment}" if self.n_environments > 1 else ""
-            where = f" ({where} of episode {episode.number}{whose})"
-        return UnusableStepError(
-            f"env gave what cannot be learned, in step {self.n_steps + 1}{where}: {error}"
-        )
-
-    def _set_next_call(self) -> None:
-        """Find the step after which callbacks are called or an evaluation is due, or the last."""
-        n = self.n_steps
-        every = [interval for interval, _ in self._listeners]
-        every += [] if self.evaluate_every is None else [self.evaluate_every]
-        goal = 2**62 if self.steps is None else self.steps
-        self._next_call = min([goal, *(n - n % interval + interval for interval in every)])
-
-    def _learn_steps(self) -> int:
-        """Learn as many steps as come before the next call, and return the last one's environment.
-
-        They are of one round, and end with the first that ends an episode.
-        """
-        episodes, n = self._episodes, self.n_steps
-        while not episodes.waiting:  # where all begin with the step, none waits
-            episodes.advance()
-        most, progress = self._next_call - n, []
-        if episodes.n_environments > 1 and self.steps is not None:
-            n_most = min(most, episodes.n_environments)
-            progress = [(n + k) / self.steps for k in range(1, n_most)]
-        learned = episodes.learn_waiting(most, self.limit_bootstraps, progress)
-        self.n_steps += len(learned)
-        return learned[-1]
-
-    def _note_steps(self, i: int) -> Exception | None:
-        """Count what ends with the last step, evaluate where it is due, and call the callbacks.
-
-        Returns the error of an evaluation, without which the step is whole.
-        """
-        rows: list[Row] = []
-        failure: Exception | None = None
-        terminated = self._episodes.adapter.terminated[i]
-        ends = terminated or self._episodes.adapter.truncated[i]
-        if ends:
-            rows.append(self._episode_row(i, terminated))
-            self.n_episodes += 1
-            self._episodes.present[i] = None
-            self._warn_of_refused_reward()
-            if self.evaluate_every_episodes is not None and self._lacks_evaluation:
-                self._episodes.rounds.begin_episode(i)  # which learns what still waits
-        if (learner := self._episodes.rounds.progressing) is not None:
-            if self.steps is not None:
-                learner.progress = self.n_steps / self.steps
-            elif ends and self.episodes is not None:
-                learner.progress = self.n_episodes / max(self.episodes, self.n_episodes)
-        is_called = self.n_steps >= self._next_call
-        if (ends or is_called) and self._lacks_evaluation:
-            try:
-                rows.append(self._evaluation())
-            except Exception as error:
-                failure = error
-        if rows:
-            self._tell(rows)
-        if is_called:
-            for interval, callback in self._listeners:
-                if self.n_steps % interval == 0:
-                    callback.on_step(self)
-            self._set_next_call()
-        return failure
-
-    def _episode_row(self, i: int, terminated: bool) -> Row:
-        episode, place = self._episodes.present[i], self._episodes.rounds.places[i]
-        assert episode is not None
-        own = {"return": episode.sum_of_rewards, "length": episode.n_steps}
-        values = {"episode": self.n_episodes, **place, **own, "terminated": terminated}
-        return self._row("episode", **values)
-
-    def _tell(self, rows: list[Row]) -> None:
-        for row in rows:
-            self.rows.append(row)
-            for callback in self.callbacks:
-                callback.on_row(self, row)
-
-    @property
-    def _lacks_evaluation(self) -> bool:
-        """Whether one is due by now, and not made."""
-        if self.evaluate_every is not None:
-            return len(self.evaluations) < self.n_steps // self.evaluate_every
-        if self.evaluate_every_episodes is not None:
-            return len(self.evaluations) < self.n_episodes // self.evaluate_every_episodes
-        return False
-
-    def _evaluation(self) -> Row:
-        assert self.evaluation_env is not None
-        share_statistics(self.env, self.evaluation_env)
-        found = evaluate(
-            self.agent,
-            self.evaluation_env,
-            self.evaluation_episodes,
-            seed=self.seed,
-            options=self._options(self.n_episodes),
-        )
-        self.evaluations.append((self.n_steps, found.mean_return))
-        return self._row("evaluation", episode=self.n_episodes, **found.row())
-
-    def _row(self, kind: str, **values: Any) -> Row:
-        self.n_rows += 1
-        return {"kind": kind, "step": self.n_steps, **values}
 
 
 def _optional(name: str, value: float | None) -> int | None:

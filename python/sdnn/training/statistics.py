@@ -1,183 +1,26 @@
-"""Environments as a training steps them, and what their wrappers learn.
+"""Statistics of wrappers that learn, such as Gymnasium's NormalizeObservation.
 
-One environment is stepped as many are; results are checked and arrays copied.
+They are in an attribute ``obs_rms`` or ``return_rms`` with numbers ``mean``, ``var``, ``count``.
 """
 
 from __future__ import annotations
 
-import abc
 import base64
-import copy
-import math
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import gymnasium as gym
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.support.arguments import flag, has_methods, reward_of, shown
-
-Seeds: TypeAlias = Mapping[int, int | None]
-Options: TypeAlias = dict[str, Any] | None
-
-_SCALARS = (np.generic, int, float)
-
-_OLD_API = (
-    "; an environment of Gym before 0.26 can be wrapped:"
-    " shimmy.GymV21CompatibilityV0(env=env), from pip install shimmy"
-)
-
-
-def require_single(name: str, env: Any) -> None:
-    """Check that a value is one environment; TypeError that names the argument."""
-    has_methods(name, env, "an environment, as of gymnasium.make(id)", "reset", "step")
-    if isinstance(env, gym.vector.VectorEnv):
-        raise TypeError(
-            f"{name} must be a single environment, got a vector of them, {type(env).__name__}"
-        )
-
-
-class UnusableStepError(ValueError):
-    """A step or reset of an environment cannot be used; the message names it and the reason."""
-
-
-def has_action_masks(env: Any) -> bool:
-    """Return whether an environment, or a vector, tells which actions are allowed."""
-    return bool((getattr(env, "metadata", None) or {}).get("action_masks"))
-
-
-def mask_in(info: Mapping[str, Any]) -> Any:
-    """Return the mask in an info; UnusableStepError if there is none."""
-    if "action_mask" not in info:
-        raise UnusableStepError(
-            "info must have 'action_mask', as metadata['action_masks'] of env is True,"
-            f" got {shown(sorted(map(str, info)))}"
-        )
-    return info["action_mask"]
-
-
-def reset_env(env: Any, seed: Any, options: dict[str, Any] | None) -> tuple[Any, Any]:
-    """Reset an environment, or a vector; return what is observed first, and the info.
-
-    UnusableStepError if it returns something else than an observation and a dictionary.
-    """
-    made = env.reset(seed=seed, options=options)
-    if not (isinstance(made, tuple | list) and len(made) == 2 and isinstance(made[1], Mapping)):
-        raise UnusableStepError(
-            f"env.reset must return (observation, info), info a dictionary, got {shown(made)}"
-            f"{_OLD_API}"
-        )
-    return made[0], made[1]
-
-
-def step_env(env: Any, action: Any) -> tuple[Any, Any, Any, Any, Any]:
-    """Step an environment, or a vector; UnusableStepError if it does not return five values."""
-    made = env.step(action)
-    if not (isinstance(made, (tuple, list)) and len(made) == 5):
-        n = len(made) if isinstance(made, (tuple, list)) else 1
-        raise UnusableStepError(
-            "env.step must return five values, (observation, reward, terminated, truncated, info),"
-            f" got {n}{_OLD_API}"
-        )
-    return made  # type: ignore[return-value]
-
-
-def checked(reward: Any, terminated: Any, truncated: Any) -> tuple[float, bool, bool]:
-    """Return a finite float and bools; UnusableStepError for something else."""
-    try:
-        if type(reward) is not float:
-            reward = reward_of(reward)
-        if not math.isfinite(reward):
-            raise ValueError(f"reward must be finite, got {reward}")
-        if not type(terminated) is bool is type(truncated):
-            terminated, truncated = flag("terminated", terminated), flag("truncated", truncated)
-    except (TypeError, ValueError) as error:
-        raise UnusableStepError(str(error)) from error
-    return reward, terminated, truncated
-
-
-def own_copy(value: Any) -> Any:
-    """Copy what others may write to: environments may keep their state, or change an action."""
-    if type(value) is np.ndarray:
-        return value.copy()
-    return value if isinstance(value, _SCALARS) else copy.deepcopy(value)
-
-
-class EnvironmentAdapter(abc.ABC):
-    """The interface of all environments, single and vectorized.
-
-    ``can_repeat`` is whether each environment can be reset at any time, with a seed of its own.
-    ``rewards``, ``terminated`` and ``truncated`` are those of the last step in each. ``masks`` are
-    those of the actions allowed after the last reset or step in each, None where it has none; None
-    altogether where `has_action_masks` is False.
-    """
-
-    n_environments: int
-    can_repeat: bool
-    rewards: list[float]
-    terminated: list[bool]
-    truncated: list[bool]
-    masks: list[Any] | None
-
-    @abc.abstractmethod
-    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
-        """Begin episodes in some environments, with seeds; return their first observations.
-
-        Where one is missing, the episode begins with the next `step`, which returns it.
-        """
-
-    @abc.abstractmethod
-    def step(self, actions: Sequence[Any]) -> Any:
-        """Take an action in each, any one where the episode has not begun.
-
-        Returns what is observed, in an array or a list: the last observations where episodes end.
-        """
-
-
-class OneEnvironment(EnvironmentAdapter):
-    """A single environment."""
-
-    n_environments = 1
-    can_repeat = True
-
-    def __init__(self, env: gym.Env[Any, Any]) -> None:
-        self._env = env
-        self.rewards, self.terminated, self.truncated = [0.0], [False], [False]
-        self.masks = [None] if has_action_masks(env) else None
-
-    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
-        """Begin its episode."""
-        first, info = reset_env(self._env, seeds[0], options)
-        if self.masks is not None:
-            self.masks = [mask_in(info)]
-        return {0: first}
-
-    def take(self, action: Any) -> tuple[Any, float, bool, bool]:
-        """Take an action; return what a step gives but for the info."""
-        seen, reward, terminated, truncated, info = step_env(self._env, own_copy(action))
-        reward, terminated, truncated = checked(reward, terminated, truncated)
-        if self.masks is not None:
-            self.masks = [None if terminated else mask_in(info)]
-        return seen, reward, terminated, truncated
-
-    def step(self, actions: Sequence[Any]) -> Any:
-        """Take the only action."""
-        seen, self.rewards[0], self.terminated[0], self.truncated[0] = self.take(actions[0])
-        return seen[np.newaxis] if type(seen) is np.ndarray else [seen]
-
-
-# Wrappers that learn: they have an attribute ``obs_rms`` or ``return_rms`` with numbers ``mean``,
-# ``var`` and ``count``, as Gymnasium's NormalizeObservation and NormalizeReward have.
-
 _STATISTICS = ("obs_rms", "return_rms")
 _MOMENTS = ("mean", "var", "count")
 _SUMS = ("discounted_reward", "accumulated_reward")
 _FEW = 1.0
-"""The count of statistics that have seen nothing is below it."""
+"""The count of statistics without an observation is below it."""
 
 
 class _Numbers(msgspec.Struct, frozen=True):

@@ -6,71 +6,23 @@ import json
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
-from sdnn.support.arguments import has_methods, path_of, real, require, shown, whole
+from sdnn.support.arguments import path_of, real, require, whole
 from sdnn.support.files import naming, open_to_append, read_bytes, write_whole
 from sdnn.support.progress import ProgressBars
+from sdnn.training.loop import Row
+from sdnn.training.training import Callback, Training
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sdnn.agents.training import Training
-
 MOST_BYTES_OF_ROWS = 2**32
 SHOWN_AFTER = 5.0
 """Seconds of a training after which its bar appears."""
-
-Row: TypeAlias = Mapping[str, Any]
-"""An episode (``kind``, ``step``, ``episode``, ``return``, ``length``, ``terminated``, and with
-several environments ``environment``) or an evaluation (``kind``, ``step``, ``episode``,
-``mean_return``, ``mean_length``, ``share_terminated``, and lists ``returns``, ``lengths``,
-``terminated`` of its episodes). Steps and episodes are those learned until then."""
-
-
-class Callback:
-    """The base of callbacks: every method does nothing unless overridden.
-
-    A callback stops the training by ``training.stop()``.
-    """
-
-    step_interval: int = 1
-    """``on_step`` is called where the number of steps is a multiple of it."""
-
-    def on_start(self, training: Training) -> None:
-        """Before the first step, also of a training that is resumed."""
-
-    def on_step(self, training: Training) -> None:
-        """After every learned step, or every ``step_interval`` of them."""
-
-    def on_row(self, training: Training, row: Row) -> None:
-        """After an episode (``row["kind"] == "episode"``) and an evaluation (``"evaluation"``)."""
-
-    def on_end(self, training: Training) -> None:
-        """After the last step, also of a training that was interrupted."""
-
-
-def listed(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
-    """Check callbacks, of any class that has the methods; TypeError."""
-    try:
-        found = tuple(callbacks)
-    except TypeError:
-        raise TypeError(f"callbacks must be a list of callbacks, got {shown(callbacks)}") from None
-    for callback in found:
-        has_methods("callbacks", callback, "callbacks", "on_start", "on_step", "on_row", "on_end")
-    return found
-
-
-def listeners(callbacks: Iterable[Callback]) -> list[tuple[int, Callback]]:
-    """Return those that do something after steps, and after how many; ValueError."""
-    return [
-        (whole("step_interval", getattr(callback, "step_interval", 1), 1, 2**53), callback)
-        for callback in callbacks
-        if getattr(callback.on_step, "__func__", None) is not Callback.on_step
-    ]
 
 
 class JSONLines(Callback):

@@ -12,21 +12,21 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.agents.adapters import (
+from sdnn.environments.matching import require_same_kind
+from sdnn.support.arguments import has_methods, require, seed_of, whole
+from sdnn.support.display import Displayed
+from sdnn.training.episodes import EVALUATION, episode_seed
+from sdnn.training.names import explained
+from sdnn.training.statistics import fixed
+from sdnn.training.steps import (
     UnusableStepError,
-    checked,
-    fixed,
+    checked_outcome,
     has_action_masks,
     mask_in,
     require_single,
     reset_env,
     step_env,
 )
-from sdnn.agents.episode import EVALUATION, episode_seed
-from sdnn.agents.matching import require_same_kind
-from sdnn.agents.names import explained
-from sdnn.support.arguments import has_methods, require, seed_of, whole
-from sdnn.support.display import Displayed
 
 _LONG = 100_000
 """Warn after this many steps in one episode."""
@@ -188,7 +188,7 @@ def greedy_episode(
             observation, *values, info = step_env(env, action)
             n_steps += 1
             try:
-                reward, terminated, truncated = checked(*values)
+                reward, terminated, truncated = checked_outcome(*values)
             except UnusableStepError as error:
                 raise unusable(error) from error
             total += reward

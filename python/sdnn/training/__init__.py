@@ -1,0 +1,1 @@
+"""The training loop, evaluations and callbacks; `sdnn.agents` has the public names."""

@@ -1,0 +1,336 @@
+"""Episodes of a training, one in each of its environments, and how they are repeated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.training.environments import EnvironmentAdapter, OneEnvironment
+from sdnn.training.files import SavedEpisode
+from sdnn.training.learners import EachLearner
+from sdnn.training.statistics import Statistics, learning_wrappers, names_of, statistics_of
+from sdnn.training.steps import UnusableStepError
+
+_LEARNING, EVALUATION = 0, 1
+"""The kinds of episodes that `episode_seed` gives seeds to."""
+
+_N_RECENT = 1024
+"""Actions that are gathered before they become an array."""
+
+
+class UnrepeatedEpisodeError(ValueError):
+    """An environment does not repeat the episode in which a training was saved."""
+
+
+def episode_seed(seed: int, kind: int, episode: int) -> int:
+    """Return the seed of an episode's `reset`; learning and evaluation have their own."""
+    word = np.random.SeedSequence(seed, spawn_key=(kind, episode)).generate_state(1, np.uint32)[0]
+    return int(word) % 2**31  # some environments take no larger ones
+
+
+class _ActionLog:
+    """The actions of an episode, which may have millions of them, in arrays of many each."""
+
+    def __init__(self, actions: NDArray[Any] | None = None) -> None:
+        self._arrays = [] if actions is None or not len(actions) else [actions]
+        self._recent: list[Any] = []
+
+    def array(self) -> NDArray[Any]:
+        """Return all of them, shape (n, ...)."""
+        arrays = self._arrays + ([np.array(self._recent)] if self._recent else [])
+        return np.concatenate(arrays) if arrays else np.empty(0)
+
+    def append(self, action: Any) -> None:
+        """Add an action, of the shape and type of the others."""
+        self._recent.append(action)
+        if len(self._recent) == _N_RECENT:
+            self._arrays.append(np.array(self._recent))
+            self._recent.clear()
+
+
+@dataclass(slots=True, eq=False)
+class Episode:
+    """The state of an episode; ``actions`` are kept where it may be repeated."""
+
+    number: int
+    actions: _ActionLog = field(default_factory=_ActionLog)
+    n_steps: int = 0
+    sum_of_rewards: float = 0.0
+
+
+class Episodes:
+    """The episodes in all environments of a training: begins, steps and repeats them.
+
+    ``options`` returns those of a single environment's reset from the episode's number, and
+    ``unusable`` the error for one of a step or reset, in an environment or in any (None). ``seed``
+    is the root of the episodes' seeds; None: resets have no seeds. ``first`` is the number of the
+    first episode.
+
+    Attributes
+    ----------
+    present : list of (Episode or None)
+        In each environment; None: the next one has not begun.
+    next_number : int
+        The number of the episode that begins next.
+    unlearned : list of int
+        Environments whose last step is to be learned, in order.
+    observations, previous_observations, actions, masks
+        The latest observations, those before the last step, the actions of that step, and the masks
+        of the latest observations where environments have them, as the learner reads them.
+    adapter : EnvironmentAdapter
+        Has the rewards and ends of the last step.
+    wrappers, learned : list
+        The wrappers that learn, and what they had learned when the last episode began.
+    """
+
+    observations: Any
+    previous_observations: Any
+    masks: Any = None
+
+    def __init__(
+        self,
+        env: Any,
+        adapter: EnvironmentAdapter,
+        learner: EachLearner,
+        seed: int | None,
+        first: int,
+        options: Callable[[int], dict[str, Any] | None],
+        unusable: Callable[[Exception, int | None], UnusableStepError],
+    ) -> None:
+        self._env, self._seed, self._options = env, seed, options
+        self._unusable, self._learner = unusable, learner
+        self.adapter = adapter
+        self.wrappers = learning_wrappers(env)
+        self.learned: list[Statistics] = []
+        n = self.n_environments = adapter.n_environments
+        self.next_number = first
+        self.present: list[Episode | None] = [None] * n
+        self.unlearned: list[int] = []
+        self.actions: Any = [None] * n
+        self._environments = list(range(n))
+        self._begins_with_step: dict[int, int] = {}
+
+    @property
+    def learned_before(self) -> list[Statistics]:
+        """Steps and episodes learned before the present episode, or the next."""
+        return self.learned if any(self.present) else statistics_of(self.wrappers)
+
+    def leave(self) -> None:
+        """Begin anew in every environment with the next step, with other seeds."""
+        self.adapter = adapter_for(self._env)
+        self.present[:] = [None] * self.n_environments
+        self.unlearned = []
+
+    def begin(self) -> None:
+        """Begin episodes where none is present: now, or with the next step of some vectors."""
+        present = self.present
+        self.unlearned = self._environments.copy()
+        self._begins_with_step = {}
+        if None not in present:
+            return
+        over = [i for i, episode in enumerate(present) if episode is None]
+        numbers = {i: self.next_number + k for k, i in enumerate(over)}
+        self.next_number += len(over)
+        self.learned = statistics_of(self.wrappers)
+        first_observations = self._reset(numbers)
+        for i in first_observations:
+            present[i] = Episode(numbers.pop(i))
+        self._put(first_observations)
+        for i in first_observations:
+            self._learner.begin_episode(i)
+        self._begins_with_step = numbers
+        self.unlearned = [i for i in self._environments if present[i] is not None]
+
+    def step(self, actions: Any) -> None:
+        """Take a step in every environment."""
+        self.actions, self.previous_observations = actions, self.observations
+        elements = self._learner.elements(actions)
+        for i in self.unlearned:
+            episode: Any = self.present[i]
+            episode.n_steps += 1
+            if self._seed is not None:
+                episode.actions.append(elements[i])
+        # The calls of _checked are written out: this runs at every step.
+        try:
+            observations = self.adapter.step(elements)
+        except UnusableStepError as error:
+            raise self._unusable(error, None) from error
+        try:
+            self.observations = self._learner.read("next_observation", observations)
+            if self.adapter.masks is not None:
+                self.masks = self._learner.masks(self.adapter.masks)
+        except ValueError as error:
+            raise self._unusable(error, None) from error
+        for i, number in self._begins_with_step.items():
+            self.present[i] = Episode(number)
+            self._learner.begin_episode(i)
+
+    def is_over(self, environment: int) -> bool:
+        """Return whether the last step has ended the episode of an environment."""
+        adapter = self.adapter
+        return adapter.terminated[environment] or adapter.truncated[environment]
+
+    def until_an_end(self, most: int) -> list[int]:
+        """Return at most so many environments to be learned from, none after an episode's end."""
+        environments = self.unlearned[:most]
+        for k, i in enumerate(environments, 1):
+            if self.is_over(i):
+                del environments[k:]
+        return environments
+
+    def terminated(self, limit_bootstraps: bool) -> list[bool]:
+        """Return which steps are learned as terminating, after which no value follows."""
+        adapter = self.adapter
+        if limit_bootstraps:
+            return adapter.terminated
+        return [a or b for a, b in zip(adapter.terminated, adapter.truncated, strict=True)]
+
+    def note_learned(self, environments: list[int]) -> None:
+        """Note that the steps of these environments, the first of `unlearned`, are learned."""
+        del self.unlearned[: len(environments)]
+        for i in environments:
+            episode: Any = self.present[i]
+            episode.sum_of_rewards += self.adapter.rewards[i]
+
+    def _reset(self, numbers: Mapping[int, int]) -> dict[int, Any]:
+        """Begin episodes of these numbers in some environments; return first observations."""
+        seeds = {
+            i: None if self._seed is None else episode_seed(self._seed, _LEARNING, number)
+            for i, number in numbers.items()
+        }
+        return self.adapter.reset(seeds, self._options(1 + max(numbers.values())))
+
+    def _put(self, first_observations: dict[int, Any]) -> None:
+        """Read the first observations of all, or some, environments."""
+        if len(first_observations) == self.n_environments:
+            observations = list(first_observations.values())
+            self.observations = self._checked(self._learner.read, "observation", observations)
+        else:
+            for i, first in first_observations.items():
+                self.observations[i] = self._checked(self._learner.read, "observation", [first])[0]
+        self._read_masks()
+
+    def _read_masks(self) -> None:
+        if self.adapter.masks is not None:
+            self.masks = self._checked(self._learner.masks, self.adapter.masks)
+
+    def _checked(self, read: Callable[..., Any], *arguments: Any) -> Any:
+        """Read what an environment returned, or raise the error that names the step."""
+        try:
+            return read(*arguments)
+        except ValueError as error:
+            raise self._unusable(error, None) from error
+
+    def saved(self, shape: tuple[int, ...]) -> list[SavedEpisode | None]:
+        """Return the present episodes for a file; ``shape`` is an action's."""
+        return [
+            None
+            if episode is None
+            else SavedEpisode(
+                number=episode.number,
+                sum_of_rewards=episode.sum_of_rewards,
+                actions=episode.actions.array().reshape((-1, *shape)),
+                observation=self._learner.flat(self.observations[i]),
+                waits=i in self.unlearned,
+            )
+            for i, episode in enumerate(self.present)
+        ]
+
+    def repeat(self, saved: Sequence[SavedEpisode | None]) -> None:
+        """Bring every environment to where its episode was saved.
+
+        UnrepeatedEpisodeError if an environment does not repeat its episode; ValueError if the
+        environments are others, or cannot be reset one by one with seeds.
+        """
+        self._require_repeatable(len(saved))
+        if self.wrappers and not isinstance(self.adapter, OneEnvironment) and any(saved):
+            raise UnrepeatedEpisodeError(
+                f"env must repeat its episodes, but {type(self.wrappers[0]).__name__} has learned"
+                " from several environments at once: repeat_episodes=False begins new ones"
+            )
+        for i, episode in enumerate(saved):
+            if episode is not None:
+                actions = _ActionLog(episode.actions)
+                self.present[i] = Episode(
+                    episode.number, actions, len(episode.actions), episode.sum_of_rewards
+                )
+        self._replay()
+        self.unlearned = [i for i, e in enumerate(saved) if e is not None and e.waits]
+        for i, episode in enumerate(saved):
+            if episode is None:
+                continue
+            observation = self._learner.flat(self.observations[i])
+            if not np.array_equal(observation, episode.observation, equal_nan=True):
+                raise UnrepeatedEpisodeError(
+                    "env must repeat the episode in which the training was saved: the same seed"
+                    f" and actions led to {observation}, not to {episode.observation}. One of"
+                    f" {names_of(self._env)} draws without the seed or remembers earlier episodes:"
+                    " repeat_episodes=False begins a new one"
+                )
+
+    def _require_repeatable(self, n_saved: int) -> None:
+        if n_saved != self.n_environments:
+            raise ValueError(
+                f"env must have {n_saved} environments, as the training had,"
+                f" got {self.n_environments}"
+            )
+        if self._seed is None:
+            raise ValueError(
+                "repeat_episodes must be False for a training whose episodes had no seeds, got True"
+            )
+        if not self.adapter.can_repeat:
+            raise ValueError(
+                "env must reset each of its environments with a seed of its own where episodes are"
+                f" repeated, got {type(self._env.unwrapped).__name__}: repeat_episodes=False begins"
+                " new ones; or take SyncVectorEnv or AsyncVectorEnv, as"
+                " gymnasium.make_vec(..., vectorization_mode='sync') makes it, with shared memory"
+                " or the autoreset mode DISABLED"
+            )
+
+    def _replay(self) -> None:
+        """Take the actions of all present episodes again, so that all end at the same time.
+
+        Until its own episode begins, an environment takes any actions.
+        """
+        present = {i: episode for i, episode in enumerate(self.present) if episode is not None}
+        actions = {i: episode.actions.array() for i, episode in present.items()}
+        n_rounds = max(map(len, actions.values()), default=0)
+        longest = next((i for i, array in actions.items() if len(array) == n_rounds), 0)
+        over = set(self._environments)
+        for t in range(n_rounds + bool(actions)):
+            beginning = {i for i, array in actions.items() if n_rounds - len(array) == t}
+            own_episode = beginning.copy()
+            if t < n_rounds or n_rounds == 0:
+                beginning |= over
+            if beginning:
+                numbers = {
+                    i: present[i if i in own_episode else longest].number for i in sorted(beginning)
+                }
+                self._put(self._reset(numbers))
+            if t == n_rounds:  # only episodes without actions begin here
+                return
+            self.actions = [
+                actions[i][t - n_rounds]
+                if i in actions and t >= n_rounds - len(actions[i])
+                else actions[longest][t]
+                for i in self._environments
+            ]
+            observations = self.adapter.step(self.actions)
+            self.previous_observations = self.observations
+            self.observations = self._checked(self._learner.read, "observation", observations)
+            self._read_masks()
+            over = {i for i in self._environments if self.is_over(i)}
+
+
+def adapter_for(env: Any) -> EnvironmentAdapter:
+    """Return the adapter for an environment, or for a vector of them."""
+    if not isinstance(env, gym.vector.VectorEnv):
+        return OneEnvironment(env)
+    from sdnn.training.vectors import vector_adapter
+
+    return vector_adapter(env)

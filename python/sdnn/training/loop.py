@@ -1,0 +1,275 @@
+"""The training loop on one page: act, step, learn, evaluate.
+
+In each round the agent acts in all environments, these step together, and the agent learns the
+outcomes in the environments' order. The round pauses where an episode ends, an evaluation is due or
+a callback is called.
+"""
+
+from __future__ import annotations
+
+import abc
+import time
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import ExitStack
+from typing import Any, TypeAlias
+
+from sdnn.support.interrupts import Interrupts
+from sdnn.training.episodes import Episodes
+from sdnn.training.evaluation import evaluate
+from sdnn.training.learners import EachLearner
+from sdnn.training.statistics import share_statistics, statistics_of
+from sdnn.training.steps import UnusableStepError
+
+Row: TypeAlias = Mapping[str, Any]
+"""An episode (``kind``, ``step``, ``episode``, ``return``, ``length``, ``terminated``, and with
+several environments ``environment``) or an evaluation (``kind``, ``step``, ``episode``,
+``mean_return``, ``mean_length``, ``share_terminated``, and lists ``returns``, ``lengths``,
+``terminated`` of its episodes). Steps and episodes are those learned until then."""
+
+
+class TrainingLoop(abc.ABC):
+    """The loop of a training; `Training` has its arguments and its files."""
+
+    agent: Any
+    env: Any
+    evaluation_env: Any
+    steps: int | None
+    episodes: int | None
+    seed: int | None
+    evaluate_every: int | None
+    evaluate_every_episodes: int | None
+    evaluation_episodes: int
+    limit_bootstraps: bool
+    callbacks: Sequence[Any]
+    n_steps = 0
+    n_episodes = 0
+    n_rows = 0
+    evaluations: list[tuple[int, float]]
+    """Steps and mean returns of all evaluations so far, also of those before it was loaded."""
+    rows: list[Row]
+    """Rows since it was begun, or last loaded."""
+    is_within_step = False
+    """Whether an error left a step half done, which cannot be saved."""
+
+    _episodes: Episodes
+    _learner: EachLearner
+    _listeners: Sequence[tuple[int, Any]]
+    _stops = False
+
+    def pieces(self, seconds: float) -> Generator[None, None, None]:
+        """Learn as `run` does, in pieces of about ``seconds`` each.
+
+        Closing the generator between two pieces stops the training there, like `stop`.
+        """
+        if self.is_within_step:
+            raise RuntimeError("a training that was left within a step cannot be resumed: load it")
+        with Interrupts(self.stop) as interrupts, ExitStack() as stack:
+            stack.callback(setattr, self, "_stops", False)
+            stack.callback(self._keep_statistics)
+            stack.callback(self._warn_of_refused_reward)
+            for callback in self.callbacks:
+                callback.on_start(self)
+                stack.callback(callback.on_end, self)
+            self._begin()
+            due = time.monotonic() + seconds
+            while not (self.is_finished or self._stops):
+                self.is_within_step = True
+                try:
+                    while not self._episodes.unlearned:
+                        self._act_and_step()
+                    environment = self._learn()
+                except Exception:
+                    self._episodes.leave()
+                    self.is_within_step = False
+                    raise
+                failure = self._note_outcome(environment)
+                self.is_within_step = False
+                if failure is not None:
+                    raise failure
+                if time.monotonic() >= due:
+                    yield
+                    due = time.monotonic() + seconds
+        if interrupts.received is not None:
+            raise KeyboardInterrupt
+
+    def _begin(self) -> None:
+        if self._lacks_evaluation:
+            self._report([self._evaluate()])
+        n_environments = self._episodes.n_environments
+        if getattr(self.agent, "n_environments", 1) != n_environments and not self.is_finished:
+            self.agent.n_environments = n_environments
+        self._listeners = self._find_listeners()
+        self._set_next_call()
+
+    def _act_and_step(self) -> None:
+        """Reset environments whose episode is over, act, and step all environments."""
+        episodes = self._episodes
+        episodes.begin()
+        try:
+            actions = self._learner.act(
+                episodes.observations, episodes.actions, episodes.unlearned, episodes.masks
+            )
+        except ValueError as error:
+            raise self._unusable(error) from error
+        episodes.step(actions)
+
+    def _learn(self) -> int:
+        """Learn outcomes up to the first end of an episode or the next call of a callback.
+
+        Returns the environment of the last one.
+        """
+        episodes, n = self._episodes, self.n_steps
+        most, progress = self._next_call - n, []
+        if episodes.n_environments > 1 and self.steps is not None:
+            n_most = min(most, episodes.n_environments)
+            progress = [(n + k) / self.steps for k in range(1, n_most)]
+        environments = episodes.until_an_end(most)
+        try:
+            n_learned = self._learner.learn(
+                episodes.previous_observations,
+                episodes.actions,
+                episodes.adapter.rewards,
+                episodes.observations,
+                episodes.terminated(self.limit_bootstraps),
+                environments,
+                progress,
+                episodes.masks,
+            )
+        except (ValueError, OverflowError) as error:
+            raise self._unusable(error, environments[0]) from error
+        episodes.note_learned(environments[:n_learned])
+        self.n_steps += n_learned
+        return environments[n_learned - 1]
+
+    def _note_outcome(self, environment: int) -> Exception | None:
+        """Count an episode that ended, evaluate where it is due, and call the callbacks.
+
+        Returns the error of an evaluation, without which the step is whole.
+        """
+        rows: list[Row] = []
+        failure: Exception | None = None
+        if is_over := self._episodes.is_over(environment):
+            rows.append(self._episode_row(environment))
+            self.n_episodes += 1
+            self._episodes.present[environment] = None
+            self._warn_of_refused_reward()
+            if self.evaluate_every_episodes is not None and self._lacks_evaluation:
+                self._learner.begin_episode(environment)  # learns n-step returns that are pending
+        self._set_progress(is_over)
+        is_called = self.n_steps >= self._next_call
+        if (is_over or is_called) and self._lacks_evaluation:
+            try:
+                rows.append(self._evaluate())
+            except Exception as error:
+                failure = error
+        if rows:
+            self._report(rows)
+        if is_called:
+            for interval, callback in self._listeners:
+                if self.n_steps % interval == 0:
+                    callback.on_step(self)
+            self._set_next_call()
+        return failure
+
+    def _set_progress(self, is_episode_over: bool) -> None:
+        """Tell the learner which part of the training is done, which schedules follow."""
+        learner = self._learner.progressing
+        if learner is None:
+            return
+        if self.steps is not None:
+            learner.progress = self.n_steps / self.steps
+        elif is_episode_over and self.episodes is not None:
+            learner.progress = self.n_episodes / max(self.episodes, self.n_episodes)
+
+    def _set_next_call(self) -> None:
+        """Find the step after which callbacks are called or an evaluation is due, or the last."""
+        n = self.n_steps
+        intervals = [interval for interval, _ in self._listeners]
+        intervals += [] if self.evaluate_every is None else [self.evaluate_every]
+        goal = 2**62 if self.steps is None else self.steps
+        self._next_call = min([goal, *(n - n % interval + interval for interval in intervals)])
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether all steps or episodes are done."""
+        if self.steps is not None:
+            return self.n_steps >= self.steps
+        assert self.episodes is not None
+        return self.n_episodes >= self.episodes
+
+    def stop(self) -> None:
+        """Stop after the present step, or before the first one of the next `run`."""
+        self._stops = True
+
+    @property
+    def _lacks_evaluation(self) -> bool:
+        """Whether an evaluation is due by now, and not made."""
+        if self.evaluate_every is not None:
+            return len(self.evaluations) < self.n_steps // self.evaluate_every
+        if self.evaluate_every_episodes is not None:
+            return len(self.evaluations) < self.n_episodes // self.evaluate_every_episodes
+        return False
+
+    def _evaluate(self) -> Row:
+        share_statistics(self.env, self.evaluation_env)
+        evaluation = evaluate(
+            self.agent,
+            self.evaluation_env,
+            self.evaluation_episodes,
+            seed=self.seed,
+            options=self._options(self.n_episodes),
+        )
+        self.evaluations.append((self.n_steps, evaluation.mean_return))
+        return self._row("evaluation", episode=self.n_episodes, **evaluation.row())
+
+    def _episode_row(self, environment: int) -> Row:
+        episode = self._episodes.present[environment]
+        assert episode is not None
+        return self._row(
+            "episode",
+            episode=self.n_episodes,
+            **self._learner.arguments[environment],
+            **{"return": episode.sum_of_rewards},
+            length=episode.n_steps,
+            terminated=self._episodes.adapter.terminated[environment],
+        )
+
+    def _row(self, kind: str, **values: Any) -> Row:
+        self.n_rows += 1
+        return {"kind": kind, "step": self.n_steps, **values}
+
+    def _report(self, rows: list[Row]) -> None:
+        for row in rows:
+            self.rows.append(row)
+            for callback in self.callbacks:
+                callback.on_row(self, row)
+
+    def _warn_of_refused_reward(self) -> None:
+        if hasattr(self.agent, "warn_of_refused_reward"):
+            self.agent.warn_of_refused_reward()
+
+    def _keep_statistics(self) -> None:
+        """Let the agent keep what the wrappers of its environment have learned."""
+        if hasattr(self.agent, "wrappers"):
+            self.agent.wrappers = statistics_of(self._episodes.wrappers)
+
+    @abc.abstractmethod
+    def _options(self, episode: int) -> dict[str, Any] | None:
+        """Return the options of a reset."""
+
+    @abc.abstractmethod
+    def _find_listeners(self) -> Sequence[tuple[int, Any]]:
+        """Return the callbacks that are called after steps, each with its interval."""
+
+    def _unusable(self, error: Exception, environment: int | None = None) -> UnusableStepError:
+        """Return the error that names step and episode, in an environment or in any."""
+        where = ""
+        n_environments = self._episodes.n_environments
+        episode = self._episodes.present[environment or 0]
+        if episode is not None and (environment is not None or n_environments == 1):
+            where = f"step {episode.n_steps}" if episode.n_steps else "the reset"
+            whose = f" in environment {environment}" if n_environments > 1 else ""
+            where = f" ({where} of episode {episode.number}{whose})"
+        return UnusableStepError(
+            f"env gave what cannot be learned, in step {self.n_steps + 1}{where}: {error}"
+        )
