@@ -63,7 +63,7 @@ def timer(part, n_inputs):
     return lambda n: parts.time_values(n) + parts.time_corrections(n, N_CORRECTED)
 
 
-def draw(found, path):
+def draw(results, path):
     """Draw the figure from the measurements."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -72,7 +72,7 @@ def draw(found, path):
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     for part, (title, color, marker) in PARTS.items():
-        own = {key[1]: row for key, row in found.items() if key[0] == part}
+        own = {key[1]: row for key, row in results.items() if key[0] == part}
         x = np.array(list(own))
         lower, y, upper = (
             np.array([row[f"{quartile}_us"] for row in own.values()])
@@ -108,11 +108,11 @@ def draw(found, path):
 
 
 def main():
-    given = options(__doc__, seeds=1).parse_args()
+    arguments = options(__doc__, seeds=1).parse_args()
     keys = [(part, n) for part in ("values", "decision") for n in N_INPUTS]
-    measure_missing(KIND, measure, [*keys, *(("trial", n) for n in N_SENSORS)], given)
-    if not given.only:
-        draw(measured(KIND, given.folder), given.folder / "cost-of-inputs.png")
+    measure_missing(KIND, measure, [*keys, *(("trial", n) for n in N_SENSORS)], arguments)
+    if not arguments.only:
+        draw(measured(KIND, arguments.folder), arguments.folder / "cost-of-inputs.png")
 
 
 if __name__ == "__main__":

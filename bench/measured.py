@@ -63,9 +63,9 @@ def options(doc: str, *, seeds: int, jobs: int = 1) -> argparse.ArgumentParser:
     return parser
 
 
-def is_wanted(key: Key, given: argparse.Namespace) -> bool:
+def is_wanted(key: Key, arguments: argparse.Namespace) -> bool:
     """Return whether a key has all the words of --only."""
-    return set(given.only) <= set(" ".join(map(str, key)).split())
+    return set(arguments.only) <= set(" ".join(map(str, key)).split())
 
 
 def measured(kind: str, folder: Path = EVIDENCE) -> dict[Key, dict[str, Any]]:
@@ -74,15 +74,15 @@ def measured(kind: str, folder: Path = EVIDENCE) -> dict[Key, dict[str, Any]]:
         place = folder if (folder / STORE_NAME).exists() else Path(unpacked)
         _unpack(folder, place)
         with ResultStore(place, read_only=True) as store:
-            found = store.measurements(kind)
-    return dict(sorted((tuple(json.loads(key)), content) for key, content in found.items()))
+            results = store.measurements(kind)
+    return dict(sorted((tuple(json.loads(key)), content) for key, content in results.items()))
 
 
 def measure_missing(
     kind: str,
     measure: Callable[..., Mapping[str, Any]],
     asked: Iterable[Key],
-    given: argparse.Namespace,
+    arguments: argparse.Namespace,
     *,
     apart: bool = False,
 ) -> None:
@@ -96,15 +96,15 @@ def measure_missing(
         Gives a measurement from its key.
     asked
         The keys.
-    given
+    arguments
         Options of the command.
     apart
         Whether each is measured in a process of its own, `jobs` at a time.
     """
-    plan = [Work(key, Measure(measure)) for key in asked if is_wanted(key, given)]
-    executor = Processes(_measure, given.jobs) if apart else Here(_measure)
-    if not given.redraw:
-        run_missing(plan, executor, given.folder, lambda store: _Measurements(store, kind))
+    plan = [Work(key, Measure(measure)) for key in asked if is_wanted(key, arguments)]
+    executor = Processes(_measure, arguments.jobs) if apart else Here(_measure)
+    if not arguments.redraw:
+        run_missing(plan, executor, arguments.folder, lambda store: _Measurements(store, kind))
 
 
 def run_missing(
@@ -178,8 +178,8 @@ class _Measurements:
     def keys(self) -> set[Key]:
         return {tuple(json.loads(key)) for key in self.store.measurements(self.kind)}
 
-    def add(self, found: tuple[Key, dict[str, Any]], *, is_exact: bool) -> None:
-        key, content = found
+    def add(self, results: tuple[Key, dict[str, Any]], *, is_exact: bool) -> None:
+        key, content = results
         self.store.put(self.kind, json.dumps(key), content)
 
 

@@ -74,8 +74,8 @@ def unpack(content: bytes, folder: Path) -> None:
                 record["config"] = about["configs"][record["config"]]
                 record["key"] = TrialKey(*record["key"])
                 store.add(TrialRecord(**record, rows=TrialRows(table)))
-            for kind, found in about["measurements"].items():
-                for key, one in found.items():
+            for kind, results in about["measurements"].items():
+                for key, one in results.items():
                     store.put(kind, key, one)
         store.path.replace(folder / STORE_NAME)
 
@@ -83,8 +83,8 @@ def unpack(content: bytes, folder: Path) -> None:
 def _kinds(path: Path) -> list[str]:
     """Return the kinds of a store's measurements."""
     with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as connection:
-        found = connection.execute("SELECT DISTINCT kind FROM measurements ORDER BY kind")
-        return [kind for (kind,) in found]
+        results = connection.execute("SELECT DISTINCT kind FROM measurements ORDER BY kind")
+        return [kind for (kind,) in results]
 
 
 def _columns(tables: list[NDArray[np.void]]) -> dict[str, NDArray[Any]]:
@@ -139,12 +139,12 @@ def main() -> None:
     parser.add_argument("file", type=Path, help="packed file")
     parser.add_argument("folder", type=Path, help="folder of the store")
     parser.add_argument("--pack", action="store_true", help="write the file")
-    given = parser.parse_args()
+    options = parser.parse_args()
     try:
-        if given.pack:
-            write_whole(given.file, pack(given.folder))
+        if options.pack:
+            write_whole(options.file, pack(options.folder))
         else:
-            unpack(given.file.read_bytes(), given.folder)
+            unpack(options.file.read_bytes(), options.folder)
     except (OSError, ValueError, lzma.LZMAError, StoreError, sqlite3.Error) as error:
         parser.error(str(error))
 

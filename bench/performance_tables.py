@@ -26,8 +26,8 @@ DENSE_TITLES = {"numpy": "NumPy, 1 thread", "core": "sdnn's own kernel"}
 
 def stored(name: str) -> dict[str, Any]:
     """Read what a command printed."""
-    found: dict[str, Any] = json.loads((EVIDENCE / f"{name}.json").read_text())
-    return found
+    measured: dict[str, Any] = json.loads((EVIDENCE / f"{name}.json").read_text())
+    return measured
 
 
 def to_markdown(results: dict[str, Any]) -> str:

@@ -120,8 +120,8 @@ class _Trials:
     def keys(self) -> set[TrialKey]:
         return self.store.keys()
 
-    def add(self, found: tuple[TrialRecord, Any], *, is_exact: bool) -> None:
-        record, curve = found
+    def add(self, results: tuple[TrialRecord, Any], *, is_exact: bool) -> None:
+        record, curve = results
         self.store.put(self.kind, json.dumps(record.key), {**curve, "version": record.version})
         self.store.add(record, is_exact=False)
 
@@ -129,30 +129,30 @@ class _Trials:
 def run_study(
     kind: str,
     study: StudyFile,
-    given: argparse.Namespace,
+    arguments: argparse.Namespace,
 ) -> None:
     """Run the trials of a study that are not stored, and store their curves under a kind."""
-    study.pairs = tuple(pair for pair in study.combinations if is_wanted(pair[::-1], given))
-    if not given.redraw:
-        executor = Processes(learn, given.jobs, study.header.imports)
-        run_missing(study.plan(), executor, given.folder, lambda store: _Trials(store, kind))
+    study.pairs = tuple(pair for pair in study.combinations if is_wanted(pair[::-1], arguments))
+    if not arguments.redraw:
+        executor = Processes(learn, arguments.jobs, study.header.imports)
+        run_missing(study.plan(), executor, arguments.folder, lambda store: _Trials(store, kind))
 
 
 def curves(
     kind: str,
     study: StudyFile,
-    given: argparse.Namespace,
+    arguments: argparse.Namespace,
 ) -> Curves:
     """Read the curves of a study's trials.
 
     Trials from before specifications were stored, which have no hash but the variant's name, are
     read where there are no others.
     """
-    stored = measured(kind, given.folder)
-    found = {}
+    stored = measured(kind, arguments.folder)
+    results = {}
     for (case, variant), one in study.combinations.items():
         own = [stored[planned.key] for planned in one.trials if planned.key in stored]
         old = [curve for key, curve in stored.items() if (*key[:2], key[4]) == (case, variant, "")]
         if own or old:
-            found[case, variant] = own or old
-    return found
+            results[case, variant] = own or old
+    return results

@@ -112,9 +112,9 @@ def main() -> None:
     parser.add_argument("--agents", nargs="+", choices=AGENTS, default=list(AGENTS))
     parser.add_argument("--n-envs", nargs="+", type=int, default=[1, 8])
     parser.add_argument("--repeats", type=int, default=500)
-    given = parser.parse_args()
+    options = parser.parse_args()
     rows = []
-    for task, agent, n_envs in itertools.product(given.tasks, given.agents, given.n_envs):
+    for task, agent, n_envs in itertools.product(options.tasks, options.agents, options.n_envs):
         env = make(task, 1)
         learners = [
             AGENTS[agent](env.observation_space, env.action_space, seed=1) for _ in range(2)
@@ -127,7 +127,7 @@ def main() -> None:
             core_slices(learners[1], task, n_envs, list(range(n_envs))),
             core_slices(learners[1], task, n_envs, []),
         )
-        times = [[take() for take in parts] for _ in range(given.repeats)]
+        times = [[take() for take in parts] for _ in range(options.repeats)]
         trained, alone, core, calls = np.percentile(times, PERCENT, axis=0)
         core -= calls
         cells = (f"{us:.1f}" for us in (trained, alone, core, trained - alone))

@@ -124,10 +124,10 @@ def measure(stage: str, *key: Any) -> dict[str, Any]:
     }
 
 
-def medians(found: dict[Key, dict[str, Any]], stage: str) -> dict[Setting, dict[str, float]]:
+def medians(results: dict[Key, dict[str, Any]], stage: str) -> dict[Setting, dict[str, float]]:
     """Return the medians over trials of each setting, the best score first."""
     groups = defaultdict(list)
-    for (name, *values, _), one in found.items():
+    for (name, *values, _), one in results.items():
         if name == stage:
             groups[Setting(*values)].append(one)
     middles = {
@@ -138,16 +138,16 @@ def medians(found: dict[Key, dict[str, Any]], stage: str) -> dict[Setting, dict[
 
 
 def main() -> None:
-    given = options(__doc__ or "", seeds=len(SEARCH_SEEDS), jobs=2).parse_args()
+    arguments = options(__doc__ or "", seeds=len(SEARCH_SEEDS), jobs=2).parse_args()
     for stage in STAGES:
-        grid = medians(measured(KIND, given.folder), "grid")
-        seeds = REPORT_SEEDS if stage == "report" else SEARCH_SEEDS[: given.seeds]
+        grid = medians(measured(KIND, arguments.folder), "grid")
+        seeds = REPORT_SEEDS if stage == "report" else SEARCH_SEEDS[: arguments.seeds]
         best = next(iter(grid), BEFORE)
         keys = [(stage, *setting, seed) for setting in settings_of(stage, best) for seed in seeds]
-        measure_missing(KIND, measure, keys, given, apart=True)
+        measure_missing(KIND, measure, keys, arguments, apart=True)
         rows = [
             (*map(str, setting), *(f"{100 * share:.1f} %" for share in of.values()))
-            for setting, of in medians(measured(KIND, given.folder), stage).items()
+            for setting, of in medians(measured(KIND, arguments.folder), stage).items()
         ]
         print(markdown((f"{stage}: bases", "width", "rate", "ties", *WINDOWS, "score"), rows))
 

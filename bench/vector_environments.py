@@ -22,9 +22,9 @@ KIND = "vector environments"
 STUDY = Path(__file__).with_suffix(".toml")
 
 
-def table_rows(found: Curves) -> Iterator[Sequence[str]]:
+def table_rows(results: Curves) -> Iterator[Sequence[str]]:
     """Medians over the seeds, with 95 % bootstrap intervals."""
-    for (task, n), own in found.items():
+    for (task, n), own in results.items():
         middles = map(estimate_median, np.array([one["mean_return"] for one in own]).T)
         returns = (f"{m.value:.0f} ({m.lower:.0f} to {m.upper:.0f})" for m in middles)
         us = np.median([1e6 * one["cpu_seconds"][-1] / one["steps"][-1] for one in own])
@@ -32,12 +32,12 @@ def table_rows(found: Curves) -> Iterator[Sequence[str]]:
 
 
 def main() -> None:
-    given = options(__doc__ or "", seeds=10, jobs=2).parse_args()
-    study = StudyFile(STUDY, n_trials=given.seeds)
-    run_study(KIND, study, given)
+    arguments = options(__doc__ or "", seeds=10, jobs=2).parse_args()
+    study = StudyFile(STUDY, n_trials=arguments.seeds)
+    run_study(KIND, study, arguments)
     heads = (f"after {step:,}" for step in (20_000, 40_000, 60_000))
     header = ("task", "environments", "seeds", *heads, "us per step")
-    print(markdown(header, table_rows(curves(KIND, study, given))))
+    print(markdown(header, table_rows(curves(KIND, study, arguments))))
 
 
 if __name__ == "__main__":

@@ -53,9 +53,9 @@ def measure(case: str, number: int) -> dict[str, Any]:
     }
 
 
-def table(found: dict[tuple[Any, ...], dict[str, Any]]) -> str:
+def table(results: dict[tuple[Any, ...], dict[str, Any]]) -> str:
     groups = defaultdict(list)
-    for (case, _), one in found.items():
+    for (case, _), one in results.items():
         groups[case].append(one)
 
     def cells(case):
@@ -81,11 +81,11 @@ def table(found: dict[tuple[Any, ...], dict[str, Any]]) -> str:
 
 
 def main() -> None:
-    given = options(__doc__ or "", seeds=10, jobs=2).parse_args()
-    keys = [(case, number) for number in range(given.seeds) for case in CASES]
-    measure_missing(KIND, measure, keys, given, apart=True)
-    found = measured(KIND, given.folder)
-    show({"whole trials": table(found)}, given.folder / "performance.md")
+    arguments = options(__doc__ or "", seeds=10, jobs=2).parse_args()
+    keys = [(case, number) for number in range(arguments.seeds) for case in CASES]
+    measure_missing(KIND, measure, keys, arguments, apart=True)
+    results = measured(KIND, arguments.folder)
+    show({"whole trials": table(results)}, arguments.folder / "performance.md")
 
 
 if __name__ == "__main__":

@@ -79,7 +79,7 @@ def numpy_product(n_rows, n_columns):
 
 def caches(folder=CACHE_FOLDER):
     """Bytes of the first core's caches by name, such as L1d, L2."""
-    found = {}
+    measured = {}
     try:
         for index in sorted(folder.glob("index*")):
             kind, level, size = (
@@ -87,19 +87,19 @@ def caches(folder=CACHE_FOLDER):
             )
             if kind != "Instruction":
                 name = f"L{level}{'d' if kind == 'Data' else ''}"
-                found[name] = int(size.rstrip("KMG")) * MULTIPLES.get(size[-1:], 1)
+                measured[name] = int(size.rstrip("KMG")) * MULTIPLES.get(size[-1:], 1)
     except (OSError, ValueError):
         pass
-    return found
+    return measured
 
 
 def blas():
     """Which library computes NumPy's product."""
     try:
-        found = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
+        measured = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     except (KeyError, TypeError):
         return "unknown"
-    return f"{found['name']} {found['version']}"
+    return f"{measured['name']} {measured['version']}"
 
 
 def measure(*, quick=False):

@@ -34,11 +34,13 @@ def page() -> str:
     definitions = spec_schema()["$defs"]
     text = HEAD
     described: dict[str, str] = {}
-    for table, found in definitions["RunSpec"]["properties"].items():
-        text += f"\n## {table}\n\n{found['description']}\n"
-        names = [kind.__name__ for kind in CORE.get(table, ())]
+    for table, schema in definitions["RunSpec"]["properties"].items():
+        text += f"\n## {table}\n\n{schema['description']}\n"
+        names = [config_type.__name__ for config_type in CORE.get(table, ())]
         names = names or [
-            one["$ref"].rpartition("/")[2] for one in found.get("anyOf", [found]) if "$ref" in one
+            alternative["$ref"].rpartition("/")[2]
+            for alternative in schema.get("anyOf", [schema])
+            if "$ref" in alternative
         ]
         for name in names:
             text += f"\n### {name}\n\n" if len(names) > 1 else "\n"
@@ -48,18 +50,18 @@ def page() -> str:
 
 def entries(
     table: str,
-    kind: str,
+    class_name: str,
     properties: dict[str, Any],
     described: dict[str, str],
 ) -> Iterator[str]:
     """Write a line for each setting; what an earlier class has alike is named only."""
     same: dict[str, list[str]] = {}
-    for name, found in properties.items():
-        what, text = words(found), short(found.get("description", ""))
-        first = described.setdefault(f"{name} {text}", kind)
-        if described.setdefault(f"{name} {what} {text}", kind) != kind:
+    for name, schema in properties.items():
+        what, text = default_and_range(schema), short(schema.get("description", ""))
+        first = described.setdefault(f"{name} {text}", class_name)
+        if described.setdefault(f"{name} {what} {text}", class_name) != class_name:
             same.setdefault(first, []).append(name)
-        elif first != kind and len(text.split()) > 5:
+        elif first != class_name and len(text.split()) > 5:
             yield f"- **`{table}.{name}`** ({what}): As in {first}.\n"
         elif (twin := twin_of(name, properties)) and name.endswith("_1"):
             both = f"**`{table}.{name}`**, **`{twin}`**"
@@ -74,8 +76,8 @@ def twin_of(name: str, properties: dict[str, Any]) -> str:
     """Return the setting that is the same of the other link, if there is one."""
     other = name[:-1] + {"1": "2", "2": "1"}.get(name[-1], "")
     mine, its = (
-        {key: re.sub("[12]", "", f"{value}") for key, value in properties.get(one, {}).items()}
-        for one in (name, other)
+        {key: re.sub("[12]", "", f"{value}") for key, value in properties.get(setting, {}).items()}
+        for setting in (name, other)
     )
     return other if other != name and mine == its else ""
 
@@ -83,26 +85,26 @@ def twin_of(name: str, properties: dict[str, Any]) -> str:
 def short(description: str) -> str:
     """Return the first sentences of a description, without what they say of the paper."""
     text = ASSUMPTION.sub("", description)
-    text = NOT_IN_THE_PAPER.sub(lambda found: f" {(found[1] or '').upper()}".rstrip(), text)
+    text = NOT_IN_THE_PAPER.sub(lambda match: f" {(match[1] or '').upper()}".rstrip(), text)
     text, *more = re.split(r"(?<=\.) (?=[A-Z0-9])", text)
-    for one in more:
-        if len(f"{text} {one}".split()) > MOST_WORDS:
+    for sentence in more:
+        if len(f"{text} {sentence}".split()) > MOST_WORDS:
             break
-        text += f" {one}"
+        text += f" {sentence}"
     return text
 
 
-def words(found: dict[str, Any]) -> str:
+def default_and_range(schema: dict[str, Any]) -> str:
     """Write a default and what else is allowed, but for bounds that go without saying."""
-    default = found.get("default")
+    default = schema.get("default")
     shown = [] if default in (None, (), {}) else [f"`{default}`"]
-    for one in found.get("anyOf", [found]):
-        if "enum" in one:
-            shown += [f"`{word}`" for word in one["enum"] if word not in (None, default)]
-        elif "exclusiveMinimum" not in one and one.get("maximum", 1e6) < 1e6:
-            shown.append(f"{one['minimum']:g} to {one['maximum']:g}")
-        elif one.get("type") != "null" and default in (None, (), {}):
-            shown.append(one.get("type", ""))
+    for alternative in schema.get("anyOf", [schema]):
+        if "enum" in alternative:
+            shown += [f"`{word}`" for word in alternative["enum"] if word not in (None, default)]
+        elif "exclusiveMinimum" not in alternative and alternative.get("maximum", 1e6) < 1e6:
+            shown.append(f"{alternative['minimum']:g} to {alternative['maximum']:g}")
+        elif alternative.get("type") != "null" and default in (None, (), {}):
+            shown.append(alternative.get("type", ""))
     return ", ".join(shown)
 
 

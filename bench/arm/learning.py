@@ -46,7 +46,7 @@ class Task:
     def agent(self, seed, kind, ram_bytes=None):
         """Make the agent, which has learned nothing."""
         high = np.array(self.high)
-        given = {"approximator": self.approximator} if kind == "q-lambda" else {}
+        arguments = {"approximator": self.approximator} if kind == "q-lambda" else {}
         space = gym.spaces.Box(-high, high, dtype=np.float64)
         return new_agent(
             space,
@@ -55,7 +55,7 @@ class Task:
             ram_bytes=ram_bytes,
             angles=self.angles,
             seed=seed,
-            **given,
+            **arguments,
         )
 
 
@@ -88,8 +88,8 @@ def program(path, task, compiler, *options):
 
 def output(*command):
     """Return the output of a program, and that of its emulator."""
-    words = [str(word) for word in command]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    command_words = [str(word) for word in command]
+    done = subprocess.run(command_words, capture_output=True, text=True, check=True)
     return done.stdout.strip(), done.stderr
 
 
@@ -109,8 +109,8 @@ def main():
     parser.add_argument("--ram", type=int, help="Bytes that SDNN-C may take.")
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--emulate", action="store_true", help="Train in the emulator.")
-    given = parser.parse_args()
-    name, task, kind = given.task, TASKS[given.task], given.agent
+    arguments = parser.parse_args()
+    name, task, kind = arguments.task, TASKS[arguments.task], arguments.agent
     options = ["-DFOLLOWS_PROGRESS"] if kind == "sdnn-c" else []
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
@@ -118,16 +118,16 @@ def main():
         source = HERE / "instruction_count.c"
         subprocess.run(["gcc", "-O2", "-shared", "-fPIC", source, "-o", plugin], check=True)
         returns = []
-        for seed in range(1, given.seeds + 1):
-            agent = task.agent(seed, kind, given.ram)
+        for seed in range(1, arguments.seeds + 1):
+            agent = task.agent(seed, kind, arguments.ram)
             header = export_c_header(agent, folder / "pole.h", learning=True)
             native = [program(folder / "native", name, "gcc", *options)]
             emulated = program(folder / "emulated", name, ARM, "-mthumb", "-static", *options)
-            runner = ["qemu-arm", emulated] if given.emulate else native
+            runner = ["qemu-arm", emulated] if arguments.emulate else native
             returns.append(float(output(*runner, task.n_steps, EPISODES)[0]))
             print(f"seed {seed}: {returns[-1]:.1f}", flush=True)
         n_solved = sum(one >= task.solved for one in returns)
-        print(f"{n_solved} of {given.seeds} reach {task.solved:g} after {task.n_steps:,} steps")
+        print(f"{n_solved} of {arguments.seeds} reach {task.solved:g} after {task.n_steps:,} steps")
         print(f"{header.ram_bytes:,} bytes of memory, {header.flash_bytes:,} bytes of constants")
         flash, static, stacks = sizes(folder, name, *options)
         print(

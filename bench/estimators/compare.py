@@ -94,8 +94,8 @@ def demonstration(name, seed):
     model.fit(X, target(X))
     parts = np.array_split(lattice(), n_parts)
     wrong = errors(lattice(), np.concatenate([model.predict(part) for part in parts]))
-    found = dict(zip(("all", "data", "blank"), (round(one, 5) for one in wrong), strict=True))
-    return {**found, "chosen": chosen(model)}
+    results = dict(zip(("all", "data", "blank"), (round(one, 5) for one in wrong), strict=True))
+    return {**results, "chosen": chosen(model)}
 
 
 def useless_keys(n_seeds):
@@ -109,9 +109,9 @@ def useless(name, n_useless, seed):
     noise, test_noise = random.uniform(size=(1000, 8)), random.uniform(size=(4000, 8))
     X, Z = np.hstack([train, noise[:, :n_useless]]), np.hstack([test, test_noise[:, :n_useless]])
     model = tuned(*regressors(2 + n_useless, noisy=False, seed=seed)[name])
-    model, found = timed_fit(model, X, target(train))
+    model, results = timed_fit(model, X, target(train))
     rmse = np.sqrt(np.mean((model.predict(Z) - target(test)) ** 2))
-    return {**found, "rmse": round(float(rmse), 5)}
+    return {**results, "rmse": round(float(rmse), 5)}
 
 
 REAL = {
@@ -138,8 +138,8 @@ def real(data, name, repeat, fold):
     folds = splitter(n_splits=N_FOLDS, n_repeats=N_REPEATS, random_state=0).split(X, y)
     train, test = list(folds)[N_FOLDS * repeat + fold]
     model = tuned(*real_candidates(data, X.shape[1], repeat)[name])
-    model, found = timed_fit(model, X[train], y[train])
-    return {**found, "score": round(float(model.score(X[test], y[test])), 5)}
+    model, results = timed_fit(model, X[train], y[train])
+    return {**results, "score": round(float(model.score(X[test], y[test])), 5)}
 
 
 LOW, STEP, N_UNITS, N_EPOCHS, N_CODES = -0.2, 0.005, 280, 300, 20
@@ -182,10 +182,10 @@ def seeds(n_pattern_units, seed):
 
 def grouped(kind, folder, n_words):
     """Measurements by the first words of their keys."""
-    found = defaultdict(list)
+    results = defaultdict(list)
     for key, row in measured(kind, folder).items():
-        found[key[:n_words]].append(row)
-    return found
+        results[key[:n_words]].append(row)
+    return results
 
 
 def spread_of(group, name):
@@ -194,23 +194,23 @@ def spread_of(group, name):
     return f"{text} +- {np.std(values, ddof=1):.4f}" if len(values) > 1 else text
 
 
-def demonstration_table(found):
+def demonstration_table(results):
     wrong = ("all", "data", "blank")
-    by_error = sorted(found.items(), key=lambda item: np.mean([row["all"] for row in item[1]]))
+    by_error = sorted(results.items(), key=lambda item: np.mean([row["all"] for row in item[1]]))
     rows = [(name, *(spread_of(group, key) for key in wrong)) for (name,), group in by_error]
     return markdown(("system", "RMSE all", "data", "blank"), rows)
 
 
-def useless_table(found):
-    rows = [(name, *(spread_of(found[name, n], "rmse") for n in USELESS)) for name in COLORS]
+def useless_table(results):
+    rows = [(name, *(spread_of(results[name, n], "rmse") for n in USELESS)) for name in COLORS]
     return markdown(("system", *map(str, USELESS)), rows)
 
 
-def real_tables(found):
+def real_tables(results):
     """Means over folds; 95 % intervals with Nadeau and Bengio's correction for shared samples."""
     for data in REAL:
         rows = []
-        for (where, name), group in found.items():
+        for (where, name), group in results.items():
             if where != data:
                 continue
             scores = np.array([row["score"] for row in group])
@@ -223,30 +223,30 @@ def real_tables(found):
         yield markdown((data, "mean", "95 % interval", "folds"), rows)
 
 
-def seeds_table(found):
+def seeds_table(results):
     names = ("all", "data", "blank")
     seconds = ("train_s", "predict_s")
     rows = [
         (str(n), *(spread_of(group, name) for name in names),
          *(f"{np.median([row[name] for row in group]):.2f}" for name in seconds))
-        for (n,), group in found.items()
+        for (n,), group in results.items()
     ]  # fmt: skip
     return markdown(("units a pattern", *(f"RMSE {n}" for n in names), *seconds), rows)
 
 
 def main():
-    given = options(__doc__, seeds=5).parse_args()
+    arguments = options(__doc__, seeds=5).parse_args()
     codes = [(n, seed) for n in (2000, 8000) for seed in range(1, N_CODES + 1)]
     for kind, measure, keys in (
-        ("demonstration", demonstration, demonstration_keys(given.seeds)),
-        ("useless", useless, useless_keys(given.seeds)),
+        ("demonstration", demonstration, demonstration_keys(arguments.seeds)),
+        ("useless", useless, useless_keys(arguments.seeds)),
         ("real", real, real_keys()),
         ("seeds", seeds, codes),
     ):
-        measure_missing(f"regression {kind}", measure, keys, given)
-    if given.only:
+        measure_missing(f"regression {kind}", measure, keys, arguments)
+    if arguments.only:
         return
-    folder = given.folder
+    folder = arguments.folder
     print(demonstration_table(grouped("regression demonstration", folder, 1)))
     print(useless_table(grouped("regression useless", folder, 2)))
     print(*real_tables(grouped("regression real", folder, 2)), sep="\n")

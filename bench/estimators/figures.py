@@ -80,17 +80,17 @@ def kernel_figure():
 
 def useless_figure(rows):
     """Error against the number of useless inputs; single seeds as dots, means as lines."""
-    found = defaultdict(lambda: defaultdict(list))
+    results = defaultdict(lambda: defaultdict(list))
     for (system, n_useless, _), row in rows.items():
-        found[system][n_useless].append(row["rmse"])
+        results[system][n_useless].append(row["rmse"])
     figure = Figure(figsize=(6.6, 3.8), layout="constrained")
     axes = figure.subplots()
     for shift, (name, (color, marker)) in enumerate(COLORS.items()):
-        numbers = sorted(found[name])
-        means = [np.mean(found[name][number]) for number in numbers]
+        numbers = sorted(results[name])
+        means = [np.mean(results[name][number]) for number in numbers]
         axes.plot(numbers, means, color=color, marker=marker, markersize=5, label=name)
         for number in numbers:
-            values = found[name][number]
+            values = results[name][number]
             if len(values) == 1:
                 continue
             offset = (shift - 2) * 0.07

@@ -284,8 +284,8 @@ def measure(problem, name, seed):
 # Figures and tables of the measurements.
 
 
-def scores(found, problem, model, what="score"):
-    return np.array([row[what] for row in found[problem, model]])
+def scores(results, problem, model, what="score"):
+    return np.array([row[what] for row in results[problem, model]])
 
 
 def ranks(middles):
@@ -295,12 +295,12 @@ def ranks(middles):
     return (better + (equal + 1) / 2).mean(axis=0)
 
 
-def middles_of(found, problems, models, what="score", middle=np.median):
+def middles_of(results, problems, models, what="score", middle=np.median):
     """Medians or means of a score, shape (n_problems, n_models); NaN where there is none."""
     return np.array(
         [
             [
-                middle(scores(found, problem, model, what)) if found[problem, model] else np.nan
+                middle(scores(results, problem, model, what)) if results[problem, model] else np.nan
                 for model in models
             ]
             for problem in problems
@@ -334,14 +334,14 @@ def rank_columns(title, models, middles):
 def rank_column(models, middles, is_ranked):
     """Mean ranks of some models among themselves."""
     names = [model for model, ranked in zip(models, is_ranked, strict=True) if ranked]
-    found = ranks(middles[:, is_ranked])
-    return {name: f"{rank:.1f}" for name, rank in zip(names, found, strict=True)}
+    results = ranks(middles[:, is_ranked])
+    return {name: f"{rank:.1f}" for name, rank in zip(names, results, strict=True)}
 
 
-def fit_column(found, problems, models):
+def fit_column(results, problems, models):
     """Median seconds of fitting by model."""
     return {
-        model: f"{np.median([row['fit_s'] for p in problems for row in found[p, model]]):.2g}"
+        model: f"{np.median([row['fit_s'] for p in problems for row in results[p, model]]):.2g}"
         for model in models
     }
 
@@ -353,15 +353,15 @@ def by_model(columns):
     return markdown(("model", *columns), rows)
 
 
-def coverages(found):
+def coverages(results):
     """Between which two shares, of problems' medians, the targets are covered."""
     medians = [
-        np.median([row["coverage"] for row in found[problem, "SDNN"]]) for problem in REGRESSION
+        np.median([row["coverage"] for row in results[problem, "SDNN"]]) for problem in REGRESSION
     ]
     return min(medians), max(medians)
 
 
-def draw(found, path):
+def draw(results, path):
     """A dot for each model and problem at the median, a bar over the middle 80 % of seeds."""
     figure = Figure(figsize=(10, 6.4), layout="constrained")
     colors = {
@@ -375,7 +375,7 @@ def draw(found, path):
         for row, problem in enumerate(problems):
             for place, model in enumerate(models):
                 low, middle, high = np.quantile(
-                    scores(found, problem, model), (0.1, 0.5, 0.9)
+                    scores(results, problem, model), (0.1, 0.5, 0.9)
                 ).clip(0, 1)
                 y = -row - 0.35 + 0.7 * place / (len(models) - 1)
                 ours = model.startswith("SDNN")
@@ -396,22 +396,22 @@ def draw(found, path):
 
 
 def main():
-    given = options(__doc__, seeds=10).parse_args()
-    measure_missing(KIND, measure, keys(given.seeds), given)
-    if given.only:
+    arguments = options(__doc__, seeds=10).parse_args()
+    measure_missing(KIND, measure, keys(arguments.seeds), arguments)
+    if arguments.only:
         return
-    found = defaultdict(list)
-    for (problem, model, _), row in measured(KIND, given.folder).items():
-        found[problem, model].append(row)
-    draw(found, given.folder / "problems.png")
+    results = defaultdict(list)
+    for (problem, model, _), row in measured(KIND, arguments.folder).items():
+        results[problem, model].append(row)
+    draw(results, arguments.folder / "problems.png")
     summary = {}
     for unit, (problems, models) in TABLES.items():
-        middles = middles_of(found, problems, models)
+        middles = middles_of(results, problems, models)
         summary |= rank_columns(f"{unit}, rank", models, middles)
-        summary[f"{unit}, seconds to fit"] = fit_column(found, problems, models)
-        if given.full:
+        summary[f"{unit}, seconds to fit"] = fit_column(results, problems, models)
+        if arguments.full:
             print(table(problems, models, middles))
-    show({"made problems": by_model(summary)}, given.folder / "problems.md")
+    show({"made problems": by_model(summary)}, arguments.folder / "problems.md")
 
 
 if __name__ == "__main__":

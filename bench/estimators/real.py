@@ -87,12 +87,12 @@ def of_classes(model, X, y):
         return {"auc": round(float(area(model.decision_function(X), y, model.classes_)), 5)}
     p = model.predict_proba(X)
     right = model.classes_[p.argmax(axis=1)] == y
-    found = {
+    results = {
         "auc": area(p if p.shape[1] > 2 else p[:, 1], y, model.classes_),
         "calibration": calibration_error(p.max(axis=1), right),
         "log_loss": log_loss(y, p, labels=model.classes_),
     }
-    return {name: round(float(value), 5) for name, value in found.items()}
+    return {name: round(float(value), 5) for name, value in results.items()}
 
 
 def measure(problem, name, fold):
@@ -109,10 +109,10 @@ def measure(problem, name, fold):
     fitted = time.process_time()
     score = model.score(X.iloc[test], y[test])
     us = 1e6 * (time.process_time() - fitted) / len(test)
-    found = {"score": round(float(score), 5), "fit_s": round(fitted - begun, 3)}
+    results = {"score": round(float(score), 5), "fit_s": round(fitted - begun, 3)}
     if problem in CLASSIFICATION:
-        found |= of_classes(model, X.iloc[test], y[test])
-    return {**found, "predict_us": round(us, 1)}
+        results |= of_classes(model, X.iloc[test], y[test])
+    return {**results, "predict_us": round(us, 1)}
 
 
 def keys():
@@ -126,10 +126,10 @@ def keys():
     ]
 
 
-def class_columns(found):
+def class_columns(results):
     """Means over the classifications by model; times are medians."""
     rows = {
-        model: [row for problem in CLASSIFICATION for row in found[problem, model]]
+        model: [row for problem in CLASSIFICATION for row in results[problem, model]]
         for model in CLASSIFIERS
     }
     means = {
@@ -144,28 +144,28 @@ def class_columns(found):
         model: f"{np.median([row['predict_us'] for row in of_all]):.0f}"
         for model, of_all in rows.items()
     }
-    fits = problems.fit_column(found, CLASSIFICATION, CLASSIFIERS)
+    fits = problems.fit_column(results, CLASSIFICATION, CLASSIFIERS)
     return {**means, "fit, s": fits, "prediction, us a row": times}
 
 
 def main():
-    given = options(__doc__, seeds=N_FOLDS).parse_args()
-    measure_missing(KIND, measure, keys(), given)
-    if given.only:
+    arguments = options(__doc__, seeds=N_FOLDS).parse_args()
+    measure_missing(KIND, measure, keys(), arguments)
+    if arguments.only:
         return
-    found = defaultdict(list)
-    for (problem, model, _), row in measured(KIND, given.folder).items():
-        found[problem, model].append(row)
+    results = defaultdict(list)
+    for (problem, model, _), row in measured(KIND, arguments.folder).items():
+        results[problem, model].append(row)
     summary, tables = {}, {}
     for title, (what, data, models) in TABLES.items():
-        middles = problems.middles_of(found, data, models, what, np.mean)
+        middles = problems.middles_of(results, data, models, what, np.mean)
         summary |= problems.rank_columns(f"{title}, rank", models, middles)
         if title == "R2":
             tables["R2, measured data"] = problems.table(data, models, middles, SHOWN)
-        if given.full:
+        if arguments.full:
             print(problems.table(data, models, middles))
-    tables["measured data"] = problems.by_model({**summary, **class_columns(found)})
-    show(tables, given.folder / "problems.md")
+    tables["measured data"] = problems.by_model({**summary, **class_columns(results)})
+    show(tables, arguments.folder / "problems.md")
 
 
 if __name__ == "__main__":

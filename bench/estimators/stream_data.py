@@ -183,9 +183,9 @@ def of_tables():
 
 def main() -> None:
     """Check the lists against the rule and print what it gives."""
-    given = {*of_river(), *of_tables()}
-    if given - set(LEFT_OUT) != LISTED:
-        raise SystemExit(f"the rule and the lists differ in {given - set(LEFT_OUT) ^ LISTED}")
+    arguments = {*of_river(), *of_tables()}
+    if arguments - set(LEFT_OUT) != LISTED:
+        raise SystemExit(f"the rule and the lists differ in {arguments - set(LEFT_OUT) ^ LISTED}")
     for name in STREAMS:
         xs, ys = samples(name, 0)
         kind = "a number" if name in REGRESSION else f"{len(set(ys))} classes"

@@ -153,12 +153,12 @@ def complete(rows):
     of_seeds = defaultdict(dict)
     for (stream, model, seed), row in rows.items():
         of_seeds[stream, seed][model] = row
-    found = defaultdict(list)
+    results = defaultdict(list)
     for (stream, _), of_models in of_seeds.items():
         if set(REGRESSORS if stream in REGRESSION else CLASSIFIERS) <= set(of_models):
             for model, row in of_models.items():
-                found[stream, model].append(row)
-    return found
+                results[stream, model].append(row)
+    return results
 
 
 def score(rows):
@@ -170,41 +170,45 @@ def told(value):
     return "< -10" if value < -10 else f"{value:.2f}" if abs(value) >= 0.005 else "0.00"
 
 
-def places(found, data, models):
+def places(results, data, models):
     """Ranks of each model, one for each stream; a variant is ranked in SDNN's place."""
     others = [name for name in models if not name.startswith("SDNN")]
     ranks = {}
     for own in reversed([name for name in models if name not in others]):  # SDNN last
         names = [own, *others]
-        scores = [[score(found[stream, name]) for stream in data] for name in names]
+        scores = [[score(results[stream, name]) for stream in data] for name in names]
         ranks |= zip(names, rankdata(-np.array(scores), axis=0), strict=True)
     return {name: ranks[name] for name in models}
 
 
-def by_model(found, data, models, most, timed):
+def by_model(results, data, models, most, timed):
     """Ranks of each model and its time on one stream, measured on one machine.
 
     Counted is in how many streams a model is among the first `most`.
     """
     rows = []
-    for name, ranks in places(found, data, models).items():
-        us = np.median([row["us"] for row in found[timed, name]])
+    for name, ranks in places(results, data, models).items():
+        us = np.median([row["us"] for row in results[timed, name]])
         count = np.sum(ranks < most + 1)
         rows.append((name, f"{ranks.mean():.1f}", f"{count}", f"{us:,.0f}"))
     place = "first" if most == 1 else f"among {most}"
     return markdown(("model", "mean rank", f"{place} in {len(data)}", "us a sample"), rows)
 
 
-def by_stream(found, data, models):
+def by_stream(results, data, models):
     """All scores."""
     rows = [
-        (stream, str(len(found[stream, "SDNN"])), *(told(score(found[stream, m])) for m in models))
+        (
+            stream,
+            str(len(results[stream, "SDNN"])),
+            *(told(score(results[stream, m])) for m in models),
+        )
         for stream in data
     ]
     return markdown(("stream", "seeds", *models), rows)
 
 
-def draw_scores(found, path):
+def draw_scores(results, path):
     """Draw all scores, shaded by rank."""
     figure = Figure(figsize=(11, 9.5), layout="constrained")
     kinds = (("R2", REGRESSION, REGRESSORS), ("accuracy", CLASSIFICATION, CLASSIFIERS))
@@ -212,15 +216,15 @@ def draw_scores(found, path):
     for axes, (title, data, models) in zip(
         figure.subplots(2, 1, height_ratios=heights), kinds, strict=True
     ):
-        ranks = np.array([*places(found, data, models).values()]).T
+        ranks = np.array([*places(results, data, models).values()]).T
         axes.imshow(ranks, cmap="Blues_r", vmin=-1, vmax=10, aspect="auto")
         for y, stream in enumerate(data):
             for x, name in enumerate(models):
                 weight = "bold" if ranks[y, x] < 2 else None
-                text = told(score(found[stream, name]))
+                text = told(score(results[stream, name]))
                 color = "white" if ranks[y, x] < 3.5 else "black"
                 axes.text(x, y, text, ha="center", va="center", weight=weight, color=color)
-        seeds = [len(found[stream, "SDNN"]) for stream in data]
+        seeds = [len(results[stream, "SDNN"]) for stream in data]
         names = [f"{stream} ({n})" for stream, n in zip(data, seeds, strict=True)]
         axes.set_yticks(range(len(data)), names)
         names = [name.replace(" ", "\n", 1).replace("=", "\n=") for name in models]
@@ -235,14 +239,14 @@ DPI = 130
 COLORS = ("#1f5fa8", "#d9822b", "#5b8c5a", "#a05195")
 
 
-def draw(found, path, data, last, label):
+def draw(results, path, data, last, label):
     """Draw the error of four models along each stream."""
     shown = ("SDNN", "adaptive random forest", "MLP 64-64", last)
     n_rows = len(data) // 4
     figure = Figure(figsize=(12, 2.4 * n_rows + 0.4), layout="constrained")
     for axes, stream in zip(figure.subplots(n_rows, 4, sharex=True).flat, data, strict=True):
         for model, color in zip(shown, COLORS, strict=True):
-            windows = np.array([row["windows"] for row in found[stream, model]])
+            windows = np.array([row["windows"] for row in results[stream, model]])
             middle = np.median(windows, axis=0)
             x = (np.arange(len(middle)) + 0.5) / len(middle)
             axes.plot(x, middle, color=color, label=model, linewidth=1.6)
@@ -275,22 +279,22 @@ def keys(n_seeds):
 
 
 def main():
-    given = options(__doc__, seeds=3).parse_args()
-    measure_missing(KIND, measure, keys(given.seeds), given)
-    if given.only:
+    arguments = options(__doc__, seeds=3).parse_args()
+    measure_missing(KIND, measure, keys(arguments.seeds), arguments)
+    if arguments.only:
         return
-    found = complete(measured(KIND, given.folder))
-    folder = given.folder
-    draw(found, folder / "streams.png", REGRESSION, "Mondrian forest (AMF)", "error / variance")
-    draw(found, folder / "stream-classes.png", CLASSIFICATION, "nearest neighbours", "error rate")
-    draw_scores(found, folder / "stream-scores.png")
+    results = complete(measured(KIND, arguments.folder))
+    folder = arguments.folder
+    draw(results, folder / "streams.png", REGRESSION, "Mondrian forest (AMF)", "error / variance")
+    draw(results, folder / "stream-classes.png", CLASSIFICATION, "nearest neighbours", "error rate")
+    draw_scores(results, folder / "stream-scores.png")
     tables = {
-        "regression": by_model(found, REGRESSION, REGRESSORS, 1, "Friedman, local drift"),
-        "classification": by_model(found, CLASSIFICATION, CLASSIFIERS, 3, "Agrawal"),
+        "regression": by_model(results, REGRESSION, REGRESSORS, 1, "Friedman, local drift"),
+        "classification": by_model(results, CLASSIFICATION, CLASSIFIERS, 3, "Agrawal"),
     }
-    if given.full:
-        print(by_stream(found, REGRESSION, REGRESSORS))
-        print(by_stream(found, CLASSIFICATION, CLASSIFIERS))
+    if arguments.full:
+        print(by_stream(results, REGRESSION, REGRESSORS))
+        print(by_stream(results, CLASSIFICATION, CLASSIFIERS))
     show(tables, folder / "streams.md")
 
 

@@ -14,12 +14,12 @@ from sdnn.runs.study import Study
 from sdnn.support.files import write_whole
 
 
-def draw(study: Study, found: Curves, path: Path) -> None:
+def draw(study: Study, results: Curves, path: Path) -> None:
     """Draw return against steps and against processor time, a column for each task."""
     require_matplotlib()
     from matplotlib.figure import Figure
 
-    names = [name for name in TASKS if any(case == name for case, _ in found)]
+    names = [name for name in TASKS if any(case == name for case, _ in results)]
     if not names:
         return
     n_columns = min(len(names), 4)
@@ -29,7 +29,7 @@ def draw(study: Study, found: Curves, path: Path) -> None:
     for number, name in enumerate(names):
         block, column = divmod(number, n_columns)
         panels = grid[2 * block : 2 * block + 2, column]
-        _draw_task(panels, study, found, name)
+        _draw_task(panels, study, results, name)
         if column == 0:
             for panel in panels:
                 panel.set_ylabel("mean return, greedy")
@@ -43,14 +43,14 @@ def draw(study: Study, found: Curves, path: Path) -> None:
     write_whole(path, png_bytes(figure, dpi=130))
 
 
-def _draw_task(panels, study: Study, found: Curves, name: str) -> None:
+def _draw_task(panels, study: Study, results: Curves, name: str) -> None:
     """Draw a task's curves into two panels."""
     from matplotlib import colormaps
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     shades = colormaps["tab20"].colors  # each colour dark and light
     for variant, color in zip(study.variants, [*shades[::2], *shades[1::2]], strict=False):
-        trials = found.get((name, variant.id))
+        trials = results.get((name, variant.id))
         if not trials:
             continue
         returns = np.array([trial["mean_return"] for trial in trials])

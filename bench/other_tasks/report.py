@@ -42,9 +42,9 @@ def score(case: str, trials: Trials) -> float:
     return value
 
 
-def _goal_rows(found: Curves) -> Iterator[Sequence[str]]:
+def _goal_rows(results: Curves) -> Iterator[Sequence[str]]:
     for case, goal in GOALS.items():
-        trials = found.get((case, OURS), ())
+        trials = results.get((case, OURS), ())
         returns = returns_after(trials, goal.steps)
         if np.isnan(returns).any() or not returns.size:
             continue
@@ -62,13 +62,13 @@ def _goal_rows(found: Curves) -> Iterator[Sequence[str]]:
 
 
 def _end_table(
-    study: Study, found: Curves, cases: Sequence[str], names: Sequence[str]
+    study: Study, results: Curves, cases: Sequence[str], names: Sequence[str]
 ) -> tuple[Sequence[str], list[Sequence[str]]]:
     """Return header and rows of the medians in some cases, of the agents that any of them has."""
-    variants = [v for v in study.variants if any((case, v.id) in found for case in cases)]
+    variants = [v for v in study.variants if any((case, v.id) in results for case in cases)]
     rows = []
     for case in cases:
-        here = {v.id: found[case, v.id] for v in variants if (case, v.id) in found}
+        here = {v.id: results[case, v.id] for v in variants if (case, v.id) in results}
         best = max(score(case, trials) for trials in here.values())
         cells = []
         for variant in variants:
@@ -83,17 +83,19 @@ def _end_table(
     return (*names, *(variant.title for variant in variants)), rows
 
 
-def _ours_rows(found: Curves, tasks: Sequence[str], sensors: Iterable[str]) -> Iterator[list[str]]:
+def _ours_rows(
+    results: Curves, tasks: Sequence[str], sensors: Iterable[str]
+) -> Iterator[list[str]]:
     """Our medians under each change of the sensors, a column for each task."""
     for change in sensors:
-        trials = [found.get((f"{task} {change}", OURS), ()) for task in tasks]
+        trials = [results.get((f"{task} {change}", OURS), ()) for task in tasks]
         yield [change, *(number(np.median(last_returns(t))) if t else "" for t in trials)]
 
 
-def _cost_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
+def _cost_rows(study: Study, results: Curves) -> Iterator[Sequence[str]]:
     """Medians of each agent over the cases."""
     for variant in study.variants:
-        own = [trials for (_, name), trials in found.items() if name == variant.id]
+        own = [trials for (_, name), trials in results.items() if name == variant.id]
         if own:
             spent, kept = (np.median([f(t) for t in own]) for f in (_microseconds, _kibibytes))
             yield variant.title, f"{spent:,.0f}", f"{kept:,.0f}"
@@ -109,17 +111,17 @@ def _kibibytes(trials: Trials) -> float:
     return float(np.median([t["bytes"] for t in trials])) / 1024
 
 
-def _loss_rows(study: Study, found: Curves) -> Iterator[Sequence[str]]:
+def _loss_rows(study: Study, results: Curves) -> Iterator[Sequence[str]]:
     """Tell where an agent's median is notably better than ours, the largest difference first."""
     losses = []
-    for (case, variant), trials in found.items():
-        ours = found.get((case, OURS))
+    for (case, variant), trials in results.items():
+        ours = results.get((case, OURS))
         if ours and variant != OURS:
             difference = score(case, trials) - score(case, ours)
             if difference > NOTABLE:
                 losses.append((difference, case, variant))
     for difference, case, variant in sorted(losses, reverse=True):
-        medians = (last_returns(found[case, who]) for who in (variant, OURS))
+        medians = (last_returns(results[case, who]) for who in (variant, OURS))
         theirs, our = (
             f"{number(np.median(m))} ({m.size} seed{'s' * (m.size > 1)})" for m in medians
         )
@@ -151,32 +153,32 @@ def title_of(study: Study, variant: str) -> str:
     return next(one.title for one in study.variants if one.id == variant)
 
 
-def tables(study: Study, found: Curves) -> dict[str, str]:
+def tables(study: Study, results: Curves) -> dict[str, str]:
     """Give each table by its name in the page."""
     goals = ("task", "steps", "goal", "median (range)", "seeds", "asked")
     losses = ("task", "agent", "its median", "ours", "of the way")
-    cases = [case.id for case in study.cases if any(case.id == one for one, _ in found)]
+    cases = [case.id for case in study.cases if any(case.id == one for one, _ in results)]
     clean = [case for case in cases if parts_of(case)[1] == "clean"]
     changed = [case for case in cases if case not in clean]
-    compared = [case for case in changed if any(k[0] == case and k[1] != OURS for k in found)]
+    compared = [case for case in changed if any(k[0] == case and k[1] != OURS for k in results)]
     tasks = list(dict.fromkeys(parts_of(case)[0] for case in changed))
     sensors = dict.fromkeys(parts_of(case)[1] for case in changed if case not in compared)
     return {
-        "goals": markdown(goals, _goal_rows(found)),
-        "at the end": markdown(*_end_table(study, found, clean, ["task"])),
-        "other sensors": markdown(*_end_table(study, found, compared, ["task", "sensors"])),
-        "ours, other sensors": markdown(["sensors", *tasks], _ours_rows(found, tasks, sensors)),
-        "losses": markdown(losses, _loss_rows(study, found)),
-        "costs": markdown(("agent", "us a step", "KiB"), _cost_rows(study, found)),
+        "goals": markdown(goals, _goal_rows(results)),
+        "at the end": markdown(*_end_table(study, results, clean, ["task"])),
+        "other sensors": markdown(*_end_table(study, results, compared, ["task", "sensors"])),
+        "ours, other sensors": markdown(["sensors", *tasks], _ours_rows(results, tasks, sensors)),
+        "losses": markdown(losses, _loss_rows(study, results)),
+        "costs": markdown(("agent", "us a step", "KiB"), _cost_rows(study, results)),
     }
 
 
-def along_the_way(study: Study, found: Curves) -> str:
+def along_the_way(study: Study, results: Curves) -> str:
     """Give the table of every case and agent after some numbers of steps."""
     header = (
         "task", "sensors", "agent", "seeds", *(f"{steps // 1000}k" for steps in STEPS),
         "at the end", "steps", "us a step", "KiB",
     )  # fmt: skip
     order = [case.id for case in study.cases]
-    every = sorted(found, key=lambda key: order.index(key[0]))
-    return markdown(header, (_row(study, *key, found[key]) for key in every))
+    every = sorted(results, key=lambda key: order.index(key[0]))
+    return markdown(header, (_row(study, *key, results[key]) for key in every))

@@ -30,16 +30,16 @@ KIND = "other tasks"
 
 def main() -> None:
     """Run what is missing, then write tables and figure."""
-    given = options(__doc__ or "", seeds=10, jobs=2).parse_args()
-    study = StudyFile(STUDY, n_trials=given.seeds)
-    run_study(KIND, study, given)
-    if given.only:
+    arguments = options(__doc__ or "", seeds=10, jobs=2).parse_args()
+    study = StudyFile(STUDY, n_trials=arguments.seeds)
+    run_study(KIND, study, arguments)
+    if arguments.only:
         return
-    found = curves(KIND, study, given)
-    show(tables(study, found), given.folder / "benchmarks.md")
-    if given.full:
-        print(along_the_way(study, found))
-    draw(study, found, given.folder / "other-tasks.png")
+    results = curves(KIND, study, arguments)
+    show(tables(study, results), arguments.folder / "benchmarks.md")
+    if arguments.full:
+        print(along_the_way(study, results))
+    draw(study, results, arguments.folder / "other-tasks.png")
 
 
 if __name__ == "__main__":

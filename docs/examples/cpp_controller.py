@@ -32,7 +32,7 @@ here = Path(__file__).parent if "__file__" in globals() else Path.cwd()
 folder = Path(tempfile.mkdtemp())
 file = folder / "car.safetensors"
 agent.save(file)
-found = subprocess.run(
+cmake_folder = subprocess.run(
     [sys.executable, "-m", "sdnn", "--cmakedir"], check=True, capture_output=True, text=True
 )
 configure = [
@@ -41,7 +41,7 @@ configure = [
     here / "cpp",
     "-B",
     folder,
-    f"-Dsdnn_DIR={found.stdout.strip()}",
+    f"-Dsdnn_DIR={cmake_folder.stdout.strip()}",
     "-DCMAKE_BUILD_TYPE=Debug",
 ]
 subprocess.run(configure, check=True, stdout=subprocess.DEVNULL)
@@ -64,7 +64,7 @@ observations = generator.uniform(low, high, size=(1000, 2))
 lines = "\n".join(f"{float(position)!r} {float(speed)!r}" for position, speed in observations)
 answers, _ = program.communicate(lines)
 in_cpp = np.array(answers.split(), float)
-in_python = np.array([agent.act(one, explore=False)[0] for one in observations])
+in_python = np.array([agent.act(observation, explore=False)[0] for observation in observations])
 same = int((in_cpp.astype(np.float32) == in_python).sum())
 print(f"{same} of {len(in_python)} actions are the same")
 assert same == len(in_python)

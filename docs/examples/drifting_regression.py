@@ -43,8 +43,8 @@ for portion in range(120):
     x = random.uniform(size=(50, 2))
     y = waves(x, 0.5 * max(portion - 20, 0) / 100) + random.normal(0.0, 0.1, 50)
     if portion >= 1:
-        for name, one in (("stays as it is", fixed), ("keeps learning", online)):
-            errors[name].append(np.sqrt(np.mean((one.predict(x) - y) ** 2)))
+        for name, model in (("stays as it is", fixed), ("keeps learning", online)):
+            errors[name].append(np.sqrt(np.mean((model.predict(x) - y) ** 2)))
     if portion < 20:
         fixed.partial_fit(x, y)
     online.partial_fit(x, y)

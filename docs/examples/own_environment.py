@@ -64,8 +64,8 @@ class AimsAtTheJetty:
 controllers = {"agent": agent, "aims at the jetty": AimsAtTheJetty()}
 test = gym.make("examples/River-v0")
 for name, controller in controllers.items():
-    found = evaluate(controller, test, episodes=100, seed=9)
-    print(f"{name}: return {found.mean_return:.2f}, {found.lengths.mean():.1f} steps")
+    evaluation = evaluate(controller, test, episodes=100, seed=9)
+    print(f"{name}: return {evaluation.mean_return:.2f}, {evaluation.lengths.mean():.1f} steps")
 
 # %% [markdown]
 # A perfect landing gives 1 less 0.02 for each step. The rule is carried away by the current in the

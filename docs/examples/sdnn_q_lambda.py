@@ -247,11 +247,11 @@ def train(env, s, report=print):
     state, total = state_of(env.reset(seed=s.seed)[0]), 0.0
     for step in range(1, s.steps + 1):
         action = agent.act(state)
-        taken = action[0]
+        task_action = action[0]
         if is_box:
             part = np.array(action) / (s.n_box_actions - 1)
-            taken = (actions.low + (actions.high - actions.low) * part).astype(actions.dtype)
-        observation, reward, terminated, truncated, _ = env.step(taken)
+            task_action = (actions.low + (actions.high - actions.low) * part).astype(actions.dtype)
+        observation, reward, terminated, truncated, _ = env.step(task_action)
         agent.learn(state, action, reward, state_of(observation), terminated)
         state, total = state_of(observation), total + reward
         if terminated or truncated:

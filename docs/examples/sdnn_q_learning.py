@@ -122,8 +122,8 @@ class SDNNC:
         # (1.7) Weights -1, 0 or 1, of two random bits each; large thresholds of alternating sign.
         n, n_columns = s.n_hidden_units, s.n_pattern_units * len(pairs)
         random = Random(s.seed, WEIGHTS)
-        words = [[random.bits() for _ in range(0, n, 32)] for _ in range(n_columns)]
-        bits = np.array(words, np.uint64)[:, :, None] >> np.arange(0, 64, 2, np.uint64)
+        random_bits = [[random.bits() for _ in range(0, n, 32)] for _ in range(n_columns)]
+        bits = np.array(random_bits, np.uint64)[:, :, None] >> np.arange(0, 64, 2, np.uint64)
         first, second = (bits & 1).astype(np.float32), (bits >> 1 & 1).astype(np.float32)
         self.weights = np.ascontiguousarray((first - second).reshape(n_columns, -1)[:, :n].T)
         self.thresholds = s.initial_threshold * np.where(np.arange(n) % 2 == 0, -1, 1)
@@ -149,8 +149,8 @@ class SDNNC:
     def counts(self, state):
         """(1.5) Active units in the window of each action: (n_actions,)."""
         n_active_before = np.append(0, np.cumsum(self.potentials(state) > 0))
-        ends = self.first_units + self.settings.n_active_units
-        return n_active_before[ends] - n_active_before[self.first_units]
+        end_units = self.first_units + self.settings.n_active_units
+        return n_active_before[end_units] - n_active_before[self.first_units]
 
     def values(self, state):
         """(1.6) Q(state, a) of all actions: (n_actions,)."""

@@ -67,7 +67,7 @@ print(f"mean distance before: {before:.2f} m, after: {after:.2f} m")
 
 # %%
 plt.figure(figsize=(4.5, 4.5))
-ends = []
+distances = []
 for seed in range(8):
     observation, _ = test.reset(seed=seed)
     arm = test.unwrapped
@@ -75,10 +75,10 @@ for seed in range(8):
     for _ in range(40):
         observation, *_ = test.step(agent.act(observation, explore=False))
         path.append(tip(arm.joints))
-    ends.append(np.linalg.norm(path[-1] - tip(arm.goal)))
+    distances.append(np.linalg.norm(path[-1] - tip(arm.goal)))
     (line,) = plt.plot(*np.array(path).T, ".-", markersize=3)
     plt.plot(*tip(arm.goal), "*", markersize=10, color=line.get_color())
-print(f"distance at the end: {np.median(ends):.2f} m in the median of eight episodes")
+print(f"distance at the end: {np.median(distances):.2f} m in the median of eight episodes")
 plt.title("paths of the tip; stars: goals")
 plt.xlabel("m")
 plt.ylabel("m")

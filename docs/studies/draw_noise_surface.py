@@ -29,13 +29,13 @@ STUDY = Path(__file__).with_name("noise-surface.toml")
 def shares(study: Study, store: ResultStore) -> dict[tuple[str, str, float], list[float]]:
     """Return the shares solved of the stored trials, by case, agent and noise."""
     stored = store.keys()
-    found: dict[tuple[str, str, float], list[float]] = {}
+    by_cell: dict[tuple[str, str, float], list[float]] = {}
     for (case_id, variant_id), combination in study.combinations.items():
         keys = [key for key in study.keys(case_id, variant_id) if key in stored]
         spec = combination.spec
         cell = (case_id, spec.label, spec.sensors.noise)
-        found[cell] = [final_share_solved(record.rows.solved) for record in store.load(keys)]
-    return found
+        by_cell[cell] = [final_share_solved(record.rows.solved) for record in store.load(keys)]
+    return by_cell
 
 
 def main() -> None:
@@ -49,13 +49,13 @@ def main() -> None:
 
     study = ClaimStudy(STUDY)
     with ResultStore(options.kept) as store:
-        found = shares(study, store)
-    agents = list(dict.fromkeys(agent for _, agent, _ in found))
-    sigmas = sorted({sigma for _, _, sigma in found})
+        by_cell = shares(study, store)
+    agents = list(dict.fromkeys(agent for _, agent, _ in by_cell))
+    sigmas = sorted({sigma for _, _, sigma in by_cell})
     figure = Figure(figsize=(4.2 * len(agents) + 1.6, 4.3), layout="constrained")
     panels = figure.subplots(1, len(agents), sharey=True, squeeze=False)[0]
     for agent, axes in zip(agents, panels, strict=True):
-        cells = [[found[case.id, agent, sigma] for sigma in sigmas] for case in study.cases]
+        cells = [[by_cell[case.id, agent, sigma] for sigma in sigmas] for case in study.cases]
         values = np.array([[np.median(c) if c else np.nan for c in row] for row in cells])
         image = axes.imshow(values, cmap="viridis", vmin=0, vmax=1, aspect="auto")
         for y, row in enumerate(cells):

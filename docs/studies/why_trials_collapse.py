@@ -100,19 +100,25 @@ def look(
 def whole_trial(spec: RunSpec, number: int, step: int = 50) -> Rows:
     """Run a trial from end to end, looking into it every `step` episodes."""
     last = spec.budget.episodes or 0
-    seen: dict[str, list[Any]] = {"episode": [], "q": [], "path": [], "torque": [], "spread": []}
+    measured: dict[str, list[Any]] = {
+        "episode": [],
+        "q": [],
+        "path": [],
+        "torque": [],
+        "spread": [],
+    }
     trial = None
     for episode, trial, inspector, tolerance in look(spec, number, range(step, last + 1, step)):
         torques, values, _ = inspector.path(trial.agent, tolerance)
-        seen["episode"].append(episode)
-        seen["q"].append(inspector.first_values(trial.agent).astype(np.float32))
-        seen["path"].append(values + [np.nan] * (PATH - len(values)))
-        seen["torque"].append(torques + [np.nan] * (PATH - len(torques)))
-        seen["spread"].append(inspector.spread(trial.agent))
+        measured["episode"].append(episode)
+        measured["q"].append(inspector.first_values(trial.agent).astype(np.float32))
+        measured["path"].append(values + [np.nan] * (PATH - len(values)))
+        measured["torque"].append(torques + [np.nan] * (PATH - len(torques)))
+        measured["spread"].append(inspector.spread(trial.agent))
     assert trial is not None
     rows = trial.test_rows()
     return {
-        **{name: np.array(values) for name, values in seen.items()},
+        **{name: np.array(values) for name, values in measured.items()},
         **{f"test_{name}": column for name, column in rows.items()},
     }
 
@@ -120,14 +126,14 @@ def whole_trial(spec: RunSpec, number: int, step: int = 50) -> Rows:
 def around(spec: RunSpec, number: int, middle: int) -> Rows:
     """Look at the episodes around a collapse, one by one."""
     episodes = range(middle - WINDOW, middle + WINDOW + 1)
-    seen: dict[str, list[Any]] = {"episode": [], "path": [], "torque": [], "clean": []}
+    measurements: dict[str, list[Any]] = {"episode": [], "path": [], "torque": [], "clean": []}
     for episode, trial, inspector, tolerance in look(spec, number, episodes):
         torques, values, solved = inspector.path(trial.agent, tolerance)
-        seen["episode"].append(episode)
-        seen["path"].append(values + [np.nan] * (PATH - len(values)))
-        seen["torque"].append(torques + [np.nan] * (PATH - len(torques)))
-        seen["clean"].append(solved)
-    return {name: np.array(values) for name, values in seen.items()}
+        measurements["episode"].append(episode)
+        measurements["path"].append(values + [np.nan] * (PATH - len(values)))
+        measurements["torque"].append(torques + [np.nan] * (PATH - len(torques)))
+        measurements["clean"].append(solved)
+    return {name: np.array(values) for name, values in measurements.items()}
 
 
 def begun_anew(spec: RunSpec, agent: Any, seed: int) -> NDArray[np.bool_]:
@@ -182,16 +188,16 @@ class Kept:
 
     def rows(self, name: str, measure: Callable[[], Rows] | None = None) -> Rows:
         """Return the rows of that name, measured if they are missing."""
-        found = {k.split("/")[1]: v for k, v in self._arrays.items() if k.split("/")[0] == name}
-        if found or measure is None:
-            return found
+        rows = {k.split("/")[1]: v for k, v in self._arrays.items() if k.split("/")[0] == name}
+        if rows or measure is None:
+            return rows
         print(f"measuring {name}", flush=True)
-        found = measure()
-        self._arrays |= {f"{name}/{key}": value for key, value in found.items()}
+        rows = measure()
+        self._arrays |= {f"{name}/{key}": value for key, value in rows.items()}
         buffer = BytesIO()
         np.savez_compressed(buffer, **self._arrays)
         write_whole(self.path, buffer.getvalue())
-        return found
+        return rows
 
 
 def measure(kept: Kept, n_trials: int) -> None:
@@ -227,8 +233,8 @@ STEP_COLORS = ("#1f5a96", "#3c7d4b", "#d9a441", "#c2542d")
 
 def numbers(kept: Kept, prefix: str, n_trials: int) -> dict[int, Rows]:
     """Return stored rows of one kind, by the number of the trial."""
-    found = {n: kept.rows(f"{prefix}:{n}") for n in range(n_trials)}
-    return {n: rows for n, rows in found.items() if rows}
+    rows_of_trials = {n: kept.rows(f"{prefix}:{n}") for n in range(n_trials)}
+    return {n: rows for n, rows in rows_of_trials.items() if rows}
 
 
 def final_share(rows: Rows) -> float:
@@ -289,10 +295,10 @@ def draw_around(kept: Kept, n_trials: int) -> Any:
     """Draw the episodes around collapses: values along the path, whether it ends in the goal."""
     from matplotlib.figure import Figure
 
-    found = list(numbers(kept, "around", n_trials).items())[:4]
+    rows_of_trials = list(numbers(kept, "around", n_trials).items())[:4]
     figure = Figure(figsize=(11.5, 5.6), layout="constrained")
-    grid = figure.subplots(2, len(found), sharey="row", squeeze=False)
-    for column, (number, rows) in enumerate(found):
+    grid = figure.subplots(2, len(rows_of_trials), sharey="row", squeeze=False)
+    for column, (number, rows) in enumerate(rows_of_trials):
         values, torques = grid[:, column]
         x = rows["episode"] - rows["episode"][WINDOW]
         clean = rows["clean"].astype(bool)
@@ -342,12 +348,12 @@ def draw_recovery(kept: Kept, n_trials: int) -> Any:
 
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     axes = figure.subplots()
-    found = list(numbers(kept, "recovery", n_trials).values())
+    rows_of_trials = list(numbers(kept, "recovery", n_trials).values())
     x = 10 * np.arange(1, RECOVERY_EPISODES // 10 + 1)
     for name, color in (("fresh", BLUE), ("collapsed", RED)):
-        shares = np.mean([rows[name].astype(float) for rows in found], axis=0)
+        shares = np.mean([rows[name].astype(float) for rows in rows_of_trials], axis=0)
         smooth = np.convolve(shares, np.full(10, 0.1), "valid")
-        axes.plot(x[9:], smooth, color=color, label=f"{name}, {len(found)} networks")
+        axes.plot(x[9:], smooth, color=color, label=f"{name}, {len(rows_of_trials)} networks")
     axes.set_ylim(0, 1.02)
     axes.set_xlabel("learning episodes from where the goal is wide again")
     axes.set_ylabel("share of tests solved (mean over ten tests)")

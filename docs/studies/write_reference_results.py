@@ -43,10 +43,10 @@ def reference_csv(results: Iterable[CaseResult], root_seed: int) -> bytes:
 def rekey() -> None:
     """Replace the hashes of configurations."""
     text = FILE.read_text()
-    for one in reference_results():
-        new = case_spec(PAPER_CASES[one.case_id], one.agent).config_hash
-        start = f"{one.case_id},{one.agent},"
-        text = text.replace(f"{start}{one.config_hash},", f"{start}{new},")
+    for result in reference_results():
+        new = case_spec(PAPER_CASES[result.case_id], result.agent).config_hash
+        start = f"{result.case_id},{result.agent},"
+        text = text.replace(f"{start}{result.config_hash},", f"{start}{new},")
     FILE.write_text(text)
 
 

@@ -54,14 +54,14 @@ class Block(NamedTuple):
 
 def pages() -> list[Path]:
     """List the pages with code, by their names."""
-    found = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
-    return [page for page in found if any(b.language not in SHOWN for b in blocks(page))]
+    paths = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+    return [page for page in paths if any(b.language not in SHOWN for b in blocks(page))]
 
 
 def blocks(page: Path) -> list[Block]:
     """List the blocks of a page; ValueError for a language or a mark that nobody knows."""
     text = page.read_text("utf-8")
-    found = []
+    blocks_of_page = []
     for match in _BLOCK.finditer(text):
         mark, reason, language, content = match.groups(default="")
         if not mark and language == "sh" and content.startswith("python bench/"):
@@ -77,13 +77,13 @@ def blocks(page: Path) -> list[Block]:
             raise ValueError(f"{page}:{line}: no mark is called {mark!r}")
         if language == "sh" and mark != "not run" and re.search(r"\b(pip|apt) install\b", content):
             raise ValueError(f"{page}:{line}: a block that installs something is marked not run")
-        found.append(Block(line, language, content, mark, reason))
-    return found
+        blocks_of_page.append(Block(line, language, content, mark, reason))
+    return blocks_of_page
 
 
-def _command(*words: str) -> Callable[[], bool]:
+def _command(*arguments: str) -> Callable[[], bool]:
     def is_there() -> bool:
-        return subprocess.run(words, capture_output=True, check=False).returncode == 0
+        return subprocess.run(arguments, capture_output=True, check=False).returncode == 0
 
     return is_there
 
@@ -159,8 +159,8 @@ def _run_shell(text: str) -> None:
 
 def count() -> Counter[str]:
     """Count the blocks of all pages by their marks."""
-    found = (b for page in pages() for b in blocks(page) if b.language not in SHOWN)
-    return Counter(block.mark or "run" for block in found)
+    code_blocks = (b for page in pages() for b in blocks(page) if b.language not in SHOWN)
+    return Counter(block.mark or "run" for block in code_blocks)
 
 
 def main() -> None:
@@ -169,18 +169,18 @@ def main() -> None:
     parser.add_argument("page", type=Path, nargs="?")
     parser.add_argument("--weekly", action="store_true", help="blocks over a minute, too")
     parser.add_argument("--list", action="store_true", help="count the blocks of all pages")
-    given = parser.parse_args()
-    if given.list:
+    options = parser.parse_args()
+    if options.list:
         print(*(f"{mark}: {n}" for mark, n in sorted(count().items())), sep="\n")
         return
-    if given.page is None:
+    if options.page is None:
         parser.error("name a page, or --list")
-    page = given.page.resolve()
+    page = options.page.resolve()
     with tempfile.TemporaryDirectory() as folder:
         os.environ.update(make_folder(Path(folder)))
         os.chdir(folder)
         sys.path[:0] = [folder]
-        for block, seconds, lacks in run(page, weekly=given.weekly):
+        for block, seconds, lacks in run(page, weekly=options.weekly):
             what = f"left out, needs {', '.join(lacks)}" if lacks else f"{seconds:.1f} s"
             print(f"{page.name}:{block.line} {block.language}: {what}", flush=True)
         os.chdir(ROOT)

@@ -39,9 +39,9 @@ def run(script, folder, *options):
 
 def numbers(pattern, printed):
     """The numbers in the place of a pattern's groups."""
-    found = re.search(pattern, printed)
-    assert found, printed
-    return [float(number) for number in found.groups()]
+    match = re.search(pattern, printed)
+    assert match, printed
+    return [float(number) for number in match.groups()]
 
 
 def test_the_page_learns_with_the_settings_of_its_options(tmp_path):
@@ -171,10 +171,10 @@ def test_notebooks_are_their_scripts(script):
     pieces = re.split(r"^# %%(.*)\n", script.read_text(), flags=re.MULTILINE)
     assert pieces[0] == ""
     cells = []
-    for kind, text in zip(pieces[1::2], pieces[2::2], strict=True):
-        if kind == " [markdown]":
+    for cell_type, text in zip(pieces[1::2], pieces[2::2], strict=True):
+        if cell_type == " [markdown]":
             text = re.sub(r"^# ?", "", text, flags=re.MULTILINE)
-        cells.append(("markdown" if kind else "code", text.strip()))
+        cells.append(("markdown" if cell_type else "code", text.strip()))
     assert [(cell.cell_type, cell.source) for cell in notebook.cells] == cells
     assert cells[0][0] == "markdown"
     assert cells[0][1].startswith("# ")

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -23,9 +24,9 @@ def test_the_page_is_that_of_the_declarations():
 
 def test_the_schema_has_every_setting_and_is_printed():
     schema = spec_schema()
-    for kind in (kind for kinds in CORE.values() for kind in kinds):
-        names = {field.name for field in fields_of(kind)} - {"n_inputs"}
-        assert set(schema["$defs"][kind.__name__]["properties"]) == names
+    for config_type in chain.from_iterable(CORE.values()):
+        names = {field.name for field in fields_of(config_type)} - {"n_inputs"}
+        assert set(schema["$defs"][config_type.__name__]["properties"]) == names
     printed = CliRunner().invoke(main, ["train", "--schema"])
     assert json.loads(printed.stdout) == json.loads(json.dumps(schema))
 

@@ -128,11 +128,11 @@ def n_words(page):
 
 
 def test_the_documents_are_short():
-    words = {
+    lengths = {
         page.relative_to(ROOT).as_posix(): n_words(page)
         for page in pages()
         if page.name != "CHANGELOG.md"
     }
-    assert sum(words.values()) <= 23_000
-    assert words["README.md"] <= 400
-    assert {name for name, n in words.items() if n > 1_500} <= GENERATED
+    assert sum(lengths.values()) <= 23_000
+    assert lengths["README.md"] <= 400
+    assert {name for name, n in lengths.items() if n > 1_500} <= GENERATED
