@@ -15,7 +15,7 @@ import time
 import numpy as np
 from demonstration import lattice
 
-from sdnn.estimators.libsdnn import read_parameter_file
+from sdnn.libsdnn import read_parameter_file
 
 
 def main(parameter_file, sample_file, n_iterations, n_runs):

@@ -7,6 +7,7 @@ Packages, from the network up (each is imported when first used):
 - ``sdnn.SDNNRegressor``, ``sdnn.SDNNClassifier``: the network as scikit-learn estimators;
   ``sdnn.SDNNKernelRidge``, ``sdnn.SDNNKernelClassifier``: ridge regression with its kernel
   (package ``sdnn.estimators``, needs ``sdnn[sklearn]``)
+- ``sdnn.libsdnn``: the files and numbers of the library LIBSDNN
 - ``sdnn.coding``: how inputs become patterns; ``sdnn.coding.kernel``: the kernel of the code
 - ``sdnn.environments``: the acrobot swing-up, redundant and noisy sensors
 - ``sdnn.export``: trained agents as C headers, also as the command ``sdnn export``
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
         environments as environments,
         estimators as estimators,
         export as export,
+        libsdnn as libsdnn,
         reproduction as reproduction,
         runs as runs,
     )
@@ -53,7 +55,7 @@ __getattr__, __dir__, __all__ = attach(
     {
         "sdnn": (
             "agents approximators benchmarks coding environments estimators export "
-            "reproduction runs"
+            "libsdnn reproduction runs"
         ),
         "sdnn.estimators": "SDNNClassifier SDNNKernelClassifier SDNNKernelRidge SDNNRegressor",
         "sdnn.support.machine": "instruction_set set_instruction_set",

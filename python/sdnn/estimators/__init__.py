@@ -16,10 +16,6 @@ if TYPE_CHECKING:
         SDNNKernelClassifier as SDNNKernelClassifier,
         SDNNKernelRidge as SDNNKernelRidge,
     )
-    from sdnn.estimators.libsdnn import (
-        read_model_file as read_model_file,
-        read_parameter_file as read_parameter_file,
-    )
     from sdnn.estimators.outliers import OutlierWarning as OutlierWarning
     from sdnn.estimators.regressor import SDNNRegressor as SDNNRegressor
 
@@ -29,7 +25,6 @@ _load, __dir__, __all__ = attach(
         "sdnn.estimators.base": "OutOfRangeWarning",
         "sdnn.estimators.classifier": "SDNNClassifier",
         "sdnn.estimators.kernel_ridge": "SDNNKernelClassifier SDNNKernelRidge",
-        "sdnn.estimators.libsdnn": "read_model_file read_parameter_file",
         "sdnn.estimators.outliers": "OutlierWarning",
         "sdnn.estimators.regressor": "SDNNRegressor",
     },

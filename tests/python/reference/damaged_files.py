@@ -15,8 +15,8 @@ import agent_files
 from bad_inputs import leaves, replaced
 from checksums import with_checksum
 from mutated_files import READERS as OTHERS, Reader, contents_of, written
+from sdnn import libsdnn
 from sdnn.agents import JSONLines, SDNNQLearning, Training
-from sdnn.estimators import libsdnn
 from sdnn.runs import Run
 from sdnn.runs.errors import RunError
 from sdnn.support.files import read_file, write_file

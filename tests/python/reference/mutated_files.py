@@ -14,10 +14,9 @@ from safetensors.numpy import load, save
 
 from checksums import with_checksum
 from made_records import make_record
-from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn import SDNNClassifier, SDNNRegressor, libsdnn
 from sdnn.agents import load_agent
 from sdnn.coding import Symbolic, WithMissing
-from sdnn.estimators import libsdnn
 from sdnn.reproduction.report import ClaimStudy
 from sdnn.runs import ResultStore, StoreError
 from sdnn.runs.config_file import read_spec

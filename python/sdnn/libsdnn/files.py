@@ -1,4 +1,4 @@
-"""LIBSDNN's parameter and model files, and the same network from them."""
+"""Readers of LIBSDNN's parameter and model files."""
 
 from __future__ import annotations
 
@@ -8,24 +8,20 @@ import re
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from sdnn import _core
+from sdnn.libsdnn.network import Library, LibsdnnInput, LibsdnnModel, LibsdnnParameters
 from sdnn.support.arguments import path_of, shown
 from sdnn.support.files import read_bytes
-
-Library = Literal["msvc", "libstdc++"]
 
 MOST_BYTES = 2**20  # of parameters
 MOST_BYTES_OF_MODEL = 2**31
 MOST_ITEMS = 100_000  # of a list, and tags around each other
 MOST_PAIRS = 1_000_000
-MOST_DRAWN = 2**27  # flips and 64-unit words of code tables: some seconds
 
 OPERATORS: dict[type, Callable[..., float]] = {
     ast.Add: operator.add,
@@ -82,22 +78,22 @@ def items_of(text: str, what: str) -> list[str]:
     """Return the items of ``[a, b:3]``, which is ``[a, b, b, b]``."""
     if not (text.startswith("[") and text.endswith("]")):
         raise ValueError(f"{what} must be a list in brackets, got {text[:80]!r}")
-    found: list[str] = []
+    items: list[str] = []
     for item in split_outside_brackets(text[1:-1]):
         content, colon, times = item.partition(":")
-        found += [content] * (whole_of(times, f"repeats of {what}", 1, MOST_ITEMS) if colon else 1)
-        if len(found) > MOST_ITEMS:
+        items += [content] * (whole_of(times, f"repeats of {what}", 1, MOST_ITEMS) if colon else 1)
+        if len(items) > MOST_ITEMS:
             raise ValueError(f"{what} must have at most {MOST_ITEMS} items")
-    return found
+    return items
 
 
 def split_outside_brackets(text: str) -> list[str]:
     """Split at commas that are in no brackets."""
     depth, commas = 0, [-1]
-    for found in re.finditer(r"[(),]", text):
-        depth += {"(": 1, ")": -1, ",": 0}[found[0]]
-        if found[0] == "," and depth == 0:
-            commas.append(found.start())
+    for mark in re.finditer(r"[(),]", text):
+        depth += {"(": 1, ")": -1, ",": 0}[mark[0]]
+        if mark[0] == "," and depth == 0:
+            commas.append(mark.start())
     return [text[i + 1 : j] for i, j in zip(commas, [*commas[1:], len(text)], strict=True)]
 
 
@@ -130,9 +126,9 @@ class Entries(dict[str, str]):
         """Return an entry that is one of some words."""
         word = self.get(name, default)
         if word not in (default, *others):
-            words = ", ".join((default, *others))
+            choices = ", ".join((default, *others))
             raise ValueError(
-                f"{name.replace('/', ' / ')} must be one of {words}, got {shown(word)}"
+                f"{name.replace('/', ' / ')} must be one of {choices}, got {shown(word)}"
             )
         return word
 
@@ -150,126 +146,6 @@ class Entries(dict[str, str]):
         if self.get(name, "hardware_entropy") == "hardware_entropy":
             return None
         return tuple(whole_of(item, name, 0, 2**32 - 1) for item in self.list_of(name))
-
-
-@dataclass(frozen=True, kw_only=True)
-class LibsdnnInput:
-    """Coding of one input: numbers in [0, 1], or symbols (whole numbers from 0)."""
-
-    symbolic: bool
-    n_bins: int
-    n_flipped: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class LibsdnnParameters:
-    """The content of a parameter file; seeds are None for hardware entropy.
-
-    ``output_range`` and ``step_size`` are for regression, ``n_classes`` and ``scheme`` for
-    classification.
-    """
-
-    task: Literal["regression", "classification"]
-    n_units: int
-    inputs: tuple[LibsdnnInput, ...]
-    pairs: tuple[tuple[int, int], ...]
-    pattern_seed: tuple[int, ...] | None
-    weight_seed: tuple[int, ...] | None
-    initial_range: tuple[int, int] = (-5, 5)
-    output_range: tuple[float, float] = (0.0, 1.0)
-    step_size: float = 0.01
-    n_classes: int = 2
-    scheme: Literal["one_vs_one", "one_vs_rest"] = "one_vs_one"
-
-    @property
-    def n_output_units(self) -> int:
-        """Perceptrons: one per output step, per class or per pair of classes."""
-        if self.task == "regression":
-            low, high = self.output_range
-            return int((high - low) / self.step_size)
-        return _core.n_units_for(self.scheme, self.n_classes)
-
-    def bins(self, inputs: npt.ArrayLike) -> npt.NDArray[np.int32]:
-        """Return the bins of samples, shape (n_samples, n_inputs), values outside clipped."""
-        values = np.asarray(inputs, dtype=np.float64)
-        if values.ndim != 2 or values.shape[1] != len(self.inputs):
-            raise ValueError(
-                f"inputs must have shape (n_samples, {len(self.inputs)}), got {values.shape}"
-            )
-        if not np.isfinite(values).all():
-            raise ValueError("inputs must be finite, got NaN or infinity")
-        factors = np.array([1 if one.symbolic else one.n_bins for one in self.inputs])
-        highest = np.array([one.n_bins - 1 for one in self.inputs])
-        bins = np.clip(np.trunc(values * factors), 0, highest)
-        return np.asarray(bins, dtype=np.int32)
-
-    def make_code(self, library: Library = "msvc") -> _core.SelectiveDesensitization:
-        """Return the code with LIBSDNN's own tables; needs a seed in the file."""
-        if self.pattern_seed is None:
-            raise ValueError("random_seed of PC must be a list of numbers, got hardware_entropy")
-        n_tables = 2 * len(self.pairs)
-        for one in {self.inputs[index] for pair in self.pairs for index in pair}:
-            if n_tables * one.n_bins * max(one.n_flipped, self.n_units // 64) > MOST_DRAWN:
-                raise ValueError(
-                    f"q of RANDOM_INVERSE is too large: {one.n_bins} patterns of {self.n_units} "
-                    f"units, {one.n_flipped} flipped, in {n_tables} tables"
-                )
-        sizes = [(one.n_bins, one.n_flipped) for one in self.inputs]
-        pairs = np.array(self.pairs, dtype=np.int32)
-        modified, modifiers = _core.libsdnn_tables(
-            self.n_units, sizes, pairs, self.pattern_seed, library
-        )
-        return _core.SelectiveDesensitization(modified, modifiers, pairs)
-
-    def make_layer(self, library: Library = "msvc") -> _core.ParallelPerceptron:
-        """Return the untrained network, bit for bit; needs seeds in the file."""
-        if self.weight_seed is None:
-            raise ValueError("random_seed of NN must be a list of numbers, got hardware_entropy")
-        code = self.make_code(library)
-        # LIBSDNN's classifiers always start from [-5, 5].
-        low, high = self.initial_range if self.task == "regression" else (-5, 5)
-        weights, thresholds = _core.libsdnn_weights(
-            self.n_output_units, code.n_columns, low, high, self.weight_seed, library
-        )
-        return _core.ParallelPerceptron(
-            code, self.n_output_units, weights=weights, thresholds=thresholds
-        )
-
-    def make_trainer(
-        self, layer: _core.ParallelPerceptron, inputs: npt.ArrayLike, targets: npt.ArrayLike
-    ) -> _core.PDeltaTrainer | _core.PerceptronTrainer:
-        """Return a trainer whose ``present(np.arange(n_samples))`` is one iteration of LIBSDNN."""
-        bins = self.bins(inputs)
-        if self.task == "regression":
-            low = self.output_range[0]
-            counts = (np.asarray(targets, dtype=np.float64).reshape(-1, 1) - low) / self.step_size
-            return _core.PDeltaTrainer(layer, bins, counts)
-        labels = np.asarray(targets, dtype=np.int32)
-        return _core.PerceptronTrainer(layer, bins, labels, self.n_classes, self.scheme)
-
-
-@dataclass(frozen=True, kw_only=True)
-class LibsdnnModel:
-    """A trained network from a model file."""
-
-    parameters: LibsdnnParameters
-    layer: _core.ParallelPerceptron
-
-    def predict(self, inputs: npt.ArrayLike, n_threads: int = 1) -> npt.NDArray[Any]:
-        """Return LIBSDNN's outputs, numbers or classes from 0, shape (n_samples,)."""
-        given = self.parameters
-        bins = given.bins(inputs)
-        if given.task == "regression":
-            counts = self.layer.counts(bins, n_threads=n_threads)[:, 0]
-            return np.asarray(given.step_size * counts + given.output_range[0])
-        potentials = self.layer.potentials(bins, n_threads=n_threads)
-        if given.scheme == "one_vs_rest":  # class 0 if no unit fires
-            return np.asarray(np.maximum(potentials, 0).argmax(axis=1))
-        votes = np.zeros((len(bins), given.n_classes), dtype=np.int64)
-        for unit, (i, j) in enumerate(zip(*np.triu_indices(given.n_classes, 1), strict=True)):
-            votes[:, i] += potentials[:, unit] > 0
-            votes[:, j] += potentials[:, unit] <= 0
-        return np.asarray(votes.argmax(axis=1))
 
 
 def read_parameter_file(path: str | Path) -> LibsdnnParameters:
@@ -339,15 +215,15 @@ def read_model_file(
 
 
 def _input(text: str, n_units: int) -> LibsdnnInput:
-    found = re.fullmatch(r"(NUMERICAL|SYMBOLIC)\(RANDOM_INVERSE\(([^,]*),([^,]*)\)\)", text)
-    if found is None:
+    match = re.fullmatch(r"(NUMERICAL|SYMBOLIC)\(RANDOM_INVERSE\(([^,]*),([^,]*)\)\)", text)
+    if match is None:
         raise ValueError(
             "input_type_and_creation_method must be NUMERICAL or SYMBOLIC, by RANDOM_INVERSE(q, r) "
             f"to be reproduced, got {text[:80]!r}"
         )
-    kind, n_bins, n_flipped = found.groups()
+    input_type, n_bins, n_flipped = match.groups()
     return LibsdnnInput(
-        symbolic=kind == "SYMBOLIC",
+        symbolic=input_type == "SYMBOLIC",
         n_bins=whole_of(n_bins, "q of RANDOM_INVERSE", 1, 2**24),
         n_flipped=whole_of(n_flipped, "r of RANDOM_INVERSE", 1, n_units // 2 - 1),
     )
@@ -398,27 +274,24 @@ def _parameters(text: str, path: Path) -> LibsdnnParameters:
     low, high = (whole_of(item, name, -(10**6), 10**6) for item in (limits * 2)[:2])
     if len(limits) != 2 or low > high:
         raise ValueError(f"{name} must be two numbers that rise, got [{', '.join(limits)[:80]}]")
-    given: dict[str, Any] = {}
-    if task == "function_approximation":
-        span = entries.list_of("ISSUE/FA/output_range")
-        step = number_of(entries["ISSUE/FA/required_step_size"], "required_step_size")
-        bounds = tuple(number_of(item, "output_range") for item in span)
-        if len(bounds) != 2 or not 1e-6 <= step <= bounds[1] - bounds[0]:
-            raise ValueError("output_range must be two numbers, a step size at least apart")
-        given |= {"task": "regression", "output_range": bounds, "step_size": step}
-    else:
-        scheme = entries.one_of("ISSUE/PR/multi_class_recognition", "1v1", "1vR")
-        given |= {
-            "task": "classification",
-            "n_classes": entries.whole("ISSUE/PR/class_number", 2, 1024),
-            "scheme": "one_vs_one" if scheme == "1v1" else "one_vs_rest",
-        }
-    return LibsdnnParameters(
+    parameters = LibsdnnParameters(
+        task="regression" if task == "function_approximation" else "classification",
         n_units=n_units,
         inputs=inputs,
         pairs=_pairs(entries, n_inputs),
         pattern_seed=entries.seed("SDNN/PC/random_seed"),
         weight_seed=entries.seed("SDNN/NN/random_seed"),
         initial_range=(low, high),
-        **given,
     )
+    if parameters.task == "classification":
+        scheme = entries.one_of("ISSUE/PR/multi_class_recognition", "1v1", "1vR")
+        return replace(
+            parameters,
+            n_classes=entries.whole("ISSUE/PR/class_number", 2, 1024),
+            scheme="one_vs_one" if scheme == "1v1" else "one_vs_rest",
+        )
+    step = number_of(entries["ISSUE/FA/required_step_size"], "required_step_size")
+    outputs = [number_of(item, "output_range") for item in entries.list_of("ISSUE/FA/output_range")]
+    if len(outputs) != 2 or not 1e-6 <= step <= outputs[1] - outputs[0]:
+        raise ValueError("output_range must be two numbers, a step size at least apart")
+    return replace(parameters, output_range=(outputs[0], outputs[1]), step_size=step)

@@ -1,4 +1,4 @@
-"""The same numbers as LIBSDNN, and readers of its files.
+"""The numbers of LIBSDNN, and readers of its files.
 
 Hashes and model files were made by LIBSDNN itself (commit 5a862cc, g++ 12, -O3), from the
 parameters and samples below; the hash is of thresholds and weights as its model file has them.
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn.estimators import libsdnn
+from sdnn import libsdnn
 
 FILES = Path(__file__).parents[1] / "reference" / "libsdnn_files"
 

@@ -1,0 +1,12 @@
+"""LIBSDNN's parameter files, model files and numbers, bit for bit."""
+
+from sdnn.libsdnn.files import read_model_file, read_parameter_file
+from sdnn.libsdnn.network import LibsdnnInput, LibsdnnModel, LibsdnnParameters
+
+__all__ = [
+    "LibsdnnInput",
+    "LibsdnnModel",
+    "LibsdnnParameters",
+    "read_model_file",
+    "read_parameter_file",
+]
