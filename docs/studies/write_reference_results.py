@@ -19,7 +19,7 @@ from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES
 from sdnn.reproduction.claims import FILE_NAME, HEADER, reference_results
 from sdnn.runs import CaseResult, ResultStore, measure
 from sdnn.runs.results import STEP_MEASURES
-from sdnn.support.files import csv_bytes
+from sdnn.support.csv_files import csv_bytes
 
 FILE = Path(__file__).parents[2] / "python" / "sdnn" / "reproduction" / FILE_NAME
 

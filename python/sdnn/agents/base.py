@@ -46,7 +46,7 @@ from sdnn.support.arguments import (
     whole,
 )
 from sdnn.support.display import Displayed
-from sdnn.support.files import Arrays, Description, write_file
+from sdnn.support.state_files import Arrays, Description, write_file
 from sdnn.training.files import CLASSES, read_agent
 from sdnn.training.names import explained
 from sdnn.training.statistics import Statistics, read_statistics

@@ -18,7 +18,7 @@ from sdnn.coding.symbols import Categorical
 from sdnn.estimators.inputs import Array, Floats, Ints, coding_entries
 from sdnn.estimators.network import InputCode, Network, code_bytes
 from sdnn.support.arguments import seed_of, whole
-from sdnn.support.files import Arrays, Description, read_file, write_file
+from sdnn.support.state_files import Arrays, Description, read_file, write_file
 
 Self = TypeVar("Self", bound="Fitted")
 

@@ -35,7 +35,7 @@ from sdnn.runs.study import Layer, Study, StudyCase, StudyVariant
 from sdnn.runs.sweep import Comparison
 from sdnn.runs.trial import ROW_HEADER, trial_rows
 from sdnn.support.arguments import one_of, whole
-from sdnn.support.files import csv_bytes
+from sdnn.support.csv_files import csv_bytes
 
 QUICK_TRIALS = 2
 QUICK_EPISODES = 300

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from sdnn.runs.errors import RunError
 from sdnn.runs.figures import draw_curves
 from sdnn.runs.run import Run
-from sdnn.support.files import csv_bytes, write_whole
+from sdnn.support.csv_files import csv_bytes
+from sdnn.support.files import write_whole
 from sdnn.support.interrupts import stay_interrupts
 
 WINDOW = 20

@@ -45,7 +45,8 @@ from sdnn.runs.results import (
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Combination, Pair, Study, StudyCase, StudyVariant
 from sdnn.runs.trial import ROW_HEADER, TrialRecord, records_digest, trial_rows
-from sdnn.support.files import csv_pieces, gzip_pieces, remove_abandoned_files
+from sdnn.support.csv_files import csv_pieces, gzip_pieces
+from sdnn.support.files import remove_abandoned_files
 
 MIN_TRIALS_TO_DIFFER = 6
 """Fewer paired trials are all on one side by chance more often than once in twenty times."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sdnn.environments.spaces import Actions
 from sdnn.support.arguments import seed_of
-from sdnn.support.files import Arrays, Description, read_file, write_file
+from sdnn.support.state_files import Arrays, Description, read_file, write_file
 from sdnn.training.statistics import Statistics, read_statistics
 
 _ARRAYS_OF_TRAINING = "training."

@@ -19,7 +19,8 @@ from sdnn.runs.curves import curves_of, write_curves
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import tensorboard_in
 from sdnn.runs.store import STORE_NAME
-from sdnn.support.files import write_file, write_whole
+from sdnn.support.files import write_whole
+from sdnn.support.state_files import write_file
 
 RUN = RunSpec(
     environment=EnvironmentSpec(id="Pendulum-v1"),
@@ -318,9 +319,9 @@ def test_links_that_would_be_written_to_are_refused(tmp_path, name):
 TRUNCATED = """
 import sys
 from pathlib import Path
-from sdnn.support import files
+from sdnn.support import state_files
 
-path, real = Path(sys.argv[1]), files.os.fstat
+path, real = Path(sys.argv[1]), state_files.os.fstat
 
 def truncated(descriptor):
     status = real(descriptor)
@@ -328,9 +329,9 @@ def truncated(descriptor):
         file.truncate(status.st_size // 2)
     return status
 
-files.os.fstat = truncated
+state_files.os.fstat = truncated
 try:
-    files.read_file(path, "agent")
+    state_files.read_file(path, "agent")
 except ValueError as error:
     print(error)
 """

@@ -11,14 +11,8 @@ import pytest
 
 from refusals import refuses
 from sdnn.support import files
-from sdnn.support.files import (
-    PARTIAL_SUFFIX,
-    csv_bytes,
-    csv_pieces,
-    gzip_pieces,
-    remove_abandoned_files,
-    write_whole,
-)
+from sdnn.support.csv_files import csv_bytes, csv_pieces, gzip_pieces
+from sdnn.support.files import PARTIAL_SUFFIX, remove_abandoned_files, write_whole
 
 WRITE_SLOWLY = """
 import sys, time

@@ -15,7 +15,7 @@ from sdnn.reports.plots import figure_bytes
 from sdnn.runs.figures import draw_study
 from sdnn.runs.sweep import compare, study_json, study_page, trial_table
 from sdnn.runs.trial import TrialRecord, TrialRows
-from sdnn.support.files import csv_bytes
+from sdnn.support.csv_files import csv_bytes
 
 FRAGMENTS = (
     "=1+1", "+2", "-3", "@SUM(A1)", "=cmd|' /C calc'!A0", "\t=4", "|", "\\", "`", "*", "_", "~~",
