@@ -1,6 +1,7 @@
-"""Show the settings that the core declares, and names that packages load when they are used."""
+"""Show what is only known when modules run: settings of the core, lazy names, joined docstrings."""
 
 import importlib
+import inspect
 
 import griffe
 
@@ -8,7 +9,7 @@ import sdnn.config
 
 
 class CoreSettings(griffe.Extension):
-    """Give the classes of `sdnn.config` their parameters, and lazy packages their ``__all__``."""
+    """Adds parameters of `sdnn.config`, ``__all__`` of lazy packages, docstrings of estimators."""
 
     def on_module_members(self, *, mod, **kwargs):
         """Note the public names of a package whose list is made when it is imported."""
@@ -16,7 +17,10 @@ class CoreSettings(griffe.Extension):
             mod.exports = importlib.import_module(mod.path).__all__
 
     def on_class(self, *, cls, **kwargs):
-        """Add the constructor's parameters to a class of the core that has fields."""
+        """Add parameters to classes of the core, and entries of base classes to docstrings."""
+        if any(decorator.callable_path.endswith(".documents") for decorator in cls.decorators):
+            estimator = getattr(importlib.import_module(cls.module.path), cls.name)
+            cls.docstring = griffe.Docstring(inspect.getdoc(estimator), parent=cls)
         if not cls.path.startswith("sdnn._core."):
             return
         fields = sdnn.config.fields_of(getattr(sdnn.config, cls.name, None))

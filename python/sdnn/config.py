@@ -1,4 +1,4 @@
-"""The settings that the core declares: their fields, checks and documentation come from C++."""
+"""The settings of the core, whose fields, checks and documentation are declared in C++."""
 
 from __future__ import annotations
 
@@ -37,41 +37,43 @@ class Field(NamedTuple):
 
     @property
     def type(self) -> Any:
-        """Its type, as Python's type hints have it."""
+        """The type of its values."""
         return eval(self.hint, {"typing": typing})
 
 
-def fields_of(kind: Any) -> tuple[Field, ...]:
-    """Return the settings of one of the core's classes; none of any other class.
+def fields_of(config_class: object) -> tuple[Field, ...]:
+    """Return the settings of a class of the core, or none for any other class.
 
     Examples
     --------
     >>> [field.name for field in fields_of(FuzzyRulesConfig)]
     ['n_inputs', 'n_sets', 'n_actions', 'max_table_bytes']
     """
-    return tuple(Field(*field) for field in getattr(kind, "fields", ()))
+    return tuple(Field(*field) for field in getattr(config_class, "fields", ()))
 
 
-def values_of(config: Any) -> dict[str, Any]:
-    """Return the values of all settings by name, as data that JSON can hold."""
+def values_of(config: object) -> dict[str, Any]:
+    """Return the values of all settings by name, in types that JSON has."""
     return {field.name: getattr(config, field.name) for field in fields_of(type(config))}
 
 
-def _complete(kind: Any) -> None:
-    """Make a class of the core a dataclass: for `dataclasses.replace`, `fields` and `asdict`."""
+def _make_dataclass(config_class: Any) -> None:
+    """Give a class of the core what `dataclasses.replace`, `fields` and `asdict` need."""
     fields = [
         (field.name, field.type, dataclasses.field(default=field.default))
-        for field in fields_of(kind)
+        for field in fields_of(config_class)
     ]
-    like = dataclasses.make_dataclass(kind.__name__, fields, repr=False, eq=False, kw_only=True)
-    kind.__dataclass_fields__ = vars(like)["__dataclass_fields__"]
-    kind.__annotations__ = like.__annotations__
-    kind.__signature__ = inspect.signature(like).replace(return_annotation=inspect.Signature.empty)
-    explains_names()(kind)
+    name = config_class.__name__
+    model = dataclasses.make_dataclass(name, fields, repr=False, eq=False, kw_only=True)
+    signature = inspect.signature(model).replace(return_annotation=inspect.Signature.empty)
+    config_class.__dataclass_fields__ = vars(model)["__dataclass_fields__"]
+    config_class.__annotations__ = model.__annotations__
+    config_class.__signature__ = signature
+    explains_names()(config_class)
 
 
 (WARM_UP,) = fields_of(Controller)
 """The number of steps of a warm-up, which agents and specifications share."""
 
-for _kind in [kind for name, kind in vars().items() if name.endswith("Config")]:
-    _complete(_kind)
+for _config_class in [value for name, value in vars().items() if name.endswith("Config")]:
+    _make_dataclass(_config_class)

@@ -70,8 +70,8 @@ class SDNNC:
         tables: Sequence[ArrayLike] | None = None,
     ) -> None:
         self.config = config if config is not None else SDNNCConfig()
-        given = {} if tables is None else {"tables": pattern_tables(tables)}
-        self._core = _core.SDNNC(self.config, seed_of(seed), **given)
+        options = {} if tables is None else {"tables": pattern_tables(tables)}
+        self._core = _core.SDNNC(self.config, seed_of(seed), **options)
 
     @property
     def _lattice_step(self) -> np.float64:
@@ -93,7 +93,7 @@ class SDNNC:
         return tuple(self._core.pairs)
 
     def values(self, state: ArrayLike) -> NDArray[np.float64]:
-        """Q(state, a) for every action.
+        """Return Q(state, a) for every action.
 
         Parameters
         ----------
@@ -107,11 +107,11 @@ class SDNNC:
         return self._core.values(state)
 
     def value(self, state: ArrayLike, action: int) -> float:
-        """Q(state, action)."""
+        """Return Q(state, action)."""
         return self._core.value(state, action)
 
     def update(self, state: ArrayLike, action: int, target: float, rate: float = 1.0) -> None:
-        """One step of error correction (Fig. 2): Q towards (1 - rate) Q + rate * target.
+        """Correct the error once (Fig. 2): move Q towards (1 - rate) Q + rate * target.
 
         Raises
         ------

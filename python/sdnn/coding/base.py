@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sdnn.support.arguments import shown
 
 Value = TypeVar("Value")
+Column = NDArray[Any]  # the values of an input, numbers or objects
 
 CODINGS: dict[str, type[Coding]] = {}
 """Every coding of this package by its name."""
@@ -28,8 +29,8 @@ class Coding(abc.ABC):
     is_numeric: ClassVar[bool] = True
 
     @abc.abstractmethod
-    def fit(self, column: NDArray[Any], n_units: int) -> Coding:
-        """Return a copy with everything learned that was not given.
+    def fit(self, column: Column, n_units: int) -> Coding:
+        """Return a copy whose fields that are None are learned from a column.
 
         Parameters
         ----------
@@ -55,7 +56,7 @@ class Coding(abc.ABC):
         """Number of bins, and of patterns, of a fitted coding."""
 
     @abc.abstractmethod
-    def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
+    def bins(self, column: Column) -> NDArray[np.int32]:
         """Return the bin of each value, shape (n_samples,); the coding must be fitted."""
 
     def ends(self) -> tuple[float, float] | None:
@@ -83,7 +84,7 @@ def known(value: Value | None) -> Value:
 
 
 def coding_named(coding: str | Coding) -> Coding:
-    """Return the coding itself, or the one of this name with default values.
+    """Return a coding unchanged, or the coding of a name with default values.
 
     >>> coding_named("anchor").n_anchor_patterns
     9
@@ -98,7 +99,7 @@ def coding_named(coding: str | Coding) -> Coding:
     return CODINGS[coding]()
 
 
-def to_dict(coding: Coding) -> dict[str, Any]:
+def to_dict(coding: Coding) -> dict[str, object]:
     """Describe a coding of this package in plain data that JSON can hold.
 
     >>> from sdnn.coding import Symbolic
@@ -108,15 +109,15 @@ def to_dict(coding: Coding) -> dict[str, Any]:
     if type(coding) not in CODINGS.values():
         raise TypeError(f"only codings of sdnn.coding can be described, got {shown(coding)}")
     fields = {field.name: getattr(coding, field.name) for field in dataclasses.fields(coding)}  # type: ignore[arg-type]
-    return {"coding": coding.name, **{name: plain(value) for name, value in fields.items()}}
+    return {"coding": coding.name, **{name: json_value(value) for name, value in fields.items()}}
 
 
-def plain(value: Any) -> Any:
+def json_value(value: object) -> object:
     """Replace codings by descriptions and NumPy numbers by Python's, also in tuples."""
     if isinstance(value, Coding):
         return to_dict(value)
     if isinstance(value, tuple):
-        return tuple(map(plain, value))
+        return tuple(map(json_value, value))
     return value.item() if isinstance(value, np.generic) else value
 
 
@@ -126,12 +127,12 @@ def from_dict(data: Mapping[str, Any]) -> Coding:
     >>> from_dict({"coding": "circular", "period": 24.0}).period
     24.0
     """
-    fields = {name: tupled(value) for name, value in data.items() if name != "coding"}
+    fields = {name: restored(value) for name, value in data.items() if name != "coding"}
     return CODINGS[data["coding"]](**fields)
 
 
-def tupled(value: Any) -> Any:
-    """Undo `plain`; lists become tuples."""
+def restored(value: Any) -> Any:
+    """Return the value that `json_value` described; lists become tuples."""
     if isinstance(value, Mapping):
         return from_dict(value)
-    return tuple(map(tupled, value)) if isinstance(value, list | tuple) else value
+    return tuple(map(restored, value)) if isinstance(value, list | tuple) else value

@@ -8,15 +8,16 @@ and counts twice.
 >>> import numpy as np
 >>> from sdnn.coding import kernel
 >>> from sdnn.coding import RandomInverse
->>> one = kernel.AnalyticKernel(RandomInverse(length_scale=0.2, low=0.0, high=1.0), n_inputs=2)
->>> one(np.array([[0.5, 0.5]]), np.array([[0.5, 0.5], [0.7, 0.5], [0.7, 0.9]])).round(2)
+>>> unit = RandomInverse(length_scale=0.2, low=0.0, high=1.0)
+>>> kernel_of_two = kernel.AnalyticKernel(unit, n_inputs=2)
+>>> kernel_of_two(np.array([[0.5, 0.5]]), np.array([[0.5, 0.5], [0.7, 0.5], [0.7, 0.9]])).round(2)
 array([[1.  , 0.52, 0.15]])
 """
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,15 +41,15 @@ ENTRIES_AT_ONCE = 2**18  # entries of a kernel matrix computed at a time
 def fitted(coding: str | Coding, n_units: int) -> Coding:
     """Return a fitted coding, on [0, 1] unless it has a range."""
     whole("n_units", n_units, 2, 2**16)
-    one = coding_named(coding)
-    ends = None if one.learns else one.ends()
-    # The range of a constant column is one point, which only such a column fits again.
-    is_constant = ends is not None and ends[0] == ends[1]
-    return one.fit(np.array(ends if is_constant else [0.0, 1.0]), n_units)
+    coding = coding_named(coding)
+    limits = None if coding.learns else coding.ends()
+    # A coding of a constant column has a range of a single point, and can only be fitted to it.
+    is_constant = limits is not None and limits[0] == limits[1]
+    return coding.fit(np.array(limits if is_constant else [0.0, 1.0]), n_units)
 
 
 def pattern_key(coding: Coding) -> Hashable:
-    """Return what the correlations of a fitted coding depend on: all but its range or categories.
+    """Return the fields that decide the correlations: all but the range or categories.
 
     >>> from sdnn.coding import Symbolic
     >>> letters, numbers = Symbolic(categories=("a", "b")), Symbolic(categories=(1, 2))
@@ -87,7 +88,7 @@ class AnalyticKernel:
     Parameters
     ----------
     coding : str, Coding or sequence of Coding
-        Of all inputs, or of each; on [0, 1] without a given or learned range.
+        The coding of all inputs, or of each; on [0, 1] without a given or learned range.
     n_inputs : int, optional
         Needed with one coding for all inputs.
     pairs : list of (int, int), optional
@@ -112,12 +113,12 @@ class AnalyticKernel:
             raise ValueError(f"coding must be a coding, or one for each input, got {shown(coding)}")
         inputs = range(len(coding))
         every = [(mu, nu) for mu in inputs for nu in inputs if mu != nu] or [(0, 0)]
-        self.codings = tuple(fitted(one, n_units) for one in coding)
+        self.codings = tuple(fitted(of_input, n_units) for of_input in coding)
         self.pairs = tuple(every) if pairs is None else _read_pairs(pairs, len(inputs))
         self._every = pairs is None
         keys = list(map(pattern_key, self.codings))
         different = dict(zip(keys, self.codings, strict=True))
-        matrices = {key: one.correlations(n_units) for key, one in different.items()}
+        matrices = {key: of_key.correlations(n_units) for key, of_key in different.items()}
         self._correlations = [matrices[key] for key in keys]
 
     def __call__(self, X: ArrayLike, Y: ArrayLike | None = None) -> NDArray[np.float64]:
@@ -126,22 +127,22 @@ class AnalyticKernel:
         Returns shape (n_samples, n_others). Raises ValueError for another number of inputs, NaN, or
         an unknown category.
         """
-        one = array_of("X", X, _CELLS, "a table of numbers or words")
-        other = one if Y is None else array_of("Y", Y, _CELLS, "a table of numbers or words")
-        for name, table in (("X", one), ("Y", other)):
+        first = array_of("X", X, _CELLS, "a table of numbers or words")
+        second = first if Y is None else array_of("Y", Y, _CELLS, "a table of numbers or words")
+        for name, table in (("X", first), ("Y", second)):
             is_table = table.ndim == 2 and table.shape[1] == len(self.codings)
             require(is_table, name, f"have shape (n, {len(self.codings)})", table.shape)
         bins = [
-            (coding.bins(one[:, index]), coding.bins(other[:, index]))
+            (coding.bins(first[:, index]), coding.bins(second[:, index]))
             for index, coding in enumerate(self.codings)
         ]
-        kernel = np.empty((len(one), len(other)))
-        n_rows = max(1, ENTRIES_AT_ONCE // max(1, len(other)))
-        for begin in range(0, len(one), n_rows):
+        kernel = np.empty((len(first), len(second)))
+        n_rows = max(1, ENTRIES_AT_ONCE // max(1, len(second)))
+        for begin in range(0, len(first), n_rows):
             rows = slice(begin, begin + n_rows)
             of_inputs = (
-                matrix[np.ix_(of_one[rows], of_other)]
-                for matrix, (of_one, of_other) in zip(self._correlations, bins, strict=True)
+                matrix[np.ix_(of_first[rows], of_second)]
+                for matrix, (of_first, of_second) in zip(self._correlations, bins, strict=True)
             )
             kernel[rows] = self._of_correlations(of_inputs, np.zeros_like(kernel[rows]))
         return kernel
@@ -163,7 +164,7 @@ class AnalyticKernel:
         return total / sum(2 if mu == nu else 1 for mu, nu in self.pairs)
 
 
-def _read_pairs(pairs: Any, n_inputs: int) -> tuple[tuple[int, int], ...]:
+def _read_pairs(pairs: Sequence[tuple[int, int]], n_inputs: int) -> tuple[tuple[int, int], ...]:
     last = n_inputs - 1
     try:
         read = tuple((whole("pairs", a, 0, last), whole("pairs", b, 0, last)) for a, b in pairs)
@@ -182,19 +183,20 @@ def plot_similarity(
     """
     from matplotlib.figure import Figure
 
-    one = fitted(coding, n_units)
-    drawn, expected = similarity(one, n_units, seed), one.correlations(n_units)
-    middle = one.size // 2
+    coding = fitted(coding, n_units)
+    drawn, expected = similarity(coding, n_units, seed), coding.correlations(n_units)
+    middle = coding.size // 2
     figure = Figure(figsize=(8.0, 3.4), layout="constrained")
     left, right = figure.subplots(1, 2)
     image = left.imshow(drawn, vmin=-1, vmax=1, cmap="RdBu_r", origin="lower")
     figure.colorbar(image, ax=left, label="correlation of patterns")
     left.set(xlabel="bin", ylabel="bin")
-    style: dict[str, Any] = {} if one.is_numeric else {"marker": "o", "linestyle": "none"}
-    right.plot(drawn[middle], color="tab:blue", label=f"drawn, {n_units} units", **style)
+    marker, line = ("", "-") if coding.is_numeric else ("o", "none")
+    label = f"drawn, {n_units} units"
+    right.plot(drawn[middle], color="tab:blue", label=label, marker=marker, linestyle=line)
     right.plot(expected[middle], color="black", linewidth=1, label="expected", linestyle="--")
     right.set(xlabel="bin", ylabel=f"correlation with bin {middle}", ylim=(-1.05, 1.05))
     right.legend(frameon=False, loc="lower left")
     right.spines[["top", "right"]].set_visible(False)
-    figure.suptitle(title or f"{one.name}, {one.size} bins")
+    figure.suptitle(title or f"{coding.name}, {coding.size} bins")
     return figure

@@ -6,13 +6,13 @@ import contextlib
 import dataclasses
 import math
 import warnings
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.coding.base import Coding, known
+from sdnn.coding.base import Coding, Column, known
 from sdnn.support.arguments import array_of, one_of, real, require, shown, whole
 
 MAX_BINS = 65535
@@ -28,7 +28,7 @@ class CoarseCodeWarning(UserWarning):
     """A length scale leaves few bins: neighbouring patterns differ in at least one unit."""
 
 
-def numbers(column: NDArray[Any]) -> NDArray[np.float64]:
+def numbers(column: Column) -> NDArray[np.float64]:
     """Return the column as floats; ValueError for NaN or complex numbers."""
     if np.iscomplexobj(column):
         raise ValueError("Complex data not supported")
@@ -55,8 +55,8 @@ def quantile_knots(column: NDArray[np.float64]) -> Knots:
     return tuple(zip(values.tolist(), levels.tolist(), strict=True))
 
 
-def checked_knots(knots: Any, low: float, high: float) -> Knots:
-    """Return given knots, which must rise from (low, 0) to (high, 1)."""
+def checked_knots(knots: object, low: float, high: float) -> Knots:
+    """Return knots after checking that they rise from (low, 0) to (high, 1)."""
     last = 1.0 if low < high else 0.0
     with contextlib.suppress(IndexError, TypeError, ValueError):
         values, levels = array_of("knots", knots).astype(np.float64).T
@@ -86,19 +86,19 @@ class Ranged(Coding):
     def even_range(self) -> tuple[float, float] | None:
         return self.ends() if self.knots is None else None
 
-    def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
+    def bins(self, column: Column) -> NDArray[np.int32]:
         values, (low, high) = numbers(column), self.ends()
-        if not low / 2 < high / 2:  # of a column that had one value only, or all next to 0
-            where = np.zeros(len(values))
+        if not low / 2 < high / 2:  # a column with a single value, or values next to 0
+            positions = np.zeros(len(values))
         elif self.knots is not None:
-            where = np.interp(values, *np.array(self.knots).T)
+            positions = np.interp(values, *np.array(self.knots).T)
         else:  # halves, so that the width of the widest range is still a number
-            where = (np.clip(values, low, high) / 2 - low / 2) / (high / 2 - low / 2)
-        # Equal half-open parts of [0, 1]; 1 is in the last.
-        return np.minimum((where * self.size).astype(np.int32), np.int32(self.size - 1))
+            positions = (np.clip(values, low, high) / 2 - low / 2) / (high / 2 - low / 2)
+        # Bins are equal half-open parts of [0, 1]; the last one includes 1.
+        return np.minimum((positions * self.size).astype(np.int32), np.int32(self.size - 1))
 
     def _learned_range(self, column: NDArray[np.float64]) -> tuple[float, float]:
-        """Return the given ends, or the column's."""
+        """Return the given limits, or the column's where they are None."""
         low = float(np.min(column)) if self.low is None else real("low", self.low)
         high = float(np.max(column)) if self.high is None else real("high", self.high)
         is_constant = low == high and bool(np.all(column == low))
@@ -110,7 +110,7 @@ class Ranged(Coding):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RandomInverse(Ranged):
-    """Random first pattern; each next one flips a few units of each sign.
+    """A random first pattern, and further patterns that each flip a few units of each sign.
 
     The correlation falls exponentially with the distance of the bins,
     ``(1 - 4 * n_flipped / n_units) ** distance``.
@@ -139,7 +139,7 @@ class RandomInverse(Ranged):
     high: float | None = None
     knots: Knots | None = None
 
-    def fit(self, column: NDArray[Any], n_units: int) -> RandomInverse:
+    def fit(self, column: Column, n_units: int) -> RandomInverse:
         one_of("spacing", self.spacing, ("even", "quantile"))
         is_learned = self.knots is not None and not self.learns
         has_range = not (self.low is None and self.high is None)
@@ -200,7 +200,7 @@ class RandomInverse(Ranged):
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
         of_distances = np.power(1 - 4 * known(self.n_flipped) / n_units, np.arange(self.size))
-        # A view: every diagonal has one value.
+        # The result is a view, as every diagonal has a single value.
         both_ways = np.concatenate([of_distances[:0:-1], of_distances])
         return np.lib.stride_tricks.sliding_window_view(both_ways, self.size)[::-1]
 
@@ -227,8 +227,8 @@ class Anchored(Coding):
         )
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        # Linear within a stretch between two anchors; in neighbouring ones the product of both
-        # patterns' shares of the anchor between them.
+        # Within a stretch between two anchors the correlation falls linearly. Between neighbouring
+        # stretches it is the product of both patterns' shares of the anchor between them.
         n_stretches, n_portions = self.n_anchor_patterns - 1, self.n_interpolated + 1
         stretch, portion = np.divmod(np.arange(self.size), n_portions)
         share = portion / n_portions
@@ -264,7 +264,7 @@ class Anchor(Anchored, Ranged):
     low: float | None = None
     high: float | None = None
 
-    def fit(self, column: NDArray[Any], n_units: int) -> Anchor:
+    def fit(self, column: Column, n_units: int) -> Anchor:
         self._check_anchors()
         low, high = self._learned_range(numbers(column))
         return dataclasses.replace(self, low=low, high=high)
@@ -290,7 +290,7 @@ class Circular(Anchored):
     n_interpolated: int = 44
     learns: ClassVar[bool] = False
 
-    def fit(self, column: NDArray[Any], n_units: int) -> Circular:
+    def fit(self, column: Column, n_units: int) -> Circular:
         self._check_anchors()
         numbers(column)
         is_period = 0 < real("period", self.period) < math.inf
@@ -298,11 +298,11 @@ class Circular(Anchored):
         require(math.isfinite(real("origin", self.origin)), "origin", "be finite", self.origin)
         return self
 
-    def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
+    def bins(self, column: Column) -> NDArray[np.int32]:
         values = numbers(column)
         if np.isinf(values).any():
             raise ValueError("Input contains infinity, which has no place on a circle")
         turns = (values - self.origin) / self.period
-        # Rounded, so that values a period apart are in the same bin also where bins meet.
+        # Rounding puts values a period apart into the same bin, even where bins meet.
         positions = np.round((turns - np.floor(turns)) * self.size, 9)
         return positions.astype(np.int32) % np.int32(self.size)

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Hashable, Iterable
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.coding.base import Coding, known
+from sdnn.coding.base import Coding, Column, known
 from sdnn.coding.numeric import RandomInverse
 from sdnn.support.arguments import array_of, one_of, require, seed_of, shown
 
 Category = str | float | int | bool
 
 
-def is_missing(value: Any) -> bool:
+def is_missing(value: object) -> bool:
     """Return whether a value is None, NaN or pandas.NA."""
     try:
         return value is None or bool(value != value)
@@ -25,7 +25,7 @@ def is_missing(value: Any) -> bool:
         return True
 
 
-def missing_as_nan(values: NDArray[Any]) -> NDArray[np.float64]:
+def missing_as_nan(values: Column) -> NDArray[np.float64]:
     """Return numbers of any type as floats, missing ones as NaN.
 
     >>> missing_as_nan(np.array([1, None, "2.5"], dtype=object))
@@ -42,12 +42,12 @@ class Categorical(Coding):
     categories: tuple[Category, ...] | None
 
     def __post_init__(self) -> None:
-        given: Any = self.categories
-        if given is None:
+        categories: object = self.categories
+        if categories is None:
             return
-        is_listed = isinstance(given, Iterable) and not isinstance(given, str | bytes)
-        require(is_listed, "categories", "be a tuple of values", given)
-        object.__setattr__(self, "categories", tuple(given))
+        if not isinstance(categories, Iterable) or isinstance(categories, str | bytes):
+            raise ValueError(f"categories must be a tuple of values, got {shown(categories)}")
+        object.__setattr__(self, "categories", tuple(categories))
         are_hashable = all(isinstance(category, Hashable) for category in known(self.categories))
         require(are_hashable, "categories", "be words or numbers", self.categories)
 
@@ -59,20 +59,20 @@ class Categorical(Coding):
     def size(self) -> int:
         return len(known(self.categories))
 
-    def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        places = {category: place for place, category in enumerate(known(self.categories))}
+    def bins(self, column: Column) -> NDArray[np.int32]:
+        numbers = {category: number for number, category in enumerate(known(self.categories))}
         try:
-            return np.array([places[value] for value in column.tolist()], dtype=np.int32)
+            return np.array([numbers[value] for value in column.tolist()], dtype=np.int32)
         except (KeyError, TypeError):
             unknown = dict.fromkeys(map(shown, column.tolist()))
-            names = [value for value in unknown if value not in set(map(shown, places))]
+            names = [value for value in unknown if value not in set(map(shown, numbers))]
             raise ValueError(f"Found unknown categories [{', '.join(names)}]") from None
 
-    def knows(self, column: NDArray[Any]) -> NDArray[np.bool_]:
+    def knows(self, column: Column) -> NDArray[np.bool_]:
         """Return whether each value is one of the categories."""
         categories = set(known(self.categories))
 
-        def is_known(value: Any) -> bool:
+        def is_known(value: object) -> bool:
             try:
                 return value in categories
             except TypeError:
@@ -80,7 +80,7 @@ class Categorical(Coding):
 
         return np.array([is_known(value) for value in column.tolist()], dtype=bool)
 
-    def _learned(self, column: NDArray[Any]) -> tuple[Category, ...]:
+    def _learned(self, column: Column) -> tuple[Category, ...]:
         """Return the given categories, or the sorted distinct values of a column."""
         if self.categories is not None:
             return self.categories
@@ -96,7 +96,7 @@ class Categorical(Coding):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Symbolic(Categorical):
-    """Categories without order or similarity: an independent random pattern each.
+    """Categories without order or similarity, with an independent random pattern each.
 
     Attributes
     ----------
@@ -107,10 +107,10 @@ class Symbolic(Categorical):
     name: ClassVar[str] = "symbolic"
     categories: tuple[Category, ...] | None = None
 
-    def fit(self, column: NDArray[Any], n_units: int) -> Symbolic:
-        given = self.categories
-        are_different = given is None or (given and len(set(given)) == len(given))
-        require(are_different, "categories", "be different and at least one", given)
+    def fit(self, column: Column, n_units: int) -> Symbolic:
+        categories = self.categories
+        are_different = categories is None or 0 < len(set(categories)) == len(categories)
+        require(are_different, "categories", "be different and at least one", categories)
         return dataclasses.replace(self, categories=self._learned(column))
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
@@ -143,7 +143,7 @@ class CorrelationMatrix(Categorical):
     """
 
     name: ClassVar[str] = "correlation-matrix"
-    matrix: Any
+    matrix: ArrayLike
     categories: tuple[Category, ...] | None = None
 
     def __post_init__(self) -> None:
@@ -151,7 +151,7 @@ class CorrelationMatrix(Categorical):
         rows = np.atleast_2d(array_of("matrix", self.matrix).astype(np.float64))
         object.__setattr__(self, "matrix", tuple(map(tuple, rows.tolist())))
 
-    def fit(self, column: NDArray[Any], n_units: int) -> CorrelationMatrix:
+    def fit(self, column: Column, n_units: int) -> CorrelationMatrix:
         matrix = np.array(self.matrix)
         is_square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]
         is_symmetric = is_square and np.array_equal(matrix, matrix.T)
@@ -176,7 +176,7 @@ class CorrelationMatrix(Categorical):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class WithMissing(Coding):
-    """Another coding with one more, unrelated pattern for None, NaN and pandas.NA.
+    """Another coding with an additional, unrelated pattern for None, NaN and pandas.NA.
 
     Attributes
     ----------
@@ -197,13 +197,13 @@ class WithMissing(Coding):
     base: Coding = dataclasses.field(default_factory=RandomInverse)
     unknown: Literal["missing", "error"] = "missing"
 
-    def fit(self, column: NDArray[Any], n_units: int) -> WithMissing:
+    def fit(self, column: Column, n_units: int) -> WithMissing:
         one_of("unknown", self.unknown, ("missing", "error"))
-        learns = self.learns  # first, because it refuses a base that is no coding
-        there = self._values(column[self._is_there(column)])
-        if learns and len(there) == 0:
+        learns = self.learns  # first, because it checks that the base is a coding
+        present = self._values(column[self._is_present(column)])
+        if learns and len(present) == 0:
             raise ValueError("every value of an input is missing: there is nothing to learn")
-        return dataclasses.replace(self, base=self.base.fit(there, n_units))
+        return dataclasses.replace(self, base=self.base.fit(present, n_units))
 
     @property
     def learns(self) -> bool:
@@ -218,32 +218,33 @@ class WithMissing(Coding):
     def ends(self) -> tuple[float, float] | None:
         return self.base.ends()
 
-    def bins(self, column: NDArray[Any]) -> NDArray[np.int32]:
-        is_there = self._is_there(column)
+    def bins(self, column: Column) -> NDArray[np.int32]:
+        is_present = self._is_present(column)
         if isinstance(self.base, Categorical) and self.unknown == "missing":
-            is_there &= self.base.knows(column)
-        found = np.full(len(column), self.size - 1, dtype=np.int32)
-        found[is_there] = self.base.bins(self._values(column[is_there]))
-        return found
+            is_present &= self.base.knows(column)
+        bins = np.full(len(column), self.size - 1, dtype=np.int32)
+        bins[is_present] = self.base.bins(self._values(column[is_present]))
+        return bins
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
-        own = int(np.random.SeedSequence(seed_of(seed)).generate_state(1, np.uint64)[0])
-        missing = _core.symbol_patterns(1, n_units, own)
+        sequence = np.random.SeedSequence(seed_of(seed))
+        seed_of_missing = int(sequence.generate_state(1, np.uint64)[0])
+        missing = _core.symbol_patterns(1, n_units, seed_of_missing)
         return np.vstack([self.base.patterns(n_units, seed), missing])
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        every = np.eye(self.size)
-        every[:-1, :-1] = self.base.correlations(n_units)
-        return every
+        correlations = np.eye(self.size)
+        correlations[:-1, :-1] = self.base.correlations(n_units)
+        return correlations
 
-    def _is_there(self, column: NDArray[Any]) -> NDArray[np.bool_]:
+    def _is_present(self, column: Column) -> NDArray[np.bool_]:
         return np.array([not is_missing(value) for value in column.tolist()], dtype=bool)
 
-    def _values(self, there: NDArray[Any]) -> NDArray[Any]:
-        """Return values as the base coding takes them; numbers must be finite."""
+    def _values(self, present: Column) -> Column:
+        """Return values in the type of the base coding; numbers must be finite."""
         if not self.base.is_numeric:
-            return there
-        values = missing_as_nan(there)
+            return present
+        values = missing_as_nan(present)
         if not np.isfinite(values).all():
             raise ValueError("Input contains infinity")
         return values

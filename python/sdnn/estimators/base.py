@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+from collections.abc import Sequence
 from numbers import Real
 from typing import Any, TypeVar
 
@@ -15,18 +16,29 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 
 from sdnn import _core
+from sdnn.coding import Coding
+from sdnn.estimators.columns import (
+    Array,
+    Floats,
+    Ints,
+    PairChoice,
+    Pairs,
+    Sample,
+    input_pairs,
+)
 from sdnn.estimators.fitted import Fitted
-from sdnn.estimators.inputs import Array, CodedInputs, Floats, Ints, Pairs, input_pairs
+from sdnn.estimators.inputs import CodedInputs
 from sdnn.estimators.network import (
     FEW_SAMPLES,
     Network,
+    Rule,
     code_bytes,
     draw_input_code,
     units_for_pairs,
 )
 from sdnn.estimators.outliers import warn_caller
 from sdnn.estimators.pair_selection import select_pairs, with_categories
-from sdnn.estimators.parameters import SHARE, parameter, wholes, words
+from sdnn.estimators.parameters import SHARE, RandomState, parameter, wholes, words
 from sdnn.estimators.training import (
     LARGE_SAMPLE,
     History,
@@ -38,6 +50,7 @@ from sdnn.estimators.training import (
     without_absent,
 )
 
+Rows = NDArray[np.int64]
 MOST_EPOCHS = 30  # by default
 FEWEST_EPOCHS = 5
 MOST_PRESENTATIONS = 80_000  # of samples in all epochs by default
@@ -51,10 +64,84 @@ class OutOfRangeWarning(UserWarning):
 
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class BaseSDNN(Fitted, CodedInputs):
-    """Base class of `SDNNRegressor` and `SDNNClassifier`, with the parameters of both."""
+    """Base class of `SDNNRegressor` and `SDNNClassifier`, with the parameters of both.
+
+    Parameters
+    ----------
+    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
+        How inputs become patterns: "random-inverse", "anchor", "circular", "symbolic", or an
+        object of `sdnn.coding`; for all inputs, or for columns given as to scikit-learn's
+        ColumnTransformer (other inputs have "random-inverse"). Columns of a data frame of type
+        "category" are symbols, which may be missing, unless a list or an object codes them.
+    ranges : {"auto", "all", "robust"}, default="auto"
+        Whether learned ranges leave out outliers; "auto" those farthest away, with an
+        `OutlierWarning`.
+    n_pattern_units : int, optional
+        Units per pattern, even. None divides about 16,000 columns among the pairs.
+    pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
+        Pairs of features, by number or name; a modifier of None leaves a pattern plain. "budget"
+        takes all pairs up to 22 features, beyond that an even random share: 500 pairs, or one per
+        feature. "auto" drops features that do not matter, half of them at a time, by the score of a
+        held-out fifth, which takes up to five times as long.
+    tables : {"shared", "separate"}, default="shared"
+        One table of patterns per input, permuted for each pair, or two tables per pair.
+    max_iter : int, optional
+        Largest number of epochs of `fit`, which stops early once nothing is corrected. None: 30,
+        or as many as present 80,000 samples, at least 5. Use more for exact targets, say 300.
+    n_averaged_epochs : int, default=4
+        Number of networks whose mean is predicted: that after the last epoch of `fit`, and those
+        after every third epoch before it (every epoch from 5,001 samples on). `partial_fit`
+        resumes from the last alone.
+    correction_share : float
+        Share of the missing or superfluous units that a sample corrects, at least one; in (0, 1].
+        Default: 1 in regression; 1/4 in classification, where samples of classes overlap.
+    shuffle : bool, default=True
+        Whether each epoch has a new random order; from 5,001 samples without weights on, of blocks
+        of 512 samples, which are drawn once: half of the time.
+    early_stopping : bool, default=False
+        Whether to hold out samples, stop when their score no longer improves, and keep the best
+        weights.
+    validation_fraction : float, default=0.1
+        Fraction of the sample held out by early stopping.
+    n_iter_no_change : int, default=10
+        Epochs without improvement before early stopping.
+    training : {"auto", "dual", "block", "plain"}, default="auto"
+        Form of training; affects time and memory, never the result.
+    memory_limit : int, default=2**30
+        Bytes for weights and patterns of all networks kept, and again for training.
+    warm_start : bool, default=False
+        Whether `fit` resumes with the existing network, ranges and categories.
+    random_state : int, RandomState or None, default=None
+        Determines patterns, initial weights, orders and the validation share.
+    n_jobs : int, optional
+        Threads; the result does not depend on it.
+    verbose : int, default=0
+        Whether to show a progress bar, with the time left.
+
+    Attributes
+    ----------
+    codings_ : tuple of Coding
+        The fitted coding of each input.
+    pairs_ : tuple of (int, int)
+        The pairs (modified, modifier) in use; equal numbers for a plain pattern.
+    pair_names_ : list of (name, name or None)
+        These pairs by feature names (numbers without names), as the parameter ``pairs`` has them.
+    weights_ : ndarray of int32, shape (n_units, n_pairs * n_pattern_units)
+    thresholds_ : ndarray of int32, shape (n_units,)
+    n_inputs_out_of_range_ : int
+        Values learned since the last `fit` that were outside their range.
+    n_iter_ : int
+        Epochs of the last `fit` and calls of `partial_fit` since.
+    n_corrected_ : ndarray of int64, shape (n_epochs,)
+        Samples corrected in each epoch of the last `fit`.
+    training_form_, training_memory_ : str, int
+        Form of training that the last `fit` chose, and its bytes beside the weights.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        As in scikit-learn.
+    """
 
     n_pattern_units: int | None = parameter(None, wholes(2, 2**24), None)
-    pairs: Any = parameter("budget", words("budget", "all", "auto"), "array-like")
+    pairs: PairChoice = parameter("budget", words("budget", "all", "auto"), "array-like")
     tables: str = parameter("shared", words("shared", "separate"))
     out_of_range: str = parameter("clip", words("clip", "error"))
     max_iter: int | None = parameter(None, wholes(1, 10**9), None)
@@ -67,7 +154,7 @@ class BaseSDNN(Fitted, CodedInputs):
     training: str = parameter("auto", words(*_core.TRAINING_FORMS))
     memory_limit: int = parameter(2**30, wholes(0, 2**62))
     warm_start: bool = parameter(False, "boolean")
-    random_state: Any = parameter(None, "random_state")
+    random_state: RandomState = parameter(None, "random_state")
     n_jobs: int | None = parameter(None, wholes(-4096, 4096), None)
     verbose: int = parameter(0, "verbose")
 
@@ -75,12 +162,12 @@ class BaseSDNN(Fitted, CodedInputs):
 
     @abc.abstractmethod
     def _check_samples(
-        self, X: Any, y: Any, reset: bool, in_fit: bool = False
+        self, X: object, y: object, reset: bool, in_fit: bool = False
     ) -> tuple[Array, Array]:
         """Return samples and targets, checked by scikit-learn's rules."""
 
     @abc.abstractmethod
-    def _set_outputs(self, y: Array) -> int:
+    def _set_outputs(self, y: ArrayLike) -> int:
         """Learn the outputs from targets (or all classes); return the number of units."""
 
     @abc.abstractmethod
@@ -92,7 +179,7 @@ class BaseSDNN(Fitted, CodedInputs):
         """Return targets as learned, one row per sample; may widen the output range."""
 
     @abc.abstractmethod
-    def _rule_arguments(self, targets: Array) -> tuple[Any, ...]:
+    def _rule_arguments(self, targets: Array) -> Rule:
         """Return (counts, share) of the p-delta rule, or (labels, n_classes, scheme)."""
 
     @abc.abstractmethod
@@ -133,19 +220,18 @@ class BaseSDNN(Fitted, CodedInputs):
         return self
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
-        # Not by scikit-learn's _fit_context: an interrupt could leave its global setting changed.
+        # An interrupt of scikit-learn's _fit_context could leave its global setting changed.
         self._validate_params()
         resumes = bool(self.warm_start) and hasattr(self, "network_")
         X, y, sample_weight = without_absent(X, y, sample_weight)
-        table, given = self._check_samples(X, y, reset=not resumes, in_fit=True)
+        table, observed = self._check_samples(X, y, reset=not resumes, in_fit=True)
         weights = sample_weights(sample_weight, len(table))
         if resumes:
-            random = self._resume(table, given)
+            random = self._resume(table, observed)
         else:
-            pairs = self._select_pairs(X, table, given, weights)
-            random = self._begin(X, table, given, pairs, self._n_networks(len(table)))
-        targets = self._targets(given, at_once=True)
-        self.__dict__.pop("_has_outliers", None)
+            pairs = self._select_pairs(X, table, observed, weights)
+            random = self._begin(X, table, observed, pairs, self._n_networks(len(table)))
+        targets = self._targets(observed, at_once=True)
         bins = self.network_.input_code.bins(table)
         held, kept = self._split(random, len(table))
         held_bins, held_targets = bins[held], targets[held]
@@ -154,17 +240,18 @@ class BaseSDNN(Fitted, CodedInputs):
         def score() -> float:
             return self._validation_score(held_bins, held_targets, held_weights)
 
-        def train(rows: Any, max_iter: int, n_averaged: int) -> tuple[Trainer, History]:
-            part = None if weights is None else weights[rows]
+        def train(rows: Rows, max_iter: int, n_averaged: int) -> tuple[Trainer, History]:
+            weights_of_rows = None if weights is None else weights[rows]
             scored = score if self.early_stopping and rows is kept else None
-            times = self._presentations(targets[rows], part)
+            times = self._presentations(targets[rows], weights_of_rows)
             n_samples = len(rows)
             in_blocks = self.shuffle and times is None and n_samples > LARGE_SAMPLE
             if in_blocks:
                 rows = random.permutation(rows)
-            # Few epochs are what the block form suits, which keeps what does not change of blocks.
+            # The block form reuses sums of blocks that are presented again, and is chosen for few
+            # epochs.
             n_epochs = min(max_iter, 2) if in_blocks else max_iter
-            learned = self._conditional(bins[rows], targets[rows], part)
+            learned = self._conditional(bins[rows], targets[rows], weights_of_rows)
             trainer = self._trainer(bins[rows], learned, n_epochs)
             return trainer, run_epochs(
                 self, trainer, n_samples, max_iter, random, scored, times, n_averaged, in_blocks
@@ -177,7 +264,7 @@ class BaseSDNN(Fitted, CodedInputs):
         self.n_corrected_ = np.array(history.n_corrected, dtype=np.int64)
         self.validation_scores_ = np.array(history.scores)
         self.training_form_, self.training_memory_ = trainer.form, trainer.memory
-        if is_refitted:  # anew on the whole sample, for as many epochs as were best
+        if is_refitted:  # on the whole sample, for the best number of epochs
             first = self.network_
             self.network_ = Network(first.input_code, first.n_units, seed=self._weight_seed)
             _, history = train(np.arange(len(table)), history.n_epochs, self.n_averaged_epochs)
@@ -191,33 +278,32 @@ class BaseSDNN(Fitted, CodedInputs):
         classes: ArrayLike | None,
         sample_weight: ArrayLike | None,
     ) -> Self:
-        """Present samples once, or as often as their weights say, in order; all or nothing."""
+        """Present samples in order, once or by their weights; all or nothing."""
         work = self._scratch()
         first = not hasattr(self, "network_")
         if first:
             self._validate_params()
         X, y, sample_weight = without_absent(X, y, sample_weight)
-        table, given = work._check_samples(X, y, reset=first)
+        table, observed = work._check_samples(X, y, reset=first)
         if first:
-            work._begin(X, table, given if classes is None else classes)
+            work._begin(X, table, observed if classes is None else classes)
             work.n_iter_ = 0
         else:
-            work._check_outputs(given, classes)
+            work._check_outputs(observed, classes)
             work._note_inputs(work._finite(table, work.codings_))
         weights = sample_weights(sample_weight, len(table))
         if weights is not None:
             rows = presented(len(table), weights, 0, work._n_weighted)
             work._n_weighted += len(table)
-            table, given = table[rows], given[rows]
+            table, observed = table[rows], observed[rows]
         if len(table):
-            bins, targets = work.network_.input_code.bins(table), work._targets(given)
-            work.__dict__.pop("_has_outliers", None)
+            bins, targets = work.network_.input_code.bins(table), work._targets(observed)
             work._learn(bins, targets)
         self.__dict__ = work.__dict__
         return self
 
-    def _learn_one(self: Self, x: Any, y: Array, classes: ArrayLike | None) -> Self:
-        """Learn one sample; y has shape (1,) or (1, n_outputs)."""
+    def _learn_one(self: Self, x: Sample, y: Array, classes: ArrayLike | None) -> Self:
+        """Learn a sample; y has shape (1,) or (1, n_outputs)."""
         work = self._scratch()
         if hasattr(self, "network_"):
             work._check_outputs(y, classes)
@@ -236,7 +322,12 @@ class BaseSDNN(Fitted, CodedInputs):
         return self
 
     def _begin(
-        self, X: Any, table: Array, y: Any, pairs: Pairs | None = None, n_networks: int = 1
+        self,
+        X: object,
+        table: Array,
+        y: ArrayLike,
+        pairs: Pairs | None = None,
+        n_networks: int = 1,
     ) -> np.random.RandomState:
         """Fit the codings, draw tables and weights; return the generator of orders."""
         n_units = self._set_outputs(y)
@@ -272,16 +363,18 @@ class BaseSDNN(Fitted, CodedInputs):
         random: np.random.RandomState = check_random_state(self.random_state)
         return random
 
-    def _select_pairs(self, X: Any, table: Array, y: Any, weights: Floats | None) -> Pairs | None:
+    def _select_pairs(
+        self, X: ArrayLike, table: Array, y: Array, weights: Floats | None
+    ) -> Pairs | None:
         """Return the pairs selected with a hold-out; None without ``pairs="auto"``."""
         if not (isinstance(self.pairs, str) and self.pairs == "auto") or table.shape[1] < 2:
             return None
         seed = int(check_random_state(self.random_state).randint(2**31 - 1))
         model = clone(self).set_params(random_state=seed, early_stopping=False, verbose=0)
         codings = self._codings(X, table)
-        known = [with_categories(coding, table[:, i]) for i, coding in enumerate(codings)]
-        if known != codings:
-            model.set_params(coding=[(coding, [index]) for index, coding in enumerate(known)])
+        complete = [with_categories(coding, table[:, i]) for i, coding in enumerate(codings)]
+        if complete != codings:
+            model.set_params(coding=[(coding, [index]) for index, coding in enumerate(complete)])
         return select_pairs(model, X, y, weights, table.shape[1], seed)
 
     def _most_epochs(self, n_samples: int) -> int:
@@ -298,7 +391,12 @@ class BaseSDNN(Fitted, CodedInputs):
         return 1 + (2 if has_best else 1) * n_earlier  # the best ones beside the last ones
 
     def _require_memory(
-        self, n_units: int, n_networks: int, n_pattern_units: int, codings: Any, pairs: Any
+        self,
+        n_units: int,
+        n_networks: int,
+        n_pattern_units: int,
+        codings: Sequence[Coding],
+        pairs: Sequence[tuple[int, int]],
     ) -> None:
         """Raise ValueError if weights and patterns exceed the limit."""
         n_bytes = 4 * n_networks * n_units * len(pairs) * n_pattern_units
@@ -313,9 +411,7 @@ class BaseSDNN(Fitted, CodedInputs):
                 f"memory_limit={self.memory_limit}"
             )
 
-    def _split(
-        self, random: np.random.RandomState, n_samples: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _split(self, random: np.random.RandomState, n_samples: int) -> tuple[Rows, Rows]:
         """Return the indices of the held-out samples and of the others."""
         if not self.early_stopping:
             return np.empty(0, dtype=np.int64), np.arange(n_samples)
@@ -330,8 +426,10 @@ class BaseSDNN(Fitted, CodedInputs):
 
     def _trainer(self, bins: Ints, targets: Array, n_epochs: int) -> Trainer:
         rule = self._rule_arguments(targets)
-        kind: Any = _core.PDeltaTrainer if len(rule) == 2 else _core.PerceptronTrainer
-        trainer: Trainer = kind(
+        trainer_class: type[Any] = (
+            _core.PDeltaTrainer if len(rule) == 2 else _core.PerceptronTrainer
+        )
+        trainer: Trainer = trainer_class(
             self.network_.layer,
             bins,
             *rule,
@@ -345,7 +443,7 @@ class BaseSDNN(Fitted, CodedInputs):
     def _learn(self, bins: Ints, targets: Array) -> None:
         """Present every sample once, in order; all or nothing.
 
-        Small numbers are learned in place, so nothing that may fail may follow.
+        A few samples are learned in place, so that no later statement may fail.
         """
         self.n_iter_ += 1
         if self._earlier:
@@ -370,18 +468,18 @@ class BaseSDNN(Fitted, CodedInputs):
         if self.out_of_range == "error":
             raise ValueError(f"X has {first}, but out_of_range is 'error'")
         if self.n_inputs_out_of_range_ == 0 and not self._has_outliers:
-            message = f"X has {first}: values beyond a range are clipped"
+            message = f"X has {first}: values outside a range are clipped"
             warn_caller(message, OutOfRangeWarning)
         self.n_inputs_out_of_range_ += n_outside
 
-    def _bins(self, X: Any) -> Ints:
-        """Return the bins of samples to predict, checked."""
+    def _bins(self, X: object) -> Ints:
+        """Check samples to predict and return their bins."""
         codings = self.codings_
         table = self._finite(self._validated(X, reset=False), codings)
         return self.network_.input_code.bins(table)
 
-    def _bins_of_one(self, x: Any) -> Ints:
-        """Return the bins of one sample to predict, without overhead."""
+    def _bins_of_one(self, x: Sample) -> Ints:
+        """Return the bins of a sample to predict, without the overhead of a table."""
         code = self._fitted_network.input_code
         return code.bins_of_row(self._row(x, code))
 

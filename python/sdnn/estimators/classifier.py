@@ -13,22 +13,24 @@ from sklearn.utils.multiclass import _ovr_decision_function, unique_labels
 
 from sdnn import _core
 from sdnn.estimators.base import BaseSDNN
+from sdnn.estimators.columns import Array, Floats, Ints, Sample
 from sdnn.estimators.fitted import mean_of
-from sdnn.estimators.inputs import Array, Floats, Ints, check_labels, class_labels
-from sdnn.estimators.network import Network
-from sdnn.estimators.parameters import SHARE, parameter, wholes, words
-from sdnn.estimators.training import class_weights, sample_weights, weighted_mean
+from sdnn.estimators.inputs import check_labels, class_labels
+from sdnn.estimators.network import Network, Rule
+from sdnn.estimators.parameters import SHARE, documents, parameter, wholes, words
+from sdnn.estimators.training import ClassWeight, class_weights, sample_weights, weighted_mean
 from sdnn.support.arguments import explains_names, require, shown
 
 UNITS_EACH = 60
 MOST_UNITS = 1200
-OWN_SHARE = 5 / 6  # of a class's units, to fire for its samples; the rest for others
+FIRING_SHARE = 5 / 6  # of a class's units for its samples; the rest fires for other classes
 STEEPNESS = 6.0  # of the softmax of scores
 
 Self = TypeVar("Self", bound="SDNNClassifier")
 
 
 @explains_names()
+@documents(BaseSDNN)
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class SDNNClassifier(ClassifierMixin, BaseSDNN):
     """Classification by a selective desensitization neural network, exact and online.
@@ -40,88 +42,21 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
 
     Parameters
     ----------
-    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
-        How inputs become patterns: "random-inverse", "anchor", "circular", "symbolic", or an
-        object of `sdnn.coding`; for all inputs, or for columns given as to scikit-learn's
-        ColumnTransformer (other inputs have "random-inverse"). Columns of a data frame of type
-        "category" are symbols, which may be missing, unless a list or an object codes them.
-    ranges : {"auto", "all", "robust"}, default="auto"
-        Whether learned ranges leave out outliers; "auto" those farthest away, with an
-        `OutlierWarning`.
-    n_pattern_units : int, optional
-        Units per pattern, even. None divides about 16,000 columns among the pairs.
-    pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
-        Pairs of features, by number or name; a modifier of None leaves a pattern plain. "budget"
-        takes all pairs up to 22 features, beyond that an even random share: 500 pairs, or one per
-        feature. "auto" drops features that do not matter, half of them at a time, by the score of a
-        held-out fifth, which takes up to five times as long.
-    tables : {"shared", "separate"}, default="shared"
-        One table of patterns per input, permuted for each pair, or two tables per pair.
-    max_iter : int, optional
-        Largest number of epochs of `fit`, which stops early once nothing is corrected. None: 30,
-        or as many as present 80,000 samples, at least 5. Use more for exact targets, say 300.
-    n_averaged_epochs : int, default=4
-        Predict the mean over the networks after the last epoch of `fit` and after so many, less
-        one, of every third epoch before (from 5,001 samples on, of every one). `partial_fit`
-        resumes from the last alone.
-    correction_share : float
-        Share of the missing or superfluous units that a sample corrects, at least one; in (0, 1].
-        Default: 1 in regression; 1/4 in classification, where samples of classes overlap.
-    shuffle : bool, default=True
-        Whether each epoch has a new random order; from 5,001 samples without weights on, of blocks
-        of 512 samples, which are drawn once: half of the time.
-    early_stopping : bool, default=False
-        Whether to hold out samples, stop when their score no longer improves, and keep the best
-        weights.
-    validation_fraction : float, default=0.1
-        Fraction of the sample held out by early stopping.
-    n_iter_no_change : int, default=10
-        Epochs without improvement before early stopping.
-    training : {"auto", "dual", "block", "plain"}, default="auto"
-        Form of training; affects time and memory, never the result.
-    memory_limit : int, default=2**30
-        Bytes for weights and patterns of all networks kept, and again for training.
-    warm_start : bool, default=False
-        Whether `fit` resumes with the existing network, ranges and categories.
-    random_state : int, RandomState or None, default=None
-        Determines patterns, initial weights, orders and the validation share.
-    n_jobs : int, optional
-        Threads; the result does not depend on it.
-    verbose : int, default=0
-        Whether to show a progress bar, with the time left.
     out_of_range : {"clip", "error"}, default="clip"
         Whether inputs to learn outside their range are clipped, with an `OutOfRangeWarning`.
     scheme : {"one_vs_rest", "one_vs_one"}, default="one_vs_rest"
         Units per class, of which the largest score wins; or one per pair of classes, which vote.
     n_units_per_class : int, optional
-        Units per class. Five sixths of the own class's units are trained to fire and one sixth of
-        the others', so that units may specialize. With 1, the potential is the score. None: 60, or
-        fewer from 20 classes on (1,200 in all); 1 with "one_vs_one".
+        Units per class. Five sixths of the units of a sample's class are trained to fire and one
+        sixth of those of other classes, so that units may specialize. With 1, the potential is the
+        score. None: 60, or fewer from 20 classes on (1,200 in all); 1 with "one_vs_one".
     class_weight : "balanced" or dict, optional
         Mean number of presentations per epoch of `fit` of each class's samples.
 
     Attributes
     ----------
-    codings_ : tuple of Coding
-        The fitted coding of each input.
-    pairs_ : tuple of (int, int)
-        The pairs (modified, modifier) in use; equal numbers for a plain pattern.
-    pair_names_ : list of (name, name or None)
-        The same by feature names (numbers without names), as ``pairs`` takes them.
-    weights_ : ndarray of int32, shape (n_units, n_pairs * n_pattern_units)
-    thresholds_ : ndarray of int32, shape (n_units,)
-    n_inputs_out_of_range_ : int
-        Values learned since the last `fit` that were outside their range.
-    n_iter_ : int
-        Epochs of the last `fit` and calls of `partial_fit` since.
-    n_corrected_ : ndarray of int64, shape (n_epochs,)
-        Samples corrected in each epoch of the last `fit`.
-    training_form_, training_memory_ : str, int
-        Form of training that the last `fit` chose, and its bytes beside the weights.
-    n_features_in_, feature_names_in_ : int, ndarray of str
-        As in scikit-learn.
     classes_ : ndarray, shape (n_classes,)
-        The labels, sorted; those that came late in a `RiverClassifier` follow in their order.
+        The labels, sorted; a `RiverClassifier` appends later labels in the order of the stream.
     validation_scores_ : ndarray, shape (n_epochs,) or (0,)
         With early stopping, the accuracy on the held-out samples.
 
@@ -137,7 +72,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
 
     scheme: str = parameter("one_vs_rest", words(*_core.CLASS_SCHEMES))
     n_units_per_class: int | None = parameter(None, wholes(1, 1024), None)
-    class_weight: Any = parameter(None, words("balanced"), dict, None)
+    class_weight: ClassWeight = parameter(None, words("balanced"), dict, None)
     correction_share: float = parameter(0.25, SHARE)
 
     def partial_fit(
@@ -149,17 +84,17 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     ) -> Self:
         """Present the samples once, in order; any portions give the same weights.
 
-        With ``sample_weight`` each is presented so often in the mean: of weight 2 twice, of weight
-        1/2 every other one.
+        ``sample_weight`` is the mean number of presentations: samples of weight 2 are presented
+        twice, and every other sample of weight 1/2.
 
-        They equal those of `fit` with ``max_iter=1, shuffle=False`` if ranges and categories are
-        given; otherwise the first call learns them. ``classes``, all labels that can occur, must be
-        given in the first call. Raises as `fit`.
+        The weights equal those of `fit` with ``max_iter=1, shuffle=False`` if ranges and categories
+        are given; otherwise the first call learns them. ``classes``, all labels that can occur,
+        must be given in the first call. Raises as `fit`.
         """
         self._require_classes(classes)
         return self._partial_fit(X, y, classes, sample_weight)
 
-    def learn_one(self: Self, x: Any, y: Any, classes: ArrayLike | None = None) -> Self:
+    def learn_one(self: Self, x: Sample, y: object, classes: ArrayLike | None = None) -> Self:
         """Learn one sample: `partial_fit` of one row, to the same bits, without its overhead.
 
         ``x`` is a row or a mapping from feature names to values, which may lack features coded with
@@ -168,7 +103,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         self._require_classes(classes)
         return self._learn_one(x, np.array([y]), classes)
 
-    def predict_one(self, x: Any) -> Any:
+    def predict_one(self, x: Sample) -> Any:
         """Predict the label of one sample, given as to `learn_one`."""
         decision = self._decision(self._bins_of_one(x), n_threads=1)
         return self.classes_[self._winners(decision)[0]]
@@ -176,8 +111,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def decision_function(self, X: ArrayLike) -> Floats:
         """Return the score of each class, shape (n_samples, n_classes).
 
-        The share of its units that fire, the potential of a single unit, or with "one_vs_one" the
-        votes, ties decided by potentials. Two classes: shape (n_samples,), positive for the second.
+        A score is the share of the class's units that fire, the potential of a single unit, or with
+        "one_vs_one" the votes, where potentials break ties. Two classes: shape (n_samples,),
+        positive for the second.
         """
         return self._decision(self._bins(X), self._n_threads())
 
@@ -200,20 +136,20 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         return self._probabilities(self._bins(X), self._n_threads())
 
     @available_if(_has_several_units)  # type: ignore[untyped-decorator]
-    def predict_proba_one(self, x: Any) -> Floats:
+    def predict_proba_one(self, x: Sample) -> Floats:
         """Return `predict_proba` of one sample, given as to `learn_one`, shape (n_classes,)."""
-        of_one: Floats = self._probabilities(self._bins_of_one(x), n_threads=1)[0]
-        return of_one
+        probabilities: Floats = self._probabilities(self._bins_of_one(x), n_threads=1)[0]
+        return probabilities
 
     def _require_classes(self, classes: ArrayLike | None) -> None:
-        """Check the arguments of learning piece by piece."""
+        """Check the arguments of `partial_fit` and `learn_one` that `fit` does not have."""
         if self.class_weight is not None:
             raise ValueError(f"class_weight works in fit only, got {shown(self.class_weight)}")
         if classes is None and not hasattr(self, "network_"):
             raise ValueError("classes must be given in the first call of partial_fit or learn_one")
 
     def _check_samples(
-        self, X: Any, y: Any, reset: bool, in_fit: bool = False
+        self, X: object, y: object, reset: bool, in_fit: bool = False
     ) -> tuple[Array, Array]:
         table, labels = self._validated(X, y, reset=reset, ensure_min_samples=2 if in_fit else 1)
         check_labels(labels)
@@ -222,16 +158,16 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def _set_outputs(self, y: ArrayLike) -> int:
         self.classes_: Array = class_labels(y)
         n_classes = len(self.classes_)
-        several, given = self.scheme == "one_vs_rest", self.n_units_per_class
-        fits = several or given is None or given == 1
-        require(fits, "n_units_per_class", "be 1 or None with scheme='one_vs_one'", given)
-        if given is None:
-            given = min(UNITS_EACH, max(2, MOST_UNITS // n_classes)) if several else 1
+        may_be_several, n_units_each = self.scheme == "one_vs_rest", self.n_units_per_class
+        fits = may_be_several or n_units_each is None or n_units_each == 1
+        require(fits, "n_units_per_class", "be 1 or None with scheme='one_vs_one'", n_units_each)
+        if n_units_each is None:
+            n_units_each = min(UNITS_EACH, max(2, MOST_UNITS // n_classes)) if may_be_several else 1
         self._scheme = self.scheme
-        self._n_units_each = given
-        return _core.n_units_for(self.scheme, n_classes) * given
+        self._n_units_each = n_units_each
+        return _core.n_units_for(self.scheme, n_classes) * n_units_each
 
-    def _add_class(self, label: Any) -> None:
+    def _add_class(self, label: object) -> None:
         """Add a class as the last one, with untrained units."""
         classes = np.append(self.classes_, [label])
         is_alike = classes.dtype.kind == self.classes_.dtype.kind and label == label  # no NaN
@@ -243,8 +179,8 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             )
         network = self.network_
         n_units = _core.n_units_for(self._scheme, len(classes)) * self._n_units_each
-        begun = Network(network.input_code, n_units, seed=self._weight_seed)
-        weights, thresholds = begun.weights, begun.thresholds
+        untrained = Network(network.input_code, n_units, seed=self._weight_seed)
+        weights, thresholds = untrained.weights, untrained.thresholds
         weights[: network.n_units] = network.weights
         thresholds[: network.n_units] = network.thresholds
         self.network_ = Network(network.input_code, n_units, weights=weights, thresholds=thresholds)
@@ -269,12 +205,12 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         order = np.argsort(self.classes_)
         return order[np.searchsorted(self.classes_, y, sorter=order)].astype(np.int32)
 
-    def _rule_arguments(self, targets: Ints) -> tuple[Any, ...]:
+    def _rule_arguments(self, targets: Ints) -> Rule:
         n_classes = len(self.classes_)
         if self._n_units_each == 1:
             return targets, n_classes, self._scheme
-        own = targets[:, None] == np.arange(n_classes)
-        counts = self._n_units_each * np.where(own, OWN_SHARE, 1 - OWN_SHARE)
+        is_target = targets[:, None] == np.arange(n_classes)
+        counts = self._n_units_each * np.where(is_target, FIRING_SHARE, 1 - FIRING_SHARE)
         return counts, self.correction_share
 
     def _presentations(self, targets: Ints, weights: Floats | None) -> Floats | None:
@@ -308,10 +244,10 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         if self._scheme == "one_vs_rest":
             return scores[:, 1] - scores[:, 0] if n_classes == 2 else scores
         # A firing unit (potential above 0) votes for the first class of its pair.
-        leaning = scores - 0.5
+        margins = scores - 0.5
         if n_classes == 2:
-            return -leaning[:, 0]
-        decision: Floats = _ovr_decision_function(leaning <= 0, -leaning, n_classes)
+            return -margins[:, 0]
+        decision: Floats = _ovr_decision_function(margins <= 0, -margins, n_classes)
         return decision
 
     @staticmethod

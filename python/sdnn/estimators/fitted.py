@@ -15,7 +15,7 @@ from sklearn.utils.validation import check_is_fitted
 from sdnn import _core
 from sdnn.coding import Coding, WithMissing, from_dict, to_dict
 from sdnn.coding.symbols import Categorical
-from sdnn.estimators.inputs import Array, Floats, Ints, coding_entries
+from sdnn.estimators.columns import Array, Codings, Floats, Ints, coding_entries
 from sdnn.estimators.network import InputCode, Network, code_bytes
 from sdnn.support.arguments import seed_of, whole
 from sdnn.support.state_files import Arrays, Description, read_file, write_file
@@ -47,7 +47,7 @@ class Learned:
     _weight_seed: int
 
 
-ATTRIBUTES: dict[str, type[Any]] = {
+ATTRIBUTES: dict[str, type] = {
     "n_corrected_": np.ndarray,
     "n_features_in_": int,
     "n_inputs_out_of_range_": int,
@@ -71,11 +71,11 @@ ATTRIBUTES: dict[str, type[Any]] = {
 class Fitted(Learned, BaseEstimator):
     """Attributes of an estimator that holds a network, and its file."""
 
-    coding: Any
+    coding: Codings
     memory_limit: int
     network_: Network
     _earlier: tuple[Network, ...] = ()
-    _n_weighted = 0  # samples that came to partial_fit with weights
+    _n_weighted = 0  # samples with weights that partial_fit has received
 
     @property
     def _fitted_network(self) -> Network:
@@ -122,13 +122,13 @@ class Fitted(Learned, BaseEstimator):
         counts: Ints = _core.counts_of_all(layers, bins, n_groups, n_threads)
         return counts
 
-    def _names_or_numbers(self) -> list[Any]:
+    def _names_or_numbers(self) -> list[str | int]:
         """Return the names of the features, or their numbers."""
         names = getattr(self, "feature_names_in_", np.arange(len(self.codings_)))
         return list(names.tolist())
 
     @property
-    def pair_names_(self) -> list[tuple[Any, Any]]:
+    def pair_names_(self) -> list[tuple[str | int, str | int | None]]:
         """The pairs by names of the features, as ``pairs`` takes them."""
         names = self._names_or_numbers()
         return [(names[mu], None if mu == nu else names[nu]) for mu, nu in self.pairs_]
@@ -137,8 +137,8 @@ class Fitted(Learned, BaseEstimator):
         """Return the mean squared change of the weights of pairs with each feature."""
         network = self.network_
         code = network.input_code
-        begun = _core.ParallelPerceptron(code.core, network.n_units, seed=self._weight_seed)
-        change = network.weights - begun.weights
+        untrained = _core.ParallelPerceptron(code.core, network.n_units, seed=self._weight_seed)
+        change = network.weights - untrained.weights
         of_pairs = change.reshape(network.n_units, len(code.pairs), code.n_units)
         squares: Floats = np.square(of_pairs, dtype=np.float64).sum(axis=(0, 2))
         total, count = np.zeros((2, self.n_features_in_))
@@ -172,10 +172,10 @@ class Fitted(Learned, BaseEstimator):
         parameters = self.get_params(deep=False)
         description = {
             "class": type(self).__name__,
-            "parameters": {name: plain(value) for name, value in parameters.items()},
+            "parameters": {name: json_value(value) for name, value in parameters.items()},
             "attributes": attributes,
-            "names": {name: named(held[name]) for name in NAMES if name in held},
-            "codings": [described(index, coding) for index, coding in enumerate(code.codings)],
+            "names": {name: typed_list(held[name]) for name in NAMES if name in held},
+            "codings": [description_of(index, coding) for index, coding in enumerate(code.codings)],
             "pairs": code.pairs,
             "n_units": self.network_.n_units,
             "n_networks": len(networks),
@@ -215,44 +215,44 @@ class Fitted(Learned, BaseEstimator):
 
 
 def mean_of(arrays: Sequence[Array] | Array) -> Array:
-    """Return the mean of arrays; a single one as it is."""
+    """Return the mean of several arrays, or a single array unchanged."""
     mean: Array = np.mean(arrays, axis=0) if len(arrays) > 1 else arrays[0]
     return mean
 
 
-def described(index: int, coding: Coding) -> dict[str, Any]:
+def description_of(index: int, coding: Coding) -> dict[str, object]:
     """Describe the coding of an input; TypeError that names it if that is impossible."""
     try:
-        found = to_dict(coding)
-        json.dumps(found)
+        description = to_dict(coding)
+        json.dumps(description)
     except TypeError as error:
         raise TypeError(f"the coding of column {index} cannot be saved: {error}") from None
-    return found
+    return description
 
 
-def plain(value: Any) -> Any:
+def json_value(value: object) -> object:
     """Turn a parameter into data that JSON can hold; TypeError if that is impossible."""
     if isinstance(value, Coding):
         return to_dict(value)
     if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
+        return json_value(value.tolist())
     if isinstance(value, slice):
-        return {"slice": [plain(end) for end in (value.start, value.stop, value.step)]}
-    if isinstance(value, Mapping):  # whose keys may be numbers, which those of JSON are not
-        return {"dict": [[plain(key), plain(item)] for key, item in value.items()]}
+        return {"slice": [json_value(part) for part in (value.start, value.stop, value.step)]}
+    if isinstance(value, Mapping):  # as a list, because keys may be numbers
+        return {"dict": [[json_value(key), json_value(item)] for key, item in value.items()]}
     if isinstance(value, np.random.RandomState):
-        return None  # a fitted model draws no more
+        return None  # a fitted model draws no further numbers
     if value is None or isinstance(value, str | int | float | bool):
         return value
     if hasattr(value, "__array__"):  # columns and labels of pandas
-        return plain(np.asarray(value))
+        return json_value(np.asarray(value))
     if isinstance(value, Iterable) and not isinstance(value, bytes | Iterator):
-        return [plain(item) for item in value]
+        return [json_value(item) for item in value]
     raise TypeError(f"a parameter cannot be saved: {value!r}")
 
 
 def restored(value: Any) -> Any:
-    """Undo `plain`."""
+    """Return the parameter that `json_value` described."""
     if isinstance(value, dict):
         if "slice" in value:
             return slice(*value["slice"])
@@ -264,45 +264,46 @@ def restored(value: Any) -> Any:
 
 def narrowed(values: Ints) -> Array:
     """Return integers in the smallest type that holds them."""
-    for kind in (np.int8, np.int16):
-        info = np.iinfo(kind)
+    for integer in (np.int8, np.int16):
+        info = np.iinfo(integer)
         if values.size == 0 or (values.min() >= info.min and values.max() <= info.max):
-            return values.astype(kind)
+            return values.astype(integer)
     return values
 
 
-def named(values: Array) -> dict[str, Any]:
+def typed_list(values: Array) -> dict[str, object]:
     """Describe an array of labels or names with its type."""
-    kind = "object" if values.dtype == object else values.dtype.str
-    return {"type": kind, "values": values.tolist()}
+    type_name = "object" if values.dtype == object else values.dtype.str
+    return {"type": type_name, "values": values.tolist()}
 
 
 def array_of_names(name: str, stored: Mapping[str, Any]) -> Array:
-    """Undo `named`."""
-    values, kind = stored["values"], np.dtype(stored["type"])
-    if kind.kind not in "biufUO" or kind.itemsize * len(values) > MOST_BYTES_OF_NAMES:
+    """Return the array that `typed_list` described."""
+    values, dtype = stored["values"], np.dtype(stored["type"])
+    if dtype.kind not in "biufUO" or dtype.itemsize * len(values) > MOST_BYTES_OF_NAMES:
         raise ValueError(f"names.{name}.type must be one of labels, got {stored['type']!r}")
-    array = np.array(values, dtype=kind)
+    array = np.array(values, dtype=dtype)
     if array.ndim != 1:
         raise ValueError(f"names.{name}.values must be a list of labels")
     return array
 
 
 def read_estimator(
-    description: Description, arrays: Arrays, kind: type[Self], memory_limit: int
+    description: Description, arrays: Arrays, estimator_class: type[Self], memory_limit: int
 ) -> Self:
     """Make the estimator with its parameters and everything it has learned."""
-    estimator = kind(**{name: restored(value) for name, value in description["parameters"].items()})
+    parameters = {name: restored(value) for name, value in description["parameters"].items()}
+    estimator = estimator_class(**parameters)
     estimator._validate_params()
     coding_entries(estimator.coding)
     held: dict[str, Any] = estimator.__dict__
-    given = {**description["attributes"], **arrays}
+    stored = {**description["attributes"], **arrays}
     for name, expected in ATTRIBUTES.items():
-        if name in given:
-            if type(given[name]) is not expected:
-                words = f"must be of type {expected.__name__}, got {given[name]!r:.80}"
-                raise ValueError(f"attributes.{name} {words}")
-            held[name] = given[name]
+        if name in stored:
+            if type(stored[name]) is not expected:
+                problem = f"must be of type {expected.__name__}, got {stored[name]!r:.80}"
+                raise ValueError(f"attributes.{name} {problem}")
+            held[name] = stored[name]
     for name in NAMES:
         if name in description["names"]:
             held[name] = array_of_names(name, description["names"][name])
@@ -335,15 +336,15 @@ def require_consistent(estimator: Fitted) -> None:
         raise ValueError("its parts do not fit together")
 
 
-def checked(coding: Coding, n_units: int) -> Coding:
-    """Return a fitted coding; ValueError if a field of it is wrong."""
-    of_values = coding.base if isinstance(coding, WithMissing) else coding
-    if isinstance(of_values, Categorical):
-        values = np.empty(of_values.size, object)
-        values[:] = of_values.categories
+def require_fitted(coding: Coding, n_units: int) -> Coding:
+    """Return a coding that is fitted; ValueError if it is not, or a field of it is wrong."""
+    base = coding.base if isinstance(coding, WithMissing) else coding
+    if isinstance(base, Categorical):
+        values = np.empty(base.size, object)
+        values[:] = base.categories
     else:
-        values = np.array(of_values.ends() or (0.0,))
-    if coding.fit(values, n_units) != coding:  # which changes nothing where all is given
+        values = np.array(base.ends() or (0.0,))
+    if coding.fit(values, n_units) != coding:  # fit changes nothing of a fitted coding
         raise ValueError(f"{coding} is not fitted")
     return coding
 
@@ -351,7 +352,7 @@ def checked(coding: Coding, n_units: int) -> Coding:
 def read_code(description: Description, arrays: Arrays, memory_limit: int) -> InputCode:
     """Build the code; nothing is allocated before its size is known."""
     n_units = whole("n_pattern_units", description["n_pattern_units"], 2, 2**24)
-    codings = [checked(from_dict(coding), n_units) for coding in description["codings"]]
+    codings = [require_fitted(from_dict(coding), n_units) for coding in description["codings"]]
     last = len(codings) - 1
     pairs = [
         (whole("pairs", mu, 0, last), whole("pairs", nu, 0, last))

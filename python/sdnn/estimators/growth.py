@@ -1,4 +1,4 @@
-"""Inputs and categories that a trained network gets later, without losing what it has learned."""
+"""Inputs and categories that are added to a trained network, whose predictions stay."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.coding import Coding
 from sdnn.estimators.base import BaseSDNN
-from sdnn.estimators.inputs import PAIR_BUDGET, Pairs
+from sdnn.estimators.columns import PAIR_BUDGET, Pairs
 from sdnn.estimators.network import InputCode, Network
 
 Table = NDArray[np.int8]
 
 
 def pairs_of_new(n_before: int, n_new: int, random: np.random.RandomState) -> Pairs:
-    """Return pairs of new inputs and earlier ones: all, or a random share beyond the budget.
+    """Return the pairs of new inputs and earlier inputs, or a random share beyond the budget.
 
     >>> pairs_of_new(2, 1, np.random.RandomState(0))
     [(2, 0), (0, 2), (2, 1), (1, 2)]
@@ -33,7 +33,7 @@ def pairs_of_new(n_before: int, n_new: int, random: np.random.RandomState) -> Pa
 
 
 def longer(table: Table, n_rows: int, random: np.random.RandomState) -> Table:
-    """Return a table with random patterns before the last one, that of missing values."""
+    """Return a table with random patterns inserted before its last pattern, for missing values."""
     n_new = n_rows - len(table)
     if n_new == 0:
         return table
@@ -46,13 +46,13 @@ def grow(
 ) -> bool:
     """Give a trained model new inputs, and inputs codings with more categories.
 
-    The new weights are 0, so that predictions stay as they are. The codings are fitted, those of
-    ``changed`` are with missing values. Return False, and change nothing, if the code would have
+    The new weights are 0, so that predictions stay as they are. All codings are fitted, and those
+    in ``changed`` have missing values. Return False, and change nothing, if the code would have
     more columns than ``most_columns``.
     """
     network, before = model.network_, model.network_.input_code
     n_before, n_units = len(before.codings), before.n_units
-    n_patterns = sum(coding.size for coding in before.codings)  # other ones in the next growth
+    n_patterns = sum(coding.size for coding in before.codings)  # differs at the next growth
     random = np.random.RandomState((model._weight_seed + n_patterns) % 2**32)
     added = pairs_of_new(n_before, len(new), random)
     pairs = [*before.pairs, *added]

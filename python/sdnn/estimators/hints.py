@@ -5,14 +5,13 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
 WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
 
 
-def first_of_words(X: Any) -> tuple[Any, list[Any]]:
+def first_of_words(X: object) -> tuple[str | int | None, list[object]]:
     """Return the name or number of the first column that cannot be numbers, and its values."""
     names = list(X.columns) if hasattr(X, "columns") else itertools.count()
     for name, column in zip(names, np.asarray(X).T, strict=False):
@@ -23,8 +22,8 @@ def first_of_words(X: Any) -> tuple[Any, list[Any]]:
     return None, []
 
 
-def hint_about(values: Iterable[Any]) -> str:
-    """Return what to do about a column of words, if they look like numbers written otherwise.
+def hint_about(values: Iterable[object]) -> str:
+    """Return advice on a column of words that may be numbers in another notation.
 
     >>> hint_about(["19,1", "20,5"])
     "these are numbers with a decimal comma: pandas.read_csv(..., decimal=',') reads them"
@@ -35,8 +34,8 @@ def hint_about(values: Iterable[Any]) -> str:
     marks = [text for text in texts if text.lower() in _MARKS]
     others = [text for text in texts if text not in marks and not _PLAIN.fullmatch(text)]
     hints = []
-    units = {found[1] or found[2] for text in others if (found := _UNIT.fullmatch(text))}
-    separators = {found[1] for text in others if (found := _THOUSANDS.fullmatch(text))}
+    units = {match[1] or match[2] for text in others if (match := _UNIT.fullmatch(text))}
+    separators = {match[1] for text in others if (match := _THOUSANDS.fullmatch(text))}
     if len(separators) == 1 and all(map(_THOUSANDS.fullmatch, others)):
         thousands = f"pandas.read_csv(..., thousands={separators.pop()!r}) reads them"
         hints.append(f"these are numbers with thousands separators: {thousands}")

@@ -6,7 +6,7 @@ import abc
 import dataclasses
 from collections.abc import Sequence
 from numbers import Real
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,15 +19,8 @@ from sklearn.utils.validation import check_is_fitted
 
 from sdnn.coding import Coding
 from sdnn.coding.kernel import N_UNITS, AnalyticKernel
-from sdnn.estimators.inputs import (
-    Array,
-    CodedInputs,
-    CodedRegressor,
-    Floats,
-    check_labels,
-    class_labels,
-    input_pairs,
-)
+from sdnn.estimators.columns import Array, Floats, PairChoice, input_pairs
+from sdnn.estimators.inputs import CodedInputs, CodedRegressor, check_labels, class_labels
 from sdnn.estimators.leave_one_out import (
     Rows,
     Samples,
@@ -36,8 +29,8 @@ from sdnn.estimators.leave_one_out import (
     portions,
     solve,
 )
-from sdnn.estimators.parameters import parameter, wholes, words
-from sdnn.estimators.training import class_weights, sample_weights, without_absent
+from sdnn.estimators.parameters import RandomState, documents, parameter, wholes, words
+from sdnn.estimators.training import ClassWeight, class_weights, sample_weights, without_absent
 from sdnn.support.arguments import explains_names, real
 
 AUTO = words("auto")
@@ -49,7 +42,7 @@ Self = TypeVar("Self", bound="BaseKernelRidge")
 
 
 def of_degree(kernel: Floats, degree: int) -> Floats:
-    """Turn a kernel, in place, into that of functions of up to ``2 * degree`` inputs."""
+    """Turn a kernel, in place, into the kernel of functions of up to ``2 * degree`` inputs."""
     if degree == 2:
         kernel *= 0.5 + 0.5 * kernel
     elif degree == 3:
@@ -59,13 +52,56 @@ def of_degree(kernel: Floats, degree: int) -> Floats:
 
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class BaseKernelRidge(CodedInputs):
-    """Base class of `SDNNKernelRidge` and `SDNNKernelClassifier`, with the parameters of both."""
+    """Base class of `SDNNKernelRidge` and `SDNNKernelClassifier`, with the parameters of both.
+
+    Parameters
+    ----------
+    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
+        As for `SDNNRegressor`.
+    ranges : {"auto", "all", "robust"}, default="auto"
+        Whether learned ranges leave out outliers, and clip targets; "auto" those farthest away,
+        with an `OutlierWarning`.
+    alpha : float or "auto", default="auto"
+        Strength of the penalty, above 0. "auto" takes the value with the smallest error when
+        each sample is left out, by a closed formula.
+    degree : {1, 2, 3} or "auto", default="auto"
+        The kernel k itself, (k + k^2) / 2 or k^3: functions of up to 2, 4 or 6 inputs. "auto" takes
+        the degree with the smallest leave-one-out error.
+    pairs : "all" or list of (modified, modifier), default="all"
+        Pairs of features, by number or name; a modifier of None leaves a pattern plain. All pairs
+        are as fast as one per feature.
+    max_components : int, default=2000
+        Most samples that span the solution. Up to this number it is exact, beyond that of low
+        rank (Nystroem's method).
+    random_state : int, RandomState or None, default=None
+        Draws the components from more samples.
+
+    Attributes
+    ----------
+    kernel_ : AnalyticKernel
+        The kernel k.
+    alpha_, degree_ : float, int
+        The penalty and the degree in use.
+    leave_one_out_error_ : float
+        Mean squared error when each sample is left out, in variances of the targets.
+    X_fit_ : ndarray, shape (n_components, n_features)
+    dual_coef_, intercept_ : ndarray, shapes (n_components, n_outputs) and (n_outputs,)
+        Outputs are ``kernel @ dual_coef_ + intercept_``, with the kernel of the degree.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        As in scikit-learn.
+
+    Notes
+    -----
+    For m components, or m samples if these are fewer, `fit` takes ``48 m^2`` bytes, ``98304 m``
+    more with low rank, `predict` ``65536 m``, and both ``8 n_bins^2`` per different coding. Time
+    grows with the cube of m, and beyond that with the number of samples.
+    """
 
     alpha: float | str = parameter("auto", Interval(Real, 0, np.inf, closed="neither"), AUTO)
     degree: int | str = parameter("auto", wholes(1, 3), AUTO)
-    pairs: Any = parameter("all", words("all"), "array-like")
+    pairs: PairChoice = parameter("all", words("all"), "array-like")
     max_components: int = parameter(2000, wholes(10, 2**15))
-    random_state: Any = parameter(None, "random_state")
+    random_state: RandomState = parameter(None, "random_state")
 
     def fit(self: Self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
         """Learn ranges, alpha and degree, and a weight of each component.
@@ -86,7 +122,6 @@ class BaseKernelRidge(CodedInputs):
         self._validate_params()
         work = self._scratch()
         work._fit(*without_absent(X, y, sample_weight))
-        work.__dict__.pop("_has_outliers", None)
         self.__dict__ = work.__dict__
         return self
 
@@ -95,16 +130,21 @@ class BaseKernelRidge(CodedInputs):
         """Check the samples and learn from them."""
 
     @staticmethod
-    def _counts_of(sample_weight: Any, n_samples: int) -> Floats:
+    def _counts_of(sample_weight: ArrayLike | None, n_samples: int) -> Floats:
         counts = sample_weights(sample_weight, n_samples)
         return np.ones(n_samples) if counts is None else counts
 
     def _solve(
-        self, X: Any, table: Array, targets: Floats, counts: Floats, factors: Floats | None = None
+        self,
+        X: object,
+        table: Array,
+        targets: Floats,
+        counts: Floats,
+        factors: Floats | None = None,
     ) -> tuple[Floats, Rows]:
         """Learn ranges, kernel, settings and solution; samples weigh counts times factors.
 
-        Returns the outputs of samples by models without them, and which samples these are.
+        Returns the outputs of samples by models without them, and the numbers of these samples.
         """
         if (largest := np.abs(targets).max()) > LARGEST_TARGET:
             raise ValueError(f"y must be within +-{LARGEST_TARGET:g}, got {largest:g}: scale it")
@@ -126,7 +166,7 @@ class BaseKernelRidge(CodedInputs):
         for degree in DEGREES if self.degree == "auto" else (int(self.degree),):
             problem = diagonal(of_degree(base.copy(), degree), samples[components])
             solutions[degree] = solve(problem, samples[components], alpha)
-            del problem  # before the next one takes as much memory
+            del problem  # before the next problem takes as much memory
         self.degree_ = min(solutions, key=lambda degree: solutions[degree].error)
         solution = solutions[self.degree_]
         if len(table) > len(components):
@@ -154,53 +194,12 @@ class BaseKernelRidge(CodedInputs):
 
 
 @explains_names()
+@documents(BaseKernelRidge)
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
     """Kernel ridge regression with the network's kernel, as for infinitely many units.
 
     Its settings need no search. It does not learn online.
-
-    Parameters
-    ----------
-    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
-        As for `SDNNRegressor`.
-    ranges : {"auto", "all", "robust"}, default="auto"
-        Whether learned ranges leave out outliers, and clip targets; "auto" those farthest away,
-        with an `OutlierWarning`.
-    alpha : float or "auto", default="auto"
-        Strength of the penalty, above 0. "auto" takes the one with the smallest error when each
-        sample is left out, by a closed formula.
-    degree : {1, 2, 3} or "auto", default="auto"
-        The kernel k itself, (k + k^2) / 2 or k^3: functions of up to 2, 4 or 6 inputs. "auto" takes
-        the one with the smallest error of the same kind.
-    pairs : "all" or list of (modified, modifier), default="all"
-        Pairs of features, by number or name; a modifier of None leaves a pattern plain. All pairs
-        are as fast as one per feature.
-    max_components : int, default=2000
-        Most samples that span the solution. Up to this number it is exact, beyond that of low
-        rank (Nystroem's method).
-    random_state : int, RandomState or None, default=None
-        Draws the components from more samples.
-
-    Attributes
-    ----------
-    kernel_ : AnalyticKernel
-        The kernel k.
-    alpha_, degree_ : float, int
-        The penalty and the degree in use.
-    leave_one_out_error_ : float
-        Mean squared error when each sample is left out, in variances of the targets.
-    X_fit_ : ndarray, shape (n_components, n_features)
-    dual_coef_, intercept_ : ndarray, shapes (n_components, n_outputs) and (n_outputs,)
-        Outputs are ``kernel @ dual_coef_ + intercept_``, with the kernel of the degree.
-    n_features_in_, feature_names_in_ : int, ndarray of str
-        As in scikit-learn.
-
-    Notes
-    -----
-    For m components, or m samples if these are fewer, `fit` takes ``48 m^2`` bytes, ``98304 m``
-    more with low rank, `predict` ``65536 m``, and both ``8 n_bins^2`` per different coding. Time
-    grows with the cube of m, and beyond that with the number of samples.
 
     Examples
     --------
@@ -226,6 +225,7 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
 
 
 @explains_names()
+@documents(BaseKernelRidge)
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
     """Classification by kernel ridge with the network's kernel, on one-hot targets.
@@ -234,51 +234,15 @@ class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
 
     Parameters
     ----------
-    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
-        As for `SDNNRegressor`.
-    ranges : {"auto", "all", "robust"}, default="auto"
-        Whether learned ranges leave out outliers, and clip targets; "auto" those farthest away,
-        with an `OutlierWarning`.
-    alpha : float or "auto", default="auto"
-        Strength of the penalty, above 0. "auto" takes the one with the smallest error when each
-        sample is left out, by a closed formula.
-    degree : {1, 2, 3} or "auto", default="auto"
-        The kernel k itself, (k + k^2) / 2 or k^3: functions of up to 2, 4 or 6 inputs. "auto" takes
-        the one with the smallest error of the same kind.
-    pairs : "all" or list of (modified, modifier), default="all"
-        Pairs of features, by number or name; a modifier of None leaves a pattern plain. All pairs
-        are as fast as one per feature.
-    max_components : int, default=2000
-        Most samples that span the solution. Up to this number it is exact, beyond that of low
-        rank (Nystroem's method).
-    random_state : int, RandomState or None, default=None
-        Draws the components from more samples.
     class_weight : "balanced" or dict, optional
         Weight of the samples of each class.
 
     Attributes
     ----------
-    kernel_ : AnalyticKernel
-        The kernel k.
-    alpha_, degree_ : float, int
-        The penalty and the degree in use.
-    leave_one_out_error_ : float
-        Mean squared error when each sample is left out, in variances of the targets.
-    X_fit_ : ndarray, shape (n_components, n_features)
-    dual_coef_, intercept_ : ndarray, shapes (n_components, n_outputs) and (n_outputs,)
-        Outputs are ``kernel @ dual_coef_ + intercept_``, with the kernel of the degree.
-    n_features_in_, feature_names_in_ : int, ndarray of str
-        As in scikit-learn.
     classes_ : ndarray, shape (n_classes,)
         The labels, sorted.
     steepness_ : float
-        Of the softmax of scores; it has the smallest log loss when each sample is left out.
-
-    Notes
-    -----
-    For m components, or m samples if these are fewer, `fit` takes ``48 m^2`` bytes, ``98304 m``
-    more with low rank, `predict` ``65536 m``, and both ``8 n_bins^2`` per different coding. Time
-    grows with the cube of m, and beyond that with the number of samples.
+        Steepness of the softmax of scores, with the smallest log loss when each sample is left out.
 
     Examples
     --------
@@ -289,7 +253,7 @@ class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
     True
     """
 
-    class_weight: Any = parameter(None, words("balanced"), dict, None)
+    class_weight: ClassWeight = parameter(None, words("balanced"), dict, None)
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         table, labels = self._validated(X, y, reset=True)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from sdnn.estimators.inputs import Floats
+from sdnn.estimators.columns import Floats
 
 ALPHAS = np.logspace(-6, 0, 19)  # to try, as shares of the sum of eigenvalues
 NEGLIGIBLE = 1e-12  # eigenvalues, as shares of the largest
@@ -28,7 +28,7 @@ Rows = NDArray[np.int64]
 class Samples:
     """Targets, weights, and the share of a sample that is left out at a time.
 
-    A sample that counts for two is as two samples, so that leaving one out leaves half of it.
+    A sample of count 2 stands for two samples, so that leaving one out leaves half of its weight.
     """
 
     targets: Floats  # shape (n_samples, n_outputs)
@@ -54,7 +54,7 @@ class Diagonal:
     to_dual: Floats  # shape (n_components, n_features)
     kernel_mean: Floats  # weighted mean over the samples, shape (n_components,)
     features: Floats  # of samples to leave out, times the roots of their weights
-    rows: Rows  # which samples these are
+    rows: Rows  # the numbers of these samples
 
 
 @dataclasses.dataclass
@@ -66,7 +66,7 @@ class Solution:
     dual: Floats  # shape (n_components, n_outputs)
     intercept: Floats  # shape (n_outputs,)
     left_out: Floats  # outputs of samples by models without them
-    rows: Rows  # which samples these are
+    rows: Rows  # the numbers of these samples
 
 
 def portions(n_samples: int) -> Iterator[Rows]:
@@ -76,14 +76,14 @@ def portions(n_samples: int) -> Iterator[Rows]:
 
 
 def eigenvectors(matrix: Floats) -> tuple[Floats, Floats]:
-    """Return the eigenvalues that are not negligible and their vectors; the matrix is lost."""
+    """Return the eigenvalues that are not negligible and their vectors; overwrite the matrix."""
     values, vectors = eigh(matrix, overwrite_a=True, check_finite=False, driver="evd")
     kept = values > NEGLIGIBLE * values[-1]
     return values[kept], vectors[:, kept]
 
 
 def diagonal(kernel: Floats, samples: Samples) -> Diagonal:
-    """Diagonalize the problem of samples that are all components; their kernel is lost."""
+    """Diagonalize the problem of samples that are all components; overwrite their kernel."""
     weights, roots = samples.weights, np.sqrt(samples.weights)[:, None]
     mean = weights @ kernel / weights.sum()
     kernel -= mean
@@ -130,7 +130,7 @@ def low_rank_diagonal(
 
 
 def solve(problem: Diagonal, samples: Samples, alpha: float | None) -> Solution:
-    """Solve for the alpha with the smallest error of leaving each sample out, or the given one."""
+    """Solve for a given alpha, or for the alpha with the smallest leave-one-out error."""
     left = samples[problem.rows]
     total, roots = samples.weights.sum(), np.sqrt(left.weights)[:, None]
     targets = roots * (left.targets - samples.mean)

@@ -6,7 +6,6 @@ import contextlib
 import functools
 import threading
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +13,14 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.coding import Coding, WithMissing
 from sdnn.coding.symbols import missing_as_nan
-from sdnn.estimators.inputs import PAIR_BUDGET, Array, Floats, Ints, Pairs
+from sdnn.estimators.columns import PAIR_BUDGET, Array, Floats, Ints, Pairs
 
+Rule = tuple[Array, float] | tuple[Ints, int, str]
+"""Arguments of learning: (counts, share) of the p-delta rule, or (labels, n_classes, scheme)."""
 COLUMN_BUDGET = 16000  # columns divided among the pairs by default
 FEW_SAMPLES = 32  # up to which weights in bytes learn faster
 FEW_TO_PREDICT = 12  # up to which they predict faster
-WORTH_BYTES = 2  # samples predicted, few at a time, after which weights are copied into bytes
+WORTH_BYTES = 2  # samples predicted, a few at a time, after which weights are copied into bytes
 
 
 def units_for_pairs(n_pairs: int) -> int:
@@ -63,13 +64,14 @@ class InputCode:
         self.modifiers = modifiers
         # Inputs that no pair mentions are validated and then ignored.
         self.used = sorted({index for pair in self.pairs for index in pair})
-        place = {index: number for number, index in enumerate(self.used)}
-        self.core_pairs = np.array([(place[mu], place[nu]) for mu, nu in self.pairs], np.int32)
+        number_of = {index: number for number, index in enumerate(self.used)}
+        pairs_of_used = [(number_of[mu], number_of[nu]) for mu, nu in self.pairs]
+        self.core_pairs = np.array(pairs_of_used, np.int32)
         self.may_lack = np.array([isinstance(coding, WithMissing) for coding in self.codings])
         self.is_numeric = all(present(coding).is_numeric for coding in self.codings)
         self.core = _core.SelectiveDesensitization(modified, modifiers, self.core_pairs)
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return InputCode, (self.codings, self.pairs, self.modified, self.modifiers)
 
     @property
@@ -88,21 +90,22 @@ class InputCode:
         return bins
 
     @functools.cached_property
-    def _even(self) -> tuple[Any, ...] | None:
-        """Return inputs in pairs, ranges, half widths and numbers of bins, if all bins are even."""
+    def _even(self) -> tuple[slice | Ints, Floats, Floats, Floats, Ints] | None:
+        """The inputs in pairs, ranges, half widths and numbers of bins, if all bins are even."""
         codings = [present(self.codings[index]) for index in self.used]
         ranges = [coding.even_range() for coding in codings]
-        if any(ends is None for ends in ranges):
+        if None in ranges:
             return None
         every = self.used == list(range(len(self.codings)))
         low, high = np.array(ranges, dtype=np.float64).T
-        half_width = high / 2 - low / 2  # 0 for a column that had one value only
+        half_width = high / 2 - low / 2  # 0 for a column with a single value
         half_width[half_width == 0] = 1
         sizes = np.array([coding.size for coding in codings], dtype=np.int32)
-        return slice(None) if every else np.array(self.used), low, high, half_width, sizes
+        used = slice(None) if every else np.array(self.used, dtype=np.int32)
+        return used, low, high, half_width, sizes
 
     def bins_of_row(self, row: Array) -> Ints:
-        """Return the bins of one sample; equal-width bins are found together, which is faster."""
+        """Return the bins of one sample; bins of equal width are computed at once, to be fast."""
         if self._even is None or row.dtype != np.float64:
             return self.bins(row[None])
         used, low, high, half_width, sizes = self._even
@@ -116,16 +119,19 @@ class InputCode:
         return bins[None]
 
     @functools.cached_property
-    def _ends(self) -> tuple[list[int], Floats, Floats]:
-        """Return the inputs that have a range, and their ranges."""
-        ends = {index: self.codings[index].ends() for index in self.used}
-        ranges = {index: pair for index, pair in ends.items() if pair is not None}
+    def _ranges(self) -> tuple[list[int], Floats, Floats]:
+        """The inputs that have a range, and their lowest and highest values."""
+        ranges = {
+            index: limits
+            for index in self.used
+            if (limits := self.codings[index].ends()) is not None
+        }
         low, high = np.array(list(ranges.values()), dtype=np.float64).reshape(-1, 2).T
         return list(ranges), low, high
 
     def outside(self, table: Array) -> tuple[int, str]:
-        """Return how many values are outside their input's range, and describe the first."""
-        indices, low, high = self._ends
+        """Count the values that are outside their input's range, and describe the first of them."""
+        indices, low, high = self._ranges
         values = table if len(indices) == table.shape[1] else table[:, indices]
         if values.dtype != np.float64:
             values = missing_as_nan(values)
@@ -133,10 +139,10 @@ class InputCode:
         n_beyond = int(np.count_nonzero(beyond))
         if n_beyond == 0:
             return 0, ""
-        row, place = np.argwhere(beyond)[0]
+        row, column = np.argwhere(beyond)[0]
         return n_beyond, (
-            f"{values[row, place]} in column {indices[place]}, whose range is "
-            f"[{low[place]}, {high[place]}]"
+            f"{values[row, column]} in column {indices[column]}, whose range is "
+            f"[{low[column]}, {high[column]}]"
         )
 
 
@@ -202,14 +208,14 @@ class Network:
                 "their weights"
             ) from None
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return Network, (self.input_code, self.n_units, 0, self.weights, self.thresholds)
 
     @property
     def layer(self) -> _core.ParallelPerceptron:
         """The core's layer, synchronized; train a `copy` of the network instead."""
         if self._synchronized is not self._learned:
-            # One thread while others wait: the core refuses to synchronize what others read.
+            # Only one thread may synchronize: the core refuses while others read the layer.
             with self._lock:
                 learned = self._learned
                 if self._online is not None and self._synchronized is not learned:
@@ -233,7 +239,7 @@ class Network:
         return self._online
 
     def expect_few(self, n_samples: int, memory_limit: int) -> None:
-        """Copy the weights into bytes once predicting few samples at a time is worth it."""
+        """Copy the weights into bytes once a few samples at a time are predicted repeatedly."""
         if self._online is None and n_samples <= FEW_TO_PREDICT:
             if self._n_predicted >= WORTH_BYTES:
                 self.online(memory_limit)
@@ -246,19 +252,21 @@ class Network:
             FEW_SAMPLES if is_behind else FEW_TO_PREDICT
         )
 
-    def learn_online(self, bins: Ints, rule: tuple[Any, ...], memory_limit: int) -> bool:
+    def learn_online(self, bins: Ints, rule: Rule, memory_limit: int) -> bool:
         """Learn samples in place, in order; return False without a layer for single samples.
 
-        ``rule`` is (counts, share) for the p-delta rule, or (labels, n_classes, scheme). Nothing
-        that may fail may follow.
+        ``rule`` is (counts, share) for the p-delta rule, or (labels, n_classes, scheme). The
+        caller must do nothing afterwards that may fail.
         """
         online = self.online(memory_limit)
         if online is None:
             return False
-        learn = online.learn_counts if len(rule) == 2 else online.learn_labels
         ended = object()
-        self._learned = object()  # an interrupt may come between learning and the other mark
-        learn(bins, *rule)
+        self._learned = object()  # in case an interrupt follows before the other mark
+        if len(rule) == 2:
+            online.learn_counts(bins, *rule)
+        else:
+            online.learn_labels(bins, *rule)
         self._learned = ended
         return True
 

@@ -1,32 +1,31 @@
-"""Values far from all others, which widen a range until the others are hardly told apart."""
+"""Outliers: values so far from all others that a range with them hides differences of these."""
 
 from __future__ import annotations
 
 import sys
 import warnings
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdnn.coding import Coding, WithMissing
 from sdnn.coding.symbols import missing_as_nan
+from sdnn.estimators.columns import Array, Floats
 
-Floats = NDArray[np.float64]
 TAIL = 0.025  # share of values at either end that may be outliers
 FAR = 2.0  # gap beyond which values are outliers, in widths of the middle values
-FEWEST = 10  # values, of which none is an outlier
+FEWEST = 10  # values; smaller samples have no outliers
 
 
 class OutlierWarning(UserWarning):
-    """A range is learned from values of which some are far from all others."""
+    """A warning that a range is learned from values of which some are far from all others."""
 
 
 def usual_range(values: Floats) -> tuple[float, float]:
     """Return the smallest and largest value that are no outliers.
 
     Outliers are at most a fortieth of the values at either end, beyond a gap of twice the width of
-    the middle 95 %; of a value that most have and the middle of the others, if there is one.
+    the middle 95 %. If more than half of the values are equal, this width includes their value and
+    the middle 95 % of the others.
 
     >>> usual_range(np.append(np.arange(100.0), 1e6))
     (0.0, 99.0)
@@ -50,13 +49,13 @@ def usual_range(values: Floats) -> tuple[float, float]:
 
 
 def middle_of(ordered: Floats) -> tuple[float, float]:
-    """Return the ends of sorted values without their tails."""
+    """Return the smallest and largest of sorted values without their tails."""
     n_tail = min(int(np.ceil(TAIL * len(ordered))), (len(ordered) - 1) // 2)
     return float(ordered[n_tail]), float(ordered[-1 - n_tail])
 
 
-def numbers_to_range(coding: Coding, column: NDArray[Any]) -> Floats | None:
-    """Return the numbers whose range a coding learns, NaN where missing; None if it learns none."""
+def numbers_to_range(coding: Coding, column: Array) -> Floats | None:
+    """Return the numbers whose range a coding learns, NaN where missing; None without a range."""
     base = coding.base if isinstance(coding, WithMissing) else coding
     if not (base.is_numeric and base.learns) or getattr(base, "spacing", "even") == "quantile":
         return None

@@ -10,14 +10,14 @@ from sklearn.base import clone, is_classifier
 from sklearn.utils import _safe_indexing
 
 from sdnn.coding import Coding, CorrelationMatrix, Symbolic, WithMissing
-from sdnn.estimators.inputs import Array, Pairs, input_pairs
+from sdnn.estimators.columns import Array, Floats, Pairs, input_pairs
 
 HELD_OUT_EVERY = 5  # samples
 FEWEST_SAMPLES = 10
 
 
 def with_categories(coding: Coding, column: Array) -> Coding:
-    """Return a coding with all categories of the column, where it could refuse unknown ones."""
+    """Return a coding with all categories of the column, if it could refuse unknown categories."""
     base = coding.base if isinstance(coding, WithMissing) else coding
     is_strict = not isinstance(coding, WithMissing) or coding.unknown == "error"
     if isinstance(base, CorrelationMatrix) or (isinstance(base, Symbolic) and is_strict):
@@ -26,24 +26,24 @@ def with_categories(coding: Coding, column: Array) -> Coding:
 
 
 def pairs_among(features: NDArray[np.int64], seed: int) -> Pairs:
-    """Return the pairs of some features, as many as ``pairs="budget"`` has.
+    """Return the pairs of some features that ``pairs="budget"`` has.
 
     >>> pairs_among(np.array([3, 7]), 0)
     [(3, 7), (7, 3)]
     """
     listed = features.tolist()
-    among = input_pairs("budget", None, len(listed), seed)
-    return [(listed[mu], listed[nu]) for mu, nu in among]
+    pairs = input_pairs("budget", None, len(listed), seed)
+    return [(listed[mu], listed[nu]) for mu, nu in pairs]
 
 
 def select_pairs(
-    model: Any, X: ArrayLike, y: ArrayLike, weights: Any, n_features: int, seed: int
+    model: Any, X: ArrayLike, y: Array, weights: Floats | None, n_features: int, seed: int
 ) -> Pairs:
     """Return the pairs of the features with which a held-out fifth is predicted best.
 
-    The features are halved by how much training changes the weights of their pairs, down to two,
-    and those of the best score taken; fewer win where scores are equal. Classes have their share
-    in the held-out part.
+    The features are halved repeatedly, down to two: those whose pairs' weights training changes
+    most are kept. The pairs with the best score are returned, the fewest where scores are equal.
+    The held-out part is stratified by class.
     """
     labels = np.asarray(y)
     features = np.arange(n_features)
@@ -57,10 +57,11 @@ def select_pairs(
     if len(labels) < FEWEST_SAMPLES or too_few:
         return best[1]
 
-    def part(rows: NDArray[np.bool_]) -> tuple[Any, Any, Any]:
-        weighted = weights is not None and weights[rows].any()  # a part may have none above 0
-        each = weights[rows] if weighted else None
-        return _safe_indexing(X, np.flatnonzero(rows)), labels[rows], each
+    def part(rows: NDArray[np.bool_]) -> tuple[ArrayLike, Array, Floats | None]:
+        weights_of_rows = None if weights is None else weights[rows]
+        if weights_of_rows is not None and not weights_of_rows.any():
+            weights_of_rows = None  # fit refuses weights that are all 0
+        return _safe_indexing(X, np.flatnonzero(rows)), labels[rows], weights_of_rows
 
     held = part(is_held)
     while True:

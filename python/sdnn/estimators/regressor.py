@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sdnn.estimators.base import BaseSDNN, OutOfRangeWarning
+from sdnn.estimators.columns import Array, Floats, Ints, Sample
 from sdnn.estimators.fitted import mean_of
-from sdnn.estimators.inputs import Array, CodedRegressor, Floats, Ints
+from sdnn.estimators.inputs import CodedRegressor
+from sdnn.estimators.network import Rule
 from sdnn.estimators.outliers import warn_caller
-from sdnn.estimators.parameters import parameter, wholes, words
+from sdnn.estimators.parameters import documents, parameter, wholes, words
 from sdnn.estimators.training import weighted_mean
 from sdnn.support.arguments import explains_names, require, shown
 
@@ -23,6 +25,7 @@ Self = TypeVar("Self", bound="SDNNRegressor")
 
 
 @explains_names()
+@documents(BaseSDNN)
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
 class SDNNRegressor(CodedRegressor, BaseSDNN):
     """Regression by a selective desensitization neural network, exact and online.
@@ -34,55 +37,6 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
 
     Parameters
     ----------
-    coding : str, Coding, or list of (str or Coding, columns), default="random-inverse"
-        How inputs become patterns: "random-inverse", "anchor", "circular", "symbolic", or an
-        object of `sdnn.coding`; for all inputs, or for columns given as to scikit-learn's
-        ColumnTransformer (other inputs have "random-inverse"). Columns of a data frame of type
-        "category" are symbols, which may be missing, unless a list or an object codes them.
-    ranges : {"auto", "all", "robust"}, default="auto"
-        Whether learned ranges leave out outliers; "auto" those farthest away, with an
-        `OutlierWarning`.
-    n_pattern_units : int, optional
-        Units per pattern, even. None divides about 16,000 columns among the pairs.
-    pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
-        Pairs of features, by number or name; a modifier of None leaves a pattern plain. "budget"
-        takes all pairs up to 22 features, beyond that an even random share: 500 pairs, or one per
-        feature. "auto" drops features that do not matter, half of them at a time, by the score of a
-        held-out fifth, which takes up to five times as long.
-    tables : {"shared", "separate"}, default="shared"
-        One table of patterns per input, permuted for each pair, or two tables per pair.
-    max_iter : int, optional
-        Largest number of epochs of `fit`, which stops early once nothing is corrected. None: 30,
-        or as many as present 80,000 samples, at least 5. Use more for exact targets, say 300.
-    n_averaged_epochs : int, default=4
-        Predict the mean over the networks after the last epoch of `fit` and after so many, less
-        one, of every third epoch before (from 5,001 samples on, of every one). `partial_fit`
-        resumes from the last alone.
-    correction_share : float
-        Share of the missing or superfluous units that a sample corrects, at least one; in (0, 1].
-        Default: 1 in regression; 1/4 in classification, where samples of classes overlap.
-    shuffle : bool, default=True
-        Whether each epoch has a new random order; from 5,001 samples without weights on, of blocks
-        of 512 samples, which are drawn once: half of the time.
-    early_stopping : bool, default=False
-        Whether to hold out samples, stop when their score no longer improves, and keep the best
-        weights.
-    validation_fraction : float, default=0.1
-        Fraction of the sample held out by early stopping.
-    n_iter_no_change : int, default=10
-        Epochs without improvement before early stopping.
-    training : {"auto", "dual", "block", "plain"}, default="auto"
-        Form of training; affects time and memory, never the result.
-    memory_limit : int, default=2**30
-        Bytes for weights and patterns of all networks kept, and again for training.
-    warm_start : bool, default=False
-        Whether `fit` resumes with the existing network, ranges and categories.
-    random_state : int, RandomState or None, default=None
-        Determines patterns, initial weights, orders and the validation share.
-    n_jobs : int, optional
-        Threads; the result does not depend on it.
-    verbose : int, default=0
-        Whether to show a progress bar, with the time left.
     n_output_units : int, default=280
         Units per output, which divide the output range into as many steps.
     output_range : (float, float) or array_like of shape (n_outputs, 2), optional
@@ -97,24 +51,6 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
 
     Attributes
     ----------
-    codings_ : tuple of Coding
-        The fitted coding of each input.
-    pairs_ : tuple of (int, int)
-        The pairs (modified, modifier) in use; equal numbers for a plain pattern.
-    pair_names_ : list of (name, name or None)
-        The same by feature names (numbers without names), as ``pairs`` takes them.
-    weights_ : ndarray of int32, shape (n_units, n_pairs * n_pattern_units)
-    thresholds_ : ndarray of int32, shape (n_units,)
-    n_inputs_out_of_range_ : int
-        Values learned since the last `fit` that were outside their range.
-    n_iter_ : int
-        Epochs of the last `fit` and calls of `partial_fit` since.
-    n_corrected_ : ndarray of int64, shape (n_epochs,)
-        Samples corrected in each epoch of the last `fit`.
-    training_form_, training_memory_ : str, int
-        Form of training that the last `fit` chose, and its bytes beside the weights.
-    n_features_in_, feature_names_in_ : int, ndarray of str
-        As in scikit-learn.
     output_range_ : ndarray, shape (n_outputs, 2)
     n_outputs_, n_outputs_out_of_range_ : int
         Number of outputs, and of targets outside the range since the last `fit`.
@@ -135,7 +71,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     """
 
     n_output_units: int = parameter(280, wholes(1, 2**20))
-    output_range: Any = parameter(None, "array-like", None)
+    output_range: ArrayLike | None = parameter(None, "array-like", None)
     out_of_range: str = parameter("clip", words("clip", "widen", "error"))
     refit: bool = parameter(False, "boolean")
 
@@ -144,16 +80,16 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     ) -> Self:
         """Present the samples once, in order; any portions give the same weights.
 
-        With ``sample_weight`` each is presented so often in the mean: of weight 2 twice, of weight
-        1/2 every other one.
+        ``sample_weight`` is the mean number of presentations: samples of weight 2 are presented
+        twice, and every other sample of weight 1/2.
 
-        They equal those of `fit` with ``max_iter=1, shuffle=False`` if ranges and categories are
-        given; otherwise the first call learns them. With ``out_of_range="widen"`` targets widen the
-        range one after the other, not all at once as in `fit`. Raises as `fit`.
+        The weights equal those of `fit` with ``max_iter=1, shuffle=False`` if ranges and categories
+        are given; otherwise the first call learns them. With ``out_of_range="widen"`` targets widen
+        the range one after the other, not all at once as in `fit`. Raises as `fit`.
         """
         return self._partial_fit(X, y, None, sample_weight)
 
-    def learn_one(self: Self, x: Any, y: Any) -> Self:
+    def learn_one(self: Self, x: Sample, y: ArrayLike) -> Self:
         """Learn one sample: `partial_fit` of one row, to the same bits, without its overhead.
 
         ``x`` is a row or a mapping from feature names to values, which may lack features coded with
@@ -175,13 +111,13 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         require(is_finite, "y", "be a finite number or one per output", y)
         return self._learn_one(x, targets[None], None)
 
-    def predict_one(self, x: Any) -> Any:
+    def predict_one(self, x: Sample) -> float | Floats:
         """Predict a sample given as to `learn_one`: a float, or shape (n_outputs,)."""
         counts = self._counts(self._bins_of_one(x), self.n_outputs_, n_threads=1)
         values = self._of_counts(mean_of(counts))[0]
         return float(values[0]) if self._flat else values
 
-    def predict(self, X: ArrayLike, return_std: bool = False) -> Any:
+    def predict(self, X: ArrayLike, return_std: bool = False) -> Floats | tuple[Floats, Floats]:
         """Predict the outputs of samples, shape (n_samples,) or (n_samples, n_outputs).
 
         ``return_std`` adds the standard deviation over the averaged epochs, which shows how settled
@@ -196,15 +132,16 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         return (values[:, 0], spread[:, 0]) if self._flat else (values, spread)
 
     def _check_samples(
-        self, X: Any, y: Any, reset: bool, in_fit: bool = False
+        self, X: object, y: object, reset: bool, in_fit: bool = False
     ) -> tuple[Array, Floats]:
         if in_fit and self.warm_start and self.refit:
             raise ValueError("refit=True trains a new network: it cannot be with warm_start=True")
         return self._validated_numbers(X, y, reset)
 
-    def _set_outputs(self, y: Floats) -> int:
-        self._flat = y.ndim == 1
-        targets = y.reshape(len(y), -1)
+    def _set_outputs(self, y: ArrayLike) -> int:
+        targets = np.asarray(y)
+        self._flat = targets.ndim == 1
+        targets = targets.reshape(len(targets), -1)
         self.n_outputs_ = targets.shape[1]
         self.output_range_ = self._range_of(targets)
         self.n_outputs_out_of_range_ = 0
@@ -221,7 +158,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     def _conditional(self, bins: Ints, targets: Floats, weights: Floats | None) -> Floats:
         """Return the mean target of the samples with each code, which all of them learn.
 
-        Otherwise the network would follow the noise of the last one presented.
+        Otherwise the network would follow the noise of the last presented sample.
         """
         codes, of_samples = np.unique(bins, axis=0, return_inverse=True)
         if len(codes) == len(bins):
@@ -229,10 +166,10 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         of_samples = of_samples.reshape(-1)
         counts = np.bincount(of_samples, weights)
         weighted = targets if weights is None else targets * weights[:, None]
-        means = [np.bincount(of_samples, part) / counts for part in weighted.T]
+        means = [np.bincount(of_samples, column) / counts for column in weighted.T]
         return np.ascontiguousarray(np.stack(means, axis=1)[of_samples])
 
-    def _rule_arguments(self, targets: Floats) -> tuple[Any, ...]:
+    def _rule_arguments(self, targets: Floats) -> Rule:
         return targets, self.correction_share
 
     def _validation_score(self, bins: Ints, targets: Floats, weights: Floats | None) -> float:
@@ -242,20 +179,20 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     def _range_of(self, targets: Floats) -> Floats:
         if self.output_range is not None:
             try:
-                given = np.asarray(self.output_range)
+                ranges = np.asarray(self.output_range)
             except ValueError:  # rows of different lengths
-                given = np.empty(0)
-            is_real = given.dtype.kind in "iuf"  # numbers beyond all floats are objects
-            given = given.astype(np.float64) if is_real else np.empty(0)
-            given = np.tile(given, (self.n_outputs_, 1)) if given.ndim == 1 else given
+                ranges = np.empty(0)
+            is_real = ranges.dtype.kind in "iuf"  # numbers beyond all floats are objects
+            ranges = ranges.astype(np.float64) if is_real else np.empty(0)
+            ranges = np.tile(ranges, (self.n_outputs_, 1)) if ranges.ndim == 1 else ranges
             is_range = (
-                given.shape == (self.n_outputs_, 2)
-                and np.all(given[:, 0] < given[:, 1])
-                and np.all(np.abs(given) <= FURTHEST)
+                ranges.shape == (self.n_outputs_, 2)
+                and np.all(ranges[:, 0] < ranges[:, 1])
+                and np.all(np.abs(ranges) <= FURTHEST)
             )
             expected = f"be (low, high) or one row (low, high) per output, within {FURTHEST}"
             require(is_range, "output_range", f"{expected}, low < high", self.output_range)
-            return given
+            return ranges
         self._need_two(targets, "the output_range that is not given")
         low, high = self._ranges_of(targets)
         if np.any(np.maximum(-low, high) > FURTHEST):
@@ -289,12 +226,14 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         if not outside.any():  # a count that was rounded
             return counts
         row, output = np.argwhere(outside)[0].tolist()
-        ends = f"{targets[row, output]}, beyond output_range_ [{low[output]}, {high[output]}]"
+        problem = (
+            f"y has {targets[row, output]}, beyond output_range_ [{low[output]}, {high[output]}]"
+        )
         if self.out_of_range == "error":
-            raise ValueError(f"y has {ends}, but out_of_range is 'error'")
+            raise ValueError(f"{problem}, but out_of_range is 'error'")
         if self.n_outputs_out_of_range_ == 0 and not self._has_outliers:
-            then = "are clipped" if self.out_of_range == "clip" else "widen it"
-            warn_caller(f"y has {ends}: values beyond the range {then}", OutOfRangeWarning)
+            effect = "are clipped" if self.out_of_range == "clip" else "widen it"
+            warn_caller(f"{problem}: values outside the range {effect}", OutOfRangeWarning)
         if self.out_of_range == "clip" or at_once:
             self.n_outputs_out_of_range_ += int(np.count_nonzero(outside))
         if self.out_of_range == "clip":
@@ -308,9 +247,8 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             counts[begin:row] = self._in_counts(targets[begin:row])
             begin = row
             low, high = self.output_range_.T
-            nearest = targets[row].clip(
-                2 * low - high, 2 * high - low
-            )  # an outlier is not followed
+            # The range does not follow an outlier all the way.
+            nearest = targets[row].clip(2 * low - high, 2 * high - low)
             self.n_outputs_out_of_range_ += self._widen(nearest)
         counts[begin:] = self._in_counts(targets[begin:])
         return counts

@@ -17,8 +17,8 @@ from sklearn.base import clone
 from sdnn.coding import Coding, Symbolic, WithMissing
 from sdnn.coding.symbols import is_missing
 from sdnn.estimators.classifier import SDNNClassifier
+from sdnn.estimators.columns import Codings, Entry, Floats, coding_entries, codings_of_columns
 from sdnn.estimators.growth import grow
-from sdnn.estimators.inputs import Floats, coding_entries, codings_of_columns
 from sdnn.estimators.network import COLUMN_BUDGET, present
 from sdnn.estimators.outliers import numbers_to_range
 from sdnn.estimators.regressor import SDNNRegressor
@@ -26,12 +26,12 @@ from sdnn.support.arguments import flag, require, shown, whole
 
 WINDOW = 500  # samples whose range is followed
 REMEMBERED = 1000  # last samples, from which new features and categories are learned
-FEWEST = 5  # of these that must have a new feature or category
+FEWEST = 5  # of these samples must have a new feature or category
 MOST_FEATURES = 1000  # later ones are ignored
-MOST_CATEGORIES = 1000  # of a feature; later ones are as missing values
+MOST_CATEGORIES = 1000  # of a feature; later ones count as missing values
 
 
-def cleaned(x: Mapping[Any, Any]) -> dict[str, Any]:
+def cleaned(x: Mapping[Hashable, Any]) -> dict[str, Any]:
     """Return a sample with strings as names and None for missing values."""
     sample = {str(name): value for name, value in x.items()}
     if len(sample) < len(x):
@@ -52,8 +52,8 @@ def cleaned(x: Mapping[Any, Any]) -> dict[str, Any]:
     return sample
 
 
-def number(value: Any) -> Any:
-    """Return a number, also of a word that is one; None for other words."""
+def number_of(value: object) -> object:
+    """Return a number unchanged, or the number that a word spells; None for other words."""
     if not isinstance(value, str):
         return value
     try:
@@ -63,16 +63,16 @@ def number(value: Any) -> Any:
     return read if math.isfinite(read) else None
 
 
-def unchanged(value: Any) -> Any:
-    """Return a category as it is."""
+def unchanged(value: object) -> object:
+    """Return a category unchanged."""
     return value
 
 
-def known_columns(coding: Any, names: Collection[str]) -> Any:
-    """Return a coding, or a list of (coding, columns) without names that no sample has had."""
+def known_columns(coding: Codings, names: Collection[str]) -> Codings:
+    """Return a coding, or a list of (coding, columns) without names that no sample has."""
     if not isinstance(coding, list | tuple):
         return coding
-    known: list[Any] = []
+    known: list[Entry] = []
     for entry, columns in coding_entries(coding):
         listed: Any = [columns] if isinstance(columns, str) else columns
         if isinstance(listed, list | tuple):
@@ -86,43 +86,43 @@ class FollowedRanges:
 
     Parameters
     ----------
-    ends : dict of str to (float, float)
+    ranges : dict of str to (float, float)
         The learned range of each feature to follow.
     first : DataFrame
-        The samples from which they were learned.
+        The samples from which the ranges were learned.
     """
 
-    def __init__(self, ends: Mapping[str, tuple[float, float]], first: pd.DataFrame) -> None:
-        self.names = list(ends)
-        self.low, self.high = np.array(list(ends.values()), dtype=np.float64).reshape(-1, 2).T
+    def __init__(self, ranges: Mapping[str, tuple[float, float]], first: pd.DataFrame) -> None:
+        self.names = list(ranges)
+        self.low, self.high = np.array(list(ranges.values()), dtype=np.float64).reshape(-1, 2).T
         values = first[self.names].to_numpy(dtype=np.float64, na_value=np.nan)
         self.recent = np.full((WINDOW, len(self.names)), np.nan)
         last = np.clip(values[-WINDOW:], self.low, self.high)
         self.recent[: len(last)] = last
-        self.n_seen = len(last)
+        self.n_noted = len(last)
         self.now = self.low, self.high
 
-    def extend(self, ends: Mapping[str, tuple[float, float]], last: pd.DataFrame) -> None:
-        """Follow more features, of which the last samples are given."""
-        more = FollowedRanges(ends, last)
+    def extend(self, ranges: Mapping[str, tuple[float, float]], last: pd.DataFrame) -> None:
+        """Follow more features, whose ranges were learned from the last samples."""
+        more = FollowedRanges(ranges, last)
         self.names += more.names
         self.low, self.high = np.append(self.low, more.low), np.append(self.high, more.high)
         self.recent = np.hstack([self.recent, more.recent])
         self.now = np.append(self.now[0], more.low), np.append(self.now[1], more.high)
 
     def note(self, values: Floats) -> None:
-        """Take a sample's numbers, NaN where there are none, into the window."""
-        self.recent[self.n_seen % WINDOW] = values
-        self.n_seen += 1
+        """Add a sample's numbers, NaN where it has none, to the window."""
+        self.recent[self.n_noted % WINDOW] = values
+        self.n_noted += 1
         low, high = self.now
-        if self.n_seen % WINDOW == 0 or np.any((values < low) | (values > high)):
+        if self.n_noted % WINDOW == 0 or np.any((values < low) | (values > high)):
             low = np.fmin.reduce(self.recent)
             high = np.fmax.reduce(self.recent)
             is_range = high > low  # also where none is NaN
             self.now = np.where(is_range, low, self.now[0]), np.where(is_range, high, self.now[1])
 
-    def moved(self, x: dict[str, Any], learns: bool) -> dict[str, Any]:
-        """Return a sample with its numbers moved; what is no finite number stays."""
+    def moved(self, x: dict[str, object], learns: bool) -> dict[str, object]:
+        """Return a sample with its finite numbers moved and its other values unchanged."""
         try:
             values = np.array([x.get(name) for name in self.names], dtype=np.float64)
         except (TypeError, ValueError):
@@ -144,15 +144,19 @@ class Waiting:
     Later features and categories are learned from the last samples, once several have them.
     """
 
-    usual: Any  # the model where none is given
-    least_targets = 1  # different ones among the first samples
+    default_model: SDNNRegressor | SDNNClassifier
+    least_targets = 1  # the number of different targets among the first samples
 
     def __init__(
-        self, model: Any = None, grace_period: int = 100, follows_ranges: bool = True
+        self,
+        model: SDNNRegressor | SDNNClassifier | None = None,
+        grace_period: int = 100,
+        follows_ranges: bool = True,
     ) -> None:
-        kind = type(self.usual)
-        chosen = clone(self.usual) if model is None else model
-        require(isinstance(chosen, kind), "model", f"be an {kind.__name__}", chosen, TypeError)
+        model_class = type(self.default_model)
+        chosen = clone(self.default_model) if model is None else model
+        is_model = isinstance(chosen, model_class)
+        require(is_model, "model", f"be an {model_class.__name__}", chosen, TypeError)
         self.model = chosen
         self.grace_period = whole("grace_period", grace_period, 2, 2**53)
         self.follows_ranges = flag("follows_ranges", follows_ranges)
@@ -162,13 +166,13 @@ class Waiting:
         self.samples: collections.deque[dict[str, Any]] = collections.deque(maxlen=most)
         self.targets: collections.deque[Any] = collections.deque(maxlen=most)
         self.n_learned = 0
-        self.n_before_news: int | None = None  # samples before something new came
-        self.reads: dict[str, Callable[[Any], Any]] = {}  # how values of a feature are read
-        self.categories: dict[str, set[Any]] = {}  # of features whose categories are learned
+        self.n_before_news: int | None = None  # samples before the first new feature or category
+        self.reads: dict[str, Callable[[Any], object]] = {}  # by feature; read its values
+        self.categories: dict[str, set[object]] = {}  # of features whose categories are learned
         self.most_columns = 0  # of a code that grows
 
     def learn_one(self, x: dict[Hashable, Any], y: Any) -> None:
-        """Learn one sample; what is refused changes nothing."""
+        """Learn one sample; an error changes nothing."""
         sample = cleaned(x)
         self._check_target(y)
         if self.fitted is not None:
@@ -183,20 +187,20 @@ class Waiting:
         ):
             try:
                 self._begin()
-            except ValueError:  # for which a setting is the reason: samples were checked
+            except ValueError:  # because of a setting, as the samples were checked
                 self.samples.pop()
                 self.targets.pop()
                 raise
 
     @abc.abstractmethod
-    def _check_target(self, y: Any) -> None:
+    def _check_target(self, y: object) -> None:
         """Raise ValueError for an impossible target."""
 
-    def _learn(self, sample: dict[str, Any], y: Any) -> None:
+    def _learn(self, sample: dict[str, object], y: Any) -> None:
         self.fitted.learn_one(sample, y)
 
-    def _sample(self, sample: Mapping[str, Any], learns: bool = False) -> dict[str, Any]:
-        """Return the values of the features that are known, None for missing ones."""
+    def _sample(self, sample: Mapping[str, object], learns: bool = False) -> dict[str, object]:
+        """Return the values of the known features, None for missing values."""
         get = sample.get
         read = {
             name: None if (value := get(name)) is None else as_read(value)
@@ -205,7 +209,7 @@ class Waiting:
         return read if self.ranges is None else self.ranges.moved(read, learns)
 
     def _codings(self, names: list[str], new: list[str]) -> list[Coding]:
-        """Return the codings of new features among all names; note how their values are read."""
+        """Return the codings of new features among all names, and set how their values are read."""
         frame = pd.DataFrame({name: [x.get(name) for x in self.samples] for name in names})
         coding = known_columns(self.model.coding, names)
         chosen = dict(zip(names, codings_of_columns(coding, names, len(names), frame), strict=True))
@@ -217,15 +221,15 @@ class Waiting:
             if not present(coding).is_numeric:
                 is_mixed = coding.learns and 0 < n_texts < len(values)
                 self.reads[name] = str if is_mixed else unchanged
-            elif n_texts and any(number(value) is None for value in values):
+            elif n_texts and any(number_of(value) is None for value in values):
                 coding, self.reads[name] = Symbolic(), str
             else:
-                self.reads[name] = number
+                self.reads[name] = number_of
             codings.append(coding if isinstance(coding, WithMissing) else WithMissing(base=coding))
         return codings
 
     def _frame(self) -> pd.DataFrame:
-        """Return the last samples, as they are read."""
+        """Return the last samples as a table, with values as the model reads them."""
         rows = [
             [None if (value := x.get(name)) is None else read(value) for x in self.samples]
             for name, read in self.reads.items()
@@ -239,7 +243,7 @@ class Waiting:
         )
         fewest = min(FEWEST, max(1, len(self.samples) // 20))
         often = [name for name, count in counts.items() if count >= fewest]
-        names = sorted(often[:MOST_FEATURES])  # whatever the order of the dictionaries
+        names = sorted(often[:MOST_FEATURES])  # independent of the order in dictionaries
         if not names:
             return
         self.reads, self.categories = {}, {}
@@ -260,20 +264,21 @@ class Waiting:
     def _follow(
         self, codings: Sequence[Coding], fitted: Sequence[Coding], frame: pd.DataFrame
     ) -> None:
-        """Follow the ranges, and note the categories, that were learned for a frame's columns."""
-        ends: dict[str, Any] = {}
+        """Follow the learned ranges of a frame's columns, and store their learned categories."""
+        ranges: dict[str, tuple[float, float]] = {}
         for name, coding, learned in zip(frame, codings, fitted, strict=True):
-            if numbers_to_range(coding, frame[name].to_numpy()) is not None:
-                ends[name] = learned.ends()
+            limits = learned.ends()
+            if limits and numbers_to_range(coding, frame[name].to_numpy()) is not None:
+                ranges[name] = limits
             if isinstance(base := present(learned), Symbolic) and coding.learns:
                 self.categories[name] = set(base.categories or ())
-        if ends and self.follows_ranges:
+        if ranges and self.follows_ranges:
             if self.ranges is None:
-                self.ranges = FollowedRanges(ends, frame)
+                self.ranges = FollowedRanges(ranges, frame)
             else:
-                self.ranges.extend(ends, frame)
+                self.ranges.extend(ranges, frame)
 
-    def _is_new(self, name: str, value: Any) -> bool:
+    def _is_new(self, name: str, value: object) -> bool:
         """Return whether a feature, or a category of it, is not known."""
         if value is None or name not in self.reads:
             return value is not None and len(self.reads) < MOST_FEATURES
@@ -282,8 +287,8 @@ class Waiting:
             return False
         return self.reads[name](value) not in known
 
-    def _learn_news(self, sample: Mapping[str, Any]) -> None:
-        """Learn features and categories some time after the first of them came."""
+    def _learn_news(self, sample: Mapping[str, object]) -> None:
+        """Learn new features and categories some time after the first of them."""
         if self.n_before_news is None:
             may_be_new = self.categories or not sample.keys() <= self.reads.keys()
             if not (may_be_new and any(self._is_new(*item) for item in sample.items())):
@@ -307,9 +312,9 @@ class Waiting:
                 self._learn(self._sample(x), y)
 
     def _frequent_news(self) -> tuple[list[str], dict[int, Coding]]:
-        """Return new features, and the codings of others with new categories, by their numbers.
+        """Return new features, and by number the codings of features with new categories.
 
-        They are in several of the last samples.
+        Only news that several of the last samples have count.
         """
         counts = collections.Counter(
             (name, self.reads[name](value) if name in self.reads else None)
@@ -333,7 +338,7 @@ class Waiting:
         return new[: MOST_FEATURES - len(self.reads)], changed
 
     def _grow(self, new: list[str], changed: Mapping[int, Coding]) -> bool:
-        """Add features and categories; return False where the model begins anew instead."""
+        """Add features and categories; return False if the model is trained anew instead."""
         names = list(self.reads)
         unfitted = self._codings([*names, *new], new)
         frame = self._frame()[new]
@@ -359,14 +364,14 @@ class RiverRegressor(Waiting, base.Regressor):
         is symbolic, unless the model has another coding for it.
     grace_period : int, default=100
         Samples from which ranges and categories are learned; until then the mean is predicted.
-        Features and categories that come later are learned once the first of them came so many
-        samples ago (or a tenth of all, up to 1,000) and they are in 5 of the last 1,000. At most
-        1,000 features, and categories of each, are learned.
+        Later features and categories are learned this number of samples (or a tenth of all, up to
+        1,000) after the first of them, if 5 of the last 1,000 samples have them. At most 1,000
+        features, and categories of each, are learned.
     follows_ranges : bool, default=True
         Whether learned ranges of inputs become those of the last 500 samples as the stream drifts.
     """
 
-    usual = SDNNRegressor(out_of_range="widen")
+    default_model = SDNNRegressor(out_of_range="widen")
 
     def _check_target(self, y: Any) -> None:
         try:
@@ -393,38 +398,38 @@ class RiverClassifier(Waiting, base.Classifier):
     grace_period : int, default=100
         Samples, of at least two classes, from which ranges, categories and classes are learned.
         Until then label frequencies are predicted. Later features as in `RiverRegressor`. A class
-        that comes later gets units of its own, but is an error with ``scheme="one_vs_one"``.
+        that comes later gets additional units, but is an error with ``scheme="one_vs_one"``.
     follows_ranges : bool, default=True
         As in `RiverRegressor`.
     """
 
     least_targets = 2
 
-    usual = SDNNClassifier(correction_share=0.5)
+    default_model = SDNNClassifier(correction_share=0.5)
 
     @property
-    def _multiclass(self) -> bool:  # what River asks of classifiers
+    def _multiclass(self) -> bool:  # an attribute of every classifier of river
         return True
 
-    def _check_target(self, y: Any) -> None:
+    def _check_target(self, y: object) -> None:
         first = self.targets[0] if self.targets else y
         is_label = not is_missing(y) and isinstance(y, str) == isinstance(first, str)
         require(is_label, "y", f"be a label, like {shown(first)}", y)
 
-    def _learn(self, sample: dict[str, Any], y: Any) -> None:
+    def _learn(self, sample: dict[str, object], y: Any) -> None:
         if y not in self.fitted.classes_:
-            self.fitted._bins_of_one(sample)  # which raises before a class is added
+            self.fitted._bins_of_one(sample)  # raises before a class is added
             self.fitted._add_class(y)
         super()._learn(sample, y)
 
-    def predict_one(self, x: dict[Hashable, Any], **_options: Any) -> Any:
+    def predict_one(self, x: dict[Hashable, Any], **_options: object) -> Any:
         """Predict one label; None before the first sample."""
         if self.fitted is not None:
             return self.fitted.predict_one(self._sample(cleaned(x)))
-        # The first to come where several are equally frequent.
+        # Ties go to the label that was observed first.
         return max(dict.fromkeys(self.targets), key=self.targets.count, default=None)
 
-    def predict_proba_one(self, x: dict[Hashable, Any], **_options: Any) -> dict[Any, float]:
+    def predict_proba_one(self, x: dict[Hashable, Any], **_options: object) -> dict[Any, float]:
         """Estimate the probability of each label; none before the first sample.
 
         NotImplementedError for models with one unit per class or pair of classes.

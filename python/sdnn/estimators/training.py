@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,16 +15,17 @@ from sklearn.utils.class_weight import compute_sample_weight
 from sklearn.utils.validation import _num_samples
 
 from sdnn import _core
-from sdnn.estimators.inputs import Array, Floats, Ints
+from sdnn.estimators.columns import Array, Floats, Ints
 from sdnn.estimators.network import Network
 from sdnn.support.arguments import require, shown
 
 LARGE_SAMPLE = 5000
 """Samples above which one epoch alone changes much, and blocks are shuffled instead of samples."""
-BLOCK = 512  # the trainer keeps what does not change of blocks of so many samples
+BLOCK = 512  # samples; the trainer reuses sums of blocks that it meets again
 LARGEST_WEIGHT = 10**6
 MOST_PRESENTED = 2**28  # samples in an epoch: their indices take a GiB
 
+ClassWeight = str | Mapping[Any, float] | None
 Trainer = _core.PDeltaTrainer | _core.PerceptronTrainer
 
 
@@ -78,12 +79,14 @@ def sample_weights(
     return each
 
 
-def without_absent(X: Any, y: Any, sample_weight: Any) -> tuple[Any, Any, Any]:
-    """Return samples, targets and weights without the samples of weight 0: they are absent."""
+def without_absent(
+    X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None
+) -> tuple[ArrayLike, ArrayLike, ArrayLike | None]:
+    """Return samples, targets and weights without the samples of weight 0."""
     try:
         n_samples = _num_samples(X)
         fits = _num_samples(y) == n_samples
-    except TypeError:  # which validation explains
+    except TypeError:  # validation explains it later
         fits = False
     if sample_weight is None or not fits:
         return X, y, sample_weight
@@ -94,7 +97,7 @@ def without_absent(X: Any, y: Any, sample_weight: Any) -> tuple[Any, Any, Any]:
     return _safe_indexing(X, rows), _safe_indexing(y, rows), weights[rows]
 
 
-def class_weights(class_weight: Any, labels: Array) -> Floats | None:
+def class_weights(class_weight: ClassWeight, labels: Array) -> Floats | None:
     """Return the weight of each sample by its class, or None without class weights."""
     if class_weight is None:
         return None
@@ -112,9 +115,10 @@ def weighted_mean(values: Array, weights: Floats | None) -> float:
 
 
 def presented(n_samples: int, weights: Floats | None, epoch: int, n_before: int = 0) -> Ints:
-    """Return the samples of an epoch: one of weight 2 twice, one of 1/2 in every other epoch.
+    """Return the samples of an epoch: those of weight 2 twice, of 1/2 in every other epoch.
 
-    Of one epoch alone, samples of weight 1/2 come every other one; ``n_before`` were before these.
+    In a single epoch every other sample of weight 1/2 is presented. ``n_before`` is the number of
+    samples of earlier calls.
 
     >>> [presented(3, np.array([2.0, 0.5, 0.0]), epoch).tolist() for epoch in range(3)]
     [[0, 0, 1], [0, 0], [0, 0, 1]]
@@ -122,13 +126,13 @@ def presented(n_samples: int, weights: Floats | None, epoch: int, n_before: int 
     in_order = np.arange(n_samples, dtype=np.int32)
     if weights is None:
         return in_order
-    phases = (n_before + in_order) * 0.6180339887498949 % 1  # so that not all come together
+    phases = (n_before + in_order) * 0.6180339887498949 % 1  # spread over the epochs
     times = np.floor(weights * (epoch + 1) + phases) - np.floor(weights * epoch + phases)
     return np.repeat(in_order, times.astype(np.int64))
 
 
 def presentations(weights: Floats | None) -> Floats | None:
-    """Return weights scaled to a mean of 1 if none reaches 1, as where they sum to 1.
+    """Return weights scaled to a mean of 1 if none of them reaches 1.
 
     >>> presentations(np.array([0.25, 0.75])).tolist()
     [0.5, 1.5]
@@ -140,7 +144,7 @@ def presentations(weights: Floats | None) -> Floats | None:
 
 
 def epochs_to_present_all(weights: Floats | None) -> int:
-    """Return after how many epochs every sample of a weight above 0 was presented."""
+    """Return the number of epochs in which every sample of a weight above 0 is presented."""
     if weights is None:
         return 1
     least = float(np.min(weights, where=weights > 0, initial=1.0))
@@ -148,7 +152,7 @@ def epochs_to_present_all(weights: Floats | None) -> int:
 
 
 def averaged_every(n_samples: int) -> int:
-    """Return how many epochs lie between networks to be averaged: neighbours are too alike."""
+    """Return the number of epochs between averaged networks; consecutive ones are too similar."""
     return 1 if n_samples > LARGE_SAMPLE else 3
 
 

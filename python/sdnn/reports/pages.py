@@ -1,4 +1,4 @@
-"""Pages of figures and tables: on the screen, as Markdown and as HTML; each cell is written once.
+"""Pages of figures and tables for terminals, in Markdown and in HTML.
 
 Jinja and rich are imported when they are needed.
 """
@@ -29,7 +29,7 @@ class Table:
     brief: Sequence[str] = ()  # columns that a terminal shows by default: all
 
     def print(self, console: Console, *, full: bool = True) -> None:
-        """Print it: all columns, or the brief ones, which fit 80 characters."""
+        """Print all columns, or the brief ones, which fit 80 characters."""
         from rich import box
         from rich.table import Table as RichTable
         from rich.text import Text
@@ -48,10 +48,10 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """A part of a page, shown in the order of its fields; what is empty is left out.
+    """A part of a page, shown in the order of its fields; empty fields are left out.
 
-    The title is that of the table by default; one of level 0 is a faint paragraph. A picture is an
-    SVG. Folded sections, of notes, terms, text and table, open on demand.
+    The default title is that of the table; a title of level 0 is a faint paragraph. Pictures are
+    SVG. Folded sections have notes, terms, text and a table, and open on demand.
     """
 
     title: str = ""
@@ -72,13 +72,13 @@ class Section:
 
     @property
     def picture_url(self) -> str:
-        """The figure as an address that holds it: its names cannot clash with those of another."""
+        """The figure as a data URL, so that its identifiers are separate from those of others."""
         return "data:image/svg+xml;base64," + base64.b64encode(self.picture).decode()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Page:
-    """A report: its head, its sections, and where the rows come from."""
+    """A report: its head, its sections, and the source of its rows."""
 
     title: str
     intro: str
@@ -88,32 +88,36 @@ class Page:
 
     @property
     def tables(self) -> Iterator[Table]:
-        """All tables; those that open on demand come last."""
-        yield from (one.table for one in self.sections if one.table)
-        yield from (one.table for part in self.sections for one in part.folded if one.table)
+        """All tables, those of folded sections last."""
+        folded = (part for section in self.sections for part in section.folded)
+        yield from (section.table for section in (*self.sections, *folded) if section.table)
 
     @property
     def notes(self) -> list[str]:
-        """Explanations below the tables; those of files and settings are with their texts."""
-        parts = [*self.sections, *(o for part in self.sections for o in part.folded if not o.text)]
-        notes = [note for part in parts for note in part.notes]
-        return notes + [f"{name}: {text}." for part in parts for name, text in part.terms.items()]
+        """Explanations below the tables, except those of folded sections with a text."""
+        folded = (part for section in self.sections for part in section.folded if not part.text)
+        sections = [*self.sections, *folded]
+        notes = [note for section in sections for note in section.notes]
+        terms = [item for section in sections for item in section.terms.items()]
+        return notes + [f"{name}: {text}." for name, text in terms]
 
     def print(self, console: Console, *, full: bool = False) -> None:
-        """Print it without figures: tables that fit 80 characters, or everything."""
+        """Print the page without figures: tables that fit 80 characters, or everything."""
         for line in (self.title, self.intro, *self.warnings):
             console.print(line, highlight=False, markup=False)
-        for table in self.tables if full else (one.table for one in self.sections if one.table):
+        tables = (section.table for section in self.sections if section.table)
+        for table in self.tables if full else tables:
             table.print(console, full=full)
-        for note in self.notes if full else (note for one in self.sections for note in one.notes):
+        notes = (note for section in self.sections for note in section.notes)
+        for note in self.notes if full else notes:
             console.print(note, style="dim", highlight=False, markup=False)
 
     def to_markdown(self) -> str:
-        """Write it without figures."""
+        """Return the page in Markdown, without figures."""
         return self._render("page.md.jinja")
 
     def to_html(self, call: str) -> str:
-        """Make it one self-contained HTML page; `call` is the command that made it."""
+        """Return the page as self-contained HTML; `call` is the command that made it."""
         return self._render("page.html.jinja", call=call)
 
     def _render(self, name: str, **values: str) -> str:
@@ -129,7 +133,7 @@ class Page:
 
 
 def markdown_text(text: str) -> str:
-    r"""Write a text for a line of Markdown, in which it can be no markup, HTML or link.
+    r"""Escape a text for a line of Markdown, so that it has no markup, HTML or links.
 
     >>> markdown_text("<b> [1, 2] | [a](b)")
     '\\<b> [1, 2] \\| [a\\](b)'
@@ -138,7 +142,7 @@ def markdown_text(text: str) -> str:
 
 
 def plain_number(value: float, decimals: int, sign: str = "") -> str:
-    """Write a number with a given number of decimals at most.
+    """Format a number with a maximum number of decimals.
 
     >>> plain_number(2.50, 2), plain_number(-0.01, 1), plain_number(1234.25, 2, sign="+")
     ('2.5', '0', '+1,234.25')
@@ -149,7 +153,7 @@ def plain_number(value: float, decimals: int, sign: str = "") -> str:
 
 
 def duration_words(seconds: float) -> str:
-    """Write a time for a reader.
+    """Format a duration in words.
 
     >>> duration_words(61.4), duration_words(3661.4)
     ('1 min 1 s', '1 h 1 min')

@@ -29,13 +29,13 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def color_of(place: int) -> str:
-    """Return the color of a thing by its place in a list, the same whatever else is shown."""
-    return COLORS[place % len(COLORS)]
+def color_of(index: int) -> str:
+    """Return the color of an item by its index in a fixed list."""
+    return COLORS[index % len(COLORS)]
 
 
 def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
-    """Return a figure as PNG and as SVG; the same rows give the same bytes."""
+    """Return a figure as PNG and as SVG; equal rows give equal bytes."""
     from matplotlib import rc_context
 
     svg = BytesIO()

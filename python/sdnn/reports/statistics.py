@@ -1,9 +1,9 @@
 """Statistics over trials.
 
-The spread that matters is the one between trials, so every interval is a percentile bootstrap over
-whole trials. Each call draws from a generator of its own with a fixed seed: an interval depends on
-the values alone. Its ends are values of the bootstrap distribution, never interpolated, so
-censored, infinite trials are allowed.
+The relevant spread is that between trials, so every interval is a percentile bootstrap over
+whole trials. Each call draws from a new generator with a fixed seed: an interval depends on the
+values alone. Its limits are values of the bootstrap distribution, never interpolated, so censored,
+infinite trials are allowed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _N_RESAMPLES = 10_000
 
 
 def json_number(value: float, last_episode: int | None) -> float | str | None:
-    """Return a number as JSON can hold it: NaN is null, infinity ``">last_episode"`` or null.
+    """Return a number for JSON: NaN is null, infinity ``">last_episode"`` or null.
 
     >>> json_number(math.inf, 15000)
     '>15000'
@@ -37,7 +37,7 @@ def json_number(value: float, last_episode: int | None) -> float | str | None:
 class Estimate:
     """A statistic over trials, infinite where it is censored, with its interval.
 
-    The ends are NaN where there are fewer than two trials.
+    The limits are NaN for fewer than two trials.
     """
 
     value: float
@@ -45,12 +45,12 @@ class Estimate:
     upper: float
 
     def to_json(self, last_episode: int) -> dict[str, float | str | None]:
-        """Return it as values that JSON can hold; what is censored is ``">last_episode"``."""
+        """Return the values for JSON; a censored value is ``">last_episode"``."""
         return {name: json_number(value, last_episode) for name, value in vars(self).items()}
 
 
 def running_median(values: ArrayLike, window: int) -> FloatArray:
-    """Return the median of each value with its neighbours, fewer at both ends; the window is odd.
+    """Return the median of each value and its neighbours within an odd window.
 
     >>> running_median([1, 9, 2, 3, 8], 3)
     array([5. , 2. , 3. , 3. , 5.5])
@@ -99,14 +99,14 @@ def estimate_contrast(
 
 
 def tails(distribution: FloatArray, confidence: float = CONFIDENCE) -> FloatArray:
-    """Return the ends of the middle part of distributions over the last axis, values of theirs.
+    """Return the values that limit the middle part of distributions over the last axis.
 
     >>> tails(np.arange(101.0), 0.9)
     array([ 5., 95.])
     """
     tail = (1 - confidence) / 2
-    ends = np.quantile(distribution, (tail, 1 - tail), axis=-1, method="inverted_cdf")
-    return np.asarray(ends, np.float64)
+    limits = np.quantile(distribution, (tail, 1 - tail), axis=-1, method="inverted_cdf")
+    return np.asarray(limits, np.float64)
 
 
 def _estimate(statistic: Callable[..., FloatArray], *groups: ArrayLike) -> Estimate:

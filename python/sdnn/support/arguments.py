@@ -25,7 +25,7 @@ _REPR.maxstring = _REPR.maxother = _REPR.maxlong = 200
 _REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = 12
 
 
-def shown(value: Any) -> str:
+def shown(value: object) -> str:
     """Return the `repr` of any value for a message, shortened; lists may contain themselves.
 
     >>> shown(list(range(1000)))
@@ -37,10 +37,10 @@ def shown(value: Any) -> str:
         return object.__repr__(value)
 
 
-def array_of(name: str, value: Any, kinds: str = "fiub", what: str = "numbers") -> NDArray[Any]:
+def array_of(name: str, value: Any, types: str = "fiub", what: str = "numbers") -> NDArray[Any]:
     """Read an array of any library, a number, or lists of such; ValueError for others.
 
-    ``kinds`` are letters of the possible types, as in ``numpy.dtype.kind``, and ``what`` their word
+    ``types`` are letters of the possible types, as in ``numpy.dtype.kind``, and ``what`` their word
     in messages. Masked arrays are refused: their mask would be lost.
 
     >>> array_of("levels", [0.5, "a"])
@@ -50,7 +50,7 @@ def array_of(name: str, value: Any, kinds: str = "fiub", what: str = "numbers") 
     import numpy as np  # takes longer than all else that `import sdnn` loads
 
     is_plain = type(value) is np.ndarray or isinstance(value, np.generic)
-    if is_plain and value.dtype.kind in kinds:
+    if is_plain and value.dtype.kind in types:
         return np.asarray(value)
     rows = value if isinstance(value, list | tuple) else [value]
     has_mask = any(isinstance(row, np.ma.MaskedArray) for row in rows)
@@ -59,11 +59,11 @@ def array_of(name: str, value: Any, kinds: str = "fiub", what: str = "numbers") 
         array = np.asarray(value)
     except Exception:  # lists of several lengths, and what arrays of other libraries raise
         array = np.empty(0, object)
-    require(array.dtype.kind in kinds, name, f"be {what}", value)
+    require(array.dtype.kind in types, name, f"be {what}", value)
     return array
 
 
-def argument_error(name: str, problem: str, kind: type[Exception] = ValueError) -> Exception:
+def argument_error(name: str, problem: str, error_class: type[Exception] = ValueError) -> Exception:
     """Make an error about an argument, whose name is its attribute ``argument``.
 
     Errors of the core have this attribute, too.
@@ -72,22 +72,26 @@ def argument_error(name: str, problem: str, kind: type[Exception] = ValueError) 
     ValueError('n_bins must be at least 2, got 1')
     """
     is_named = problem.startswith(f"{name},")  # with others, as the core does
-    error: Any = kind(problem if is_named else f"{name} {problem}")
-    error.argument = name
-    return error  # type: ignore[no-any-return]
+    error = error_class(problem if is_named else f"{name} {problem}")
+    error.argument = name  # type: ignore[attr-defined]
+    return error
 
 
 def require(
-    is_so: object, name: str, expected: str, given: Any, kind: type[Exception] = ValueError
+    condition: object,
+    name: str,
+    expected: str,
+    value: object,
+    error_class: type[Exception] = ValueError,
 ) -> None:
-    """Raise an error about an argument unless something is so; ``expected`` follows "must".
+    """Raise an error about an argument unless a condition holds; ``expected`` follows "must".
 
     >>> require(False, "period", "be positive", -1)
     Traceback (most recent call last):
     ValueError: period must be positive, got -1
     """
-    if not is_so:
-        raise argument_error(name, f"must {expected}, got {shown(given)}", kind)
+    if not condition:
+        raise argument_error(name, f"must {expected}, got {shown(value)}", error_class)
 
 
 def blamed(error: BaseException) -> tuple[str, str]:
@@ -112,27 +116,26 @@ def choice(name: str, word: Any, members: Mapping[str, Member]) -> Member:
     try:
         return members[word]
     except (KeyError, TypeError):
-        words = ", ".join(repr(member) for member in members)
-        raise argument_error(name, f"must be one of {words}, got {shown(word)}") from None
+        names = ", ".join(repr(member) for member in members)
+        raise argument_error(name, f"must be one of {names}, got {shown(word)}") from None
 
 
-def one_of(name: str, word: Any, words: tuple[str, ...]) -> str:
-    """Check that an argument is one of some words; ValueError if not.
+def one_of(name: str, word: object, choices: tuple[str, ...]) -> str:
+    """Check that an argument is one of several words; ValueError if not.
 
     >>> one_of("direction", "up", ("up", "down"))
     'up'
     """
-    return choice(name, word, {member: member for member in words})
+    return choice(name, word, {member: member for member in choices})
 
 
-def _is_of_numpy(value: Any, *names: str) -> bool:
-    """Return whether a value is one of NumPy's scalars of these names, without NumPy."""
-    kind = type(value)
-    return kind.__module__ == "numpy" and kind.__name__ in names
+def _is_of_numpy(value: object, *names: str) -> bool:
+    """Return whether a value is a NumPy scalar of one of these types, without importing NumPy."""
+    return type(value).__module__ == "numpy" and type(value).__name__ in names
 
 
-def _is_no_number(value: Any) -> bool:
-    """Return whether it is a truth value or a duration, which Python and NumPy count as numbers."""
+def _is_no_number(value: object) -> bool:
+    """Return whether a value is a bool or a duration, which Python and NumPy count as numbers."""
     return isinstance(value, bool) or _is_of_numpy(value, "timedelta64")
 
 
@@ -149,12 +152,12 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
     return int(value)
 
 
-def seed_of(value: Any) -> int:
+def seed_of(value: object) -> int:
     """Check that a seed is one that the core takes, in [0, 2**64); ValueError if not."""
     return whole("seed", value, 0, 2**64 - 1)
 
 
-def real(name: str, value: Any) -> float:
+def real(name: str, value: object) -> float:
     """Check that an argument is a number, perhaps NaN or infinite; ValueError if not.
 
     >>> real("period", "a day")
@@ -191,7 +194,7 @@ def reward_of(reward: Any) -> float:
         raise ValueError(str(error)) from None
 
 
-def flag(name: str, value: Any) -> bool:
+def flag(name: str, value: object) -> bool:
     """Check that an argument is a bool, Python's or NumPy's; TypeError if not.
 
     >>> flag("explore", "no")
@@ -203,34 +206,35 @@ def flag(name: str, value: Any) -> bool:
     return bool(value)
 
 
-def path_of(name: str, value: Any) -> Path:
+def path_of(name: str, value: object) -> Path:
     """Check that an argument can name a file; TypeError or ValueError if not.
 
     >>> path_of("path", None)
     Traceback (most recent call last):
     TypeError: path must be the name of a file, got None
     """
-    require(isinstance(value, str | os.PathLike), name, "be the name of a file", value, TypeError)
+    if not isinstance(value, str | os.PathLike):
+        raise argument_error(name, f"must be the name of a file, got {shown(value)}", TypeError)
     text = os.fspath(value)
-    is_name = isinstance(text, str) and text and "\0" not in text
-    require(is_name, name, "be the name of a file", value)
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise argument_error(name, f"must be the name of a file, got {shown(value)}")
     return Path(text)
 
 
-def is_of_class(value: Any, kind: type[Any]) -> bool:
-    """Return whether a value is of a class, or of one with its name and fields.
+def is_of_class(value: object, expected: type) -> bool:
+    """Return whether a value is of a class, or of a class with the same name and fields.
 
     A cell of a notebook that runs again defines its classes again.
     """
-    if isinstance(value, kind):
+    if isinstance(value, expected):
         return True
-    own = type(value)
-    if (own.__module__, own.__qualname__) != (kind.__module__, kind.__qualname__):
+    actual = type(value)
+    if (actual.__module__, actual.__qualname__) != (expected.__module__, expected.__qualname__):
         return False
-    return getattr(own, "__annotations__", {}) == getattr(kind, "__annotations__", {})
+    return getattr(actual, "__annotations__", {}) == getattr(expected, "__annotations__", {})
 
 
-def has_methods(name: str, value: Any, what: str, *methods: str) -> None:
+def has_methods(name: str, value: object, what: str, *methods: str) -> None:
     """Check that an argument has some methods; TypeError if not.
 
     >>> has_methods("env", 5, "a Gymnasium environment", "reset", "step")
@@ -351,7 +355,7 @@ def explains_names(
             return called
 
         @functools.wraps(called)
-        def call(*arguments: Any, **options: Any) -> Any:
+        def call(*arguments: Any, **options: Any) -> object:
             try:
                 return called(*arguments, **options)
             except TypeError as error:
@@ -369,7 +373,7 @@ def explains_names(
 
 
 def _misfit(
-    called: Any, arguments: tuple[Any, ...], options: Mapping[str, Any],
+    called: Callable[..., object], arguments: tuple[object, ...], options: Mapping[str, object],
     elsewhere: Mapping[str, str],
 ) -> Exception | None:  # fmt: skip
     """Return the error that explains why a function cannot be called so; None if it can."""
@@ -380,9 +384,10 @@ def _misfit(
     except ValueError:  # a class of the core has the signature
         signature = inspect.signature(type(arguments[0]))
         arguments = arguments[1:]
-    names = [name for name, one in signature.parameters.items() if one.kind is not one.VAR_KEYWORD]
+    parameters = signature.parameters.values()
+    names = [p.name for p in parameters if p.kind is not inspect.Parameter.VAR_KEYWORD]
     possible = [name for name in names if name not in ("self", "cls")]
-    if len(names) == len(signature.parameters):
+    if len(names) == len(parameters):
         for name in options:
             if name not in names:
                 problem = f"is no argument of {who}: {advice(name, possible, elsewhere)}"

@@ -1,4 +1,4 @@
-"""Signals that wait for the end of a step or a block."""
+"""Signals that are handled at the end of a step or a block."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ class Interrupts:
 
 @contextmanager
 def stay_interrupts() -> Iterator[None]:
-    """Let a Ctrl-C wait for the end of the block, and be KeyboardInterrupt there.
+    """Delay a Ctrl-C to the end of the block, and raise KeyboardInterrupt there.
 
     Extensions replace the exceptions of the Python code that they call, or forget them: matplotlib
-    answers a Ctrl-C with "Invalid affine transformation matrix". A second one acts as usual.
+    reports a Ctrl-C as "Invalid affine transformation matrix". A second one acts as usual.
     """
     with Interrupts(lambda: None) as interrupts:
         yield
@@ -62,11 +62,11 @@ def stay_interrupts() -> Iterator[None]:
 
 @contextmanager
 def thread_pool(n_threads: int) -> Iterator[ThreadPoolExecutor]:
-    """Run a block with a pool of threads, all of which have ended when it is left.
+    """Run a block with a pool of threads, and wait for all of them at its end.
 
-    Python before 3.13 takes a thread for ended once a Ctrl-C has broken the waiting for it, and
-    crashes if the thread is in C++ as the interpreter ends (python/cpython#90882). A second Ctrl-C
-    while threads are waited for acts as usual: it gives up what hangs.
+    If a Ctrl-C interrupts the wait for a thread, Python before 3.13 considers the thread ended, and
+    crashes if it is in C++ when the interpreter exits (python/cpython#90882). A second Ctrl-C
+    during the wait acts as usual, in case a thread hangs.
     """
     from concurrent.futures import ThreadPoolExecutor
 

@@ -1,4 +1,4 @@
-"""Bars on a terminal: of trainings, studies and measurements."""
+"""Progress bars of trainings, studies and measurements."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _NOTEBOOK_SECONDS = 0.25
 
 
 def is_shown() -> bool:
-    """Return whether bars are seen: on a terminal, unless it cannot move its cursor, or a notebook.
+    """Return whether bars are shown: in a notebook, and on a terminal that can move its cursor.
 
     A log, a pipe and a captured standard error show none.
     """
@@ -80,7 +80,7 @@ class ProgressBars:
         self._draw()
 
     def _draw(self) -> None:
-        """Change the output of a notebook, where it is time."""
+        """Update the output of a notebook, at most every quarter of a second."""
         now = time.monotonic()
         if not self._is_notebook or now < self._due:
             return

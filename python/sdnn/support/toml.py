@@ -1,4 +1,4 @@
-"""TOML and JSON from strangers: parsed within limits, and where their keys are."""
+"""TOML and JSON from untrusted sources: parsing within limits, and the lines of keys."""
 
 from __future__ import annotations
 
@@ -42,15 +42,15 @@ def line_of(text: str, key: KeyPath) -> int | None:
 
     with suppress(OverflowError):
         while key:
-            found = bisect.bisect_left(range(len(lines)), True, key=begins)
-            if found < len(lines):
-                return found + 1
+            index = bisect.bisect_left(range(len(lines)), True, key=begins)
+            if index < len(lines):
+                return index + 1
             key = key[:-1]
     return None
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Parse TOML; ValueError for a key of many parts, which would take time without end."""
+    """Parse TOML; ValueError for a key of many parts, which would take unlimited time."""
     for part in re.split(r"[={},\n]", text):
         if part.count(".") > MOST_LEVELS:
             raise ValueError(f"a key must have at most {MOST_LEVELS} parts, got {part[:40]!r}...")
@@ -59,7 +59,7 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 def deep_key(values: dict[str, Any]) -> KeyPath | None:
-    """Return the key of a value that is too deep, if there is one."""
+    """Return the key of a value that is too deep, or None."""
     level: list[tuple[KeyPath, Any]] = [((), values)]
     for _ in range(MOST_LEVELS):
         items = (

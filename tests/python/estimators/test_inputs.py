@@ -10,7 +10,7 @@ from refusals import refuses
 from sdnn import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators import OutOfRangeWarning
-from sdnn.estimators.inputs import codings_of_columns, column_indices, input_pairs
+from sdnn.estimators.columns import codings_of_columns, column_indices, input_pairs
 from sdnn.estimators.network import draw_input_code
 
 RANDOM = np.random.RandomState(0)
