@@ -42,7 +42,8 @@ def test_train_shows_it_where_it_is_asked_for(capsys):
 
 def test_a_notebook_shows_it_where_a_training_is_long():
     nbclient, nbformat = map(pytest.importorskip, ("nbclient", "nbformat"))
-    source = """import gymnasium as gym; from sdnn import agents; from sdnn.training import callbacks
+    source = """import gymnasium as gym
+from sdnn import agents; from sdnn.training import callbacks
 callbacks.SHOWN_AFTER, env = {}, gym.make("Pendulum-v1")
 agents.RBFQLearning(env).train(env, 500)"""
     for limit, n_outputs in ((0.0, 2), (60.0, 1)):
