@@ -27,7 +27,7 @@ from page import markdown
 
 from sdnn.agents import QLearningConfig
 from sdnn.approximators import RBFNetworkConfig
-from sdnn.runs import AgentSpec, BudgetSpec, ProtocolSpec, RunSpec
+from sdnn.reproduction import paper_spec
 from sdnn.runs.engine import trial_seed
 
 KIND = "rbf tuning"
@@ -93,14 +93,14 @@ def measure(stage: str, *key: Any) -> dict[str, Any]:
     """Run a trial."""
     *values, seed = key
     setting = Setting(*values)
-    spec = RunSpec(
-        agent=AgentSpec(name="rbf"),
+    spec = paper_spec(
+        agent="rbf",
         approximator=RBFNetworkConfig(
             n_bases=setting.n_bases, width=setting.width, gradient_rate=setting.gradient_rate
         ),
         learning=QLearningConfig(tie_rule=setting.tie_rule),
-        protocol=ProtocolSpec(evaluate_every_episodes=TEST_INTERVAL),
-        budget=BudgetSpec(episodes=N_EPISODES),
+        protocol={"evaluate_every_episodes": TEST_INTERVAL},
+        budget={"episodes": N_EPISODES},
     )
     trial = spec.make_trial(seed)
     start = time.thread_time()

@@ -17,8 +17,7 @@ from measured import measure_missing, measured, options
 from page import markdown, show
 
 from sdnn import _core
-from sdnn.environments import SensorConfig
-from sdnn.runs import RunSpec
+from sdnn.reproduction import paper_spec
 from sdnn.runs.engine import trial_seed
 
 KIND = "whole trials"
@@ -34,8 +33,9 @@ def dense_microseconds(n_inputs: int) -> float:
 def measure(case: str, number: int) -> dict[str, Any]:
     n_inputs, noise = CASES[case]
     dense = dense_microseconds(n_inputs)
-    sensors = SensorConfig(n_sensors=n_inputs, noise=noise)
-    trial = RunSpec(sensors=sensors).make_trial(trial_seed(0, case, number))
+    sensors = {"n_sensors": n_inputs, "noise": noise}
+    spec = paper_spec(environment={"kwargs": {"sensors": sensors}})
+    trial = spec.make_trial(trial_seed(0, case, number))
     start = time.thread_time()
     trial.advance(N_EPISODES)
     seconds = time.thread_time() - start

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from sdnn.runs.spec_schema import CORE, spec_schema
+from sdnn.runs.spec_schema import PAPER_ARGUMENTS, PARTS, spec_schema
 
 PAGE = Path(__file__).parent / "reference" / "settings.md"
 
@@ -19,8 +19,8 @@ The keys of files for `sdnn train --config FILE`, of `--set KEY=VALUE`, and of
 [studies](../how-to/studies.md): default, range, meaning. `approximator.*` and `learning.*` are
 those of the agent, with the paper's defaults, before a preset. `sdnn train --schema` has details.
 
-A study without an environment is about the paper's acrobot: the agent is `sdnn-c` with the preset
-`paper`, the budget 15,000 episodes, and every 10 episodes there is an evaluation of one episode.
+In the cases of the paper the agent is by default `sdnn-c` with the preset `paper`, the budget
+15,000 episodes, and every 10 episodes there is an evaluation of one episode.
 """
 ASSUMPTION = re.compile(r" An assumption\b.*| \(section [^)]*\)")
 NOT_IN_THE_PAPER = re.compile(r" Not in the paper[^.:]*(?:\.|: (\w))")
@@ -36,7 +36,7 @@ def page() -> str:
     described: dict[str, str] = {}
     for table, schema in definitions["RunSpec"]["properties"].items():
         text += f"\n## {table}\n\n{schema['description']}\n"
-        names = [config_type.__name__ for config_type in CORE.get(table, ())]
+        names = [config_type.__name__ for config_type in PARTS.get(table, ())]
         names = names or [
             alternative["$ref"].rpartition("/")[2]
             for alternative in schema.get("anyOf", [schema])
@@ -45,6 +45,10 @@ def page() -> str:
         for name in names:
             text += f"\n### {name}\n\n" if len(names) > 1 else "\n"
             text += "".join(entries(table, name, definitions[name]["properties"], described))
+    for argument, config in PAPER_ARGUMENTS.items():
+        key, name = f"environment.kwargs.{argument}", config.__name__
+        text += f"\n## {key}\n\nOf `sdnn/PaperAcrobot-v0`, the paper's acrobot.\n\n"
+        text += "".join(entries(key, name, definitions[name]["properties"], described))
     return text
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from sdnn.agents.registry import title_of
 from sdnn.reports.plots import png_bytes
-from sdnn.reproduction.report import ClaimStudy
+from sdnn.reproduction.claim_study import ClaimStudy
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.results import SHARE_STABLE, final_share_solved
 from sdnn.runs.store import ResultStore
@@ -33,7 +33,7 @@ def shares(study: Study, store: ResultStore) -> dict[tuple[str, str, float], lis
     for (case_id, variant_id), combination in study.combinations.items():
         keys = [key for key in study.keys(case_id, variant_id) if key in stored]
         spec = combination.spec
-        cell = (case_id, spec.label, spec.sensors.noise)
+        cell = (case_id, spec.label, spec.environment.paper_settings().sensors.noise)
         by_cell[cell] = [final_share_solved(record.rows.solved) for record in store.load(keys)]
     return by_cell
 

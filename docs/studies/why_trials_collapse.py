@@ -49,10 +49,11 @@ class Inspector:
     """Measurements of a training agent that do not change it."""
 
     def __init__(self, spec: RunSpec) -> None:
-        self._acrobot_config = spec.acrobot
-        clean = replace(spec.sensors, noise=0.0)
+        task = spec.environment.paper_settings()
+        self._acrobot_config = task.acrobot
+        clean = replace(task.sensors, noise=0.0)
         self._clean = _core.AcrobotSensors(clean, 0, _core.Stream.sensor_noise)
-        self._noisy = _core.AcrobotSensors(spec.sensors, 12345, _core.Stream.sensor_noise)
+        self._noisy = _core.AcrobotSensors(task.sensors, 12345, _core.Stream.sensor_noise)
 
     def greedy(self, agent: Any, observation: NDArray[np.float64]) -> tuple[float, float]:
         """Return the mean of the best torques, in N m, and their value."""
@@ -90,7 +91,7 @@ def look(
 ) -> Iterator[tuple[int, Any, Inspector, float]]:
     """Advance a trial, stopping after the given numbers of learning episodes."""
     trial = spec.make_trial(trial_seed(0, CASE.id, number))
-    goal = _core.GoalSchedule(spec.goal)
+    goal = _core.GoalSchedule(spec.environment.paper_settings().goal)
     inspector = Inspector(spec)
     for episode in episodes:
         trial.advance(episode - trial.episode)
@@ -138,10 +139,10 @@ def around(spec: RunSpec, number: int, middle: int) -> Rows:
 
 def begun_anew(spec: RunSpec, agent: Any, seed: int) -> NDArray[np.bool_]:
     """Let an agent live through the schedule's first episodes; return which tests it solved."""
-    acrobot = _core.Acrobot(spec.acrobot)
-    goal = _core.GoalSchedule(spec.goal)
+    task = spec.environment.paper_settings()
+    acrobot, goal = _core.Acrobot(task.acrobot), _core.GoalSchedule(task.goal)
     sensors, test_sensors = (
-        _core.AcrobotSensors(spec.sensors, seed, stream)
+        _core.AcrobotSensors(task.sensors, seed, stream)
         for stream in (_core.Stream.sensor_noise, _core.Stream.evaluation_sensor_noise)
     )
     n_actions = agent.action_value.n_actions

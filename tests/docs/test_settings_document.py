@@ -2,7 +2,6 @@
 
 import importlib.util
 import json
-from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,7 @@ from click.testing import CliRunner
 
 from sdnn.cli import main
 from sdnn.config import fields_of
-from sdnn.runs.spec_schema import CORE, spec_schema
+from sdnn.runs.spec_schema import PAPER_ARGUMENTS, PARTS, spec_schema
 
 SCRIPT = Path(__file__).parents[2] / "docs" / "write_settings.py"
 
@@ -24,9 +23,10 @@ def test_the_page_is_that_of_the_declarations():
 
 def test_the_schema_has_every_setting_and_is_printed():
     schema = spec_schema()
-    for config_type in chain.from_iterable(CORE.values()):
-        names = {field.name for field in fields_of(config_type)} - {"n_inputs"}
-        assert set(schema["$defs"][config_type.__name__]["properties"]) == names
+    parts = [config for configs in PARTS.values() for config in configs]
+    for config in (*parts, *PAPER_ARGUMENTS.values()):
+        names = {field.name for field in fields_of(config)} - {"n_inputs"}
+        assert set(schema["$defs"][config.__name__]["properties"]) == names
     printed = CliRunner().invoke(main, ["train", "--schema"])
     assert json.loads(printed.stdout) == json.loads(json.dumps(schema))
 
@@ -36,4 +36,9 @@ def test_the_schema_tells_good_files_from_bad_ones():
     schema = json.loads(json.dumps(spec_schema()))
     jsonschema.validate({"environment": "CartPole-v1", "budget": {"steps": 5}}, schema)
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate({"budget": {"steps": 0}}, schema)
+        jsonschema.validate({"environment": "CartPole-v1", "budget": {"steps": 0}}, schema)
+    task = {"id": "sdnn/PaperAcrobot-v0", "kwargs": {"sensors": {"n_sensors": 6}}}
+    jsonschema.validate({"environment": task}, schema)
+    task["kwargs"]["sensors"]["n_sensors"] = 7
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({"environment": task}, schema)

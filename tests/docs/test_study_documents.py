@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sdnn.reproduction.report import ClaimStudy
+from sdnn.reproduction.claim_study import ClaimStudy
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "how-to" / "studies.md").read_text()
@@ -28,7 +28,8 @@ def test_the_page_shows_the_studies_as_they_are(name):
     "name",
     [
         "support.toml", "runs.engine", "runs.environment", "agents.registry", "support.arguments",
-        "runs.spec", "runs.report", "runs.results", "reports.pages", "reports.statistics",
+        "runs.spec", "runs.report", "runs.results", "reports.pages",
+        "reports.statistics", "reproduction.reproduce", "environments.paper_acrobot",
     ],
 )  # fmt: skip
 def test_examples_in_docstrings(name):

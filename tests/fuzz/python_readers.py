@@ -36,8 +36,7 @@ from sdnn.agents import (
 )
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig
 from sdnn.runs import ResultStore, StoreError, TrialRows
-from sdnn.runs.spec import HASH_DIGITS
-from sdnn.runs.trial import ROW
+from sdnn.runs.trial import HASH_DIGITS, ROW
 from sdnn.training.statistics import read_statistics
 
 BOX = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)

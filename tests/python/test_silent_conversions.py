@@ -118,7 +118,7 @@ def test_fields_of_runs_are_of_their_type():
         {"learning": 5}, {"approximator": []}, {"output": True}, {"protocol": "abc"},
     ):  # fmt: skip
         with pytest.raises(Exception, match=next(iter(given))):
-            RunSpec(**given)
+            RunSpec(**{"environment": "CartPole-v1"} | given)
 
 
 def test_seeds_of_trials_are_whole_numbers():

@@ -111,11 +111,6 @@ def labels() -> tuple[str, ...]:
     return tuple(dict.fromkeys((*AGENTS, *(label_of(*pair) for pair in pairs))))
 
 
-def default_agent(*, on_acrobot: bool) -> str:
-    """Return who learns where no agent is named: the paper's in its task, else Q(lambda)."""
-    return "sdnn-c" if on_acrobot else "q-lambda"
-
-
 def split_label(label: str) -> tuple[str, str | None]:
     """Return the agent and the preset that a word stands for; None: the default.
 

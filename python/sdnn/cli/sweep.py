@@ -41,7 +41,7 @@ def sweep(
     Finished trials are kept in OUT/results.sqlite, which `reproduce` may share; the same command
     continues where it stopped.
     """
-    from sdnn.reproduction.report import ClaimStudy
+    from sdnn.reproduction.claim_study import ClaimStudy
     from sdnn.runs.errors import ConfigError
 
     try:

@@ -160,8 +160,6 @@ def train(
     with run_command(words):
         values = {} if source is None else source.specification()
         spec = RunSpec.from_values(overridden(values, given))
-        if spec.environment is None:
-            raise click.UsageError("ENV_ID must be given, or a --config that names an environment")
         folder = out or _folder_of(spec)
         if dry_run:
             Run(folder, spec).check()

@@ -7,6 +7,7 @@ Importing this package registers the acrobot with Gymnasium. An id can import it
 (4,)
 
 `goal_tolerance` sets the difficulty; `TighteningGoal` reduces it during training, as in the paper.
+``"sdnn/PaperAcrobot-v0"`` is the paper's task, with such a goal and the paper's sensors.
 """
 
 import gymnasium as gym
@@ -15,6 +16,7 @@ from sdnn.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.goal import GoalSchedule, TighteningGoal
 from sdnn.environments.masks import ActionMasks
+from sdnn.environments.paper_acrobot import PAPER_ACROBOT, PaperAcrobotEnv
 from sdnn.environments.sensors import AcrobotSensors, NoisySensors, RedundantSensors, UnitSensors
 from sdnn.environments.vector_env import AcrobotSwingUpVectorEnv
 
@@ -27,6 +29,7 @@ __all__ = [
     "GoalSchedule",
     "GoalScheduleConfig",
     "NoisySensors",
+    "PaperAcrobotEnv",
     "RedundantSensors",
     "SensorConfig",
     "TighteningGoal",
@@ -38,4 +41,10 @@ gym.register(
     entry_point="sdnn.environments.acrobot:AcrobotSwingUpEnv",
     vector_entry_point="sdnn.environments.vector_env:AcrobotSwingUpVectorEnv",
     reward_threshold=10.0,
+)
+gym.register(
+    id=PAPER_ACROBOT,
+    entry_point="sdnn.environments.paper_acrobot:PaperAcrobotEnv",
+    reward_threshold=10.0,
+    order_enforce=False,
 )

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from sdnn.reproduction.reproduce import (
         PaperStudy as PaperStudy,
         case_spec as case_spec,
+        paper_spec as paper_spec,
         plan_trials as plan_trials,
     )
 
@@ -36,6 +37,6 @@ __getattr__, __dir__, __all__ = attach(
         "sdnn.reproduction.claims": "CLAIMS Claim judge_claims",
         "sdnn.reproduction.cost": "CostConfig CostRecord",
         "sdnn.reproduction.figures": "draw_cost draw_experiment",
-        "sdnn.reproduction.reproduce": "PaperStudy case_spec plan_trials",
+        "sdnn.reproduction.reproduce": "PaperStudy case_spec paper_spec plan_trials",
     },
 )

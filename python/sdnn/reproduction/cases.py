@@ -13,6 +13,7 @@ from sdnn.support.arguments import one_of
 
 PAPER_TRIALS = 10  # per case; fewer support no conclusion
 PAPER_EPISODES = 15_000  # learning episodes per trial
+PAPER_INTERVAL = 10  # learning episodes between evaluations
 
 MOST_EPISODES = 10**8
 """Learning episodes per trial at most: the rows of more test episodes fill the memory."""
@@ -34,6 +35,15 @@ class Case:
     noise: float  # standard deviation in units of the normalized variables
     agents: tuple[str, ...]
     paper_figure: str
+
+    @property
+    def settings(self) -> dict[str, str | float]:
+        """The environment, by the keys of a specification."""
+        return {
+            "environment.id": "sdnn/PaperAcrobot-v0",
+            "environment.kwargs.sensors.n_sensors": self.n_sensors,
+            "environment.kwargs.sensors.noise": self.noise,
+        }
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,11 @@
-"""The results of a run as a page and as JSON, and a study's verdicts on the paper's claims."""
+"""The results of a run as a page and as JSON."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from sdnn import _core
 from sdnn.agents.registry import title_of
 from sdnn.reports.pages import Page, Section, Table, plain_number
-from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS, Experiment
+from sdnn.reproduction.cases import PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.reproduction.claims import (
     ALWAYS,
     NEVER,
@@ -22,7 +21,6 @@ from sdnn.reproduction.claims import (
     CheckOutcome,
     ClaimOutcome,
     ReferenceResult,
-    TenTrials,
     Verdict,
     is_paper_scale,
     judge_claims,
@@ -38,8 +36,6 @@ from sdnn.runs.report import (
     settings_section,
 )
 from sdnn.runs.results import STEP_MEASURES, CaseResult, records_of
-from sdnn.runs.study_file import KnownCase, StudyFile
-from sdnn.runs.sweep import Addition, Comparison
 from sdnn.runs.trial import TrialRecord, records_digest
 
 QUICK_WARNING = "QUICK LOOK: a fraction of the experiments, not their result."
@@ -157,7 +153,7 @@ class Report:
         folded = []
         if self.claims:
             title = "Each quantity of the claims, by these trials alone"
-            table = Table(title, _CHECKS, [*_check_rows(self.claims)], VERDICT_KINDS)
+            table = Table(title, CHECKS_HEADER, [*check_rows(self.claims)], VERDICT_KINDS)
             folded.append(Section(table=table, notes=[RULE_NOTE]))
         more = _more_table(self.claims)
         if more.rows:
@@ -249,11 +245,11 @@ def _name(check: Check) -> str:
     return check.measure.replace("_", " ") + (", difference" if check.minus else "")
 
 
-_CHECKS = ("claim", "measured", "paper", "ours", "verdict")
+CHECKS_HEADER = ("claim", "measured", "paper", "ours", "verdict")
 
 
-def _check_rows(claims: Iterable[ClaimOutcome]) -> Iterator[tuple[str, ...]]:
-    """Yield the verdict on each check by these trials alone, under `_CHECKS`."""
+def check_rows(claims: Iterable[ClaimOutcome]) -> Iterator[tuple[str, ...]]:
+    """Yield the verdict on each check by these trials alone, under `CHECKS_HEADER`."""
     for claim in claims:
         for one in claim.checks:
             words = (str(claim.claim.number), str(one.check), one.check.paper)
@@ -319,89 +315,3 @@ def _cost(cost: CostRecord | None, with_one_less: CostRecord | None) -> str:
 
 def _growth(ratio: float) -> str:
     return f"{ratio:.1f}x" if ratio < 100 else f"{ratio:,.0f}x"
-
-
-MIN_TRIALS_TO_DRAW = 2 * PAPER_TRIALS
-"""Fewer trials are too few to draw ten from."""
-
-CLAIMS_NOTE = "A claim is shown where the study has every case and agent that it speaks of."
-CHANCES_NOTE = (
-    f"In how many draws of {PAPER_TRIALS} of a variant's trials, as the paper's ten were one, the"
-    " medians lie in all ranges of a claim; with intervals over the trials that are drawn from."
-    f" Shown from {MIN_TRIALS_TO_DRAW} trials on."
-)
-
-
-class ClaimStudy(StudyFile):
-    """A study that may name the paper's cases, and whose report has verdicts on its claims."""
-
-    def __init__(self, path: Path, **options: Any) -> None:
-        known_cases = {
-            case.id: KnownCase(
-                case.title, {"sensors.n_sensors": case.n_sensors, "sensors.noise": case.noise}
-            )
-            for case in PAPER_CASES.values()
-        }
-        super().__init__(path, known_cases=known_cases, **options)
-
-    def additions(self, comparison: Comparison) -> Addition:
-        """Make verdicts about all claims, how often ten trials show them, and the quantities."""
-        judged = judge_variants(comparison)
-        values = [
-            {
-                "variant": variant,
-                "ten_trials_show_it": one.chance and one.chance.to_json(PAPER_EPISODES),
-                **one.to_json(),
-            }
-            for variant, claims in judged.items()
-            for one in claims.values()
-        ]
-        numbers = sorted({number for claims in judged.values() for number in claims})
-        if not numbers:
-            return [], {"claims": values}
-        titles = {variant.id: variant.title for variant in comparison.variants}
-        header = ("variant", *(f"claim {number}" for number in numbers))
-
-        def rows(cell: Callable[[ClaimOutcome], str]) -> list[tuple[str, ...]]:
-            return [
-                (titles[variant], *(cell(claims[n]) if n in claims else "-" for n in numbers))
-                for variant, claims in judged.items()
-            ]
-
-        verdicts = rows(lambda one: one.verdict.value)
-        table = Table("The paper's claims", header, verdicts, {"-": "none", **VERDICT_KINDS})
-        sections = [Section(table=table, notes=[CLAIMS_NOTE, RULE_NOTE])]
-        if self.n_trials >= MIN_TRIALS_TO_DRAW:
-            chances = rows(lambda one: format_share(one.chance))
-            table = Table("How often ten trials show the claims", header, chances)
-            sections.append(Section(level=3, table=table, notes=[CHANCES_NOTE]))
-        checks = [
-            (titles[variant], *row)
-            for variant, claims in judged.items()
-            for row in _check_rows(claims.values())
-        ]
-        table = Table("Each quantity of the claims", ("variant", *_CHECKS), checks, VERDICT_KINDS)
-        return [*sections, Section(folded=[Section(table=table)])], {"claims": values}
-
-
-def judge_variants(comparison: Comparison) -> dict[str, dict[int, ClaimOutcome]]:
-    """Judge the paper's claims about each variant of a study, by its id and the claim's number.
-
-    A case counts as the paper's by its id, an agent by its own: what a variant has changed is what
-    is judged. Claims of which a quantity is not measured are left out.
-    """
-    judged = {}
-    for variant in comparison.variants:
-        results = [
-            one.result
-            for (case, name), one in comparison.measured.items()
-            if name == variant.id and case in PAPER_CASES
-            if one.combination.spec.environment is None
-        ]
-        draws = TenTrials(results if comparison.study.n_trials >= MIN_TRIALS_TO_DRAW else ())
-        judged[variant.id] = {
-            outcome.claim.number: replace(outcome, chance=draws.chance(outcome.claim))
-            for outcome in judge_claims(results)
-            if all(checked.estimate is not None for checked in outcome.checks)
-        }
-    return judged

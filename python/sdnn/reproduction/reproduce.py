@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from sdnn.agents.registry import split_label, title_of
-from sdnn.config import SensorConfig
+from sdnn.agents.registry import agent_entry, split_label, title_of
+from sdnn.environments.paper_acrobot import PAPER_ACROBOT
 from sdnn.reports.plots import figure_bytes
 from sdnn.reproduction import cost
 from sdnn.reproduction.cases import (
@@ -16,6 +16,7 @@ from sdnn.reproduction.cases import (
     EXPERIMENTS,
     MOST_EPISODES,
     PAPER_EPISODES,
+    PAPER_INTERVAL,
     PAPER_TRIALS,
     Case,
     Experiment,
@@ -28,8 +29,8 @@ from sdnn.reproduction.report import Report
 from sdnn.runs.engine import Observer, PlannedTrial
 from sdnn.runs.report import Content
 from sdnn.runs.results import CaseResult
-from sdnn.runs.settings import AgentSpec, BudgetSpec
-from sdnn.runs.spec import PAPER_INTERVAL, RunSpec
+from sdnn.runs.settings import overridden
+from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Layer, Study, StudyCase, StudyVariant
 from sdnn.runs.sweep import Comparison
@@ -169,18 +170,51 @@ def collect(experiment: Experiment, comparison: Comparison) -> tuple[CaseResult,
     )
 
 
+def with_paper_defaults(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the values of a specification with the paper's where others are missing.
+
+    The agent is SDNN-C, with the settings of the paper unless a preset is named; it learns 15,000
+    episodes, with a test episode after every ten, and the noise runs on over episodes.
+    """
+    environment = {"id": PAPER_ACROBOT} | values.get("environment", {})
+    agent = {"name": "sdnn-c", "angle_pairs": "none", "inputs": "all"} | values.get("agent", {})
+    budget, protocol = dict(values.get("budget", {})), dict(values.get("protocol", {}))
+    try:
+        name, preset = split_label(agent["name"])
+        if preset is None and "paper" in agent_entry(name).presets:
+            agent.setdefault("preset", "paper")
+    except ValueError:  # refused with the specification
+        pass
+    if not budget.keys() & {"steps", "episodes"}:
+        budget["episodes"] = PAPER_EPISODES
+    if not protocol.keys() & {"evaluate_every", "evaluate_every_episodes"}:
+        protocol["evaluate_every_episodes"] = PAPER_INTERVAL
+    protocol = {"evaluation_episodes": 1, "seeded_episodes": False} | protocol
+    tables = {"environment": environment, "agent": agent, "budget": budget, "protocol": protocol}
+    return {**values, **tables}
+
+
+def paper_spec(**tables: object) -> RunSpec:
+    """Return a specification of the paper's task, with the given tables or values of them.
+
+    Examples
+    --------
+    >>> spec = paper_spec(agent="fuzzy", budget={"episodes": 100})
+    >>> spec.label, spec.task, spec.protocol.evaluate_every_episodes
+    ('fuzzy', 'sdnn/PaperAcrobot-v0', 10)
+    """
+    return RunSpec.from_values(with_paper_defaults(overridden(tables, {})))
+
+
 def case_spec(case: Case, agent: str, n_episodes: int = PAPER_EPISODES) -> RunSpec:
     """Return the specification of an agent in a case: its defaults, the case's sensors.
 
     Raises ValueError if the agent takes no part in the case, or if there is no such agent.
     """
     one_of("agent", agent, case.agents)
-    name, preset = split_label(agent)
-    return RunSpec(
-        agent=AgentSpec(name=name, preset=preset),
-        sensors=SensorConfig(n_sensors=case.n_sensors, noise=case.noise),
-        budget=BudgetSpec(episodes=n_episodes),
-    )
+    split_label(agent)
+    settings = {**case.settings, "agent.name": agent, "budget.episodes": n_episodes}
+    return paper_spec(**overridden({}, settings))
 
 
 def specs_of(

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import sqlite3
-from contextlib import closing, suppress
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
+from sdnn.runs.errors import StoreError
 from sdnn.support.files import is_there
 
 BUSY_SECONDS = 60.0
@@ -67,6 +69,24 @@ def foreign_journal(journal: Path) -> sqlite3.OperationalError:
         f"{journal.name} is not the journal of this file, whose content it would change or remove:"
         " move it away"
     )
+
+
+@contextmanager
+def as_store_error(path: Path) -> Iterator[None]:
+    """Turn errors of SQLite and the file system into one that names the file."""
+    try:
+        yield
+    except MemoryError as error:
+        raise StoreError(f"cannot use {path}: out of memory") from error
+    except (
+        sqlite3.DatabaseError, OSError, ValueError, TypeError, OverflowError, RecursionError,
+    ) as error:  # fmt: skip
+        if isinstance(error, sqlite3.OperationalError | OSError):
+            raise StoreError(f"cannot use {path}: {error}") from error
+        raise StoreError(
+            f"{path} is damaged or not a result file of sdnn ({error});"
+            " move it away or choose another output folder"
+        ) from error
 
 
 _MAGIC_OF_JOURNAL = bytes.fromhex("d9d505f920a163d7")

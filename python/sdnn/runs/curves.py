@@ -30,7 +30,6 @@ HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "hig
 
 Kind: TypeAlias = Literal["return", "running median", "evaluation"]
 
-_TASK = ("environment", "acrobot", "goal", "sensors")  # tables of a configuration
 _CHANGES_NOTHING = ("seed", "output", "budget.steps", "budget.episodes")  # but for the goals
 
 
@@ -58,7 +57,7 @@ def groups_of(runs: Sequence[Run]) -> list[Group]:
         task, agent = [spec.task], [f"{spec.agent.name} {spec.agent.preset or ''}".strip()]
         alike = [(dict(s), r[0].spec) for s, r in members.items() if r[0].spec.task == spec.task]
         for key, value in own:
-            is_of_task = key.partition(".")[0] in _TASK
+            is_of_task = key.startswith("environment.")
             others = (s for s, other in alike if is_of_task or other.label == spec.label)
             if any(other.get(key) != value for other in others):
                 word = value if key == "goals" else f"{key.rpartition('.')[2]}={value}"

@@ -357,7 +357,7 @@ def _joins_a_team(spec: RunSpec) -> bool:
     entry = spec.entry
     if not (entry.advances_together and entry.table_bytes and spec.is_compiled):
         return False
-    return entry.table_bytes(spec.approximator) <= MOST_TABLE_BYTES
+    return entry.table_bytes(spec.core_settings()["approximator"]) <= MOST_TABLE_BYTES
 
 
 def teams_of(planned: Iterable[PlannedTrial], jobs: int) -> Iterable[list[PlannedTrial]]:
@@ -365,12 +365,14 @@ def teams_of(planned: Iterable[PlannedTrial], jobs: int) -> Iterable[list[Planne
 
     Trials that are not faster together are teams of one.
     """
-    kinds: dict[object, list[PlannedTrial]] = {}
+    by_task: dict[object, list[PlannedTrial]] = {}
     for one in planned:
-        kind = (one.spec.agent.name, one.spec.acrobot) if _joins_a_team(one.spec) else one.key
-        kinds.setdefault(kind, []).append(one)
+        task: object = one.key
+        if _joins_a_team(one.spec):
+            task = one.spec.agent.name, one.spec.environment.paper_settings().acrobot
+        by_task.setdefault(task, []).append(one)
     teams: dict[PlannedTrial, list[PlannedTrial]] = {}
-    for alike in kinds.values():
+    for alike in by_task.values():
         size = min(MOST_TOGETHER, -(-len(alike) // jobs))
         teams |= {alike[k]: alike[k : k + size] for k in range(0, len(alike), size)}
     return [teams[one] for one in planned if one in teams]

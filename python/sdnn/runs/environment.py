@@ -8,7 +8,7 @@ import sys
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 import gymnasium as gym
 import msgspec
@@ -17,11 +17,21 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from sdnn.agents.scaling import Scaling, neighbours
-from sdnn.environments import ActionMasks, NoisySensors, RedundantSensors, UnitSensors
+from sdnn.config import values_of
+from sdnn.environments import (
+    AcrobotConfig,
+    ActionMasks,
+    GoalScheduleConfig,
+    NoisySensors,
+    RedundantSensors,
+    SensorConfig,
+    UnitSensors,
+)
+from sdnn.environments.paper_acrobot import PAPER_ACROBOT
 from sdnn.environments.sensors import in_own_units
 from sdnn.runs.errors import ConfigError, RunError
-from sdnn.runs.settings import Settings, doc
-from sdnn.support.arguments import shown
+from sdnn.runs.settings import Settings, changed, doc
+from sdnn.support.arguments import blamed, shown
 from sdnn.support.bounds import flat_bounds
 
 ALL = "all"
@@ -30,6 +40,16 @@ ALL = "all"
 Ends = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 Stream: TypeAlias = Literal["sensor_noise", "evaluation_sensor_noise"]
+
+AnyEnv: TypeAlias = gym.Env[Any, Any]
+
+
+class PaperSettings(NamedTuple):
+    """The arguments of the paper's acrobot as the core has them."""
+
+    acrobot: AcrobotConfig
+    goal: GoalScheduleConfig
+    sensors: SensorConfig
 
 
 def mean_of(first: int, second: int, observation: NDArray[Any]) -> float:
@@ -42,6 +62,9 @@ class EnvironmentSpec(Settings, frozen=True):
 
     With noise or redundant variables, observations are flattened and, but for ``own_units``, scaled
     to [0, 1]; values outside their ranges saturate. Without, the agent gets them as they are.
+
+    ``kwargs`` of the paper's acrobot, ``sdnn/PaperAcrobot-v0``, are filled in, since its trials may
+    run in C++: ``acrobot``, ``goal`` and ``sensors``, each a table with every setting.
     """
 
     id: Annotated[
@@ -93,6 +116,11 @@ class EnvironmentSpec(Settings, frozen=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.is_paper_acrobot:
+            kwargs = dict(self.kwargs)
+            for name, default in _PAPER_DEFAULTS._asdict().items():
+                kwargs[name] = values_of(changed(default, kwargs.get(name, {}), f"kwargs.{name}"))
+            msgspec.structs.force_setattr(self, "kwargs", kwargs)
         try:
             json.dumps(self.kwargs, allow_nan=False)
         except (TypeError, ValueError) as error:
@@ -111,6 +139,35 @@ class EnvironmentSpec(Settings, frozen=True):
         return hash((self.id, self.noise, self.redundant, json.dumps(self.kwargs, sort_keys=True)))
 
     @property
+    def is_paper_acrobot(self) -> bool:
+        """Whether it is the acrobot of the paper's experiments."""
+        return self.id.rpartition(":")[2] == PAPER_ACROBOT
+
+    @property
+    def is_plain_paper_acrobot(self) -> bool:
+        """Whether it is the paper's acrobot, and nothing else changes what is observed of it."""
+        return (
+            self.is_paper_acrobot
+            and self.kwargs.keys() == set(PaperSettings._fields)
+            and self == EnvironmentSpec(id=self.id, kwargs=self.kwargs)
+        )
+
+    def paper_settings(self) -> PaperSettings:
+        """Return the arguments of the paper's acrobot as the core has them."""
+        acrobot, goal, sensors = (self.kwargs[name] for name in PaperSettings._fields)
+        return PaperSettings(
+            AcrobotConfig(**acrobot), GoalScheduleConfig(**goal), SensorConfig(**sensors)
+        )
+
+    def without_noise(self) -> EnvironmentSpec:
+        """Return the environment without noise on its sensors."""
+        if not self.is_paper_acrobot:
+            return self.replace(noise=0.0)
+        return self.replace(
+            noise=0.0, kwargs=self.kwargs | {"sensors": self.kwargs["sensors"] | {"noise": 0.0}}
+        )
+
+    @property
     def changes_observations(self) -> bool:
         """Whether the agent observes variables that are scaled to [0, 1]."""
         return self.has_other_sensors and not self.own_units
@@ -120,9 +177,7 @@ class EnvironmentSpec(Settings, frozen=True):
         """Whether the agent's observations differ from the environment's."""
         return self.noise > 0.0 or self.redundant > 0
 
-    def make(
-        self, stream: Stream = "sensor_noise", render_mode: str | None = None
-    ) -> gym.Env[Any, Any]:
+    def make(self, stream: Stream = "sensor_noise", render_mode: str | None = None) -> AnyEnv:
         """Make the environment; every reset with a seed starts its noise.
 
         ConfigError if there is no such environment, it cannot be made, or ranges are missing or
@@ -135,7 +190,7 @@ class EnvironmentSpec(Settings, frozen=True):
         render_mode
             As Gymnasium has it.
         """
-        env = self._bare(render_mode)
+        env = self._bare(stream, render_mode)
         try:
             if render_mode is not None and env.render_mode != render_mode:
                 raise RunError(_no_pictures(self.id, render_mode))
@@ -168,7 +223,7 @@ class EnvironmentSpec(Settings, frozen=True):
             env.close()
             raise
 
-    def _masked(self, env: gym.Env[Any, Any]) -> gym.Env[Any, Any]:
+    def _masked(self, env: AnyEnv) -> AnyEnv:
         try:
             return ActionMasks(env)
         except ValueError as error:
@@ -190,7 +245,7 @@ class EnvironmentSpec(Settings, frozen=True):
             raise ConfigError("environment.id", words) from error
         return True
 
-    def scaling(self, env: gym.Env[Any, Any] | None = None) -> Scaling | None:
+    def scaling(self, env: AnyEnv | None = None) -> Scaling | None:
         """Return how observations are scaled; None: not at all.
 
         Where the agent acts without the noisy or redundant sensors of its run, it needs
@@ -220,7 +275,7 @@ class EnvironmentSpec(Settings, frozen=True):
         pairs = zip(env.observation_low.tolist(), env.observation_high.tolist(), strict=True)
         return Scaling(ranges=tuple(pairs), n_redundant=self.redundant)
 
-    def ends(self, env: gym.Env[Any, Any]) -> Ends:
+    def ends(self, env: AnyEnv) -> Ends:
         """Return the lowest and highest values of the flattened observation; infinite: not known.
 
         ConfigError if a range is given of a variable that is not there, or observations are no
@@ -247,8 +302,10 @@ class EnvironmentSpec(Settings, frozen=True):
             low[int(key)], high[int(key)] = ends
         return low, high
 
-    def _bare(self, render_mode: str | None) -> gym.Env[Any, Any]:
+    def _bare(self, stream: Stream, render_mode: str | None) -> AnyEnv:
         options = {"disable_env_checker": True, **self.kwargs}
+        if self.is_paper_acrobot:
+            options["stream"] = stream
         if render_mode is not None:
             options["render_mode"] = render_mode
         find_module(self.id.rpartition(":")[0])
@@ -262,12 +319,39 @@ class EnvironmentSpec(Settings, frozen=True):
             raise ConfigError("environment.id", f"no environment {self.id!r}: {error}") from error
         except Exception as error:  # whatever a user's environment raises
             if render_mode is not None:
-                self._bare(None).close()
+                self._bare(stream, None).close()
                 raise RunError(_no_pictures(self.id, render_mode)) from error
-            key = "environment.kwargs" if self.kwargs else "environment.id"
-            raise ConfigError(
-                key, f"{self.id} cannot be made: {type(error).__name__}: {error}"
-            ) from error
+            problem = f"{self.id} cannot be made: {type(error).__name__}: {error}"
+            other = "environment.kwargs" if self.kwargs else "environment.id"
+            raise ConfigError(self.key_of(blamed(error)[0]) or other, problem) from error
+
+    def key_of(self, argument: str) -> str:
+        """Return the key of an argument, also in a table; an empty one of an unknown name."""
+        for key, value in self.kwargs.items():
+            if argument == key:
+                return f"environment.kwargs.{key}"
+            if isinstance(value, dict) and argument in value:
+                return f"environment.kwargs.{key}.{argument}"
+        return ""
+
+
+_PAPER_DEFAULTS = PaperSettings(AcrobotConfig(), GoalScheduleConfig(), SensorConfig())
+
+
+class SeedFirstReset(gym.Wrapper[Any, Any, Any, Any]):
+    """Gives the first reset a seed, so that the random streams of all others follow from it."""
+
+    def __init__(self, env: AnyEnv, seed: int) -> None:
+        super().__init__(env)
+        self._seed: int | None = seed
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Reset the environment."""
+        if seed is None:
+            seed, self._seed = self._seed, None
+        return super().reset(seed=seed, options=options)
 
 
 _folders: list[str] = []
@@ -290,7 +374,7 @@ def find_module(name: str) -> None:
         sys.path += [folder for folder in _folders if folder not in sys.path]
 
 
-def render_modes(env: gym.Env[Any, Any]) -> tuple[str, ...]:
+def render_modes(env: AnyEnv) -> tuple[str, ...]:
     """Return the render modes in the metadata of an environment; none where there are none."""
     return tuple((env.metadata or {}).get("render_modes") or ())
 

@@ -45,7 +45,6 @@ from sdnn.runs.trial import (
     TrialKey,
     TrialRecord,
     TrialRows,
-    training_trial,
 )
 from sdnn.support.display import Displayed
 from sdnn.support.files import lock, open_to_append, remove_abandoned_files, write_whole
@@ -158,14 +157,13 @@ class Run(Displayed):
     def check(self) -> None:
         """Make all that is needed once, to see that it works; ConfigError if not."""
         instruction_set()  # whose variable may be wrong
-        if self.spec.environment is None:
+        if not self.spec.protocol.seeded_episodes:
             raise ConfigError(
-                "environment",
-                "must be given for a run in a folder: the paper's acrobot has sensor noise that"
-                " runs on over episodes, so that none can be repeated. Studies and `sdnn reproduce`"
-                " run it; sdnn.environments:sdnn/AcrobotSwingUp-v0 is the same acrobot",
+                "protocol.seeded_episodes",
+                "must be true for a run in a folder: without seeds no episode can be repeated,"
+                " which resuming needs. Studies and `sdnn reproduce` run such specifications",
             )
-        training_trial(self.spec).close()
+        self.spec.make_training().close()
         if self.spec.output.tensorboard:
             tensorboard_in(self.folder)
 
@@ -328,12 +326,12 @@ class Run(Displayed):
         if self.goals or has_goal:
             spec = spec.replace(budget=spec.budget.replace(target_return=None))
         if not (self.folder / CHECKPOINT).exists():
-            trial = training_trial(spec, callbacks)
+            trial = spec.make_training(callbacks)
             trial.training.steps, trial.training.episodes = self.goal.steps, self.goal.episodes
             return trial
         try:
-            return training_trial(
-                spec, callbacks, self.folder / CHECKPOINT, repeat_episodes=repeat_episodes
+            return spec.make_training(
+                callbacks, self.folder / CHECKPOINT, repeat_episodes=repeat_episodes
             )
         except UnrepeatedEpisodeError as error:
             begins = resume_command(self.folder, "--new-episode")

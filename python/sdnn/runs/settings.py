@@ -8,9 +8,19 @@ import functools
 import math
 import types
 import typing
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    Protocol,
+    TypeVar,
+    get_args,
+    get_origin,
+    runtime_checkable,
+)
 
 import msgspec
 import numpy as np
@@ -22,6 +32,9 @@ from sdnn.runs.errors import ConfigError
 from sdnn.support.arguments import advice, blamed, shown
 
 AnySettings = TypeVar("AnySettings", bound="Settings")
+AnyPart = TypeVar("AnyPart", bound="PartSettings")
+
+DEFAULT_AGENT = "q-lambda"
 
 SHORTHANDS = {"environment": "id", "agent": "name"}
 """Tables that may be given as the value of one of their keys."""
@@ -42,6 +55,18 @@ _WORDS = {
     "Expected ": "",
 }
 """Words for those of msgspec's messages."""
+
+
+@runtime_checkable
+class PartSettings(Protocol):
+    """The settings of a part of an agent: a frozen dataclass, or a class of the core."""
+
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
+
+
+@dataclasses.dataclass(frozen=True)
+class PresetSettings:
+    """Stands for the settings of an agent's preset."""
 
 
 def doc(text: str) -> Meta:
@@ -82,7 +107,9 @@ def _kinds_of(kind: type[Any]) -> Mapping[str, Any]:
 
 def schemas_of(*kinds: Any) -> dict[str, Any]:
     """Return the JSON Schemas of classes and of those in them, by name, as ``#/$defs/`` refers."""
-    _, schemas = msgspec.json.schema_components(kinds, ref_template="#/$defs/{name}")
+    _, schemas = msgspec.json.schema_components(
+        kinds, ref_template="#/$defs/{name}", schema_hook=lambda _: {"type": "object"}
+    )
     return schemas
 
 
@@ -98,6 +125,8 @@ def checked(kind: Any, value: Any, key: str) -> Any:
 
     ConfigError if it does not fit.
     """
+    if _alternatives(kind) == (PartSettings,):
+        return value  # which follows from the agent: see `changed`
     if isinstance(value, np.generic | np.ndarray):
         if isinstance(value, np.ma.MaskedArray) or value.dtype.kind not in "biufU":
             raise ConfigError(key, f"must be numbers or texts, got {shown(value)}")
@@ -141,8 +170,10 @@ def _problem(possible: Iterable[Any], text: str) -> str:
     return f"must be {expected[:1].lower() + expected[1:]}"
 
 
-def check_names(values: Any, possible: Iterable[str], where: str = "", hint: str = "") -> None:
-    """Check that a table has no other keys than the possible ones; ConfigError if it has."""
+def check_names(
+    values: object, possible: Iterable[str], where: str = "", hint: str = ""
+) -> Mapping[str, Any]:
+    """Return a table, if it has no other keys than the possible ones; else ConfigError."""
     if not isinstance(values, Mapping):
         raise ConfigError(where, f"must be a table, got {shown(values)}")
     known = tuple(possible)
@@ -151,15 +182,16 @@ def check_names(values: Any, possible: Iterable[str], where: str = "", hint: str
             path = _path(where, name)
             others = {last: key for last, key in KEYS_BY_NAME.items() if not path.endswith(key)}
             raise ConfigError(path, f"unknown key; {advice(str(name), known, others)}{hint}")
+    return values
 
 
-def read(kind: type[AnySettings], values: Any, where: str = "") -> AnySettings:
+def read(kind: type[AnySettings], values: object, where: str = "") -> AnySettings:
     """Make settings of a table as JSON or TOML has it, with the tables in it.
 
     What is missing has its default; ``where`` is the table's key. ConfigError if a key is unknown
     or missing, or a value does not fit.
     """
-    check_names(values, kind.__struct_fields__, where)
+    values = check_names(values, kind.__struct_fields__, where)
     with within(where):
         for field in msgspec.structs.fields(kind):
             if field.required and field.name not in values:
@@ -167,7 +199,7 @@ def read(kind: type[AnySettings], values: Any, where: str = "") -> AnySettings:
         return kind(**values)
 
 
-def changed(base: Any, values: Any, where: str, hint: str = "") -> Any:
+def changed(base: AnyPart, values: object, where: str, hint: str = "") -> AnyPart:
     """Return settings of an agent's part with the values of a table, whose key is ``where``.
 
     They are those of the core, which check themselves, or a frozen dataclass. ConfigError if a key
@@ -176,7 +208,7 @@ def changed(base: Any, values: Any, where: str, hint: str = "") -> Any:
     names = names_of(type(base))
     if isinstance(values, Mapping) and "n_inputs" in values:
         raise ConfigError(f"{where}.n_inputs", "follows from the observations: omit it")
-    check_names(values, [name for name in names if name != "n_inputs"], where, hint)
+    values = check_names(values, [name for name in names if name != "n_inputs"], where, hint)
     if not fields_of(type(base)):
         kinds = _kinds_of(base.__class__)
         values = {name: checked(kinds[name], v, f"{where}.{name}") for name, v in values.items()}
@@ -185,6 +217,34 @@ def changed(base: Any, values: Any, where: str, hint: str = "") -> Any:
     except Exception as error:  # of whatever settings an agent has
         name, problem = blamed(error)
         raise ConfigError(f"{where}.{name}" if name in names else where, problem) from error
+
+
+def differences(
+    values: Mapping[str, object], defaults: Mapping[str, object], always: Collection[str] = ()
+) -> dict[str, Any]:
+    """Return the values, also in tables, that are not the default, and some by their names.
+
+    Examples
+    --------
+    >>> differences({"a": 1, "b": {"c": 2, "d": 3}}, {"a": 1, "b": {"c": 2, "d": 4}})
+    {'b': {'d': 3}}
+    """
+    changes: dict[str, Any] = {}
+    for name, value in values.items():
+        default = defaults.get(name)
+        if isinstance(value, Mapping) and isinstance(default, Mapping):
+            if table := differences(value, default, always):
+                changes[name] = table
+        elif name in always or value != default:
+            changes[name] = value
+    return changes
+
+
+def changed_size(approximator: PartSettings, n_inputs: int) -> PartSettings:
+    """Return the settings of an approximator with a number of inputs, if it has that field."""
+    if "n_inputs" not in names_of(type(approximator)):
+        return approximator
+    return dataclasses.replace(approximator, n_inputs=n_inputs)
 
 
 @contextmanager
@@ -237,8 +297,8 @@ class AgentSpec(Settings, frozen=True):
         Literal["none", "find"] | tuple[tuple[Index, Index], ...] | None,
         doc(
             "Which cosines and sines of an angle become one input: pairs of observed "
-            "variables, from 0, or those that the warm-up finds. By default `none`; of `sdnn-"
-            "linear`, `find`, unless observations are scaled."
+            "variables, from 0, or those that the warm-up finds. By default `none`; of "
+            "`q-lambda`, `find`, unless observations are scaled."
         ),
     ] = None
     inputs: Annotated[
@@ -282,9 +342,15 @@ class ProtocolSpec(Settings, frozen=True):
         Count | None, doc("Learning episodes between evaluations, instead of steps.")
     ] = None
     evaluation_episodes: Annotated[
-        Annotated[int, Meta(ge=1, le=10**9)] | None,
-        doc("Greedy episodes in each evaluation. By default 10."),
-    ] = None
+        int, Meta(ge=1, le=10**9), doc("Greedy episodes in each evaluation.")
+    ] = 10
+    seeded_episodes: Annotated[
+        bool,
+        doc(
+            "Whether each episode's reset has a seed of its own. If not, only the first has one,"
+            " and random streams run on from episode to episode, as in the paper."
+        ),
+    ] = True
     limit_bootstraps: Annotated[bool, doc(_CORE["limit_bootstraps"].doc)] = _CORE[
         "limit_bootstraps"
     ].default

@@ -2,81 +2,59 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
+from contextlib import ExitStack, closing
+from pathlib import Path
 from typing import Annotated, Any
 
-import gymnasium as gym
 import msgspec
+from gymnasium.vector import SyncVectorEnv
 from msgspec import Meta
 
-from sdnn.agents import Agent, Preset
+from sdnn.agents import Agent, Callback, StopTrainingOnRewardThreshold, Training
 from sdnn.agents.q_learning import CodedAgent
-from sdnn.agents.registry import (
-    AGENTS,
-    AgentEntry,
-    agent_entry,
-    default_agent,
-    label_of,
-    split_label,
-)
+from sdnn.agents.registry import AGENTS, AgentEntry, agent_entry, label_of, split_label
 from sdnn.config import ProtocolConfig
-from sdnn.environments import (
-    AcrobotConfig,
-    AcrobotSensors,
-    AcrobotSwingUpEnv,
-    GoalSchedule,
-    GoalScheduleConfig,
-    SensorConfig,
-    TighteningGoal,
-)
-from sdnn.runs.environment import EnvironmentSpec, Stream
+from sdnn.runs.environment import AnyEnv, EnvironmentSpec, SeedFirstReset, Stream
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.settings import (
+    DEFAULT_AGENT,
     SHORTHANDS,
     AgentSpec,
     BudgetSpec,
     OutputSpec,
+    PartSettings,
+    PresetSettings,
     ProtocolSpec,
     Settings,
     changed,
+    changed_size,
+    differences,
     doc,
     names_of,
     read,
 )
-from sdnn.runs.trial import TrainingTrial, Trial, training_trial
-from sdnn.support.arguments import blamed, is_of_class, shown
+from sdnn.runs.trial import TrainingTrial, Trial, canonical_json, config_hash
+from sdnn.support.arguments import blamed, shown
 from sdnn.support.bounds import flat_bounds
 from sdnn.training.learners import Learner
 
-HASH_DIGITS = 16
-"""Hexadecimal digits kept of a specification's SHA-256: 64 bits."""
-
 DEFAULT_STEPS = 200_000
-PAPER_EPISODES = 15_000
-PAPER_INTERVAL = 10
+DEFAULT_INTERVAL = 10_000
 
 _ALWAYS = ("id", "name", "preset", "steps", "episodes")
 """Settings that are written also where they are the default."""
 
-ACROBOT = {"acrobot": AcrobotConfig, "goal": GoalScheduleConfig, "sensors": SensorConfig}
-"""Tables of the paper's task, which a specification without an environment has."""
-
-_OF_SPACES = ("observation_range", "angles", "angle_pairs", "inputs", "warm_up_steps", "missing")
-"""Settings of agents in environments."""
-
-_UNUSED = AgentSpec(angle_pairs="none", inputs="all")
-"""Values of these settings on the acrobot."""
+_OPTIONAL = ("observation_range", "angles", "angle_pairs", "inputs", "warm_up_steps", "missing")
+"""Settings of `AgentSpec` that are arguments of an agent where they are not the default."""
 
 
 class RunSpec(Settings, frozen=True):
     """Everything that fixes the rows of a run, and what is written of it.
 
-    What is not given is filled in: preset, budget and evaluations follow from the task, the
-    settings of the agent's parts from its preset. ``approximator.n_inputs`` follows from what is
-    observed.
+    Missing settings are filled in; those of the agent's parts, ``approximator`` and ``learning``,
+    follow from its preset. Each of the two may be a mapping of the settings that differ.
+    ``approximator.n_inputs`` follows from the observations.
 
     ConfigError if a value cannot be used; ``key`` names it, with dots between tables.
 
@@ -85,20 +63,15 @@ class RunSpec(Settings, frozen=True):
     >>> spec = RunSpec(environment=EnvironmentSpec(id="CartPole-v1"), seed=3)
     >>> spec.budget.steps, spec.agent.name, spec.agent.preset
     (200000, 'q-lambda', 'general')
-    >>> RunSpec(learning={"epsilon": 0.2}).learning.epsilon
+    >>> spec = RunSpec.from_values({"environment": "CartPole-v1", "learning": {"epsilon": 0.2}})
+    >>> spec.learning.epsilon
     0.2
     """
 
-    environment: Annotated[
-        EnvironmentSpec | None,
-        doc("A Gymnasium environment; by default the task is the paper's acrobot."),
-    ] = None
-    acrobot: Annotated[Any, doc("Physics, goal and reward of the acrobot.")] = None
-    goal: Annotated[Any, doc("How the acrobot's goal tightens.")] = None
-    sensors: Annotated[Any, doc("What is observed of the acrobot, and how noisily.")] = None
+    environment: Annotated[EnvironmentSpec, doc("The task: an environment of Gymnasium.")]
     agent: Annotated[AgentSpec, doc("Who learns.")] = AgentSpec()
-    approximator: Annotated[Any, doc("What the agent learns with.")] = None
-    learning: Annotated[Any, doc("How the agent learns and explores.")] = None
+    approximator: Annotated[PartSettings, doc("What the agent learns with.")] = PresetSettings()
+    learning: Annotated[PartSettings, doc("How the agent learns and explores.")] = PresetSettings()
     protocol: Annotated[ProtocolSpec, doc("How it is evaluated.")] = ProtocolSpec()
     budget: Annotated[BudgetSpec, doc("How long it learns.")] = BudgetSpec()
     seed: Annotated[int, Meta(ge=0), doc("Root of all seeds, at most 2**64 - 1.")] = 0
@@ -111,34 +84,27 @@ class RunSpec(Settings, frozen=True):
         super().__post_init__()
         if self.seed >= 2**64:
             raise ConfigError("seed", f"must be at most 2**64 - 1, got {shown(self.seed)}")
-        for name, kind in ACROBOT.items():
-            if self.environment is None:
-                self._set(**{name: self._part(name, kind())})
-            elif getattr(self, name) is not None:
-                raise ConfigError(name, "is the acrobot's: it does not go with an environment")
         self._fill_agent()
         self._fill_protocol()
 
-    def _set(self, **values: Any) -> None:
+    def _set(self, **values: object) -> None:
         for name, value in values.items():
             msgspec.structs.force_setattr(self, name, value)
 
-    def _part(self, name: str, base: Any, hint: str = "") -> Any:
-        """Return settings of a part: as given, or those of ``base`` with the given changes."""
-        value = getattr(self, name)
-        if value is None or isinstance(value, Mapping):
-            return changed(base, value or {}, name, hint)
-        if is_of_class(value, type(base)):
+    def _part(self, name: str, base: PartSettings, hint: str) -> PartSettings:
+        """Return the settings of a part, or those of ``base`` with the given changes."""
+        value: object = getattr(self, name)
+        if isinstance(value, type(base)):
             return value
-        words = f"must be a table or {type(base).__name__}{hint}"
-        raise ConfigError(name, f"{words}, got {shown(value)}")
+        if value is None or isinstance(value, Mapping | PresetSettings):
+            return changed(base, value if isinstance(value, Mapping) else {}, name, hint)
+        expected = f"must be a table or {type(base).__name__}{hint}"
+        raise ConfigError(name, f"{expected}, got {shown(value)}")
 
     def _fill_agent(self) -> None:
         entry, preset = self._chosen_agent()
-        for name in self._of_spaces() if self.environment is None else ():
-            raise ConfigError(f"agent.{name}", "is for environments: omit it on acrobot")
         if preset is None and entry.presets:
-            preset = "paper" if self.environment is None else "general"
+            preset = "general"
         if preset is not None and preset not in entry.presets:
             words = f"one of {', '.join(map(repr, entry.presets))}" if entry.presets else "omitted"
             others = [other.id for other in AGENTS.values() if preset in other.presets]
@@ -149,62 +115,42 @@ class RunSpec(Settings, frozen=True):
             )
         defaults = entry.settings(preset)
         for name in ("approximator", "learning"):
-            base = getattr(defaults, name)
+            base: PartSettings = getattr(defaults, name)
             self._set(**{name: self._part(name, base, f" (agent {entry.id})")})
-        self._set(agent=self.agent.replace(name=entry.id, preset=preset, **self._chosen(defaults)))
-        if self.environment is None:
-            self._set(approximator=changed_size(self.approximator, self.sensors.n_inputs))
+        pairs = "none" if self.environment.changes_observations else defaults.angle_pairs
+        agent = self.agent
+        self._set(
+            agent=agent.replace(
+                name=entry.id,
+                preset=preset,
+                angle_pairs=pairs if agent.angle_pairs is None else agent.angle_pairs,
+                inputs=defaults.inputs if agent.inputs is None else agent.inputs,
+            )
+        )
 
     def _chosen_agent(self) -> tuple[AgentEntry, str | None]:
         """Return the agent and the preset; a name such as ``"sdnn-c-robust"`` has both."""
-        word, preset = self.agent.name, self.agent.preset
-        if word is None:
-            word = default_agent(on_acrobot=self.environment is None)
+        label, preset = self.agent.name or DEFAULT_AGENT, self.agent.preset
         try:
-            name, named = split_label(word)
+            name, named = split_label(label)
         except ValueError as error:
-            if self.environment is None or not self.environment.imported():
+            if not self.environment.imported():
                 raise ConfigError("agent.name", blamed(error)[1]) from None
             return self._chosen_agent()  # which the environment's module may have registered
         if named is not None and preset not in (None, named):
-            raise ConfigError("agent.preset", f"must be that of {word!r}, got {shown(preset)}")
+            raise ConfigError("agent.preset", f"must be that of {label!r}, got {shown(preset)}")
         return agent_entry(name), named or preset
 
-    def _chosen(self, preset: Preset) -> dict[str, Any]:
-        """Return what is an input: as given, or as the preset has it in environments."""
-        environment, agent = self.environment, self.agent
-        default = _UNUSED if environment is None else preset
-        pairs = "none" if environment and environment.changes_observations else default.angle_pairs
-        return {
-            "angle_pairs": pairs if agent.angle_pairs is None else agent.angle_pairs,
-            "inputs": default.inputs if agent.inputs is None else agent.inputs,
-        }
-
-    def _of_spaces(self) -> dict[str, Any]:
-        """Return the settings for environments that are not those of the acrobot."""
-        given = {name: getattr(self.agent, name) for name in _OF_SPACES}
-        return {k: value for k, value in given.items() if value not in (None, getattr(_UNUSED, k))}
-
     def _fill_protocol(self) -> None:
-        on_acrobot, environment = self.environment is None, self.environment
         protocol, budget = self.protocol, self.budget
         if protocol.evaluate_every is protocol.evaluate_every_episodes is None:
-            name = "evaluate_every_episodes" if on_acrobot else "evaluate_every"
-            protocol = protocol.replace(**{name: PAPER_INTERVAL if on_acrobot else 10_000})
-        if protocol.evaluation_episodes is None:
-            protocol = protocol.replace(evaluation_episodes=1 if on_acrobot else 10)
+            protocol = protocol.replace(evaluate_every=DEFAULT_INTERVAL)
         if budget.steps is budget.episodes is None:
-            name = "episodes" if on_acrobot else "steps"
-            budget = budget.replace(**{name: PAPER_EPISODES if on_acrobot else DEFAULT_STEPS})
+            budget = budget.replace(steps=DEFAULT_STEPS)
         self._set(protocol=protocol, budget=budget)
-        if on_acrobot and protocol.n_envs > 1:
-            raise ConfigError("protocol.n_envs", f"must be 1 for acrobot, got {protocol.n_envs}")
-        if budget.target_return is not None and not self.is_evaluated:
-            raise ConfigError(
-                "budget.target_return", "needs evaluations: evaluate_every must not be 0"
-            )
-        if self.output.keep_best and not self.is_evaluated:
-            raise ConfigError("output.keep_best", "needs evaluations: evaluate_every must not be 0")
+        if not self.is_evaluated and (budget.target_return is not None or self.output.keep_best):
+            key = "output.keep_best" if self.output.keep_best else "budget.target_return"
+            raise ConfigError(key, "needs evaluations: evaluate_every must not be 0")
         if self.output.keep_best and budget.steps and budget.steps < (protocol.evaluate_every or 0):
             raise ConfigError(
                 "output.keep_best",
@@ -217,7 +163,7 @@ class RunSpec(Settings, frozen=True):
                 "budget.episodes",
                 f"must be at least evaluate_every_episodes ({every}), got {budget.episodes}",
             )
-        if self.agent.angle_pairs == "find" and environment and environment.changes_observations:
+        if self.agent.angle_pairs == "find" and self.environment.changes_observations:
             raise ConfigError(
                 "agent.angle_pairs",
                 "finds no angles in scaled observations: not together with noise or redundant",
@@ -226,8 +172,6 @@ class RunSpec(Settings, frozen=True):
     def __hash__(self) -> int:
         return hash((self.canonical_json(), self.seed, self.output))
 
-    # What is derived.
-
     @property
     def is_evaluated(self) -> bool:
         """Whether there are evaluations."""
@@ -235,8 +179,8 @@ class RunSpec(Settings, frozen=True):
 
     @property
     def task(self) -> str:
-        """The environment's id, or ``"acrobot"`` for the paper's."""
-        return "acrobot" if self.environment is None else self.environment.id
+        """The environment's id."""
+        return self.environment.id
 
     @property
     def label(self) -> str:
@@ -251,16 +195,26 @@ class RunSpec(Settings, frozen=True):
     @property
     def is_compiled(self) -> bool:
         """Whether the whole run can be done in C++, by `core_trial`, without the GIL."""
+        protocol = self.protocol
         return (
-            self.environment is None
-            and self.entry.core_trial is not None
-            and self.protocol.evaluation_episodes == 1
-            and self.protocol.evaluate_every_episodes is not None
+            self.entry.core_trial is not None
+            and self.environment.is_plain_paper_acrobot
+            and not self._optional_settings()
+            and (protocol.n_envs, protocol.evaluation_episodes) == (1, 1)
+            and protocol.evaluate_every_episodes is not None
+            and not protocol.seeded_episodes
             and self.budget.episodes is not None
             and self.budget.target_return is None
         )
 
-    # What is made of it.
+    def core_settings(self) -> dict[str, object]:
+        """Return the settings of the trial in C++ that are not its protocol, by their names."""
+        paper = self.environment.paper_settings()
+        return {
+            **paper._asdict(),
+            "approximator": changed_size(self.approximator, paper.sensors.n_inputs),
+            "learning": self.learning,
+        }
 
     def core_trial(self) -> Trial:
         """Make the trial in C++: the rows of the training loop, bit for bit.
@@ -268,17 +222,16 @@ class RunSpec(Settings, frozen=True):
         It releases the GIL while it advances. ValueError if a value is out of its range, or if it
         is not `is_compiled`.
         """
-        entry = self.entry
-        if not self.is_compiled or entry.core_trial is None:
+        make = self.entry.core_trial
+        if not self.is_compiled or make is None:
             raise ValueError(f"{self.label} has no trial in C++ under this protocol")
-        parts = {name: getattr(self, name) for name in (*ACROBOT, "approximator", "learning")}
         protocol = ProtocolConfig(
             episodes=self.budget.episodes or 0,
             evaluate_every_episodes=self.protocol.evaluate_every_episodes or 0,
             limit_bootstraps=self.protocol.limit_bootstraps,
             noisy_evaluations=self.protocol.noisy_evaluations,
         )
-        trial: Trial = entry.core_trial(**parts, protocol=protocol, seed=self.seed)
+        trial: Trial = make(**self.core_settings(), protocol=protocol, seed=self.seed)
         return trial
 
     @property
@@ -292,15 +245,73 @@ class RunSpec(Settings, frozen=True):
         ConfigError if environment or agent cannot be made; ValueError if a value is out of range.
         """
         spec = self.replace(seed=seed)
-        return spec.core_trial() if spec.is_compiled else training_trial(spec)
+        return spec.core_trial() if spec.is_compiled else spec.make_training()
+
+    def make_training(
+        self,
+        callbacks: Iterable[Callback] = (),
+        checkpoint: Path | None = None,
+        *,
+        repeat_episodes: bool = True,
+    ) -> TrainingTrial:
+        """Make the trial in Python: a training with its environments.
+
+        It resumes at the checkpoint, if there is one; see `sdnn.agents.Training.load`. ConfigError
+        if a part cannot be made.
+        """
+        budget, protocol = self.budget, self.protocol
+        target, evaluation_env = None, None
+        if budget.target_return is not None:
+            target = StopTrainingOnRewardThreshold(budget.target_return)
+            callbacks = (target, *callbacks)
+        with ExitStack() as environments:
+            env = environments.enter_context(closing(self.make_training_env()))
+            if self.is_evaluated:
+                evaluation_env = self._make_evaluation_env()
+                environments.callback(evaluation_env.close)
+            single: AnyEnv = env.envs[0] if isinstance(env, SyncVectorEnv) else env
+            options = None
+            if single.metadata.get("reset_episode"):
+                options = _episode_option
+                if protocol.n_envs > 1:
+                    problem = f"must be 1: resets of {self.task} take the number of the episode"
+                    raise ConfigError("protocol.n_envs", f"{problem}, got {protocol.n_envs}")
+            if checkpoint is not None:
+                training = Training.load(
+                    checkpoint, env, callbacks=callbacks, evaluation_env=evaluation_env,
+                    repeat_episodes=repeat_episodes, reset_options=options,
+                )  # fmt: skip
+            else:
+                training = self.entry.training(
+                    self.make_agent(single),
+                    env,
+                    steps=budget.steps,
+                    episodes=budget.episodes,
+                    seed=self.seed if protocol.seeded_episodes else None,
+                    callbacks=callbacks,
+                    evaluate_every=protocol.evaluate_every or None,
+                    evaluate_every_episodes=protocol.evaluate_every_episodes,
+                    evaluation_env=evaluation_env,
+                    evaluation_episodes=protocol.evaluation_episodes,
+                    limit_bootstraps=protocol.limit_bootstraps,
+                    reset_options=options,
+                )
+            return TrainingTrial(training, environments.pop_all(), target)
+
+    def _make_evaluation_env(self) -> AnyEnv:
+        try:
+            return self.make_env("evaluation_sensor_noise")
+        except ConfigError as error:  # there may be one robot only
+            problem = f"needs a second environment, or must be 0: {error.problem}"
+            raise ConfigError("protocol.evaluate_every", problem) from error
 
     def make_env(
         self, stream: Stream = "sensor_noise", *, render_mode: str | None = None
-    ) -> gym.Env[Any, Any]:
+    ) -> AnyEnv:
         """Make an environment to learn in or, of the other stream, to be evaluated in.
 
-        Each reset with a seed starts the sensors' noise. On the paper's acrobot it starts at the
-        run's seed and runs on over episodes.
+        Each reset with a seed starts the sensors' noise. Where episodes have no seeds, the first
+        reset has the run's.
 
         ConfigError if it cannot be made. RunError if it can be made, but not with this render mode.
 
@@ -311,23 +322,18 @@ class RunSpec(Settings, frozen=True):
         render_mode
             As Gymnasium has it.
         """
-        is_quiet = stream == "evaluation_sensor_noise" and not self.protocol.noisy_evaluations
-        if self.environment is not None:
-            environment = self.environment.replace(noise=0.0) if is_quiet else self.environment
-            return environment.make(stream, render_mode)
-        sensors = replace(self.sensors, noise=0.0) if is_quiet else self.sensors
-        env = AcrobotSwingUpEnv(config=self.acrobot, dtype="float64", render_mode=render_mode)
-        tightening = TighteningGoal(env, GoalSchedule(self.goal))
-        return AcrobotSensors(tightening, sensors, seed=self.seed, stream=stream)
+        environment = self.environment
+        if stream == "evaluation_sensor_noise" and not self.protocol.noisy_evaluations:
+            environment = environment.without_noise()
+        env = environment.make(stream, render_mode)
+        return env if self.protocol.seeded_episodes else SeedFirstReset(env, self.seed)
 
-    def make_training_env(self) -> gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]:
+    def make_training_env(self) -> AnyEnv | SyncVectorEnv:
         """Make what the agent learns in, as `make_env`, or a vector of ``protocol.n_envs``."""
         n_envs = self.protocol.n_envs
-        return (
-            self.make_env() if n_envs == 1 else gym.vector.SyncVectorEnv([self.make_env] * n_envs)
-        )
+        return self.make_env() if n_envs == 1 else SyncVectorEnv([self.make_env] * n_envs)
 
-    def make_agent(self, env: gym.Env[Any, Any]) -> Learner:
+    def make_agent(self, env: AnyEnv) -> Learner:
         """Make the agent for an environment such as `make_env` makes.
 
         ConfigError if a setting is out of its range, or the agent cannot work with the spaces.
@@ -335,8 +341,8 @@ class RunSpec(Settings, frozen=True):
         entry = self.entry
         approximator = self.approximator
         shape = env.observation_space.shape
-        is_own = _is_kind_of(entry.agent, Agent)
-        if not is_own and shape is not None and len(shape) == 1:
+        is_agent = _is_class_of(entry.agent, Agent)
+        if not is_agent and shape is not None and len(shape) == 1:
             approximator = changed_size(approximator, shape[0])  # others find it out themselves
         try:
             agent = entry.agent(
@@ -345,74 +351,70 @@ class RunSpec(Settings, frozen=True):
                 approximator=approximator,
                 learning=self.learning,
                 seed=self.seed,
-                **self._agent_options(env),
+                **self._agent_arguments(env),
             )
         except (TypeError, ValueError, OverflowError, MemoryError) as error:
             raise self.refusal(error) from error
-        if isinstance(agent, Agent) and self.environment is not None:
+        if isinstance(agent, Agent):
             agent.scaling = self.environment.scaling(env)
         return agent
 
-    def _agent_options(self, env: gym.Env[Any, Any]) -> dict[str, Any]:
+    def _optional_settings(self) -> dict[str, object]:
+        """Return the settings of `_OPTIONAL` that are not the default."""
+        values = {name: getattr(self.agent, name) for name in _OPTIONAL}
+        defaults = AgentSpec(angle_pairs="none", inputs="all")
+        return {k: value for k, value in values.items() if value != getattr(defaults, k)}
+
+    def _agent_arguments(self, env: AnyEnv) -> dict[str, object]:
         """Return the arguments that only some agents have: those that are not the default."""
-        given, environment = self._of_spaces(), self.environment
-        if _is_kind_of(self.entry.agent, CodedAgent):  # by its preset
-            given |= {"angle_pairs": self.agent.angle_pairs, "inputs": self.agent.inputs}
-        if environment is None or not environment.ranges:
-            return given
+        arguments, environment = self._optional_settings(), self.environment
+        if _is_class_of(self.entry.agent, CodedAgent):  # by its preset
+            arguments |= {"angle_pairs": self.agent.angle_pairs, "inputs": self.agent.inputs}
+        if not environment.ranges:
+            return arguments
         if environment.has_other_sensors:  # given ranges are the space's then
-            return {"observation_range": flat_bounds(env.observation_space), **given}
-        if "observation_range" in given:
+            return {"observation_range": flat_bounds(env.observation_space), **arguments}
+        if "observation_range" in arguments:
             raise ConfigError(
                 "environment.ranges", "must not be given together with adaptive ranges"
             )
-        return {**given, "observation_range": environment.ends(env)}
+        return {**arguments, "observation_range": environment.ends(env)}
 
     def refusal(self, error: Exception) -> ConfigError:
         """Return an error as one about the setting that it names, or about the task."""
         if isinstance(error, ConfigError):
             return error
         name, problem = blamed(error)
-        tables = ("approximator", "learning", "agent", *(ACROBOT if self.acrobot else ()))
-        for table in tables:
+        for table in ("approximator", "learning", "agent"):
             if name != "n_inputs" and name in names_of(type(getattr(self, table))):
                 return ConfigError(f"{table}.{name}", problem)
-        key = "environment.id" if self.environment is not None else "agent.name"
-        return ConfigError(key, str(error) or type(error).__name__)
-
-    # Files and stores.
+        key = self.environment.key_of(name)
+        whole = str(error) or type(error).__name__
+        return ConfigError(key or "environment.id", problem if key else whole)
 
     def values(self) -> dict[str, Any]:
         """Return what is not the default as JSON has it; `from_values` reads it.
 
         The settings of the agent's parts are those that differ from its preset.
         """
-        environment = None if self.environment is None else EnvironmentSpec(id=self.task)
-        agent = AgentSpec(name=self.agent.name, preset=self.agent.preset)
-        defaults = RunSpec(environment=environment, agent=agent).full_values()
-        values: dict[str, Any] = {}
-        for name, value in self.full_values().items():
-            if isinstance(value, Mapping):
-                value = {
-                    key: one
-                    for key, one in value.items()
-                    if key in _ALWAYS or one != defaults[name].get(key)
-                }
-                if name in ("agent", "budget", "protocol"):  # None: as it follows from others
-                    value = {key: one for key, one in value.items() if one is not None}
-            if value not in ({}, defaults[name]):
-                values[name] = value
-        return values
+        defaults = RunSpec(
+            environment=EnvironmentSpec(id=self.task),
+            agent=AgentSpec(name=self.agent.name, preset=self.agent.preset),
+        )
+        values = differences(self.full_values(), defaults.full_values(), _ALWAYS)
+        for name in ("agent", "budget", "protocol"):  # None: as it follows from others
+            table = values.get(name, {})
+            values[name] = {key: value for key, value in table.items() if value is not None}
+        return {name: value for name, value in values.items() if value != {}}
 
     def full_values(self) -> dict[str, Any]:
         """Return all values as JSON has them."""
         values: dict[str, Any] = msgspec.to_builtins(self)
-        values = {name: value for name, value in values.items() if value is not None}
         values["approximator"].pop("n_inputs", None)
         return values
 
     @classmethod
-    def from_values(cls, values: Mapping[str, Any]) -> RunSpec:
+    def from_values(cls, values: Mapping[str, object]) -> RunSpec:
         """Make it of values as JSON or TOML has them.
 
         ``environment`` may be the id of one, and ``agent`` the name of one, perhaps with a preset:
@@ -429,46 +431,20 @@ class RunSpec(Settings, frozen=True):
         agent's version, where its entry has one.
         """
         values = self.full_values()
-        for name in ("seed", "output"):
-            del values[name]
-        values["agent"].pop("preset")
-        # As in trials from before there was a choice.
-        if values["agent"]["inputs"] == "all":
-            del values["agent"]["inputs"]
-        if values["agent"]["missing"] == "error":
-            del values["agent"]["missing"]
-        if values.get("approximator", {}).get("weight_limit") == 0:
-            del values["approximator"]["weight_limit"]
-        if not values.get("environment", {}).get("action_masks", True):
-            del values["environment"]["action_masks"]
+        del values["seed"], values["output"], values["agent"]["preset"]
         if version := self.entry.version:
             values["agent"]["version"] = version
-        return json.dumps(
-            _canonical(values), sort_keys=True, separators=(",", ":"), allow_nan=False
-        )
+        return canonical_json(values)
 
     @property
     def config_hash(self) -> str:
         """First 16 hexadecimal digits of the SHA-256 of `canonical_json`."""
-        return hashlib.sha256(self.canonical_json().encode()).hexdigest()[:HASH_DIGITS]
+        return config_hash(self.canonical_json())
 
 
-def changed_size(approximator: Any, n_inputs: int) -> Any:
-    """Return the settings of an approximator with a number of inputs, if it has that field."""
-    if "n_inputs" not in names_of(type(approximator)):
-        return approximator
-    return replace(approximator, n_inputs=n_inputs)
+def _is_class_of(agent: object, ancestor: type[object]) -> bool:
+    return isinstance(agent, type) and issubclass(agent, ancestor)
 
 
-def _is_kind_of(agent: Any, kind: type[Any]) -> bool:
-    return isinstance(agent, type) and issubclass(agent, kind)
-
-
-def _canonical(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _canonical(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_canonical(item) for item in value]
-    if isinstance(value, float) and value.is_integer():
-        return int(value)
-    return value
+def _episode_option(episode: int) -> dict[str, int]:
+    return {"episode": max(1, episode)}

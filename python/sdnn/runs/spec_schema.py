@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
 import msgspec
 
 from sdnn.agents.registry import AGENTS
 from sdnn.config import Field, fields_of
+from sdnn.environments.paper_acrobot import PAPER_ACROBOT
+from sdnn.runs.environment import PaperSettings
 from sdnn.runs.settings import schemas_of
-from sdnn.runs.spec import ACROBOT, RunSpec
+from sdnn.runs.spec import RunSpec
 
-CORE: dict[str, tuple[Any, ...]] = {name: (kind,) for name, kind in ACROBOT.items()} | {
+PAPER_ARGUMENTS: dict[str, Any] = get_type_hints(PaperSettings)
+"""The core's settings that are arguments of the paper's acrobot."""
+
+PARTS: dict[str, tuple[Any, ...]] = {
     part: tuple(
         dict.fromkeys(getattr(entry, part) for entry in AGENTS.values() if entry.core_trial)
     )
     for part in ("approximator", "learning")
 }
-"""The core's settings in a specification, by their tables."""
+"""The core's settings of the parts of agents, by their tables."""
 
 
 def spec_schema() -> dict[str, Any]:
@@ -29,13 +34,18 @@ def spec_schema() -> dict[str, Any]:
     >>> spec_schema()["$defs"]["QLearningConfig"]["properties"]["epsilon"]["maximum"]
     1.0
     """
-    structs = [_struct(kind) for kinds in CORE.values() for kind in kinds]
+    configs = [config for configs in PARTS.values() for config in configs]
+    structs = [_struct(config) for config in (*configs, *PAPER_ARGUMENTS.values())]
     components = schemas_of(RunSpec, *structs)
     properties = components["RunSpec"]["properties"]
-    for table, core in CORE.items():
-        properties[table]["anyOf"] = [{"$ref": f"#/$defs/{kind.__name__}"} for kind in core]
-    for table in ("approximator", "learning"):
-        properties[table]["anyOf"].append({"type": "object"})  # of an agent from elsewhere
+    for table, core in PARTS.items():
+        properties[table]["anyOf"] = [
+            *({"$ref": f"#/$defs/{kind.__name__}"} for kind in core),
+            {"type": "object"},  # of an agent from elsewhere
+        ]
+    arguments = {name: {"$ref": f"#/$defs/{c.__name__}"} for name, c in PAPER_ARGUMENTS.items()}
+    components["EnvironmentSpec"]["if"] = {"properties": {"id": {"const": PAPER_ACROBOT}}}
+    components["EnvironmentSpec"]["then"] = {"properties": {"kwargs": {"properties": arguments}}}
     for table in ("environment", "agent"):
         inner = {
             name: properties[table].pop(name)

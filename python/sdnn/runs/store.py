@@ -7,7 +7,6 @@ full synchronization). Runs under different settings live side by side under dif
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 import sqlite3
@@ -22,10 +21,9 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
-from sdnn.runs.connection import connect, foreign_journal, has_rows, is_hot
+from sdnn.runs.connection import as_store_error, connect, foreign_journal, has_rows, is_hot
 from sdnn.runs.errors import StoreError
-from sdnn.runs.spec import HASH_DIGITS
-from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows
+from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows, config_hash as hash_of
 from sdnn.support.files import is_there, open_regular
 
 STORE_NAME = "results.sqlite"
@@ -90,7 +88,7 @@ class ResultStore:
         if folder.exists() and not folder.is_dir():
             raise StoreError(f"the output must be a folder, but {folder} is a file")
         self._hashes: dict[int, Any] = {}  # of the rows of runs in progress
-        with _as_store_error(self.path):
+        with as_store_error(self.path):
             if not read_only:
                 folder.mkdir(parents=True, exist_ok=True)
             recovered = self._recovered()
@@ -212,20 +210,20 @@ class ResultStore:
 
     def rows(self, key: TrialKey) -> TrialRows:
         """Return the rows of a run, finished or in progress; none if it is not stored."""
-        with _as_store_error(self.path):
+        with as_store_error(self.path):
             for run in self._runs(key):
                 return self._rows(run)
             return TrialRows(np.zeros(0, ROW))
 
     def keys(self, *, unfinished: bool = False) -> set[TrialKey]:
         """Return the keys of all finished trials, and if wanted of those in progress."""
-        with _as_store_error(self.path):
+        with as_store_error(self.path):
             runs = self._runs()
             return {run.key for run in runs if unfinished or run.finished_at is not None}
 
     def seconds(self) -> dict[TrialKey, float]:
         """Return the processor times of the finished trials, without reading their rows."""
-        with _as_store_error(self.path):
+        with as_store_error(self.path):
             return {run.key: run.seconds for run in self._runs() if run.finished_at is not None}
 
     def load(self, keys: Iterable[TrialKey] | None = None) -> tuple[TrialRecord, ...]:
@@ -235,7 +233,7 @@ class ResultStore:
 
         StoreError if the rows of a trial are not the ones that were stored.
         """
-        with _as_store_error(self.path):
+        with as_store_error(self.path):
             found = {run.key: run for run in self._runs() if run.finished_at is not None}
             wanted = sorted(found if keys is None else found.keys() & set(keys))
             return tuple(self._record(found[key]) for key in wanted)
@@ -253,7 +251,7 @@ class ResultStore:
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        with _as_store_error(self.path), self._connection as connection:
+        with as_store_error(self.path), self._connection as connection:
             connection.execute("BEGIN IMMEDIATE")
             yield
 
@@ -352,7 +350,7 @@ class ResultStore:
 
     def measurements(self, kind: str) -> dict[str, Any]:
         """Return the contents of all measurements of a kind, by their sorted keys."""
-        with _as_store_error(self.path):
+        with as_store_error(self.path):
             (n,) = self._connection.execute("SELECT count(*) FROM measurements").fetchone()
             if n > MOST_MEASUREMENTS:
                 raise StoreError(f"{self.path} holds {n} measurements, over {MOST_MEASUREMENTS}")
@@ -374,7 +372,7 @@ def _crc(values: tuple[Any, ...]) -> int:
 @lru_cache(maxsize=1024)
 def _problem_of_config(config: str, config_hash: str) -> str:
     """Say what is wrong with a configuration, or nothing."""
-    if hashlib.sha256(config.encode()).hexdigest()[:HASH_DIGITS] != config_hash:
+    if hash_of(config) != config_hash:
         return "config does not have the hash beside it, config_hash"
     try:
         is_table = isinstance(json.loads(config), dict)
@@ -386,24 +384,6 @@ def _problem_of_config(config: str, config_hash: str) -> str:
 def _stored(key: TrialKey) -> TrialKey:
     """Return a key as it is stored: SQLite's integers have a sign."""
     return key._replace(seed=key.seed - 2**64 if key.seed >= 2**63 else key.seed)
-
-
-@contextmanager
-def _as_store_error(path: Path) -> Iterator[None]:
-    """Turn errors of SQLite and the file system into one that names the file."""
-    try:
-        yield
-    except MemoryError as error:
-        raise StoreError(f"cannot use {path}: out of memory") from error
-    except (
-        sqlite3.DatabaseError, OSError, ValueError, TypeError, OverflowError, RecursionError,
-    ) as error:  # fmt: skip
-        if isinstance(error, sqlite3.OperationalError | OSError):
-            raise StoreError(f"cannot use {path}: {error}") from error
-        raise StoreError(
-            f"{path} is damaged or not a result file of sdnn ({error});"
-            " move it away or choose another output folder"
-        ) from error
 
 
 def _inspect(path: Path) -> bool:

@@ -15,12 +15,13 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from msgspec import Meta
 
-from sdnn.agents.registry import default_agent, labels, split_label
+from sdnn.agents.registry import labels, split_label
 from sdnn.runs.config_file import ConfigFile
 from sdnn.runs.environment import find_module, search_folder
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.report import Content
 from sdnn.runs.settings import (
+    DEFAULT_AGENT,
     SHORTHANDS,
     Settings,
     check_names,
@@ -48,7 +49,8 @@ MOST_SETTINGS = 5_000
 """Most settings of a table."""
 
 TABLES = ("study", "base", "agents", "cases", "variants", "axes")
-_NAMED_VALUES = (("environment", "kwargs"), ("environment", "ranges"))
+_DEPTHS: dict[tuple[str, ...], int] = {("environment", "kwargs"): 4, ("environment", "ranges"): 3}
+"""Parts of the longest keys in tables with any keys; elsewhere keys have two."""
 
 
 class StudyHeader(Settings, frozen=True):
@@ -181,20 +183,25 @@ class StudyFile(Study):
         """
         own = (case.settings, variant.settings, variant.case_settings.get(case.id, {}))
         settings = reduce(or_, (self.base, *own))
-        chosen = settings.get(("agent", "name"))
-        on_acrobot = not any(name[0] == "environment" for name in settings)
-        label = default_agent(on_acrobot=on_acrobot) if chosen is None else str(chosen.value)
         try:
-            words = [split_label(label)[0], label]
-        except ValueError:  # refused with the specification
-            words = []
-        agents = (self.agents.get(word, {}) for word in words)
-        settings = reduce(or_, (self.base, *agents, *own))
-        try:
-            values = {".".join(name): setting.value for name, setting in settings.items()}
-            return RunSpec.from_values(overridden({}, values)), settings
+            label = str(self._values(case, settings).get("agent", {}).get("name", DEFAULT_AGENT))
+            try:
+                names = [split_label(label)[0], label]
+            except ValueError:  # refused with the specification
+                names = []
+            agents = (self.agents.get(name, {}) for name in names)
+            settings = reduce(or_, (self.base, *agents, *own))
+            return RunSpec.from_values(self._values(case, settings)), settings
         except ConfigError as error:
             raise self.refusal(case, variant, settings, error) from error
+
+    def _values(self, case: StudyCase, settings: Layer) -> dict[str, Any]:
+        values = {".".join(name): setting.value for name, setting in settings.items()}
+        return self.completed(case, overridden({}, values))
+
+    def completed(self, case: StudyCase, values: dict[str, Any]) -> dict[str, Any]:
+        """Return the values of a specification with the defaults of its case."""
+        return values
 
     def refusal(
         self, case: StudyCase, variant: StudyVariant, settings: Layer, error: ConfigError
@@ -229,7 +236,7 @@ class StudyFile(Study):
     ) -> None:
         for key, value in table.items():
             name, place = (*prefix, *key.split(".")), (*where, key)
-            depth = 3 if name[:2] in _NAMED_VALUES else 2
+            depth = _DEPTHS.get(name[:2], 2)
             if isinstance(value, dict) and len(name) < depth:
                 self._collect(place, value, name, found)
                 continue
@@ -307,7 +314,7 @@ class StudyFile(Study):
             return StudyCase(case_id, title, settings, where)
         fixed = {tuple(name.split(".")): value for name, value in known.settings.items()}
         for name, setting in settings.items():
-            if name[0] == "environment" or setting.value != fixed.get(name, setting.value):
+            if setting.value != fixed.get(name, setting.value):
                 words = ", ".join(f"{key} = {value}" for key, value in known.settings.items())
                 raise self.file.error(
                     setting.where,

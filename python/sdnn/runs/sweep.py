@@ -137,9 +137,10 @@ def compare(study: Study, records: Iterable[TrialRecord]) -> Comparison:
     for pair, combination in study.combinations.items():
         keys = study.keys(*pair)
         if by_key.keys() >= set(keys):
-            has_returns = combination.spec.environment is not None
-            names = RETURN_MEASURES if has_returns else STEP_MEASURES
-            results[pair] = measure(combination.case.title, [by_key[key] for key in keys], names)
+            records_of_pair = [by_key[key] for key in keys]
+            is_paper_acrobot = combination.spec.environment.is_paper_acrobot
+            names = STEP_MEASURES if is_paper_acrobot else RETURN_MEASURES
+            results[pair] = measure(combination.case.title, records_of_pair, names)
     measured = {}
     for (case, variant), result in results.items():
         reference = None if variant == study.reference else results.get((case, study.reference))

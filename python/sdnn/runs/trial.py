@@ -7,26 +7,21 @@ siblings), by the same protocol, bit for bit.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import Any, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn._core import __version__
-from sdnn.agents import Callback, Evaluation, StopTrainingOnRewardThreshold, Training
-from sdnn.runs.errors import ConfigError
+from sdnn.agents import Evaluation, StopTrainingOnRewardThreshold, Training
 from sdnn.support.arguments import whole
 from sdnn.training.loop import Row
-
-if TYPE_CHECKING:
-    from sdnn.runs.spec import RunSpec
 
 ROW_HEADER = (
     "case", "agent", "trial", "seed", "config_hash", "version", "episode", "steps",
@@ -43,6 +38,36 @@ class TrialKey(NamedTuple):
     trial: int
     seed: int
     config_hash: str
+
+
+HASH_DIGITS = 16
+"""Hexadecimal digits kept of a text's SHA-256: 64 bits."""
+
+
+def canonical_json(values: Mapping[str, object]) -> str:
+    """Return values as one line of JSON: sorted keys, 1 for 1.0."""
+    return json.dumps(_canonical(values), sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def config_hash(text: str) -> str:
+    """Return the first 16 hexadecimal digits of the SHA-256 of a text.
+
+    Examples
+    --------
+    >>> config_hash(canonical_json({"noise": 0.0})) == config_hash(canonical_json({"noise": 0}))
+    True
+    """
+    return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
+
+
+def _canonical(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {str(key): _canonical(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_canonical(item) for item in value]
+    if isinstance(value, float) and value.is_integer():
+        return int(value)
+    return value
 
 
 ROW = np.dtype(
@@ -338,54 +363,3 @@ class TrainingTrial:
     def close(self) -> None:
         """Close the environments, if they are open still."""
         self._environments.close()
-
-
-def training_trial(
-    spec: RunSpec,
-    callbacks: Iterable[Callback] = (),
-    checkpoint: Path | None = None,
-    *,
-    repeat_episodes: bool = True,
-) -> TrainingTrial:
-    """Make the trial of a specification in Python; ConfigError if a part cannot be made.
-
-    Its rows are those of the compiled trial, bit for bit. On the paper's acrobot the sensors' noise
-    runs on over all episodes, and resets receive the number of the episode, for the goal that
-    tightens. Elsewhere each episode has its own seed. The trial resumes at the checkpoint, if there
-    is one; see `sdnn.agents.Training.load`.
-    """
-    target, evaluation_env = None, None
-    if spec.budget.target_return is not None:
-        target = StopTrainingOnRewardThreshold(spec.budget.target_return)
-        callbacks = (target, *callbacks)
-    with ExitStack() as environments:
-        env: Any = environments.enter_context(closing(spec.make_training_env()))
-        if spec.is_evaluated:
-            try:
-                evaluation_env = spec.make_env("evaluation_sensor_noise")
-            except ConfigError as error:  # there may be one robot only
-                problem = f"needs a second environment, or must be 0: {error.problem}"
-                raise ConfigError("protocol.evaluate_every", problem) from error
-            environments.callback(evaluation_env.close)
-        if checkpoint is not None:
-            training = Training.load(
-                checkpoint, env, callbacks=callbacks, evaluation_env=evaluation_env,
-                repeat_episodes=repeat_episodes,
-            )  # fmt: skip
-        else:
-            is_acrobot = spec.environment is None
-            training = spec.entry.training(
-                spec.make_agent(env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env),
-                env,
-                steps=spec.budget.steps,
-                episodes=spec.budget.episodes,
-                seed=None if is_acrobot else spec.seed,
-                callbacks=callbacks,
-                evaluate_every=spec.protocol.evaluate_every or None,
-                evaluate_every_episodes=spec.protocol.evaluate_every_episodes,
-                evaluation_env=evaluation_env,
-                evaluation_episodes=spec.protocol.evaluation_episodes or 1,
-                limit_bootstraps=spec.protocol.limit_bootstraps,
-                reset_options=(lambda episode: {"episode": episode}) if is_acrobot else None,
-            )
-        return TrainingTrial(training, environments.pop_all(), target)

@@ -51,9 +51,9 @@ def test_an_installation_without_sources_works(tmp_path):
     code = f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
     code += "sys.meta_path[:] = sys.meta_path[-3:]  # not an editable installation's\n"
     code += "import sdnn, sdnn.runs, sdnn.reproduction; assert sdnn.__file__.endswith('.pyc')\n"
-    code += "print(sdnn.runs.RunSpec().seed, sdnn.SDNNRegressor(), sdnn.SDNNKernelRidge())"
+    code += "print(sdnn.runs.BudgetSpec().steps, sdnn.SDNNRegressor(), sdnn.SDNNKernelRidge())"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout == "0 SDNNRegressor() SDNNKernelRidge()\n", done.stderr
+    assert done.stdout == "None SDNNRegressor() SDNNKernelRidge()\n", done.stderr
 
 
 def test_docstrings():

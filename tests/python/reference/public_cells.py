@@ -26,6 +26,7 @@ from sdnn.environments import (
     AcrobotSwingUpEnv,
     AcrobotSwingUpVectorEnv,
     GoalSchedule,
+    PaperAcrobotEnv,
     SensorConfig,
 )
 from sdnn.estimators import (
@@ -407,13 +408,11 @@ def _without_key(parameter, call, value=None):
 
 
 def _protocol_used(given):
-    RunSpec(protocol=ProtocolSpec(**given), budget=BudgetSpec(episodes=20)).make_trial(1).advance(1)
-    return ""
+    return _spec_used({"protocol": ProtocolSpec(**given), "budget": BudgetSpec(episodes=20)})
 
 
 def _budget_used(given):
-    RunSpec(budget=BudgetSpec(**given)).make_trial(1).advance(1)
-    return ""
+    return _spec_used({"budget": BudgetSpec(**given)})
 
 
 def _environment_used(given):
@@ -425,7 +424,7 @@ def _environment_used(given):
 
 
 def _spec_used(given):
-    RunSpec(**given).make_trial(1)
+    RunSpec(**{"environment": "Pendulum-v1", "agent": "fuzzy"} | given).make_trial(1).advance(1)
     return ""
 
 
@@ -433,6 +432,7 @@ def environment_cells():
     makers = {
         "AcrobotSwingUpEnv": AcrobotSwingUpEnv,
         "AcrobotSwingUpVectorEnv": AcrobotSwingUpVectorEnv,
+        "PaperAcrobotEnv": PaperAcrobotEnv,
     }
     for name, maker in makers.items():
         for parameter in parameters_of(maker.__init__):

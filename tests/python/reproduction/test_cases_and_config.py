@@ -7,8 +7,14 @@ from refusals import refuses
 from sdnn.agents import FuzzyQLearningConfig
 from sdnn.approximators import FuzzyRulesConfig
 from sdnn.environments import SensorConfig
-from sdnn.reproduction import EXPERIMENTS, case_spec, plan_trials, select_experiments
-from sdnn.runs import AGENTS, ProtocolSpec, RunSpec, trial_seed
+from sdnn.reproduction import (
+    EXPERIMENTS,
+    case_spec,
+    paper_spec,
+    plan_trials,
+    select_experiments,
+)
+from sdnn.runs import AGENTS, ProtocolSpec, trial_seed
 
 
 def test_experiment_a_is_the_one_of_the_paper():
@@ -70,18 +76,17 @@ def test_presets_run_beside_the_agents_of_a_case():
 
 
 def test_canonical_json_is_sorted_and_does_not_depend_on_how_numbers_are_typed():
-    config = RunSpec()
+    config = paper_spec()
     text = config.canonical_json()
     assert text == json.dumps(json.loads(text), sort_keys=True, separators=(",", ":"))
     noise_typed = [0, 0.0, -0.0, np.float64(0.0)]
-    hashes = {
-        config.replace(sensors=replace(config.sensors, noise=n)).config_hash for n in noise_typed
-    }
+    tables = [{"kwargs": {"sensors": {"noise": noise}}} for noise in noise_typed]
+    hashes = {paper_spec(environment=table).config_hash for table in tables}
     assert hashes == {config.config_hash}
 
 
 def test_changed_code_of_an_agent_is_another_version(monkeypatch):
-    config = RunSpec()
+    config = paper_spec()
     before = config.config_hash
     monkeypatch.setitem(AGENTS, "sdnn-c", replace(AGENTS["sdnn-c"], version="2"))
     assert '"version":"2"' in config.canonical_json()
@@ -89,14 +94,14 @@ def test_changed_code_of_an_agent_is_another_version(monkeypatch):
 
 
 def test_the_hash_covers_every_table():
-    base = RunSpec()
+    base = paper_spec()
     others = [
-        RunSpec(agent={"name": "rbf"}),
+        paper_spec(agent={"name": "rbf"}),
         base.replace(approximator=replace(base.approximator, lattice=2)),
         base.replace(learning=replace(base.learning, discount=0.8)),
-        base.replace(acrobot=replace(base.acrobot, gravity=9.81)),
-        base.replace(goal=replace(base.goal, scale=50.0)),
-        base.replace(sensors=replace(base.sensors, noise=0.02)),
+        paper_spec(environment={"kwargs": {"acrobot": {"gravity": 9.81}}}),
+        paper_spec(environment={"kwargs": {"goal": {"scale": 50.0}}}),
+        paper_spec(environment={"kwargs": {"sensors": {"noise": 0.02}}}),
         base.replace(protocol=ProtocolSpec(evaluate_every_episodes=5)),
     ]
     assert len({spec.config_hash for spec in [base, *others]}) == 1 + len(others)
@@ -106,7 +111,7 @@ def test_the_hash_covers_every_table():
 def test_a_case_fits_the_network_to_the_sensors():
     (experiment,) = select_experiments("a")
     spec = case_spec(experiment.cases[1], "sdnn-c")
-    assert spec.approximator.n_inputs == spec.sensors.n_sensors == 6
+    assert spec.core_settings()["approximator"].n_inputs == 6
     assert (spec.budget.episodes, spec.protocol.evaluate_every_episodes) == (15_000, 10)
     refuses("'fuzzy'", case_spec, experiment.cases[1], "fuzzy")
 
@@ -114,9 +119,9 @@ def test_a_case_fits_the_network_to_the_sensors():
 def test_a_case_gives_every_agent_its_own_settings():
     (experiment,) = select_experiments("b")
     spec = case_spec(experiment.cases[2], "fuzzy")
-    assert spec.approximator == FuzzyRulesConfig(n_inputs=5)
+    assert spec.core_settings()["approximator"] == FuzzyRulesConfig(n_inputs=5)
     assert spec.learning == FuzzyQLearningConfig()
-    assert spec.sensors == SensorConfig(n_sensors=5, noise=0.02)
+    assert spec.environment.paper_settings().sensors == SensorConfig(n_sensors=5, noise=0.02)
 
 
 def test_an_experiment_with_other_agents_differs_in_nothing_else():

@@ -8,8 +8,8 @@ import pytest
 
 from sdnn.reports.plots import figure_bytes
 from sdnn.reports.statistics import Estimate
+from sdnn.reproduction.claim_study import judge_variants
 from sdnn.reproduction.claims import Verdict
-from sdnn.reproduction.report import judge_variants
 from sdnn.runs.figures import draw_study
 from sdnn.runs.report import format_estimate
 from sdnn.runs.sweep import compare, study_json, study_page
@@ -282,8 +282,11 @@ def claimed_records_of(study, n_trials):
             yield record(study, case, variant, number, steps_of((60, 4)))
 
 
+OWN = "[base]\nenvironment = 'sdnn/PaperAcrobot-v0'\n"
+
+
 def test_a_case_that_is_not_the_papers_has_no_claims(study):
-    mine = study("[study]\ntrials = 10\n[cases.mine]\n[variants.a]\n")
+    mine = study(OWN + "[study]\ntrials = 10\n[cases.mine]\n[variants.a]\n")
     records = [record(mine, "mine", "a", n, steps_of((1500, 4))) for n in range(10)]
     assert not any(judge_variants(compare(mine, records)).values())
 
@@ -371,7 +374,7 @@ def test_the_figure_is_the_same_each_time_and_shows_every_trial(mixed):
 
 
 def test_many_cases_go_on_below(study):
-    mine = study("[study]\ntrials = 1\n" + "".join(f"[cases.c{i}]\n" for i in range(7)))
+    mine = study(OWN + "[study]\ntrials = 1\n" + "".join(f"[cases.c{i}]\n" for i in range(7)))
     records = [record(mine, f"c{i}", "base", 0, steps_of((60, 4))) for i in range(7)]
     figure = draw_study(compare(mine, records), "")
     assert len(figure.axes) == 4 * 5

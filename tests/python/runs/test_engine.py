@@ -77,9 +77,10 @@ def test_trials_in_teams_have_the_rows_of_each_by_itself(tmp_path):
 def test_a_failure_in_a_team_is_of_its_trial_alone(tmp_path, monkeypatch):
     plan = plan_of_small_agents(1, 20)
     spec = plan[0].spec
-    bad = PlannedTrial(
-        plan[0].key, spec.replace(acrobot=spec.acrobot.replace(goal_reward=1e39, penalty=1e39))
-    )
+    kwargs = spec.environment.kwargs
+    acrobot = kwargs["acrobot"] | {"goal_reward": 1e39, "penalty": 1e39}
+    environment = spec.environment.replace(kwargs=kwargs | {"acrobot": acrobot})
+    bad = PlannedTrial(plan[0].key, spec.replace(environment=environment))
     monkeypatch.setattr("sdnn.runs.engine.teams_of", lambda planned, jobs: [planned])
     with ResultStore(tmp_path) as store:
         outcome = run_trials([bad, plan[3]], store, executor=ThreadExecutor(1))

@@ -107,7 +107,7 @@ def test_html_shows_names_as_they_are(name):
 def test_a_study_of_hostile_names(study, name):
     mine = study(
         f"[study]\ntitle = {json.dumps(name)}\ntrials = 2\n"
-        f"[cases.mine]\ntitle = {json.dumps(name)}\n"
+        f"[cases.mine]\ntitle = {json.dumps(name)}\nenvironment = 'sdnn/PaperAcrobot-v0'\n"
         f"[variants.{json.dumps(name)}]\n[variants.other]\ntitle = {json.dumps(name)}\n"
         "learning.discount = 0.5\n"
     )

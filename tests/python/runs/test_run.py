@@ -15,6 +15,7 @@ import drifting_env  # noqa: F401
 from refusals import refuses
 from run_specs import run_spec
 from sdnn.agents import Callback, Training, load_agent
+from sdnn.reproduction import paper_spec
 from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunError, RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrialRows
@@ -246,8 +247,8 @@ def test_a_run_counts_the_time_of_all_its_parts(tmp_path):
     assert max(parts) < record.seconds < sum(parts)
 
 
-def test_the_paper_s_acrobot_is_no_run_in_a_folder(tmp_path):
-    refuses("environment", Run.create, tmp_path / "run", RunSpec(), error=ConfigError)
+def test_episodes_without_seeds_are_no_run_in_a_folder(tmp_path):
+    refuses("seeded_episodes", Run.create, tmp_path / "run", paper_spec(), error=ConfigError)
     assert not (tmp_path / "run").exists()
 
 

@@ -9,6 +9,7 @@ from refusals import refuses
 from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLambda, SDNNQLearning, Training
 from sdnn.agents.registry import AGENTS, agent_entry, register
 from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
+from sdnn.reproduction import paper_spec
 from sdnn.runs import (
     AgentSpec,
     BudgetSpec,
@@ -19,6 +20,7 @@ from sdnn.runs import (
     RunSpec,
 )
 
+PAPER = "sdnn/PaperAcrobot-v0"
 CART_POLE = EnvironmentSpec(id="CartPole-v1")
 
 FULL = RunSpec(
@@ -40,7 +42,7 @@ FULL = RunSpec(
 
 
 @pytest.mark.parametrize(
-    "spec", [FULL, RunSpec(), RunSpec(environment=CART_POLE), RunSpec(agent=AgentSpec(name="rbf"))]
+    "spec", [FULL, RunSpec(environment=CART_POLE), paper_spec(agent="rbf"), paper_spec()]
 )
 def test_a_specification_survives_json_and_pickle(spec):
     again = RunSpec.from_values(json.loads(json.dumps(spec.values())))
@@ -49,17 +51,24 @@ def test_a_specification_survives_json_and_pickle(spec):
     assert pickle.loads(pickle.dumps(spec)) == spec
 
 
-def test_defaults_follow_from_the_task():
-    acrobot, environment = RunSpec(), RunSpec(environment=CART_POLE)
-    assert (acrobot.agent.preset, environment.agent.preset) == ("paper", "general")
-    assert (acrobot.label, environment.label) == ("sdnn-c", "q-lambda-general")
-    assert (acrobot.budget.episodes, acrobot.budget.steps) == (15_000, None)
-    assert (environment.budget.episodes, environment.budget.steps) == (None, 200_000)
-    assert acrobot.protocol.evaluate_every_episodes == 10
-    assert environment.protocol.evaluate_every == 10_000
-    assert environment.learning == SDNNQLambda.presets["general"].learning
-    assert RunSpec(sensors={"n_sensors": 6}).approximator == SDNNCConfig(n_inputs=6)
-    assert RunSpec.from_values({"environment": "CartPole-v1", "agent": "q-lambda"}) == environment
+def test_missing_settings_are_filled_in():
+    spec = RunSpec(environment=CART_POLE)
+    assert (spec.agent.preset, spec.label) == ("general", "q-lambda-general")
+    assert (spec.budget.episodes, spec.budget.steps) == (None, 200_000)
+    assert (spec.protocol.evaluate_every, spec.protocol.evaluation_episodes) == (10_000, 10)
+    assert spec.learning == SDNNQLambda.presets["general"].learning
+    assert RunSpec.from_values({"environment": "CartPole-v1", "agent": "q-lambda"}) == spec
+
+
+def test_the_paper_s_task_has_the_paper_s_settings():
+    spec = paper_spec()
+    assert (spec.agent.preset, spec.label) == ("paper", "sdnn-c")
+    assert (spec.budget.episodes, spec.budget.steps) == (15_000, None)
+    assert spec.protocol.evaluate_every_episodes == 10
+    assert (spec.agent.angle_pairs, spec.agent.inputs) == ("none", "all")
+    assert spec.approximator == SDNNCConfig()
+    general = paper_spec(agent="q-lambda-general")
+    assert general.make_agent(general.make_env()).approximator.n_inputs == 4
 
 
 def test_the_hash_is_that_of_what_fixes_the_rows():
@@ -67,10 +76,10 @@ def test_the_hash_is_that_of_what_fixes_the_rows():
     assert spec.replace(seed=5).config_hash == spec.config_hash
     assert spec.replace(output=OutputSpec(tensorboard=True)).config_hash == spec.config_hash
     assert FULL.config_hash != spec.config_hash
-    robust = RunSpec(agent=AgentSpec(preset="robust"))
-    typed = RunSpec(approximator={"n_actions": 61}, learning={"n_steps": 5})
+    robust = paper_spec(agent="sdnn-c-robust")
+    typed = paper_spec(approximator={"n_actions": 61}, learning={"n_steps": 5})
     assert robust.config_hash == typed.config_hash
-    assert RunSpec(learning={"discount": 1}) == RunSpec(learning={"discount": 1.0})
+    assert paper_spec(learning={"discount": 1}) == paper_spec(learning={"discount": 1.0})
 
 
 @pytest.mark.parametrize(
@@ -84,7 +93,6 @@ def test_the_hash_is_that_of_what_fixes_the_rows():
         ({"environment": {"id": "A", "ranges": {"0": [1, 1]}}}, "environment.ranges.0", "low <"),
         ({"environment": {"id": "A", "ranges": {"x": [0, 1]}}}, "environment.ranges.x", "a number"),
         ({"environment": 5}, "environment", "must be a table, got 5"),
-        ({"environment": "A", "sensors": {}}, "sensors", "does not go with an environment"),
         ({"agent": "dqn"}, "agent.name", "one of sdnn-c, "),
         ({"agent": {"preset": "best"}}, "agent.preset", "got 'best'"),
         ({"agent": {"name": "rbf", "preset": "paper"}}, "agent.preset", "omitted"),
@@ -97,10 +105,18 @@ def test_the_hash_is_that_of_what_fixes_the_rows():
         ({"learning": {"tie_rule": "x"}}, "learning.tie_rule", "one of 'uniform', 'lowest'"),
         ({"lerning": {"discount": 1}}, "lerning", "possible: learning"),
         ({"approximator": {"n_inputs": 3}}, "approximator.n_inputs", "follows from the obs"),
-        ({"sensors": {"noise": True}}, "sensors.noise", "a number, got True"),
+        (
+            {"environment": {"id": PAPER, "kwargs": {"sensors": {"noise": True}}}},
+            "environment.kwargs.sensors.noise",
+            "a number, got True",
+        ),
         ({"budget": {"steps": "x"}}, "budget.steps", "whole number, got 'x'"),
         ({"budget": {"steps": 5, "episodes": 5}}, "budget.episodes", "together with steps"),
-        ({"budget": {"episodes": 5}}, "budget.episodes", "at least evaluate_every_episodes (10)"),
+        (
+            {"budget": {"episodes": 5}, "protocol": {"evaluate_every_episodes": 10}},
+            "budget.episodes",
+            "at least evaluate_every_episodes (10)",
+        ),
         (
             {"protocol": {"evaluate_every": 0}, "budget": {"target_return": 1}},
             "budget.target_return",
@@ -112,7 +128,7 @@ def test_the_hash_is_that_of_what_fixes_the_rows():
             "needs evaluations",
         ),
         (
-            {"environment": "CartPole-v1", "budget": {"steps": 9}, "output": {"keep_best": True}},
+            {"budget": {"steps": 9}, "output": {"keep_best": True}},
             "output.keep_best",
             "at least 10000",
         ),
@@ -121,14 +137,14 @@ def test_the_hash_is_that_of_what_fixes_the_rows():
 )
 def test_errors_name_the_key(values, key, words):
     with pytest.raises(ConfigError) as caught:
-        RunSpec.from_values(values)
+        RunSpec.from_values({"environment": "CartPole-v1"} | values)
     assert caught.value.key == key
     assert words in caught.value.problem
 
 
 def test_parts_of_another_agent_are_refused():
     with pytest.raises(ConfigError) as caught:
-        RunSpec(approximator=RBFNetworkConfig())
+        RunSpec(environment=CART_POLE, approximator=RBFNetworkConfig())
     assert caught.value.key == "approximator"
 
 
@@ -194,12 +210,6 @@ def test_what_an_agent_finds_follows_from_its_preset(preset, noise, given, found
     assert (spec.agent.angle_pairs, spec.agent.inputs) == found
     assert RunSpec.from_values(spec.values()) == spec
     assert spec.make_agent(spec.make_env()).is_warming_up == (found != ("none", "all"))
-
-
-def test_the_paper_s_task_has_all_its_inputs():
-    spec = RunSpec(agent=AgentSpec(name="q-lambda", preset="general"))
-    assert (spec.agent.angle_pairs, spec.agent.inputs) == ("none", "all")
-    assert spec.make_agent(spec.make_env()).approximator.n_inputs == 4
 
 
 def test_an_agent_brings_its_own_training():
@@ -295,15 +305,19 @@ def test_what_only_the_agent_knows_names_the_setting(values, key, words):
 
 
 def test_the_papers_acrobot_is_compiled_under_the_papers_protocol():
-    spec = RunSpec(budget=BudgetSpec(episodes=20), seed=3)
+    spec = paper_spec(budget={"episodes": 20}, seed=3)
     assert spec.is_compiled
     trial = spec.core_trial()
     trial.advance(20)
     assert trial.test_rows()["episode"].tolist() == [10, 20]
+    paper = spec.protocol
     for other in (
-        spec.replace(protocol=ProtocolSpec(evaluate_every=100)),
-        spec.replace(protocol=ProtocolSpec(evaluation_episodes=2)),
+        spec.replace(protocol=paper.replace(evaluate_every=100, evaluate_every_episodes=None)),
+        spec.replace(protocol=paper.replace(evaluation_episodes=2)),
+        spec.replace(protocol=paper.replace(seeded_episodes=True)),
         spec.replace(budget=BudgetSpec(steps=20)),
+        spec.replace(environment=spec.environment.replace(noise=0.1)),
+        spec.replace(agent=spec.agent.replace(angles=(0,))),
         RunSpec(environment=CART_POLE, budget=BudgetSpec(episodes=20)),
     ):
         assert not other.is_compiled
@@ -313,7 +327,10 @@ def test_the_papers_acrobot_is_compiled_under_the_papers_protocol():
 def test_sensors_of_evaluations_are_quiet_if_wanted():
     protocol = ProtocolSpec(noisy_evaluations=False)
     for spec in (
-        RunSpec(sensors={"noise": 0.1}, protocol=protocol),
+        RunSpec(
+            environment=EnvironmentSpec(id=PAPER, kwargs={"sensors": {"noise": 0.1}}),
+            protocol=protocol,
+        ),
         RunSpec(environment=EnvironmentSpec(id="MountainCar-v0", noise=0.1), protocol=protocol),
     ):
         noisy, quiet = spec.make_env(), spec.make_env("evaluation_sensor_noise")

@@ -1,13 +1,12 @@
 """From a study file to configurations and trials, and what is said about wrong files."""
 
 import sys
-from dataclasses import replace
 
 import pytest
 
 from refusals import refuses
-from sdnn.reproduction import EXPERIMENTS, case_spec, plan_trials
-from sdnn.runs import AGENTS, ConfigError, RunSpec
+from sdnn.reproduction import EXPERIMENTS, case_spec, paper_spec, plan_trials
+from sdnn.runs import AGENTS, ConfigError
 
 PAPER = """
 [study]
@@ -53,7 +52,7 @@ def test_later_layers_override_earlier_ones(study):
         [base]
         learning.discount = 0.1
         learning.epsilon = 0.11
-        "acrobot.max_torque" = 5
+        "environment.kwargs.acrobot.max_torque" = 5
         [agents.sdnn-c]
         learning.discount = 0.2
         learning.learning_rate = 0.22
@@ -61,7 +60,8 @@ def test_later_layers_override_earlier_ones(study):
         learning.discount = 0.25
         [cases.own]
         title = "my own"
-        sensors = { n_sensors = 5, noise = 0.1 }
+        environment = { id = "sdnn/PaperAcrobot-v0", kwargs.sensors.n_sensors = 5 }
+        agent = "sdnn-c-paper"
         learning = { discount = 0.3, n_greedy_steps = 3 }
         [variants.a]
         [variants.b]
@@ -86,10 +86,9 @@ def test_later_layers_override_earlier_ones(study):
         ("own", "c"): (0.3, 0.5, 3),
     }
     assert {c.learning.epsilon for c in configs(found).values()} == {0.11}
-    assert {c.acrobot.max_torque for c in configs(found).values()} == {5.0}
-    assert {p[0]: c.approximator.n_inputs for p, c in configs(found).items()} == {
-        "s4": 4, "own": 5,
-    }  # fmt: skip
+    tasks = {p[0]: c.environment.paper_settings() for p, c in configs(found).items()}
+    assert {name: task.sensors.n_sensors for name, task in tasks.items()} == {"s4": 4, "own": 5}
+    assert {task.acrobot.max_torque for task in tasks.values()} == {5.0}
     assert [case.title for case in found.cases] == ["Case I: 4 inputs, no noise", "my own"]
     assert [variant.title for variant in found.variants] == ["the b", "a", "c"]  # reference first
 
@@ -101,17 +100,17 @@ def test_arrays_words_and_numbers_reach_the_configuration(study):
         [variants.x]
         approximator.initial_threshold = 10
         approximator.u_low = 7
-        goal.kind = "inverse_sqrt"
+        environment.kwargs.goal.kind = "inverse_sqrt"
         [variants.x.cases.s4]
         approximator.circular = [true, true, false, false]
         """
     )
     config = configs(found)["s4", "x"]
-    expected = RunSpec(
+    expected = paper_spec(
         approximator={
             "circular": (True, True, False, False), "initial_threshold": 10.0, "u_low": 7
         },
-        goal={"kind": "inverse_sqrt"},
+        environment={"kwargs": {"goal": {"kind": "inverse_sqrt"}}},
     )  # fmt: skip
     assert config == expected
     assert config.config_hash == expected.config_hash
@@ -125,8 +124,8 @@ def test_axes_vary_one_key_at_a_time(study):
         [axes]
         learning.tie_rule = ["uniform", "middle"]
         approximator.circular = [[true, true, false, false, false, false]]
-        sensors.noise = [0.01]
-        goal.scale = [50]
+        environment.kwargs.sensors.noise = [0.01]
+        environment.kwargs.goal.scale = [50]
         """
     )
     assert [variant.id for variant in found.variants] == [
@@ -135,8 +134,8 @@ def test_axes_vary_one_key_at_a_time(study):
     ]  # fmt: skip
     of_s6 = {variant: c for (case, variant), c in configs(found).items() if case == "s6"}
     assert of_s6["tie_rule=middle"].learning.tie_rule == "middle"
-    assert of_s6["noise=0.01"].sensors.noise == 0.01
-    assert of_s6["scale=50"] == of_s6["base"].replace(goal=replace(of_s6["base"].goal, scale=50.0))
+    assert of_s6["noise=0.01"].environment.paper_settings().sensors.noise == 0.01
+    assert of_s6["scale=50"].environment.paper_settings().goal.scale == 50.0
     assert found.copies() == {"tie_rule=uniform": "base"}
     assert len(found.plan()) == 2 * 3 * 5  # what is the same is run once
 
@@ -148,8 +147,8 @@ def test_axes_combine_to_a_product(study):
         [axes]
         combine = "product"
         agent = ["sdnn-c", "fuzzy"]
-        goal.scale = [50, 100]
-        acrobot.integration_step = [0.02]
+        environment.kwargs.goal.scale = [50, 100]
+        environment.kwargs.acrobot.integration_step = [0.02]
         [variants.paper]
         """
     )
@@ -162,13 +161,15 @@ def test_axes_combine_to_a_product(study):
     ]
     assert found.reference == "paper"
     last = configs(found)["s4", "agent=fuzzy, scale=100, integration_step=0.02"]
-    assert (last.agent.name, last.goal.scale) == ("fuzzy", 100.0)
+    assert last == configs(found)["s4", "paper"].replace(
+        agent=last.agent, approximator=last.approximator, learning=last.learning
+    )
+    assert last.agent.name == "fuzzy"
 
 
 def test_axes_of_the_same_last_word_have_whole_names(study):
-    text = PAPER + "[axes]\nlearning.epsilon = [0.2]\nsensors.noise = [0.1]\n"
-    text += "[variants.other]\nagent = 'fuzzy'\n"
-    found = study(text.replace("sensors.noise", "goal.floor").replace("[0.1]", "[0.02]"))
+    text = PAPER + "[axes]\nlearning.epsilon = [0.2]\nenvironment.kwargs.goal.floor = [0.02]\n"
+    found = study(text + "[variants.other]\nagent = 'fuzzy'\n")
     assert [v.id for v in found.variants] == ["base", "other", "epsilon=0.2", "floor=0.02"]
     text = "[base]\nenvironment.id = 'Pendulum-v1'\n[axes]\n"
     text += "environment.noise = [0.1]\nenvironment.kwargs.g = [5.0]\n"
@@ -205,7 +206,7 @@ def test_both_kinds_of_tasks_fit_into_one_study(study):
         environment.ranges.3 = [-4, 4]
         """
     )
-    assert configs(found)["s4", "base"].environment is None
+    assert configs(found)["s4", "base"].environment.is_paper_acrobot
     cart = configs(found)["cart", "base"]
     assert cart.environment.ranges == {"1": (-4.0, 4.0), "3": (-4.0, 4.0)}
     found.check()
@@ -330,10 +331,13 @@ WRONG = {
         "cases.x: is not among the cases of [study]",
     ),
     "paper's case": (
-        "[cases.s4-noise]\n[cases.s4]\nsensors.noise = 0.1\n", 3,
-        "cases.s4.sensors.noise: s4 is a case with sensors.n_sensors = 4,",
+        "[cases.s4-noise]\n[cases.s4]\nenvironment.kwargs.sensors.noise = 0.1\n", 3,
+        "cases.s4.environment.kwargs.sensors.noise: s4 is a case with environment.id = sdnn/Paper",
     ),
-    "no table of sensors": ("[cases.s4]\nsensors = 3\n", 2, "cases.s4.sensors: must be a table"),
+    "no table of sensors": (
+        "[cases.x.environment]\nid = 'sdnn/PaperAcrobot-v0'\nkwargs.sensors = 3\n", 3,
+        "cases.x.environment.kwargs.sensors: must be a table",
+    ),
     "paper's case elsewhere": (
         "[cases.s4]\nenvironment = 'Pendulum-v1'\n", 2,
         "cases.s4.environment: s4 is a case with",
@@ -381,8 +385,8 @@ WRONG = {
         "base.learning.discount: must be a number, got '0.5'",
     ),
     "infinite": (
-        "[cases.s4]\n[base.acrobot]\ngravity = inf\n", 3,
-        "base.acrobot.gravity: must be finite, got inf",
+        "[cases.s4]\n[base.environment.kwargs.acrobot]\ngravity = inf\n", 3,
+        "base.environment.kwargs.acrobot.gravity: must be finite, got inf",
     ),
     "int": (
         "[cases.s4]\n[base.protocol]\nevaluate_every_episodes = 10.0\n", 3,
@@ -424,33 +428,30 @@ WRONG = {
         "[cases.s4]\n[base]\nbudget.episodes = 9\n", 3,
         "base.budget.episodes: must be at least evaluate_every_episodes (10), got 9",
     ),
-    "axis": ("[cases.s4]\n[axes]\ngoal.scale = 5\n", 3, "axes.goal.scale: must be an array"),
+    "axis": ("[cases.s4]\n[axes]\nlearning.epsilon = 5\n", 3, "axes.learning.epsilon: must be an"),
     "axis twice": (
-        "[cases.s4]\n[axes]\ngoal.scale = [5, 5]\n", 3, "axes.goal.scale: must be different values"
+        "[cases.s4]\n[axes]\nlearning.epsilon = [5, 5]\n", 3,
+        "axes.learning.epsilon: must be different values",
     ),
     "combine": (
         "[cases.s4]\n[axes]\ncombine = 'all'\n", 3,
         "axes.combine: must be one of 'one_at_a_time', 'product', got 'all'",
     ),
     "name taken": (
-        "[cases.s4]\n[axes]\ngoal.scale = [5]\n[variants.'scale=5']\n", 3,
-        "axes.goal.scale[0]: there is a variant 'scale=5' already",
+        "[cases.s4]\n[axes]\nlearning.epsilon = [0]\n[variants.'epsilon=0']\n", 3,
+        "axes.learning.epsilon[0]: there is a variant 'epsilon=0' already",
     ),
     "case of a variant": (
         "[cases.s4]\n[variants.a.cases.s6]\n", 2,
         "variants.a.cases.s6: unknown key; possible: s4",
-    ),
-    "environment and acrobot": (
-        "[base]\nenvironment = 'Pendulum-v1'\ngoal.scale = 3\n", 3,
-        "base.goal.scale: is the acrobot's: it does not go with an environment",
     ),
     "environment without id": (
         "[cases.x]\nenvironment.noise = 0.1\n", 2,
         "environment.id: must be given",
     ),
     "sensors": (
-        "[cases.x]\nsensors.n_sensors = 9\n", 2,
-        "cases.x.sensors.n_sensors: must be in [4, 6], got 9",
+        "[cases.x.environment]\nid = 'sdnn/PaperAcrobot-v0'\nkwargs.sensors.n_sensors = 9\n", 3,
+        "cases.x.environment.kwargs.sensors.n_sensors: must be in [4, 6], got 9",
     ),
     "discount": (
         "[cases.s4]\n[variants.ok]\n[variants.bad]\nlearning.discount = 2\n", 4,
@@ -482,8 +483,8 @@ def test_errors_name_file_line_and_key(study, name, tmp_path):
     ("text", "line", "message"),
     [
         (
-            "[cases.s4]\n[axes]\nacrobot.integration_step = [\n0.02,\n0.3]\n", 3,
-            "axes.acrobot.integration_step[1]: must be a whole fraction",
+            "[cases.s4]\n[axes.environment.kwargs]\nacrobot.integration_step = [\n0.02,\n0.3]\n", 3,
+            "axes.environment.kwargs.acrobot.integration_step[1]: must be a whole fraction",
         ),
         (
             "[base]\nenvironment = 'MountainCar-v0'\n[variants.f]\nagent = 'fuzzy'\n", 2,
@@ -514,7 +515,8 @@ def test_what_the_core_refuses_is_refused_before_anything_runs(
 
 
 def test_what_is_stored_is_not_tried_again(study, monkeypatch):
-    found = study("[cases.s4]\n[variants.a]\nacrobot.integration_step = 0.3\n", n_trials=2)
+    text = "[cases.s4]\n[variants.a]\nenvironment.kwargs.acrobot.integration_step = 0.3\n"
+    found = study(text, n_trials=2)
     found.check(stored=found.keys("s4", "a"))
     with pytest.raises(ConfigError):
         found.check(stored=found.keys("s4", "a")[:1])
@@ -534,16 +536,3 @@ def test_trials_that_could_not_be_compared_are_refused(study, settings, key):
         study(f"[base]\nenvironment.id = 'CartPole-v1'\n{RANGES}{settings}\n").check,
         error=ConfigError,
     )
-
-
-SETTINGS_OF_ENVIRONMENTS = [
-    "angles = [0]", "angle_pairs = 'find'", "inputs = 'relevant'", "inputs = [1]",
-    "warm_up_steps = 9",
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("setting", SETTINGS_OF_ENVIRONMENTS)
-def test_what_the_acrobot_does_not_use_is_refused(study, setting):
-    key = f"agent.{setting.partition(' ')[0]}"
-    text = f"[cases.s4]\n[base]\nagent.{setting}\n"
-    refuses(key, lambda: study(text).check(), error=ConfigError)

@@ -9,11 +9,10 @@ from refusals import refuses
 from sdnn import _core
 from sdnn.agents import SDNNQLearning
 from sdnn.agents.registry import labels, title_of
-from sdnn.reproduction import Case, case_spec
+from sdnn.reproduction import Case, case_spec, paper_spec
 from sdnn.runs import (
     AGENTS,
     AgentEntry,
-    AgentSpec,
     BudgetSpec,
     EnvironmentSpec,
     ProtocolSpec,
@@ -21,14 +20,14 @@ from sdnn.runs import (
     agent_entry,
     register,
 )
-from sdnn.runs.trial import TrainingTrial, TrialRows, training_trial
+from sdnn.runs.trial import TrainingTrial, TrialRows
 
 SEED = 11
 
 
 def spec_of(agent, n_sensors=4, noise=0.0):
     spec = case_spec(Case("case", "", n_sensors, noise, (agent,), ""), agent, 60)
-    return spec.replace(seed=SEED, protocol=ProtocolSpec(evaluate_every_episodes=5))
+    return spec.replace(seed=SEED, protocol=spec.protocol.replace(evaluate_every_episodes=5))
 
 
 COLUMNS = ("episode", "steps", "episode_return", "solved")
@@ -83,12 +82,15 @@ def test_it_reproduces_the_compiled_trial_bit_for_bit(agent, n_sensors, noise, m
 
 def test_the_settings_of_the_task_reach_it(monkeypatch):
     spec = spec_of("fuzzy")
+    kwargs = {
+        "acrobot": {"max_decisions": 3, "penalty": -1.0},
+        "goal": {"kind": "constant", "constant_value": 0.1},
+        "sensors": {
+            "noise": 0.02, "noise_entry": "basic_sensors", "n_constant": 1, "n_random": 1
+        },
+    }  # fmt: skip
     spec = spec.replace(
-        acrobot=replace(spec.acrobot, max_decisions=3, penalty=-1.0),
-        goal=replace(spec.goal, kind="constant", constant_value=0.1),
-        sensors=replace(
-            spec.sensors, noise=0.02, noise_entry="basic_sensors", n_constant=1, n_random=1
-        ),
+        environment=spec.environment.replace(kwargs=kwargs),
         protocol=spec.protocol.replace(limit_bootstraps=False, noisy_evaluations=False),
     )
     core, trial = spec.make_trial(SEED), python_trial(spec, monkeypatch)
@@ -124,8 +126,8 @@ def entry_of(agent_id):
 
 
 def test_an_agent_may_have_other_settings_than_the_defaults():
-    spec = spec_of("sdnn-c-robust", n_sensors=5)
-    assert spec.approximator == replace(SDNNQLearning.presets["robust"].approximator, n_inputs=5)
+    spec = spec_of("sdnn-c-robust")
+    assert spec.approximator == SDNNQLearning.presets["robust"].approximator
     assert spec.learning == SDNNQLearning.presets["robust"].learning
     assert spec_of("sdnn-c").learning == SDNNQLearning.presets["paper"].learning
 
@@ -164,18 +166,14 @@ def test_agents_are_looked_up_by_word():
 def test_a_registered_dataclass_is_the_configuration_of_its_agent(monkeypatch):
     monkeypatch.setitem(AGENTS, "new", entry_of("new"))
     spec = spec_of("new", 5)
-    assert spec.approximator == Nothing(5)
+    assert spec.approximator == Nothing()
     assert '"name":"new"' in spec.canonical_json()
     assert len(spec.config_hash) == 16
 
 
 def short_spec(agent="sdnn-c", **changes):
-    given = {
-        "agent": AgentSpec(name=agent),
-        "protocol": ProtocolSpec(evaluate_every_episodes=5),
-        "budget": BudgetSpec(episodes=60),
-    }
-    return RunSpec(**given | changes)
+    tables = {"protocol": {"evaluate_every_episodes": 5}, "budget": {"episodes": 60}}
+    return paper_spec(agent=agent, **tables | changes)
 
 
 @pytest.mark.parametrize(
@@ -184,16 +182,22 @@ def short_spec(agent="sdnn-c", **changes):
         *map(short_spec, ("sdnn-c", "rbf", "fuzzy")),
         short_spec(
             agent="fuzzy",
-            acrobot={"max_decisions": 3, "penalty": -1.0},
-            sensors={"n_sensors": 5, "noise": 0.02},
-            protocol=ProtocolSpec(
-                evaluate_every_episodes=5, limit_bootstraps=False, noisy_evaluations=False
-            ),
+            environment={
+                "kwargs": {
+                    "acrobot": {"max_decisions": 3, "penalty": -1.0},
+                    "sensors": {"n_sensors": 5, "noise": 0.02},
+                }
+            },
+            protocol={
+                "evaluate_every_episodes": 5,
+                "limit_bootstraps": False,
+                "noisy_evaluations": False,
+            },
         ),
     ],
 )
 def test_both_trials_of_a_specification_have_the_same_rows(spec):
-    core, trial = spec.make_trial(SEED), training_trial(spec.replace(seed=SEED))
+    core, trial = spec.make_trial(SEED), spec.replace(seed=SEED).make_training()
     assert (type(core).__module__, spec.length) == (_core.__name__, 60)
     core.advance(60)
     trial.advance(60)

@@ -1,0 +1,110 @@
+"""The task of the paper: the acrobot with a goal that tightens, seen through its sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn import _core
+from sdnn.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
+from sdnn.environments.acrobot import AcrobotSwingUpEnv
+from sdnn.environments.goal import GoalSchedule
+from sdnn.environments.sensors import NoiseStream
+from sdnn.support.arguments import one_of, require, seed_of, whole
+
+PAPER_ACROBOT = "sdnn/PaperAcrobot-v0"
+
+AnyConfig = TypeVar("AnyConfig", AcrobotConfig, GoalScheduleConfig, SensorConfig)
+
+
+class PaperAcrobotEnv(AcrobotSwingUpEnv):
+    """Swing up the acrobot of `AcrobotSwingUpEnv` as in the experiments of the SDNN papers.
+
+    The goal tolerance falls with the learning episode, which the reset option ``"episode"`` sets;
+    it is counted from 1 and stays for later resets. Observations, shape (n_inputs,), float64, have
+    the order s1..s6, constant, random inputs; a reset with a seed restarts their noise. All equals
+    a compiled trial, bit for bit.
+
+    Arguments may be mappings of the settings that differ from the defaults.
+
+    Parameters
+    ----------
+    acrobot : AcrobotConfig, optional
+        Physics, goal and reward.
+    goal : GoalScheduleConfig, optional
+        The schedule of the goal tolerance.
+    sensors : SensorConfig, optional
+        Observed variables and their noise.
+    stream : {"sensor_noise", "evaluation_sensor_noise"}
+        The core's random stream, of learning or of test episodes.
+    render_mode : str, optional
+        As of `AcrobotSwingUpEnv`.
+
+    Examples
+    --------
+    >>> import gymnasium as gym
+    >>> env = gym.make("sdnn/PaperAcrobot-v0", sensors={"n_sensors": 6, "noise": 0.02})
+    >>> observation, info = env.reset(seed=1, options={"episode": 300})
+    >>> observation.shape, info["goal_tolerance"]
+    ((6,), 0.25)
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        **AcrobotSwingUpEnv.metadata,
+        "reset_episode": True,  # an option of reset: the number of the learning episode
+    }
+
+    def __init__(
+        self,
+        *,
+        acrobot: AcrobotConfig | Mapping[str, object] | None = None,
+        goal: GoalScheduleConfig | Mapping[str, object] | None = None,
+        sensors: SensorConfig | Mapping[str, object] | None = None,
+        stream: NoiseStream = "sensor_noise",
+        render_mode: str | None = None,
+    ) -> None:
+        config = _config("acrobot", AcrobotConfig, acrobot)
+        super().__init__(config=config, render_mode=render_mode, dtype="float64")
+        self.schedule = GoalSchedule(_config("goal", GoalScheduleConfig, goal))
+        self.sensors = _config("sensors", SensorConfig, sensors)
+        one_of("stream", stream, ("sensor_noise", "evaluation_sensor_noise"))
+        self._stream = _core.Stream.__members__[stream]
+        self._restart_noise(0)
+        self._episode = 1
+        self.observation_space = gym.spaces.Box(0.0, 1.0, (self.sensors.n_inputs,), np.float64)
+
+    def _restart_noise(self, seed: int) -> None:
+        self._sensors = _core.AcrobotSensors(self.sensors, seed_of(seed), self._stream)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[Any], dict[str, Any]]:
+        """Begin an episode; the option ``"episode"`` holds for it and later ones."""
+        options = dict(options or {})
+        self._episode = whole("episode", options.pop("episode", self._episode), 1, 2**31 - 1)
+        require(not options, "options", "hold no more than 'episode'", options)
+        if seed is not None:
+            self._restart_noise(seed)
+        tolerance = {"goal_tolerance": self.schedule(self._episode)}
+        return super().reset(seed=seed, options=tolerance)
+
+    def _observation(self) -> NDArray[np.float64]:
+        return self._sensors.observe(self.state)
+
+
+def _config(
+    name: str, config_type: type[AnyConfig], value: AnyConfig | Mapping[str, object] | None
+) -> AnyConfig:
+    """Return settings as they are, or the defaults with those of a mapping."""
+    make: Callable[..., AnyConfig] = config_type
+    if value is None:
+        return make()
+    if isinstance(value, Mapping):
+        return make(**value)
+    is_config = isinstance(value, config_type)
+    require(is_config, name, f"be a {config_type.__name__} or a mapping", value, TypeError)
+    return value
