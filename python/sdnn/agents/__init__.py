@@ -1,7 +1,6 @@
 """Agents: ``agent.train(env, steps=...)``, or ``act(observation)`` and ``learn(transition)``."""
 
-from sdnn.agents.agent import Agent
-from sdnn.agents.base import load_agent
+from sdnn.agents.agent import Agent, load_agent
 from sdnn.agents.datasets import learn_from
 from sdnn.agents.fixed_rate import FixedRate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning

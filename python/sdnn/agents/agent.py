@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -12,9 +13,19 @@ from numpy.typing import NDArray
 
 from sdnn.agents.base import Approximator, BaseAgent, Learning
 from sdnn.agents.batches import unbatched
-from sdnn.support.arguments import argument_error, blamed, flag, require, reward_of, shown, whole
+from sdnn.support.arguments import (
+    argument_error,
+    blamed,
+    flag,
+    path_of,
+    require,
+    reward_of,
+    shown,
+    whole,
+)
 from sdnn.support.progress import is_shown
 from sdnn.training.callbacks import ProgressBarCallback
+from sdnn.training.files import read_agent
 from sdnn.training.learners import Transition
 from sdnn.training.names import explained
 from sdnn.training.training import Callback, Training, TrainingResult, listed
@@ -291,3 +302,10 @@ class Agent(BaseAgent[Approximator, Learning]):
         finally:
             if seed is None:
                 self._next_episode = training.next_episode
+
+
+@explained
+def load_agent(path: str | Path) -> Agent[Any, Any]:
+    """Read an agent of any kind that `Agent.save` wrote; see `Agent.load`."""
+    agent: Agent[Any, Any] = read_agent(path_of("path", path), "agent", "training")[0]
+    return agent

@@ -54,8 +54,6 @@ from sdnn.training.statistics import Statistics, read_statistics
 if TYPE_CHECKING:
     from typing import Self
 
-    from sdnn.agents.agent import Agent
-
 _MOST_ENVIRONMENTS = 2**14
 
 Approximator = TypeVar("Approximator")
@@ -288,7 +286,7 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         OSError if the file cannot be read; ValueError if it is damaged, of another format, or holds
         another kind of agent.
         """
-        agent: Any = load_agent(path)
+        agent: Any = read_agent(path_of("path", path), "agent", "training")[0]
         if not is_of_class(agent, cls):
             raise ValueError(f"{path} holds a {type(agent).__name__}, not a {cls.__name__}")
         return agent  # type: ignore[no-any-return]
@@ -371,10 +369,3 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         return type(self).rebuild, (self.description(), self.state())
-
-
-@explained
-def load_agent(path: str | Path) -> Agent[Any, Any]:
-    """Read an agent of any kind that `Agent.save` wrote; see `Agent.load`."""
-    agent: Agent[Any, Any] = read_agent(path_of("path", path), "agent", "training")[0]
-    return agent
