@@ -12,10 +12,11 @@ from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
 from sdnn.reproduction.claims import ClaimOutcome, TenTrials, judge_claims
 from sdnn.reproduction.report import CHECKS_HEADER, RULE_NOTE, VERDICT_KINDS, check_rows
 from sdnn.reproduction.reproduce import with_paper_defaults
+from sdnn.runs.comparison import Comparison
 from sdnn.runs.report import format_share
 from sdnn.runs.study import StudyCase
 from sdnn.runs.study_file import KnownCase, StudyFile
-from sdnn.runs.sweep import Addition, Comparison
+from sdnn.runs.sweep import Addition
 
 MIN_TRIALS_TO_DRAW = 2 * PAPER_TRIALS
 """Fewer trials are too few to draw ten from."""

@@ -1,32 +1,21 @@
-"""Learning curves: which runs differ in their seeds only, the numbers of their rows, and files."""
+"""Learning curves: which runs differ in their seeds only, and the numbers of their rows."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from io import BytesIO
-from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.runs.errors import RunError
-from sdnn.runs.figures import draw_curves
 from sdnn.runs.run import Run
-from sdnn.support.csv_files import csv_bytes
-from sdnn.support.files import write_whole
-from sdnn.support.interrupts import stay_interrupts
 
 WINDOW = 20
 """Episodes in the running median of the returns, or all so far where they are fewer."""
-
-SUFFIXES = (".png", ".svg", ".pdf")
-"""Kinds of figures that the curves of runs may be written as."""
-
-HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "high")
 
 Kind: TypeAlias = Literal["return", "running median", "evaluation"]
 
@@ -121,24 +110,6 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
     return curves, notes
 
 
-def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
-    """Draw the curves of runs into a file, and write their numbers beside it as CSV; return both.
-
-    Raises RunError if the name has another ending than those of `SUFFIXES`.
-    """
-    if path.suffix not in SUFFIXES:
-        raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
-    content = BytesIO()
-    figure = draw_curves(curves)
-    with stay_interrupts():
-        figure.savefig(content, format=path.suffix[1:], dpi=150)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    numbers = path.with_suffix(".csv")
-    write_whole(path, content.getvalue())
-    write_whole(numbers, csv_bytes(HEADER, _csv_rows(curves)))
-    return path, numbers
-
-
 def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
     """Make the curves of each run, or the one of several that have evaluations, and notes."""
     rows = {run: run.rows() for run in group.runs}
@@ -188,13 +159,3 @@ def _series(rows: Sequence[Any], kind: Kind) -> tuple[NDArray[np.int64], NDArray
         ends = range(1, len(values) + 1)
         values = np.array([np.median(values[max(0, end - WINDOW) : end]) for end in ends])
     return steps, values
-
-
-def _csv_rows(curves: Sequence[Curve]) -> Iterable[tuple[object, ...]]:
-    """Numbers of curves under `HEADER`."""
-    for curve in curves:
-        names = (curve.task, curve.agent, curve.kind, curve.n_runs, curve.run)
-        columns = (curve.values, curve.low, curve.high)
-        for place, step in enumerate(curve.steps):
-            numbers = ("" if c is None else float(c[place]) for c in columns)
-            yield (*names, int(step), *numbers)

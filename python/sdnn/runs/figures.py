@@ -1,4 +1,4 @@
-"""Figures of stored rows: learning curves of runs and of trials, and of studies."""
+"""Figures of stored trials: their learning curves, and the variants of a study."""
 
 from __future__ import annotations
 
@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from sdnn.agents.registry import labels, title_of
 from sdnn.reports.plots import FAINT, INK, color_of, label, new_figure, style
 from sdnn.reports.statistics import estimate_mean, running_median
-from sdnn.runs.report import require_matplotlib
+from sdnn.runs.comparison import Comparison, Measured
 from sdnn.runs.results import CaseResult, MeasureName
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sdnn.runs.curves import Curve
-    from sdnn.runs.sweep import Comparison, Measured
 
 SMOOTHED_TESTS = 25
 """Test episodes in the running median of a long run, which lies over the thin median curve."""
@@ -66,42 +64,6 @@ def draw_steps(
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
     style(axes)
-
-
-def draw_curves(curves: Sequence[Curve]) -> Figure:
-    """Draw the curves of runs: a panel per task, a color per agent.
-
-    Raises a `PlotUnavailableError` if matplotlib is not installed.
-    """
-    require_matplotlib()
-    tasks = list(dict.fromkeys(curve.task for curve in curves))
-    agents = list(dict.fromkeys(curve.agent for curve in curves))
-    colors = {agent: color_of(place) for place, agent in enumerate(agents)}
-    figure = new_figure(7.5, 3.6 * len(tasks))
-    panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
-    for task, axes in zip(tasks, panels, strict=True):
-        for curve in (one for one in curves if one.task == task):
-            _draw_curve(axes, curve, colors[curve.agent])
-        axes.set_title(task, fontsize=10)
-        axes.set(xlabel="steps", ylabel="return")
-        axes.grid(alpha=0.25)
-        axes.legend(fontsize=8, frameon=False)
-    return figure
-
-
-def _draw_curve(axes: Axes, curve: Curve, color: str) -> None:
-    of = f" ({curve.n_runs} runs)" if curve.n_runs > 1 else ""
-    label = f"{curve.agent}: {curve.kind}{of}"
-    if curve.kind == "return":
-        axes.plot(curve.steps, curve.values, ".", ms=2, color=color, alpha=0.25, label=label)
-        return
-    is_main = curve.kind == "evaluation"
-    width, dashes, marker = (1.8, "-", "o") if is_main else (1.0, "--", "")
-    axes.plot(
-        curve.steps, curve.values, dashes, lw=width, marker=marker, ms=3, color=color, label=label
-    )
-    if curve.low is not None and curve.high is not None:
-        axes.fill_between(curve.steps, curve.low, curve.high, color=color, alpha=0.2, lw=0)
 
 
 def draw_study(comparison: Comparison, footer: str) -> Figure:

@@ -5,18 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
-from sdnn.runs.engine import Observer, PlannedTrial, trials_of
+from sdnn.runs.engine import PlannedTrial, trials_of
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.spec import RunSpec
-from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrialKey, opened
 from sdnn.support.toml import KeyPath
-
-if TYPE_CHECKING:
-    from sdnn.runs.report import Content
-    from sdnn.runs.sweep import Comparison
 
 
 class Setting(NamedTuple):
@@ -130,20 +125,9 @@ class Study:
         rounds = zip(*(self.combinations[pair].trials for pair in self.pairs), strict=True)
         return tuple({one.key: one for trials in rounds for one in trials}.values())
 
-    def measure(self, store: ResultStore, observe: Observer) -> None:
-        """Measure and store what is asked for besides trials."""
-
     def other_work(self, out: Path) -> dict[str, Any]:
         """Count what is asked for besides trials, as values that JSON can hold."""
         return {}
-
-    def report(self, comparison: Comparison, store: ResultStore) -> Content | None:
-        """Make the report of what is complete; None if there is nothing."""
-        raise NotImplementedError
-
-    def file_name(self, name: str) -> str:
-        """Return the name of a file of the report in a folder that others share."""
-        return name
 
     def copies(self) -> dict[str, str]:
         """Map each variant that is the same as an earlier one in every case to the first such."""

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from msgspec import Meta
 
 from sdnn.agents.registry import labels, split_label
+from sdnn.runs.comparison import Comparison
 from sdnn.runs.config_file import ConfigFile
 from sdnn.runs.environment import find_module, search_folder
 from sdnn.runs.errors import ConfigError
@@ -32,8 +33,8 @@ from sdnn.runs.settings import (
 )
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
-from sdnn.runs.study import Layer, Setting, Study, StudyCase, StudyVariant
-from sdnn.runs.sweep import Addition, Comparison, study_content
+from sdnn.runs.study import Layer, Setting, StudyCase, StudyVariant
+from sdnn.runs.sweep import Addition, ReportedStudy, study_content
 from sdnn.support.arguments import advice
 from sdnn.support.toml import KeyPath, dotted
 
@@ -92,7 +93,7 @@ class KnownCase(NamedTuple):
     settings: Mapping[str, Any]
 
 
-class StudyFile(Study):
+class StudyFile(ReportedStudy):
     """A study, read from a file; modules that it imports are looked for beside it, too.
 
     ConfigError if the file cannot be read, or has something unknown or impossible; the message
