@@ -39,13 +39,9 @@ if TYPE_CHECKING:
         StoreError as StoreError,
         WorkerLostError as WorkerLostError,
     )
+    from sdnn.runs.outcome import RunEvaluation as RunEvaluation, RunOutcome as RunOutcome
     from sdnn.runs.results import CaseResult as CaseResult, measure as measure
-    from sdnn.runs.run import (
-        Goal as Goal,
-        Run as Run,
-        RunEvaluation as RunEvaluation,
-        RunOutcome as RunOutcome,
-    )
+    from sdnn.runs.run import Goal as Goal, Run as Run
     from sdnn.runs.settings import (
         AgentSpec as AgentSpec,
         BudgetSpec as BudgetSpec,
@@ -73,7 +69,8 @@ __getattr__, __dir__, __all__ = attach(
             " WorkerLostError"
         ),
         "sdnn.runs.results": "CaseResult measure",
-        "sdnn.runs.run": "Goal Run RunEvaluation RunOutcome",
+        "sdnn.runs.outcome": "RunEvaluation RunOutcome",
+        "sdnn.runs.run": "Goal Run",
         "sdnn.runs.settings": "AgentSpec BudgetSpec OutputSpec ProtocolSpec",
         "sdnn.runs.spec": "RunSpec",
         "sdnn.runs.store": "ResultStore",

@@ -11,7 +11,8 @@ from sdnn.reports.plots import color_of, new_figure
 from sdnn.runs.curves import Curve
 from sdnn.runs.errors import RunError
 from sdnn.runs.report import require_matplotlib
-from sdnn.support.files import csv_bytes, write_whole
+from sdnn.support.csv_files import csv_bytes
+from sdnn.support.files import write_whole
 from sdnn.support.interrupts import stay_interrupts
 
 if TYPE_CHECKING:

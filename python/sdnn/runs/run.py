@@ -6,9 +6,9 @@ import json
 import shlex
 import signal
 import time
-from collections.abc import Iterable, Iterator, Mapping
+import weakref
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,9 +21,7 @@ from sdnn.agents import (
     Agent,
     Callback,
     CheckpointCallback,
-    Evaluation,
     SaveBestAgent,
-    Scaling,
     TensorBoard,
     Training,
     UnrepeatedEpisodeError,
@@ -36,11 +34,11 @@ from sdnn.environments.matching import require_same_kind
 from sdnn.runs.config_file import FORMAT, ConfigFile, read_spec
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
+from sdnn.runs.outcome import RunEvaluation, RunOutcome
 from sdnn.runs.settings import BudgetSpec, read
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import (
-    Reason,
     TrainingTrial,
     TrialKey,
     TrialRecord,
@@ -51,6 +49,7 @@ from sdnn.support.files import lock, open_to_append, remove_abandoned_files, wri
 from sdnn.support.interrupts import Interrupts
 from sdnn.support.machine import instruction_set
 from sdnn.training.loop import Row
+from sdnn.training.training import listed
 
 if TYPE_CHECKING:
     from typing import Self
@@ -74,33 +73,6 @@ class Goal(BudgetSpec, frozen=True, kw_only=True):
             raise ConfigError("steps", "or episodes must be given")
 
 
-@dataclass(frozen=True, kw_only=True)
-class RunOutcome:
-    """The result of training a run.
-
-    ``learning_report``: see `sdnn.agents.SDNNQLearning`, None for fuzzy agents and while one is
-    warming up; ``is_solved``: whether the last evaluation reached the environment's reward
-    threshold; ``has_pictures``: whether `record` can render the environment.
-    """
-
-    n_steps: int
-    n_episodes: int
-    reason: Reason
-    last_evaluation: Row | None
-    learning_report: Mapping[str, Any] | None
-    is_warming_up: bool
-    is_solved: bool
-    has_pictures: bool
-    scaling: Scaling | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunEvaluation(Evaluation):
-    """The result of greedy episodes; ``is_warming_up``: all actions of the agent are random."""
-
-    is_warming_up: bool
-
-
 class Run(Displayed):
     """A run in its folder, which `create` and `open` make.
 
@@ -111,6 +83,7 @@ class Run(Displayed):
         self.folder = folder
         self.spec = spec
         self.goals = tuple(goals)
+        self._checked: TrainingTrial | None = None  # a training that has not begun
 
     @classmethod
     def create(cls, folder: str | Path, spec: RunSpec) -> Self:
@@ -125,9 +98,10 @@ class Run(Displayed):
         remove_abandoned_files(place)
         if place.exists() and (not place.is_dir() or any(place.iterdir())):
             raise RunError(f"{place} is there already, and no run: take another folder")
-        cls(place, spec).check()
-        place.mkdir(parents=True, exist_ok=True)
         run = cls(place, spec)
+        run._checked = run._check()
+        weakref.finalize(run, run._checked.close)  # where it is not trained
+        place.mkdir(parents=True, exist_ok=True)
         run.write_config()
         return run
 
@@ -156,6 +130,9 @@ class Run(Displayed):
 
     def check(self) -> None:
         """Make all that is needed once, to see that it works; ConfigError if not."""
+        self._check().close()
+
+    def _check(self) -> TrainingTrial:
         instruction_set()  # whose variable may be wrong
         if not self.spec.protocol.seeded_episodes:
             raise ConfigError(
@@ -163,9 +140,14 @@ class Run(Displayed):
                 "must be true for a run in a folder: without seeds no episode can be repeated,"
                 " which resuming needs. Studies and `sdnn reproduce` run such specifications",
             )
-        self.spec.make_training().close()
-        if self.spec.output.tensorboard:
-            tensorboard_in(self.folder)
+        trial = self.spec.make_training()
+        try:
+            if self.spec.output.tensorboard:
+                tensorboard_in(self.folder)
+        except ConfigError:
+            trial.close()
+            raise
+        return trial
 
     def train(
         self,
@@ -202,13 +184,13 @@ class Run(Displayed):
                     " the edit, or begin a new run with --config and another --out"
                 )
             checkpoints = _StoredCheckpoints(self, store)
-            listed = [checkpoints, *callbacks]
+            all_callbacks = [checkpoints, *callbacks]
             if self.spec.output.keep_best:
-                listed.append(SaveBestAgent(self.folder / BEST))
+                all_callbacks.append(SaveBestAgent(self.folder / BEST))
             if self.spec.output.tensorboard:
-                listed.append(tensorboard_in(self.folder))
+                all_callbacks.append(tensorboard_in(self.folder))
             has_goal = steps is not None or episodes is not None
-            trial = self._trial(listed, has_goal=has_goal, repeat_episodes=repeat_episodes)
+            trial = self._trial(all_callbacks, has_goal=has_goal, repeat_episodes=repeat_episodes)
             stack.enter_context(closing(trial))
             training = trial.training
             if training.n_rows > len(store.rows(self.key).to_training()):
@@ -326,7 +308,10 @@ class Run(Displayed):
         if self.goals or has_goal:
             spec = spec.replace(budget=spec.budget.replace(target_return=None))
         if not (self.folder / CHECKPOINT).exists():
-            trial = spec.make_training(callbacks)
+            trial, self._checked = self._checked, None
+            if trial is None or spec != self.spec:
+                trial = spec.make_training()
+            trial.training.callbacks = listed((*trial.training.callbacks, *callbacks))
             trial.training.steps, trial.training.episodes = self.goal.steps, self.goal.episodes
             return trial
         try:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Transition(NamedTuple):
-    """One step of an environment.
+    """A step of an environment.
 
     ``terminated`` is Gymnasium's: the episode ended in a terminal state. An episode cut off by a
     time limit (``truncated``) is not terminated; its last transition is learned like any other.

@@ -202,6 +202,16 @@ def test_a_goal_before_the_first_checkpoint(tmp_path):
     assert run.train(steps=30).n_steps == 30
 
 
+def test_a_new_run_makes_each_environment_once(tmp_path, monkeypatch):
+    made = []
+    make = EnvironmentSpec.make
+    monkeypatch.setattr(
+        EnvironmentSpec, "make", lambda self, *args: made.append(args[0]) or make(self, *args)
+    )
+    Run.create(tmp_path / "run", run_spec(CONFIG, n_envs=1)).train()
+    assert sorted(made) == ["evaluation_sensor_noise", "sensor_noise"]
+
+
 def test_what_is_there_is_not_overwritten(whole, tmp_path):
     run = whole(CONFIG)
     before = contents(run)
