@@ -66,7 +66,7 @@ def option_of(key: str) -> str:
     if key in (*KEYS, "steps", "episodes"):
         return "--" + key.rpartition(".")[2].replace("_", "-")
     if key.startswith("environment.kwargs"):
-        return " ".join(["--env-arg", *key.split(".")[2:]])
+        return f"--env-arg {key[len('environment.kwargs.') :]}".rstrip()
     if key.startswith("environment.ranges"):
         return " ".join(["--range", *key.split(".")[2:]])
     return "ENV_ID" if key in ("environment", "environment.id") else f"--set {key}"

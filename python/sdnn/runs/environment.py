@@ -338,6 +338,16 @@ class EnvironmentSpec(Settings, frozen=True):
 _PAPER_DEFAULTS = PaperSettings(AcrobotConfig(), GoalScheduleConfig(), SensorConfig())
 
 
+def takes_episode(env: AnyEnv) -> bool:
+    """Return whether resets take the number of the learning episode as an option."""
+    return bool(env.metadata.get("reset_episode"))
+
+
+def episode_option(episode: int) -> dict[str, Any]:
+    """Return the option of resets that has the number of the learning episode, from 1."""
+    return {"episode": max(1, episode)}
+
+
 class SeedFirstReset(gym.Wrapper[Any, Any, Any, Any]):
     """Gives the first reset a seed, so that the random streams of all others follow from it."""
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents import UnusableStepError
-from sdnn.runs.environment import render_modes
+from sdnn.runs.environment import AnyEnv, render_modes
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
 from sdnn.runs.spec import RunSpec
@@ -65,7 +65,7 @@ def record(
         run.check_spaces(agent, env)
 
         def frames() -> Iterator[NDArray[np.uint8]]:
-            for now in greedy_episode(agent, env, root, 0):
+            for now in greedy_episode(agent, env, root, 0, run.reset_options(env)):
                 recording.total_reward = now.total_reward
                 for frame in _rendered(env):
                     recording.n_frames += 1
@@ -84,7 +84,7 @@ def record(
     return recording
 
 
-def _rendered(env: gym.Env[Any, Any]) -> Iterator[NDArray[np.uint8]]:
+def _rendered(env: AnyEnv) -> Iterator[NDArray[np.uint8]]:
     """Yield the pictures of the present step, shape (height, width, 3)."""
     try:
         rendered: Any = env.render()
@@ -99,7 +99,7 @@ def _rendered(env: gym.Env[Any, Any]) -> Iterator[NDArray[np.uint8]]:
         yield frame
 
 
-def _filmed(spec: RunSpec) -> gym.Env[Any, Any]:
+def _filmed(spec: RunSpec) -> AnyEnv:
     env = spec.make_env("evaluation_sensor_noise", render_mode="rgb_array")
     if "rgb_array_list" not in render_modes(env):
         return env

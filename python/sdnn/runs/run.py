@@ -32,7 +32,7 @@ from sdnn.agents import (
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.environments.matching import require_same_kind
 from sdnn.runs.config_file import FORMAT, ConfigFile, read_spec
-from sdnn.runs.environment import render_modes
+from sdnn.runs.environment import AnyEnv, episode_option, render_modes, takes_episode
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
 from sdnn.runs.outcome import RunEvaluation, RunOutcome
 from sdnn.runs.settings import BudgetSpec, read
@@ -251,17 +251,24 @@ class Run(Displayed):
         with closing(self.spec.make_env("evaluation_sensor_noise")) as env:
             self.check_spaces(agent, env)
             try:
-                found = evaluate(agent, env, episodes, seed=root)
+                options = self.reset_options(env)
+                evaluation = evaluate(agent, env, episodes, seed=root, options=options)
             except UnusableStepError as error:
                 raise RunError(f"{self.spec.task}: {error}") from error
-        return RunEvaluation(**vars(found), is_warming_up=agent.is_warming_up)
+        return RunEvaluation(**vars(evaluation), is_warming_up=agent.is_warming_up)
 
-    def check_spaces(self, agent: Agent[Any, Any], env: gym.Env[Any, Any]) -> None:
+    def check_spaces(self, agent: Agent[Any, Any], env: AnyEnv) -> None:
         """Check that the environment still is what the agent learned in; RunError if not."""
         try:
             require_same_kind(agent, env)
         except ValueError as error:
             raise RunError(f"{self.spec.task} has changed: {error}") from error
+
+    def reset_options(self, env: AnyEnv) -> dict[str, Any] | None:
+        """Return the options of resets in an evaluation now, if the environment takes any."""
+        if not takes_episode(env):
+            return None
+        return episode_option(sum(row["kind"] == "episode" for row in self.rows()))
 
     @property
     def fresh_seed(self) -> int:

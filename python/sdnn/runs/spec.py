@@ -15,7 +15,14 @@ from sdnn.agents import Agent, Callback, StopTrainingOnRewardThreshold, Training
 from sdnn.agents.q_learning import CodedAgent
 from sdnn.agents.registry import AGENTS, AgentEntry, agent_entry, label_of, split_label
 from sdnn.config import ProtocolConfig
-from sdnn.runs.environment import AnyEnv, EnvironmentSpec, SeedFirstReset, Stream
+from sdnn.runs.environment import (
+    AnyEnv,
+    EnvironmentSpec,
+    SeedFirstReset,
+    Stream,
+    episode_option,
+    takes_episode,
+)
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.settings import (
     DEFAULT_AGENT,
@@ -39,8 +46,7 @@ from sdnn.support.arguments import blamed, shown
 from sdnn.support.bounds import flat_bounds
 from sdnn.training.learners import Learner
 
-DEFAULT_STEPS = 200_000
-DEFAULT_INTERVAL = 10_000
+DEFAULT_STEPS, DEFAULT_INTERVAL = 200_000, 10_000
 
 _ALWAYS = ("id", "name", "preset", "steps", "episodes")
 """Settings that are written also where they are the default."""
@@ -270,12 +276,10 @@ class RunSpec(Settings, frozen=True):
                 evaluation_env = self._make_evaluation_env()
                 environments.callback(evaluation_env.close)
             single: AnyEnv = env.envs[0] if isinstance(env, SyncVectorEnv) else env
-            options = None
-            if single.metadata.get("reset_episode"):
-                options = _episode_option
-                if protocol.n_envs > 1:
-                    problem = f"must be 1: resets of {self.task} take the number of the episode"
-                    raise ConfigError("protocol.n_envs", f"{problem}, got {protocol.n_envs}")
+            options = episode_option if takes_episode(single) else None
+            if options is not None and protocol.n_envs > 1:
+                problem = f"must be 1: resets of {self.task} take the number of the episode"
+                raise ConfigError("protocol.n_envs", f"{problem}, got {protocol.n_envs}")
             if checkpoint is not None:
                 training = Training.load(
                     checkpoint, env, callbacks=callbacks, evaluation_env=evaluation_env,
@@ -388,9 +392,9 @@ class RunSpec(Settings, frozen=True):
         for table in ("approximator", "learning", "agent"):
             if name != "n_inputs" and name in names_of(type(getattr(self, table))):
                 return ConfigError(f"{table}.{name}", problem)
-        key = self.environment.key_of(name)
-        whole = str(error) or type(error).__name__
-        return ConfigError(key or "environment.id", problem if key else whole)
+        if key := self.environment.key_of(name):
+            return ConfigError(key, problem)
+        return ConfigError("environment.id", str(error) or type(error).__name__)
 
     def values(self) -> dict[str, Any]:
         """Return what is not the default as JSON has it; `from_values` reads it.
@@ -444,7 +448,3 @@ class RunSpec(Settings, frozen=True):
 
 def _is_class_of(agent: object, ancestor: type[object]) -> bool:
     return isinstance(agent, type) and issubclass(agent, ancestor)
-
-
-def _episode_option(episode: int) -> dict[str, int]:
-    return {"episode": max(1, episode)}
