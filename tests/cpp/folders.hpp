@@ -48,7 +48,7 @@ inline void write_content(const std::filesystem::path& path, const std::string& 
   std::ofstream(path, std::ios::binary) << content;
 }
 
-/// What std::runtime_error says that `call` throws; "no error" if it throws none.
+/// The message of the std::runtime_error that `call` throws, or "no error".
 template <class Call>
 std::string runtime_error_of(const Call& call) {
   try {

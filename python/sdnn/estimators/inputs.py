@@ -234,7 +234,7 @@ class CodedInputs(BaseEstimator):
             effect = "it is left out of the range, and clipped; ranges='all' takes it in"
         others = f"far from the other values, which are within {list(usual)}"
         warn_caller(f"{name} has {outlier}, {others}: {effect}", OutlierWarning)
-        self._has_outliers = self._has_outliers or is_left_out
+        self._has_outliers |= is_left_out
         return usual if is_left_out else full
 
     def _need_two(self, samples: Array, what: str) -> None:

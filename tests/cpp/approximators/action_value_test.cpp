@@ -74,8 +74,8 @@ SDNNCConfig small_network() {
           .n_actions = 5};
 }
 
-// What the table of expressions promises, for every model: values and value agree, asking changes
-// nothing, and corrections move the value to the target.
+// Checks the concept for every model: values and value agree, asking changes nothing, and
+// corrections move the value to the target.
 template <ActionValue Q>
 void expect_a_model(Q model) {
   testing::WithWorkspace<Q> q(std::move(model));
@@ -122,7 +122,7 @@ std::vector<double> all_values(const Q& q, const std::vector<std::array<double, 
   return all;
 }
 
-// What each thread reads between the updates is what one reads alone.
+// Each thread reads the values that a single reader would read between the updates.
 template <ActionValue Q>
 void expect_that_threads_may_read(Q q) {
   const auto states = some_states(60);

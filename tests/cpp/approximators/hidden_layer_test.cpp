@@ -137,7 +137,7 @@ TEST(HiddenLayer, AWeightOutsideAByteHasAHighByte) {
   EXPECT_EQ(p.weight(0, 0), 0);
 }
 
-// Of a block with few high bytes a pass reads their columns alone, of one with many all of its.
+// A pass reads only the columns with high bytes if a block has few of them, else all columns.
 TEST(HiddenLayer, FewAndManyHighBytesAddUpAlike) {
   HiddenLayer p(130, 1000);
   for (std::size_t j = 0; j < 1000; j += 3) p.set_weight(7, j, j % 2 == 0 ? 5000 : -5000);

@@ -63,7 +63,7 @@ TEST(SDNNC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
   EXPECT_EQ(largest, 4);
 }
 
-// One correction by hand: d subsets, in each the nearest unit, moved by lattice * (|x|^2 + 1).
+// A correction by hand: d subsets, in each the nearest unit, moved by lattice * (|x|^2 + 1).
 TEST(SDNNC, OneCorrectionMovesOneUnitOfEachSubset) {
   SDNNCConfig config = small();
   config.lattice = 4;

@@ -21,7 +21,8 @@ struct Drawn {
   std::uint64_t bits;
 };
 
-// As numpy.random.Generator(PCG64(SeedSequence(seeds))) draws: integers, random, integers, raw.
+// Expected numbers of numpy.random.Generator(PCG64(SeedSequence(seeds))): integers, random,
+// integers, raw.
 TEST(Pcg64, DrawsAsNumPy) {
   const std::vector<Drawn> drawn = {
       {{0}, {5, 4, 3, 1, 2}, 0.016527635528529094, 42963, 15002187965291974971U},

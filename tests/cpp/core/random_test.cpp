@@ -146,7 +146,7 @@ TEST(Random, GoesOnFromItsState) {
   for (int i = 0; i < 100; ++i) EXPECT_EQ(other.bits(), random.bits());
 }
 
-// Of zeros alone come zeros for ever, and below(3) would wait for another number.
+// A state of zeros gives only zeros, for which below(3) would not terminate.
 TEST(Random, RefusesAStateOfZeros) {
   Random random(1, Stream::weights);
   sdnn::testing::expect_that_damage_is_refused(random);

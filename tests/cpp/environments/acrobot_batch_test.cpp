@@ -25,7 +25,7 @@ bool same_bits(const AcrobotState& a, const AcrobotState& b) {
   return true;
 }
 
-/// What one batch step is given and gives, of the right sizes.
+/// Arguments and results of a batch step, with the right sizes.
 struct Step {
   explicit Step(std::size_t n)
       : torques(n), tolerances(n, 1.0), moving(n, 1), rewards(n), terminated(n), truncated(n) {}

@@ -31,7 +31,7 @@ inline Code random_code(std::size_t n_words, core::Random& random) {
   return code;
 }
 
-/// The same code with some slots of another.
+/// Returns a code with some slots of another.
 inline Code neighbour_of(const Code& code, std::size_t n_changes, core::Random& random) {
   Code changed = code;
   const Code other = random_code(code.active.size(), random);

@@ -18,7 +18,7 @@ namespace {
 
 using estimators::ParallelPerceptron;
 
-/// One input of two bins, +1 +1 -1 and -1 +1 +1, not desensitized.
+/// A code of an input with two bins, +1 +1 -1 and -1 +1 +1, not desensitized.
 std::shared_ptr<const ParallelPerceptron::Code> small_code() {
   const std::vector<std::int8_t> signs{1, 1, -1, -1, 1, 1};
   const std::vector<std::int8_t> on(6, 1);

@@ -25,7 +25,7 @@ namespace {
 using testing::LookupTable;
 using Network = approximators::SDNNC;
 
-/// What a test varies; the rest is the paper's.
+/// The settings that a test varies; the others have the paper's values.
 struct Setting {
   environments::AcrobotConfig acrobot = {};
   environments::SensorConfig sensors = {};

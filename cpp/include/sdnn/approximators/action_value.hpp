@@ -1,4 +1,4 @@
-/// The concept that every approximator models: a function Q(s, a) as an agent uses it.
+/// The concept of an approximator: a function Q(s, a) for agents.
 #pragma once
 
 #include <concepts>
@@ -11,19 +11,18 @@
 namespace sdnn::approximators {
 
 /// A learnable table of action values over continuous states in [0, 1]^l: a model that many threads
-/// may read at once, each through a workspace of its own.
+/// may read at once, each through a separate workspace.
 ///
 /// - q.n_actions(): number of actions
 /// - q.n_inputs(): l, the size of a state
-/// - q.workspace(): what one user needs, a Q::Workspace: caches and room to compute in
+/// - q.workspace(): a Q::Workspace for one user: caches and buffers
 /// - q.values(state, workspace, out): writes Q(state, a) for every action a; out: (n_actions,)
 /// - q.value(state, workspace, action): Q(state, action)
 /// - q.update(state, workspace, action, target, rate): moves Q = Q(state, action) towards
 ///   (1 - rate) Q + rate target, as near as it can go; rate in (0, 1]
 ///
-/// A workspace may speed up what follows, but never changes what is returned. It serves whatever
-/// the model has become since, and copies of the model. While update runs, nobody else may use the
-/// model.
+/// A workspace may speed up later calls, but never changes results. It remains usable after changes
+/// of the model, and for its copies. During update, no other thread may use the model.
 template <class Q>
 concept ActionValue =
     requires(Q q, const Q& const_q, typename Q::Workspace& workspace, std::span<const double> state,
@@ -36,12 +35,12 @@ concept ActionValue =
       q.update(state, workspace, action, target, rate);
     };
 
-/// An approximator whose values are those of whole numbers, of which the largest are found quicker.
+/// An approximator whose values are functions of integers, of which the largest are found faster.
 ///
-/// - q.count(state, workspace, averaged): finds the number of every action, then in
-///   workspace.counts(), as WindowCounts has them; by the average of the weights if asked to
-/// - q.value_of_count(count): Q(state, a) where `count` is the number of a
-/// - q.values_rise(): whether no value is below that of a smaller number
+/// - q.count(state, workspace, averaged): computes the integer of every action, as WindowCounts in
+/// workspace.counts(); `averaged` selects the average of the weights
+/// - q.value_of_count(count): Q(state, a) for the integer `count` of a
+/// - q.values_rise(): whether no value is below that of a smaller integer
 template <class Q>
 concept CountedActionValue =
     ActionValue<Q> &&

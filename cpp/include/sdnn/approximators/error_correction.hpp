@@ -1,4 +1,4 @@
-/// The paper's learning rule: which units to correct.
+/// The units that the paper's learning rule corrects.
 #pragma once
 
 #include <bit>
@@ -20,8 +20,8 @@ namespace sdnn::approximators {
 
 namespace detail {
 
-/// As h ^ flip + offset the distance of a unit from its threshold: h - 1 of active ones, -h of the
-/// others, and 2^31 or more of those that are not asked for.
+/// The distance of a unit from its threshold is h ^ flip + offset: h - 1 if active units are to be
+/// found, -h if inactive ones are, and at least 2^31 for all other units.
 struct DistanceOf {
   explicit DistanceOf(bool active) noexcept : flip(active ? 0 : -1), offset(active ? -1 : 1) {}
 
@@ -46,7 +46,7 @@ inline std::size_t nearest_unit_portable(const std::int32_t* potentials, std::si
 
 #if SDNN_X86_KERNELS
 
-/// Eight units at a time, the last eight once more.
+/// Compares eight units at a time, and the last eight units again.
 [[SDNN_TARGET_AVX2]] inline std::size_t nearest_unit_avx2(const std::int32_t* potentials,
                                                           std::size_t size,
                                                           const DistanceOf& of) noexcept {
@@ -85,22 +85,21 @@ SDNN_KERNEL_NEON(std::size_t, nearest_unit,
                  (const std::int32_t* potentials, std::size_t size, const detail::DistanceOf& of),
                  (potentials, size, of))
 
-/// The first of the units nearest to their threshold, of those that are asked for; `size` if there
-/// is none.
+/// The first of the active or inactive units that is nearest to its threshold; `size` if there is
+/// none.
 SDNN_DISPATCH(std::size_t, nearest_unit,
               (const std::int32_t* potentials, std::size_t size, const detail::DistanceOf& of),
               (potentials, size, of))
 
 /// Selects the units of a window whose correction moves the number of active ones by `deficit`.
 ///
-/// The window is split in index order into |deficit| contiguous subsets, cut at
-/// floor(i * size / |deficit|). Of each, the unit nearest to its threshold is taken among the
-/// inactive ones (deficit > 0: they should become active) or the active ones (deficit < 0); equal
-/// distances go to the lowest index, and a subset without such a unit gives none. Nothing is
-/// selected when deficit is 0.
+/// The window is split in index order into |deficit| contiguous subsets, cut at floor(i * size /
+/// |deficit|). Each subset gives the unit nearest to its threshold among the inactive ones (deficit
+/// > 0: they should become active) or the active ones (deficit < 0), the lowest index first; a
+/// subset without such a unit gives none. Nothing is selected when deficit is 0.
 ///
-/// Source: Fig. 2, steps 1 and 2. Shapes: potentials (n',), those of the window's units; `selected`
-/// is overwritten with positions in the window. Requires |deficit| <= n' and |potential| < 2^31.
+/// Source: Fig. 2, steps 1 and 2. Shapes: potentials (n',), of the window's units; `selected` is
+/// overwritten with positions in the window. Requires |deficit| <= n' and |potential| < 2^31.
 inline void select_units(std::span<const std::int32_t> potentials, int deficit,
                          std::vector<std::uint32_t>& selected) {
   selected.clear();

@@ -45,7 +45,7 @@ struct FuzzyRulesConfig {
   bool operator==(const FuzzyRulesConfig&) const = default;
 };
 
-/// The rules that fire in a state, and how true each is: the workspace of who reads the rules.
+/// The rules that fire in a state, with their truth values; the workspace of a user.
 struct FiredRules {
   std::vector<std::size_t> rules;
   std::vector<double> truth_values;  ///< of `rules`; their sum is 1 up to rounding
@@ -57,8 +57,8 @@ struct FiredRules {
 ///
 /// A rule's truth value is the product of the memberships of the inputs in its sets. Neighbouring
 /// triangles overlap by one half, so an input belongs to two sets, or to one at a centre: at most
-/// 2^d rules fire, and only they are ever read or written. All values start at 0; rules that never
-/// fire cost no memory where the operating system hands out zero pages lazily.
+/// 2^d rules fire, and only these are read or written. All values start at 0; rules that never fire
+/// cost no memory where the operating system hands out zero pages lazily.
 /// Source: method.md, section 3. The table has 4 n_actions n_sets^d bytes: 45 MB at d = 6. Thread
 /// safety: const functions may be called by many threads at once.
 class FuzzyRules {
@@ -66,8 +66,8 @@ class FuzzyRules {
   /// v(rule, action), a row per rule.
   using Table = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-  /// Throws std::invalid_argument naming the size that is impossible; std::length_error naming
-  /// rules, bytes and limit, before any memory is asked for; std::bad_alloc.
+  /// Throws std::invalid_argument naming the impossible size; std::length_error naming rules, bytes
+  /// and limit, before any allocation; std::bad_alloc.
   explicit FuzzyRules(const FuzzyRulesConfig& config)
       : config_(checked(config)),
         n_rules_(core::grid_cells("n_sets or n_inputs", "rules",
@@ -82,7 +82,7 @@ class FuzzyRules {
   std::size_t n_rules() const noexcept { return n_rules_; }
   std::size_t max_fired() const noexcept { return std::size_t{1} << n_inputs(); }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.fixed("values", {self.n_rules_, self.n_actions()}, self.table_.span());

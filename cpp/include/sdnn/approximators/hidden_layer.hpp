@@ -23,25 +23,25 @@
 
 namespace sdnn::approximators {
 
-/// n units h_i = w_i . x_SD - w_i0 whose weights and thresholds are integers.
+/// A layer of n units h_i = w_i . x_SD - w_i0 whose weights and thresholds are integers.
 ///
-/// Every sum is exact, so its order does not matter. The units come in blocks of 64; a block holds
-/// its weights column by column (one cache line: one input unit, 64 hidden units), because a pass
+/// Every sum is exact, so its order does not matter. The units form blocks of 64; a block stores
+/// its weights by columns (a cache line has an input unit and 64 hidden units), because a pass
 /// reads only the columns that are not neutral. A weight is a byte, -127 to 127, plus 128 times a
-/// *high byte*. High bytes lie in a second layer, of which a pass reads only the columns that have
-/// one that is not 0 in a block: in training, few ever do. A correction that would take a weight
-/// out of both bytes, or a potential out of 32 bits, throws and changes nothing.
+/// *high byte*. High bytes are in a second layer, of which a pass reads only the columns of a block
+/// with high bytes other than 0; few columns have them in training. A correction throws and changes
+/// nothing if a weight would exceed two bytes, or a potential 32 bits.
 ///
 /// Source: section 3.1 (layer 4, z) and Eqs. (2), (3).
 class HiddenLayer {
  public:
-  /// Units of a block, and the largest |weight| that two bytes hold.
+  /// The units of a block, and the largest |weight| that fits into two bytes.
   static constexpr std::size_t kBlockUnits = approximators::kBlockUnits;
   static constexpr std::int32_t kWeightLimit = 127 * 128 + 127;
 
-  /// All weights and thresholds zero. The first `n_double` columns stand for two inputs each, half
-  /// whose sum or difference they are: a correction moves their weights by twice its step. Throws
-  /// std::invalid_argument, std::bad_alloc.
+  /// Sets all weights and thresholds to zero. Each of the first `n_double` columns is half of the
+  /// sum or difference of two inputs, so that a correction moves its weights by twice the step.
+  /// Throws std::invalid_argument, std::bad_alloc.
   HiddenLayer(std::size_t n_units, std::size_t n_columns, std::size_t n_double = 0)
       : n_units_(n_units), n_columns_(n_columns), n_double_(n_double) {
     core::require_in_range("n_units", n_units, 1, std::size_t{1} << 20);
@@ -65,9 +65,9 @@ class HiddenLayer {
   std::size_t n_columns() const noexcept { return n_columns_; }
   std::size_t n_double_columns() const noexcept { return n_double_; }
   std::size_t n_blocks() const noexcept { return n_blocks_; }
-  /// The columns that a pass reads high bytes of, summed over blocks.
+  /// The number of columns with high bytes, summed over blocks.
   std::size_t n_high_columns() const noexcept { return n_high_columns_; }
-  /// The largest |weight| that is held before std::overflow_error.
+  /// The largest |weight| that does not cause std::overflow_error.
   std::int32_t weight_limit() const noexcept { return weight_limit_; }
 
   std::int32_t weight(std::size_t unit, std::size_t column) const noexcept {
@@ -90,14 +90,15 @@ class HiddenLayer {
   void set_weight(std::size_t unit, std::size_t column, std::int32_t value) {
     core::require_in_range("weight", value, -weight_limit_, weight_limit_);
     if (std::abs(value) > largest_weight_[unit]) note_largest(unit, std::abs(value));
-    // Written only where there is one: pages of both layers in turn would share cache sets.
+    // High bytes are written only if they are needed: alternating pages of both layers would share
+    // cache sets.
     if (may_have_high_[unit]) {
       high_bytes_[byte_index(unit, column)] = 0;
       note_high(unit / kBlockUnits, column, false);
     }
     store(unit, column, value);
   }
-  /// Adds sign * changes to the weights of a column. Shape: changes (n,). Throws as set_weight.
+  /// Adds sign * changes to the weights of a column. Shape: changes (n,). Throws like set_weight.
   void add_to_column(std::size_t column, std::span<const std::int32_t> changes, int sign) {
     assert(changes.size() == n_units_);
     const std::int32_t limit = std::min(kByteLimit, weight_limit_);
@@ -123,8 +124,8 @@ class HiddenLayer {
     thresholds_[unit] = value;
   }
 
-  /// Writes to all memory that learning may need, so that no decision meets pages it is the first
-  /// to use. Changes nothing.
+  /// Writes to all memory that learning may need, so that no decision is the first to use a page.
+  /// It changes no result.
   void touch_memory() noexcept {
     constexpr std::size_t kPage = 4096;
     for (std::size_t at = 0; at < high_bytes_.size(); at += kPage) {
@@ -133,31 +134,33 @@ class HiddenLayer {
     }
   }
 
-  /// The inner potentials of all units for the ternary input with these columns. Shape: out (n,).
+  /// Writes the inner potentials of all units for the ternary input with these columns. Shape: out
+  /// (n,).
   void potentials(const coding::SignedColumns& input, std::span<std::int32_t> out) const {
     assert(out.size() == n_units_);
     for (std::size_t i = 0; i < n_units_; ++i) out[i] = -thresholds_[i];
     add(input, out);
   }
 
-  /// out_i += w_i . x for the input with these columns, in which a column may come more than once.
+  /// Adds w_i . x to out_i for the input with these columns, which may be repeated.
   void add(const coding::SignedColumns& input, std::span<std::int32_t> out) const {
     add_signed(input.plus, input.plus_bits, +1, out);
     add_signed(input.minus, input.minus_bits, -1, out);
   }
 
-  /// Whether no |weight| of the unit that update moves would exceed `limit`.
+  /// Whether update would keep the |weights| of the unit that it moves within `limit`.
   bool has_room(std::size_t unit, const coding::SignedColumns& input, std::int32_t step,
                 std::int32_t limit) const {
     return largest_weight_[unit] + growth(step) <= limit ||
            fits(unit, parts_of(input, step), limit);
   }
 
-  /// w_i += step * x, twice that in double columns, and w_i0 -= step for every i in `units`. No
-  /// unit or column may come twice, and double columns come first in the input's lists.
+  /// Adds step * x to w_i, twice as much in double columns, and subtracts step from w_i0, for every
+  /// i in `units`. Units and columns must differ, and double columns precede others in the input's
+  /// lists.
   ///
   /// Source: Eqs. (2), (3). Throws std::overflow_error before any change if a weight or threshold
-  /// would leave its range. Requires |step| <= 64. Quickest for `units` in rising order.
+  /// would leave its range. Requires |step| <= 64. It is fastest for `units` in rising order.
   void update(std::span<const std::uint32_t> units, const coding::SignedColumns& input,
               std::int32_t step) {
     const std::array<Part, 4> parts = parts_of(input, step);
@@ -198,10 +201,10 @@ class HiddenLayer {
     return unit / kBlockUnits * block_bytes() + column * kBlockUnits + unit % kBlockUnits;
   }
 
-  /// A block's bytes: its columns, and one more of zeros, to which lists of columns are padded.
+  /// The bytes of a block: its columns, and a column of zeros, for the padding of lists of columns.
   std::size_t block_bytes() const noexcept { return (n_columns_ + 1) * kBlockUnits; }
 
-  /// out_i += sign * the weights of the columns, of which there may be bits.
+  /// Adds sign * the weights of the columns to out_i; the columns may have bits.
   void add_signed(std::span<const std::uint32_t> columns, std::span<const std::uint64_t> bits,
                   int sign, std::span<std::int32_t> out) const {
     if (columns.size() > ColumnPlaces::kMost) bits = {};
@@ -223,7 +226,7 @@ class HiddenLayer {
     }
   }
 
-  /// The part of high bytes. Where many columns have some, telling which costs more than it saves.
+  /// Adds the high bytes. If many columns have them, selecting these would cost more than it saves.
   void add_high_bytes(std::size_t block, const ColumnPlaces& all, const Listed& listed,
                       std::span<const std::uint64_t> bits, int sign, std::int32_t* sums) const {
     const int group = high_group_of_block_[block];
@@ -243,7 +246,7 @@ class HiddenLayer {
                 sums);
   }
 
-  /// Columns of an input whose weights a correction changes alike.
+  /// The columns of an input whose weights a correction changes equally.
   struct Part {
     std::span<const std::uint32_t> columns;
     std::int32_t change;
@@ -263,7 +266,7 @@ class HiddenLayer {
              {input.minus.subspan(n_minus), -step}}};
   }
 
-  /// Largest growth of a unit's largest weight by one correction.
+  /// The largest growth of a unit's largest weight by a correction.
   std::int32_t growth(std::int32_t step) const noexcept {
     return std::abs(step) * (n_double_ > 0 ? 2 : 1);
   }
@@ -289,7 +292,7 @@ class HiddenLayer {
     }
   }
 
-  /// Gives the byte of a weight this value; what lies outside a byte is added to the high byte.
+  /// Sets the byte of a weight; the part that exceeds a byte is added to the high byte.
   void store(std::size_t unit, std::size_t column, std::int32_t value) noexcept {
     const std::size_t at = byte_index(unit, column);
     if (std::abs(value) > kByteLimit) {
@@ -302,7 +305,7 @@ class HiddenLayer {
     bytes_[at] = static_cast<std::int8_t>(value);
   }
 
-  /// Keeps the set of a block's columns with high bytes, after one of them has changed.
+  /// Updates the set of a block's columns with high bytes after a change.
   void note_high(std::size_t block, std::size_t column, bool is_there) noexcept {
     ColumnSet& columns = high_columns_[block];
     n_high_columns_ -= columns.size();
@@ -325,7 +328,8 @@ class HiddenLayer {
     return largest;
   }
 
-  /// Keeps the bound of a unit, and how many columns of its block may be added in 8 bits.
+  /// Updates the bound of a unit, and the number of columns of its block that may be added in 8
+  /// bits.
   void note_largest(std::size_t unit, std::int32_t bound) noexcept {
     largest_weight_[unit] = bound;
     const auto narrow = [](int& group, std::int32_t limit) {
@@ -335,9 +339,9 @@ class HiddenLayer {
     narrow(high_group_of_block_[unit / kBlockUnits], (bound + kByteLimit) / kHighByte);
   }
 
-  /// Throws unless the correction keeps the unit in range. The bound kept per unit only grows, so
-  /// the true maximum is looked up when the bound gets there, and the corrected weights themselves
-  /// when that is at the limit: going back is always possible.
+  /// Throws unless the correction keeps the unit in range. The stored bound of a unit only grows,
+  /// so the true maximum is computed when the bound reaches the limit, and the corrected weights
+  /// when the maximum does: a correction towards 0 is always possible.
   void require_room(std::size_t unit, std::span<const Part> parts, std::int32_t step) {
     const std::int32_t room = weight_limit_ - growth(step);
     if (largest_weight_[unit] > room) largest_weight_[unit] = largest_weight(unit);
@@ -357,8 +361,8 @@ class HiddenLayer {
     });
   }
 
-  /// Raises the unit's bound by `growth`. Where the bound would cost speed, the true maximum is
-  /// looked up first; a unit within an eighth of a limit gives that one up, so that look-ups stay
+  /// Raises the unit's bound by `growth`. Before the bound costs speed, the true maximum is
+  /// computed; a unit within an eighth of a limit moves on to the next limit, so that this stays
   /// rare.
   void raise_bound(std::size_t unit, std::int32_t growth) {
     const std::int32_t before = largest_weight_[unit];
@@ -372,8 +376,8 @@ class HiddenLayer {
     note_largest(unit, bound);
   }
 
-  /// The largest |weight| of a unit. Lowers the bounds of its block's other units, of which some
-  /// may be about to grow.
+  /// Computes the largest |weight| of a unit, and lowers the bounds of the other units of its
+  /// block, some of which may grow soon.
   std::int32_t look_up(std::size_t unit, std::int32_t growth) {
     if (may_have_high_[unit]) return largest_weight(unit);
     const std::size_t block = unit / kBlockUnits;

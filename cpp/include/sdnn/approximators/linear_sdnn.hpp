@@ -31,15 +31,15 @@ namespace sdnn::approximators {
 /// Q(s, a) = sum over the dimensions d of the action, and over the units in the window of a_d, of
 /// the inner product of the unit's weights and the code x_SD(s).
 ///
-/// The maximum over all actions is the sum of the dimensions' maxima: exact, in one pass.
+/// The maximum over all actions is the sum of the dimensions' maxima, which a single pass finds.
 ///
-/// Everything is an integer. A value counts *units* of 2^exponent; weights have the same unit. The
+/// All numbers are integers. A value counts *units* of 2^exponent; weights have the same unit. The
 /// exponent follows the rewards: the first one that is not 0 has 31 bits, and when a weight would
 /// need more than 23 bits, or a value more than 33, all are halved and the exponent grows by one.
-/// The agent may make units smaller again (refine_unit). So there is no range of values to be
+/// The agent may make units smaller again (refine_unit). Thus no range of values needs to be
 /// chosen, and sums are exact in any order.
 ///
-/// The code is the paired one of StateCode, whose inner products are half of those of x_SD: a
+/// The code is the paired code of StateCode, whose inner products are half of those of x_SD; a
 /// quarter of its columns are not neutral.
 ///
 /// Source: the code of section 3.1, layers 1 to 3, with a linear readout in the place of layers 4
@@ -50,7 +50,7 @@ class LinearSDNN {
   using Workspace = LinearWorkspace;
   using Trace = LinearTrace;
 
-  /// Rates of a step of learning; see QLambdaConfig.
+  /// The rates of a step of learning; see QLambdaConfig.
   struct Step {
     std::int64_t error = 0;       ///< in units: what the trace is multiplied by
     std::int64_t correction = 0;  ///< in units: what the code is multiplied by
@@ -61,16 +61,16 @@ class LinearSDNN {
 
   static constexpr std::int32_t kRateOne = 1 << 16;
 
-  /// Code books by anchor interpolation, or of symbols. `n_actions` has the number of actions of
-  /// each dimension. Of all inputs, `n_first` came first, if it is not 0; see continue_from. Throws
-  /// std::invalid_argument naming the field that is impossible; std::length_error naming bytes,
-  /// before much memory is asked for; std::bad_alloc.
+  /// Makes code books by anchor interpolation, or of symbols. `n_actions` has the number of actions
+  /// of each dimension. If `n_first` is not 0, inputs after the first `n_first` were added; see
+  /// continue_from. Throws std::invalid_argument naming the impossible field; std::length_error
+  /// naming bytes, before a large allocation; std::bad_alloc.
   LinearSDNN(const LinearSDNNConfig& config, std::span<const std::size_t> n_actions,
              std::uint64_t seed, std::size_t n_first = 0)
       : LinearSDNN(config, n_actions, code_books_of(with_pattern_units(config), seed), seed,
                    n_first) {}
 
-  /// Code books of any coding, a table per input. Throws as above.
+  /// Takes code books of any coding, a table per input. Throws like the other constructor.
   LinearSDNN(const LinearSDNNConfig& config, std::span<const std::size_t> n_actions,
              std::vector<coding::PatternTable> tables, std::uint64_t seed, std::size_t n_first = 0)
       : config_(with_pattern_units(config)),
@@ -102,13 +102,13 @@ class LinearSDNN {
   std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
   std::size_t n_dimensions() const noexcept { return dimensions_.size(); }
   std::size_t n_actions(std::size_t d = 0) const noexcept { return dimensions_[d].n_actions; }
-  /// Units of all dimensions: rows of the weights.
+  /// The number of units of all dimensions, the rows of the weights.
   std::size_t n_rows() const noexcept { return n_rows_; }
-  /// Columns of a row, with those that are always 0.
+  /// The number of columns of a row, including those that are always 0.
   std::size_t n_slots() const noexcept { return 64 * code_->n_words(); }
   /// Shape: (n_rows, n_slots).
   std::span<const std::int32_t> weights() const noexcept { return weights_; }
-  /// The size of a unit of values is 2 to this power; none before a reward that is not 0.
+  /// The exponent of the unit of values, 2^exponent; none before the first reward that is not 0.
   std::optional<std::int32_t> exponent() const noexcept { return exponent_; }
 
   Workspace workspace() const {
@@ -124,12 +124,12 @@ class LinearSDNN {
   }
   Trace trace() const { return {n_rows_, n_slots()}; }
 
-  /// Reads a state. Shape: state (l,) in [0, 1]. Throws std::invalid_argument for another one.
+  /// Reads a state. Shape: state (l,) in [0, 1]. Throws std::invalid_argument for other states.
   void read(std::span<const double> state, Workspace& workspace) const {
     workspace.bins_.clear();
     read_next(state, workspace);
   }
-  /// Reads a state where the workspace has read this model last: a state with the same code keeps
+  /// Reads a state into a workspace that has read this model last. A state with an equal code keeps
   /// the sums of rows that have not changed.
   void read_next(std::span<const double> state, Workspace& workspace) const {
     code_->bins_of(state, workspace.new_bins_);
@@ -151,7 +151,7 @@ class LinearSDNN {
   }
 
   /// The dimension's part of Q(s, a) of the state that was read, for each of its actions, in units;
-  /// by the average of the weights where `averaged` and there is one. Valid until the workspace is
+  /// `averaged` selects the average of the weights, if there is one. Valid until the workspace is
   /// used again.
   std::span<const std::int64_t> sums(Workspace& workspace, std::size_t d,
                                      bool averaged = false) const {
@@ -187,7 +187,7 @@ class LinearSDNN {
     });
     return total;
   }
-  /// Sum as by `sum`, of the trace instead of the weights; kTraceOne for 1.
+  /// Like `sum`, for the trace instead of the weights; kTraceOne stands for 1.
   std::int64_t sum_of_trace(const Code& code, std::span<const std::size_t> action,
                             const Trace& trace) const noexcept {
     std::int64_t total = 0;
@@ -198,9 +198,9 @@ class LinearSDNN {
     return total;
   }
 
-  /// Makes the unit fit a number. The first number that is not 0 decides how large a unit is; a
-  /// larger one may make units larger. Returns how often the unit was doubled. Requires a finite
-  /// number of at most 1e300 in size.
+  /// Adapts the unit to a number. The first number that is not 0 decides the size of the unit;
+  /// larger numbers may enlarge it. Returns the number of doublings. Requires a finite number of
+  /// magnitude 1e300 at most.
   int fit_unit(double number) {
     if (number == 0.0) return 0;
     if (!exponent_) exponent_ = std::max(std::ilogb(number) - 30, kLeastExponent);
@@ -208,7 +208,7 @@ class LinearSDNN {
     while (std::abs(std::ldexp(number, -*exponent_)) >= kLargestReward) double_unit();
     return *exponent_ - before;
   }
-  /// A number in units, rounded to the nearest, halves up.
+  /// Returns a number in units, rounded to the nearest integer, halves up.
   std::int64_t units_of(double number) const noexcept {
     if (!exponent_) return 0;
     return static_cast<std::int64_t>(std::floor(std::ldexp(number, -*exponent_) + 0.5));
@@ -218,7 +218,8 @@ class LinearSDNN {
     return std::clamp(std::ldexp(static_cast<double>(units), exponent_.value_or(0)), -kMost, kMost);
   }
 
-  /// Doubles the unit: weights are halved, halves up. The caller halves the values that it keeps.
+  /// Doubles the unit and halves the weights, halves rounded up. The caller must halve the values
+  /// that it keeps.
   void double_unit() noexcept {
     assert(exponent_);
     ++*exponent_;
@@ -226,16 +227,16 @@ class LinearSDNN {
     for (std::int32_t& weight : averaged_) weight = halved(weight);
     std::ranges::fill(versions_, ++version_);
   }
-  /// The number of bits that no weight needs.
+  /// The number of leading bits that no weight uses.
   int spare_bits() const noexcept {
     std::uint32_t used = 0;
     for (const std::int32_t weight : weights_) used |= size_bits(weight);
     for (const std::int32_t weight : averaged_) used |= size_bits(weight);
     return kWeightBits - static_cast<int>(std::bit_width(used));
   }
-  /// Makes the unit 2^n times smaller: weights are multiplied by 2^n, and clipped where they have
-  /// no room. The caller multiplies the values that it keeps. Returns n, or less where the unit
-  /// would become too small for a number.
+  /// Makes the unit 2^n times smaller: weights are multiplied by 2^n and clipped to their range.
+  /// The caller must multiply the values that it keeps. Returns n, or less if the unit would be too
+  /// small for a number.
   int refine_unit(int n) noexcept {
     assert(exponent_ && n >= 0);
     n = std::min(n, *exponent_ - kLeastExponent);
@@ -246,29 +247,29 @@ class LinearSDNN {
     std::ranges::fill(versions_, ++version_);
     return n;
   }
-  /// A value in units that became 2^n times smaller, clipped where it has no room.
+  /// Returns a value in units that became 2^n times smaller, clipped to its range.
   static std::int64_t refined(std::int64_t units, int n) noexcept {
     return std::clamp(units << std::min(n, kWeightBits), 1 - kLargestValue, kLargestValue - 1);
   }
-  /// The largest number of bits that a value with so many weights can have.
+  /// The largest number of bits of a value with this number of weights.
   static int most_bits_of(std::int64_t n_weights) noexcept {
     const auto bits = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(n_weights)));
     return std::min(kWeightBits + bits - 1, 33);
   }
-  /// The number of weights that have a part in Q(s, a) of the code's state, 1 at least.
+  /// The number of weights that contribute to Q(s, a) of the code's state, at least 1.
   std::int64_t n_weights_of(const Code& code) const noexcept {
     return std::max<std::int64_t>(
         1, std::int64_t{code.n_active()} * static_cast<std::int64_t>(n_dimensions() * window()));
   }
 
-  /// Whether a value has more bits than it may: then double the unit.
+  /// Whether a value has too many bits, so that the unit must be doubled.
   static bool is_too_large(std::int64_t units) noexcept {
     return units >= kLargestValue || units <= -kLargestValue;
   }
 
-  /// The trace decays and takes up the code of (s, a), and the weights move by rate / n times the
-  /// error along the trace, less rate / n times the correction along the code, where n is the
-  /// number of weights that have a part in Q(s, a). Returns how often the unit was doubled.
+  /// Decays the trace, adds the code of (s, a) to it, and moves the weights by rate / n times the
+  /// error along the trace, minus rate / n times the correction along the code, where n is the
+  /// number of weights that contribute to Q(s, a). Returns the number of doublings of the unit.
   int learn(const Code& code, std::span<const std::size_t> action, Trace& trace, const Step& step) {
     const std::int64_t rate = (std::int64_t{step.rate} << 12) / n_weights_of(code);  // 2^28 for 1
     RowStep row_step{
@@ -316,15 +317,16 @@ class LinearSDNN {
     while (used >= kLargestWeight) {
       double_unit();
       used >>= 1;
-      // Halves are rounded up, so the largest may be too large once more.
+      // Halves are rounded up, so the largest weight may still be too large.
       if (std::ranges::find(weights_, kLargestWeight) != weights_.end()) used |= kLargestWeight;
     }
     if (config_.averaging_interval > 0) note_step();
     return exponent_.value_or(0) - exponent;
   }
 
-  /// Takes over what a readout with fewer inputs has learned: Q(s, a) is the same, whatever the
-  /// inputs that were added. Both have as many actions, units and first inputs, and all pairs.
+  /// Copies the weights of a readout with fewer inputs, such that Q(s, a) does not depend on the
+  /// added inputs. Both have equal numbers of actions and units, the same first inputs, and all
+  /// pairs.
   void continue_from(const LinearSDNN& fewer) {
     assert(fewer.n_rows_ == n_rows_ && fewer.n_inputs() <= n_inputs());
     copy_to_more_inputs(*fewer.code_, fewer.weights_, *code_, weights_);
@@ -335,7 +337,7 @@ class LinearSDNN {
     std::ranges::fill(versions_, ++version_);
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.fixed("weights", {self.n_rows_, self.n_slots()}, self.weights_);
@@ -377,7 +379,7 @@ class LinearSDNN {
                           const Code& code) const noexcept {
     return row_sum(&rows[row * n_slots()], code.masks(), n_slots());
   }
-  /// Sums rows first to end that have changed, or those of the average.
+  /// Updates the sums of rows that have changed from first to end, or those of the average.
   void sum_rows(std::size_t first, std::size_t end, bool averaged,
                 Workspace& workspace) const noexcept {
     const std::vector<std::int32_t>& weights = averaged ? averaged_ : weights_;
@@ -405,7 +407,7 @@ class LinearSDNN {
     }
   }
 
-  /// The average moves to the weights by 1 / 2^k of the way, ever less: by about 3 / (n + 3).
+  /// Moves the average towards the weights by 1 / 2^k of the way, about 3 / (n + 3) after n steps.
   void note_step() noexcept {
     if (++n_steps_ % config_.averaging_interval != 0) return;
     const int k =

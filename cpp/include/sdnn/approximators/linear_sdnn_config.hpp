@@ -1,4 +1,4 @@
-/// Everything that defines a linear readout of the SDNN code.
+/// The configuration of a linear readout of the SDNN code.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace sdnn::approximators {
 
-/// Everything that defines a linear readout; the defaults are those we recommend for any task.
+/// The configuration of a linear readout; the defaults are recommended for any task.
 struct LinearSDNNConfig {
   int n_inputs = 4;
   int max_pairs = 0;
@@ -56,11 +56,11 @@ struct LinearSDNNConfig {
   bool operator==(const LinearSDNNConfig&) const = default;
 };
 
-/// The configuration with a number of units where it has none: patterns of too few units are alike
-/// by chance, and more columns take more time.
+/// Returns the configuration with a number of units if it has none. Patterns of too few units are
+/// correlated by chance, and more columns take more time.
 inline LinearSDNNConfig with_pattern_units(LinearSDNNConfig config) noexcept {
   if (config.n_pattern_units == 0) {
-    // Of any number of inputs, impossible ones too: hence 64 bits.
+    // The number of inputs is not checked yet, hence 64 bits.
     const std::int64_t n_partners = coding::n_partners_of(config);
     const std::int64_t n_groups = std::max<std::int64_t>(1, config.n_inputs * n_partners);
     const std::int64_t usual = (3072 / n_groups + 32) / 64 * 64;
@@ -71,8 +71,8 @@ inline LinearSDNNConfig with_pattern_units(LinearSDNNConfig config) noexcept {
   return config;
 }
 
-/// Weights of a readout with so many actions in each dimension, with those that are always 0. Of
-/// any fields, impossible ones too: hence a double.
+/// The number of weights of a readout with these numbers of actions in each dimension, including
+/// weights that are always 0. It is a double, because the fields may not be checked yet.
 inline double n_linear_weights(const LinearSDNNConfig& config,
                                std::span<const std::size_t> n_actions) {
   double n_rows = 0.0;
@@ -83,8 +83,8 @@ inline double n_linear_weights(const LinearSDNNConfig& config,
          coding::n_partners_of(config);
 }
 
-/// Throws std::length_error if so many weights, with the patterns of so many bins and one trace,
-/// have more bytes than config.max_table_bytes.
+/// Throws std::length_error if `n_weights` weights, the patterns of `n_bins` bins and a trace have
+/// more bytes than config.max_table_bytes.
 inline void require_room(const LinearSDNNConfig& config, double n_bins, double n_weights) {
   const double n_copies = config.averaging_interval > 0 ? 3.0 : 2.0;
   core::require_table_bytes(
@@ -93,7 +93,7 @@ inline void require_room(const LinearSDNNConfig& config, double n_bins, double n
       4.0 * n_copies * n_weights + coding::pattern_bytes_of(config, n_bins),
       config.max_table_bytes);
 }
-/// The same of one dimension: before the code is made.
+/// Checks the room for actions of a single dimension, before the code is made.
 inline void require_room(const LinearSDNNConfig& config, double n_bins) {
   const std::size_t n_actions[] = {static_cast<std::size_t>(config.n_actions)};
   require_room(config, n_bins, n_linear_weights(config, n_actions));

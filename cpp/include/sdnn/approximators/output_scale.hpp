@@ -1,4 +1,4 @@
-/// Layer 6: from a number of active units to a value, and back.
+/// Layer 6: the conversion between numbers of active units and values.
 #pragma once
 
 #include <algorithm>
@@ -10,13 +10,14 @@
 
 namespace sdnn::approximators {
 
-/// g: the straight line that maps [u_low, u_high] onto [q_low, q_high], saturating outside.
+/// The function g: a straight line that maps [u_low, u_high] onto [q_low, q_high], saturating
+/// outside.
 ///
 /// Source: section 4.2 (the paper's g: 20 <= u <= 280 onto [-20, 20]); method.md, section 1.6.
 class OutputScale {
  public:
-  /// Throws std::invalid_argument unless u_low < u_high and q_low < q_high, both within +- 1e301:
-  /// beyond, what lies between them would overflow.
+  /// Throws std::invalid_argument unless u_low < u_high and q_low < q_high, both within +- 1e301,
+  /// so that their difference does not overflow.
   OutputScale(int u_low, int u_high, double q_low, double q_high)
       : u_low_(u_low), u_high_(u_high), q_low_(q_low), q_high_(q_high) {
     core::require_in_range("u_low", u_low, 0, 1 << 20);
@@ -33,12 +34,12 @@ class OutputScale {
   double q_low() const noexcept { return q_low_; }
   double q_high() const noexcept { return q_high_; }
 
-  /// What one unit more is worth.
+  /// The change of the value by a unit.
   double step() const noexcept {
     return q_high_ / (u_high_ - u_low_) - q_low_ / (u_high_ - u_low_);
   }
 
-  /// g(u), the value of `n_firing` active units.
+  /// The value g(u) of `n_firing` active units.
   double operator()(int n_firing) const noexcept {
     if (n_firing > u_high_) return q_high_;
     if (n_firing < u_low_) return q_low_;
@@ -46,8 +47,8 @@ class OutputScale {
     return (q_low_ * (u_high_ - n_firing) + q_high_ * (n_firing - u_low_)) / (u_high_ - u_low_);
   }
 
-  /// The place of `value`, clipped to [q_low, q_high], on the line: a number of units, not rounded.
-  /// For every u in [u_low, u_high], exact_inverse(g(u)) is within 1e-9 of u. Requires a number.
+  /// The number of units, not rounded, of `value` clipped to [q_low, q_high]. For every u in
+  /// [u_low, u_high], exact_inverse(g(u)) is within 1e-9 of u. Requires a number.
   double exact_inverse(double value) const noexcept {
     assert(!std::isnan(value));
     const double clipped = std::clamp(value, q_low_, q_high_);

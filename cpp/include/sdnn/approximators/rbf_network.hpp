@@ -1,4 +1,5 @@
-/// A network of radial basis functions over state and action: Q(s, a) linear in its weights.
+/// A network of radial basis functions over state and action, whose Q(s, a) is linear in its
+/// weights.
 #pragma once
 
 #include <Eigen/Core>
@@ -62,18 +63,18 @@ struct RBFNetworkConfig {
 /// Normalized Gaussian bases on an even grid over [0, 1]^d and the action's range.
 ///
 /// A joint basis is the product of one Gaussian per dimension, divided by the sum of all joint
-/// bases: n_bases^(d+1) in number. That sum is a product too, so a normalized joint basis is the
-/// product of Gaussians normalized in their own dimension. Hence, with phi(s) the normalized bases
-/// of the state, an outer product, the weights are multiplied once, u = phi(s)^T W, and every
-/// action has psi(a)^T u. All sums start at 0 and add in the order of the bases: columns of Eigen's
-/// arrays, never its products, whose order depends on the instruction set.
+/// bases: n_bases^(d+1) in number. This sum is a product too, so a normalized joint basis is the
+/// product of Gaussians normalized in each dimension. Hence, with phi(s) the normalized bases of
+/// the state, an outer product, the weights are multiplied once, u = phi(s)^T W, and every action
+/// has psi(a)^T u. All sums start at 0 and add in the order of the bases. They use columns of
+/// Eigen's arrays, and not its products, whose order depends on the instruction set.
 ///
 /// Source: method.md, section 4. Cost at d = 6: 16,384 multiply-adds for all actions. Thread
 /// safety: const functions may be called by many threads at once, with a workspace each.
 class RBFNetwork {
  public:
-  /// All weights 0. Throws std::invalid_argument naming the field that is impossible;
-  /// std::length_error naming bases, bytes and limit before any memory is asked for.
+  /// Sets all weights to 0. Throws std::invalid_argument naming the impossible field;
+  /// std::length_error naming bases, bytes and limit before any allocation.
   explicit RBFNetwork(const RBFNetworkConfig& config)
       : config_(checked(config)),
         n_joint_bases_(core::grid_cells("n_bases or n_inputs", "joint bases", n_bases(),
@@ -87,7 +88,7 @@ class RBFNetwork {
     }
   }
 
-  /// State of one user: buffers, and the bases of the last state.
+  /// The workspace of a user: buffers, and the bases of the last state.
   class Workspace {
     friend class RBFNetwork;
 
@@ -130,7 +131,7 @@ class RBFNetwork {
     ++n_updates_;
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.fixed("weights", {self.n_joint_bases_}, self.weights_.span());
@@ -142,7 +143,7 @@ class RBFNetwork {
     }
   }
 
-  /// Q(state, a) for every action. Shapes: state (d,) in [0, 1], out (n_actions,).
+  /// Writes Q(state, a) for every action. Shapes: state (d,) in [0, 1], out (n_actions,).
   ///
   /// Throws std::invalid_argument for a state of wrong size or outside [0, 1].
   void values(std::span<const double> state, Workspace& workspace, std::span<double> out) const {
@@ -167,8 +168,8 @@ class RBFNetwork {
     return q;
   }
 
-  /// One gradient step of Q = Q(state, action) towards q_hat = (1 - rate) Q + rate target:
-  /// W += gradient_rate (q_hat - Q) phi(state, action).
+  /// Takes a gradient step of Q = Q(state, action) towards q_hat = (1 - rate) Q + rate target: W +=
+  /// gradient_rate (q_hat - Q) phi(state, action).
   ///
   /// Throws std::invalid_argument like value, and for a NaN target or a rate outside (0, 1];
   /// std::overflow_error if the step exceeds 1e305 (the network has diverged, or target is
@@ -209,7 +210,7 @@ class RBFNetwork {
 
   static Eigen::Index index(std::size_t i) noexcept { return static_cast<Eigen::Index>(i); }
 
-  // bases = the Gaussians of one dimension at x, divided by their sum.
+  // Writes the Gaussians of one dimension at x, divided by their sum, to `bases`.
   void to_one_dimension(double x, Eigen::ArrayXd& bases) const noexcept {
     double total = 0.0;
     for (Eigen::Index k = 0; k < bases.size(); ++k) {
@@ -221,7 +222,7 @@ class RBFNetwork {
     bases /= total;
   }
 
-  // phi(state)^T W, with phi(state) in the workspace; nothing to do if it has them already.
+  // Returns phi(state)^T W, with phi(state) in the workspace, and reuses them for the last state.
   const Eigen::ArrayXd& mix(std::span<const double> state, Workspace& workspace) const {
     core::require_unit_values("state", state, n_inputs());
     if (workspace.network_ == identity_.number() && workspace.n_updates_ == n_updates_ &&
@@ -250,7 +251,8 @@ class RBFNetwork {
     Eigen::Index size = 1;
     for (const double x : workspace.state_) {
       to_one_dimension(x, workspace.one_dimension_);
-      // From the back, so that one array is enough: entry i becomes entries i n .. i n + n - 1.
+      // The loop runs backwards, so that one array is enough: entry i becomes entries i n .. i n +
+      // n - 1.
       for (Eigen::Index i = size; i-- > 0;) {
         state_bases.segment(i * n, n) = state_bases[i] * workspace.one_dimension_.head(n);
       }

@@ -37,7 +37,7 @@
 
 namespace sdnn::approximators {
 
-/// Outcomes of the corrections of a network.
+/// The numbers of outcomes of a network's corrections.
 struct CorrectionCounts {
   std::uint64_t asked = 0;         ///< all of them
   std::uint64_t changed = 0;       ///< units were corrected
@@ -46,26 +46,26 @@ struct CorrectionCounts {
   double mean_error = 0.0;  ///< of the last thousand or so: how far targets, clipped, were from Q
 };
 
-/// The network of section 3: what is learned, for any number of users.
+/// The network of section 3, a model for any number of users.
 ///
 /// Wiring (code books, permutations) is fixed by config and seed and shared by copies. Each user
-/// reads the network through a Workspace of its own, which caches the potentials of recent states
-/// and keeps them exact while the network learns (see ActivationCache), so that one decision needs
-/// at most one pass over the weights. A workspace changes the time of a call, never its result.
+/// reads the network through a separate Workspace, which caches the potentials of recent states and
+/// keeps them exact while the network learns (see ActivationCache), so that one decision needs at
+/// most one pass over the weights. A workspace affects the time of a call, but not its result.
 ///
-/// With averaging_interval > 0 it also keeps an average of its weights (see WeightAverage), of
-/// which averaged_values are the values. Learning uses the weights themselves. Not in the paper.
+/// With averaging_interval > 0 it also keeps an average of its weights (see WeightAverage), used by
+/// averaged_values. Learning uses the weights themselves. The average is not in the paper.
 ///
 /// Thread safety: const functions may be called by many threads at once, with a workspace each.
 class SDNNC {
  public:
-  /// State of one user who reads a network or lets it learn: the potentials of recent states, and
-  /// room to compute in. For that network, whatever it becomes, and for its copies, which an
-  /// assertion checks. Sized once, so that a step allocates nothing.
+  /// The workspace of a user who reads or trains a network: the potentials of recent states, and
+  /// buffers. It fits this network at any time, and its copies, which an assertion checks. Its size
+  /// is fixed, so that a step allocates nothing.
   class Workspace {
    public:
     const ActivationCache& cache() const noexcept { return cache_; }
-    /// Of the state that values or counts were asked for last.
+    /// The counts of the state that was evaluated last.
     const WindowCounts& counts() const noexcept { return counts_; }
     WindowCounts& counts() noexcept { return counts_; }
 
@@ -93,15 +93,16 @@ class SDNNC {
     std::vector<std::uint32_t> selected_;
   };
 
-  /// Code books by anchor interpolation, or of symbols. Throws std::invalid_argument naming the
-  /// field that is impossible; std::length_error naming bytes, max_table_bytes and what to reduce,
-  /// before much memory is asked for; std::bad_alloc.
+  /// Makes code books by anchor interpolation, or of symbols. Throws std::invalid_argument naming
+  /// the impossible field; std::length_error naming bytes, max_table_bytes and the fields to
+  /// reduce, before a large allocation; std::bad_alloc.
   SDNNC(const SDNNCConfig& config, std::uint64_t seed)
       : SDNNC(config, code_books_of(config, seed), seed) {}
 
-  /// Code books of any coding, a table per input: the range [0, 1] is cut into as many equal bins
-  /// as the table has patterns. The config's fields about anchors and symbols do not matter then.
-  /// Throws std::invalid_argument if n_inputs or n_pattern_units are not the tables', and as above.
+  /// Takes code books of any coding, a table per input: the range [0, 1] is divided into equal
+  /// bins, one for each pattern of the table. The config's fields about anchors and symbols are
+  /// ignored. Throws std::invalid_argument if n_inputs or n_pattern_units do not fit the tables,
+  /// and like the other constructor.
   SDNNC(const SDNNCConfig& config, std::vector<coding::PatternTable> tables, std::uint64_t seed)
       : config_(config),
         code_(wiring_of(config, std::move(tables), seed)),
@@ -128,7 +129,7 @@ class SDNNC {
   const OutputScale& output_scale() const noexcept { return scale_; }
   const HiddenLayer& hidden_layer() const noexcept { return hidden_layer_; }
   const CorrectionCounts& correction_counts() const noexcept { return counts_; }
-  /// A number that no other network has; another one when weights are replaced.
+  /// A number that no other network has, and that changes when weights are replaced.
   std::uint64_t identity() const noexcept { return log_.identity(); }
   std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
   std::size_t n_actions() const noexcept { return actions_.n_actions(); }
@@ -138,23 +139,24 @@ class SDNNC {
     return paired_weight(hidden_layer_, unit, code_->columns_of(j));
   }
 
-  /// Q(state, a) for every action. Shapes: state (l,) in [0, 1], out (n_actions,).
+  /// Writes Q(state, a) for every action. Shapes: state (l,) in [0, 1], out (n_actions,).
   ///
   /// Throws std::invalid_argument for a state of wrong size or outside [0, 1].
   void values(std::span<const double> state, Workspace& workspace, std::span<double> out) const {
     fill_values(state, workspace, out, false);
   }
 
-  /// Values by the average of the weights, rounded to steps of the lattice, where there is one.
-  /// The first call after the average has changed takes some milliseconds. Throws as values.
+  /// Writes the values by the average of the weights, rounded to steps of the lattice, if there is
+  /// an average. The first call after a change of the average takes some milliseconds. Throws like
+  /// values.
   void averaged_values(std::span<const double> state, Workspace& workspace,
                        std::span<double> out) const {
     fill_values(state, workspace, out, true);
   }
 
-  /// Counts the firing units in the window of every action, of which workspace.counts() has the
-  /// numbers and value_of_count the values; by the average of the weights as averaged_values.
-  /// Throws as values.
+  /// Counts the firing units in the window of every action. workspace.counts() then has the counts,
+  /// and value_of_count gives their values. `averaged` selects the average of the weights, as in
+  /// averaged_values. Throws like values.
   void count(std::span<const double> state, Workspace& workspace, bool averaged) const {
     assert(fits(workspace));
     code_->bins_of(state, workspace.bins_);
@@ -170,11 +172,11 @@ class SDNNC {
   double value_of_count(std::int32_t count) const noexcept {
     return value_of_count_[static_cast<std::size_t>(count)];
   }
-  /// Whether no value is below that of a smaller count: unless rounding errors exceed what a unit
-  /// is worth.
+  /// Whether no value is below that of a smaller count, which is true unless rounding errors exceed
+  /// the step of a unit.
   bool values_rise() const noexcept { return values_rise_; }
 
-  /// Whether there has been a snapshot for the average.
+  /// Whether the average has a snapshot.
   bool has_average() const noexcept { return average_ && average_->n_snapshots() > 0; }
 
   /// The average of a weight, in the paper's order, and of a threshold, rounded to steps of the
@@ -192,12 +194,12 @@ class SDNNC {
     return scale_(count_in_window(recall(state, workspace).potentials, action));
   }
 
-  /// One step of error correction: Q = Q(state, action) moves towards
-  /// q_hat = (1 - rate) Q + rate * target.
+  /// Corrects the error once: Q = Q(state, action) moves towards q_hat = (1 - rate) Q + rate *
+  /// target.
   ///
-  /// Source: Fig. 2, Eqs. (1) to (3); method.md, section 1.8. Throws std::invalid_argument for
-  /// a bad state, action or rate or a NaN target, std::overflow_error; then no weight or threshold
-  /// has changed and nothing is counted, though a random rounding may have been drawn.
+  /// Source: Fig. 2, Eqs. (1) to (3); method.md, section 1.8. Throws std::invalid_argument for a
+  /// bad state, action or rate or a NaN target, std::overflow_error; then no weight or threshold
+  /// has changed and nothing is counted, but a random number for rounding may have been drawn.
   void update(std::span<const double> state, Workspace& workspace, std::size_t action,
               double target, double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);
@@ -206,9 +208,9 @@ class SDNNC {
     if (average_ && average_->note(counts_.asked, hidden_layer_)) averaged_.reset();
   }
 
-  /// The inner potentials in lattice steps (c / lattice), by a full pass. Shape: out (n,).
+  /// Writes the inner potentials in lattice steps (c / lattice), by a full pass. Shape: out (n,).
   ///
-  /// Needs no workspace. Allocates.
+  /// It needs no workspace, but allocates.
   void potentials(std::span<const double> state, std::span<std::int32_t> out) const {
     core::require(out.size() == hidden_layer_.n_units(), "out",
                   std::to_string(hidden_layer_.n_units()) + " values", out.size());
@@ -221,9 +223,8 @@ class SDNNC {
     hidden_layer_.potentials(lists.columns(), out);
   }
 
-  /// Evaluates some states and forgets them, and touches the memory that learning may need: the
-  /// first decision then finds everything in the caches, as every later one does. Nothing that is
-  /// ever returned changes.
+  /// Evaluates and discards some states, and touches the memory that learning may need, so that the
+  /// first decision is as fast as later ones. It changes no result.
   void warm_caches(Workspace& workspace) {
     constexpr int kStates = 8;  // each reads a third of the weights
     hidden_layer_.touch_memory();
@@ -236,7 +237,7 @@ class SDNNC {
   }
 
   /// Replaces weights and thresholds, in lattice steps. Shapes: weights (n, D) row by row,
-  /// thresholds (n,). Throws std::invalid_argument, and then nothing has changed.
+  /// thresholds (n,). Throws std::invalid_argument; then nothing has changed.
   void set_parameters(std::span<const std::int32_t> weights,
                       std::span<const std::int32_t> thresholds) {
     const std::size_t n_columns = code_->n_columns();
@@ -253,14 +254,15 @@ class SDNNC {
     averaged_.reset();
   }
 
-  /// Gives the range of values other ends. What was learned keeps its place in the range, and so
-  /// its order. Throws std::invalid_argument naming q_low or q_high, and then nothing has changed.
+  /// Changes the range of values. Learned values keep their relative positions in the range, and
+  /// thus their order. Throws std::invalid_argument naming q_low or q_high; then nothing has
+  /// changed.
   void set_output_range(double q_low, double q_high) {
     scale_ = OutputScale(scale_.u_low(), scale_.u_high(), q_low, q_high);
     tabulate_values();
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     const std::size_t n_units = self.hidden_layer_.n_units();
@@ -324,7 +326,7 @@ class SDNNC {
   }
 
   /// Shapes: weights (n, D), in the paper's order, thresholds (n,). Throws std::invalid_argument
-  /// for a weight or threshold out of range, and then nothing has changed.
+  /// for a weight or threshold out of range; then nothing has changed.
   template <class Weight>
   void replace_parameters(std::span<Weight> weights, std::span<const std::int32_t> thresholds) {
     const std::size_t n_columns = code_->n_columns();
@@ -337,7 +339,7 @@ class SDNNC {
     log_.restart();
   }
 
-  /// Whether the workspace is of a network of these sizes.
+  /// Whether the workspace fits a network of these sizes.
   bool fits(const Workspace& workspace) const noexcept {
     return workspace.bins_.size() == n_inputs() &&
            workspace.cache_.n_units() == actions_.n_hidden_units() &&
@@ -361,7 +363,7 @@ class SDNNC {
     });
   }
 
-  /// Corrects, after the arguments have been checked.
+  /// Corrects the error, after the arguments have been checked.
   void correct(std::span<const double> state, Workspace& workspace, std::size_t action,
                double target, double rate) {
     const Cached entry = recall(state, workspace);
@@ -409,7 +411,7 @@ class SDNNC {
     return workspace.cache_.recall(*code_, hidden_layer_, log_, workspace.bins_);
   }
 
-  /// Number of units to fire for the value `wanted`, where `n_firing` do.
+  /// The number of units that should fire for the value `wanted`, given that `n_firing` do.
   int rounded_count(double wanted, int n_firing) {
     if (config_.rounding == Rounding::half_up) return scale_.inverse(wanted);
     const double exact = scale_.exact_inverse(wanted);

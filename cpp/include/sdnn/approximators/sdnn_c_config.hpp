@@ -1,4 +1,4 @@
-/// Everything that defines an SDNN-C.
+/// The configuration of an SDNN-C.
 #pragma once
 
 #include <array>
@@ -33,7 +33,7 @@ constexpr std::array<std::string_view, 3> words_of(Rounding) noexcept {
   return {"half_up", "random", "away"};
 }
 
-/// Everything that defines an SDNN-C; the defaults are the paper's values.
+/// The configuration of an SDNN-C; the defaults are the paper's values.
 struct SDNNCConfig {
   int n_inputs = 4;
   int max_pairs = 0;

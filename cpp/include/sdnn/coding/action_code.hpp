@@ -13,16 +13,16 @@ namespace sdnn::coding {
 /// Windows of `n_active_units` neighbouring hidden units, evenly spread over `n_hidden_units`.
 ///
 /// With the default number of actions, n_hidden_units - n_active_units + 1, window a starts at unit
-/// a: every possible window is used once. With fewer actions the starts are spread evenly,
-/// floor(a * (n_hidden_units - n_active_units) / (n_actions - 1)), so that a task with a few
-/// discrete actions gets windows that overlap little.
+/// a: every possible window is used once. With fewer actions the starts are spread evenly, floor(a
+/// * (n_hidden_units - n_active_units) / (n_actions - 1)), so that the windows of a few discrete
+/// actions overlap little.
 ///
 /// Source: section 3.1 (layer 4, y); method.md, section 1.4. Units are counted from 0.
 class ActionCode {
  public:
-  /// `n_actions` = 0 means all windows.
+  /// `n_actions` = 0 stands for all windows.
   ///
-  /// Throws std::invalid_argument naming the size that is impossible.
+  /// Throws std::invalid_argument naming the impossible size.
   ActionCode(int n_hidden_units, int n_active_units, int n_actions = 0) {
     core::require_in_range("n_hidden_units", n_hidden_units, 1, 1 << 20);
     core::require_in_range("n_active_units", n_active_units, 1, n_hidden_units);

@@ -21,14 +21,14 @@ namespace sdnn::coding {
 
 namespace detail {
 
-/// Prefetches a value that will soon be read, where the compiler supports it.
+/// Prefetches a value that will be read soon, if the compiler supports it.
 inline void prefetch([[maybe_unused]] const void* address) noexcept {
 #if defined(__GNUC__)
   __builtin_prefetch(address);
 #endif
 }
 
-/// Patterns as bytes and their inner products, moved towards wanted ones by swaps of two units.
+/// Patterns as bytes, whose inner products are moved towards given ones by swaps of two units.
 class CorrelationSearch {
  public:
   CorrelationSearch(std::span<const double> correlations, std::size_t n_bins, std::size_t n_units)
@@ -42,7 +42,8 @@ class CorrelationSearch {
     }
   }
 
-  /// Starts pattern i as a copy of the most alike of those before it, inverted if unlike.
+  /// Starts pattern i as a copy of the preceding pattern with the largest correlation, inverted if
+  /// it is negative.
   void begin(std::size_t i, core::Random& random) {
     std::size_t nearest = i;
     for (std::size_t j = 0; j < i; ++j) {
@@ -67,9 +68,9 @@ class CorrelationSearch {
     }
   }
 
-  /// Proposes swaps in the pattern of `draw_pattern()`, judged by the first `n_others`.
+  /// Proposes swaps in the pattern of `draw_pattern()`, evaluated by the first `n_others`.
   ///
-  /// They are drawn some way ahead of their trial, so that their units come from memory meanwhile.
+  /// They are drawn in advance, so that their units are prefetched from memory.
   template <class DrawPattern>
   void propose(std::size_t n_proposals, std::size_t n_others, core::Random& random,
                DrawPattern draw_pattern) {
@@ -89,7 +90,7 @@ class CorrelationSearch {
     }
   }
 
-  /// The patterns one after another.
+  /// All patterns, one after another.
   std::vector<std::int8_t> patterns() const {
     std::vector<std::int8_t> by_pattern(signs_.size());
     for (std::size_t k = 0; k < n_units_; ++k) {
@@ -152,15 +153,14 @@ class CorrelationSearch {
 
 /// Balanced patterns whose pairwise correlations approach a given symmetric matrix.
 ///
-/// Each pattern starts as a copy of its most alike predecessor and is then improved by swaps of two
-/// units, first against its predecessors and at last against all. Only integers are compared, so
-/// the same seed gives the same patterns everywhere. A matrix that no patterns can have is
-/// approached in the least squares sense.
+/// Each pattern starts as a copy of its most correlated predecessor and is then improved by swaps
+/// of two units, first against its predecessors and finally against all patterns. Only integers are
+/// compared, so the same seed gives the same patterns everywhere. A matrix that no patterns can
+/// have is approached in the least squares sense.
 ///
-/// Source: Horie et al. 2014 (the purpose; the search is ours). Shapes: correlations
-/// (n_bins, n_bins). Cost: about 40 n_units n_bins^2 steps, at most some 10^9. Throws
-/// std::invalid_argument if n_units is odd, or the matrix is not symmetric with unit diagonal and
-/// entries in [-1, 1].
+/// Source: Horie et al. 2014 (for the purpose; the search is ours). Shapes: correlations (n_bins,
+/// n_bins). Cost: about 40 n_units n_bins^2 steps, at most some 10^9. Throws std::invalid_argument
+/// if n_units is odd, or the matrix is not symmetric with unit diagonal and entries in [-1, 1].
 inline PatternTable correlation_matrix_patterns(int n_units, std::span<const double> correlations,
                                                 std::size_t n_bins, core::Random& random) {
   core::require_in_range("n_units", n_units, 2, 1 << 24);

@@ -21,19 +21,20 @@ namespace sdnn::coding {
 /// The number of a sub-range of an input's range, and of the pattern that stands for it.
 using Bin = std::int32_t;
 
-/// The bin of `value` among `n_bins` equal half-open parts of [0, 1]; 1 falls into the last.
+/// The bin of `value` among `n_bins` equal half-open parts of [0, 1]; the last includes 1.
 inline Bin bin_of(double value, std::size_t n_bins) noexcept {
   assert(value >= 0.0 && value <= 1.0);
   const auto bin = static_cast<std::size_t>(value * static_cast<double>(n_bins));
   return static_cast<Bin>(bin < n_bins ? bin : n_bins - 1);
 }
 
-/// `n_bins` patterns of `n_units` units each (set = +1): what every coding makes.
+/// A table of `n_bins` patterns of `n_units` units each (set = +1), made by every coding.
 ///
 /// Source: section 3.1 (layer 2). Memory: n_bins * n_units / 8 bytes, patterns begin on words.
 class PatternTable {
  public:
-  /// All units -1. Throws std::invalid_argument unless there is at least one bin and one unit.
+  /// Sets all units to -1. Throws std::invalid_argument unless there is at least one bin and one
+  /// unit.
   PatternTable(std::size_t n_bins, std::size_t n_units)
       : n_bins_(n_bins), n_units_(n_units), n_words_(core::n_bit_words(n_units)) {
     core::require_in_range("n_bins", n_bins, 1, std::size_t{1} << 30);
@@ -41,7 +42,7 @@ class PatternTable {
     words_.resize(core::checked_product(n_bins_, n_words_));
   }
 
-  /// Patterns from signs, bin by bin.
+  /// Makes patterns from signs, bin by bin.
   ///
   /// Shapes: signs (n_bins, n_units). Throws std::invalid_argument if a sign is not +1 or -1.
   static PatternTable from_signs(std::span<const std::int8_t> signs, std::size_t n_bins,
@@ -83,7 +84,7 @@ class PatternTable {
     assert(bin < n_bins_ && unit < n_units_);
     words_[bin * n_words_ + unit / 64].flip(unit % 64);
   }
-  /// Makes the pattern of `bin` a copy of that of `from`.
+  /// Copies the pattern of `from` to `bin`.
   void copy(std::size_t from, std::size_t bin) noexcept {
     assert(from < n_bins_ && bin < n_bins_);
     std::copy_n(words_.data() + from * n_words_, n_words_, words_.data() + bin * n_words_);
@@ -98,8 +99,8 @@ class PatternTable {
   std::vector<core::BitWord> words_;
 };
 
-/// Makes `bin` a random pattern: `balanced`, with floor(n_units / 2) units at +1, or of
-/// independent fair units. It must be all -1 before.
+/// Makes `bin` a random pattern: `balanced`, with floor(n_units / 2) units at +1, or of independent
+/// fair units. Its units must be -1 before.
 inline void fill_random(PatternTable& table, std::size_t bin, bool balanced, core::Random& random) {
   if (!balanced) {
     for (std::size_t k = 0; k < table.n_units(); ++k) table.set(bin, k, random.below(2) == 1);
@@ -111,7 +112,7 @@ inline void fill_random(PatternTable& table, std::size_t bin, bool balanced, cor
   for (std::size_t k = 0; k < order.size() / 2; ++k) table.set(bin, order[k]);
 }
 
-/// The table with a random pattern more, after the others.
+/// Returns the table with an additional random pattern after the others.
 inline PatternTable with_random_pattern(const PatternTable& table, bool balanced,
                                         core::Random& random) {
   PatternTable longer(table.n_bins() + 1, table.n_units());

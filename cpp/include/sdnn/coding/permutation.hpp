@@ -38,7 +38,7 @@ inline Permutation inverse(const Permutation& permutation) {
   return result;
 }
 
-/// Throws std::invalid_argument unless it names each of `n_units` units once.
+/// Throws std::invalid_argument unless the permutation has each of `n_units` units once.
 inline void require_permutation(const Permutation& permutation, std::size_t n_units) {
   core::require(permutation.size() == n_units, "permutation",
                 std::to_string(n_units) + " units long", permutation.size());
@@ -50,7 +50,7 @@ inline void require_permutation(const Permutation& permutation, std::size_t n_un
   }
 }
 
-/// A table of which every pattern is permuted. Throws std::invalid_argument as above.
+/// A table with every pattern permuted. Throws std::invalid_argument as above.
 inline PatternTable permuted(const PatternTable& table, const Permutation& permutation) {
   require_permutation(permutation, table.n_units());
   PatternTable result(table.n_bins(), table.n_units());

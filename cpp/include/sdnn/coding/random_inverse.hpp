@@ -1,4 +1,4 @@
-/// Codes of numbers: chains of patterns in which neighbours are alike.
+/// Codes of numbers: chains of patterns in which neighbours are similar.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,8 @@ struct RandomInverseConfig {
   int n_flipped = 5;   ///< r, units of each sign that differ between neighbours
 };
 
-/// The first pattern is random and balanced; each next one flips `n_flipped` units of each sign.
+/// The first pattern is random and balanced; each further pattern flips `n_flipped` units of each
+/// sign.
 ///
 /// Source: Nonaka, Tanaka, Morita 2011. The expected correlation of patterns d bins apart is
 /// (1 - 4 n_flipped / n_units)^d. Throws std::invalid_argument naming the impossible field.
@@ -36,7 +37,7 @@ inline PatternTable random_inverse_patterns(const RandomInverseConfig& config,
   PatternTable table(static_cast<std::size_t>(config.n_bins), n_units);
   fill_random(table, 0, true, random);
 
-  // Units of each sign, in an order that only the draws below change.
+  // The units of each sign, in an order that only the draws below change.
   std::vector<std::size_t> positive;
   std::vector<std::size_t> negative;
   for (std::size_t k = 0; k < n_units; ++k) {

@@ -53,7 +53,8 @@ struct Gate {
   std::size_t end;
 };
 
-/// <x_SD(a), x_SD(b)>, gate by gate: where both modifiers are on, like signs less unlike ones.
+/// The product <x_SD(a), x_SD(b)>, gate by gate: where both modifiers are on, the number of equal
+/// signs minus that of unequal signs.
 template <std::size_t Words>
 SDNN_INLINE std::int32_t gated_product_of_width(std::span<const Gate> gates,
                                                 const TableOfInput* modified, std::size_t n_words,
@@ -83,7 +84,7 @@ SDNN_INLINE std::int32_t gated_product_of_width(std::span<const Gate> gates,
 SDNN_INLINE std::int32_t gated_product_body(std::span<const Gate> gates,
                                             const TableOfInput* modified, std::size_t n_words,
                                             const Bin* a, const Bin* b) noexcept {
-  // The paper's 200 units have four words: a number known when the loop is compiled.
+  // The paper's 200 units have four words, so the loop is compiled for this number too.
   return n_words == 4 ? gated_product_of_width<4>(gates, modified, n_words, a, b)
                       : gated_product_of_width<0>(gates, modified, n_words, a, b);
 }
@@ -98,8 +99,8 @@ SDNN_KERNEL(std::int32_t, gated_product,
 
 /// x_SD: for each pair (mu, nu) the pattern of input mu where that of nu is +1, and 0 elsewhere.
 ///
-/// In the paper x^mu(nu)_k = (1 + (sigma_mu_nu x^nu)_k) / 2 * x^mu_k. A table per pair and role:
-/// tables shared by pairs, permuted ones and separate ones differ only in what they hold.
+/// In the paper x^mu(nu)_k = (1 + (sigma_mu_nu x^nu)_k) / 2 * x^mu_k. There is a table for each
+/// pair and role, whether it is shared by pairs, permuted or separate.
 ///
 /// Columns are numbered pair by pair, n_units each. Kernels number them in *slots*: each pair
 /// begins on a 64-bit word, so slots and columns differ if n_units % 64 != 0.
@@ -107,7 +108,8 @@ SDNN_KERNEL(std::int32_t, gated_product,
 /// Source: section 3.1 (layer 3); Nonaka, Tanaka, Morita 2011.
 class SelectiveDesensitization {
  public:
-  /// One table of each list per pair. Consecutive pairs with the same modifier table are a gate.
+  /// Takes a table from each list for every pair. Consecutive pairs with the same modifier table
+  /// form a gate.
   ///
   /// Throws std::invalid_argument if the lists differ in length or are empty, if the tables differ
   /// in n_units, or if two tables of one input differ in n_bins.
@@ -140,7 +142,7 @@ class SelectiveDesensitization {
       max_active_ += most_on;
     }
   }
-  /// Tables that no pairs share.
+  /// Takes tables that no pairs share.
   SelectiveDesensitization(std::vector<PatternTable> modified, std::vector<PatternTable> modifiers,
                            std::vector<InputPair> pairs)
       : SelectiveDesensitization(shared(std::move(modified)), shared(std::move(modifiers)),
@@ -150,14 +152,14 @@ class SelectiveDesensitization {
   std::size_t n_pairs() const noexcept { return pairs_.size(); }
   std::size_t n_units() const noexcept { return modified_.front()->n_units(); }
   std::size_t n_columns() const noexcept { return n_pairs() * n_units(); }
-  /// Words of a pair's columns.
+  /// The number of words of a pair's columns.
   std::size_t n_pair_words() const noexcept { return modified_.front()->n_words(); }
-  /// Words of 64 slots in the code of a sample.
+  /// The number of words of 64 slots in the code of a sample.
   std::size_t n_words() const noexcept { return n_pairs() * n_pair_words(); }
   std::size_t n_slots() const noexcept { return 64 * n_words(); }
-  /// The most columns of a code that are not 0: no code's products exceed it.
+  /// The largest number of columns of a code that are not 0, a bound of all inner products.
   std::size_t max_active() const noexcept { return max_active_; }
-  /// The patterns of an input; 0 if no pair uses it.
+  /// The number of patterns of an input; 0 if no pair uses it.
   std::size_t n_bins(std::size_t input) const noexcept { return n_bins_[input]; }
   InputPair pair(std::size_t p) const noexcept { return pairs_[p]; }
 
@@ -165,7 +167,7 @@ class SelectiveDesensitization {
     return column / n_units() * 64 * n_pair_words() + column % n_units();
   }
 
-  /// Throws std::invalid_argument unless every one of `bins` is a bin of its input.
+  /// Throws std::invalid_argument unless all `bins` are bins of their inputs.
   ///
   /// Shapes: bins (n_samples, n_inputs).
   void check_bins(std::span<const Bin> bins) const {
@@ -199,7 +201,7 @@ class SelectiveDesensitization {
     }
   }
 
-  /// One word of a pair's part of the code, from the bins of its inputs.
+  /// Encodes a word of a pair's part of the code, from the bins of its inputs.
   void encode_word(std::size_t pair, std::size_t word, Bin modified, Bin modifier,
                    std::uint64_t* active, std::uint64_t* positive) const noexcept {
     const std::size_t n_words = n_pair_words();

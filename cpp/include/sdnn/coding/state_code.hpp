@@ -1,4 +1,4 @@
-/// Layers 2 and 3 as fixed wiring: from a state to its ternary code.
+/// Layers 2 and 3, the fixed wiring from a state to its ternary code.
 #pragma once
 
 #include <algorithm>
@@ -32,16 +32,16 @@ namespace sdnn::coding {
 /// is in the order of the units that modify it: then all groups (mu, nu) of one nu share a gate,
 /// the plain pattern of nu.
 ///
-/// The k units that unit q of x^nu modifies, one in each group (mu, nu), are neutral together.
-/// Two of them, x_i and x_j, are stored as (x_i + x_j) / 2 and (x_i - x_j) / 2. One of these is
-/// always neutral, so whoever reads or corrects the columns that are not has half as many of them.
-/// This is the *paired code*, D columns too. Its first n_double_columns() are such halves: for each
-/// nu and each two of its groups m half sums, then m half differences, in the order of q. If k is
-/// odd, the group of the last mu is left over for each nu and follows as it is.
+/// The k units that unit q of x^nu modifies, one in each group (mu, nu), are neutral together. Two
+/// of them, x_i and x_j, are stored as (x_i + x_j) / 2 and (x_i - x_j) / 2. One of these is always
+/// neutral, which halves the number of columns to read or correct. This is the *paired code*, D
+/// columns too. Its first n_double_columns() are such halves: for each nu and each two of its
+/// groups m half sums, then m half differences, in the order of q. If k is odd, the group of the
+/// last mu of each nu has no partner and follows unchanged.
 class StateCode {
  public:
-  /// Wiring from given tables, one per input, permutations, one per group in the paper's order, and
-  /// strides; without any, all of them.
+  /// Makes the wiring from tables, one per input, permutations, one per group in the paper's order,
+  /// and strides, by default all of them.
   ///
   /// Throws std::invalid_argument unless there are at least two tables of one pattern size,
   /// ascending strides of 1 to l - 1, and l permutations of that size for each of them.
@@ -56,20 +56,21 @@ class StateCode {
 
   std::size_t n_inputs() const noexcept { return tables_.size(); }
   std::size_t n_pattern_units() const noexcept { return tables_.front()->n_units(); }
-  /// k, the inputs that each one modifies and is modified by; l - 1 in the paper.
+  /// k, the number of inputs that each input modifies, and by which it is modified; l - 1 in the
+  /// paper.
   std::size_t n_partners() const noexcept { return strides_.size(); }
   std::size_t n_groups() const noexcept { return n_inputs() * n_partners(); }
   /// The pairs (mu, nu) of all groups in the paper's order.
   std::span<const InputPair> groups() const noexcept { return groups_; }
   /// D = m l k, the length of x_SD; m l (l - 1) in the paper.
   std::size_t n_columns() const noexcept { return n_pattern_units() * n_groups(); }
-  /// Words of the paired code.
+  /// The number of words of the paired code.
   std::size_t n_words() const noexcept { return n_groups() * code_.n_pair_words(); }
   /// Number of columns of the paired code that are half a sum or difference; they come first.
   std::size_t n_double_columns() const noexcept {
     return 2 * n_inputs() * n_pairs() * n_pattern_units();
   }
-  /// Room for the columns of the paired code.
+  /// Returns buffers for the columns of the paired code.
   ColumnLists column_lists() const { return {n_words(), code_.n_pair_words(), n_pattern_units()}; }
 
   /// The patterns of an input. Throws std::out_of_range if there is no such input.
@@ -93,8 +94,8 @@ class StateCode {
     }
   }
 
-  /// Place of a unit of x_SD in the paired code: x = first + sign * second, or, unless it is
-  /// paired, first alone; and its weight is half of that sum of their weights, or the weight alone.
+  /// The columns of a unit of x_SD in the paired code. If it is paired, x = first + sign * second,
+  /// and its weight is half of this sum of their weights; otherwise both are those of `first`.
   struct PairedColumns {
     bool paired;
     std::size_t first;
@@ -164,7 +165,7 @@ class StateCode {
     return groups;
   }
 
-  /// For each group how many before it have the same modifier.
+  /// For each group, the number of groups before it with the same modifier.
   std::vector<std::size_t> rank_groups() const {
     std::vector<std::size_t> n_before(n_inputs(), 0);
     std::vector<std::size_t> ranks;
@@ -185,7 +186,8 @@ class StateCode {
     return result;
   }
 
-  /// The groups in the order of the paired code: those that are paired, then those left over.
+  /// The groups in the order of the paired code: paired groups first, then groups without a
+  /// partner.
   SelectiveDesensitization make_code() const {
     core::require(permutations_.size() == n_groups(), "number of permutations",
                   "n_inputs times the number of strides", permutations_.size());

@@ -1,4 +1,4 @@
-/// The settings of a state's code, for every configuration that has one.
+/// The settings of a state's code, shared by several configurations.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace sdnn::coding {
 
-/// The fields that define the code, of any configuration with members of these names.
+/// The fields that define the code, for any configuration with members of these names.
 template <class Config>
 constexpr auto state_code_fields(const char* units = "m, units per pattern (section 4.2: 200).",
                                  int least_units = 2) noexcept {
@@ -44,7 +44,7 @@ constexpr auto state_code_fields(const char* units = "m, units per pattern (sect
                   core::within(0, 1 << 24)));
 }
 
-/// Number of inputs that modify each one: an even share of max_pairs, at least one.
+/// The number of inputs that modify each input: an even share of max_pairs, at least one.
 template <class Config>
 int n_partners_of(const Config& config) noexcept {
   if (config.n_inputs < 2) return 0;
@@ -53,7 +53,8 @@ int n_partners_of(const Config& config) noexcept {
              : config.n_inputs - 1;
 }
 
-/// Bins of all inputs by anchors and symbols. Of any fields, impossible ones too: hence a double.
+/// The number of bins of all inputs by anchors and symbols; a double, because the fields may not be
+/// checked yet.
 template <class Config>
 double n_bins_of(const Config& config) noexcept {
   double n_of_symbols = 0.0;
@@ -67,7 +68,7 @@ double n_bins_of(const Config& config) noexcept {
          n_numbers * (config.n_anchor_patterns - 1.0) * (config.n_interpolated + 1.0);
 }
 
-/// Bytes of the patterns of so many bins, plain and permuted for each partner.
+/// The bytes of the patterns of `n_bins` bins, plain and permuted for each partner.
 template <class Config>
 double pattern_bytes_of(const Config& config, double n_bins) noexcept {
   return (n_partners_of(config) + 1.0) * n_bins * 8.0 * std::ceil(config.n_pattern_units / 64.0);

@@ -1,4 +1,4 @@
-/// The code of symbols, which have no order: a random pattern for each.
+/// The code of symbols without order: a random pattern for each.
 #pragma once
 
 #include <cstddef>
@@ -10,10 +10,11 @@
 
 namespace sdnn::coding {
 
-/// n_symbols independent patterns: what is learned about one symbol says nothing of another.
+/// Draws n_symbols independent patterns, so that nothing is generalized between symbols.
 ///
-/// `balanced` patterns have as many +1 as -1; others are of independent fair units. Source: as the
-/// anchors of section 3.1 (layer 2). Throws std::invalid_argument naming the impossible argument.
+/// `balanced` patterns have equal numbers of +1 and -1; other patterns have independent fair units.
+/// Source: the anchors of section 3.1 (layer 2). Throws std::invalid_argument naming the impossible
+/// argument.
 inline PatternTable symbol_patterns(int n_symbols, int n_units, bool balanced,
                                     core::Random& random) {
   core::require_in_range("n_symbols", n_symbols, 1, 1 << 24);
@@ -26,10 +27,10 @@ inline PatternTable symbol_patterns(int n_symbols, int n_units, bool balanced,
   return table;
 }
 
-/// A unit for each of n_symbols: only that symbol's is +1.
+/// Makes patterns with a unit for each of n_symbols, of which only that of the symbol is +1.
 ///
-/// An input that is modified by itself then has one unit of each group that is not neutral, another
-/// for each symbol: what is learned is a table, exactly.
+/// An input that is modified by itself then has a single non-neutral unit in each group, a
+/// different one for each symbol. The weights are then an exact table.
 inline PatternTable one_hot_patterns(std::size_t n_symbols) {
   PatternTable table(n_symbols, n_symbols);
   for (std::size_t symbol = 0; symbol < n_symbols; ++symbol) table.set(symbol, symbol);

@@ -10,11 +10,11 @@
 
 namespace sdnn::core {
 
-/// 64 binary units. The words of a std::bitset of any other size have no portable access; those of
-/// this one have (to_ullong), and rows of them give layers of any size.
+/// A word of 64 binary units. Only a std::bitset of this size has portable access to its word
+/// (to_ullong); rows of words form layers of any size.
 using BitWord = std::bitset<64>;
 
-/// Words that hold `n_units` binary units.
+/// The number of words that hold `n_units` binary units.
 constexpr std::size_t n_bit_words(std::size_t n_units) noexcept { return (n_units + 63) / 64; }
 
 /// A view of `size` binary units in a row of words; unit i is bit i % 64 of word i / 64, and the

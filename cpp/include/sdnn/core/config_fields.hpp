@@ -1,5 +1,5 @@
-/// The fields of a configuration: name, member, documentation and bounds of each, listed once, and
-/// read by whoever needs all of them: checks, files, the bindings, and through these the commands.
+/// The fields of a configuration, with name, member, documentation and bounds. Each is listed once,
+/// for checks, files and the bindings, and through these for the command line.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace sdnn::core {
 
-/// The numbers that a field takes: finite ones from `low` to `high`.
+/// The finite numbers that a field may have, from `low` to `high`.
 struct Bounds {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -24,9 +24,9 @@ struct Bounds {
 
 constexpr Bounds at_least(double low) noexcept { return {.low = low}; }
 constexpr Bounds above(double low) noexcept { return {.low = low, .excludes_low = true}; }
-/// In [low, high].
+/// Bounds [low, high].
 constexpr Bounds within(double low, double high) noexcept { return {.low = low, .high = high}; }
-/// In (low, high].
+/// Bounds (low, high].
 constexpr Bounds above_up_to(double low, double high) noexcept {
   return {.low = low, .high = high, .excludes_low = true};
 }

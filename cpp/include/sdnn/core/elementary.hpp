@@ -1,8 +1,8 @@
 /// Elementary functions with the same bits everywhere.
 ///
-/// std::sin and std::log may differ in the last bit between two mathematical libraries, and one bit
-/// is enough to end two learning runs at different networks. These use IEEE + - * / sqrt and bit
-/// operations alone; compile with contraction of a * b + c off (the CMake target does).
+/// std::sin and std::log may differ in the last bit between mathematical libraries, and a single
+/// bit may change the outcome of a training. These functions use only IEEE + - * / sqrt and bit
+/// operations; they need contraction of a * b + c to be off (as in the CMake target).
 #pragma once
 
 #include <array>
@@ -49,11 +49,11 @@ constexpr double polynomial(const std::array<double, Size>& c, double x) noexcep
 /// `Real` is double or core::Lanes, with the same bits in every lane.
 /// Error: the largest of 570,000 arguments, a sixth of them next to multiples of pi/2, was 0.82 ulp
 /// (against 60 digits; the tests repeat a part of it). sin is exactly odd, -0 included, and cos
-/// exactly even. No branch and no table, so that it runs in lanes, and short chains of dependent
-/// operations, since an integrator waits for the result.
-/// Source: reduction by Cody and Waite, pi/2 as 34 + 34 + 53 bits; minimax-like polynomials of our
-/// own for (sin r - r) / r^3 and (cos r - 1 + r^2/2) / r^4 in r^2, |r| <= pi/4 (relative error
-/// 2^-57.8 and 2^-63.7).
+/// exactly even. It has no branch and no table, so that it runs in lanes, and short chains of
+/// dependent operations, because an integrator needs the result soon.
+/// Source: reduction by Cody and Waite, pi/2 as 34 + 34 + 53 bits; our minimax-like polynomials for
+/// (sin r - r) / r^3 and (cos r - 1 + r^2/2) / r^4 in r^2, |r| <= pi/4 (relative error 2^-57.8 and
+/// 2^-63.7).
 template <class Real>
 SDNN_INLINE BasicSinCos<Real> sin_cos(const Real& x) noexcept {
   constexpr std::uint64_t kSignBit = std::uint64_t{1} << 63;
@@ -100,7 +100,7 @@ SDNN_INLINE BasicSinCos<Real> sin_cos(const Real& x) noexcept {
 ///
 /// Error: the largest of 285,000 arguments over the whole range was 0.79 ulp.
 /// Source: x = 2^k (1 + f), s = f / (2 + f), log(1 + f) = 2 s + (2/3) s^3 + ..., summed so that the
-/// large parts are exact; coefficients of our own (relative error 2^-59).
+/// large parts are exact; our coefficients (relative error 2^-59).
 inline double log(double x) noexcept {
   constexpr std::uint64_t kMantissa = (std::uint64_t{1} << 52) - 1;
   constexpr std::uint64_t kOne = std::uint64_t{1023} << 52;
@@ -139,10 +139,9 @@ inline double log(double x) noexcept {
 /// e^x; infinity above 709.78, gradually 0 below -708.4, NaN for NaN.
 ///
 /// Error: the largest of 400,000 arguments with a normal result was 0.66 ulp; a subnormal result is
-/// rounded a second time. No branch and no table, so that a loop over it can be vectorized.
+/// rounded a second time. It has no branch and no table, so that a loop over it can be vectorized.
 /// Source: x = n log 2 + r, |r| <= log(2) / 2, log 2 as 42 + 53 bits; e^r = 1 + r + r^2/2 + r^3
-/// p(r) with a polynomial of our own (relative error 2^-59.8), summed so that the large parts are
-/// exact.
+/// p(r) with our polynomial (relative error 2^-59.8), summed so that the large parts are exact.
 inline double exp(double x) noexcept {
   constexpr double kLog2Inverse = 0x1.71547652b82fep+0;
   constexpr double kRounder = 0x1.8p52;  // adding it leaves the nearest integer in the low bits
@@ -169,7 +168,7 @@ inline double exp(double x) noexcept {
   const double rest = (1.0 - one_plus) + r;  // what that sum lost
   const double mantissa = one_plus + (rest + (tail + (0.5 * z + (r * z) * poly)));
 
-  // 2^n as two factors, since n itself may leave the range of exponents.
+  // 2^n has two factors because n may leave the range of exponents.
   const std::uint64_t biased =
       std::bit_cast<std::uint64_t>(shifted) - std::bit_cast<std::uint64_t>(kRounder) + kTwiceBias;
   const std::uint64_t half = biased >> 1;
@@ -182,8 +181,8 @@ inline double exp(double x) noexcept {
 ///
 /// Error: the largest of 40,000,000 arguments was 1.47 ulp.
 /// Source: with a >= b the magnitudes, atan(b / a) or, beyond 1/2, pi/4 + atan((b - a) / (b + a)),
-/// where b - a is exact; a polynomial of our own for (atan r - r) / r^3 in r^2, |r| <= 1/2
-/// (relative error 2^-59.9); multiples of pi/4 as 53 + 53 bits.
+/// where b - a is exact; our polynomial for (atan r - r) / r^3 in r^2, |r| <= 1/2 (relative error
+/// 2^-59.9); multiples of pi/4 as 53 + 53 bits.
 inline double atan2(double y, double x) noexcept {
   constexpr std::array<double, 13> kSeries{
       -0x1.5555555555555p-2, 0x1.99999999998e0p-3, -0x1.24924924881f5p-3, 0x1.c71c71c014e0dp-4,
@@ -231,7 +230,7 @@ inline double atan2(double y, double x) noexcept {
   return std::copysign(kEighths[eighths] + (rest + kRests[eighths]), y);
 }
 
-/// The number that a standard normal variable stays below with probability `p`.
+/// The quantile of the standard normal distribution for the probability `p`.
 ///
 /// -inf at 0, +inf at 1, NaN outside [0, 1]. Relative error below 1e-15 (measured).
 /// Source: Wichura, M. J. (1988). Algorithm AS 241, PPND16. Applied Statistics 37(3), 477-484.

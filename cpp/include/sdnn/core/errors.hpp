@@ -1,4 +1,4 @@
-/// Errors reach the caller as exceptions or, where there are none, through a function of his.
+/// Errors: exceptions or, in builds without exceptions, calls of a handler.
 #pragma once
 
 #if defined(__cpp_exceptions) || defined(_CPPUNWIND)
@@ -15,7 +15,7 @@
 
 namespace sdnn::core {
 
-/// An argument, or a field of a configuration, is not what it must be.
+/// An error about the value of an argument or a field of a configuration.
 class ArgumentError : public std::invalid_argument {
  public:
   ArgumentError(std::string name, const std::string& message)
@@ -28,13 +28,13 @@ class ArgumentError : public std::invalid_argument {
   std::string name_;
 };
 
-/// An argument, or a field of a configuration, needs more memory than is allowed.
+/// An error about an argument or a field that needs more memory than is allowed.
 class SizeError : public std::length_error {
  public:
   SizeError(std::string name, const std::string& message)
       : std::length_error(message), name_(std::move(name)) {}
 
-  /// Name of the argument or field to reduce; the first one, if several would do.
+  /// Name of the argument or field to reduce, or of the first of several.
   const std::string& name() const noexcept { return name_; }
 
  private:
@@ -43,11 +43,12 @@ class SizeError : public std::length_error {
 
 #if !SDNN_EXCEPTIONS
 
-/// Gets the message of an error, and does not return: it restarts the processor, say.
+/// A function that handles the message of an error and does not return; it may restart the
+/// processor.
 using ErrorHandler = void (*)(const char* message);
 
-/// The handler in use. At first: it writes the message to standard error. Should a handler return,
-/// the program is aborted.
+/// The current handler; the default writes the message to standard error. The program is aborted if
+/// a handler returns.
 inline ErrorHandler& error_handler() noexcept {
   static ErrorHandler handler = [](const char* message) {
     std::fprintf(stderr, "sdnn: %s\n", message);

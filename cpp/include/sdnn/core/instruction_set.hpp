@@ -1,4 +1,4 @@
-/// Vector instructions of the kernels: chosen once, at run time.
+/// The choice of vector instructions for the kernels, once at run time.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@
 #define SDNN_X86_KERNELS 0
 #endif
 
-// Every AArch64 processor has NEON; of 32-bit ones those that it was compiled for (-mfpu=neon).
+// Every AArch64 processor has NEON; 32-bit builds use it only if compiled for it (-mfpu=neon).
 #if defined(__ARM_NEON) && (defined(__GNUC__) || defined(__clang__))
 #define SDNN_NEON_KERNELS 1
 #else
@@ -25,7 +25,8 @@
 
 namespace sdnn::core {
 
-/// Levels, those of a processor in rising order. Results have the same bits on all of them.
+/// Levels of instruction sets, in rising order for each processor. Results have the same bits on
+/// all of them.
 enum class InstructionSet {
   portable,  ///< whatever the compiler makes of plain loops
   neon,      ///< Arm's Advanced SIMD
@@ -50,7 +51,7 @@ inline std::string_view name_of(InstructionSet level) noexcept {
 inline constexpr std::array kInstructionSets = {InstructionSet::portable, InstructionSet::neon,
                                                 InstructionSet::avx2, InstructionSet::avx512};
 
-/// Do this processor, its operating system and this build offer the level?
+/// Whether this processor, its operating system and this build offer the level.
 inline bool offers(InstructionSet level) noexcept {
   switch (level) {
     case InstructionSet::portable:
@@ -72,7 +73,7 @@ inline bool offers(InstructionSet level) noexcept {
   }
 }
 
-/// The highest level on offer.
+/// The highest available level.
 inline InstructionSet best_instruction_set() noexcept {
   InstructionSet best = InstructionSet::portable;
   for (const InstructionSet level : kInstructionSets) {
@@ -81,8 +82,8 @@ inline InstructionSet best_instruction_set() noexcept {
   return best;
 }
 
-/// The level called `name`. Throws std::invalid_argument if there is no such level, or none on
-/// offer.
+/// The level called `name`. Throws std::invalid_argument if the level does not exist or is not
+/// available.
 inline InstructionSet instruction_set_named(std::string_view name) {
   for (const InstructionSet level : kInstructionSets) {
     if (name != name_of(level)) continue;
@@ -109,7 +110,8 @@ inline std::atomic<InstructionSet>& active_level() {
 
 }  // namespace detail
 
-/// The level in use: the best one, unless SDNN_INSTRUCTION_SET or set_instruction_set chose.
+/// The current level: the highest, unless SDNN_INSTRUCTION_SET or set_instruction_set chose
+/// another.
 ///
 /// Throws std::invalid_argument on the first call if the environment variable is unusable.
 inline InstructionSet instruction_set() {

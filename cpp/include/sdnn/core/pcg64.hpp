@@ -14,8 +14,8 @@ namespace sdnn::core {
 
 /// PCG64 with a SeedSequence: the numbers of numpy.random.Generator(PCG64(SeedSequence(seeds))).
 ///
-/// Everything else draws from Random. Warm-ups draw from this one, because results that were
-/// recorded with NumPy's numbers must stay what they are.
+/// Only warm-ups use this generator, to reproduce results that were recorded with NumPy; everything
+/// else uses Random.
 ///
 /// Source: O'Neill, M. (2014). PCG (XSL RR 128/64); O'Neill, M. (2015). Developing a seed_seq
 /// alternative; numpy/random/src/distributions/distributions.c (bounded integers after Lemire).
@@ -55,7 +55,7 @@ class Pcg64 {
     return static_cast<std::uint32_t>(scaled >> 32U);
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     std::array<std::uint64_t, 6> words{self.state_.high,    self.state_.low, self.increment_.high,

@@ -16,8 +16,8 @@
 
 namespace sdnn::core {
 
-/// Purpose of a random number. Each purpose draws from a stream of its own, so that using more
-/// numbers for one never changes the others.
+/// Purpose of a random number. Each purpose has a separate stream, so that drawing more numbers for
+/// one never changes another.
 enum class Stream : std::uint64_t {
   code_books = 1,
   permutations = 2,
@@ -36,7 +36,7 @@ enum class Stream : std::uint64_t {
 
 /// xoshiro256** (Blackman, Vigna 2018), seeded by SplitMix64 from (seed, stream, index).
 ///
-/// std::shuffle and std::normal_distribution differ between standard libraries; this does not.
+/// Unlike std::shuffle and std::normal_distribution, it does not depend on the standard library.
 class Random {
  public:
   /// The generator number `index` of `stream` under the root `seed`.
@@ -47,7 +47,7 @@ class Random {
     for (auto& word : state_) word = split_mix(mixed);
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.fixed("words", {self.state_.size()}, self.state_);
@@ -91,8 +91,8 @@ class Random {
     return normal_quantile((static_cast<double>(bits() >> 12) + 0.5) * 0x1.0p-52);
   }
 
-  /// Puts `items` in a uniformly random order (Fisher-Yates, from the back). Long work: may be
-  /// stopped.
+  /// Puts `items` in a uniformly random order (Fisher-Yates, from the back). The computation may be
+  /// interrupted.
   template <class Item>
   void shuffle(std::span<Item> items) {
     constexpr std::size_t kItemsPerPoint = std::size_t{1} << 16;

@@ -1,5 +1,5 @@
-/// The one file format of agents, trainings and estimators, which Python reads and writes too
-/// (python/sdnn/support/files.py says how it is made). Needs the library nlohmann/json.
+/// The file format of agents, trainings and estimators, which Python reads and writes too (see
+/// python/sdnn/support/state_files.py). Needs the library nlohmann/json.
 #pragma once
 
 #include <algorithm>
@@ -38,12 +38,12 @@ struct FileContent {
   State tensors;
 };
 
-/// The number of the format, the only one that is read.
+/// The number of the only supported format.
 inline constexpr int kFileFormat = 1;
 
-/// The JSON value in `text`. Throws std::runtime_error where it is none, names a member of the
-/// outermost object twice, or is larger or deeper than a header has reason to be; what is refused
-/// has not been built.
+/// The JSON value in `text`. Throws std::runtime_error for a text that is not JSON, has a member of
+/// the outermost object twice, or exceeds the size or depth of headers; it is refused before it is
+/// built.
 inline nlohmann::json parse_json(std::string_view text) {
   constexpr int kMostLevels = 32;
   constexpr std::size_t kMostValues = 1'000'000;
@@ -68,11 +68,11 @@ inline nlohmann::json parse_json(std::string_view text) {
 namespace detail {
 
 inline constexpr std::uint64_t kLongestHeader = 100'000'000;
-// 16 GiB, or as much as can be addressed.
+// The limit is 16 GiB, or the address space.
 inline constexpr std::uint64_t kLargestFile =
     std::min<std::uint64_t>(std::uint64_t{1} << 34, std::numeric_limits<std::ptrdiff_t>::max());
 
-// Tensors that a file may have beyond one for two bytes of all of them.
+// Tensors that a file may have in addition to one for every two bytes of data.
 inline constexpr std::uint64_t kMostEmptyTensors = 1024;
 
 inline std::size_t count_of(std::string_view text, std::string_view part) {
@@ -135,7 +135,7 @@ struct Safetensors {
 };
 
 /// `read(begin, into)` gives the bytes of a file of `size` bytes. All sizes are checked before any
-/// memory is asked for. Source: https://huggingface.co/docs/safetensors, "Format".
+/// allocation. Source: https://huggingface.co/docs/safetensors, "Format".
 template <class Read>
 Safetensors parse_safetensors(std::uint64_t size, const Read& read) {
   std::uint64_t header_size = 0;
@@ -194,7 +194,7 @@ inline std::string digits_of(std::uint32_t crc) {
   return digits;
 }
 
-/// The checksum of a file of `size` bytes: of all but its own.
+/// The checksum of all bytes of a file of `size` bytes except its own.
 template <class Read>
 std::string checksum_of(std::uint64_t size, const Read& read) {
   std::vector<std::byte> piece(std::size_t{1} << 16);
@@ -257,8 +257,8 @@ constexpr int storage_rank(TensorType type) noexcept {
 
 }  // namespace detail
 
-/// Reads a file of one of these kinds. Its checksum is compared before anything else is used.
-/// Throws std::runtime_error naming the file and what is wrong with it.
+/// Reads a file of one of several kinds. Its checksum is compared before anything else is used.
+/// Throws std::runtime_error naming the file and the problem.
 inline FileContent read_file(const std::filesystem::path& path,
                              std::initializer_list<std::string_view> kinds) {
   try {
@@ -284,9 +284,9 @@ inline FileContent read_file(const std::filesystem::path& path,
   }
 }
 
-/// Writes a file, whole or not at all: the same bytes as in Python, but for rare numbers whose
-/// shortest text is not the only one. Throws std::runtime_error naming the file, and then what was
-/// there before stays.
+/// Writes a file whole or not at all, with the same bytes as in Python, except for rare numbers
+/// with several shortest texts. Throws std::runtime_error naming the file; an earlier file then
+/// stays.
 inline void write_file(const std::filesystem::path& path, const FileContent& content) {
   std::vector<const State::value_type*> order;
   for (const auto& named : content.tensors) order.push_back(&named);

@@ -1,4 +1,4 @@
-/// State of an object, by name: to be saved and restored.
+/// The state of an object as named tensors, to be saved and restored.
 #pragma once
 
 #include <algorithm>
@@ -39,7 +39,7 @@ constexpr TensorType tensor_type() noexcept {
   if constexpr (std::is_same_v<T, std::uint64_t>) return TensorType::u64;
 }
 
-/// Its name, and the bytes of one number.
+/// The name of a type, and the bytes of a number.
 struct TensorTypeFacts {
   const char* name;
   std::size_t n_bytes;
@@ -51,7 +51,7 @@ constexpr TensorTypeFacts facts_of(TensorType type) noexcept {
   return kFacts[static_cast<std::size_t>(type)];
 }
 
-/// Numbers of one type in a shape, row by row, as they lie in memory.
+/// Numbers of one type in a shape, row by row, in the byte order of memory.
 struct Tensor {
   TensorType type = TensorType::f64;
   std::vector<std::size_t> shape;
@@ -66,7 +66,7 @@ using State = std::map<std::string, Tensor, std::less<>>;
 
 namespace detail {
 
-/// Names what a class lists with a prefix, for the parts of an object.
+/// Adds a prefix to the names that a part of an object lists.
 template <class Archive>
 class Prefixed {
  public:
@@ -85,7 +85,7 @@ class Prefixed {
 
 }  // namespace detail
 
-/// Collects a state. A class that has one lists its members once, for writing and for reading:
+/// Collects a state. A class with a state lists its members once, for writing and for reading:
 ///
 ///     template <class Self, class Archive>
 ///     static void serialize(Self& self, Archive& archive) {
@@ -97,7 +97,7 @@ class StateWriter {
  public:
   static constexpr bool kReads = false;
 
-  /// One number. Shape: ().
+  /// Adds a number. Shape: ().
   template <class T>
   void number(std::string_view name, const T& value) {
     if constexpr (std::is_same_v<T, bool>) {
@@ -106,22 +106,22 @@ class StateWriter {
       add<T>(name, {}, std::span<const T>(&value, 1));
     }
   }
-  /// One that may be missing: then there is no tensor.
+  /// Adds a number, or no tensor if it is missing.
   template <class T>
   void number(std::string_view name, const std::optional<T>& value) {
     if (value) number(name, *value);
   }
-  /// Array of any length. Shape: (n,).
+  /// Adds an array of any length. Shape: (n,).
   template <class T>
   void numbers(std::string_view name, const std::vector<T>& values) {
     add<T>(name, {values.size()}, values);
   }
-  /// One that may be empty: then there is no tensor.
+  /// Adds an array, or no tensor if it is empty.
   template <class T>
   void some_numbers(std::string_view name, const std::vector<T>& values) {
     if (!values.empty()) numbers(name, values);
   }
-  /// Array of a known shape: anything with data() and size().
+  /// Adds an array of a known shape: any object with data() and size().
   template <class Values>
   void fixed(std::string_view name, std::vector<std::size_t> shape, const Values& values) {
     using T = std::remove_cvref_t<decltype(*values.data())>;
@@ -151,8 +151,8 @@ class StateWriter {
   }
 };
 
-/// Puts a state back. Every member throws std::invalid_argument that names the tensor that is
-/// missing or does not fit: read into a copy, and move that where all went well.
+/// Restores a state. Every member throws std::invalid_argument naming a tensor that is missing or
+/// does not fit; read into a copy, and move it after success.
 class StateReader {
  public:
   static constexpr bool kReads = true;
@@ -213,7 +213,8 @@ class StateReader {
     }
   }
 
-  /// Throws unless there is a tensor of so many numbers: before memory for them is asked for.
+  /// Throws unless there is a tensor with this number of items, before memory for them is
+  /// allocated.
   void expect_size(std::string_view name, double size) const {
     const auto found = state_.find(prefix + std::string(name));
     expect(found != state_.end(), name, "there");
@@ -221,14 +222,14 @@ class StateReader {
            "as large as the approximator's");
   }
 
-  /// Throws unless `holds`, naming the tensor and what it must be.
+  /// Throws unless `holds`, naming the tensor and the requirement.
   void expect(bool holds, std::string_view name, std::string_view what) const {
     if (holds) return;
     fail(std::invalid_argument("state: " + prefix + std::string(name) + " must be " +
                                std::string(what)));
   }
 
-  /// Does what takes a tensor over; where that throws std::invalid_argument, names the tensor.
+  /// Calls a function that reads a tensor, and names the tensor in its std::invalid_argument.
   template <class Take>
   void taking(std::string_view name, const Take& take) const {
 #if SDNN_EXCEPTIONS
@@ -243,7 +244,7 @@ class StateReader {
 #endif
   }
 
-  /// Throws if the state has a tensor that nobody asked for.
+  /// Throws if the state has a tensor that was not read.
   void finish() const {
     for (const auto& [name, tensor] : state_) {
       if (read_.contains(&tensor)) continue;
@@ -297,8 +298,8 @@ State state_of(const Object& object) {
   return std::move(writer.state);
 }
 
-/// Gives an object a state that state_of made of one of the same configuration and seed. Throws
-/// std::invalid_argument naming what does not fit, and then nothing has changed.
+/// Restores a state that state_of made from an object of the same configuration and seed. Throws
+/// std::invalid_argument naming the tensor that does not fit; then nothing has changed.
 template <class Object>
 void restore(Object& object, const State& state) {
   Object restored = object;

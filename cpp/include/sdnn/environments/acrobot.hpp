@@ -14,7 +14,7 @@
 
 namespace sdnn::environments {
 
-/// Result of one decision. `terminated`: the goal; `truncated`: the last decision was made.
+/// The result of a decision: `terminated` at the goal, `truncated` after the last decision.
 struct StepResult {
   double reward;
   bool terminated;
@@ -39,7 +39,7 @@ inline StepResult result_of(const AcrobotConfig& config, const AcrobotState& sta
 /// allocates nothing.
 class Acrobot {
  public:
-  /// At rest, hanging down. Throws std::invalid_argument if a number is outside its range.
+  /// Starts at rest, hanging down. Throws std::invalid_argument if a number is outside its range.
   explicit Acrobot(const AcrobotConfig& config = {}) : dynamics_(config) {}
 
   /// Starts an episode at rest, hanging down.
@@ -59,7 +59,7 @@ class Acrobot {
     return end_step(integrate(torque, goal_tolerance));
   }
 
-  /// The present state, its angles in [-pi, pi).
+  /// The current state, with angles in [-pi, pi).
   AcrobotState state() const noexcept { return state_; }
 
   /// Height of the tip above joint 1, in m.
@@ -78,7 +78,7 @@ class Acrobot {
     return dynamics_.mass_matrix(theta2);
   }
 
-  /// Decisions made in this episode.
+  /// The number of decisions in this episode.
   int decisions() const noexcept { return decisions_; }
 
   const AcrobotConfig& config() const noexcept { return dynamics_.config(); }
@@ -92,7 +92,7 @@ class Acrobot {
     if (over_) core::fail(std::logic_error("the episode is over: call reset before step"));
   }
 
-  // Ends a step whose integration came to the goal, or did not.
+  // Ends a step, given whether its integration reached the goal.
   StepResult end_step(bool goal) {
     state_[0] = wrap_angle(state_[0]);
     state_[1] = wrap_angle(state_[1]);
@@ -106,7 +106,8 @@ class Acrobot {
     return result;
   }
 
-  // Moves the state on by one decision interval, or to the goal: then true.
+  // Advances the state by one decision interval or to the goal; returns whether it reached the
+  // goal.
   bool integrate(double torque, double goal_tolerance) noexcept {
     const double limit_1 = config().goal_velocity_1 * goal_tolerance;
     const double limit_2 = config().goal_velocity_2 * goal_tolerance;

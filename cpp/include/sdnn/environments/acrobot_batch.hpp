@@ -1,4 +1,4 @@
-/// Many acrobots at once, several side by side in the lanes of vector registers.
+/// Batches of acrobots, which move several at a time in the lanes of vector registers.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,7 +25,7 @@
 
 namespace sdnn::environments {
 
-/// The most acrobots in one batch.
+/// The largest number of acrobots in a batch.
 inline constexpr std::size_t kMaxAcrobots = std::size_t{1} << 24;
 
 /// Results of a step for every acrobot of a batch: StepResult's members. Shapes: all (size(),).
@@ -35,13 +35,13 @@ struct AcrobotBatchResults {
   std::span<std::uint8_t> truncated;   ///< 1: the last decision was made
 };
 
-/// N acrobots in step, each with the bits that an Acrobot of its own would have.
+/// A batch of N acrobots that move together, each with the bits of an Acrobot.
 ///
-/// The torques, the goal's tolerances and the instants at which episodes end are each acrobot's
-/// own. A step allocates nothing.
+/// Each acrobot has a separate torque, goal tolerance and end of episode. A step allocates nothing.
 class AcrobotBatch {
  public:
-  /// All at rest, hanging down. Throws std::invalid_argument if a number is outside its range.
+  /// Starts all at rest, hanging down. Throws std::invalid_argument if a number is outside its
+  /// range.
   AcrobotBatch(const AcrobotConfig& config, std::size_t n_acrobots)
       : dynamics_(config),
         size_(checked(n_acrobots)),
@@ -78,12 +78,12 @@ class AcrobotBatch {
   /// std::invalid_argument unless every number is finite, std::out_of_range.
   void set_state(std::size_t i, const AcrobotState& state) { begin_at(i, wrapped(state)); }
 
-  /// Acrobot::step for every acrobot whose item of `moving` is not 0; the others stay as they are
-  /// (reward 0, no end), whatever their torque and tolerance.
+  /// Calls Acrobot::step for every acrobot whose item of `moving` is not 0; the others do not
+  /// change (reward 0, no end) and their torques and tolerances are ignored.
   ///
   /// Shapes: all (size(),). Throws std::invalid_argument or std::logic_error, like Acrobot::step,
-  /// before anything moves; std::overflow_error after all have moved. Long work: may be stopped,
-  /// and then the episodes of those that were to move are over.
+  /// before anything moves; std::overflow_error after all have moved. The computation may be
+  /// interrupted; then the episodes of all moving acrobots are over.
   void step(std::span<const double> torques, std::span<const double> goal_tolerances,
             std::span<const std::uint8_t> moving, const AcrobotBatchResults& results) {
     check_step(torques, goal_tolerances, moving, results);
@@ -119,7 +119,7 @@ class AcrobotBatch {
     }
   }
 
-  /// The present state of acrobot `i`, its angles in [-pi, pi). Throws std::out_of_range.
+  /// The current state of acrobot `i`, with angles in [-pi, pi). Throws std::out_of_range.
   AcrobotState state(std::size_t i) const {
     require_index(i);
     return state_of(i);
@@ -143,7 +143,7 @@ class AcrobotBatch {
     for (std::size_t i = 0; i < size_; ++i) out[i] = dynamics_.tip_height(state_of(i));
   }
 
-  /// Decisions made in the episode of acrobot `i`. Throws std::out_of_range.
+  /// The number of decisions in the episode of acrobot `i`. Throws std::out_of_range.
   int decisions(std::size_t i) const {
     require_index(i);
     return decisions_[i];
@@ -170,8 +170,8 @@ class AcrobotBatch {
     core::require(false, name, "of " + std::to_string(expected) + " items", size);
   }
 
-  /// Moves in parts of which each is a short time's work. Stopped between them, all that move have
-  /// ended their episodes.
+  /// Moves the batch in short parts. An interruption between them ends the episodes of all moving
+  /// acrobots.
   void move_all(std::span<const std::uint8_t> moving) {
     constexpr double kStepsPerPoint = 1 << 20;
     const double steps = std::nearbyint(config().decision_interval / config().integration_step);

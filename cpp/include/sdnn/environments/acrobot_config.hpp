@@ -10,7 +10,7 @@
 
 namespace sdnn::environments {
 
-/// Instants at which the goal is tested; the paper is silent.
+/// Instants at which the goal is tested; the paper does not define them.
 enum class GoalTest {
   every_step,        ///< after every integration step: the episode ends at that instant
   decision_instant,  ///< only when the next decision is due

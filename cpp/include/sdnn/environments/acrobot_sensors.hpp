@@ -31,7 +31,7 @@ constexpr std::array<std::string_view, 2> words_of(SensorEdge) noexcept {
   return {"wrap", "saturate"};
 }
 
-/// Number of turns apart from a whole number, in [0, 1).
+/// The fractional part of a number of turns, in [0, 1).
 inline double wrap_to_unit(double x) noexcept {
   const double wrapped = x - std::floor(x);
   return wrapped < 1.0 ? wrapped : 0.0;  // a tiny negative x rounds to 1
@@ -71,7 +71,7 @@ class SensorNoise {
     core::require(std::isfinite(sigma) && sigma >= 0.0, "noise", "finite and at least 0", sigma);
   }
 
-  /// Adds one normal number to every channel in order; sigma = 0 draws none and changes nothing.
+  /// Adds a normal number to every channel in order; sigma = 0 draws nothing and changes nothing.
   /// Shapes: (n_channels,).
   void apply(std::span<double> values) noexcept {
     assert(values.size() == edges_.size());
@@ -90,7 +90,7 @@ class SensorNoise {
   core::Random random_;
 };
 
-/// Place where noise enters (an assumption).
+/// Variables to which noise is added (an assumption).
 enum class NoiseEntry {
   every_sensor,   ///< s5 and s6 are computed from the true s1..s4 and have noise of their own
   basic_sensors,  ///< on s1..s4 alone: s5 and s6 are computed from the noisy ones
@@ -134,10 +134,10 @@ struct SensorConfig {
   bool operator==(const SensorConfig&) const = default;
 };
 
-/// s1..s4 and, if asked for, s5 and s6, with their noise, and inputs that say nothing.
+/// Sensors of s1..s4 and, if configured, s5 and s6, with noise, and useless inputs.
 ///
 /// Source: the paper's sections on the acrobot task and on noisy and redundant inputs; useless
-/// inputs are not in the paper. They come last: the constant ones, then the random ones.
+/// inputs are not in the paper. These come last: constant inputs, then random inputs.
 class AcrobotSensors {
  public:
   /// Throws std::invalid_argument if a number is outside its range.
@@ -149,7 +149,7 @@ class AcrobotSensors {
         noise_(config.noise, edges(config), seed, stream),
         random_(seed, core::Stream::useless_inputs, static_cast<std::uint64_t>(stream)) {}
 
-  /// Writes one observation of `state`. Shapes: out (n_inputs,), every entry in [0, 1].
+  /// Writes an observation of `state`. Shapes: out (n_inputs,), every entry in [0, 1].
   void observe(const AcrobotState& state, std::span<double> out) noexcept {
     assert(out.size() == n_inputs());
     const Eigen::Vector4d basic = basic_observation(state);
@@ -175,7 +175,7 @@ class AcrobotSensors {
     return static_cast<std::size_t>(value);
   }
 
-  /// One for each input that has noise; checked before.
+  /// Returns the treatment of noise for each noisy input of a checked configuration.
   static std::vector<SensorEdge> edges(const SensorConfig& config) {
     const int n_noisy = config.noise_entry == NoiseEntry::basic_sensors
                             ? kBasic

@@ -16,15 +16,15 @@ using AcrobotState = Eigen::Vector4d;
 
 /// The angle plus the whole number of turns that brings it into [-pi, pi).
 ///
-/// std::remainder is exact by IEEE 754, hence the same everywhere; an angle that lies in the
-/// interval stays as it is.
+/// std::remainder is exact by IEEE 754, hence equal on all platforms; an angle within the interval
+/// is returned unchanged.
 inline double wrap_angle(double angle) noexcept {
   if (angle >= -core::kPi && angle < core::kPi) return angle;
   const double wrapped = std::remainder(angle, core::kTwoPi);
   return wrapped >= core::kPi ? -core::kPi : wrapped;
 }
 
-/// The same state with its angles in [-pi, pi). Throws std::invalid_argument unless every number
+/// Returns the state with its angles in [-pi, pi). Throws std::invalid_argument unless every number
 /// is finite.
 inline AcrobotState wrapped(const AcrobotState& state) {
   for (const double value : state) core::require_finite("state", value);

@@ -11,14 +11,14 @@
 
 namespace sdnn::environments {
 
-/// Up to kMaxMembers acrobots of equal configs: one step of all takes little longer than one of
-/// one, and gives each the bits of its own Acrobot::step.
+/// Up to kMaxMembers acrobots of equal configs. A step of all takes little longer than that of a
+/// single one, with the bits of Acrobot::step.
 class AcrobotTeam {
  public:
   static constexpr std::size_t kMaxMembers = kAcrobotLanes;
 
-  /// Lets `acrobot` take part in the next step as number `i`, below kMaxMembers; it must live until
-  /// then. Throws as Acrobot::step does.
+  /// Adds `acrobot` to the next step as number `i`, below kMaxMembers; it must exist until then.
+  /// Throws like Acrobot::step.
   void join(std::size_t i, Acrobot& acrobot, double torque, double goal_tolerance) {
     acrobot.check_step(torque, goal_tolerance);
     members_[i] = &acrobot;
@@ -26,9 +26,9 @@ class AcrobotTeam {
     goal_tolerance_[i] = goal_tolerance;
   }
 
-  /// Acrobot::step for all that joined since the last step: calls take(i, result) for each. Returns
-  /// whether there were any. Throws std::overflow_error as Acrobot::step does, and then those
-  /// behind have no result.
+  /// Calls Acrobot::step for all that joined since the last step, and take(i, result) for each.
+  /// Returns whether there were any. Throws std::overflow_error like Acrobot::step; then later
+  /// members have no result.
   template <class Take>
   bool step(Take&& take) {
     const Acrobot* any = nullptr;

@@ -1,4 +1,5 @@
-/// lambda(k): the goal tolerance of the acrobot's task, which falls with the learning episode k.
+/// The schedule of the goal tolerance lambda(k) of the acrobot, which decreases with the learning
+/// episode k.
 #pragma once
 
 #include <array>
@@ -48,7 +49,7 @@ struct GoalScheduleConfig {
   bool operator==(const GoalScheduleConfig&) const = default;
 };
 
-/// lambda as a function of the number of the learning episode.
+/// The goal tolerance lambda as a function of the number of the learning episode.
 ///
 /// Source: the paper's section on the acrobot task, goal condition |theta1_dot| < 3 pi lambda and
 /// |theta2_dot| < 5 pi lambda.

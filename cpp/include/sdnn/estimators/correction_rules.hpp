@@ -22,18 +22,18 @@
 
 namespace sdnn::estimators {
 
-/// A unit to which direction * x_SD is added, and from whose threshold direction is taken.
+/// A correction of a unit: direction * x_SD is added to its weights, and direction is subtracted
+/// from its threshold.
 struct Correction {
   std::uint32_t unit = 0;
   std::int32_t direction = 0;  ///< +1 or -1
 };
 
-/// The p-delta rule: the number of firing units of each group is brought to its target.
+/// The p-delta rule, which moves the number of firing units of each group to its target.
 ///
-/// If too few (many) units fire, that many of the silent (firing) ones that are nearest to their
-/// threshold are corrected, the lowest index first among equals; with a `share` below 1 only
-/// max(1, int(0.5 + share * that many)). The target is int(0.5 + target), at least 0 and at most
-/// the group's size.
+/// If n units too few (too many) fire, the n silent (firing) units nearest to their threshold are
+/// corrected, the lowest index first; with a `share` below 1 only max(1, int(0.5 + share * n)). The
+/// target is int(0.5 + target), at least 0 and at most the group's size.
 ///
 /// Source: Auer, Burgsteiner, Maass 2008; Nonaka, Tanaka, Morita 2011.
 class PDeltaRule {
@@ -125,7 +125,7 @@ class PDeltaRule {
   std::vector<std::pair<std::int32_t, std::uint32_t>> ranked_;
 };
 
-/// Scheme that separates several classes by units with two sides each.
+/// The scheme that separates several classes by units that separate two sides.
 enum class ClassScheme {
   one_vs_rest,  ///< unit k fires for class k
   one_vs_one,   ///< units (0,1), (0,2), ..., (1,2), ...: fires for the first, silent for the second
@@ -146,14 +146,14 @@ inline ClassScheme class_scheme_named(std::string_view name) {
       std::invalid_argument("scheme must be one_vs_rest or one_vs_one, got " + std::string(name)));
 }
 
-/// The units that a scheme needs. Throws std::invalid_argument if there are fewer than 2 classes or
-/// more than 1024.
+/// The number of units of a scheme. Throws std::invalid_argument if there are fewer than 2 classes
+/// or more than 1024.
 inline std::size_t n_units_for(ClassScheme scheme, std::size_t n_classes) {
   core::require_in_range("n_classes", n_classes, 2, 1024);
   return scheme == ClassScheme::one_vs_rest ? n_classes : n_classes * (n_classes - 1) / 2;
 }
 
-/// Perceptron error correction: every unit that is on the wrong side for the sample's class.
+/// The perceptron rule: it corrects every unit on the wrong side for the sample's class.
 ///
 /// Source: the LIBSDNN manual (both schemes). A one-vs-one unit ignores the other classes.
 class PerceptronRule {

@@ -1,4 +1,5 @@
-/// The random choices of LIBSDNN, so that its users' weights can be continued or reproduced.
+/// The random numbers of LIBSDNN, to reproduce the weights of its users or to continue their
+/// training.
 #pragma once
 
 #include <algorithm>
@@ -21,13 +22,13 @@
 
 namespace sdnn::estimators {
 
-/// The C++ library that LIBSDNN was compiled with: they turn random bits into integers differently.
+/// The C++ library of a LIBSDNN build. Libraries convert random bits into integers differently.
 enum class StandardLibrary {
   libstdcxx,  ///< GCC 11 and later
   msvc,       ///< Visual Studio 2012 to 2019, as in LIBSDNN's own programs
 };
 
-/// "libstdc++" or "msvc". Throws std::invalid_argument for another name.
+/// Returns the library named "libstdc++" or "msvc". Throws std::invalid_argument for other names.
 inline StandardLibrary standard_library_named(std::string_view name) {
   if (name == "libstdc++") return StandardLibrary::libstdcxx;
   core::require(name == "msvc", "library", "libstdc++ or msvc", std::string(name));
@@ -81,10 +82,10 @@ inline std::size_t libsdnn_column(std::size_t unit, std::size_t n_units) noexcep
 
 }  // namespace detail
 
-/// A random-inverse code as LIBSDNN draws it: units are drawn one by one, until one of the sign
-/// asked for has come that has not flipped at this step; signs take turns, +1 first.
+/// A random-inverse code as drawn by LIBSDNN: units are drawn until one has the required sign and
+/// has not been flipped in this step; signs alternate, +1 first.
 ///
-/// Throws std::invalid_argument where LIBSDNN would refuse the setting or never end.
+/// Throws std::invalid_argument where LIBSDNN would refuse the setting or not terminate.
 inline coding::PatternTable libsdnn_patterns(const coding::RandomInverseConfig& config,
                                              LibsdnnRandom& random) {
   core::require_in_range("n_units", config.n_units, 2, 1 << 24);
@@ -119,13 +120,13 @@ inline coding::PatternTable libsdnn_patterns(const coding::RandomInverseConfig& 
   return table;
 }
 
-/// The tables of LIBSDNN's desensitization: those of every pair are its own, the modifier's first.
+/// The tables of LIBSDNN's desensitization, two for each pair, the modifier's first.
 struct LibsdnnTables {
   std::vector<coding::PatternTable> modified;
   std::vector<coding::PatternTable> modifiers;
 };
 
-/// Draws them in LIBSDNN's order.
+/// Draws the tables in LIBSDNN's order.
 ///
 /// Shapes: inputs, one configuration per input. Throws std::invalid_argument for a pair of an
 /// unknown input, and like libsdnn_patterns.
@@ -143,7 +144,7 @@ inline LibsdnnTables libsdnn_tables(std::span<const coding::RandomInverseConfig>
   return tables;
 }
 
-/// LIBSDNN's first weights: unit by unit, the threshold before the weights.
+/// The initial weights of LIBSDNN, drawn by units, the threshold before the weights.
 struct LibsdnnWeights {
   std::vector<std::int32_t> weights;     ///< (n_units, n_columns)
   std::vector<std::int32_t> thresholds;  ///< (n_units,)

@@ -1,4 +1,4 @@
-/// A layer for samples that come one at a time: weights in bytes, every change undone on failure.
+/// A layer for single samples, with weights in bytes, whose changes are undone on failure.
 #pragma once
 
 #include <algorithm>
@@ -21,11 +21,11 @@
 
 namespace sdnn::estimators {
 
-/// Learns and answers single samples with the bits of plain training.
+/// Learns and predicts single samples with the bits of plain training.
 ///
-/// The weights lie in bytes, with a second byte where one is too few: a pass reads a quarter of
-/// what the layer holds. The layer lags behind until synchronize(); nobody else may change it.
-/// Memory: about 2 bytes per weight, of which the second is touched where it is needed.
+/// The weights are bytes, with second bytes where needed, so that a pass reads a quarter of the
+/// layer's memory. The layer is out of date until synchronize(); nothing else may change it.
+/// Memory: about 2 bytes per weight, of which the second is touched only where needed.
 class OnlineLayer {
  public:
   /// Throws std::invalid_argument if a weight or threshold does not fit (|weight| up to 16383, less
@@ -55,8 +55,8 @@ class OnlineLayer {
   /// Presents samples in their order. Shapes: bins (n_samples, n_inputs).
   ///
   /// Throws std::invalid_argument for bins out of range or if the rule is for another number of
-  /// samples or units, std::overflow_error if a weight would leave its range; nothing is changed
-  /// then, nor if it is stopped (core::interruption_point).
+  /// samples or units, std::overflow_error if a weight would leave its range. An error or an
+  /// interruption (core::interruption_point) changes nothing.
   template <class Rule>
   TrainingCount present(std::span<const std::int32_t> bins, Rule& rule) {
     const std::size_t n_inputs = layer_->code().n_inputs();
@@ -107,7 +107,7 @@ class OnlineLayer {
     }
   }
 
-  /// Brings the layer's weights and thresholds up to date.
+  /// Updates the layer's weights and thresholds.
   void synchronize() {
     if (!changed_) return;
     WeightTiles<std::int32_t>& tiles = layer_->tiles();
@@ -120,7 +120,7 @@ class OnlineLayer {
   }
 
  private:
-  /// Corrections of units in one direction, by one sample.
+  /// The corrections of units in a direction, by a sample.
   struct Done {
     std::size_t sample;
     std::int32_t direction;

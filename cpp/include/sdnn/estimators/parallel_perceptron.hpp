@@ -30,14 +30,14 @@
 
 namespace sdnn::estimators {
 
-/// The most bytes that the weights of a layer may have: 4 GiB.
+/// The limit of the bytes of a layer's weights, 4 GiB.
 inline constexpr std::uint64_t kMaxWeightBytes = std::uint64_t{1} << 32;
 
-/// `n_units` units over the columns of a code: potential = weights . x_SD - threshold, firing if >
-/// 0.
+/// A layer of `n_units` units over the columns of a code: potential = weights . x_SD - threshold,
+/// firing if > 0.
 ///
-/// No potential can overflow: of every unit, |threshold| plus the sum of |weights| is below 2^31,
-/// which is checked wherever weights come from.
+/// No potential can overflow: for every unit, |threshold| plus the sum of |weights| is below 2^31,
+/// which is checked for weights of every source.
 ///
 /// Source: Nonaka, Tanaka, Morita 2011. Thread safety: const calls may run at the same time.
 class ParallelPerceptron {
@@ -48,7 +48,8 @@ class ParallelPerceptron {
   /// initial_range], unit by unit, the threshold first.
   ///
   /// Throws std::invalid_argument unless n_units is in [1, 2^20] and initial_range in [0, 10^6],
-  /// std::length_error if the weights have more than kMaxWeightBytes. Long work: may be stopped.
+  /// std::length_error if the weights have more than kMaxWeightBytes. The computation may be
+  /// interrupted.
   ParallelPerceptron(std::shared_ptr<const Code> code, std::size_t n_units, std::uint64_t seed,
                      int initial_range = 5)
       : ParallelPerceptron(std::move(code), n_units) {
@@ -65,7 +66,7 @@ class ParallelPerceptron {
     check_norms();
   }
 
-  /// Given weights and thresholds.
+  /// Takes weights and thresholds.
   ///
   /// Shapes: weights (n_units, n_columns), thresholds (n_units,). Throws std::invalid_argument for
   /// other sizes, std::overflow_error if a potential could overflow.
@@ -108,7 +109,7 @@ class ParallelPerceptron {
     }
   }
 
-  /// Weights for trainers; check_norms() holds them to the layer's promise.
+  /// The weights for trainers, which must call check_norms() to preserve the layer's bounds.
   WeightTiles<std::int32_t>& tiles() noexcept {
     narrow_.reset();
     return weights_;
@@ -117,7 +118,7 @@ class ParallelPerceptron {
   std::span<std::int32_t> thresholds() noexcept { return thresholds_; }
   std::span<const std::int32_t> thresholds() const noexcept { return thresholds_; }
 
-  /// The largest sum of |weights| and |threshold| of a unit, a bound of all potentials.
+  /// Returns the largest sum of |weights| and |threshold| of a unit, a bound of all potentials.
   /// Throws std::overflow_error if it is 2^31 or more.
   std::int64_t check_norms() const {
     std::vector<std::int64_t> norms(n_padded_units());
@@ -145,13 +146,13 @@ class ParallelPerceptron {
 
   using Layers = std::span<const ParallelPerceptron* const>;
 
-  /// Calls consume(layer, query, potentials) once per layer and query, in an order of its own and
-  /// from up to `n_threads` threads at a time.
+  /// Calls consume(layer, query, potentials) once for each layer and query, in any order and from
+  /// up to `n_threads` threads at a time.
   ///
-  /// Neighbouring queries share most of their code, and many queries what a pair of inputs adds to
-  /// their potentials. Shapes: bins (n_queries, n_inputs), potentials (n_padded_units,), of which
-  /// the first n_units mean something. Throws std::invalid_argument for no layers or layers that
-  /// differ in their code or size, bins out of range or n_threads < 1.
+  /// Similar queries share most of their code, and many queries share the contribution of a pair of
+  /// inputs. Shapes: bins (n_queries, n_inputs), potentials (n_padded_units,), whose first n_units
+  /// are valid. Throws std::invalid_argument for no layers or layers that differ in their code or
+  /// size, bins out of range or n_threads < 1.
   template <class Consume>
   static void for_each_query(Layers layers, std::span<const std::int32_t> bins, int n_threads,
                              const Consume& consume) {
@@ -215,7 +216,7 @@ class ParallelPerceptron {
     }
     n_chunks > 0 ? answer(tiles, n_chunks) : answer(wide_tiles, kMostChunks);
   }
-  /// The same for this layer, consume(query, potentials).
+  /// Calls consume(query, potentials) for this layer.
   template <class Consume>
   void for_each_query(std::span<const std::int32_t> bins, int n_threads,
                       const Consume& consume) const {
@@ -226,8 +227,8 @@ class ParallelPerceptron {
                    });
   }
 
-  /// Potentials in the order of the queries. Shapes: bins (n_queries, n_inputs), out
-  /// (n_queries, n_units). Throws like for_each_query, and for an out of another size.
+  /// Writes the potentials in the order of the queries. Shapes: bins (n_queries, n_inputs), out
+  /// (n_queries, n_units). Throws like for_each_query, and if `out` has another size.
   void potentials(std::span<const std::int32_t> bins, int n_threads,
                   std::span<std::int32_t> out) const {
     require_size(out, bins.size() / code_->n_inputs() * n_units());
@@ -237,16 +238,17 @@ class ParallelPerceptron {
     for_each_query(bins, n_threads, copy);
   }
 
-  /// Number of units in each of n_groups. Throws std::invalid_argument unless it divides n_units.
+  /// The number of units in each of n_groups. Throws std::invalid_argument unless it divides
+  /// n_units.
   std::size_t group_size(std::size_t n_groups) const {
     core::require(n_groups > 0 && n_units() % n_groups == 0, "n_groups",
                   "a divisor of n_units = " + std::to_string(n_units()), n_groups);
     return n_units() / n_groups;
   }
 
-  /// Number of firing units of each layer in each of `n_groups` equal groups. Shapes: bins
+  /// Counts the firing units of each layer in each of `n_groups` equal groups. Shapes: bins
   /// (n_queries, n_inputs), out (n_layers, n_queries, n_groups). Throws std::invalid_argument
-  /// unless n_groups divides n_units, for an out of another size, and like for_each_query.
+  /// unless n_groups divides n_units and `out` fits, and like for_each_query.
   static void counts(Layers layers, std::span<const std::int32_t> bins, std::size_t n_groups,
                      int n_threads, std::span<std::int32_t> out) {
     core::require(!layers.empty(), "layers", "at least one layer", layers.size());
@@ -260,7 +262,7 @@ class ParallelPerceptron {
     };
     for_each_query(layers, bins, n_threads, count);
   }
-  /// The same for this layer. Shapes: out (n_queries, n_groups).
+  /// Counts the firing units of this layer. Shapes: out (n_queries, n_groups).
   void counts(std::span<const std::int32_t> bins, std::size_t n_groups, int n_threads,
               std::span<std::int32_t> out) const {
     const ParallelPerceptron* const alone = this;
@@ -290,7 +292,7 @@ class ParallelPerceptron {
     return slots;
   }
 
-  /// Weights in 16 bits, half as much to read, if the sums over chunks fit.
+  /// The weights in 16 bits, which halves the memory to read, if the sums over chunks fit.
   struct Narrow {
     Narrow(const Code& code, const WeightTiles<std::int32_t>& weights) {
       std::int64_t largest = 1;  // no unit's |weights| in a chunk sum up to more
@@ -317,7 +319,7 @@ class ParallelPerceptron {
     for (std::size_t i = 0; i < n_units(); ++i) potentials[i] = -thresholds_[i];
   }
 
-  /// From query to query, by the columns in which their codes differ.
+  /// Computes potentials from query to query, by the columns in which their codes differ.
   template <class Weight, class Consume>
   void sweep(const WeightTiles<Weight>& tiles, std::size_t n_per_sum,
              std::span<const std::int32_t> bins, std::span<const std::uint32_t> order,
@@ -333,7 +335,7 @@ class ParallelPerceptron {
       code_->encode(bins.subspan(query * code_->n_inputs(), code_->n_inputs()), now, now + n_words);
       const coding::TernaryCode next{now, now + n_words};
       slots.read_changes({before, before + n_words}, next);
-      // Counting costs too, and is worth it for codes that are far apart.
+      // Counting takes time too, and pays off for codes that differ much.
       const std::size_t n_changes = slots.columns().size();
       if (n_changes > code_->max_active() / 2 && n_changes > coding::n_active(next, n_words)) {
         start_from_zero(values.data());
@@ -345,7 +347,8 @@ class ParallelPerceptron {
     }
   }
 
-  /// Do so few columns change from one query to the next that a sweep is best? By some of them.
+  /// Whether so few columns change between consecutive queries that a sweep is fastest, estimated
+  /// from a sample of queries.
   static bool is_short_walk(const Code& code, std::span<const std::int32_t> bins,
                             std::span<const std::uint32_t> order) {
     const std::size_t n_words = code.n_words();
@@ -365,15 +368,16 @@ class ParallelPerceptron {
     return n_changes < kChangesPerWord * n_steps * n_words;
   }
 
-  /// Queries of a thread between two checks for an interruption: a tenth of a second of additions.
+  /// The number of queries of a thread between two checks for an interruption, about a tenth of a
+  /// second.
   std::size_t most_at_once(std::uint64_t n_added) const noexcept {
     const std::uint64_t n_added_per_query = std::uint64_t{code_->n_slots()} * n_padded_units();
     return static_cast<std::size_t>(
         std::clamp<std::uint64_t>(n_added / n_added_per_query, 64, 4096));
   }
 
-  /// Calls work(begin, end) for parts of up to `most` queries, n_threads of them at a time. Throws
-  /// what any of them throws.
+  /// Calls work(begin, end) for parts of up to `most` queries, n_threads of them at a time, and
+  /// rethrows their exceptions.
   template <class Work>
   static void in_parts(std::size_t n_queries, std::size_t most, int n_threads, const Work& work) {
     const auto n_parts = std::min(static_cast<std::size_t>(n_threads), (n_queries + 255) / 256);

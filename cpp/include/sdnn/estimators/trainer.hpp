@@ -1,4 +1,4 @@
-/// Trains a layer by a correction rule, in the form that suits its size.
+/// Training of a layer by a correction rule, in a form that suits its size.
 #pragma once
 
 #include <algorithm>
@@ -25,11 +25,11 @@
 
 namespace sdnn::estimators {
 
-/// Presents training samples to a layer. All forms leave the same bits in it.
+/// Presents training samples to a layer. The form does not affect the result.
 ///
-/// Between synchronize() calls the layer's weights may lag behind; nobody else may change them as
-/// long as a trainer is in use. After an exception from present() the layer cannot be used:
-/// train a copy to be able to continue.
+/// Between calls of synchronize() the layer's weights may be out of date; nothing else may change
+/// them while a trainer is in use. After an exception from present() the layer is unusable; train a
+/// copy to be able to continue.
 template <class Rule>
 class Trainer {
  public:
@@ -60,16 +60,16 @@ class Trainer {
     make_training(bins, n_threads, keeps_plans);
   }
 
-  /// The layer in training.
+  /// The layer to train.
   ParallelPerceptron& layer() noexcept { return *layer_; }
   TrainingForm form() const noexcept { return form_; }
-  /// The most bytes that the form takes beside the layer.
+  /// The largest number of bytes of the form beside the layer.
   std::uint64_t memory() const noexcept { return memory_; }
   std::size_t n_samples() const noexcept { return n_samples_; }
 
   /// Presents samples in the given order. Throws std::invalid_argument for an index out of range,
-  /// before anything is changed, std::overflow_error before a potential could overflow. May be
-  /// stopped between samples or blocks of them (core::interruption_point).
+  /// before anything is changed, std::overflow_error before a potential could overflow. It may be
+  /// interrupted between samples or blocks of them (core::interruption_point).
   TrainingCount present(std::span<const std::int32_t> order) {
     for (std::size_t i = 0; i < order.size(); ++i) {
       if (order[i] >= 0 && static_cast<std::size_t>(order[i]) < n_samples_) continue;
@@ -91,7 +91,7 @@ class Trainer {
     return total;
   }
 
-  /// Brings the layer's weights and thresholds to what plain training would have made of them.
+  /// Updates the layer's weights and thresholds to those of plain training.
   void synchronize() {
     std::visit([](auto& training) { training.synchronize(); }, *training_);
   }
@@ -101,7 +101,7 @@ class Trainer {
       std::variant<PlainTraining, BlockTraining<std::int16_t>, BlockTraining<std::int32_t>,
                    DualTraining<std::int16_t>, DualTraining<std::int32_t>>;
 
-  /// A presentation raises a unit's norm by at most one per active column and one for the
+  /// A presentation increases a unit's norm by at most 1 for each active column and 1 for the
   /// threshold.
   void renew_headroom() {
     const std::int64_t left = std::numeric_limits<std::int32_t>::max() - layer_->check_norms();

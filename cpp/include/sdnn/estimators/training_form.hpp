@@ -1,4 +1,4 @@
-/// The forms of training: what each needs, and which one suits a problem.
+/// The forms of training: their memory, and the choice for a problem.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@
 
 namespace sdnn::estimators {
 
-/// Ways to the same bits.
+/// Forms of training, all with equal results.
 enum class TrainingForm {
   automatic,  ///< the fastest of the others that fits into the memory limit
   dual,       ///< potentials of all training samples, moved by rows of their inner products
@@ -52,11 +52,11 @@ inline TrainingForm training_form_named(std::string_view name) {
       std::invalid_argument("form must be auto, dual, block or plain, got " + std::string(name)));
 }
 
-/// Bytes that training may take beside the layer by default.
+/// The default limit of bytes of training beside the layer.
 inline constexpr std::size_t kMemoryLimit = std::size_t{1} << 30;
 
-/// Calls the template `function` with the integer type that holds all inner products of codes: 16
-/// bits where these do, else 32.
+/// Calls the template `function` with the smallest integer type, of 16 or 32 bits, for all inner
+/// products of codes.
 template <class Function>
 decltype(auto) with_product_type(const coding::SelectiveDesensitization& code,
                                  const Function& function) {
@@ -66,8 +66,8 @@ decltype(auto) with_product_type(const coding::SelectiveDesensitization& code,
   return function.template operator()<std::int32_t>();
 }
 
-/// Bytes that a form needs beside the layer and the samples' bins; at most 1 % less than it takes.
-/// If `keeps_plans`, block training keeps what does not change of its blocks.
+/// The bytes that a form needs beside the layer and the samples' bins; an estimate at most 1 % too
+/// low. If `keeps_plans`, block training stores the constant parts of its blocks.
 inline std::uint64_t form_memory(TrainingForm form, std::size_t n_units,
                                  const coding::SelectiveDesensitization& code,
                                  std::size_t n_samples, bool keeps_plans = false) {
@@ -83,13 +83,13 @@ inline std::uint64_t form_memory(TrainingForm form, std::size_t n_units,
   });
 }
 
-/// Expected epochs where their number is not given.
+/// The assumed number of epochs if none is given.
 inline constexpr std::size_t kExpectedEpochs = 30;
 
-/// The form to use. An estimate of the time per presentation decides between dual and block: the
-/// one moves a row of n_samples for every corrected unit, three times as slowly beyond the caches,
-/// and has computed n_samples^2 / 2 inner products and the first potentials before, spread over
-/// `n_epochs`; the other reads all weights.
+/// Chooses the form. An estimate of the time per presentation decides between dual and block. Dual
+/// training updates a row of n_samples for every corrected unit, three times slower outside the
+/// caches. It also computes n_samples^2 / 2 inner products and the first potentials, divided by
+/// `n_epochs`. Block training reads all weights.
 ///
 /// Throws std::length_error if `form` is not automatic and needs more than `memory_limit` bytes.
 inline TrainingForm choose_form(TrainingForm form, std::size_t n_units,

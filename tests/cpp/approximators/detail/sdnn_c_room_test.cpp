@@ -48,7 +48,7 @@ TEST(Wiring, StridesAreAsManyAsThereArePartners) {
   EXPECT_TRUE(differ);
 }
 
-// The same config and seed, the same code, whether or not the tables were given.
+// Equal configs and seeds give equal codes, with and without given tables.
 TEST(Wiring, IsThatOfTheNetwork) {
   const SDNNCConfig config = five_inputs();
   const auto wiring = wiring_of(config, code_books_of(config, 3), 3);
@@ -77,7 +77,7 @@ TEST(Wiring, IsRefusedBeforeItIsMade) {
   EXPECT_THROW(wiring_of(config, tables, 1), std::invalid_argument);
 }
 
-// Of fields that no network takes, too: what a file says is asked before it is believed.
+// The fields of files are used before they are checked, so impossible fields must be accepted.
 TEST(Wiring, TheSizeOfCodeBooksIsANumberForAnyFields) {
   constexpr int kMost = 2147483647;
   for (const int n : {-kMost, -1, 0, kMost}) {

@@ -41,7 +41,7 @@ TEST(TernaryCode, HoldTheExtremes) {  // where counts in bytes are fullest
   }
 }
 
-/// What the columns add to each entry of a code.
+/// Returns the sum of the columns for each entry of a code.
 std::vector<int> entries_of(const coding::ColumnLists& slots, std::size_t n_words) {
   std::vector<int> entries(64 * n_words);
   for (const std::uint32_t slot : slots.columns().plus) ++entries[slot];

@@ -44,19 +44,18 @@ SDNN_KERNEL(void, add_up_distances,
              detail::Distances& distances),
             (cached, bins, distances))
 
-/// The inner potentials of the last states that one user of a network asked about.
+/// The inner potentials of the states that a user of a network evaluated last.
 ///
-/// Most states a network meets are old ones or lie near one. Two exact identities make use of it:
-/// a correction of w_i by step * x_SD(s) moves h_i(s') by step * (<x_SD(s), x_SD(s')> + 1), so a
-/// cached state is brought up to date by one integer product per correction since; and
-/// h(s') - h(s) = W (x_SD(s') - x_SD(s)) touches only the columns in which the codes differ. The
-/// way that is cheapest by estimate is taken: from a cached state, or by a full pass. Whichever it
-/// is, the result is the same integers.
+/// Most states of a network are equal or near to earlier ones. Two exact identities use this: a
+/// correction of w_i by step * x_SD(s) moves h_i(s') by step * (<x_SD(s), x_SD(s')> + 1), so a
+/// cached state is updated by one integer product for each later correction; and h(s') - h(s) = W
+/// (x_SD(s') - x_SD(s)) touches only the columns in which the codes differ. The cheapest way by
+/// estimate is used: from a cached state, or by a full pass. Both give the same integers.
 ///
-/// Any number of caches may follow one layer: its CorrectionLog has what each needs.
+/// Any number of caches may follow a layer through its CorrectionLog.
 class ActivationCache {
  public:
-  /// One cached state. Shapes: bins (l,), potentials (n,).
+  /// A cached state. Shapes: bins (l,), potentials (n,).
   struct Entry {
     std::span<const coding::Bin> bins;
     std::span<const std::int32_t> potentials;
@@ -80,10 +79,10 @@ class ActivationCache {
         to_(code),
         changes_(code.column_lists()),
         listed_{Listed(code), Listed(code)} {
-    // A unit of a modifier switches k inputs, those that it modifies, which are about half as many
-    // columns: half the modifiers are active. Neighbouring bins differ in `differing` units of each
-    // pattern (about m / 2 / 45); where it is modified, in each of k groups, half of them are
-    // active and move two columns, or one twice.
+    // A unit of a modifier switches the k inputs that it modifies; as half of the modifiers are
+    // active, these are about k / 2 columns. Neighbouring bins differ in `differing` units of each
+    // pattern (about m / 2 / 45). In each of the k groups where the pattern is modified, half of
+    // these units are active and change two columns, or a single column twice.
     const double l = static_cast<double>(code.n_inputs());
     const coding::PatternTable& table = code.table(0);
     const double differing = static_cast<double>(table[0].distance(
@@ -99,7 +98,7 @@ class ActivationCache {
         std::min(std::ceil(columns_of_pass_ / columns_per_bin_), double{INT32_MAX}));
   }
 
-  /// Bytes that it holds, but for what does not grow with this size.
+  /// The number of bytes that grow with this size.
   static constexpr std::size_t n_bytes(std::size_t n_units) noexcept {
     return kEntries * n_units * sizeof(std::int32_t);
   }
@@ -107,8 +106,8 @@ class ActivationCache {
   const Counts& counts() const noexcept { return counts_; }
   std::size_t n_units() const noexcept { return n_units_; }
 
-  /// The potentials of the state with these bins, for the layer's present weights; valid until the
-  /// next call. `log`: all corrections of the layer.
+  /// The potentials of the state with these bins, for the layer's current weights; valid until the
+  /// next call. `log` has all corrections of the layer.
   Entry recall(const coding::StateCode& code, const HiddenLayer& hidden_layer,
                const CorrectionLog& log, std::span<const coding::Bin> bins) {
     if (layer_ != log.identity()) {
@@ -171,8 +170,8 @@ class ActivationCache {
     return use(code, log, oldest);
   }
 
-  /// The columns of the state with these bins, listed anew unless it was one of the last two that
-  /// were listed; valid until the next call of any member.
+  /// The columns of the state with these bins, which are computed unless it is one of the last two
+  /// states; valid until the next call of any member.
   coding::SignedColumns columns(const coding::StateCode& code, std::span<const coding::Bin> bins) {
     for (const Listed& listed : listed_) {
       if (std::ranges::equal(listed.bins, bins)) return listed.lists.columns();
@@ -181,7 +180,7 @@ class ActivationCache {
   }
 
  private:
-  /// Room for the paired code of a state.
+  /// Buffers for the paired code of a state.
   class Words {
    public:
     explicit Words(const coding::StateCode& code) : words_(2 * code.n_words()) {}
@@ -215,7 +214,7 @@ class ActivationCache {
     return {bins_.data() + slot * n_inputs_, n_inputs_};
   }
 
-  /// Lists the columns of a state, in the place of the list before the last.
+  /// Lists the columns of a state, and replaces the list before the last.
   coding::SignedColumns list(const coding::StateCode& code, std::span<const coding::Bin> bins) {
     std::swap(listed_[0], listed_[1]);
     listed_[0].bins.assign(bins.begin(), bins.end());
@@ -223,7 +222,7 @@ class ActivationCache {
     return listed_[0].lists.columns();
   }
 
-  /// Marks a slot as used now and brings its potentials up to date.
+  /// Marks a slot as just used and updates its potentials.
   Entry use(const coding::StateCode& code, const CorrectionLog& log, std::size_t slot) {
     const Entry entry{bins_of(slot), {potentials_.data() + slot * n_units_, n_units_}};
     std::int32_t* const potentials = potentials_.data() + slot * n_units_;
@@ -240,7 +239,7 @@ class ActivationCache {
 
   std::uint64_t layer_ = 0;  ///< the identity of the layer that the slots are of
 
-  // Slot by slot.
+  // The following arrays are ordered by slot.
   std::size_t n_inputs_;
   std::size_t n_units_;
   std::vector<coding::Bin> bins_;                   ///< [slot][input]

@@ -1,4 +1,4 @@
-/// The layer that an average of weights makes, rounded to steps of the lattice.
+/// The layer with averaged weights, rounded to steps of the lattice.
 #pragma once
 
 #include <algorithm>
@@ -15,15 +15,15 @@ namespace sdnn::approximators {
 
 namespace detail {
 
-/// value / 2^bits, halves up.
+/// Returns value / 2^bits, halves rounded up.
 inline std::int64_t rounded_average(std::int64_t value, int bits) noexcept {
   return (value + (std::int64_t{1} << (bits - 1))) >> bits;
 }
 
 }  // namespace detail
 
-/// The average of a threshold, and of the weight of the unit of x_SD that has these columns; of
-/// this at most `limit`, so that no sum of two leaves a layer's range.
+/// The averages of a threshold, and of the weight of the unit of x_SD with these columns, whose
+/// magnitude is at most `limit`, so that sums of two are within a layer's range.
 inline std::int32_t averaged_threshold(const WeightAverage& average, std::size_t unit) noexcept {
   return static_cast<std::int32_t>(
       detail::rounded_average(average.threshold(unit), WeightAverage::kFractionBits));
@@ -37,7 +37,7 @@ inline std::int32_t averaged_weight(const WeightAverage& average, std::size_t un
       limit));
 }
 
-/// A layer of averaged weights, which never changes, and the log that caches need of it.
+/// A constant layer of averaged weights, and its log for caches.
 struct AveragedLayer {
   AveragedLayer(const WeightAverage& average, const coding::StateCode& code, std::size_t n_units,
                 std::int64_t limit)

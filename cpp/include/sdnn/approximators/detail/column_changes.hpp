@@ -1,4 +1,4 @@
-/// Kernels on the weights of a block of units: corrections of some units, the largest of each.
+/// Kernels on the weights of a block of units: corrections, and the largest weight of each unit.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ SDNN_INLINE void add_to_columns_body(std::int8_t* block, const std::uint32_t* co
   }
 }
 
-/// Copied first, because bytes in memory may alias anything.
+/// The bytes are copied first, because they may alias any memory.
 inline void find_largest_bytes_portable(const std::int8_t* block, std::size_t n_columns,
                                         Bytes& largest) noexcept {
   Bytes highest{};
@@ -73,7 +73,7 @@ inline void find_largest_bytes_portable(const std::int8_t* block, std::size_t n_
 
 }  // namespace detail
 
-/// Adds `change`, a byte for each unit, to some columns of a block, modulo 256.
+/// Adds `change`, a byte for each unit, to columns of a block, modulo 256.
 SDNN_KERNEL(void, add_to_columns,
             (std::int8_t* block, const std::uint32_t* columns, std::size_t n_columns,
              const detail::Bytes& change),

@@ -1,4 +1,4 @@
-/// A set of input columns, and what a list of columns has in common with it.
+/// A set of input columns, and its intersection with lists of columns.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 
 namespace sdnn::approximators {
 
-/// Columns below a number given when it is made.
+/// A set of columns below a number that is fixed on construction.
 class ColumnSet {
  public:
   ColumnSet() = default;
@@ -65,7 +65,7 @@ SDNN_INLINE std::uint32_t* intersect_body(const ListedWord* begin, const ListedW
   return out;
 }
 
-/// Words in which both have a bit are listed first, so that no branch depends on the others.
+/// Words with common bits are listed first, so that no branch depends on other words.
 SDNN_INLINE std::uint32_t* intersect_bits_body(const std::uint64_t* bits, const core::BitWord* set,
                                                std::size_t n_words, std::uint32_t* out) noexcept {
   constexpr std::size_t kAtOnce = 64;
@@ -92,8 +92,8 @@ SDNN_KERNEL(std::uint32_t*, intersect,
              std::uint32_t* out),
             (begin, end, set, out))
 
-/// Writes the columns of words of bits that are in a set of as many; returns their end, beyond
-/// which it may write two numbers.
+/// Writes the columns of words of bits that are in a set of the same size; returns their end,
+/// beyond which it may write two numbers.
 SDNN_KERNEL(std::uint32_t*, intersect_bits,
             (const std::uint64_t* bits, const core::BitWord* set, std::size_t n_words,
              std::uint32_t* out),
@@ -103,7 +103,7 @@ SDNN_KERNEL(std::uint32_t*, intersect_bits,
 template <std::size_t Most>
 class ListedColumns {
  public:
-  /// Up to Most columns; quickest in rising order. A column may come more than once.
+  /// Takes up to Most columns, fastest in rising order; a column may be repeated.
   explicit ListedColumns(std::span<const std::uint32_t> columns) noexcept {
     assert(columns.size() <= Most);
     ListedWord now{0, 0};
@@ -118,7 +118,7 @@ class ListedColumns {
     if (now.bits != 0) words_[n_++] = now;
   }
 
-  /// Writes those that are in the set; returns how many. Shape: out, Most numbers.
+  /// Writes the columns that are in the set; returns their number. Shape: out, Most numbers.
   std::size_t in(const ColumnSet& set, std::uint32_t* out) const {
     return static_cast<std::size_t>(intersect(words_.data(), words_.data() + n_, set.words(), out) -
                                     out);

@@ -1,4 +1,4 @@
-/// The one kernel of the hidden pass: sums of byte columns, for each instruction set.
+/// The kernel of the hidden pass, sums of byte columns, for each instruction set.
 #pragma once
 
 #include <algorithm>
@@ -22,22 +22,21 @@
 
 namespace sdnn::approximators {
 
-/// Hidden units whose weights lie side by side: one cache line of bytes per column.
+/// The number of hidden units whose weights are adjacent: a cache line of bytes for each column.
 inline constexpr std::size_t kBlockUnits = 64;
 
-/// Columns in the form that the kernels read: padded with a column of zeros to a multiple of
-/// kAtOnce, and followed by the first ones in the next block, of which memory is asked for ahead. A
-/// place is a column's first byte in its block divided by kPlaceBytes, which a processor multiplies
-/// by within a load.
+/// A list of columns for the kernels, padded with a column of zeros to a multiple of kAtOnce, and
+/// followed by the first columns of the next block, which are prefetched. A place is the offset of
+/// a column in its block divided by kPlaceBytes, a factor that a load instruction can apply.
 class ColumnPlaces {
  public:
   static constexpr std::size_t kMost = 1024;
   static constexpr std::size_t kAtOnce = 8;
-  /// Columns by which prefetching is ahead: the latency of a last-level cache that others use too.
+  /// The number of columns to prefetch, by the latency of a shared last-level cache.
   static constexpr std::size_t kPrefetchAhead = 64;
   static constexpr std::size_t kPlaceBytes = 8;
 
-  /// Up to kMost columns of a block whose column `zeros` has nothing but zeros.
+  /// Takes up to kMost columns of a block whose column `zeros` has only zeros.
   ColumnPlaces(std::span<const std::uint32_t> columns, std::size_t zeros) noexcept
       : size_(core::round_up(columns.size(), kAtOnce)) {
     assert(columns.size() <= kMost);
@@ -51,9 +50,10 @@ class ColumnPlaces {
     for (std::size_t k = 0; k < kPrefetchAhead; ++k) all[k] = block + (k < size_ ? places_[k] : 0);
   }
 
-  /// A multiple of kAtOnce.
+  /// The number of places, a multiple of kAtOnce.
   std::size_t size() const noexcept { return size_; }
-  /// size() places, and kPrefetchAhead more, of the next block, that are not to be added.
+  /// The size() places, followed by kPrefetchAhead places of the next block, which are only
+  /// prefetched.
   const std::uint32_t* data() const noexcept { return places_.data(); }
 
  private:
@@ -63,10 +63,10 @@ class ColumnPlaces {
 
 namespace detail {
 
-/// Groups of columns whose sum fits into 16 bits: 256 * 127 < 2^15.
+/// The number of groups of columns whose sum fits into 16 bits: 256 * 127 < 2^15.
 inline constexpr std::size_t kGroupsPerSum = 256;
 
-/// Places from `begin` whose sum, in groups of `Group`, fits into 16 bits.
+/// The number of places from `begin` whose sum, in groups of `Group`, fits into 16 bits.
 template <std::size_t Group>
 const std::uint32_t* end_of_part(const std::uint32_t* begin, const std::uint32_t* end) noexcept {
   return begin + std::min(Group * kGroupsPerSum, static_cast<std::size_t>(end - begin));
@@ -79,8 +79,8 @@ const std::uint32_t* end_of_part(const std::uint32_t* begin, const std::uint32_t
 
 using Bytes = std::array<std::int8_t, kBlockUnits>;
 
-/// The sum of `Group` columns in 8 bits, by halves: loops of a shape that every compiler
-/// vectorizes. Copied first, because bytes in memory may alias anything.
+/// The sum of `Group` columns in 8 bits, by halves, in loops that every compiler vectorizes. The
+/// bytes are copied first, because they may alias any memory.
 template <std::size_t Group>
 Bytes group_sum_portable(const std::int8_t* block, const std::uint32_t* places) noexcept {
   Bytes sum;
@@ -127,8 +127,8 @@ inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& p
 
 #if SDNN_X86_KERNELS || SDNN_NEON_KERNELS
 
-/// Prefetches the columns that will be added kPrefetchAhead places later. Behind the last block
-/// lies nothing, which a prefetch may ask for.
+/// Prefetches the columns that will be added kPrefetchAhead places later. After the last block it
+/// prefetches addresses without data, which is allowed.
 [[gnu::always_inline]] inline void prefetch_ahead(const std::int8_t* block,
                                                   const std::uint32_t* places) noexcept {
   for (std::size_t k = 0; k < ColumnPlaces::kAtOnce; ++k) {
@@ -190,7 +190,7 @@ inline void add_columns_neon(const std::int8_t* block, const ColumnPlaces& place
 
 // Both vector kernels take two groups of columns at a time: the columns of a group are added in 8
 // bits, the bytes of the two groups are interleaved, and one multiply-add by ones widens and adds
-// them pair by pair. Interleaving leaves the 16-bit sums in an order of their own, undone at the
+// them pair by pair. Interleaving changes the order of the 16-bit sums, which is restored at the
 // end.
 
 [[SDNN_TARGET_AVX2, gnu::always_inline]] inline __m256i group_sum_avx2(const std::int8_t* block,
@@ -323,10 +323,10 @@ template <std::size_t Group>
 
 }  // namespace detail
 
-/// sums[i] += factor * sum over the columns at `places` of column[i], for i = 0..63.
+/// Adds factor * sum over the columns at `places` of column[i] to sums[i], for i = 0..63.
 ///
-/// `group` (1, 2 or 4) columns may be added in 8 bits: the caller knows that |weight| <= 127 /
-/// group in this block. All sums are exact, so every version gives the same result.
+/// `group` (1, 2 or 4) columns are added in 8 bits, which requires |weight| <= 127 / group in this
+/// block. All sums are exact, so every version gives the same result.
 SDNN_DISPATCH(void, add_columns,
               (const std::int8_t* block, const ColumnPlaces& places, int group, int factor,
                std::int32_t* sums),

@@ -15,22 +15,22 @@ namespace sdnn::approximators {
 
 /// The last kSize corrections of a layer's weights, numbered from 0.
 ///
-/// A layer with other weights has a log with another identity: whoever computed something from the
-/// layer can see whether it still holds, and which corrections have changed it since.
+/// A layer with other weights has a log with another identity. Results that were computed from the
+/// layer can thus be checked, and updated by the later corrections.
 class CorrectionLog {
  public:
   static constexpr std::size_t kSize = 512;
 
-  /// One correction: w_i += step * x_SD(bins) and w_i0 -= step for every i in `units`.
+  /// A correction: w_i += step * x_SD(bins) and w_i0 -= step for every i in `units`.
   struct Entry {
     std::span<const coding::Bin> bins;
     std::span<const std::uint32_t> units;
     std::int32_t step;
   };
 
-  /// Log of a layer that is never corrected.
+  /// The log of a layer that is never corrected.
   CorrectionLog() = default;
-  /// `max_units`: the most units that one correction may touch.
+  /// `max_units` is the largest number of units in a correction.
   CorrectionLog(std::size_t n_inputs, std::size_t max_units)
       : n_inputs_(n_inputs),
         max_units_(max_units),
@@ -38,14 +38,14 @@ class CorrectionLog {
         units_(kSize * max_units),
         sizes_(kSize) {}
 
-  /// Bytes that it holds, but for what does not grow with this size.
+  /// The number of bytes that grow with this size.
   static constexpr std::size_t n_bytes(std::size_t max_units) noexcept {
     return kSize * max_units * sizeof(std::uint32_t);
   }
 
-  /// Identity of the layer as it was when the log began.
+  /// The identity of the layer at the beginning of the log.
   std::uint64_t identity() const noexcept { return identity_.number(); }
-  /// Number of corrections since then.
+  /// The number of corrections since the beginning.
   std::uint64_t size() const noexcept { return size_; }
 
   /// A correction, one of the last kSize.
@@ -65,7 +65,7 @@ class CorrectionLog {
     ++size_;
   }
 
-  /// Begins anew: the layer has other weights.
+  /// Restarts the log after the layer's weights were replaced.
   void restart() noexcept {
     identity_ = core::Identity();
     size_ = 0;

@@ -1,4 +1,4 @@
-/// The hidden layer of an SDNN-C before it learns.
+/// The initial hidden layer of an SDNN-C.
 #pragma once
 
 #include <cmath>
@@ -47,8 +47,8 @@ inline void add_initial_weights(HiddenLayer& layer, const coding::StateCode& cod
   }
 }
 
-/// Large thresholds, negative and positive in turn. Units are numbered from 1 in the paper: the
-/// first one is odd and starts active.
+/// Sets large thresholds, alternately negative and positive. The paper numbers units from 1, so the
+/// first unit is odd and starts active.
 inline void set_initial_thresholds(HiddenLayer& layer, const SDNNCConfig& config) {
   const double steps = config.initial_threshold * config.lattice;
   core::require(steps >= 0 && steps < (1 << 30) && std::floor(steps) == steps, "initial_threshold",

@@ -16,7 +16,7 @@ struct CodeMasks {
   const std::int32_t* negative;
 };
 
-/// Change of a row and its trace. Numbers of fixed point; all products fit into 32 bits.
+/// The change of a row and its trace, in fixed-point numbers whose products fit into 32 bits.
 struct RowStep {
   std::int32_t decay;       ///< what remains of the trace: in [0, 2^13], 2^13 for all of it
   std::int32_t gain;        ///< the code's part of the new trace, 2^12 for 1; 0 outside the action
@@ -26,29 +26,29 @@ struct RowStep {
   std::int32_t correction;  ///< subtracted from the weight, times the code
 };
 
-/// State of a row after a step: bits that any trace has, and that any weight's size has.
+/// The bits that are set in any trace, and in the magnitude of any weight, after a step.
 struct RowUse {
   std::int32_t traces = 0;
   std::int32_t weights = 0;
 };
 
-/// Traces are kept within +- kLargestTrace, 32 times a code's 1.
+/// The largest magnitude of traces, 32 times the 1 of a code.
 inline constexpr std::int32_t kTraceOne = 1 << 12;
 inline constexpr std::int32_t kLargestTrace = (1 << 17) - 1;
 inline constexpr std::int32_t kDecayOne = 1 << 13;
 
-/// x, 0 or -x.
+/// Returns x, 0 or -x.
 SDNN_INLINE std::int32_t times_code(std::int32_t x, std::int32_t active,
                                     std::int32_t negative) noexcept {
   return ((x & active) ^ negative) - negative;
 }
 
-/// a * b / 2^n_bits, rounded to the nearest, halves up.
+/// Returns a * b / 2^n_bits, rounded to the nearest integer, halves up.
 constexpr std::int64_t scaled(std::int64_t a, std::int64_t b, int n_bits) noexcept {
   if (n_bits == 0) return a * b;
   return (a * b + (std::int64_t{1} << (n_bits - 1))) >> n_bits;
 }
-/// units / 2, halves up.
+/// Returns units / 2, halves rounded up.
 template <class Number>
 constexpr Number halved(Number units) noexcept {
   return (units + 1) >> 1;
@@ -58,11 +58,11 @@ constexpr Number halved(Number units) noexcept {
 inline constexpr int kWeightBits = 23;
 inline constexpr std::int32_t kLargestWeight = 1 << kWeightBits;
 
-/// Bits that a weight's size has.
+/// The bits of the magnitude of a weight.
 constexpr std::uint32_t size_bits(std::int32_t weight) noexcept {
   return static_cast<std::uint32_t>(weight ^ (weight >> 31));
 }
-/// weight * 2^n, clipped to the range of weights.
+/// Returns weight * 2^n, clipped to the range of weights.
 constexpr std::int32_t multiplied(std::int32_t weight, int n) noexcept {
   constexpr std::int64_t kMost = kLargestWeight - 1;
   return static_cast<std::int32_t>(
@@ -71,7 +71,7 @@ constexpr std::int32_t multiplied(std::int32_t weight, int n) noexcept {
 
 namespace detail {
 
-/// Rows that are summed in one pass over the code.
+/// The number of rows that are summed in a pass over the code.
 inline constexpr std::size_t kRowsAtOnce = 4;
 
 template <std::size_t kRows>
@@ -138,26 +138,26 @@ SDNN_INLINE void spread_bits_body(const std::uint64_t* words, std::size_t n_word
 
 }  // namespace detail
 
-/// A mask for every bit: all bits or none. Shapes: words (n_words,), masks (64 n_words,).
+/// Writes a mask for every bit: all bits or none. Shapes: words (n_words,), masks (64 n_words,).
 SDNN_KERNEL(void, spread_bits,
             (const std::uint64_t* words, std::size_t n_words, std::int32_t* masks),
             (words, n_words, masks))
 
-/// The sum of each row's weights, times the code. Requires weights below 2^23 in size. Shapes: rows
-/// and sums (n_rows,), each row and masks (n_columns,).
+/// Computes the product of each row with the code. Requires weights below 2^23 in magnitude.
+/// Shapes: rows and sums (n_rows,), each row and masks (n_columns,).
 SDNN_KERNEL(void, row_sums,
             (const std::int32_t* const* rows, std::size_t n_rows, CodeMasks code,
              std::size_t n_columns, std::int64_t* sums),
             (rows, n_rows, code, n_columns, sums))
 
-/// The same of one row.
+/// Returns the product of a row with the code.
 inline std::int64_t row_sum(const std::int32_t* row, CodeMasks code, std::size_t n_columns) {
   std::int64_t sum = 0;
   row_sums(&row, 1, code, n_columns, &sum);
   return sum;
 }
 
-/// One step of learning of a row. Shapes: weights, traces and masks (n_columns,).
+/// Applies a step of learning to a row. Shapes: weights, traces and masks (n_columns,).
 SDNN_KERNEL(RowUse, learn_row,
             (std::int32_t* weights, std::int32_t* traces, CodeMasks code, std::size_t n_columns,
              RowStep step),

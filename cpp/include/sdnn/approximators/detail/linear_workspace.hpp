@@ -1,4 +1,4 @@
-/// States that users of a linear readout keep beside it: codes, sums and traces.
+/// The workspaces of a linear readout: codes, sums and traces.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace sdnn::approximators {
 
 class LinearSDNN;
 
-/// The code of a state, in the form that rows of weights are multiplied by.
+/// The code of a state in the form for products with rows of weights.
 class LinearCode {
  public:
   /// Columns that are not 0.
@@ -36,8 +36,8 @@ class LinearCode {
   std::int32_t n_active_ = 0;
 };
 
-/// State of a user who reads the model: a state, its code, and the sums of rows over it, each
-/// computed anew when its weights have changed.
+/// The workspace of a user who reads the model: a state, its code, and the sums of rows over it,
+/// each updated after its weights have changed.
 class LinearWorkspace {
  public:
   const LinearCode& code() const noexcept { return code_; }
@@ -52,7 +52,7 @@ class LinearWorkspace {
   std::vector<std::int64_t> sums_;       ///< of the actions of a dimension
 };
 
-/// State of one stream of experience: the weights that had a part in earlier values.
+/// The traces of a stream of experience: the weights that contributed to earlier values.
 class LinearTrace {
  public:
   void clear() noexcept {
@@ -62,7 +62,7 @@ class LinearTrace {
     }
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     std::vector<std::int32_t> values;  // none where there is no trace

@@ -1,4 +1,4 @@
-/// Weights over the code of a state that gets more inputs.
+/// Transfer of weights to the code of a state with additional inputs.
 #pragma once
 
 #include <algorithm>
@@ -11,10 +11,12 @@
 namespace sdnn::approximators {
 
 /// Copies rows of weights over a code to rows over a code with more inputs, such that their
-/// products are the same. Both have all pairs, and as many units; `to` is 0 elsewhere.
+/// products are the same. Both codes have all pairs and equal numbers of units; `to` is 0
+/// elsewhere.
 ///
-/// In the paired code the groups of a modifier are halves of sums and differences, but for the last
-/// one where their number is odd: with one more it is a sum of two such halves.
+/// In the paired code the groups of a modifier are halves of sums and differences. If their number
+/// is odd, the last group is unpaired, and becomes a sum of two such halves with an additional
+/// group.
 inline void copy_to_more_inputs(const coding::StateCode& fewer, std::span<const std::int32_t> from,
                                 const coding::StateCode& more, std::span<std::int32_t> to) {
   const std::size_t n_columns = 64 * more.n_words() / more.n_groups();

@@ -1,4 +1,4 @@
-/// Weights in the paper's order, where a layer on the paired code keeps them.
+/// Conversion of weights between the paper's order and the paired code.
 #pragma once
 
 #include <cstddef>
@@ -20,18 +20,18 @@ inline std::int32_t paired_weight(const HiddenLayer& layer, std::size_t unit,
   return columns.paired ? (first + columns.sign * layer.weight(unit, columns.second)) / 2 : first;
 }
 
-/// The largest |weight| that a layer is given: two of them make a sum that has to fit.
+/// The largest |weight| for a layer, so that the sum of two weights fits.
 inline std::int32_t largest_paired_weight(const HiddenLayer& layer) noexcept {
   return layer.weight_limit() / 2;
 }
 
-/// A layer for the paired code, all weights and thresholds zero.
+/// Makes a layer for the paired code with weights and thresholds of zero.
 inline HiddenLayer paired_layer(const coding::StateCode& code, std::size_t n_units) {
   return {n_units, code.n_columns(), code.n_double_columns()};
 }
 
-/// A layer with the weights weight(unit, columns, j), j in the paper's order, and the thresholds
-/// threshold(unit). Throws std::invalid_argument for one that is out of range.
+/// Makes a layer with the weights weight(unit, columns, j), j in the paper's order, and the
+/// thresholds threshold(unit). Throws std::invalid_argument for values out of range.
 template <class Weight, class Threshold>
 HiddenLayer paired_layer(const coding::StateCode& code, std::size_t n_units, const Weight& weight,
                          const Threshold& threshold) {

@@ -1,4 +1,4 @@
-/// Whether an SDNN-C fits into the memory that it may have.
+/// The check that an SDNN-C fits into its memory limit.
 #pragma once
 
 #include <algorithm>
@@ -15,8 +15,9 @@
 
 namespace sdnn::approximators {
 
-/// Throws std::length_error if the network, with so many bins of all inputs, has more bytes than
-/// config.max_table_bytes. In doubles, which no product overflows; their rounding does not matter.
+/// Throws std::length_error if the network, with this number of bins of all inputs, has more bytes
+/// than config.max_table_bytes. It computes with doubles, which no product overflows; their
+/// rounding does not matter.
 inline void require_room(const SDNNCConfig& config, double n_bins) {
   const coding::ActionCode sizes(config.n_hidden_units, config.n_active_units, config.n_actions);
   const double l = config.n_inputs;

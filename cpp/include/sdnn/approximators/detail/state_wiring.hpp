@@ -1,5 +1,4 @@
-/// The wiring of a state's code: how code books, pairs and permutations follow from config and
-/// seed.
+/// The wiring of a state's code: code books, pairs and permutations from config and seed.
 #pragma once
 
 #include <algorithm>
@@ -21,8 +20,8 @@
 #include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/random.hpp"
 
-// Config is that of an approximator: it has the fields of coding/state_code_config.hpp, and beside
-// it there is a function require_room(config, n_bins).
+// Config is the configuration of an approximator, with the fields of coding/state_code_config.hpp
+// and a function require_room(config, n_bins).
 
 namespace sdnn::approximators {
 
@@ -33,7 +32,7 @@ std::size_t checked_inputs(const Config& config) {
 }
 
 /// The patterns of every input, by anchors or of symbols. Throws std::invalid_argument naming the
-/// field that is impossible, and as require_room before they are made.
+/// impossible field, and like require_room before an allocation.
 template <class Config>
 std::vector<coding::PatternTable> code_books_of(const Config& config, std::uint64_t seed) {
   const std::size_t l = checked_inputs(config);
@@ -68,7 +67,7 @@ std::vector<coding::PatternTable> code_books_of(const Config& config, std::uint6
   return tables;
 }
 
-/// Tables with a pattern more for missing readings, but those of `symbols`, which have one.
+/// Adds a pattern for missing readings to the tables, except those of `symbols`, which have one.
 template <class Config>
 std::vector<coding::PatternTable> with_missing_patterns(const Config& config,
                                                         std::vector<coding::PatternTable> tables,
@@ -82,14 +81,14 @@ std::vector<coding::PatternTable> with_missing_patterns(const Config& config,
   }
   return tables;
 }
-/// The patterns of every input, with one for missing readings; of a symbol it is the last one.
+/// The patterns of every input, the last of which stands for missing readings.
 template <class Config>
 std::vector<coding::PatternTable> code_books_with_missing(const Config& config,
                                                           std::uint64_t seed) {
   return with_missing_patterns(config, code_books_of(config, seed), config.n_symbols, seed);
 }
 
-/// The strides of the code, ascending: so many at random.
+/// Draws the strides of the code, in ascending order.
 template <class Config>
 std::vector<std::size_t> strides_of(const Config& config, std::uint64_t seed) {
   core::Random random(seed, core::Stream::pairs);
@@ -101,17 +100,17 @@ std::vector<std::size_t> strides_of(const Config& config, std::uint64_t seed) {
   return strides;
 }
 
-/// The number of the random stream of a pair's permutation, where `n_first` inputs came first:
-/// theirs are numbered in the paper's order, then those of each input that was added.
+/// The number of the random stream of a pair's permutation. Pairs of the first `n_first` inputs are
+/// numbered in the paper's order, then the pairs of each added input.
 inline std::size_t stream_of_pair(std::size_t mu, std::size_t nu, std::size_t n_first) noexcept {
   const std::size_t last = std::max(mu, nu);
   if (last < n_first) return mu * (n_first - 1) + nu - (nu > mu ? 1 : 0);
   return last * (last - 1) + 2 * std::min(mu, nu) + (mu > nu ? 1 : 0);
 }
 
-/// The code over these tables, a permutation per pair. Where inputs were added, the first `n_first`
-/// are wired as without the others; not 0 only with all pairs. Throws std::invalid_argument if the
-/// tables are not of the config's inputs and units, and as require_room.
+/// Makes the code over these tables, with a permutation for each pair. If `n_first` is not 0, which
+/// needs all pairs, the first `n_first` inputs are wired as without the others. Throws
+/// std::invalid_argument if the tables do not fit the config, and like require_room.
 template <class Config>
 std::shared_ptr<const coding::StateCode> wiring_of(const Config& config,
                                                    std::vector<coding::PatternTable> tables,

@@ -1,4 +1,4 @@
-/// The average of a hidden layer's weights over what was learned.
+/// The average of a hidden layer's weights during learning.
 #pragma once
 
 #include <algorithm>
@@ -13,15 +13,15 @@
 
 namespace sdnn::approximators {
 
-/// A moving average of weights and thresholds whose window grows with what was learned.
+/// A moving average of weights and thresholds whose window grows with the number of corrections.
 ///
-/// After n corrections the weights of correction t have about the weight (t / n)^7: what was
-/// learned first is forgotten, the swings of late learning cancel each other. A unit's sign is then
-/// that which its potential mostly had, so a value is near the median of what it was. Snapshots are
-/// taken every `interval` corrections, later every n / 64, and move the average by a power of two
-/// of the way, about 8 / n times the corrections in between. All numbers are integers, so equal
-/// corrections give equal bits. Weights have two bytes, of which 14 bits are for fractions of a
-/// step of the lattice, or fewer where one needs more for whole steps.
+/// After n corrections the weights after correction t count by about (t / n)^7: the average forgets
+/// early weights and smooths late oscillations. A unit then has the most frequent sign of its
+/// recent potentials, so a value is near the median of its recent values. Snapshots are taken every
+/// `interval` corrections, later every n / 64, and move the average by a power of two of the way,
+/// about 8 / n times the corrections in between. All numbers are integers, so equal corrections
+/// give equal bits. Weights have two bytes, of which 14 bits are for fractions of a step of the
+/// lattice, or fewer if a weight needs more bits for whole steps.
 ///
 /// Source: Polyak, B., Juditsky, A. (1992). Acceleration of stochastic approximation by averaging;
 /// Shamir, O., Zhang, T. (2013). Stochastic gradient descent for non-smooth optimization, section
@@ -42,10 +42,10 @@ class WeightAverage {
     return n_units * (2.0 * n_columns + 8.0);
   }
 
-  /// Number of snapshots in the average; 0: there is none yet.
+  /// The number of snapshots in the average; 0 before the first one.
   std::uint64_t n_snapshots() const noexcept { return n_snapshots_; }
 
-  /// Takes a snapshot if one is due after so many corrections in all; returns whether it was.
+  /// Takes a snapshot if it is due after this number of corrections; returns whether it was taken.
   bool note(std::uint64_t n_corrections, const HiddenLayer& layer) {
     if (n_corrections < due_) return false;
     add(layer, shift_at(n_corrections));
@@ -53,7 +53,7 @@ class WeightAverage {
     return true;
   }
 
-  /// Forgets what it is made of: the layer has other weights now.
+  /// Resets the average after the layer's weights were replaced.
   void forget(std::uint64_t n_corrections) noexcept {
     n_snapshots_ = 0;
     fraction_bits_ = kFractionBits;
@@ -67,7 +67,7 @@ class WeightAverage {
   }
   std::int64_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     std::vector<std::int16_t> weights(self.n_units_ * self.n_columns_);
@@ -105,11 +105,11 @@ class WeightAverage {
   static_assert(HiddenLayer::kWeightLimit << kFewestFractionBits <= INT16_MAX);
   static constexpr std::int64_t kLargestThreshold = std::int64_t{1} << (30 + kFractionBits);
 
-  /// -log2 of what a snapshot counts.
+  /// The negative logarithm (base 2) of the weight of a snapshot.
   int shift_at(std::uint64_t n_corrections) const noexcept {
     if (n_snapshots_ == 0) return 0;
     const std::uint64_t passed = std::max(interval_, n_corrections >> kLogSnapshots);
-    // A cast, since older libraries give another type.
+    // Older libraries return another type, hence the cast.
     return std::max(static_cast<int>(std::bit_width(n_corrections / passed)) - 4, 0);
   }
 
@@ -130,8 +130,8 @@ class WeightAverage {
     ++n_snapshots_;
   }
 
-  /// Moves the averages of a block's weights towards these; false, and nothing has moved, if one
-  /// needs more bits.
+  /// Moves the averages of a block's weights towards these. Returns false, and changes nothing, if
+  /// an average needs more bits.
   template <class Weights>
   bool move(std::int16_t* average, const Weights& weights, int shift, std::int32_t half) noexcept {
     Weights moved;
@@ -148,7 +148,7 @@ class WeightAverage {
     return true;
   }
 
-  /// Gives one bit of the fractions to the whole steps; halves up.
+  /// Moves a bit from the fractions to the whole steps, halves rounded up.
   void halve() noexcept {
     --fraction_bits_;
     for (std::int16_t& weight : std::span(weights_.data(), weights_.size())) {

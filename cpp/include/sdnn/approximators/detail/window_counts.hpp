@@ -17,8 +17,8 @@ namespace sdnn::approximators {
 
 namespace detail {
 
-/// Bytes of 0 and 1 times 0x01...01 are, byte by byte, the sums of all bytes up to there. Loops are
-/// vectorized only where bytes are known to alias nothing else.
+/// Bytes of 0 and 1 times 0x01...01 give prefix sums of the bytes. Loops are vectorized only where
+/// the bytes cannot alias other memory.
 SDNN_INLINE std::int32_t count_windows_body(std::span<const std::int32_t> potentials,
                                             std::size_t size, std::uint8_t* __restrict firing,
                                             std::int32_t* __restrict of_groups,
@@ -52,15 +52,15 @@ SDNN_INLINE std::int32_t count_windows_body(std::span<const std::int32_t> potent
 
 }  // namespace detail
 
-/// The number of units that fire in every window of `size` units; returns the largest. Shapes:
-/// potentials (n,), counts (n - size + 1,); scratch: firing (n,), of_groups (n / 8,), before
-/// (n + 1,).
+/// Counts the units that fire in every window of `size` units; returns the largest count. Shapes:
+/// potentials (n,), counts (n - size + 1,); scratch: firing (n,), of_groups (n / 8,), before (n +
+/// 1,).
 SDNN_KERNEL(std::int32_t, count_windows,
             (std::span<const std::int32_t> potentials, std::size_t size, std::uint8_t* firing,
              std::int32_t* of_groups, std::int32_t* before, std::int32_t* counts),
             (potentials, size, firing, of_groups, before, counts))
 
-/// Counts of the actions of a code, and room to find them.
+/// The counts of the actions of a code, and buffers to compute them.
 class WindowCounts {
  public:
   explicit WindowCounts(const coding::ActionCode& actions)
@@ -82,8 +82,8 @@ class WindowCounts {
     largest_ = *std::ranges::max_element(of_actions_);
   }
 
-  /// Makes the counts of actions whose number in the mask is 0 lower than all others, unless it is
-  /// empty. Shape: (n_actions,).
+  /// Makes the counts of actions whose entry in the mask is 0 lower than all others, unless the
+  /// mask is empty. Shape: (n_actions,).
   void exclude(std::span<const std::uint8_t> mask) noexcept {
     if (mask.empty()) return;
     std::vector<std::int32_t>& counts = of_actions_.empty() ? of_windows_ : of_actions_;
@@ -93,7 +93,7 @@ class WindowCounts {
     largest_ = *std::ranges::max_element(counts);
   }
 
-  /// Those counted last. Shape: (n_actions,).
+  /// The counts of the last call. Shape: (n_actions,).
   std::span<const std::int32_t> of_actions() const noexcept {
     return of_actions_.empty() ? of_windows_ : of_actions_;
   }

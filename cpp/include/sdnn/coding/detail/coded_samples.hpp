@@ -1,4 +1,4 @@
-/// The codes of several samples at once: as words, as signs, and their inner products.
+/// The codes of several samples as words or signs, and their inner products.
 #pragma once
 
 #include <cassert>
@@ -15,8 +15,8 @@
 
 namespace sdnn::coding {
 
-/// The codes of several samples, filled up with zeros to a multiple of 4 words: what inner products
-/// and corrections read.
+/// The codes of several samples, padded with zeros to a multiple of 4 words for inner products and
+/// corrections.
 class CodedSamples {
  public:
   /// Shapes: bins (n_samples, n_inputs), checked before.

@@ -23,8 +23,9 @@
 
 namespace sdnn::coding {
 
-/// A code of +1, 0 and -1: where it is not 0, and where it is +1. Column j is bit j % 64 of word
-/// j / 64. Plain words, because kernels count, list and compare them, which std::bitset cannot.
+/// A code of +1, 0 and -1, as bits of the columns that are not 0 and bits of those that are +1.
+/// Column j is bit j % 64 of word j / 64. The words are plain integers, because kernels count, list
+/// and compare them, which std::bitset does not support.
 struct TernaryCode {
   const std::uint64_t* active;
   const std::uint64_t* positive;
@@ -56,7 +57,7 @@ inline std::int32_t inner_product_portable(const TernaryCode& one, const Ternary
   return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
 }
 
-/// 256 bits at a time: the bits of all 4-bit parts are counted by looking them up in a register.
+/// Counts 256 bits at a time: a table in a register has the number of bits of each 4-bit part.
 [[SDNN_TARGET_AVX2]] inline std::int32_t inner_product_avx2(const TernaryCode& one,
                                                             const TernaryCode& other,
                                                             std::size_t n_words) {
@@ -105,7 +106,7 @@ inline std::int32_t inner_product_portable(const TernaryCode& one, const Ternary
 
 #if SDNN_NEON_KERNELS
 
-/// 128 bits at a time: NEON counts the bits of every byte.
+/// Counts 128 bits at a time with the byte counts of NEON.
 inline std::int32_t inner_product_neon(const TernaryCode& one, const TernaryCode& other,
                                        std::size_t n_words) noexcept {
   constexpr std::size_t kMost = 2 * 4095;  // words whose counts, 16 at most, fit into 16 bits
@@ -140,7 +141,7 @@ inline std::int32_t inner_product_neon(const TernaryCode& one, const TernaryCode
 
 }  // namespace detail
 
-/// The inner product of two codes. Quickest if n_words is a multiple of 4.
+/// The inner product of two codes, fastest if n_words is a multiple of 4.
 SDNN_DISPATCH(std::int32_t, inner_product,
               (const TernaryCode& one, const TernaryCode& other, std::size_t n_words),
               (one, other, n_words))
@@ -173,8 +174,8 @@ struct WordChanges {
   std::uint64_t up, up_again, down, down_again;
 };
 
-/// Writes `base` + the numbers of the set bits; returns their end. `Some` numbers are written at a
-/// time, so that few bits need no jump: up to that many may lie beyond the end.
+/// Writes `base` + the numbers of the set bits; returns their end. It writes `Some` numbers at a
+/// time, which avoids a jump if there are few bits; up to `Some` extra numbers may follow the end.
 template <std::size_t Some, class Number>
 SDNN_INLINE Number* append_few_bits(Number* to, std::uint64_t bits, std::size_t base) noexcept {
   Number* const end = to + std::popcount(bits);
@@ -203,8 +204,9 @@ inline constexpr std::array<BitsOfByte, 256> kBitsOfByte = [] {
   return table;
 }();
 
-/// The same for words of which about a quarter of the bits is set, a byte of bits at a time: always
-/// eight numbers, so that no branch depends on the bits. Up to eight may lie beyond the end.
+/// Like append_few_bits, for words with about a quarter of their bits set. It writes eight numbers
+/// for each byte, so that no branch depends on the bits; up to eight extra numbers may follow the
+/// end.
 inline std::uint32_t* append_many_bits(std::uint32_t* to, std::uint64_t bits,
                                        std::size_t base) noexcept {
   for (; bits != 0; bits >>= 8, base += 8) {
@@ -234,7 +236,8 @@ inline void list_columns_avx2(const TernaryCode& code, std::span<const std::uint
   list_columns_portable(code, first_columns, plus, minus);
 }
 
-/// Sixteen columns at a time: those whose bit is set are moved together and all sixteen written.
+/// Lists sixteen columns at a time: those whose bit is set are moved together, and all sixteen
+/// written.
 [[SDNN_TARGET_AVX512]] inline void list_columns_avx512(const TernaryCode& code,
                                                        std::span<const std::uint32_t> first_columns,
                                                        std::uint32_t** plus,
@@ -292,34 +295,35 @@ SDNN_KERNEL_NEON(void, list_columns,
                  (code, first_columns, plus, minus))
 
 /// Appends to `plus` and `minus` the columns that are +1 and -1; `first_columns` has the number of
-/// each word's bit 0. Up to sixteen numbers more are written.
+/// each word's bit 0. Up to sixteen extra numbers are written.
 SDNN_DISPATCH(void, list_columns,
               (const TernaryCode& code, std::span<const std::uint32_t> first_columns,
                std::uint32_t** plus, std::uint32_t** minus),
               (code, first_columns, plus, minus))
 
 /// Appends to `up` and `down` the columns whose entry rises or falls from one code to another,
-/// twice if by 2: up to 128 a word and one more. `first_columns` has the number of each word's bit
-/// 0; `words` is scratch for as many and one more.
+/// twice if by 2: up to 128 for each word, and one extra. `first_columns` has the number of each
+/// word's bit 0; `words` is scratch for one number more than words.
 SDNN_KERNEL(void, list_changes,
             (const TernaryCode& from, const TernaryCode& to,
              std::span<const std::uint32_t> first_columns, std::uint32_t* words, std::uint32_t** up,
              std::uint32_t** down),
             (from, to, first_columns, words, up, down))
 
-/// Columns to add and columns to subtract, each in rising order but for those that come twice.
+/// Columns to add and columns to subtract, each in rising order except for columns that are listed
+/// twice.
 struct SignedColumns {
   std::span<const std::uint32_t> plus;
   std::span<const std::uint32_t> minus;
-  /// The same as words of bits, column j at bit j % 64 of word j / 64, for who asked for them.
+  /// The columns as words of bits, column j at bit j % 64 of word j / 64; empty unless requested.
   std::span<const std::uint64_t> plus_bits = {};
   std::span<const std::uint64_t> minus_bits = {};
 
   std::size_t size() const noexcept { return plus.size() + minus.size(); }
 };
 
-/// Room for the columns of a code, or for those in which two codes differ. All of it is written
-/// once, so that listing allocates nothing and meets no memory that was never used.
+/// Buffers for the columns of a code, or for those in which two codes differ. They are initialized
+/// on construction, so that listing columns neither allocates nor touches new memory pages.
 class ColumnLists {
  public:
   /// Columns numbered by bits: column j is bit j % 64 of word j / 64.
@@ -339,7 +343,7 @@ class ColumnLists {
     }
   }
 
-  /// Overwrites them with the columns of a code that are +1 and -1.
+  /// Overwrites the lists with the columns of a code that are +1 and -1.
   void read(const TernaryCode& code) noexcept {
     std::uint32_t* plus = plus_.data();
     std::uint32_t* minus = minus_.data();
@@ -347,7 +351,7 @@ class ColumnLists {
     note_ends(plus, minus);
   }
 
-  /// Overwrites them with the columns that lead from one code to another, twice if by 2.
+  /// Overwrites the lists with the columns that change from one code to another, twice if by 2.
   void read_changes(const TernaryCode& from, const TernaryCode& to) {
     std::uint32_t* up = plus_.data();
     std::uint32_t* down = minus_.data();
@@ -355,12 +359,12 @@ class ColumnLists {
     note_ends(up, down);
   }
 
-  /// Columns that were read last; valid until the next reading.
+  /// The columns that were read last; valid until the next reading.
   SignedColumns columns() const noexcept {
     return {std::span(plus_).first(n_plus_), std::span(minus_).first(n_minus_)};
   }
 
-  /// The same of a code that was read last, with their bits.
+  /// The columns of the code that was read last, with their bits.
   SignedColumns columns_with_bits(const TernaryCode& code) noexcept {
     std::ranges::fill(bits_of_plus_, 0);
     std::ranges::fill(bits_of_minus_, 0);

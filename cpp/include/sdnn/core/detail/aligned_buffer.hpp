@@ -22,7 +22,7 @@ constexpr std::size_t round_up(std::size_t n, std::size_t multiple) noexcept {
   return (n + multiple - 1) / multiple * multiple;
 }
 
-/// The number of items in so many rows. Throws std::bad_alloc if a size cannot hold it.
+/// The number of items in a number of rows. Throws std::bad_alloc if a size cannot hold it.
 inline std::size_t checked_product(std::size_t n_rows, std::size_t n_columns) {
   if (n_rows != 0 && n_columns > std::numeric_limits<std::size_t>::max() / n_rows) {
     fail(std::bad_alloc());
@@ -32,8 +32,8 @@ inline std::size_t checked_product(std::size_t n_rows, std::size_t n_columns) {
 
 /// `size` zero-initialized items, aligned to a cache line; copied by value.
 ///
-/// Throws std::bad_alloc if the memory cannot be had. Pages that are never written cost no memory
-/// where the operating system hands out zero pages lazily.
+/// Throws std::bad_alloc without enough memory. Pages that are never written cost no memory where
+/// the operating system hands out zero pages lazily.
 template <class Item>
 class AlignedBuffer {
   static_assert(std::is_trivially_copyable_v<Item>);

@@ -1,4 +1,5 @@
-/// Argument checks for public edges: messages name what was expected and what was given.
+/// Argument checks for public functions: messages name the argument, the expected and the given
+/// value.
 #pragma once
 
 #include <cmath>

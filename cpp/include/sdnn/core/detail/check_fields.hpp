@@ -14,7 +14,7 @@
 
 namespace sdnn::core {
 
-/// Says which numbers are within bounds: "in [0, 1]".
+/// Describes bounds: "in [0, 1]".
 inline std::string words_of(const Bounds& bounds, bool is_whole) {
   std::ostringstream words;
   const auto write = [&words](double number) -> std::ostream& {
@@ -51,7 +51,7 @@ void check_bounds(const char* name, const Value& value, const Bounds& bounds) {
   } else if constexpr (requires { value.has_value(); }) {
     if (value) check_bounds(name, *value, bounds);
   } else {
-    // By type, because the items of a std::vector<bool> are proxies.
+    // The type is named because the items of a std::vector<bool> are proxies.
     for (const typename Value::value_type& item : value) check_bounds(name, item, bounds);
   }
 }

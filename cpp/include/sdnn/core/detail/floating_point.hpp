@@ -1,9 +1,9 @@
 /// Refuses older standards than C++20, and flags under which floating-point results would depend on
 /// the compiler or the processor.
 ///
-/// The CMake target sdnn::sdnn compiles with those that are needed. Without CMake: the option
-/// -ffp-contract=off of g++ and clang, which the headers know by -DSDNN_NO_CONTRACTION, since a
-/// compiler does not show it; /fp:precise of MSVC is the default.
+/// The CMake target sdnn::sdnn sets the required options. Without CMake, g++ and clang need
+/// -ffp-contract=off, and -DSDNN_NO_CONTRACTION to declare it, because a compiler does not show it;
+/// /fp:precise of MSVC is the default.
 #pragma once
 
 #if (defined(_MSVC_LANG) ? _MSVC_LANG : __cplusplus) <= 201703L

@@ -24,7 +24,7 @@ inline constexpr std::uint64_t kDefaultMaxTableBytes = std::uint64_t{1} << 30;
   fail(SizeError(std::string(first), message.str()));
 }
 
-/// A limit, as far as bytes can be addressed.
+/// A limit in bytes, at most the address space.
 constexpr std::uint64_t addressable(std::uint64_t most) noexcept {
   constexpr std::uint64_t kAddressable = std::numeric_limits<std::size_t>::max();
   return most < kAddressable ? most : kAddressable;
@@ -41,9 +41,9 @@ constexpr std::uint64_t addressable(std::uint64_t most) noexcept {
   fail_for_size(sizes, message);
 }
 
-/// Throws SizeError "<sizes> must be smaller: <what> need <bytes> bytes, but
-/// max_table_bytes is ..." if they are more. To be asked before memory is; a double, which no
-/// product overflows.
+/// Throws SizeError "<sizes> must be smaller: <what> need <bytes> bytes, but max_table_bytes is
+/// ..." for too many bytes. Call it before allocating; `bytes` is a double, which no product
+/// overflows.
 inline void require_table_bytes(std::string_view sizes, std::string_view what, double bytes,
                                 std::uint64_t max_table_bytes) {
   if (bytes <= static_cast<double>(addressable(max_table_bytes))) return;
@@ -53,7 +53,7 @@ inline void require_table_bytes(std::string_view sizes, std::string_view what, d
   fail_for_limit(sizes, message, bytes <= static_cast<double>(max_table_bytes), max_table_bytes);
 }
 
-/// The same where no setting allows more: "... bytes, but at most <most> are allowed".
+/// Checks a limit that no setting changes: "... bytes, but at most <most> are allowed".
 inline void require_bytes(std::string_view sizes, std::string_view what, double bytes,
                           std::uint64_t most) {
   if (bytes <= static_cast<double>(addressable(most))) return;
@@ -63,12 +63,12 @@ inline void require_bytes(std::string_view sizes, std::string_view what, double 
   fail_for_size(sizes, message);
 }
 
-/// n_per_dimension ^ n_dimensions, when a table with `bytes_per_cell` for each is allowed.
+/// Returns n_per_dimension ^ n_dimensions if a table with `bytes_per_cell` for each is allowed.
 ///
-/// A grid grows exponentially with its dimensions; asked before memory is requested, so that the
-/// answer is a message and not an exhausted machine. Requires n_per_dimension, bytes_per_cell > 0.
-/// Throws SizeError naming the `sizes` to reduce ("n_sets or n_inputs"), the number of
-/// `cells` ("rules"), the bytes and max_table_bytes.
+/// A grid grows exponentially with its dimensions. Call it before allocating, so that a grid that
+/// is too large causes an error instead of exhausting the memory. Requires n_per_dimension,
+/// bytes_per_cell > 0. Throws SizeError naming the `sizes` to reduce ("n_sets or n_inputs"), the
+/// number of `cells` ("rules"), the bytes and max_table_bytes.
 inline std::size_t grid_cells(std::string_view sizes, std::string_view cells,
                               std::size_t n_per_dimension, std::size_t n_dimensions,
                               std::size_t bytes_per_cell, std::uint64_t max_table_bytes) {

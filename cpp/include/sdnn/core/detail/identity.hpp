@@ -1,4 +1,4 @@
-/// Objects that others recognize, whatever their address.
+/// Numbers that identify objects independently of their addresses.
 #pragma once
 
 #include <atomic>
@@ -7,8 +7,7 @@
 
 namespace sdnn::core {
 
-/// A number that no other object of the process has. A copy gets a number of its own; a move takes
-/// the number along.
+/// A number that no other object of the process has. A copy gets a new number; a move transfers it.
 class Identity {
  public:
   Identity() noexcept = default;
@@ -24,7 +23,7 @@ class Identity {
   }
   ~Identity() = default;
 
-  /// Never 0.
+  /// The number, which is never 0.
   std::uint64_t number() const noexcept { return number_; }
 
  private:

@@ -15,13 +15,13 @@ namespace sdnn::core {
 
 #if SDNN_LANES
 
-// GCC's note about passing wide vectors concerns calls, and there are none.
+// GCC's note about passing wide vectors concerns calls, which are all inlined here.
 #if !defined(__clang__)
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 
-/// As many integers as fit into 32 bytes; sums wrap around.
+/// A register of the integers that fit into 32 bytes; sums wrap around.
 template <class Integer>
 struct IntegerRegister {
   typedef Integer Vector __attribute__((vector_size(32)));
@@ -43,7 +43,7 @@ struct IntegerRegister {
     v = (Vector)((Wrapping)v - other);
   }
   SDNN_INLINE void store(Integer* to) const noexcept { std::memcpy(to, &v, sizeof v); }
-  /// to[i] += the i-th integer, in the type of `to`, which is as wide or wider.
+  /// Adds the i-th integer to to[i], whose type is at least as wide.
   template <class Wide>
   SDNN_INLINE void add_to(Wide* to) const noexcept {
     if constexpr (sizeof(Wide) == sizeof(Integer)) {

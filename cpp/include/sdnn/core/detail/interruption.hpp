@@ -1,13 +1,13 @@
-/// Long work that can be stopped from outside.
+/// Interruption of long computations.
 #pragma once
 
 #include <atomic>
 
 namespace sdnn::core {
 
-/// Function that long work calls at least ten times a second; it throws to stop the work.
-/// None unless somebody sets it, as the Python package does for Ctrl-C. Called from any thread.
-/// With `at_once` it must look even if it just did: what follows cannot be undone.
+/// A function that long computations call at least ten times a second, from any thread; it throws
+/// to stop them. It is empty by default; the Python package sets it for Ctrl-C. With `at_once` it
+/// must check even if it has just done so, because the next step cannot be undone.
 using InterruptionCheck = void (*)(bool at_once);
 
 inline std::atomic<InterruptionCheck>& interruption_check() noexcept {
@@ -15,7 +15,7 @@ inline std::atomic<InterruptionCheck>& interruption_check() noexcept {
   return check;
 }
 
-/// A place where work may end early, with whatever the check throws.
+/// Lets the check stop the computation by throwing.
 inline void interruption_point(bool at_once = false) {
   if (const auto check = interruption_check().load(std::memory_order_relaxed)) check(at_once);
 }

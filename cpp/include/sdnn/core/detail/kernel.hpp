@@ -1,28 +1,27 @@
-/// Kernels: functions that are compiled for every instruction set and choose when they are called.
+/// Kernels: functions that are compiled for every instruction set, with a choice at run time.
 ///
-/// The one way to an instruction set. A kernel `name` in a package's namespace has a version for
-/// each level in the nested namespace `detail`: name_portable, name_neon, name_avx2, name_avx512.
-/// It is exact: sums of integers, or floating-point operations in a fixed order, so that all
-/// versions give the same bits. SDNN_KERNEL makes all versions from one body; a version that is
-/// worth writing by hand is written, the others are made by SDNN_KERNEL_PORTABLE, SDNN_KERNEL_NEON,
-/// SDNN_KERNEL_AVX2 and SDNN_KERNEL_AVX512, and SDNN_DISPATCH makes the function that chooses.
-/// Another level is an enumerator of core::InstructionSet, a macro like these and a line in
+/// All code for an instruction set is a kernel. A kernel `name` in a package's namespace has a
+/// version for each level in the nested namespace `detail`: name_portable, name_neon, name_avx2,
+/// name_avx512. It is exact: sums of integers, or floating-point operations in a fixed order, so
+/// that all versions give the same bits. SDNN_KERNEL makes all versions from one body. If some
+/// versions are written by hand, SDNN_KERNEL_PORTABLE, SDNN_KERNEL_NEON, SDNN_KERNEL_AVX2 and
+/// SDNN_KERNEL_AVX512 make the others, and SDNN_DISPATCH makes the function that chooses. A new
+/// level needs an enumerator of core::InstructionSet, a macro like these and a line in
 /// SDNN_DISPATCH.
 #pragma once
 
 #include "sdnn/core/detail/lanes.hpp"
 #include "sdnn/core/instruction_set.hpp"
 
-// `parameters` and `arguments` are lists in parentheses. The function `name_body` in `detail` has
-// to be SDNN_INLINE, with everything that it calls, so that it is compiled anew inside each
-// version.
+// `parameters` and `arguments` are lists in parentheses. The function `name_body` in `detail`, and
+// everything that it calls, must be SDNN_INLINE, so that it is compiled inside each version.
 
 #define SDNN_KERNEL_PORTABLE(Result, name, parameters, arguments)            \
   namespace detail {                                                         \
   inline Result name##_portable parameters { return name##_body arguments; } \
   }
 
-// What is compiled for NEON at all may use it everywhere: the portable version has it already.
+// Builds for NEON may use it everywhere, so their portable version already does.
 #if SDNN_NEON_KERNELS
 
 #define SDNN_KERNEL_NEON(Result, name, parameters, arguments)                \

@@ -16,8 +16,8 @@
 #if defined(__clang__) || \
     (defined(__GNUC__) && __GNUC__ >= 12)  // the first with shuffles as clang's
 #define SDNN_LANES 1
-/// Lanes wider than the baseline's registers must never cross a real call: everything that a kernel
-/// of another instruction set is made of has to end up inside it.
+/// Lanes wider than the registers of the baseline must not be passed to a call that is not inlined:
+/// a kernel for another instruction set must inline everything that it uses.
 #define SDNN_INLINE __attribute__((always_inline)) inline
 #define SDNN_INLINE_LAMBDA __attribute__((always_inline))
 #else
@@ -28,12 +28,12 @@
 
 namespace sdnn::core {
 
-// One number: its mask is a bool, its bits an integer.
+// For a single number, the mask is a bool and the bits are an integer.
 
 SDNN_INLINE double select(bool mask, double first, double second) noexcept {
   return mask ? first : second;
 }
-/// Is the mask set anywhere?
+/// Whether the mask is set in any lane.
 SDNN_INLINE bool any(bool mask) noexcept { return mask; }
 SDNN_INLINE bool both(bool first, bool second) noexcept { return first && second; }
 SDNN_INLINE bool first_only(bool first, bool second) noexcept { return first && !second; }
@@ -44,7 +44,7 @@ SDNN_INLINE double double_of(std::uint64_t bits) noexcept { return std::bit_cast
 
 #if SDNN_LANES
 
-// Always inlined, so the way GCC would pass a wide vector to a call does not matter.
+// These functions are always inlined, so GCC's convention for passing wide vectors does not matter.
 #if !defined(__clang__)
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wpsabi"
@@ -94,7 +94,7 @@ struct Lanes {
 
   Lanes() = default;
   SDNN_INLINE explicit Lanes(const Vector& values) noexcept : v(values) {}
-  /// The same number in every lane.
+  /// Sets every lane to a number.
   SDNN_INLINE Lanes(double value) noexcept : Lanes(value, std::make_index_sequence<Size>()) {}
 
   /// `Size` numbers from memory, at any alignment.
@@ -188,8 +188,8 @@ SDNN_INLINE Real magnitude(const Real& value) noexcept {
   return double_of(bits_of(value) & ~(std::uint64_t{1} << 63));
 }
 
-/// Calls `function` with 0, 1, ..., Size - 1, each a std::integral_constant. There is no loop left
-/// at any level of optimization, so that an array of lanes indexed by them can live in registers.
+/// Calls `function` with 0, 1, ..., Size - 1, each a std::integral_constant. No loop remains at any
+/// level of optimization, so that an array of lanes indexed by them can be kept in registers.
 template <std::size_t Size, class Function>
 SDNN_INLINE void unrolled(const Function& function) noexcept {
   [&]<std::size_t... Index>(std::index_sequence<Index...>) SDNN_INLINE_LAMBDA {

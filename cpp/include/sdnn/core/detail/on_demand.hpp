@@ -1,4 +1,4 @@
-/// Results that are computed when they are first asked for.
+/// Results that are computed when they are first needed.
 #pragma once
 
 #include <memory>
@@ -7,7 +7,8 @@
 
 namespace sdnn::core {
 
-/// A constant that the first thread that needs it computes, and all share. A copy starts without.
+/// A constant that is computed by the first thread that needs it, and shared by all. Copies start
+/// without it.
 ///
 /// Thread safety: `get` may be called by many threads at once.
 template <class T>
@@ -21,7 +22,7 @@ class OnDemand {
   }
   ~OnDemand() = default;
 
-  /// The constant; `make()` computes it where there is none yet.
+  /// Returns the constant, which `make()` computes on the first call.
   template <class Make>
   std::shared_ptr<const T> get(const Make& make) const {
 #if SDNN_HAS_THREADS
@@ -31,7 +32,7 @@ class OnDemand {
     return made_;
   }
 
-  /// The next `get` computes it anew.
+  /// Discards the constant; the next `get` computes it again.
   void reset() noexcept { made_.reset(); }
 
  private:

@@ -1,4 +1,5 @@
-/// Threads and locks, also for standard libraries that have none (WebAssembly, microcontrollers).
+/// Threads and locks, with substitutes for standard libraries without them (WebAssembly,
+/// microcontrollers).
 #pragma once
 
 #include <version>
@@ -42,7 +43,7 @@ class Threads {
 
 struct Mutex {};
 
-/// Work that is done at once, by the caller.
+/// A substitute for a future: the caller does the work immediately.
 class Threads {
  public:
   template <class Work, class Part>

@@ -1,5 +1,5 @@
-/// Files that are written as a whole or not at all, also after a kill, and read if they are
-/// regular.
+/// Files that are written whole or not at all, even if the process is killed, and read only if they
+/// are regular.
 #pragma once
 
 #include <cerrno>
@@ -29,14 +29,13 @@
 
 namespace sdnn::core {
 
-/// A file that is written under another name in the same folder, and gets its own at the end. A
-/// link or a pipe of its name is replaced: nothing is written to where it leads. What is named in
-/// /dev, such as /dev/stdout, is written to.
+/// A file that is written under a temporary name in the same folder and renamed at the end. A link
+/// or a pipe of its name is replaced, and its target stays as it was. Devices such as /dev/stdout
+/// are written to.
 ///
-/// `write` may be called many times; `finish` makes the file be there. Without it, or after an
-/// error, what was there before stays, and nothing else is left. Throws std::runtime_error naming
-/// the file and the system's error. On POSIX systems content and name are on the disk when
-/// `finish` returns.
+/// `write` may be called many times; `finish` renames the file. Without it, or after an error, an
+/// earlier file stays, and no temporary file remains. Throws std::runtime_error naming the file and
+/// the system's error. On POSIX systems content and name are on the disk when `finish` returns.
 class WholeFile {
  public:
   explicit WholeFile(const std::filesystem::path& path)
@@ -99,14 +98,14 @@ class WholeFile {
   }
 
  private:
-  /// Whether it is a name of a device, which cannot get a file in its place.
+  /// Whether the path names a device, which a file cannot replace.
   static bool is_special(const std::filesystem::path& path) {
     std::error_code ignored;
     const auto folder = std::filesystem::absolute(path, ignored).lexically_normal().parent_path();
     return folder == "/dev" || folder == "/dev/fd" || folder == "/proc/self/fd";
   }
 
-  /// One that nobody can foresee.
+  /// Returns an unpredictable suffix.
   static std::string partial_suffix() {
     std::random_device random;
     std::string suffix = ".";
@@ -152,8 +151,7 @@ class WholeFile {
 };
 
 /// A regular file, open for reading. Folders, devices and pipes are refused, without waiting for
-/// the writer of a pipe. Throws std::runtime_error that names the fault, but not
-/// the file.
+/// the writer of a pipe. Throws std::runtime_error that names the problem, but not the file.
 class RegularFile {
  public:
   explicit RegularFile(const std::filesystem::path& path) {

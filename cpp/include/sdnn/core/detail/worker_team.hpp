@@ -1,4 +1,4 @@
-/// Threads that stay ready for many short pieces of work.
+/// A pool of threads for many short pieces of work.
 #pragma once
 
 #include <atomic>
@@ -9,11 +9,11 @@
 
 namespace sdnn::core {
 
-/// `n_threads` threads, the caller's among them, that run one function at a time. Where the
-/// standard library has no threads, the caller alone.
+/// A pool of `n_threads` threads, including the caller's, that run one function at a time. Without
+/// threads in the standard library, the caller runs everything.
 ///
-/// Starting a thread costs more than a block of training; waking one that waits does not. Not to be
-/// used from several threads at once.
+/// Starting a thread costs more than a block of training; waking a waiting thread does not. A pool
+/// must not be used from several threads at once.
 class WorkerTeam {
  public:
   explicit WorkerTeam(std::size_t n_threads) {
@@ -43,7 +43,7 @@ class WorkerTeam {
 
   std::size_t size() const noexcept { return n_others_ + 1; }
 
-  /// Calls work(part) for part = 0 .. size() - 1, each in a thread of its own, and waits for all.
+  /// Calls work(part) for part = 0 .. size() - 1, each in a different thread, and waits for all.
   /// `work` must not throw.
   template <class Work>
   void run(const Work& work) {
@@ -56,7 +56,7 @@ class WorkerTeam {
     for (std::size_t busy = n_busy_.load(); busy != 0; busy = n_busy_.load()) n_busy_.wait(busy);
   }
 
-  /// Calls work(i) for i = 0 .. n - 1, each thread a contiguous part of them.
+  /// Calls work(i) for i = 0 .. n - 1, divided into a contiguous part for each thread.
   template <class Work>
   void run_over(std::size_t n, const Work& work) {
     run([&](std::size_t part) {

@@ -37,8 +37,8 @@ struct AcrobotAngles {
 /// The state as four numbers theta1, theta2 (rad), theta1_dot, theta2_dot (rad/s): of one acrobot
 /// (`Real` = double), or of one acrobot in each lane.
 ///
-/// An array and no Eigen vector: Eigen knows no numbers such as ours of lanes, and does not promise
-/// to inline its calls into a kernel that is compiled for one instruction set.
+/// This is an array and not an Eigen vector, because Eigen does not support lanes as numbers, nor
+/// guarantees that its calls are inlined into a kernel for one instruction set.
 template <class Real>
 struct SeparateForm {
   using Number = Real;
@@ -56,8 +56,8 @@ struct SeparateForm {
 };
 
 #if SDNN_LANES
-/// The state of one acrobot as a pair of angles and a pair of velocities, joint beside joint: a
-/// register of two lanes is there on every machine and halves the work on the sines.
+/// The state of an acrobot as a pair of angles and a pair of velocities. Every machine has a
+/// register of two lanes, which halves the work on the sines.
 struct PairedForm {
   using Number = double;
   using State = std::array<core::Lanes<2>, 2>;
@@ -77,13 +77,13 @@ struct PairedForm {
 
 /// The constants of the equations of motion, and one decision interval of them.
 ///
-/// theta1 = 0 hangs down, theta2 is relative to link 1; torque acts on joint 2 alone. The same bits
-/// in every form and every lane.
+/// theta1 = 0 hangs down, theta2 is relative to link 1; torque acts on joint 2 alone. Every form
+/// and every lane gives equal bits.
 /// Source: Spong, M. W. (1995). The swing up control problem for the acrobot. IEEE Control Systems
 /// 15(1), 49-55, with m2 l1 lc2 theta1_dot^2 sin theta2 in the second equation.
 class AcrobotDynamics {
  public:
-  /// The most integration steps in one decision.
+  /// The largest number of integration steps in a decision.
   static constexpr double kMaxIntegrationSteps = 1e6;
 
   /// Throws std::invalid_argument if a number is outside its range.
@@ -104,7 +104,7 @@ class AcrobotDynamics {
   /// Time derivative of `state` under `torque` (N m), given the sines and cosines of its angles.
   ///
   /// Spong's d11 a1 + d12 a2 + h1 + phi1 = 0, d12 a1 + d22 a2 + h2 + phi2 = torque by Cramer's
-  /// rule: the determinant depends on theta2 alone, so its division hides behind the right-hand
+  /// rule. The determinant depends on theta2 alone, so its division overlaps with the right-hand
   /// sides.
   template <class Form>
   SDNN_INLINE typename Form::State derivative(const typename Form::State& state,
@@ -129,7 +129,7 @@ class AcrobotDynamics {
     return -config_.link_length_1 * at.cos_1 - config_.link_length_2 * at.cos_12;
   }
 
-  /// Moves `state` on by one decision interval, or to the goal, wherever the mask `moving` is set.
+  /// Advances `state` by one decision interval, or to the goal, where the mask `moving` is set.
   ///
   /// `limit_1` and `limit_2` are the goal's limits of speed (rad/s). Returns where the goal was
   /// reached. Angles are not wrapped.
@@ -144,7 +144,7 @@ class AcrobotDynamics {
     const auto slope = [this, &torque](const State& at_state) SDNN_INLINE_LAMBDA {
       return derivative<Form>(at_state, Form::angles(at_state), torque);
     };
-    // All lanes step until the last has arrived; `state` takes the numbers of those that do.
+    // All lanes step until the last one has arrived; `state` takes the numbers of those that do.
     State now = state;
     Mask under_way = moving;
     auto at = Form::angles(now);

@@ -1,5 +1,4 @@
-/// The kernel of a batch of acrobots: their motion in lanes, wider ones where the processor has
-/// them.
+/// The kernel of a batch of acrobots, which move in the widest lanes of the processor.
 #pragma once
 
 #include <array>
@@ -13,7 +12,7 @@
 
 namespace sdnn::environments {
 
-/// One number per acrobot in each array; lengths are multiples of kAcrobotLanes.
+/// Arrays with a number for each acrobot; their lengths are multiples of kAcrobotLanes.
 struct AcrobotArrays {
   std::array<double*, 4> state;  ///< theta1, theta2, theta1_dot, theta2_dot
   const double* torque;
@@ -21,7 +20,7 @@ struct AcrobotArrays {
   std::uint64_t* mask;  ///< in: all ones where an acrobot moves, else 0; out: where the goal is
 };
 
-/// Doubles in the widest register.
+/// The number of doubles in the widest register.
 inline constexpr std::size_t kAcrobotLanes = 8;
 
 namespace detail {
@@ -93,7 +92,7 @@ inline void move_acrobots_neon(const AcrobotDynamics& dynamics, const AcrobotArr
 
 }  // namespace detail
 
-/// Moves `n` acrobots on by one decision interval or to the goal; angles are not wrapped.
+/// Advances `n` acrobots by one decision interval or to the goal; angles are not wrapped.
 SDNN_DISPATCH(void, move_acrobots,
               (const AcrobotDynamics& dynamics, const AcrobotArrays& arrays, std::size_t n),
               (dynamics, arrays, n))

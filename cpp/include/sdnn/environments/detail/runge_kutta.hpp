@@ -11,8 +11,8 @@ namespace sdnn::environments {
 /// The state after a time `step` of y' = derivative(y), given the slope at the start.
 ///
 /// `Real` is double or core::Lanes; the derivative has to be inlined for wide lanes. The slope at
-/// the start is an argument because a caller that uses every state it passes through has most of
-/// it already. The error of one step is O(step^5). Nothing is allocated.
+/// the start is an argument, because a caller that uses every state has already computed most of
+/// it. The error of a step is O(step^5). It allocates nothing.
 /// Source: Kutta 1901; the weights are 1/6, 1/3, 1/3, 1/6.
 template <class Real, std::size_t Size, class Derivative>
 SDNN_INLINE std::array<Real, Size> runge_kutta_step(const Derivative& derivative,

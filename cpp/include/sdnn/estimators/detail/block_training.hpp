@@ -1,4 +1,4 @@
-/// Training block by block over the weights: for any number of samples.
+/// Training in blocks of samples, for any number of samples.
 #pragma once
 
 #include <algorithm>
@@ -31,14 +31,13 @@ namespace sdnn::estimators {
 /// Presents samples in blocks.
 ///
 /// A pass over the weights, a few cache-resident columns of some units at a time, sums the block's
-/// potentials, for each two inputs along a short walk through the codes of their pair. What the
-/// block's own corrections change in its later potentials follows exactly from the inner products
-/// of its codes; the weights are corrected before the next pass, all corrections of a unit
-/// together. Weights are kept in 16 bits, in 32 as soon as a sum of them could leave 16.
+/// potentials, for each two inputs along a short walk through the codes of their pair. The effect
+/// of the block's corrections on its later potentials follows exactly from the inner products of
+/// its codes. The weights are corrected before the next pass, all corrections of a unit together.
+/// Weights have 16 bits, or 32 as soon as a sum of them could exceed 16.
 ///
-/// Blocks are large where the same ones come again in every epoch, each in the order of the data,
-/// and there is memory to keep what does not change of them. `Product` is an integer that holds
-/// every product.
+/// Blocks are large if they are repeated in every epoch, each in the order of the data, and if
+/// there is memory for their constant parts. `Product` is an integer that holds every product.
 template <class Product>
 class BlockTraining {
  public:
@@ -80,7 +79,7 @@ class BlockTraining {
     return count;
   }
 
-  /// Bytes beside the layer and the samples' bins; at most 1 % less than it takes.
+  /// The bytes beside the layer and the samples' bins; an estimate at most 1 % too low.
   static std::uint64_t bytes(std::size_t n_units, const coding::SelectiveDesensitization& code,
                              std::size_t n_samples, bool keeps_plans) noexcept {
     const std::uint64_t n_padded = core::round_up(n_units, kTileStep);
@@ -106,16 +105,16 @@ class BlockTraining {
   }
 
  private:
-  // Samples per pass over the weights: where plans are kept, and elsewhere.
+  // The number of samples per pass over the weights, with and without stored plans.
   static constexpr std::size_t kLargeBlock = 512;
   static constexpr std::size_t kSmallBlock = 256;
 
-  /// Words of a code, filled up with zeros to whole chunks.
+  /// The words of a code, padded with zeros to whole chunks.
   static std::size_t words_for(const coding::SelectiveDesensitization& code) noexcept {
     return core::round_up(code.n_words(), kChunkWords);
   }
 
-  /// The words of all chunks, then those that fill the last one.
+  /// The words of all chunks, then the padding of the last chunk.
   static std::vector<std::size_t> order_of(std::span<const PairChunk> chunks, std::size_t n_words) {
     std::vector<std::size_t> order;
     for (const PairChunk& chunk : chunks) {
@@ -129,7 +128,7 @@ class BlockTraining {
   using Wide = ChunkedWeights<std::int32_t>;
   static constexpr std::int64_t kLargestSum = std::numeric_limits<std::int16_t>::max();
 
-  /// Parts of a block that do not change.
+  /// The constant parts of a block.
   struct Plan {
     std::vector<CodeWalk> walks;  // of each chunk
     std::size_t stride = 0;
@@ -139,12 +138,12 @@ class BlockTraining {
   static std::size_t block_of(std::int32_t sample) noexcept {
     return static_cast<std::size_t>(sample) / kLargeBlock;
   }
-  /// Samples of the large block with a sample: the last one may have fewer.
+  /// The number of samples of the large block that has a sample; the last block may have fewer.
   std::size_t large_size(std::int32_t sample) const noexcept {
     const std::size_t n_samples = bins_.size() / layer_->code().n_inputs();
     return std::min(kLargeBlock, n_samples - block_of(sample) * kLargeBlock);
   }
-  /// Does the order begin with all samples of a large block, in the order of the data?
+  /// Whether the order begins with all samples of a large block, in the order of the data.
   bool begins_with_a_large_block(std::span<const std::int32_t> order) const noexcept {
     const auto first = static_cast<std::size_t>(order.front());
     if (!keeps_plans_ || first % kLargeBlock != 0 || order.size() < large_size(order.front())) {
@@ -261,7 +260,7 @@ class BlockTraining {
     for (auto& rows : pending_) rows.clear();
   }
 
-  /// The sum of |weights| of a unit in a chunk grows by no more than its columns per correction.
+  /// Each correction increases the sum of |weights| of a unit in a chunk by at most its columns.
   void widen_before_sums_overflow() {
     const auto* const narrow = std::get_if<Narrow>(&weights_);
     if (narrow == nullptr) return;

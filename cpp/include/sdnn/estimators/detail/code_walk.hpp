@@ -1,5 +1,5 @@
-/// Potentials of many samples, each from those of the sample before on a short walk, and the
-/// weights in the order in which such a walk reads them.
+/// Potentials of many samples along a short walk, each computed from the previous sample, and the
+/// weights in the order of such a walk.
 #pragma once
 
 #include <algorithm>
@@ -19,13 +19,13 @@
 
 namespace sdnn::estimators {
 
-/// Words of a code whose rows of weights are added together: 256 columns of 96 units in 16 bits fit
-/// into the first cache.
+/// The number of words of a code whose rows of weights are added together: 256 columns of 96 units
+/// in 16 bits fit into the first-level cache.
 inline constexpr std::size_t kChunkWords = 4;
 inline constexpr std::size_t kChunkColumns = 64 * kChunkWords;
 
-/// The weights of many units in chunks of columns, in each chunk unit after unit: n_padded_units
-/// units and 64 slots for each word, those of words that tiles lack all 0.
+/// The weights of many units in chunks of columns, and in each chunk by units: n_padded_units units
+/// and 64 slots for each word. Slots of words that tiles lack are 0.
 template <class Weight>
 class ChunkedWeights {
  public:
@@ -38,7 +38,7 @@ class ChunkedWeights {
       weights_[at] = static_cast<Weight>(tiles.at(unit, slot));
     });
   }
-  /// A copy in another type. The weights must fit.
+  /// Makes a copy in another type, which the weights must fit.
   template <class Other>
   explicit ChunkedWeights(const ChunkedWeights<Other>& other)
       : ChunkedWeights(other.n_padded_units(), other.n_chunks() * kChunkWords) {
@@ -53,7 +53,7 @@ class ChunkedWeights {
   std::size_t n_padded_units() const noexcept { return n_padded_units_; }
   std::size_t n_chunks() const noexcept { return n_chunks_; }
   const Weight* data() const noexcept { return weights_.data(); }
-  /// kChunkColumns weights of a unit; the next unit's follow.
+  /// The kChunkColumns weights of a unit, followed by those of the next unit.
   Weight* chunk(std::size_t chunk, std::size_t unit) noexcept {
     return weights_.data() + (chunk * n_padded_units_ + unit) * kChunkColumns;
   }
@@ -105,19 +105,20 @@ class ChunkedWeights {
   core::AlignedBuffer<Weight> weights_;  // (n_chunks, n_padded_units, kChunkColumns)
 };
 
-/// Units that are added side by side, in six registers.
+/// The number of units that are added together, in six registers.
 template <class Weight>
 inline constexpr std::size_t kMostUnits = 6 * core::IntegerRegister<Weight>::kSize;
 
-/// kChunkWords words of a code: where it is not 0, and where it is +1.
+/// The kChunkWords words of a code, as bits of the columns that are not 0 and that are +1.
 struct ChunkCode {
   std::uint64_t active[kChunkWords];
   std::uint64_t positive[kChunkWords];
 };
 
-/// The codes of samples in one chunk: different ones along a walk, and which of them a sample has.
+/// The codes of samples in a chunk: the different codes along a walk, and the code of each sample.
 struct CodeWalk {
-  /// From the code before, or from the code of zeros: columns that rise, then columns that fall.
+  /// The change from the previous code, or from the code of zeros: columns that rise, then columns
+  /// that fall.
   struct Step {
     std::uint16_t n_rising;
     std::uint16_t n_falling;
@@ -127,9 +128,9 @@ struct CodeWalk {
   std::vector<Step> steps;
   std::vector<std::uint16_t> places;  ///< of each sample: the step that leads to its code
 
-  /// The most samples that places can tell apart.
+  /// The largest number of samples that a place can index.
   static constexpr std::size_t kMostSamples = std::size_t{1} << 16;
-  /// The most bytes that the walks of all chunks of n_samples codes take.
+  /// The largest number of bytes of the walks of all chunks of n_samples codes.
   static std::uint64_t bytes(std::uint64_t n_samples, std::uint64_t n_chunks,
                              std::uint64_t most_active) noexcept {
     return n_samples * (most_active + n_chunks * (sizeof(Step) + sizeof(std::uint16_t)));
@@ -205,7 +206,7 @@ SDNN_INLINE void sum_steps_body(const Weight* rows, std::size_t width, const Cod
 
 }  // namespace detail
 
-/// Sums of the steps of a walk, and of each sample the step that it takes.
+/// The sums of the steps of a walk, and the step of each sample.
 template <class Weight>
 struct StepSums {
   const Weight* sums;
@@ -237,17 +238,17 @@ SDNN_INLINE void add_step_sums_body(std::span<const StepSums<Weight>> walks, std
 
 }  // namespace detail
 
-/// Lists what leads from code to code, from the code of zeros to the first and wherever that is
-/// nearer: the columns that rise, one that rises by 2 twice, then those that fall. Only the first
-/// `n_words` words of a code count. At most 64 columns a word and step, and 2 more at the end.
-/// Returns their end.
+/// Lists the changes from code to code, starting from the code of zeros for the first code and
+/// wherever that is nearer: columns that rise, twice if by 2, then columns that fall. Only the
+/// first `n_words` words of a code count. It writes at most 64 columns for each word and step, and
+/// 2 more at the end. Returns their end.
 SDNN_KERNEL(std::uint8_t*, list_steps,
             (std::span<const ChunkCode> codes, std::size_t n_words, std::uint8_t* at,
              CodeWalk::Step* steps),
             (codes, n_words, at, steps))
 
-/// sums[s * width + i] = the sum of the weights of unit i over the code of step s. A sum over
-/// a chunk has to fit into Weight.
+/// Computes sums[s * width + i], the sum of the weights of unit i over the code of step s. A sum
+/// over a chunk must fit into Weight.
 ///
 /// Shapes: rows (kChunkColumns, width).
 SDNN_KERNEL(void, sum_steps,
@@ -258,7 +259,7 @@ SDNN_KERNEL(void, sum_steps,
             (rows, width, walk, sums))
 
 /// Adds to potentials[s * stride + i], i = 0 .. width - 1, the sums of sample s in all walks, whose
-/// sum has to fit into Weight.
+/// total must fit into Weight.
 SDNN_KERNEL(void, add_step_sums,
             (std::span<const StepSums<std::int16_t>> walks, std::size_t width,
              std::size_t n_samples, std::int32_t* potentials, std::size_t stride),

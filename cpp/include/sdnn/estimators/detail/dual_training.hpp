@@ -1,4 +1,4 @@
-/// Training on potentials instead of weights: for few samples and many columns.
+/// Training on potentials instead of weights, for few samples and many columns.
 #pragma once
 
 #include <algorithm>
@@ -26,12 +26,12 @@
 
 namespace sdnn::estimators {
 
-/// Keeps the potentials of all units for all training samples, and how often each sample has been
-/// added to each unit; weights are made of that when asked for.
+/// Keeps the potentials of all units for all training samples, and the number of times that each
+/// sample was added to each unit; the weights are computed from these on demand.
 ///
 /// Correcting a unit by x_SD(t) and its threshold by 1 moves its potential for sample s by
 /// <x_SD(t), x_SD(s)> + 1, so a correction adds one row of the table of these products. Samples are
-/// presented in windows: a correction reaches the window's own potentials at once, and those of all
+/// presented in windows: a correction changes the window's potentials immediately, and those of all
 /// samples later, together with other corrections of its unit. `Product` is an integer that holds
 /// every product.
 template <class Product>
@@ -70,7 +70,7 @@ class DualTraining {
     const bool in_data_order =
         std::adjacent_find(order.begin(), order.end(),
                            [](auto one, auto next) { return next != one + 1; }) == order.end();
-    // Corrections may wait where a window's share of their rows lies side by side.
+    // Corrections may be delayed where a window's part of their rows is contiguous.
     const std::size_t interval = in_data_order ? kFlushInterval : 1;
     for (std::size_t waiting = 0; !order.empty(); waiting += kWindow) {
       core::interruption_point();
@@ -87,7 +87,7 @@ class DualTraining {
     return count;
   }
 
-  /// Bytes beside the layer and the samples' bins; at most 1 % less than it takes.
+  /// The bytes beside the layer and the samples' bins; an estimate at most 1 % too low.
   static std::uint64_t bytes(std::size_t n_units, const coding::SelectiveDesensitization& code,
                              std::size_t n_samples) noexcept {
     const std::uint64_t n_padded = core::round_up(n_units, kTileStep);
@@ -100,7 +100,8 @@ class DualTraining {
            + sizeof(Product) * kWindow * kWindow;          // gathered_
   }
 
-  /// weights += sum over samples of coefficient * x_SD, tile by tile and 64 slots at a time.
+  /// Adds the sum over samples of coefficient * x_SD to the weights, by tiles and 64 slots at a
+  /// time.
   void synchronize() {
     auto& tiles = layer_->tiles();
     const std::size_t n_padded = layer_->n_padded_units();
@@ -127,8 +128,8 @@ class DualTraining {
   }
 
  private:
-  /// The products of the samples [begin, end) with themselves and all later ones; the codes of
-  /// these few stay in the cache while those of the others pass.
+  /// Computes the products of the samples [begin, end) with themselves and all later samples; the
+  /// codes of these few samples stay in the cache.
   void fill_products(std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < coded_.size(); ++s) {
       for (std::size_t t = begin; t < std::min(end, s + 1); ++t) {
@@ -140,7 +141,7 @@ class DualTraining {
     }
   }
 
-  /// Adds word w of the samples to 64 rows of a tile, in 16 bits as long as these hold the sum.
+  /// Adds word w of the samples to 64 rows of a tile, in 16 bits while the sum fits.
   void add_samples(std::int32_t* rows, std::size_t width, std::size_t tile, std::size_t w,
                    const std::vector<std::pair<std::size_t, std::int32_t>>& samples) const {
     alignas(core::kCacheLine) std::array<std::int16_t, 64 * kTileUnits> sums{};
@@ -162,8 +163,8 @@ class DualTraining {
     widen();
   }
 
-  /// Moves the potentials of all samples by the corrections that wait; some samples at a time, so
-  /// that the products stay in the cache from unit to unit.
+  /// Applies the pending corrections to the potentials of all samples, some samples at a time, so
+  /// that the products stay in the cache for all units.
   void flush() {
     for (std::size_t begin = 0; begin < row_size_; begin += kColumns) {
       const std::size_t size = std::min(kColumns, row_size_ - begin);
@@ -175,7 +176,7 @@ class DualTraining {
     for (auto& rows : pending_) rows.clear();
   }
 
-  /// Presents samples that are neighbours in memory.
+  /// Presents samples that are contiguous in memory.
   template <class Rule>
   TrainingCount present_row(std::span<const std::int32_t> now, Rule& rule) {
     const auto begin = static_cast<std::size_t>(now[0]);
@@ -187,7 +188,7 @@ class DualTraining {
     return present_window(now, &products_[begin * row_size_ + begin], row_size_, rule);
   }
 
-  /// Presents any samples. Nothing is pending.
+  /// Presents any samples; no correction is pending.
   template <class Rule>
   TrainingCount present_some(std::span<const std::int32_t> now, Rule& rule) {
     for (std::size_t i = 0; i < layer_->n_units(); ++i) {
@@ -217,7 +218,7 @@ class DualTraining {
     });
   }
 
-  /// Entries of a row: room for a window from any sample on.
+  /// The number of entries of a row, with room for a window from any sample.
   static constexpr std::size_t row_size_for(std::size_t n_samples) noexcept {
     return core::round_up(n_samples + PresentationWindow::kAtOnce - 1, 32);
   }

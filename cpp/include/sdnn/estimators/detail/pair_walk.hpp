@@ -1,8 +1,8 @@
-/// Potentials of a block of samples, pair by pair of inputs.
+/// Potentials of a block of samples, computed by pairs of inputs.
 ///
-/// Many inputs leave no order of the samples in which neighbours have similar codes. The columns of
-/// one pair depend on two inputs alone, so each pair has an order of its own, a short walk through
-/// a plane.
+/// With many inputs, no order of the samples gives consecutive samples similar codes. The columns
+/// of a pair depend on two inputs alone, so each pair has a separate order, a short walk through a
+/// plane.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +26,7 @@
 
 namespace sdnn::estimators {
 
-/// 1, 2 or kChunkWords words of a code that depend on the same two inputs.
+/// A part of a code, 1, 2 or kChunkWords words that depend on the same two inputs.
 struct PairChunk {
   std::size_t one;
   std::size_t other;
@@ -34,7 +34,8 @@ struct PairChunk {
   std::size_t place = 0;  ///< of its first word among those of all chunks
 };
 
-/// All words of a code in chunks, large ones first: both pairs of two inputs together.
+/// Divides all words of a code into chunks, large chunks first; both pairs of two inputs are
+/// together.
 inline std::vector<PairChunk> pair_chunks(const coding::SelectiveDesensitization& code) {
   std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> words;
   for (std::size_t p = 0; p < code.n_pairs(); ++p) {
@@ -56,8 +57,8 @@ inline std::vector<PairChunk> pair_chunks(const coding::SelectiveDesensitization
   return chunks;
 }
 
-/// Walks of samples through the codes of each two inputs: in strips of equal bins of one, forth and
-/// back along the other.
+/// Walks of samples through the codes of each two inputs: in strips of equal bins of one input,
+/// alternating in direction along the other.
 class PairWalks {
  public:
   /// Shapes: bins (n_samples, n_inputs), at most CodeWalk::kMostSamples.
@@ -148,12 +149,12 @@ class PairWalks {
   std::vector<std::uint8_t> columns_;
 };
 
-/// Chunks whose sums are added together: more would leave the second cache.
+/// The number of chunks whose sums are added together, limited by the second-level cache.
 inline constexpr std::size_t kMostChunks = 4;
-/// Chunks whose walks are known at a time, so that potentials of some units stay in the caches.
+/// The number of chunks whose walks are computed at a time, so that potentials stay in the caches.
 inline constexpr std::size_t kWalks = 32;
 
-/// Sums what chunks of columns contribute to potentials, some chunks at a time.
+/// Adds the contributions of chunks of columns to potentials, some chunks at a time.
 template <class Weight>
 class ChunkSums {
  public:
@@ -168,8 +169,8 @@ class ChunkSums {
     return sizeof(Weight) * kMostUnits<Weight> * (kChunkColumns + kMostChunks * n_samples);
   }
 
-  /// Adds to potentials[s * stride + i], i = 0 .. width - 1, the codes of the samples in the walks'
-  /// chunks. read_rows(k, rows) writes the weights in the chunk of the k-th, (columns, width).
+  /// Adds to potentials[s * stride + i], i = 0 .. width - 1, the products of the samples' codes in
+  /// the walks' chunks. read_rows(k, rows) writes the weights of the k-th chunk, (columns, width).
   template <class ReadRows>
   void add(std::span<const CodeWalk> walks, std::size_t width, const ReadRows& read_rows,
            std::int32_t* potentials, std::size_t stride) {
@@ -193,7 +194,7 @@ class ChunkSums {
   core::AlignedBuffer<Weight> sums_;  // (n_chunks, n_samples, width)
 };
 
-/// Adds the weights of each sample's code to its potentials in some layers of one size,
+/// Adds the weights of each sample's code to its potentials in layers of equal size,
 /// potentials[(layer * n_samples + s) * n_padded_units + i].
 ///
 /// The sums over n_chunks chunks have to fit into Weight.

@@ -1,4 +1,4 @@
-/// Training as the rule is written: one sample, its potentials, its corrections.
+/// Training as the rule is defined: a sample, its potentials, its corrections.
 #pragma once
 
 #include <cstddef>
@@ -16,8 +16,8 @@
 
 namespace sdnn::estimators {
 
-/// The reference for the other forms: works on the layer's weights directly, and takes no memory
-/// that grows with the problem.
+/// The reference for the other forms. It works on the layer's weights directly, with a constant
+/// amount of memory.
 class PlainTraining {
  public:
   PlainTraining(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins,

@@ -1,4 +1,4 @@
-/// Samples presented one after the other, with the potentials that each of them will meet.
+/// A window of samples that are presented in sequence, with their potentials.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 
 namespace sdnn::estimators {
 
-/// Changes by a stretch of training.
+/// The changes by a part of a training.
 struct TrainingCount {
   std::size_t n_samples = 0;  ///< presentations that corrected something
   std::size_t n_units = 0;    ///< corrections of single units
@@ -26,13 +26,13 @@ struct TrainingCount {
   }
 };
 
-/// The potentials of all units for up to `capacity` samples, unit by unit, as of now; presenting
-/// the samples moves those of the later ones by the inner products of the codes.
+/// The current potentials of all units for up to `capacity` samples, ordered by units; presenting a
+/// sample changes those of later samples by the inner products of the codes.
 ///
-/// A correction reaches the next few samples one by one, the others a row at a time.
+/// A correction is applied to the next few samples individually, and to the others a row at a time.
 class PresentationWindow {
  public:
-  /// Samples whose potentials are read together: rows are filled up to a multiple of it.
+  /// The number of samples whose potentials are read together; rows are padded to a multiple of it.
   static constexpr std::size_t kAtOnce = 16;
 
   /// `n_padded_units` is a multiple of 16.
@@ -47,12 +47,13 @@ class PresentationWindow {
            (core::round_up(capacity, kAtOnce) + 2 * kAtOnce);
   }
 
-  /// Potentials of a unit for the samples of the window: to be filled before they are presented.
+  /// The potentials of a unit for the samples of the window; fill them before presenting the
+  /// samples.
   std::int32_t* row(std::size_t unit) noexcept { return by_unit_.data() + unit * stride_; }
   std::size_t stride() const noexcept { return stride_; }
 
-  /// Presents `samples` in their order, and calls note(b, correction) for what the b-th of them
-  /// corrects.
+  /// Presents `samples` in their order, and calls note(b, correction) for each correction by the
+  /// b-th sample.
   ///
   /// `products[b * stride + e]` is 1 plus the inner product of the b-th and the e-th sample, b <=
   /// e, with room for a multiple of kAtOnce products per row.

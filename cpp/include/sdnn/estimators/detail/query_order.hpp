@@ -1,4 +1,4 @@
-/// The order in which queries are answered: neighbours one after the other.
+/// An order of queries in which consecutive queries are similar.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace sdnn::estimators {
 
 namespace detail {
 
-/// The place of a point on a Hilbert curve through a cube of 2^n_bits points a side.
+/// The position of a point on a Hilbert curve through a cube with 2^n_bits points on each side.
 ///
 /// Source: Skilling 2004, "Programming the Hilbert curve". `axes` is scratch and is overwritten.
 /// Requires axes.size() * n_bits <= 64.
@@ -46,7 +46,8 @@ inline std::uint64_t hilbert_index(std::span<std::uint32_t> axes, int n_bits) no
   return index;
 }
 
-/// Length of a walk through the queries, in bins, each input's step counted up to `cap`.
+/// The length of a walk through the queries in bins; the step of each input counts as `cap` at
+/// most.
 inline std::uint64_t walk_length(std::span<const std::int32_t> bins, std::size_t n_inputs,
                                  std::span<const std::uint32_t> order, std::int32_t cap) noexcept {
   std::uint64_t length = 0;
@@ -62,8 +63,9 @@ inline std::uint64_t walk_length(std::span<const std::int32_t> bins, std::size_t
 
 }  // namespace detail
 
-/// An order of the queries in which few bins change from one to the next: the given one, or along a
-/// Hilbert curve, whichever is shorter. Shapes: bins (n_queries, n_inputs). Cost: a sort.
+/// Returns an order of the queries in which few bins change between consecutive queries: the given
+/// order or a Hilbert curve, whichever is shorter. Shapes: bins (n_queries, n_inputs). Cost: a
+/// sort.
 inline std::vector<std::uint32_t> query_order(std::span<const std::int32_t> bins,
                                               std::size_t n_inputs) {
   constexpr std::int32_t kCap = 64;  // beyond, patterns have little in common anyway

@@ -1,4 +1,4 @@
-/// Sums of some rows minus the sum of others: how corrections reach potentials and weights. Rows
+/// Sums of rows minus sums of other rows, by which corrections change potentials and weights. Rows
 /// are inner products of codes, or codes.
 #pragma once
 
@@ -35,7 +35,7 @@ struct SignedRows {
 
 namespace detail {
 
-/// `Registers` registers' worth of entries at `at`, of the rows [p, p_end) and [m, m_end).
+/// Sums the entries of `Registers` registers at `at`, of the rows [p, p_end) and [m, m_end).
 template <std::size_t Registers, class To, class Entry>
 SDNN_INLINE void add_signed_at(To* to, std::size_t at, const SignedRows<Entry>& rows, std::size_t p,
                                std::size_t p_end, std::size_t m, std::size_t m_end) noexcept {
@@ -98,7 +98,7 @@ SDNN_INLINE void add_row_body(std::int32_t* to, const Product* row, std::int32_t
 #pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 
-/// entries[k] = bit k of `plus` less bit k of `minus`, for 32 bits.
+/// Sets entries[k] = bit k of `plus` minus bit k of `minus`, for 32 bits.
 SDNN_INLINE void expand_bits(std::uint32_t plus, std::uint32_t minus,
                              std::int8_t* entries) noexcept {
 #if SDNN_LANES
@@ -145,7 +145,8 @@ SDNN_INLINE void expand_code_body(const coding::TernaryCode& code,
 
 }  // namespace detail
 
-/// to[i] += sum of row[offset + i] over the rows to add, minus that over those to subtract.
+/// Adds to to[i] the sum of row[offset + i] over the rows to add, minus that over the rows to
+/// subtract.
 ///
 /// At most `n_per_sum` (> 0) entries are added in their own type before their sum is widened.
 SDNN_KERNEL(void, add_signed,
@@ -165,7 +166,7 @@ SDNN_KERNEL(void, add_signed,
              std::size_t offset, std::size_t n_per_sum),
             (to, size, rows, offset, n_per_sum))
 
-/// to[i] += direction (+1 or -1) * row[i].
+/// Adds direction (+1 or -1) * row[i] to to[i].
 SDNN_KERNEL(void, add_row,
             (std::int32_t* to, const std::int16_t* row, std::int32_t direction, std::size_t size),
             (to, row, direction, size))
@@ -173,8 +174,8 @@ SDNN_KERNEL(void, add_row,
             (std::int32_t* to, const std::int32_t* row, std::int32_t direction, std::size_t size),
             (to, row, direction, size))
 
-/// Some words of a code as rows to add, `chunk_words` in each: entries[c * chunk_stride + k] is its
-/// +1, 0 or -1 in column k of chunk c. Their number is a multiple of `chunk_words`.
+/// Writes words of a code as rows of `chunk_words` words: entries[c * chunk_stride + k] is +1, 0 or
+/// -1, for column k of chunk c. Their number is a multiple of `chunk_words`.
 SDNN_KERNEL(void, expand_code,
             (const coding::TernaryCode& code, std::span<const std::size_t> words,
              std::size_t chunk_words, std::int8_t* entries, std::size_t chunk_stride),

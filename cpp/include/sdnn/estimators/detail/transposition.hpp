@@ -1,4 +1,4 @@
-/// Rows become columns: between values unit by unit and values sample by sample.
+/// Transposition between values ordered by units and values ordered by samples.
 #pragma once
 
 #include <cstddef>
@@ -24,14 +24,13 @@ using Shorts = core::IntegerRegister<std::int16_t>;
 using Words = core::IntegerRegister<std::int32_t>;
 using LongWords = core::IntegerRegister<std::int64_t>;
 
-/// The same 32 bytes as other integers.
+/// Reinterprets 32 bytes as other integers.
 template <class To, class From>
 SDNN_INLINE To as(const From& from) noexcept {
   return {(typename To::Vector)from.v};
 }
 
-// The first (low) or last (high) halves of the 16-byte parts of two registers, item by item in
-// turn.
+// Interleaves the first (low) or last (high) halves of the 16-byte parts of two registers.
 
 SDNN_INLINE Shorts low_turns(const Shorts& a, const Shorts& b) noexcept {
   return {
@@ -61,7 +60,7 @@ SDNN_INLINE LongWords last_halves(const LongWords& a, const LongWords& b) noexce
   return {__builtin_shufflevector(a.v, b.v, 2, 3, 6, 7)};
 }
 
-/// 16 rows and 8 columns: two squares of 8 at once, one in each half of the registers.
+/// Transposes 16 rows and 8 columns: two squares of 8 at once, one in each half of the registers.
 struct ShortBlock {
   static constexpr std::size_t kRows = 16;
   static constexpr std::size_t kColumns = 8;
@@ -94,7 +93,7 @@ struct ShortBlock {
   }
 };
 
-/// 8 rows and 8 columns.
+/// Transposes 8 rows and 8 columns.
 struct WordBlock {
   static constexpr std::size_t kRows = 8;
   static constexpr std::size_t kColumns = 8;
@@ -157,8 +156,8 @@ SDNN_INLINE void transpose_body(const Item* from, std::size_t from_stride, std::
 
 }  // namespace detail
 
-/// to[c * to_stride + r] = from[r * from_stride + c] for all rows r and columns c. Quickest for
-/// multiples of 16 rows and 8 columns.
+/// Sets to[c * to_stride + r] = from[r * from_stride + c] for all rows r and columns c. It is
+/// fastest for multiples of 16 rows and 8 columns.
 SDNN_KERNEL(void, transpose,
             (const std::int16_t* from, std::size_t from_stride, std::size_t n_rows,
              std::size_t n_columns, std::int16_t* to, std::size_t to_stride),

@@ -1,4 +1,4 @@
-/// Units that fire, and those nearest to their threshold.
+/// Counts of firing units, and the units nearest to their threshold.
 #pragma once
 
 #include <algorithm>
@@ -94,18 +94,18 @@ SDNN_INLINE std::int32_t least_above_body(const std::int32_t* values, std::size_
 
 }  // namespace detail
 
-/// Number of potentials above 0.
+/// The number of potentials above 0.
 SDNN_KERNEL(std::int32_t, count_firing, (const std::int32_t* potentials, std::size_t size),
             (potentials, size))
 
-/// keys[i] = (distance to the threshold) << n_bits | i of the units that fire (`firing`) or do not,
-/// INT32_MAX of the others; distances of `limit` and more are all `limit`. Returns the least key.
+/// Sets keys[i] = (distance to the threshold) << n_bits | i for the units that fire (`firing`) or
+/// do not, and INT32_MAX for the others; distances are at most `limit`. Returns the smallest key.
 SDNN_KERNEL(std::int32_t, rank_units,
             (const std::int32_t* potentials, std::size_t size, bool firing, int n_bits,
              std::int32_t limit, std::int32_t* keys),
             (potentials, size, firing, n_bits, limit, keys))
 
-/// The least of the values above `floor`, INT32_MAX if there is none.
+/// The smallest value above `floor`, or INT32_MAX.
 SDNN_KERNEL(std::int32_t, least_above,
             (const std::int32_t* values, std::size_t size, std::int32_t floor),
             (values, size, floor))

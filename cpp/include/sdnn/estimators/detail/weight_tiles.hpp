@@ -1,5 +1,5 @@
-/// The weights of many units, laid out so that a column of all units is a few cache lines, and the
-/// sums over these columns.
+/// The weights of many units in tiles, where a column of all units takes a few cache lines, and
+/// sums over columns.
 #pragma once
 
 #include <algorithm>
@@ -19,9 +19,9 @@
 
 namespace sdnn::estimators {
 
-/// Units whose weights lie side by side: the width of a full tile.
+/// The width of a full tile: the number of units whose weights are adjacent.
 inline constexpr std::size_t kTileUnits = 96;
-/// The widths of tiles are multiples of this.
+/// The factor of all widths of tiles.
 inline constexpr std::size_t kTileStep = 16;
 
 namespace detail {
@@ -29,8 +29,8 @@ namespace detail {
 template <std::size_t Value>
 using Size = std::integral_constant<std::size_t, Value>;
 
-/// Calls function(Size<width>()), so that the width, a multiple of 16 up to Most, is known when it
-/// is compiled.
+/// Calls function(Size<width>()), so that the width, a multiple of 16 up to Most, is a compile-time
+/// constant.
 template <std::size_t Most, std::size_t Width = kTileStep, class Function>
 SDNN_INLINE void for_width(std::size_t width, const Function& function) noexcept {
   if constexpr (Width < Most) {
@@ -108,14 +108,14 @@ SDNN_INLINE void add_outer_body(std::int16_t* rows, std::size_t width,
 }  // namespace detail
 
 /// Adds the coefficients to the rows of the set bits of `positive`, subtracts them from those of
-/// the other bits of `active`. 64 rows of `width` units.
+/// the other bits of `active`, in 64 rows of `width` units.
 SDNN_KERNEL(void, add_outer,
             (std::int16_t* rows, std::size_t width, const std::int16_t* coefficients,
              std::uint64_t active, std::uint64_t positive),
             (rows, width, coefficients, active, positive))
 
-/// sums[i] += the rows `plus` of a tile, -= its rows `minus`, i = 0 .. width - 1; at most
-/// `n_per_sum` rows are added before the sum is widened.
+/// Adds the rows `plus` of a tile to sums[i], and subtracts its rows `minus`, i = 0 .. width - 1;
+/// at most `n_per_sum` rows are added before the sum is widened.
 SDNN_KERNEL(void, add_rows,
             (const std::int16_t* tile, std::size_t width, std::span<const std::uint32_t> plus,
              std::span<const std::uint32_t> minus, std::size_t n_per_sum, std::int32_t* sums),
@@ -125,12 +125,12 @@ SDNN_KERNEL(void, add_rows,
              std::span<const std::uint32_t> minus, std::size_t n_per_sum, std::int32_t* sums),
             (tile, width, plus, minus, n_per_sum, sums))
 
-/// Weights in tiles of up to kTileUnits: inside a tile, slot after slot, the units side by side. A
-/// slot is a column's number when every pair's columns are padded to whole 64-bit words, so that
-/// slot s is bit s % 64 of word s / 64 of a code.
+/// Weights in tiles of up to kTileUnits units, which store adjacent units slot by slot. A slot is a
+/// column's number when every pair's columns are padded to whole 64-bit words, so that slot s is
+/// bit s % 64 of word s / 64 of a code.
 ///
-/// All tiles are kTileUnits wide but the last, whose width is the least multiple of 16 that holds
-/// the rest. Memory: sizeof(Weight) * n_slots * round_up(n_units, 16).
+/// All tiles are kTileUnits wide, except the last, whose width is the smallest multiple of 16 for
+/// the remaining units. Memory: sizeof(Weight) * n_slots * round_up(n_units, 16).
 template <class Weight>
 class WeightTiles {
  public:
@@ -140,7 +140,7 @@ class WeightTiles {
         n_slots_(n_slots),
         weights_(core::checked_product(core::round_up(n_units, kTileStep), n_slots)) {}
 
-  /// A copy in another type. The weights must fit.
+  /// Makes a copy in another type, which the weights must fit.
   template <class Other>
   explicit WeightTiles(const WeightTiles<Other>& other)
       : WeightTiles(other.n_units(), other.n_slots()) {
@@ -167,9 +167,9 @@ class WeightTiles {
     return tile(unit / kTileUnits)[slot * width(unit / kTileUnits) + unit % kTileUnits];
   }
 
-  /// sums[i] += unit i's weights in the slots to add, -= those to subtract; at most `n_per_sum` of
-  /// them, whose sum fits into Weight, are added before the sum is widened.
-  /// Shapes: sums (n_padded_units,).
+  /// Adds unit i's weights in the slots to add to sums[i], and subtracts those in the slots to
+  /// subtract; at most `n_per_sum` of them, whose sum fits into Weight, are added before the sum is
+  /// widened. Shapes: sums (n_padded_units,).
   void add_columns(const coding::SignedColumns& slots, std::size_t n_per_sum,
                    std::int32_t* sums) const {
     for (std::size_t t = 0; t < n_tiles(); ++t) {
