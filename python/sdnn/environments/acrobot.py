@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import gymnasium as gym
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn import _core
 from sdnn.config import AcrobotConfig
 from sdnn.environments.picture import AcrobotMotion, AcrobotPicture
+from sdnn.environments.types import Array, Data
 from sdnn.support.arguments import array_of, choice, one_of, real, require
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ _DTYPES: dict[str, type[np.float32] | type[np.float64]] = {
 }
 
 
-class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
+class AcrobotSwingUpEnv(gym.Env[Array, ArrayLike]):
     r"""Swing up a two-link pendulum with a motor at its elbow.
 
     The tip must pass 1.5 m above the fixed joint, at speeds below limits times `goal_tolerance`.
@@ -82,7 +83,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
     ```
     """
 
-    metadata: dict[str, Any] = {  # noqa: RUF012
+    metadata: Data = {  # noqa: RUF012
         "render_modes": ["human", "rgb_array", "rgb_array_list"],
         "render_fps": 4,
     }
@@ -127,9 +128,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
         require(tolerance >= 0.0, "goal_tolerance", "be at least 0", value)
         self._goal_tolerance = tolerance
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[Any], dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Data | None = None) -> tuple[Array, Data]:
         """Begin an episode; the option ``"goal_tolerance"`` holds for it and later ones."""
         super().reset(seed=seed)
         options = options or {}
@@ -149,7 +148,7 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
             self._show(())
         return self._observation(), self._info()
 
-    def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> tuple[Array, float, bool, bool, Data]:
         """Hold a torque for one decision interval.
 
         Raises ValueError unless the action is one number in [-1, 1], and RuntimeError if the
@@ -201,10 +200,10 @@ class AcrobotSwingUpEnv(gym.Env[NDArray[Any], ArrayLike]):
             self._picture.close()
             self._picture = None
 
-    def _observation(self) -> NDArray[Any]:
+    def _observation(self) -> Array:
         return _core.basic_observation(self._acrobot.state()).astype(self._dtype)
 
-    def _info(self) -> dict[str, Any]:
+    def _info(self) -> Data:
         return {
             "state": self._acrobot.state(),
             "tip_height": self._acrobot.tip_height(),

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import gymnasium as gym
-from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.config import GoalScheduleConfig
+from sdnn.environments.types import Array, Data
 from sdnn.support.arguments import whole
 
 
@@ -41,9 +41,7 @@ class GoalSchedule:
         return f"GoalSchedule({self.config})"
 
 
-class TighteningGoal(
-    gym.Wrapper[NDArray[Any], Any, NDArray[Any], Any], gym.utils.RecordConstructorArgs
-):
+class TighteningGoal(gym.Wrapper[Array, Any, Array, Any], gym.utils.RecordConstructorArgs):
     """Reduces the goal tolerance with the learning episode.
 
     The caller counts the learning episodes: ``reset(options={"episode": k})`` or the attribute
@@ -66,7 +64,7 @@ class TighteningGoal(
     """
 
     def __init__(
-        self, env: gym.Env[NDArray[Any], Any], schedule: Callable[[int], float] | None = None
+        self, env: gym.Env[Array, Any], schedule: Callable[[int], float] | None = None
     ) -> None:
         gym.utils.RecordConstructorArgs.__init__(self, schedule=schedule)
         super().__init__(env)
@@ -84,9 +82,7 @@ class TighteningGoal(
     def episode(self, value: int) -> None:
         self._episode = whole("episode", value, 1, 2**31 - 1)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[Any], dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Data | None = None) -> tuple[Array, Data]:
         """Begin an episode; the option ``"episode"`` sets the learning episode from now on."""
         options = dict(options or {})
         if "goal_tolerance" in options:

@@ -7,6 +7,7 @@ from typing import Any
 
 import gymnasium as gym
 
+from sdnn.environments.types import Data, Env
 from sdnn.support.arguments import has_methods, shown
 
 
@@ -35,9 +36,7 @@ class ActionMasks(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorAr
     300
     """
 
-    def __init__(
-        self, env: gym.Env[Any, Any], mask: Callable[[gym.Env[Any, Any]], Any] | None = None
-    ) -> None:
+    def __init__(self, env: Env, mask: Callable[[Env], Any] | None = None) -> None:
         gym.utils.RecordConstructorArgs.__init__(self, mask=mask)
         has_methods("env", env, "a Gymnasium environment", "reset", "step")
         super().__init__(env)
@@ -48,15 +47,15 @@ class ActionMasks(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorAr
         self._mask = mask
         self.metadata = {**(env.metadata or {}), "action_masks": True}
 
-    def reset(self, **kwargs: Any) -> tuple[Any, dict[str, Any]]:
+    def reset(self, **kwargs: Any) -> tuple[Any, Data]:
         """Begin an episode."""
         observation, info = self.env.reset(**kwargs)
         return observation, self._with_mask(info)
 
-    def step(self, action: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Any, Any, Any, Any, Data]:
         """Take an action."""
-        *seen, info = self.env.step(action)
-        return (*seen, self._with_mask(info))
+        *outcome, info = self.env.step(action)
+        return (*outcome, self._with_mask(info))
 
-    def _with_mask(self, info: dict[str, Any]) -> dict[str, Any]:
+    def _with_mask(self, info: Data) -> Data:
         return info if self._mask is None else {**info, "action_mask": self._mask(self.unwrapped)}

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.environments.spaces import in_a_line, wholes_of
+from sdnn.environments.types import Env, Space, VectorEnv
 from sdnn.support.arguments import require
 from sdnn.support.bounds import with_infinities
 
-Observed: TypeAlias = gym.Space[Any] | gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]
+Observed: TypeAlias = Space | Env | VectorEnv
 """An observation space, or an environment that has one."""
 
 _WAYS_OUT = {
@@ -29,9 +30,7 @@ _MOST_SHOWN = 3
 """Most variables with other bounds in a message."""
 
 
-def spaces_of(
-    observed: Observed, actions: gym.Space[Any] | None
-) -> tuple[gym.Space[Any], gym.Space[Any]]:
+def spaces_of(observed: Observed, actions: Space | None) -> tuple[Space, Space]:
     """Return the spaces of observations and actions: as given, or those of an environment."""
     has_spaces = _space_of(observed, "observation_space") is not None
     expected = "be a Gymnasium space, or an environment in its place such as gymnasium.make(id)"
@@ -44,7 +43,7 @@ def spaces_of(
     return _space_of(observed, "observation_space"), _space_of(observed, "action_space")
 
 
-def require_unbatched(observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
+def require_unbatched(observations: Space, actions: Space) -> None:
     """Check that spaces are not the batched ones of a vector environment; ValueError if they are.
 
     These are a Box with rows of equal bounds, one for each environment, and as many actions.
@@ -62,7 +61,7 @@ def require_unbatched(observations: gym.Space[Any], actions: gym.Space[Any]) -> 
         )
 
 
-def _has_equal_rows(space: gym.Space[Any]) -> bool:
+def _has_equal_rows(space: Space) -> bool:
     if not isinstance(space, gym.spaces.Box) or len(space.shape) < 2:
         return False
     return bool((space.low == space.low[:1]).all() and (space.high == space.high[:1]).all())
@@ -91,14 +90,15 @@ def require_same_kind(agent: Any, env: Any) -> None:
             " of sdnn.runs"
         )
     for name, fits in (("observation_space", _can_observe), ("action_space", _acts_alike)):
-        own, found = getattr(agent, name, None), _space_of(env, name)
-        if own is not None and found is not None and not fits(own, found):
+        space, other_space = getattr(agent, name, None), _space_of(env, name)
+        if space is not None and other_space is not None and not fits(space, other_space):
             raise ValueError(
-                f"env must have the agent's {name}, {in_a_line(own)}, got {in_a_line(found)}"
+                f"env must have the agent's {name}, {in_a_line(space)},"
+                f" got {in_a_line(other_space)}"
             )
-        if own is None or found is None or not getattr(agent, "has_bounds", True):
+        if space is None or other_space is None or not getattr(agent, "has_bounds", True):
             continue
-        if differences := list(_other_bounds(own, found)):
+        if differences := list(_other_bounds(space, other_space)):
             more = ", ..." * (len(differences) > _MOST_SHOWN)
             raise ValueError(
                 f"env must have the bounds of the agent's {name}, got others of"
@@ -106,17 +106,17 @@ def require_same_kind(agent: Any, env: Any) -> None:
             )
 
 
-def _other_bounds(own: Any, found: Any, part: str = "") -> Iterator[str]:
+def _other_bounds(space: Any, other_space: Any, part: str = "") -> Iterator[str]:
     """Yield the variables whose bounds differ, with both; the spaces fit otherwise."""
-    if isinstance(own, gym.spaces.Dict | gym.spaces.Tuple):
-        keys: Any = own.keys() if isinstance(own, gym.spaces.Dict) else range(len(own))
+    if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
+        keys: Any = space.keys() if isinstance(space, gym.spaces.Dict) else range(len(space))
         for key in keys:
-            yield from _other_bounds(own.spaces[key], found.spaces[key], f"{part}[{key!r}]")
-    if not isinstance(own, gym.spaces.Box):
+            yield from _other_bounds(space.spaces[key], other_space.spaces[key], f"{part}[{key!r}]")
+    if not isinstance(space, gym.spaces.Box):
         return
-    bounds, other = _bounds(own), _bounds(found)
-    types = [np.dtype(space.dtype) for space in (own, found)]
-    rounding = max(_ROUNDING, *(np.finfo(one).eps for one in types if one.kind == "f"), 0.0)
+    bounds, other = _bounds(space), _bounds(other_space)
+    types = [np.dtype(box.dtype) for box in (space, other_space)]
+    rounding = max(_ROUNDING, *(np.finfo(t).eps for t in types if t.kind == "f"), 0.0)
     size = np.where(np.isfinite(bounds), np.abs(bounds), 0.0).max(axis=1, keepdims=True)
     is_alike = (bounds == other) | np.isclose(bounds, other, rtol=0.0, atol=rounding * size)
     for i in np.flatnonzero(~is_alike.all(axis=1)):
@@ -133,11 +133,14 @@ def _bounds(space: Any) -> NDArray[np.float64]:
     return np.stack([with_infinities(np.ravel(end)) for end in (space.low, space.high)], axis=1)
 
 
-def require_same_variables(own: gym.Space[Any], found: gym.Space[Any]) -> None:
+def require_same_variables(space: Space, other_space: Space) -> None:
     """Check that a space can replace an agent's: all but bounds are the same; else ValueError."""
-    expected = f"have the variables of {in_a_line(own)}"
+    expected = f"have the variables of {in_a_line(space)}"
     require(
-        _can_observe(own, found) and _can_observe(found, own), "observation_space", expected, found
+        _can_observe(space, other_space) and _can_observe(other_space, space),
+        "observation_space",
+        expected,
+        other_space,
     )
 
 
@@ -151,22 +154,26 @@ def _is_unit(space: Any) -> bool:
     return bool((space.low >= 0.0).all() and (space.high <= 1.0).all())
 
 
-def _can_observe(own: gym.Space[Any], found: gym.Space[Any]) -> bool:
-    if isinstance(own, gym.spaces.Dict) and isinstance(found, gym.spaces.Dict):
-        return own.keys() == found.keys() and all(_can_observe(own[key], found[key]) for key in own)
-    if isinstance(own, gym.spaces.Tuple) and isinstance(found, gym.spaces.Tuple):
-        return len(own) == len(found) and all(map(_can_observe, own, found))
-    found_wholes, own_wholes = wholes_of(found), wholes_of(own)
-    if isinstance(own, gym.spaces.Box):
-        has_numbers = isinstance(found, gym.spaces.Box) or found_wholes is not None
-        return has_numbers and own.shape == found.shape
-    if own.shape != found.shape or found_wholes is None or own_wholes is None:
+def _can_observe(space: Space, other_space: Space) -> bool:
+    if isinstance(space, gym.spaces.Dict) and isinstance(other_space, gym.spaces.Dict):
+        return space.keys() == other_space.keys() and all(
+            _can_observe(space[key], other_space[key]) for key in space
+        )
+    if isinstance(space, gym.spaces.Tuple) and isinstance(other_space, gym.spaces.Tuple):
+        return len(space) == len(other_space) and all(map(_can_observe, space, other_space))
+    other_wholes, wholes = wholes_of(other_space), wholes_of(space)
+    if isinstance(space, gym.spaces.Box):
+        has_numbers = isinstance(other_space, gym.spaces.Box) or other_wholes is not None
+        return has_numbers and space.shape == other_space.shape
+    if space.shape != other_space.shape or other_wholes is None or wholes is None:
         return False
-    pairs = zip(found_wholes, own_wholes, strict=True)
-    return all(mine[0] <= one[0] and one[1] <= mine[1] for one, mine in pairs)
+    pairs = zip(other_wholes, wholes, strict=True)
+    return all(
+        low <= other_low and other_high <= high for (other_low, other_high), (low, high) in pairs
+    )
 
 
-def _acts_alike(own: gym.Space[Any], found: gym.Space[Any]) -> bool:
-    if isinstance(own, gym.spaces.Box) and isinstance(found, gym.spaces.Box):
-        return own.low.size == found.low.size
-    return wholes_of(own) is not None and wholes_of(own) == wholes_of(found)
+def _acts_alike(space: Space, other_space: Space) -> bool:
+    if isinstance(space, gym.spaces.Box) and isinstance(other_space, gym.spaces.Box):
+        return space.low.size == other_space.low.size
+    return wholes_of(space) is not None and wholes_of(space) == wholes_of(other_space)

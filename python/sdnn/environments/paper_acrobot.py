@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -14,6 +14,7 @@ from sdnn.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.goal import GoalSchedule
 from sdnn.environments.sensors import NoiseStream
+from sdnn.environments.types import Array, Data
 from sdnn.support.arguments import one_of, require, seed_of, whole
 
 PAPER_ACROBOT = "sdnn/PaperAcrobot-v0"
@@ -53,7 +54,7 @@ class PaperAcrobotEnv(AcrobotSwingUpEnv):
     ((6,), 0.25)
     """
 
-    metadata: dict[str, Any] = {  # noqa: RUF012
+    metadata: Data = {  # noqa: RUF012
         **AcrobotSwingUpEnv.metadata,
         "reset_episode": True,  # an option of reset: the number of the learning episode
     }
@@ -80,9 +81,7 @@ class PaperAcrobotEnv(AcrobotSwingUpEnv):
     def _restart_noise(self, seed: int) -> None:
         self._sensors = _core.AcrobotSensors(self.sensors, seed_of(seed), self._stream)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[Any], dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Data | None = None) -> tuple[Array, Data]:
         """Begin an episode; the option ``"episode"`` holds for it and later ones."""
         options = dict(options or {})
         self._episode = whole("episode", options.pop("episode", self._episode), 1, 2**31 - 1)

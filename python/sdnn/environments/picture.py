@@ -42,9 +42,9 @@ class AcrobotMotion:
     def __init__(self, config: AcrobotConfig) -> None:
         n_steps = round(config.decision_interval / config.integration_step)
         most = max(1, int(_LONGEST / config.integration_step * (1.0 + 1e-9)))
-        taken = next(n for n in range(min(most, n_steps), 0, -1) if n_steps % n == 0)
-        self.interval = taken * config.integration_step
-        self._n_intervals = n_steps // taken
+        n_joined = next(n for n in range(min(most, n_steps), 0, -1) if n_steps % n == 0)
+        self.interval = n_joined * config.integration_step
+        self._n_intervals = n_steps // n_joined
         parts = dataclasses.replace(
             config, decision_interval=self.interval, max_decisions=self._n_intervals
         )

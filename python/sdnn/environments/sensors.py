@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.config import SensorConfig
+from sdnn.environments.types import Array
 from sdnn.support.arguments import array_of, choice, one_of, require, seed_of
 from sdnn.support.bounds import with_infinities
 
-Observation = NDArray[Any]
+Observation = Array
 Env = gym.Env[Observation, Any]
 SensorFunction = Callable[[Observation], float]
 Edge = Literal["wrap", "saturate"]
@@ -42,10 +43,10 @@ class _Sensors(
 
     def _read(self, observation: Observation) -> Observation:
         """Return an observation of the environment; ValueError if it is of another shape."""
-        seen = array_of("observation", observation)
-        if seen.shape != self._space.shape:
-            raise ValueError(f"observation must have shape {self._space.shape}, got {seen.shape}")
-        return seen
+        values = array_of("observation", observation)
+        if values.shape != self._space.shape:
+            raise ValueError(f"observation must have shape {self._space.shape}, got {values.shape}")
+        return values
 
 
 class UnitSensors(_Sensors):
@@ -85,8 +86,8 @@ class UnitSensors(_Sensors):
     def observation(self, observation: Observation) -> NDArray[np.float64]:
         """Scale an observation, shape (l,)."""
         low, high = self.observation_low, self.observation_high
-        seen = self._read(observation).astype(np.float64, copy=False)
-        return np.clip((seen - low) / (high - low), 0.0, 1.0)
+        values = self._read(observation).astype(np.float64, copy=False)
+        return np.clip((values - low) / (high - low), 0.0, 1.0)
 
 
 class RedundantSensors(_Sensors):
@@ -126,8 +127,8 @@ class RedundantSensors(_Sensors):
         ends = [(0.0, 1.0)] * n if bounds is None else bounds
         if len(ends) != n:
             raise ValueError(f"bounds must have {n} entries, one per function, got {len(ends)}")
-        low: NDArray[Any] = np.append(self._space.low, [low for low, _ in ends])
-        high: NDArray[Any] = np.append(self._space.high, [high for _, high in ends])
+        low: Array = np.append(self._space.low, [low for low, _ in ends])
+        high: Array = np.append(self._space.high, [high for _, high in ends])
         self.observation_space = gym.spaces.Box(
             low.astype(self._float), high.astype(self._float), dtype=self._float
         )
@@ -197,13 +198,13 @@ class NoisySensors(_RandomSensors):
         (n_channels,) = self._space.shape
         if not (np.all(self._space.low >= 0.0) and np.all(self._space.high <= 1.0)):
             raise ValueError("the observation space must lie within [0, 1] in every channel")
-        words = (["wrap"] * 2 + ["saturate"] * n_channels)[:n_channels]
+        edges = (["wrap"] * 2 + ["saturate"] * n_channels)[:n_channels]
         if edge is not None:
-            words = [edge] * n_channels if isinstance(edge, str) else list(edge)
-        if len(words) != n_channels:
-            raise ValueError(f"edge must have {n_channels} entries, got {len(words)}")
+            edges = [edge] * n_channels if isinstance(edge, str) else list(edge)
+        if len(edges) != n_channels:
+            raise ValueError(f"edge must have {n_channels} entries, got {len(edges)}")
         self.sigma = sigma
-        self._edges = [one_of("edge", word, ("wrap", "saturate")) for word in words]
+        self._edges = [one_of("edge", word, ("wrap", "saturate")) for word in edges]
         self._restart(seed)
         self.observation_space = gym.spaces.Box(0.0, 1.0, (n_channels,), self._float)
 
@@ -248,8 +249,8 @@ class AcrobotSensors(_RandomSensors):
 
     def observation(self, observation: Observation) -> Observation:
         """Observe the environment's state, shape (n_inputs,)."""
-        seen: Observation = self._sensors.observe(cast(Any, self.unwrapped).state)
-        return seen.astype(self._float)
+        observed: Observation = self._sensors.observe(cast(Any, self.unwrapped).state)
+        return observed.astype(self._float)
 
     def _restart(self, seed: int) -> None:
         self._sensors = _core.AcrobotSensors(self._config, seed_of(seed), self._stream)
@@ -261,7 +262,7 @@ def _float_of(observation: Observation) -> np.dtype[Any]:
     return dtype if dtype.kind == "f" else np.dtype(np.float32)
 
 
-def _ends(name: str, given: ArrayLike | None, bounds: NDArray[Any]) -> NDArray[np.float64]:
+def _ends(name: str, given: ArrayLike | None, bounds: Array) -> NDArray[np.float64]:
     """Return the lower or upper ends of all ranges, shape (l,)."""
     numbers = bounds if given is None else array_of(name, given)
     ends = with_infinities(numbers.astype(np.float64))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
+from sdnn.environments.types import Array, Data, Space
 from sdnn.support.arguments import argument_error, array_of, blamed, require, shown
 from sdnn.support.bounds import flat_bounds, with_infinities
 
@@ -42,7 +43,7 @@ class Observations:
         For a space that is no vector when flattened, or has no variable.
     """
 
-    def __init__(self, space: gym.Space[Any]) -> None:
+    def __init__(self, space: Space) -> None:
         self.space = space
         self._shape = space.shape if isinstance(space, gym.spaces.Box) else None
         self._low, self._high = flat_bounds(space)
@@ -84,7 +85,7 @@ class Observations:
             missing=missing,
         )
 
-    def vector(self, name: str, observation: Any) -> NDArray[Any]:
+    def vector(self, name: str, observation: Any) -> Array:
         """Return the variables of an observation, in any shape; ValueError if it is none.
 
         Masked ones are NaN.
@@ -108,11 +109,13 @@ class Observations:
         if is_array and observations.shape[1:] == self._shape:
             rows: NDArray[np.float64] = observations.astype(np.float64)
         else:
-            rows = np.array([self.vector(name, one) for one in observations], np.float64)
+            rows = np.array(
+                [self.vector(name, observation) for observation in observations], np.float64
+            )
         return rows if rows.ndim == 2 else rows.reshape(-1, self.n_variables)
 
 
-def has_mask(space: gym.Space[Any], observation: Any) -> bool:
+def has_mask(space: Space, observation: Any) -> bool:
     """Return whether an observation of a space, or a part of it, is a masked array."""
     if isinstance(space, gym.spaces.Dict) and isinstance(observation, Mapping):
         return any(has_mask(part, observation.get(key)) for key, part in space.spaces.items())
@@ -122,7 +125,7 @@ def has_mask(space: gym.Space[Any], observation: Any) -> bool:
     return any(isinstance(row, np.ma.MaskedArray) for row in rows)
 
 
-def _readings(name: str, values: Any, kinds: str = "fiub") -> NDArray[Any]:
+def _readings(name: str, values: Any, kinds: str = "fiub") -> Array:
     """Return numbers as an array, with NaN for masked ones; ValueError for others."""
     rows = values if isinstance(values, list | tuple) else [values]
     if not any(isinstance(row, np.ma.MaskedArray) for row in rows):
@@ -130,13 +133,11 @@ def _readings(name: str, values: Any, kinds: str = "fiub") -> NDArray[Any]:
     masked: Any = np.ma.array(values)
     require(masked.dtype.kind in "fiub", name, "be numbers", values)
     is_complete = not np.ma.is_masked(masked)
-    readings: NDArray[Any] = (
-        masked.data if is_complete else masked.astype(np.float64).filled(np.nan)
-    )
+    readings: Array = masked.data if is_complete else masked.astype(np.float64).filled(np.nan)
     return readings
 
 
-def _flat_parts(space: gym.Space[Any], observation: Any) -> Iterator[NDArray[Any]]:
+def _flat_parts(space: Space, observation: Any) -> Iterator[Array]:
     """Yield the variables of each part as Gymnasium flattens them; of missing symbols NaN.
 
     ValueError, or what looking raises, for an observation that is not of the space.
@@ -173,7 +174,7 @@ def _flat_parts(space: gym.Space[Any], observation: Any) -> Iterator[NDArray[Any
         yield (values.astype(space.dtype) if is_cast else values).reshape(-1)
 
 
-def _symbols_of(space: gym.Space[Any], first: int = 0) -> Iterator[tuple[int, int]]:
+def _symbols_of(space: Space, first: int = 0) -> Iterator[tuple[int, int]]:
     """Yield the first variable and the length of each one-hot group of a flattened space."""
     if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
         for part in space.spaces.values() if isinstance(space, gym.spaces.Dict) else space.spaces:
@@ -241,7 +242,7 @@ class Actions:
         The core's settings.
     """
 
-    def __init__(self, space: gym.Space[Any]) -> None:
+    def __init__(self, space: Space) -> None:
         self.space = space
         self.is_box = isinstance(space, gym.spaces.Box)
         wholes = wholes_of(space)
@@ -273,11 +274,11 @@ class Actions:
             number=number if dtype.kind == "f" else "whole",
         )
 
-    def elements(self, numbers: NDArray[np.float64]) -> NDArray[Any]:
+    def elements(self, numbers: NDArray[np.float64]) -> Array:
         """Make the elements of the space that have these numbers, one of each row."""
         return numbers.astype(self._dtype).reshape(self._rows)
 
-    def hold(self, rows: NDArray[Any]) -> bool:
+    def hold(self, rows: Array) -> bool:
         """Return whether all rows of an array are elements: environments may not check them."""
         if rows.ndim == 0 or rows.shape[1:] != self._rows[1:]:
             return False
@@ -296,8 +297,8 @@ class Actions:
         require(not self.is_box, name, "be None where actions are a Box", mask)
         is_of_parts = isinstance(mask, tuple | list) and any(hasattr(x, "__len__") for x in mask)
         parts = [
-            array_of(name, one, "fbiu", "0 or 1 per action").reshape(-1)
-            for one in (mask if is_of_parts else (mask,))
+            array_of(name, part, "fbiu", "0 or 1 per action").reshape(-1)
+            for part in (mask if is_of_parts else (mask,))
         ]
         sizes = self.n_actions if is_of_parts else [sum(self.n_actions)]
         expected = f"have {' and '.join(map(str, sizes))} numbers"
@@ -306,7 +307,7 @@ class Actions:
         require(((allowed == 0) | (allowed == 1)).all(), name, "be 0 or 1 per action", mask)
         return allowed.astype(np.uint8)
 
-    def numbers(self, action: Any) -> NDArray[Any]:
+    def numbers(self, action: Any) -> Array:
         """Return the numbers of an element, in any shape; ValueError if they are none."""
         if type(action) is np.ndarray and action.dtype is self._dtype:
             return action
@@ -331,11 +332,11 @@ def space_of_error(error: ValueError, observations: Observations, actions: Actio
     argument, _ = blamed(error)
     if argument.startswith("action."):
         return "of action_space"
-    found = [reason for word, reason in reasons.items() if word in str(error)]
-    return ", ".join(found if argument else ())
+    matches = [reason for word, reason in reasons.items() if word in str(error)]
+    return ", ".join(matches if argument else ())
 
 
-def wholes_of(space: gym.Space[Any]) -> list[tuple[int, int]] | None:
+def wholes_of(space: Space) -> list[tuple[int, int]] | None:
     """Return the first and the last whole number of each dimension; None for other spaces."""
     if isinstance(space, gym.spaces.Discrete):
         return [(int(space.start), int(space.start) + int(space.n) - 1)]
@@ -347,12 +348,12 @@ def wholes_of(space: gym.Space[Any]) -> list[tuple[int, int]] | None:
     return None
 
 
-def in_a_line(space: gym.Space[Any]) -> str:
+def in_a_line(space: Space) -> str:
     """Return a space in one line, for a message."""
     return " ".join(str(space).split())
 
 
-def space_data(space: gym.Space[Any]) -> dict[str, Any]:
+def space_data(space: Space) -> Data:
     """Return a space as data that JSON can hold; TypeError for other kinds of spaces."""
     dtype = np.dtype(space.dtype).str
     if isinstance(space, gym.spaces.Box):
@@ -378,7 +379,7 @@ def space_data(space: gym.Space[Any]) -> dict[str, Any]:
 def _key(key: Any) -> Any:
     """Return a key of a Dict as JSON has it: a tuple as a list; TypeError for others."""
     if type(key) is tuple:
-        return [_key(one) for one in key]
+        return [_key(part) for part in key]
     if type(key) not in (str, int, bool):
         raise TypeError(
             "must have keys that are texts, whole numbers or tuples of such, got the key"
@@ -396,12 +397,12 @@ _MOST_VALUES = 2**20
 """Most values of a space in a file: more would only take memory."""
 
 
-def _finite(values: NDArray[Any]) -> list[Any]:
+def _finite(values: Array) -> list[Any]:
     """Return numbers in a row, infinite ones as words: JSON has none."""
     return [str(x) if np.isinf(x) else x for x in values.reshape(-1).tolist()]
 
 
-def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
+def space_of(data: Mapping[str, Any]) -> Space:
     """Make the space that `space_data` described; ValueError if there is none."""
     kind = data.get("dtype", "<f4")
     require(kind in _TYPES, "dtype", "be that of numbers", kind)
@@ -419,8 +420,8 @@ def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
         )
         return gym.spaces.Box(low, high, dtype=dtype.type)
     if "discrete" in data:
-        own = {} if dtype == np.int64 else {"dtype": dtype.type}  # Gymnasium 1.1 has no dtype
-        return gym.spaces.Discrete(data["discrete"], start=data["start"], **own)
+        options = {} if dtype == np.int64 else {"dtype": dtype.type}  # Gymnasium 1.1 has no dtype
+        return gym.spaces.Discrete(data["discrete"], start=data["start"], **options)
     if "multi_discrete" in data:
         n, start = np.array(data["multi_discrete"]), np.array(data["start"])
         return gym.spaces.MultiDiscrete(n, dtype=dtype.type, start=start)
@@ -431,14 +432,14 @@ def space_of(data: Mapping[str, Any]) -> gym.Space[Any]:
     return gym.spaces.Tuple([space_of(part) for part in data["tuple"]])
 
 
-def observation_space_of(config: _core.ObservationConfig) -> gym.Space[Any]:
+def observation_space_of(config: _core.ObservationConfig) -> Space:
     """Make the observation space of an agent that was made in C++: real numbers."""
     low = np.array([-np.inf if x is None else x for x in config.low], np.float64)
     high = np.array([np.inf if x is None else x for x in config.high], np.float64)
     return gym.spaces.Box(low, high, dtype=np.float64)
 
 
-def action_space_of(config: _core.ActionConfig) -> gym.Space[Any]:
+def action_space_of(config: _core.ActionConfig) -> Space:
     """Make the action space of an agent that was made in C++: Box, Discrete or MultiDiscrete."""
     low, high = np.array(config.low, np.float64), np.array(config.high, np.float64)
     if not config.discrete:

@@ -14,10 +14,11 @@ from sdnn import _core
 from sdnn.config import AcrobotConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
 from sdnn.environments.picture import AcrobotPicture
+from sdnn.environments.types import Array, Data
 from sdnn.support.arguments import array_of, one_of, require, whole
 
 
-class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDArray[Any]]):
+class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[Array, ArrayLike, Array]):
     """A vector environment with the bits of N `AcrobotSwingUpEnv`, in vector registers.
 
     ``gymnasium.make_vec("sdnn.environments:sdnn/AcrobotSwingUp-v0", num_envs=N)`` makes one.
@@ -50,7 +51,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
     ([0.0, -5.0, 0.0], [0.496, -2.0, 0.496])
     """
 
-    metadata: dict[str, Any] = {  # noqa: RUF012
+    metadata: Data = {  # noqa: RUF012
         "render_modes": ["rgb_array"],
         "render_fps": AcrobotSwingUpEnv.metadata["render_fps"],
         "autoreset_mode": gym.vector.AutoresetMode.NEXT_STEP,
@@ -98,8 +99,8 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         self,
         *,
         seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
-    ) -> tuple[NDArray[Any], dict[str, Any]]:
+        options: Data | None = None,
+    ) -> tuple[Array, Data]:
         """Begin an episode in every environment, or in those of the option ``"reset_mask"``.
 
         The option ``"goal_tolerance"``, a number or shape (num_envs,), holds for the environments
@@ -123,9 +124,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
 
     def step(
         self, actions: ArrayLike
-    ) -> tuple[
-        NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
-    ]:
+    ) -> tuple[Array, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Data]:
         """Hold torques, shape (num_envs, 1), for one decision interval; reset what has ended.
 
         Raises ValueError unless each action is in [-1, 1]; then nothing has moved.
@@ -195,12 +194,12 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[NDArray[Any], ArrayLike, NDAr
         self._ended = self._ended & ~mask
         self._batch.reset(mask)
 
-    def _observations(self) -> NDArray[Any]:
+    def _observations(self) -> Array:
         return self._batch.observations().astype(self._dtype)
 
-    def _infos(self, mask: NDArray[np.bool_]) -> dict[str, Any]:
+    def _infos(self, mask: NDArray[np.bool_]) -> Data:
         """Return arrays over the environments, 0 outside the mask, and the masks."""
-        infos: dict[str, Any] = {
+        infos: Data = {
             "state": self._batch.states(),
             "tip_height": self._batch.tip_heights(),
             "goal_tolerance": self._tolerances.copy(),

@@ -162,11 +162,11 @@ class Schedule(Callback):
         learning_rate: Callable[[float], float] | None = None,
         epsilon: Callable[[float], float] | None = None,
     ) -> None:
-        given = {"learning_rate": learning_rate, "epsilon": epsilon}
-        for name, function in given.items():
+        functions = {"learning_rate": learning_rate, "epsilon": epsilon}
+        for name, function in functions.items():
             is_function = function is None or callable(function)
             require(is_function, name, "be a function of the progress", function, TypeError)
-        self._functions = {name: f for name, f in given.items() if f is not None}
+        self._functions = {name: f for name, f in functions.items() if f is not None}
 
     def on_start(self, training: Training) -> None:
         """Set the rates of the first step."""

@@ -6,9 +6,9 @@ import abc
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
-import gymnasium as gym
 import numpy as np
 
+from sdnn.environments.types import Data, Env
 from sdnn.training.steps import (
     checked_outcome,
     copied,
@@ -19,7 +19,7 @@ from sdnn.training.steps import (
 )
 
 Seeds: TypeAlias = Mapping[int, int | None]
-Options: TypeAlias = dict[str, Any] | None
+Options: TypeAlias = Data | None
 
 
 class EnvironmentAdapter(abc.ABC):
@@ -59,7 +59,7 @@ class OneEnvironment(EnvironmentAdapter):
     n_environments = 1
     can_repeat = True
 
-    def __init__(self, env: gym.Env[Any, Any]) -> None:
+    def __init__(self, env: Env) -> None:
         self._env = env
         self.rewards, self.terminated, self.truncated = [0.0], [False], [False]
         self.masks = [None] if has_action_masks(env) else None
@@ -73,13 +73,13 @@ class OneEnvironment(EnvironmentAdapter):
 
     def take(self, action: Any) -> tuple[Any, float, bool, bool]:
         """Take an action; return what a step gives but for the info."""
-        seen, reward, terminated, truncated, info = step_env(self._env, copied(action))
+        observation, reward, terminated, truncated, info = step_env(self._env, copied(action))
         reward, terminated, truncated = checked_outcome(reward, terminated, truncated)
         if self.masks is not None:
             self.masks = [None if terminated else mask_in(info)]
-        return seen, reward, terminated, truncated
+        return observation, reward, terminated, truncated
 
     def step(self, actions: Sequence[Any]) -> Any:
         """Take the only action."""
-        seen, self.rewards[0], self.terminated[0], self.truncated[0] = self.take(actions[0])
-        return seen[np.newaxis] if type(seen) is np.ndarray else [seen]
+        observation, self.rewards[0], self.terminated[0], self.truncated[0] = self.take(actions[0])
+        return observation[np.newaxis] if type(observation) is np.ndarray else [observation]

@@ -8,8 +8,8 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 
+from sdnn.environments.types import Array, Data
 from sdnn.training.environments import EnvironmentAdapter, OneEnvironment
 from sdnn.training.files import SavedEpisode
 from sdnn.training.learners import EachLearner
@@ -36,11 +36,11 @@ def episode_seed(seed: int, kind: int, episode: int) -> int:
 class _ActionLog:
     """The actions of an episode, which may have millions of them, in arrays of many each."""
 
-    def __init__(self, actions: NDArray[Any] | None = None) -> None:
+    def __init__(self, actions: Array | None = None) -> None:
         self._arrays = [] if actions is None or not len(actions) else [actions]
         self._recent: list[Any] = []
 
-    def array(self) -> NDArray[Any]:
+    def array(self) -> Array:
         """Return all of them, shape (n, ...)."""
         arrays = self._arrays + ([np.array(self._recent)] if self._recent else [])
         return np.concatenate(arrays) if arrays else np.empty(0)
@@ -99,7 +99,7 @@ class Episodes:
         learner: EachLearner,
         seed: int | None,
         first: int,
-        options: Callable[[int], dict[str, Any] | None],
+        options: Callable[[int], Data | None],
         unusable: Callable[[Exception, int | None], UnusableStepError],
     ) -> None:
         self._env, self._seed, self._options = env, seed, options

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.environments.matching import require_same_kind
+from sdnn.environments.types import Data, Env
 from sdnn.support.arguments import has_methods, require, seed_of, whole
 from sdnn.support.display import Displayed
 from sdnn.training.episodes import EVALUATION, episode_seed
@@ -67,7 +67,7 @@ class Evaluation(Displayed):
         spread = f"{self.mean_return:.5g} ({low:.5g} to {high:.5g})"
         return {"episodes": self.returns.size, "mean return": spread}
 
-    def row(self) -> dict[str, Any]:
+    def row(self) -> Data:
         """Return it as values that JSON can hold."""
         return {
             "mean_return": self.mean_return,
@@ -82,11 +82,11 @@ class Evaluation(Displayed):
 @explained
 def evaluate(
     agent: Acts,
-    env: gym.Env[Any, Any],
+    env: Env,
     episodes: int = 10,
     *,
     seed: int | None = 0,
-    options: dict[str, Any] | None = None,
+    options: Data | None = None,
 ) -> Evaluation:
     """Run greedy episodes, in which nothing is learned and nothing of the agent's future changes.
 
@@ -126,7 +126,7 @@ def evaluate(
     n_episodes = whole("episodes", episodes, 1, 10**9)
     is_options = isinstance(options, dict | None)
     require(is_options, "options", "be a dictionary or None", options, TypeError)
-    returns, lengths, ends = [], [], []
+    returns, lengths, terminated = [], [], []
     for episode in range(n_episodes):
         for now in greedy_episode(agent, env, root, episode, options):
             if now.n_steps == _LONG:
@@ -138,9 +138,9 @@ def evaluate(
                 )
         returns.append(now.total_reward)
         lengths.append(now.n_steps)
-        ends.append(now.terminated)
+        terminated.append(now.terminated)
     return Evaluation(
-        returns=np.array(returns), lengths=np.array(lengths), terminated=np.array(ends, bool)
+        returns=np.array(returns), lengths=np.array(lengths), terminated=np.array(terminated, bool)
     )
 
 
@@ -154,18 +154,18 @@ class GreedyEpisode(NamedTuple):
 
 def greedy_episode(
     agent: Acts,
-    env: gym.Env[Any, Any],
+    env: Env,
     seed: int | None,
     number: int,
-    options: dict[str, Any] | None = None,
+    options: Data | None = None,
 ) -> Iterator[GreedyEpisode]:
     """Run an episode of an evaluation; yield how far it is, first after the reset.
 
     UnusableStepError as of `evaluate`.
     """
-    own = None if seed is None else episode_seed(seed, EVALUATION, number)
+    reset_seed = None if seed is None else episode_seed(seed, EVALUATION, number)
     with fixed(env, getattr(agent, "wrappers", ())):
-        observation, info = reset_env(env, own, options)
+        observation, info = reset_env(env, reset_seed, options)
         has_masks = has_action_masks(env)
         if hasattr(agent, "begin_greedy_episode"):
             agent.begin_greedy_episode()

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Protocol
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from sdnn.environments.spaces import Actions
+from sdnn.environments.types import Array, Data
 from sdnn.support.arguments import seed_of
 from sdnn.support.state_files import Arrays, Description, read_file, write_file
 from sdnn.training.statistics import Statistics, read_statistics
@@ -25,11 +25,11 @@ _Period = Annotated[int, msgspec.Meta(ge=1, le=2**53)]
 class SavedClass(Protocol):
     """A class whose objects are made of what files hold."""
 
-    def rebuild(self, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Any:
+    def rebuild(self, description: Mapping[str, Any], arrays: Mapping[str, Array]) -> Any:
         """Make an object; an ordinary error if description and arrays do not fit."""
 
 
-CLASSES: dict[str, Any] = {}
+CLASSES: Data = {}
 """The classes of agents, by the name that files have; `sdnn.agents.Agent` adds its subclasses."""
 
 
@@ -43,9 +43,9 @@ def read_agent(path: Path, *kinds: str) -> tuple[Any, Description, Arrays]:
     name = description.get("class")
     if str(name) not in CLASSES:
         raise ValueError(f"{path} holds an agent of an unknown class, {name!r}")
-    own = {key: a for key, a in arrays.items() if not key.startswith(_ARRAYS_OF_TRAINING)}
+    state = {key: a for key, a in arrays.items() if not key.startswith(_ARRAYS_OF_TRAINING)}
     try:
-        return CLASSES[str(name)].rebuild(description, own), description, arrays
+        return CLASSES[str(name)].rebuild(description, state), description, arrays
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is damaged: {error}") from error
 
@@ -117,12 +117,12 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
 
     takes_missing = agent.missing != "error"
 
-    def array(name: str) -> NDArray[Any]:
+    def array(name: str) -> Array:
         if name not in arrays or not (takes_missing or np.isfinite(arrays[name]).all()):
             raise ValueError(f"{path} is damaged: {name} must be there, of numbers")
         return arrays[name]
 
-    def actions(name: str) -> NDArray[Any]:
+    def actions(name: str) -> Array:
         if not Actions(agent.action_space).hold(array(name)):
             raise ValueError(f"{path} is damaged: {name} must be actions of {agent.action_space}")
         return arrays[name]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sdnn.environments.types import Array
 from sdnn.training.steps import checked_outcome, copied
 
 if TYPE_CHECKING:
@@ -124,7 +125,7 @@ class _CoreLearner(EachLearner):
         n_environments: int,
         core: Controller,
         read: Callable[[str, Any], NDArray[np.float64]],
-        elements: Callable[[NDArray[np.float64]], NDArray[Any]],
+        elements: Callable[[NDArray[np.float64]], Array],
         mask: Callable[[str, Any], NDArray[np.uint8] | None],
     ) -> None:
         super().__init__(learner, n_environments)
@@ -154,7 +155,7 @@ class _CoreLearner(EachLearner):
                 chosen[i] = np.ravel(actions[i])  # an element of the space after a replay
         return chosen
 
-    def elements(self, actions: NDArray[np.float64]) -> NDArray[Any]:
+    def elements(self, actions: NDArray[np.float64]) -> Array:
         return self._elements(actions)
 
     def learn(self, *outcomes: Any) -> int:
@@ -165,5 +166,5 @@ def each_learner(learner: Any, n_environments: int) -> EachLearner:
     """Return a learner in all environments; an agent of the core acts and learns in one call."""
     core_parts = getattr(type(learner), "core_parts", None)
     parts = core_parts and core_parts(learner)
-    kind = _CoreLearner if parts else EachLearner
-    return kind(learner, n_environments, *(parts or ()))
+    learner_class = _CoreLearner if parts else EachLearner
+    return learner_class(learner, n_environments, *(parts or ()))

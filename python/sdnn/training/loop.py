@@ -13,6 +13,7 @@ from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any, TypeAlias
 
+from sdnn.environments.types import Data
 from sdnn.support.interrupts import Interrupts
 from sdnn.training.episodes import Episodes
 from sdnn.training.evaluation import evaluate
@@ -172,7 +173,7 @@ class TrainingLoop(abc.ABC):
         return failure
 
     def _set_progress(self, is_episode_over: bool) -> None:
-        """Tell the learner which part of the training is done, which schedules follow."""
+        """Set the part of the training that is done, which the learner's schedules follow."""
         learner = self._learner.progressing
         if learner is None:
             return
@@ -254,7 +255,7 @@ class TrainingLoop(abc.ABC):
             self.agent.wrappers = statistics_of(self._episodes.wrappers)
 
     @abc.abstractmethod
-    def _options(self, episode: int) -> dict[str, Any] | None:
+    def _options(self, episode: int) -> Data | None:
         """Return the options of a reset."""
 
     @abc.abstractmethod

@@ -17,19 +17,19 @@ _OF_TRAIN = (
 
 def _elsewhere(agent: Any) -> Mapping[str, str]:
     """Return the settings of an agent or a class of agents, and how they are written."""
-    places = {name: f"train(env, {name}=...)" for name in _OF_TRAIN}
+    spellings = {name: f"train(env, {name}=...)" for name in _OF_TRAIN}
     agent_class = agent if isinstance(agent, type) else type(agent)
     if not hasattr(agent_class, "learning_type"):
-        return places
+        return spellings
     for part in ("approximator", "learning"):
-        kind = getattr(agent_class, f"{part}_type")
-        for field in fields_of(kind):
+        config_type = getattr(agent_class, f"{part}_type")
+        for field in fields_of(config_type):
             meaning = field.doc.partition(".")[0]
-            inner = f"{part}={kind.__name__}({field.name}=...)"
-            places[field.name] = f"{agent_class.__name__}(env, {inner}) ({meaning})"
+            inner = f"{part}={config_type.__name__}({field.name}=...)"
+            spellings[field.name] = f"{agent_class.__name__}(env, {inner}) ({meaning})"
     for name in inspect.signature(agent_class).parameters:
-        places.setdefault(name, f"{agent_class.__name__}(env, {name}=...)")
-    return places
+        spellings.setdefault(name, f"{agent_class.__name__}(env, {name}=...)")
+    return spellings
 
 
 explained = explains_names(_elsewhere)

@@ -14,7 +14,8 @@ from typing import Any, Literal
 import gymnasium as gym
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
+
+from sdnn.environments.types import Array
 
 _STATISTICS = ("obs_rms", "return_rms")
 _MOMENTS = ("mean", "var", "count")
@@ -40,14 +41,15 @@ class Statistics(msgspec.Struct, frozen=True):
 
 def learning_wrappers(env: Any) -> list[Any]:
     """List the wrappers of an environment, or of a vector, that learn; the outermost first."""
-    found = []
+    wrappers = []
     while env is not None:
         if any(moments_of(env, name) is not None for name in _STATISTICS):
-            found.append(env)
+            wrappers.append(env)
         if isinstance(env, gym.vector.SyncVectorEnv):
-            found += [one for inner in env.envs for one in learning_wrappers(inner)]
+            for inner in env.envs:
+                wrappers += learning_wrappers(inner)
         env = getattr(env, "__dict__", {}).get("env")
-    return found
+    return wrappers
 
 
 def names_of(env: Any) -> str:
@@ -66,15 +68,15 @@ def share_statistics(env: Any, evaluation_env: Any) -> None:
     """
     wrappers, others = learning_wrappers(env), learning_wrappers(evaluation_env)
     take_statistics(others, statistics_of(wrappers))
-    own, other = (
-        [type(one).__name__ for one in found if moments_of(one, "obs_rms") is not None]
-        for found in (wrappers, others)
+    names, other_names = (
+        [type(w).__name__ for w in learning if moments_of(w, "obs_rms") is not None]
+        for learning in (wrappers, others)
     )
-    if bool(own) != bool(other):
-        has, lacks = ("env", "evaluation_env") if own else ("evaluation_env", "env")
+    if bool(names) != bool(other_names):
+        has, lacks = ("env", "evaluation_env") if names else ("evaluation_env", "env")
         warnings.warn(
-            f"{has} has the wrapper {(own or other)[0]}, {lacks} has not: the agent observes other"
-            " numbers in evaluations than in training; wrap both in the same way",
+            f"{has} has the wrapper {(names or other_names)[0]}, {lacks} has not: the agent"
+            " observes other numbers in evaluations than in training; wrap both in the same way",
             RuntimeWarning,
             stacklevel=3,
         )
@@ -86,8 +88,9 @@ def read_statistics(values: Any) -> list[Statistics]:
         learned = msgspec.convert(values, list[Statistics])
     except msgspec.ValidationError as error:
         raise ValueError(f"wrappers: {error}") from None
-    for numbers in (one for own in learned for one in own.numbers.values()):
-        _unpacked(numbers)
+    for statistics in learned:
+        for numbers in statistics.numbers.values():
+            _unpacked(numbers)
     return learned
 
 
@@ -95,29 +98,30 @@ def statistics_of(wrappers: Sequence[Any]) -> list[Statistics]:
     """Return what wrappers have learned."""
     return [
         Statistics(
-            type(one).__name__, {name: _packed(getattr(of, key)) for name, of, key in _slots(one)}
+            type(wrapper).__name__,
+            {name: _packed(getattr(owner, key)) for name, owner, key in _slots(wrapper)},
         )
-        for one in wrappers
+        for wrapper in wrappers
     ]
 
 
 def take_statistics(wrappers: Sequence[Any], learned: Sequence[Statistics]) -> bool:
-    """Give each wrapper, in order, what one of its name has learned; return whether all match."""
-    left = list(learned)
+    """Give each wrapper, in order, the statistics of its name; return whether all match."""
+    remaining = list(learned)
     for wrapper in wrappers:
-        own = next((one for one in left if _fits(wrapper, one)), None)
-        if own is not None:
-            left.remove(own)
-            for name, of, key in _slots(wrapper):
-                value = _unpacked(own.numbers[name])
-                setattr(of, key, value if value.ndim else value.item())
-    return not left and len(wrappers) == len(learned)
+        statistics = next((s for s in remaining if _fits(wrapper, s)), None)
+        if statistics is not None:
+            remaining.remove(statistics)
+            for name, owner, key in _slots(wrapper):
+                value = _unpacked(statistics.numbers[name])
+                setattr(owner, key, value if value.ndim else value.item())
+    return not remaining and len(wrappers) == len(learned)
 
 
 def moments_of(wrapper: Any, name: str) -> Any:
     """Return a wrapper's attribute that has mean, var and count; None if it has none."""
-    found = getattr(wrapper, "__dict__", {}).get(name)
-    return found if all(hasattr(found, moment) for moment in _MOMENTS) else None
+    moments = getattr(wrapper, "__dict__", {}).get(name)
+    return moments if all(hasattr(moments, moment) for moment in _MOMENTS) else None
 
 
 def _slots(wrapper: Any) -> Iterator[tuple[str, Any, str]]:
@@ -132,9 +136,9 @@ def _slots(wrapper: Any) -> Iterator[tuple[str, Any, str]]:
 
 
 def _fits(wrapper: Any, learned: Statistics) -> bool:
-    own = {name: np.shape(getattr(of, key)) for name, of, key in _slots(wrapper)}
-    found = {name: one.shape for name, one in learned.numbers.items()}
-    return type(wrapper).__name__ == learned.wrapper and own == found
+    shapes = {name: np.shape(getattr(owner, key)) for name, owner, key in _slots(wrapper)}
+    learned_shapes = {name: numbers.shape for name, numbers in learned.numbers.items()}
+    return type(wrapper).__name__ == learned.wrapper and shapes == learned_shapes
 
 
 def _packed(value: Any) -> _Numbers:
@@ -144,7 +148,7 @@ def _packed(value: Any) -> _Numbers:
     return _Numbers("<f4" if array.itemsize == 4 else "<f8", array.shape, text)
 
 
-def _unpacked(numbers: _Numbers) -> NDArray[Any]:
+def _unpacked(numbers: _Numbers) -> Array:
     """Return the array; ValueError if it has another number of values."""
     values = np.frombuffer(base64.b64decode(numbers.values), numbers.dtype)
     return values.reshape(numbers.shape).copy()
@@ -154,32 +158,32 @@ def _unpacked(numbers: _Numbers) -> NDArray[Any]:
 def fixed(env: Any, learned: Sequence[Statistics]) -> Iterator[None]:
     """Keep the statistics of an environment's wrappers as they are, for greedy episodes.
 
-    Wrappers that have seen nothing yet take what was learned; a warning names one that cannot.
+    Wrappers without statistics take those that were learned; a warning names one that cannot.
     """
     wrappers = learning_wrappers(env)
-    fresh = [one for one in wrappers if _has_seen_nothing(one)]
+    fresh = [wrapper for wrapper in wrappers if _has_no_statistics(wrapper)]
     if fresh and not take_statistics(fresh, learned):
         warnings.warn(
-            f"{type(fresh[0]).__name__} of env has seen nothing yet, so the agent observes other"
+            f"{type(fresh[0]).__name__} of env has no statistics yet, so the agent observes other"
             " numbers than in training: give the statistics of the training's wrapper to it, or"
             " evaluate in the environment of the training",
             RuntimeWarning,
             stacklevel=3,
         )
     before = statistics_of(wrappers)
-    flags = [getattr(one, "update_running_mean", None) for one in wrappers]
+    flags = [getattr(wrapper, "update_running_mean", None) for wrapper in wrappers]
     try:
-        for one, flag in zip(wrappers, flags, strict=True):
+        for wrapper, flag in zip(wrappers, flags, strict=True):
             if flag is not None:
-                one.update_running_mean = False
+                wrapper.update_running_mean = False
         yield
     finally:
         take_statistics(wrappers, before)
-        for one, flag in zip(wrappers, flags, strict=True):
+        for wrapper, flag in zip(wrappers, flags, strict=True):
             if flag is not None:
-                one.update_running_mean = flag
+                wrapper.update_running_mean = flag
 
 
-def _has_seen_nothing(wrapper: Any) -> bool:
-    found = (moments_of(wrapper, name) for name in _STATISTICS)
-    return any(moments is not None and moments.count < _FEW for moments in found)
+def _has_no_statistics(wrapper: Any) -> bool:
+    all_moments = (moments_of(wrapper, name) for name in _STATISTICS)
+    return any(moments is not None and moments.count < _FEW for moments in all_moments)

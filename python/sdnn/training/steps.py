@@ -10,6 +10,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from sdnn.environments.types import Data
 from sdnn.support.arguments import flag, has_methods, reward_of, shown
 
 _SCALARS = (np.generic, int, float)
@@ -48,7 +49,7 @@ def mask_in(info: Mapping[str, Any]) -> Any:
     return info["action_mask"]
 
 
-def reset_env(env: Any, seed: Any, options: dict[str, Any] | None) -> tuple[Any, Any]:
+def reset_env(env: Any, seed: Any, options: Data | None) -> tuple[Any, Any]:
     """Reset an environment, or a vector; return what is observed first, and the info.
 
     UnusableStepError if it returns something else than an observation and a dictionary.

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.environments.matching import require_same_kind
+from sdnn.environments.types import Data, Env, VectorEnv
 from sdnn.support.arguments import flag, has_methods, path_of, require, shown, whole
 from sdnn.support.display import Displayed
 from sdnn.training.episodes import Episodes, adapter_for
@@ -54,8 +54,8 @@ class TrainingResult(Displayed):
     @property
     def evaluations(self) -> NDArray[np.float64]:
         """Steps and mean returns of the evaluations, shape (n, 2)."""
-        found = [(r["step"], r["mean_return"]) for r in self.rows if r["kind"] == "evaluation"]
-        return np.array(found, np.float64).reshape(-1, 2)
+        pairs = [(r["step"], r["mean_return"]) for r in self.rows if r["kind"] == "evaluation"]
+        return np.array(pairs, np.float64).reshape(-1, 2)
 
     def _facts(self) -> dict[str, object]:
         """Return what is shown of it."""
@@ -166,7 +166,7 @@ class Training(TrainingLoop):
     def __init__(
         self,
         agent: Learner,
-        env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any],
+        env: Env | VectorEnv,
         steps: int | None = None,
         *,
         episodes: int | None = None,
@@ -175,7 +175,7 @@ class Training(TrainingLoop):
         callbacks: Iterable[Callback] = (),
         evaluate_every: int | None = None,
         evaluate_every_episodes: int | None = None,
-        evaluation_env: gym.Env[Any, Any] | None = None,
+        evaluation_env: Env | None = None,
         evaluation_episodes: int = 10,
         limit_bootstraps: bool = True,
         reset_options: Callable[[int], Mapping[str, Any]] | None = None,
@@ -277,10 +277,10 @@ class Training(TrainingLoop):
     def load(
         cls,
         path: str | Path,
-        env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any],
+        env: Env | VectorEnv,
         *,
         callbacks: Iterable[Callback] = (),
-        evaluation_env: gym.Env[Any, Any] | None = None,
+        evaluation_env: Env | None = None,
         steps: int | None = None,
         episodes: int | None = None,
         repeat_episodes: bool = True,
@@ -335,7 +335,7 @@ class Training(TrainingLoop):
             if getattr(callback.on_step, "__func__", None) is not Callback.on_step
         ]
 
-    def _options(self, episode: int) -> dict[str, Any] | None:
+    def _options(self, episode: int) -> Data | None:
         if self.reset_options is None:
             return None
         options = self.reset_options(episode)

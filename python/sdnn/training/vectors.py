@@ -11,12 +11,13 @@ import numpy as np
 from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 
 from sdnn.environments.spaces import has_mask
+from sdnn.environments.types import VectorEnv
 from sdnn.support.arguments import array_of
 from sdnn.training.environments import EnvironmentAdapter, OneEnvironment, Options, Seeds
 from sdnn.training.steps import UnusableStepError, has_action_masks, mask_in, reset_env, step_env
 
 
-def vector_adapter(env: gym.vector.VectorEnv[Any, Any, Any]) -> EnvironmentAdapter:
+def vector_adapter(env: VectorEnv) -> EnvironmentAdapter:
     """Return the adapter for a vector environment."""
     if type(env) is gym.vector.SyncVectorEnv and getattr(env, "observation_mode", "") == "same":
         return _Listed(env)
@@ -30,58 +31,60 @@ class _Listed(EnvironmentAdapter):
 
     def __init__(self, env: gym.vector.SyncVectorEnv) -> None:
         self._env = env
-        self._adapters = [OneEnvironment(one) for one in env.envs]
+        self._adapters = [OneEnvironment(single) for single in env.envs]
         self.n_environments = env.num_envs
         self.masks = [None] * env.num_envs if has_action_masks(env) else None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
-        first = self._of_each(seeds, lambda one, i: one.reset({0: seeds[i]})[0])
+        first = self._of_each(seeds, lambda env, i: env.reset({0: seeds[i]})[0])
         return dict(zip(seeds, self._converted(first), strict=True))
 
     def step(self, actions: Sequence[Any]) -> Any:
-        made = self._of_each(range(self.n_environments), lambda one, i: one.take(actions[i]))
-        seen, self.rewards, self.terminated, self.truncated = map(list, zip(*made, strict=True))
-        return self._converted(seen)
+        steps = self._of_each(range(self.n_environments), lambda env, i: env.take(actions[i]))
+        columns = map(list, zip(*steps, strict=True))
+        observations, self.rewards, self.terminated, self.truncated = columns
+        return self._converted(observations)
 
     def _of_each(
         self, numbers: Iterable[int], call: Callable[[OneEnvironment, int], Any]
     ) -> list[Any]:
         """Return the result of the call for each environment; errors name the environment."""
-        made = []
+        results = []
         for i in numbers:
             try:
-                made.append(call(self._adapters[i], i))
+                results.append(call(self._adapters[i], i))
             except UnusableStepError as error:
                 raise UnusableStepError(f"environment {i}: {error}") from error
         if self.masks is not None:
-            self.masks = [one.masks[0] if one.masks else None for one in self._adapters]
-        return made
+            self.masks = [env.masks[0] if env.masks else None for env in self._adapters]
+        return results
 
-    def _converted(self, seen: list[Any]) -> Any:
+    def _converted(self, observations: list[Any]) -> Any:
         """Return observations in the numbers of their space, as the vector itself does.
 
         Others stay as they are: the agent refuses them by name.
         """
         space = self._env.single_observation_space
-        if any(one.shape != space.shape for one in seen if type(one) is np.ndarray):
-            return seen
-        if type(space) is gym.spaces.Box and all(type(one) is np.ndarray for one in seen):
-            rows = np.array(seen)
+        arrays = [x for x in observations if type(x) is np.ndarray]
+        if any(array.shape != space.shape for array in arrays):
+            return observations
+        if type(space) is gym.spaces.Box and len(arrays) == len(observations):
+            rows = np.array(observations)
             if rows.dtype == space.dtype:
                 return rows
-        if any(has_mask(space, one) for one in seen):
-            return seen  # arrays of the vector have no mask
-        batch: Any = create_empty_array(space, len(seen))
+        if any(has_mask(space, observation) for observation in observations):
+            return observations  # arrays of the vector have no mask
+        batch: Any = create_empty_array(space, len(observations))
         try:
-            return _listed(self._env, concatenate(space, seen, batch))
+            return _listed(self._env, concatenate(space, observations, batch))
         except (LookupError, TypeError, ValueError):
-            return seen
+            return observations
 
 
 class _Vector(EnvironmentAdapter, abc.ABC):
     """A vector environment: lists in, lists out."""
 
-    def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]) -> None:
+    def __init__(self, env: VectorEnv) -> None:
         self._env = env
         self._mode = _autoreset_mode(env)
         self.n_environments = env.num_envs
@@ -90,10 +93,8 @@ class _Vector(EnvironmentAdapter, abc.ABC):
 
     def _step(self, actions: Any) -> tuple[Any, Any]:
         """Return what is observed, and what is after resets in the same step."""
-        observations, rewards, terminated, truncated, infos = step_env(
-            self._env, self._batch(actions)
-        )
-        seen = _listed(self._env, observations)
+        batch, rewards, terminated, truncated, infos = step_env(self._env, self._batch(actions))
+        observations = _listed(self._env, batch)
         self.rewards = self._column("reward", rewards, "fiub", "numbers")
         self.terminated = self._column("terminated", terminated, "b", "bools")
         self.truncated = self._column("truncated", truncated, "b", "bools")
@@ -105,34 +106,35 @@ class _Vector(EnvironmentAdapter, abc.ABC):
                     "env must give the last observations of episodes in infos['final_obs'] with"
                     f" autoreset in the same step, got {sorted(infos)}"
                 )
-            last = [infos["final_obs"][i] if ended[i] else one for i, one in enumerate(seen)]
-            return last, seen
-        return seen, seen
+            final = infos["final_obs"]
+            last = [final[i] if ended[i] else x for i, x in enumerate(observations)]
+            return last, observations
+        return observations, observations
 
     def _take_masks(self, infos: Any, terminated: Sequence[bool], ended: Sequence[bool]) -> None:
         """Take the masks of what is observed: of episodes that ended, those of their ends."""
         if self.masks is None:
             return
         resets = self._mode == "SAME_STEP"  # infos are then of the next episodes
-        masks = self._masks_in(infos, [resets or not one for one in terminated])
+        masks = self._masks_in(infos, [resets or not is_terminal for is_terminal in terminated])
         self._begun = list(masks)
         if resets and any(ended):
-            cut = [end and not one for end, one in zip(ended, terminated, strict=True)]
-            last = self._masks_in(infos.get("final_info", {}), cut)
-            masks = [last[i] if end else masks[i] for i, end in enumerate(ended)]
+            truncated = [a and not b for a, b in zip(ended, terminated, strict=True)]
+            last = self._masks_in(infos.get("final_info", {}), truncated)
+            masks = [last[i] if has_ended else masks[i] for i, has_ended in enumerate(ended)]
         self.masks = masks
 
     def _masks_in(self, infos: Any, needed: Sequence[bool]) -> list[Any]:
         """Return the masks of environments in infos, where needed; UnusableStepError without."""
         if not any(needed):
             return [None] * self.n_environments
-        found = mask_in(infos)
-        own = infos.get("_action_mask", np.ones(self.n_environments, bool))
+        masks = mask_in(infos)
+        has_mask_of = infos.get("_action_mask", np.ones(self.n_environments, bool))
         for i in np.flatnonzero(needed):
-            if not own[i]:
+            if not has_mask_of[i]:
                 raise UnusableStepError(f"info of environment {i} must have 'action_mask'")
-        rows = list(zip(*found, strict=True)) if isinstance(found, tuple) else found
-        return [rows[i] if one else None for i, one in enumerate(needed)]
+        rows = list(zip(*masks, strict=True)) if isinstance(masks, tuple) else masks
+        return [rows[i] if is_needed else None for i, is_needed in enumerate(needed)]
 
     def _note_masks(self, infos: Any, begun: Collection[int]) -> None:
         """Note the masks of the environments that were reset."""
@@ -177,8 +179,8 @@ class _SeparateResets(_Vector):
         listed: Any = [seeds.get(i) for i in range(self.n_environments)]
         observations, infos = reset_env(self._env, listed, options)
         self._note_masks(infos, seeds)
-        seen = _listed(self._env, observations)
-        return {i: seen[i] for i in seeds}
+        rows = _listed(self._env, observations)
+        return {i: rows[i] for i in seeds}
 
     def step(self, actions: Sequence[Any]) -> Any:
         return self._step(actions)[0]
@@ -189,41 +191,41 @@ class _OwnResets(_Vector):
 
     can_repeat = False
 
-    def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]) -> None:
+    def __init__(self, env: VectorEnv) -> None:
         super().__init__(env)
-        self._seen: Any = None
+        self._after_resets: Any = None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
-        if self._seen is None:
+        if self._after_resets is None:
             observations, infos = reset_env(self._env, seeds[0], None)
             self._note_masks(infos, range(self.n_environments))
-            self._seen = _listed(self._env, observations)
+            self._after_resets = _listed(self._env, observations)
         elif self._mode != "SAME_STEP":
             return {}
         elif self.masks is not None:
             self.masks = [self._begun[i] if i in seeds else m for i, m in enumerate(self.masks)]
-        return {i: self._seen[i] for i in seeds}
+        return {i: self._after_resets[i] for i in seeds}
 
     def step(self, actions: Sequence[Any]) -> Any:
-        observations, self._seen = self._step(actions)
+        observations, self._after_resets = self._step(actions)
         return observations
 
 
-def _listed(env: gym.vector.VectorEnv[Any, Any, Any], observations: Any) -> Any:
+def _listed(env: VectorEnv, observations: Any) -> Any:
     """Return observations one by one, not copied."""
     if type(observations) is np.ndarray:
         return observations
     return list(iterate(env.observation_space, observations))
 
 
-def _autoreset_mode(env: gym.vector.VectorEnv[Any, Any, Any]) -> str:
+def _autoreset_mode(env: VectorEnv) -> str:
     """Return the name in Gymnasium's ``AutoresetMode``."""
     # Not by the metadata first: in Gymnasium 1.1 these may be another vector's.
     mode = getattr(env.unwrapped, "autoreset_mode", env.metadata.get("autoreset_mode"))
     return "NEXT_STEP" if mode is None else str(gym.vector.AutoresetMode(mode).name)
 
 
-def _resets_each(env: gym.vector.VectorEnv[Any, Any, Any]) -> bool:
+def _resets_each(env: VectorEnv) -> bool:
     """Return whether ``reset`` takes the option ``"reset_mask"`` and a seed per environment."""
     inner = env
     while isinstance(inner, gym.vector.VectorWrapper):
