@@ -43,7 +43,7 @@ const Network& learned(int n_inputs, int n_episodes) {
     Trial trial(agents::QLearning(Network({.n_inputs = n_inputs}, 1), {}, 1), {}, {},
                 {.n_sensors = n_inputs, .noise = kNoise}, {}, 1);
     trial.advance(n_episodes);
-    network = std::make_unique<const Network>(trial.agent().action_value());
+    network = std::make_unique<const Network>(trial.agent().networks().front());
   }
   return *network;
 }

@@ -205,6 +205,18 @@ void bind_linear_sdnn(py::module_& module) {
           },
           py::arg("state"), "The paired code of a state, -1, 0 or +1: (n_inputs,) -> (n_slots,)")
       .def(
+          "values",
+          [](const LinearSDNN& net, const ArrayArgument<double>& state, std::size_t dimension) {
+            core::require(dimension < net.n_dimensions(), "dimension",
+                          "less than " + std::to_string(net.n_dimensions()), dimension);
+            py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions(dimension)));
+            net.values(bindings::vector(state, "state"), bindings::workspace_of(net),
+                       {out.mutable_data(), net.n_actions(dimension)}, dimension, true);
+            return out;
+          },
+          py::arg("state"), py::arg("dimension") = 0,
+          "A dimension's part of Q(state, a) for its actions, by averaged weights if there are any")
+      .def(
           "weights",
           [](const LinearSDNN& net) {
             py::array_t<std::int32_t> out({net.n_rows(), net.n_slots()});

@@ -87,7 +87,9 @@ class ArgumentTypeError : public core::ArgumentError {
 
 /// The representation of any value, for a message.
 inline std::string shown(pybind11::handle value) {
-  return pybind11::module_::import("sdnn.support.arguments").attr("shown")(value).cast<std::string>();
+  return pybind11::module_::import("sdnn.support.arguments")
+      .attr("shown")(value)
+      .cast<std::string>();
 }
 
 /// Whether it is True or False, of Python or NumPy.
@@ -344,9 +346,11 @@ pybind11::class_<Config> bind_config(pybind11::module_& module, const char* name
   type.def("__hash__", [](const Config& self) {
     return py::hash(py::tuple(dictionary_of(fields_of(self)).attr("values")()));
   });
-  type.def(
-      py::pickle([](const Config& self) { return dictionary_of(fields_of(self)); },
-                 [](const py::dict& values) { return changed(Config{}, py::kwargs(values)); }));
+  type.def("__reduce__", [](const py::object& self) {
+    const auto values = dictionary_of(fields_of(self.cast<const Config&>()));
+    const auto partial = py::module_::import("functools").attr("partial");
+    return py::make_tuple(partial(py::type::of(self), **values), py::tuple());
+  });
   return type;
 }
 

@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "agent_parts.hpp"
 #include "arrays.hpp"
 #include "bind_config.hpp"
 #include "bindings.hpp"
@@ -46,45 +47,45 @@ std::pair<std::string, std::vector<std::size_t>> described(const agents::Observe
   return {};
 }
 
-/// Lets readers of the agent in other threads finish before it changes.
-void wait_for_readers_of(agents::Controller& controller) {
-  if (controller.is_warming_up()) return;
-  std::visit([](auto& agent) { bindings::wait_for_readers(agent); }, controller.agent());
-}
-
-/// Returns the parts of an agent, one for each dimension.
-template <class Agent>
-auto parts_of(const Agent& agent) {
-  if constexpr (requires { agent.part(0); }) {
-    return std::span(&agent.part(0), agent.n_dimensions());
-  } else if constexpr (requires { agent.action_value().part(0); }) {
-    return std::span(&agent.action_value().part(0), agent.n_dimensions());
-  } else {
-    return std::span(&agent, 1);
-  }
-}
-
 /// Whether there are threads that could run Python while this one works without the GIL.
 bool has_other_threads() {
   return PyThreadState_Next(PyInterpreterState_ThreadHead(PyInterpreterState_Get())) != nullptr;
 }
 
+/// Calls `read`, which reads the controller, while other threads run and may read it, too.
+template <class Read>
+void read_without_gil(Controller& controller, const Read& read) {
+  const std::span<const std::byte> parts = bindings::memory_of_parts(controller.agent());
+  const bindings::WithoutGIL unlocked(std::as_const(controller), parts);
+  read();
+}
+
+void require_warm(const Controller& controller) {
+  if (controller.is_warming_up()) throw std::runtime_error("agent is still warming up");
+}
+
 /// The action of act without `explore`, after the warm-up. Other threads run meanwhile, and may
 /// read the same controller.
-std::span<const double> best_action(agents::Controller& controller,
-                                    std::span<const double> observation, std::size_t environment,
-                                    agents::ActionMask mask) {
-  const agents::Controller& read = controller;
+std::span<const double> best_action(Controller& controller, std::span<const double> observation,
+                                    std::size_t environment, agents::ActionMask mask) {
+  const Controller& read = controller;
   const auto variables = bindings::copied(controller.hold(observation, environment));
   auto& workspace = bindings::workspace_of(read);
-  std::visit(
-      [&](const auto& agent) {
-        const auto parts = parts_of(agent);
-        const bindings::WithoutGIL unlocked(read, parts);
-        read.read(variables, workspace);
-      },
-      read.agent());
+  read_without_gil(controller, [&] { read.read(variables, workspace); });
   return controller.best_of(workspace, mask);  // which draws, and so needs the lock
+}
+
+/// The values of all actions of a dimension. Other threads run meanwhile, as in best_action.
+py::array_t<double> values(Controller& controller, const ArrayArgument<double>& observation,
+                           std::size_t dimension) {
+  require_warm(controller);
+  core::require(dimension < controller.n_dimensions(), "dimension",
+                "less than " + std::to_string(controller.n_dimensions()), dimension);
+  const auto variables = bindings::copied(bindings::flat(observation));
+  auto& workspace = bindings::workspace_of(std::as_const(controller));
+  std::span<const double> row;
+  read_without_gil(controller, [&] { row = controller.values(variables, workspace, dimension); });
+  return py::array_t<double>(static_cast<py::ssize_t>(row.size()), row.data());
 }
 
 /// Which actions are allowed; None: all.
@@ -114,12 +115,12 @@ std::span<const double> row(const ArrayArgument<double>& rows, const char* name,
   return numbers.subspan(n_columns * i, n_columns);
 }
 
-std::size_t learn_each(agents::Controller& controller, const ArrayArgument<double>& observations,
+std::size_t learn_each(Controller& controller, const ArrayArgument<double>& observations,
                        const ArrayArgument<double>& actions, const py::list& rewards,
                        const ArrayArgument<double>& next_observations, const py::list& terminated,
                        const py::list& environments, const py::list& progress,
                        const MaskArgument& next_masks) {
-  wait_for_readers_of(controller);
+  bindings::wait_for_readers(controller);
   const std::size_t n = controller.n_variables();
   std::size_t n_learned = 0;
   for (const py::handle environment : environments) {
@@ -202,20 +203,24 @@ void bind_controller(py::module_& module) {
           },
           "Of a state: kinds, and the variables that they are made of")
       .def_property_readonly(
-          "agent",
+          "networks",
           [](py::object& self) {
             auto& controller = self.cast<Controller&>();
-            if (controller.is_warming_up()) throw std::runtime_error("agent is still warming up");
-            return std::visit(
-                [&self](auto& agent) {
-                  return py::cast(agent, py::return_value_policy::reference_internal, self);
-                },
-                controller.agent());
+            require_warm(controller);
+            return bindings::networks_of(controller.agent(), self);
           },
-          "The agent in itself, with states in [0, 1]")
+          "Networks or rules of each dimension, or the readout of all; states are in [0, 1]")
+      .def_property_readonly(
+          "final_epsilon",
+          [](const Controller& self) {
+            require_warm(self);
+            const auto* const agent = std::get_if<agents::QLambda>(&self.agent());
+            return agent == nullptr ? std::nullopt : std::optional(agent->final_epsilon());
+          },
+          "Where epsilon goes with schedule_steps; None without Q(lambda)")
       .def_property("n_environments", &Controller::n_environments,
                     [](Controller& self, std::size_t n) {
-                      wait_for_readers_of(self);
+                      bindings::wait_for_readers(self);
                       self.set_n_environments(n);
                     })
       .def_property("progress", &Controller::progress, &Controller::set_progress)
@@ -224,7 +229,7 @@ void bind_controller(py::module_& module) {
       .def(
           "begin_episode",
           [](Controller& self, std::size_t environment) {
-            wait_for_readers_of(self);
+            bindings::wait_for_readers(self);
             self.begin_episode(environment);
           },
           py::arg("environment") = 0)
@@ -248,7 +253,7 @@ void bind_controller(py::module_& module) {
              const ArrayArgument<double>& action, double reward,
              const ArrayArgument<double>& next_observation, bool terminated,
              std::size_t environment, const MaskArgument& next_mask) {
-            wait_for_readers_of(self);
+            bindings::wait_for_readers(self);
             self.learn(bindings::flat(observation), bindings::flat(action), reward,
                        bindings::flat(next_observation), terminated, environment,
                        mask_of(next_mask));
@@ -292,6 +297,9 @@ void bind_controller(py::module_& module) {
           "Learns in some environments, in order; `progress` is set between two, if given. Returns "
           "how many were learned: all before the first that cannot be, whose error is raised where "
           "it comes first")
+      .def("values", &values, py::arg("observation"), py::arg("dimension") = 0,
+           "Q of all actions of a dimension, as greedy actions follow it; of fuzzy rules the value "
+           "of the observation alone")
       .def(
           "state_of",
           [array_of](Controller& self, const ArrayArgument<double>& observation) {
@@ -320,19 +328,6 @@ void bind_controller(py::module_& module) {
           "The first reward that was too large to be learned, and its number from 1; or None")
       .def_property_readonly(
           "reward_size", [](const Controller& self) { return self.reward_scale().size(); },
-          "The largest recent reward is 2 to this power, or up to twice that; or None")
-      .def_property(
-          "reward_scale",
-          [](const Controller& self) {
-            return bindings::arrays_of(core::state_of(self.reward_scale()));
-          },
-          [](Controller& self, const py::dict& state) {
-            agents::RewardScale scale;
-            core::restore(scale, bindings::state_from(state));
-            self.set_reward_scale(scale);
-          },
-          "How large rewards are: arrays by name")
-      .def(
-          "state", [](const Controller& self) { return bindings::arrays_of(core::state_of(self)); },
-          "What it remembers: arrays by name");
+          "The largest recent reward is 2 to this power, or up to twice that; or None");
+  bindings::def_state(type);
 }

@@ -1,17 +1,25 @@
 #include <pybind11/numpy.h>
+#include <pybind11/stl.h>
 #include <pybind11/typing.h>
 
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <stdexcept>
+#include <variant>
+#include <vector>
+
+#include "agent_parts.hpp"
+#include "arrays.hpp"
 #include "bind_config.hpp"
 #include "bindings.hpp"
-#include "sdnn/agents/fuzzy_q_learning.hpp"
-#include "sdnn/agents/q_lambda.hpp"
+#include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/approximators/fuzzy_rules.hpp"
-#include "sdnn/approximators/linear_sdnn.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "times.hpp"
 #include "tools/agent_steps.hpp"
+#include "tools/bare_agent.hpp"
 #include "tools/decisions.hpp"
 #include "tools/network_parts.hpp"
 #include "tools/plain_rbf_network.hpp"
@@ -20,22 +28,24 @@
 
 namespace py = pybind11;
 using namespace sdnn;
-using agents::FuzzyQLearning;
-using agents::FuzzyQLearningConfig;
 using agents::QLearning;
 using agents::QLearningConfig;
-using approximators::FuzzyRules;
-using approximators::FuzzyRulesConfig;
-using approximators::RBFNetwork;
 using approximators::RBFNetworkConfig;
 using approximators::SDNNC;
-using approximators::SDNNCConfig;
+using bindings::ArrayArgument;
 using environments::AcrobotConfig;
 using environments::GoalScheduleConfig;
 using environments::SensorConfig;
-using tools::AcrobotTrial;
 using tools::PlainRBFNetwork;
 using tools::ProtocolConfig;
+
+using Trial = tools::AcrobotTrial<tools::BareAgent>;
+using PlainRBFAgent = QLearning<PlainRBFNetwork>;
+
+template <>
+constexpr bool sdnn::bindings::kIsComposed<Trial> = false;
+template <>
+constexpr bool sdnn::bindings::kIsComposed<PlainRBFAgent> = false;
 
 namespace {
 
@@ -51,7 +61,7 @@ void def_time_agent_steps(py::module_& module) {
       "The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)");
 }
 
-template <class Value, class Trial, class Read>
+template <class Value, class Read>
 py::array_t<Value> column(const Trial& trial, Read read) {
   py::array_t<Value> out(static_cast<py::ssize_t>(trial.rows().size()));
   Value* item = out.mutable_data();
@@ -59,7 +69,6 @@ py::array_t<Value> column(const Trial& trial, Read read) {
   return out;
 }
 
-template <class Trial>
 py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
   using tools::TestRow;
   py::typing::Dict<py::str, py::array> rows;
@@ -71,10 +80,10 @@ py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
   return rows;
 }
 
-using SDNNTrial = AcrobotTrial<QLearning<SDNNC>>;
-
-py::typing::Dict<py::str, py::int_> cache_counts(const SDNNTrial& trial) {
-  const auto& counts = trial.agent().own_workspace().approximator.cache().counts();
+py::typing::Dict<py::str, py::int_> cache_counts(const Trial& trial) {
+  const auto* const agent = std::get_if<QLearning<SDNNC>>(&trial.agent().agent());
+  if (agent == nullptr) throw std::invalid_argument("trial must be one of SDNN-C");
+  const auto& counts = agent->agent_workspace().networks.front().cache().counts();
   py::typing::Dict<py::str, py::int_> out;
   out["full"] = counts.full;
   out["neighbour"] = counts.neighbour;
@@ -82,21 +91,52 @@ py::typing::Dict<py::str, py::int_> cache_counts(const SDNNTrial& trial) {
   return out;
 }
 
-/// A trial of the agent that `make_agent` makes of approximator, learning and seed; with it the
-/// time of such an agent's steps.
-template <class Agent, class Approximator, class Learning>
-py::class_<AcrobotTrial<Agent>> def_trial(py::module_& module, const char* name, const char* doc,
-                                          Agent (*make_agent)(const Approximator&, const Learning&,
-                                                              std::uint64_t)) {
-  using Trial = AcrobotTrial<Agent>;
-  def_time_agent_steps<Agent>(module);
-  py::class_<Trial> trial(module, name, doc);
-  trial
-      .def(py::init([make_agent](const Approximator& approximator, const Learning& learning,
-                                 const AcrobotConfig& acrobot, const GoalScheduleConfig& goal,
-                                 const SensorConfig& sensors, const ProtocolConfig& protocol,
-                                 std::uint64_t seed) {
-             return Trial(make_agent(approximator, learning, seed), acrobot, goal, sensors,
+void bind_bare_agent(py::module_& module) {
+  using tools::BareAgent;
+  py::class_<BareAgent>(module, "BareAgent",
+                        "An agent of any kind without a task: states in [0, 1], actions as indices "
+                        "or, of fuzzy rules, numbers in [-1, 1]")
+      .def(py::init([](const agents::AnyApproximatorConfig& approximator,
+                       const agents::AnyLearningConfig& learning, std::uint64_t seed,
+                       const std::vector<std::size_t>& n_actions) {
+             if (n_actions.empty()) return BareAgent(approximator, learning, seed);
+             return BareAgent(approximator, learning, n_actions, seed);
+           }),
+           py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"),
+           py::arg("n_actions") = std::vector<std::size_t>())
+      .def_property_readonly(
+          "networks",
+          [](py::object& self) {
+            return bindings::networks_of(self.cast<BareAgent&>().agent(), self);
+          },
+          "Networks or rules of each dimension, or the readout of all")
+      .def("begin_episode", &BareAgent::begin_episode)
+      .def(
+          "act",
+          [](BareAgent& self, const ArrayArgument<double>& state, bool explore) {
+            const auto action = self.act(bindings::vector(state, "state"), explore);
+            return std::vector<double>(action.begin(), action.end());
+          },
+          py::arg("state"), py::arg("explore") = true)
+      .def(
+          "learn",
+          [](BareAgent& self, const ArrayArgument<double>& state,
+             const ArrayArgument<double>& action, double reward,
+             const ArrayArgument<double>& next_state, bool terminated) {
+            self.learn(bindings::vector(state, "state"), bindings::vector(action, "action"), reward,
+                       bindings::vector(next_state, "next_state"), terminated);
+          },
+          py::arg("state"), py::arg("action"), py::arg("reward"), py::arg("next_state"),
+          py::arg("terminated"));
+}
+
+void bind_trial(py::module_& module) {
+  py::class_<Trial>(module, "AcrobotTrial", "An agent learns the acrobot swing-up")
+      .def(py::init([](const agents::AnyApproximatorConfig& approximator,
+                       const agents::AnyLearningConfig& learning, const AcrobotConfig& acrobot,
+                       const GoalScheduleConfig& goal, const SensorConfig& sensors,
+                       const ProtocolConfig& protocol, std::uint64_t seed) {
+             return Trial(tools::BareAgent(approximator, learning, seed), acrobot, goal, sensors,
                           protocol, seed);
            }),
            py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("acrobot"),
@@ -105,13 +145,14 @@ py::class_<AcrobotTrial<Agent>> def_trial(py::module_& module, const char* name,
       .def_property_readonly("finished", &Trial::finished)
       .def_property_readonly("n_decisions", &Trial::n_decisions)
       .def_property_readonly(
-          "agent", [](Trial& self) -> Agent& { return self.agent(); },
+          "agent", [](Trial& self) -> tools::BareAgent& { return self.agent(); },
           py::return_value_policy::reference_internal,
           "The agent at work: asking for values changes nothing that follows")
       .def(
           "advance",
           [](Trial& self, int n_episodes) {
-            const bindings::WithoutGIL unlocked(self);
+            const auto parts = bindings::memory_of_parts(self.agent().agent());
+            const bindings::WithoutGIL unlocked(self, parts);
             self.advance(n_episodes);
           },
           py::arg("n_episodes"), "Runs up to n more learning episodes")
@@ -119,38 +160,20 @@ py::class_<AcrobotTrial<Agent>> def_trial(py::module_& module, const char* name,
           "advance_together",
           [](const py::typing::Tuple<Trial, py::ellipsis>& trials, int n_decisions) {
             std::vector<Trial*> all;
+            std::vector<std::span<std::byte>> parts;
             for (const py::handle trial : trials) {
-              if (!py::isinstance<Trial>(trial)) {
-                const py::str given(py::type::handle_of(trial).attr("__name__"));
-                throw py::type_error("trials must all have the class of the method, got " +
-                                     std::string(given));
-              }
+              if (!py::isinstance<Trial>(trial)) throw py::type_error("trials must be trials");
               all.push_back(&trial.cast<Trial&>());
+              parts.push_back(bindings::memory_of_parts(all.back()->agent().agent()));
             }
-            const bindings::WithoutGIL unlocked(all);
+            const bindings::WithoutGIL unlocked(all, parts);
             Trial::advance_together(all, n_decisions);
           },
           py::arg("trials"), py::arg("n_decisions"),
           "Lets each of several trials make n more decisions, or come to its end")
-      .def("test_rows", &test_rows<Trial>, "Columns of the test episodes so far");
-  return trial;
-}
-
-/// An agent of an approximator that is made of its configuration alone.
-template <class Agent, class Approximator, class Config, class Learning>
-Agent agent_with(const Config& approximator, const Learning& learning, std::uint64_t seed) {
-  return {Approximator(approximator), learning, seed};
-}
-
-QLearning<SDNNC> sdnn_agent(const SDNNCConfig& approximator, const QLearningConfig& learning,
-                            std::uint64_t seed) {
-  return {SDNNC(approximator, seed), learning, seed};
-}
-
-agents::QLambda q_lambda_agent(const approximators::LinearSDNNConfig& approximator,
-                               const agents::QLambdaConfig& learning, std::uint64_t seed) {
-  const std::size_t n_actions[] = {static_cast<std::size_t>(approximator.n_actions)};
-  return {approximators::LinearSDNN(approximator, n_actions, seed), learning, seed};
+      .def("test_rows", &test_rows, "Columns of the test episodes so far")
+      .def("cache_counts", &cache_counts,
+           "Potentials so far, by their origin: full passes, from neighbours, columns added");
 }
 
 void bind_trials(py::module_& module) {
@@ -158,26 +181,20 @@ void bind_trials(py::module_& module) {
       module, "ProtocolConfig",
       "Learning protocol of a trial; the defaults are the paper's (section 4.2).");
 
-  def_trial(module, "AcrobotTrial", "SDNN-C learns the acrobot swing-up", &sdnn_agent)
-      .def("cache_counts", &cache_counts,
-           "How potentials came about so far: full passes, from neighbours, columns added");
-  def_trial(module, "FuzzyAcrobotTrial", "Fuzzy Q-learning learns the acrobot swing-up",
-            &agent_with<FuzzyQLearning, FuzzyRules, FuzzyRulesConfig, FuzzyQLearningConfig>);
-  def_trial(module, "RBFAcrobotTrial", "Q-learning with an RBF network learns the acrobot swing-up",
-            &agent_with<QLearning<RBFNetwork>, RBFNetwork, RBFNetworkConfig, QLearningConfig>);
+  bind_bare_agent(module);
+  bind_trial(module);
+  def_time_agent_steps<tools::BareAgent>(module);
 
-  def_trial(module, "LinearAcrobotTrial",
-            "Q(lambda) with a linear readout of the SDNN code learns the acrobot swing-up",
-            &q_lambda_agent);
-
-  using PlainRBFAgent = QLearning<PlainRBFNetwork>;
   py::class_<PlainRBFAgent>(module, "PlainRBFQLearning",
                             "Q-learning with an RBF network evaluated without its product "
                             "structure; only to be timed")
-      .def(py::init(&agent_with<PlainRBFAgent, PlainRBFNetwork, RBFNetworkConfig, QLearningConfig>),
+      .def(py::init([](const RBFNetworkConfig& approximator, const QLearningConfig& learning,
+                       std::uint64_t seed) {
+             return PlainRBFAgent(PlainRBFNetwork(approximator), learning, seed);
+           }),
            py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("seed"))
       .def_property_readonly(
-          "action_value", [](const PlainRBFAgent& agent) { return agent.action_value().network(); },
+          "network", [](const PlainRBFAgent& agent) { return agent.networks().front().network(); },
           "A copy of the network behind it");
   def_time_agent_steps<PlainRBFAgent>(module);
 }
@@ -193,10 +210,6 @@ void bind_times(py::module_& module) {
           },
           py::arg("n_repetitions"), "Nanoseconds per product: (n_repetitions,)");
   py::class_<tools::NetworkParts>(module, "NetworkParts", "The network's parts of a decision")
-      .def(py::init([](const SDNNTrial& trial, std::uint64_t seed) {
-             return tools::NetworkParts(trial.agent().action_value(), seed);
-           }),
-           py::arg("trial"), py::arg("seed"), "Times a copy of the trial's network")
       .def(py::init<SDNNC, std::uint64_t>(), py::arg("network"), py::arg("seed"),
            "Times a copy of the network")
       .def(
@@ -239,7 +252,7 @@ void bind_times(py::module_& module) {
           py::arg("n_repetitions"), "Nanoseconds per decision: (n_repetitions,)");
   module.def(
       "time_decisions",
-      [](SDNNTrial& trial, int n_episodes) {
+      [](Trial& trial, int n_episodes) {
         return bindings::times_of(trial, [&] { return tools::time_decisions(trial, n_episodes); });
       },
       py::arg("trial"), py::arg("n_episodes"),

@@ -48,7 +48,7 @@ PYBIND11_MODULE(_core, module) {
   module.attr("__version__") = SDNN_VERSION;
   module.attr("compiler") = compiler();
   pybind11::register_exception_translator(&translate);
-  sdnn::bindings::refuse_bare_objects();
+  sdnn::bindings::refuse_pickling();
   bind_core(module);
   bind_coding(module);
   bind_approximators(module);

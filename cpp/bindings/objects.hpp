@@ -12,28 +12,44 @@
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
-namespace sdnn::bindings {
-
-/// Whether `T` is a class of this library. Known by its name: a list of classes could lack one.
-template <class T>
-consteval bool is_of_library() {
-#if defined(_MSC_VER)
-  const std::string_view signature = __FUNCSIG__;
-  return signature.find("is_of_library<class sdnn::") != std::string_view::npos ||
-         signature.find("is_of_library<struct sdnn::") != std::string_view::npos;
-#else
-  return std::string_view(__PRETTY_FUNCTION__).find("T = sdnn::") != std::string_view::npos;
-#endif
+// Declared only to be found by the arguments' namespaces.
+namespace sdnn::agents {
+void is_of_library(const void*);
+}
+namespace sdnn::approximators {
+void is_of_library(const void*);
+}
+namespace sdnn::coding {
+void is_of_library(const void*);
+}
+namespace sdnn::environments {
+void is_of_library(const void*);
+}
+namespace sdnn::estimators {
+void is_of_library(const void*);
+}
+namespace sdnn::tools {
+void is_of_library(const void*);
 }
 
+namespace sdnn::bindings {
+
+/// Whether `T` is made of other types, as containers are. A template of the library that is bound
+/// needs a specialization.
 template <class T>
-concept LibraryClass = std::is_class_v<T> && is_of_library<T>();
+inline constexpr bool kIsComposed = false;
+template <template <class...> class Template, class... Types>
+inline constexpr bool kIsComposed<Template<Types...>> = true;
+
+/// Classes of the namespaces above, whose arguments are checked.
+template <class T>
+concept LibraryClass =
+    std::is_class_v<T> && !kIsComposed<T> && requires(T* object) { is_of_library(object); };
 
 /// Memory that a call reads or changes without the GIL. The GIL guards the list of them.
 struct Use {
@@ -108,17 +124,20 @@ class WithoutGIL {
   /// Throws std::runtime_error if another thread's call is in the way.
   template <class... Object>
   explicit WithoutGIL(Object&... objects) : uses_(this, {Use::of(this, objects)...}) {}
-  /// Releases the lock for a number of objects that is known only at run time.
-  template <class Object>
-  explicit WithoutGIL(const std::vector<Object*>& objects) : uses_(this, of_all(objects)) {}
+  /// Releases the lock for numbers of objects and parts that are known only at run time.
+  template <class Object, class Part>
+  WithoutGIL(const std::vector<Object*>& objects, const std::vector<std::span<Part>>& parts)
+      : uses_(this, of_all(objects, parts)) {}
   WithoutGIL(const WithoutGIL&) = delete;
   WithoutGIL& operator=(const WithoutGIL&) = delete;
 
  private:
-  template <class Object>
-  std::vector<Use> of_all(const std::vector<Object*>& objects) const {
+  template <class Object, class Part>
+  std::vector<Use> of_all(const std::vector<Object*>& objects,
+                          const std::vector<std::span<Part>>& parts) const {
     std::vector<Use> uses;
     for (Object* const object : objects) uses.push_back(Use::of(this, *object));
+    for (const std::span<Part>& part : parts) uses.push_back(Use::of(this, part));
     return uses;
   }
 
@@ -153,18 +172,15 @@ void wait_for_readers(Object& object) {
   }
 }
 
-/// Makes pybind11's base of all classes refuse to be called. Nobody does, but pickle's protocols 0
-/// and 1 and object.__reduce__; pybind11 would throw through Python's frames.
-inline void refuse_bare_objects() {
-  auto* const base =
-      reinterpret_cast<PyTypeObject*>(pybind11::detail::get_internals().instance_base);
-  base->tp_new = [](PyTypeObject* type, PyObject*, PyObject*) -> PyObject* {
-    if (!pybind11::detail::all_type_info(type).empty()) {
-      return pybind11::detail::make_new_instance(type);
-    }
-    PyErr_Format(PyExc_TypeError, "cannot make or pickle a %.200s", type->tp_name);
-    return nullptr;
-  };
+/// Lets all classes refuse to be pickled, unless they define how. For pickle's protocols 0 and 1
+/// pybind11 would throw through Python's frames.
+inline void refuse_pickling() {
+  const pybind11::handle base(pybind11::detail::get_internals().instance_base);
+  base.attr("__reduce__") = pybind11::cpp_function(
+      [](pybind11::handle self) {
+        throw pybind11::type_error("cannot pickle a " + std::string(Py_TYPE(self.ptr())->tp_name));
+      },
+      pybind11::is_method(base));
 }
 
 /// Throws TypeError if the object behind `held` was never made, std::runtime_error if another

@@ -57,7 +57,7 @@ class Inspector:
 
     def greedy(self, agent: Any, observation: NDArray[np.float64]) -> tuple[float, float]:
         """Return the mean of the best torques, in N m, and their value."""
-        values = agent.action_value.values(observation)
+        values = agent.networks[0].values(observation)
         torques = np.linspace(-10.0, 10.0, values.size)
         return float(torques[values == values.max()].mean()), float(values.max())
 
@@ -83,7 +83,7 @@ class Inspector:
     def first_values(self, agent: Any) -> NDArray[np.float64]:
         """Return Q(start, a) of every action."""
         start = _core.Acrobot(self._acrobot_config).state()
-        return np.asarray(agent.action_value.values(self._clean.observe(start)))
+        return np.asarray(agent.networks[0].values(self._clean.observe(start)))
 
 
 def look(
@@ -145,7 +145,7 @@ def begun_anew(spec: RunSpec, agent: Any, seed: int) -> NDArray[np.bool_]:
         _core.AcrobotSensors(task.sensors, seed, stream)
         for stream in (_core.Stream.sensor_noise, _core.Stream.evaluation_sensor_noise)
     )
-    n_actions = agent.action_value.n_actions
+    n_actions = agent.networks[0].n_actions
 
     def run(eyes: Any, tolerance: float, learning: bool) -> bool:
         acrobot.reset()
@@ -153,7 +153,7 @@ def begun_anew(spec: RunSpec, agent: Any, seed: int) -> NDArray[np.bool_]:
         state = eyes.observe(acrobot.state())
         while True:
             action = agent.act(state, learning)
-            torque = _core.action_value(action, n_actions, -10.0, 10.0)
+            torque = _core.action_value(int(action[0]), n_actions, -10.0, 10.0)
             reward, terminated, truncated = acrobot.step(torque, tolerance)
             next_observation = eyes.observe(acrobot.state())
             if learning:

@@ -30,7 +30,7 @@ Outcome run_episode(sdnn::agents::QLearning<Network>& agent, sdnn::environments:
   agent.begin_episode();
   sensors.observe(acrobot.state(), observed);
   for (bool over = false; !over;) {
-    const std::size_t action = agent.act(observed, learning);
+    const auto action = agent.act(observed, learning);
     const auto result = acrobot.step(max_torque * agent.normalized_action(action), lambda);
     sensors.observe(acrobot.state(), next_observed);
     if (learning) agent.learn(observed, action, result.reward, next_observed, result.terminated);

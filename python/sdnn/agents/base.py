@@ -231,11 +231,6 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
     def n_environments(self, n: int) -> None:
         self._controller.n_environments = whole("n_environments", n, 1, _MOST_ENVIRONMENTS)
 
-    @property
-    @abc.abstractmethod
-    def core(self) -> Any:
-        """The compiled agent, which shares all that is learned: states are in [0, 1]."""
-
     def _require_warm(self) -> _core.Controller:
         """Return the controller; RuntimeError while it is warming up."""
         if self.is_warming_up:
@@ -245,9 +240,18 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
             )
         return self._controller
 
-    def _state(self, observation: Any) -> NDArray[np.float64]:
-        """Return the compiled agent's state for an observation."""
-        return self._require_warm().state_of(self._observations.vector("observation", observation))
+    def _values(self, observation: Any, dimension: int) -> NDArray[np.float64]:
+        """Return the values of a dimension's actions, or of fuzzy rules that of the observation."""
+        variables = self._observations.vector("observation", observation)
+        return self._require_warm().values(variables, dimension)
+
+    @property
+    def n_dimensions(self) -> int:
+        """Dimensions of an action."""
+        return len(self._action.low)
+
+    def _dimension(self, dimension: int) -> int:
+        return whole("dimension", dimension, 0, self.n_dimensions - 1)
 
     def _facts(self) -> dict[str, object]:
         """Return what is shown of it."""
@@ -313,9 +317,21 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
             **more,
         }
 
-    def state(self) -> Arrays:
-        """Return all that the agent remembers, as arrays by name."""
-        return self._controller.state()
+    def state(self, part: str = "") -> Arrays:
+        """Return all that the agent remembers, as arrays by name.
+
+        With ``part`` those whose names begin with ``part.``, by the rest of the name: ``"agent"``
+        is the learning agent, without the ranges of its observations.
+        """
+        prefix = part and f"{part}."
+        state = self._controller.state()
+        return {name.removeprefix(prefix): a for name, a in state.items() if name.startswith(prefix)}
+
+    def _restore(self, **parts: Mapping[str, NDArray[Any]]) -> None:
+        """Replace parts of the state; ValueError if they do not fit, and nothing changes."""
+        kept = {k: a for k, a in self.state().items() if k.partition(".")[0] not in parts}
+        new = {f"{part}.{name}": a for part, state in parts.items() for name, a in state.items()}
+        self._controller.restore(kept | new)
 
     @classmethod
     def rebuild(cls, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Self:

@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sdnn import _core
 from sdnn.agents.agent import Agent
 from sdnn.config import FuzzyQLearningConfig, FuzzyRulesConfig
 from sdnn.support.arguments import whole
@@ -49,31 +50,27 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
         super()._take_spaces(observations, actions)
 
     @property
-    def core(self) -> Any:
-        """The compiled agent, which shares all that is learned: states [0, 1], actions [-1, 1].
+    def rules(self) -> list[_core.FuzzyRules]:
+        """The compiled rules of each dimension of actions, which share all that is learned.
 
-        ``core.rules`` is its table of rules. Of the first dimension, where there are several.
-        RuntimeError while the agent is warming up.
+        States are in [0, 1]. RuntimeError while the agent is warming up.
         """
-        agent: Any = self._require_warm().agent
-        return agent.part(0) if len(self._action.low) > 1 else agent
+        return self._require_warm().networks
 
     @property
     def n_rules(self) -> int:
         """Number of rules of a dimension, ``n_sets ** n_inputs``."""
-        n_rules: int = self.core.rules.n_rules
-        return n_rules
+        return self.rules[0].n_rules
 
     def value(self, observation: ArrayLike) -> float:
         """V(observation): the truth-weighted mean of every fired rule's best value.
 
         The mean over the dimensions, where there are several.
         """
-        state = self._state(observation)
-        return float(self._controller.agent.value(state))
+        values = [self._values(observation, d)[0] for d in range(self.n_dimensions)]
+        return float(sum(values) / self.n_dimensions)
 
-    def rule_values(self, rule: int) -> NDArray[np.float32]:
-        """v(rule, a) of every discrete action, shape (n_actions,); of the first dimension."""
-        rule = whole("rule", rule, 0, self.n_rules - 1)
-        values: NDArray[np.float32] = self.core.rules.values(rule)
-        return values
+    def rule_values(self, rule: int, dimension: int = 0) -> NDArray[np.float32]:
+        """v(rule, a) of every discrete action of a dimension, shape (n_actions,)."""
+        rules = self.rules[self._dimension(dimension)]
+        return rules.values(whole("rule", rule, 0, rules.n_rules - 1))

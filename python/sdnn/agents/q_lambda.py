@@ -56,6 +56,25 @@ class SDNNQLambda(CodedAgent[LinearSDNNConfig, QLambdaConfig]):
     )
     """Settings by name: ``"general"`` and ``"paper"``."""
 
+    @property
+    def readout(self) -> _core.LinearSDNN:
+        """The compiled readout of all dimensions of actions, which shares all that is learned.
+
+        States are in [0, 1]; ``readout.weights()`` are in units of 2 to the power
+        ``readout.exponent``. RuntimeError while the agent is warming up.
+        """
+        readout: _core.LinearSDNN = self.networks[0]
+        return readout
+
+    @property
+    def final_epsilon(self) -> float:
+        """The value that epsilon approaches with ``learning.schedule_steps``.
+
+        By default 0; the first value where observations are symbols only, so that every one
+        continues to be explored. RuntimeError while the agent is warming up.
+        """
+        return self._controller.final_epsilon or 0.0
+
     def learning_report(self) -> dict[str, Any]:
         """Return statistics of learning so far, to find settings that cannot work.
 
@@ -72,7 +91,7 @@ class SDNNQLambda(CodedAgent[LinearSDNNConfig, QLambdaConfig]):
         RuntimeError
             While the agent is warming up.
         """
-        exponent, size = self.core.action_value.exponent, self._controller.reward_size
+        exponent, size = self.readout.exponent, self._controller.reward_size
         return super().learning_report() | {
             "value_unit": None if exponent is None else 2.0**exponent,
             "recent_reward": None if size is None else 2.0**size,

@@ -18,7 +18,7 @@ from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.config import WARM_UP, QLearningConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.environments.matching import Observed
 from sdnn.environments.spaces import AnglePairs, Inputs, Missing, Ranges
-from sdnn.support.arguments import choice, real, whole
+from sdnn.support.arguments import choice, real
 from sdnn.training.names import explained
 
 
@@ -65,33 +65,13 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         self._controller.epsilon = None if epsilon is None else real("epsilon", epsilon)
 
     @property
-    def core(self) -> Any:
-        """The compiled agent, which shares all that is learned: states in [0, 1], indices.
+    def networks(self) -> list[Any]:
+        """The compiled network of each dimension of actions, which shares all that is learned.
 
-        Its approximator is ``core.action_value``, or ``core.action_value(dimension)`` where actions
-        have several dimensions. RuntimeError while the agent is warming up.
+        States are in [0, 1]. Networks have ``values(state)``, ``weights()`` and, by class, more.
+        RuntimeError while the agent is warming up.
         """
-        return self._require_warm().agent
-
-    def _reward_scale(self) -> dict[str, Any]:
-        """Return how large rewards are; see cpp/include/sdnn/agents/reward_scale.hpp."""
-        return dict(self._require_warm().reward_scale)
-
-    def _restore(self, state: dict[str, Any], reward_scale: dict[str, Any]) -> None:
-        """Restore the state of `core`, and how large rewards are; ValueError if they do not fit."""
-        controller = self._require_warm()
-        before = controller.reward_scale
-        controller.reward_scale = reward_scale
-        try:
-            self.core.restore(state)
-        except ValueError:
-            controller.reward_scale = before
-            raise
-
-    @property
-    def n_dimensions(self) -> int:
-        """Dimensions of an action."""
-        return len(self._action.low)
+        return self._require_warm().networks
 
     @property
     def n_actions(self) -> int | list[int]:
@@ -121,9 +101,7 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         RuntimeError, ValueError
             While the agent is warming up; for arguments that are not usable.
         """
-        state = self._state(observation)
-        values: NDArray[np.float64] = self.core.q_values(state, self._dimension(dimension))
-        return values
+        return self._values(observation, self._dimension(dimension))
 
     def learning_report(self) -> dict[str, Any]:
         """Return statistics of learning so far, to find settings that cannot work.
@@ -158,9 +136,6 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
             "share_of_range": [one and one[0] for one in use],
             "share_beyond_range": [one and one[1] for one in use],
         }
-
-    def _dimension(self, dimension: int) -> int:
-        return whole("dimension", dimension, 0, self.n_dimensions - 1)
 
 
 class CodedAgent(ValueAgent[Approximator, Learning], abc.ABC, Generic[Approximator, Learning]):
@@ -270,7 +245,7 @@ warm_up_steps, missing
         RuntimeError
             While the agent is warming up.
         """
-        networks = [self._network(dimension) for dimension in range(self.n_dimensions)]
+        networks = self.networks
         changed, rounded_away, out_of_range, n_all = np.sum(
             [network.correction_counts for network in networks], axis=0
         ).tolist()
@@ -283,11 +258,6 @@ warm_up_steps, missing
             "value_step": networks[0].value_step,
             "mean_error": float(np.mean([network.mean_error for network in networks])),
         }
-
-    def _network(self, dimension: int) -> Any:
-        """Return the approximator of a dimension."""
-        core = self.core
-        return core.action_value if self.n_dimensions == 1 else core.action_value(dimension)
 
 
 class RBFQLearning(ValueAgent[RBFNetworkConfig, QLearningConfig]):

@@ -153,7 +153,7 @@ def network_parts(n_inputs: int, effort: Effort) -> _core.NetworkParts:
     """Return the parts of a network that has learned in a short trial."""
     trial = _short_trial(n_inputs, 0.0, effort.n_episodes)
     trial.advance(effort.n_episodes)
-    return _core.NetworkParts(trial, SEED)
+    return _core.NetworkParts(trial.agent.networks[0], SEED)
 
 
 def measure_acrobot(effort: Effort) -> dict[str, Any]:

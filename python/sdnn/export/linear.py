@@ -26,7 +26,7 @@ class LinearWriter(Writer):
 
     def network(self) -> Any:
         """Return the readout."""
-        return self.core.action_value
+        return self.networks[0]
 
     def code(self) -> Code:
         """Return the code of its states."""
@@ -80,7 +80,7 @@ class LinearWriter(Writer):
         """Make the header."""
         sizes, tables = self.sizes(), self.tables_of_spaces()
         self.add_code(tables, sizes)
-        state = self.core.state()
+        state = self.agent.state("agent")
         weights = state["action_value.weights"]
         if np.any(state.get("action_value.n_snapshots", 0)):
             weights = state["action_value.averaged_weights"]
@@ -189,12 +189,12 @@ class LearnerWriter(Learner, LinearWriter):
 
     def _rate(self, name: str) -> str:
         """Write alpha or epsilon: as it is now, or by the schedule."""
-        learning, state = self.agent.learning, self.core.state()
+        learning, state = self.agent.learning, self.agent.state("agent")
         if learning.schedule_steps == 0 or name in state:
-            return str(round(getattr(self.core, name) * _ONE))
+            return str(round(getattr(self.agent, name) * _ONE))
         first, last = getattr(learning, name), learning.final_learning_rate
         if name == "epsilon":
-            last = self.core.final_epsilon
+            last = self.agent.final_epsilon
         ends = [round(one * _ONE) for one in (first, first if last is None else last)]
         return f"{self.name}_scheduled(agent, {ends[0]}, {ends[1]})"
 

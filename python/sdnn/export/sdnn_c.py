@@ -24,12 +24,7 @@ class SDNNCWriter(Writer):
 
     def network(self) -> Any:
         """Return the network of the first dimension."""
-        return self._networks()[0]
-
-    def _networks(self) -> list[Any]:
-        if not self.is_vector:
-            return [self.core.action_value]
-        return [self.core.action_value(dimension) for dimension in range(self.n_dimensions)]
+        return self.networks[0]
 
     def require_small(self, n_units: int, n_columns: int) -> None:
         """Raise ValueError for more units or weights than a header can hold."""
@@ -55,7 +50,7 @@ class SDNNCWriter(Writer):
 
     def header(self) -> CHeader:
         """Make the header."""
-        name, networks, tables = self.name, self._networks(), self.tables_of_spaces()
+        name, networks, tables = self.name, self.networks, self.tables_of_spaces()
         codes = [Code(network, self.n_inputs) for network in networks]
         n_columns = codes[0].n_columns
         self.require_small(self.agent.approximator.n_hidden_units, n_columns)
@@ -106,7 +101,7 @@ class SDNNCWriter(Writer):
         return self.write("c_sdnn_c", values, tables)
 
     def _add_ranks(self, tables: Tables) -> None:
-        networks = self._networks()
+        networks = self.networks
         values = networks[0].output_values()
         if any((network.output_values() != values).any() for network in networks):
             raise ValueError("networks of one agent must have one range of values")

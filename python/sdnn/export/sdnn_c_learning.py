@@ -215,8 +215,8 @@ class SDNNCLearner(Learner, SDNNCWriter):
         low, high = network.output_range
         reals = {
             "progress": state["progress"],
-            "rate": self.core.learning_rate,
-            "epsilon": self.core.epsilon,
+            "rate": self.agent.learning_rate,
+            "epsilon": self.agent.epsilon,
         }
         returns: dict[str, Any] = {}
         if self.adapts:

@@ -58,7 +58,7 @@ class Writer(ABC):
 
     def __init__(self, agent: CodedAgent[Any, Any], name: str, fraction_bits: int | None) -> None:
         self.agent, self.name = agent, name
-        self.core = agent.core  # RuntimeError while warming up
+        self.networks = agent.networks  # RuntimeError while warming up
         self.n_dimensions = agent.n_dimensions
         self.is_vector = self.n_dimensions > 1
         self.box = self._box()
@@ -225,8 +225,8 @@ class Learner(Writer):
 
     def state(self) -> dict[str, Any]:
         """Return the core's state, and the scale of rewards, with all of its numbers."""
-        scale = {"size": NONE, "size_in_window": NONE, **self.agent._reward_scale()}
-        return {**self.core.state(), **{f"{SCALE}.{name}": n for name, n in scale.items()}}
+        scale = {"size": NONE, "size_in_window": NONE, **self.agent.state("reward_scale")}
+        return {**self.agent.state("agent"), **{f"{SCALE}.{name}": n for name, n in scale.items()}}
 
     def image(self) -> bytes:
         """Return the state as the header's bytes."""
@@ -240,7 +240,7 @@ class Learner(Writer):
 
     def restore(self, whole: bytes) -> None:
         """Give the agent the state of an image, whole and of this agent."""
-        (image,), state = np.frombuffer(whole, self.layout(), 1), self.core.state()
+        (image,), state = np.frombuffer(whole, self.layout(), 1), self.agent.state("agent")
         for stream, words in zip(self.streams, image["words"], strict=True):
             state[f"{stream}.words"] = words.copy()
         state.pop("n_random_left", None)
@@ -250,7 +250,7 @@ class Learner(Writer):
         names = [name for name in image.dtype.names or () if name.startswith(SCALE)]
         kept = {name: np.array(image[name]) for name in names if image[name] != NONE}
         scale = {name.removeprefix(f"{SCALE}."): number for name, number in kept.items()}
-        self.agent._restore(state, scale)
+        self.agent._restore(agent=state, reward_scale=scale)
 
     def seeds(self, state: dict[str, Any]) -> NDArray[np.uint64]:
         """Return the states of the random generators, shape (n_streams, 4)."""

@@ -48,10 +48,10 @@ class CostSeries:
 
 
 SERIES = (
-    CostSeries("sdnn-c", "SDNN-C", "sdnn-c", "$d(d-1)$ groups of columns", _core.SDNNQLearning),
-    CostSeries("fuzzy", "FQL", "fuzzy", "$2^d$ fired rules of $9^d$", _core.FuzzyQLearning,
+    CostSeries("sdnn-c", "SDNN-C", "sdnn-c", "$d(d-1)$ groups of columns", _core.BareAgent),
+    CostSeries("fuzzy", "FQL", "fuzzy", "$2^d$ fired rules of $9^d$", _core.BareAgent,
                {"max_table_bytes": 2**32}),  # with 8 inputs it has 3.6 GB, nearly all untouched
-    CostSeries("rbf", "RBFN, factored", "rbf", "$4^{d+1}$ weights", _core.RBFQLearning),
+    CostSeries("rbf", "RBFN, factored", "rbf", "$4^{d+1}$ weights", _core.BareAgent),
     CostSeries("rbf-plain", "RBFN, plain", "rbf", "$601 \\cdot 4^{d+1}$ basis values",
                _core.PlainRBFQLearning, is_plain=True),
 )  # fmt: skip

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "agents/one_dimension.hpp"
 #include "approximators/lookup_table.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
@@ -20,7 +21,8 @@ static_assert(Agent<FuzzyQLearning>);
 static_assert(!Agent<approximators::RBFNetwork>);
 
 TEST(Agent, DiscreteActionsCutTheRangeEvenly) {
-  const QLearning<testing::LookupTable> agent(testing::LookupTable(1, 2, 5), {}, 1);
+  const testing::OneDimension<QLearning<testing::LookupTable>> agent(testing::LookupTable(1, 2, 5),
+                                                                     {}, 1);
   const std::vector<double> expected = {-1.0, -0.5, 0.0, 0.5, 1.0};
   for (std::size_t action = 0; action < 5; ++action) {
     EXPECT_EQ(agent.normalized_action(action), expected[action]);
@@ -47,10 +49,10 @@ void expect_that_learning_begins_no_episode(A agent) {
 TEST(Agent, ATerminatedTransitionBeginsNoEpisode) {
   const EpsilonGreedyConfig policy{
       .epsilon = 1.0, .n_greedy_steps = 1, .tie_rule = TieRule::lowest};
-  expect_that_learning_begins_no_episode(
-      QLearning<testing::LookupTable>(testing::LookupTable(1, 2, 5), {.policy = policy}, 1));
-  expect_that_learning_begins_no_episode(
-      FuzzyQLearning(approximators::FuzzyRules({.n_inputs = 1}), {.policy = policy}, 1));
+  expect_that_learning_begins_no_episode(testing::OneDimension<QLearning<testing::LookupTable>>(
+      testing::LookupTable(1, 2, 5), {.policy = policy}, 1));
+  expect_that_learning_begins_no_episode(testing::OneDimension<FuzzyQLearning>(
+      approximators::FuzzyRules({.n_inputs = 1}), {.policy = policy}, 1));
 }
 
 }  // namespace

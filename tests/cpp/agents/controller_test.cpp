@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "agents/one_dimension.hpp"
 #include "sdnn/core/random.hpp"
 #include "states.hpp"
 #include "threads.hpp"
@@ -21,7 +22,6 @@
 namespace sdnn::agents {
 namespace {
 
-using approximators::Decoupled;
 using approximators::FuzzyRulesConfig;
 using approximators::LinearSDNNConfig;
 using approximators::RBFNetwork;
@@ -121,7 +121,7 @@ TEST(Controller, DoesWhatItsAgentDoes) {
   RBFNetworkConfig bases = kBases;
   bases.n_inputs = 3;
   const RBFNetwork part(bases);
-  QLearning<Decoupled<RBFNetwork>> agent(Decoupled<RBFNetwork>({part, part}), {}, 3);
+  QLearning<RBFNetwork> agent({part, part}, {}, 3);
   Controller controller(rbf_of_vectors());
   EXPECT_EQ(controller.n_variables(), 4U);
   EXPECT_EQ(controller.n_dimensions(), 2U);
@@ -141,7 +141,7 @@ TEST(Controller, DoesWhatItsAgentDoes) {
     agent.begin_episode();
     controller.begin_episode();
   }
-  EXPECT_EQ(core::state_of(std::get<QLearning<Decoupled<RBFNetwork>>>(controller.agent())),
+  EXPECT_EQ(core::state_of(std::get<QLearning<RBFNetwork>>(controller.agent())),
             core::state_of(agent));
 }
 
@@ -183,7 +183,8 @@ TEST(Controller, IsReadByManyThreads) {
 
 TEST(Controller, OfSeveralRobotsDoesWhatItsAgentDoes) {
   const Numbers observed = {1.0, 0.0, 4.0, 11.0}, state = {0.5, 0.75, 0.25};
-  FuzzyQLearning agent(approximators::FuzzyRules({.n_inputs = 3}), kTraces, 3);
+  testing::OneDimension<FuzzyQLearning> agent(approximators::FuzzyRules({.n_inputs = 3}), kTraces,
+                                              3);
   Controller controller(fuzzy_config());
   agent.set_n_environments(3);
   controller.set_n_environments(3);
@@ -215,17 +216,18 @@ TEST(Controller, RemembersWhichIndexAWholeActionWasWhileItsRobotIsThere) {
     Controller controller(config);
     controller.set_n_environments(2);
     auto agent = std::get<QLearning<RBFNetwork>>(controller.agent());
+    const std::vector<std::size_t> learned = {leaves ? 2U : 1U};
     for (std::size_t index = 0; index != 1;) {
-      index = agent.act(state, true, 1);
+      index = agent.act(state, true, 1).front();
       ASSERT_EQ(controller.act(observed, true, 1)[0], std::floor(0.5 * double(index) + 0.5));
     }
     if (leaves) {
       for (const std::size_t n : {1U, 2U}) controller.set_n_environments(n);
     }
     controller.learn(observed, Numbers{1.0}, 1.0, observed, true, 1);
-    agent.learn(state, leaves ? 2 : 1, 1.0, state, true, 1);
-    EXPECT_EQ(core::state_of(std::get<QLearning<RBFNetwork>>(controller.agent()).action_value()),
-              core::state_of(agent.action_value()));
+    agent.learn(state, learned, 1.0, state, true, 1);
+    const auto networks = std::get<QLearning<RBFNetwork>>(controller.agent()).networks();
+    EXPECT_EQ(core::state_of(networks[0]), core::state_of(agent.networks()[0]));
   }
 }
 

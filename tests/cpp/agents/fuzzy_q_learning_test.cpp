@@ -10,19 +10,23 @@
 #include <vector>
 
 #include "agents/lives.hpp"
+#include "agents/one_dimension.hpp"
 #include "allocation_count.hpp"
 #include "sdnn/core/random.hpp"
 #include "states.hpp"
+#include "threads.hpp"
 
 namespace sdnn::agents {
 namespace {
 
 using approximators::FuzzyRules;
-using State = std::vector<double>;
+using Fuzzy = testing::OneDimension<FuzzyQLearning>;
+using Numbers = std::vector<double>;
+using State = Numbers;
 
 constexpr EpsilonGreedyConfig kGreedy{.epsilon = 0.0, .tie_rule = TieRule::lowest};
 
-std::vector<float> table(const FuzzyQLearning& agent) {
+std::vector<float> table(const Fuzzy& agent) {
   const auto values = agent.rules().table();
   return {values.data(), values.data() + values.size()};
 }
@@ -33,7 +37,7 @@ TEST(FuzzyQLearning, OneStepByHand) {
   rules.set_value(0, 2, 4.0F);  // rule 0 picks +1
   rules.set_value(1, 0, 2.0F);  // rule 1 picks -1
   rules.set_value(2, 1, 8.0F);
-  FuzzyQLearning agent(rules, {.policy = kGreedy}, 1);
+  Fuzzy agent(rules, {.policy = kGreedy}, 1);
   const State state = {0.125}, next = {0.75};
   EXPECT_EQ(agent.act(state), 0.5);                // 3/4 (+1) + 1/4 (-1)
   EXPECT_EQ(testing::value_of(agent, next), 5.0);  // (2 + 8) / 2
@@ -50,20 +54,21 @@ TEST(FuzzyQLearning, OneStepByHand) {
 }
 
 TEST(FuzzyQLearning, OnlyFiredRulesAreTouched) {
-  FuzzyQLearning agent(FuzzyRules({.n_inputs = 3}), {}, 1);
+  Fuzzy agent(FuzzyRules({.n_inputs = 3}), {}, 1);
   const State state = {0.3, 0.5, 0.9};
   const double action = agent.act(state);
   agent.learn(state, action, 1.0, {{0.4, 0.5, 0.6}}, false);
-  EXPECT_EQ(agent.fired().size(), 4U);  // 0.5 is a centre
+  EXPECT_EQ(agent.dimension().fired().size(), 4U);  // 0.5 is a centre
   EXPECT_EQ((agent.rules().table() != 0.0F).count(), 4);
   for (std::size_t i = 0; i < 4; ++i) {
-    EXPECT_EQ(agent.rules().values(agent.fired().rules[i])[agent.picked()[i]],
-              static_cast<float>(0.5 * agent.fired().truth_values[i]));
+    EXPECT_EQ(
+        agent.rules().values(agent.dimension().fired().rules[i])[agent.dimension().picked()[i]],
+        static_cast<float>(0.5 * agent.dimension().fired().truth_values[i]));
   }
 }
 
 TEST(FuzzyQLearning, ActionsAreContinuousAndStayInTheRange) {
-  FuzzyQLearning agent(FuzzyRules({.n_inputs = 2}), {}, 3);
+  Fuzzy agent(FuzzyRules({.n_inputs = 2}), {}, 3);
   core::Random world(1, core::Stream::ties);
   int between = 0;
   for (int i = 0; i < 1000; ++i) {
@@ -81,7 +86,7 @@ TEST(FuzzyQLearning, RulesExploreIndependentlyAfterTheGreedyFirstSteps) {
   for (std::size_t rule = 0; rule < rules.n_rules(); ++rule) {
     rules.set_value(rule, 7, 1.0F);
   }
-  FuzzyQLearning agent(rules, {}, 5);
+  Fuzzy agent(rules, {}, 5);
   const State state = {0.3, 0.3, 0.3, 0.3};
   int random_picks = 0;
   for (int episode = 0; episode < 500; ++episode) {
@@ -89,7 +94,7 @@ TEST(FuzzyQLearning, RulesExploreIndependentlyAfterTheGreedyFirstSteps) {
     for (int step = 0; step < 20; ++step) {
       agent.act(state);
       int others = 0;
-      for (const std::size_t action : agent.picked()) others += action != 7;
+      for (const std::size_t action : agent.dimension().picked()) others += action != 7;
       if (step < 10) {
         EXPECT_EQ(others, 0);
       }
@@ -104,7 +109,7 @@ TEST(FuzzyQLearning, ATerminatedTransitionDoesNotBootstrapATruncatedOneDoes) {
   FuzzyRules rules({.n_inputs = 1, .n_sets = 3, .n_actions = 2});
   rules.set_value(2, 0, 20.0F);
   for (const bool terminated : {true, false}) {
-    FuzzyQLearning agent(rules, {.policy = kGreedy}, 1);
+    Fuzzy agent(rules, {.policy = kGreedy}, 1);
     agent.learn(State{0.0}, agent.act(State{0.0}), 1.0, State{1.0}, terminated);
     EXPECT_EQ(agent.rules().values(0)[0], terminated ? 0.5F : 9.5F);
   }
@@ -112,8 +117,8 @@ TEST(FuzzyQLearning, ATerminatedTransitionDoesNotBootstrapATruncatedOneDoes) {
 
 // At a centre one rule fires: fuzzy Q-learning is Q-learning on a table there.
 TEST(FuzzyQLearning, AtTheCentresItIsTabularQLearning) {
-  FuzzyQLearning agent(FuzzyRules({.n_inputs = 1, .n_sets = 5, .n_actions = 2}),
-                       {.policy = {.epsilon = 0.5, .n_greedy_steps = 0}}, 9);
+  Fuzzy agent(FuzzyRules({.n_inputs = 1, .n_sets = 5, .n_actions = 2}),
+              {.policy = {.epsilon = 0.5, .n_greedy_steps = 0}}, 9);
   for (int episode = 0; episode < 2000; ++episode) {  // a corridor of four cells, then the goal
     agent.begin_episode();
     for (int s = 0; s < 4;) {
@@ -131,8 +136,8 @@ TEST(FuzzyQLearning, AtTheCentresItIsTabularQLearning) {
 }
 
 TEST(FuzzyQLearning, EvaluationDoesNotDisturbLearning) {
-  FuzzyQLearning alone(FuzzyRules({.n_inputs = 2}), {.trace_decay = 0.5}, 8);
-  FuzzyQLearning evaluated(FuzzyRules({.n_inputs = 2}), {.trace_decay = 0.5}, 8);
+  Fuzzy alone(FuzzyRules({.n_inputs = 2}), {.trace_decay = 0.5}, 8);
+  Fuzzy evaluated(FuzzyRules({.n_inputs = 2}), {.trace_decay = 0.5}, 8);
   core::Random world(2, core::Stream::sensor_noise);
   State state = {0.5, 0.5};
   for (int i = 0; i < 2000; ++i) {
@@ -155,8 +160,8 @@ TEST(FuzzyQLearning, EvaluationDoesNotDisturbLearning) {
 
 // Traces by hand: one input at centres, so truth values are 1. gamma lambda = 0.45.
 TEST(FuzzyQLearning, TracesByHand) {
-  FuzzyQLearning agent(FuzzyRules({.n_inputs = 1, .n_sets = 3, .n_actions = 1}),
-                       {.trace_decay = 0.5, .policy = kGreedy}, 1);
+  Fuzzy agent(FuzzyRules({.n_inputs = 1, .n_sets = 3, .n_actions = 1}),
+              {.trace_decay = 0.5, .policy = kGreedy}, 1);
   const auto live = [&agent](double s, double reward, double next, bool terminated = false) {
     agent.learn(State{s}, agent.act(State{s}), reward, State{next}, terminated);
   };
@@ -179,7 +184,7 @@ TEST(FuzzyQLearning, TracesByHand) {
 
 TEST(FuzzyQLearning, AStepAllocatesNothingWithAndWithoutTraces) {
   for (const double trace_decay : {0.0, 1.0}) {
-    FuzzyQLearning agent(FuzzyRules({.n_inputs = 4}), {.trace_decay = trace_decay}, 1);
+    Fuzzy agent(FuzzyRules({.n_inputs = 4}), {.trace_decay = trace_decay}, 1);
     core::Random world(3, core::Stream::ties);
     State state(4), next(4);
     const std::size_t before = testing::allocation_count();
@@ -205,7 +210,7 @@ std::string message(Call call) {
 
 TEST(FuzzyQLearning, NamesWhatIsImpossible) {
   const auto of = [](const FuzzyQLearningConfig& config) {
-    return message([&] { FuzzyQLearning(FuzzyRules({.n_inputs = 1}), config, 1); });
+    return message([&] { Fuzzy(FuzzyRules({.n_inputs = 1}), config, 1); });
   };
   EXPECT_EQ(of({.learning_coefficient = 0.0}), "learning_coefficient must be in (0, 1], got 0");
   EXPECT_EQ(of({.discount = 1.5}), "discount must be in [0, 1], got 1.5");
@@ -217,12 +222,12 @@ TEST(FuzzyQLearning, NamesWhatIsImpossible) {
 
 TEST(FuzzyQLearning, TooManyTracesAreRefusedBeforeMemoryIsAskedFor) {
   const FuzzyRules rules({.n_inputs = 16, .n_sets = 2, .n_actions = 2});
-  EXPECT_THROW(FuzzyQLearning(rules, {.discount = 1.0, .trace_decay = 0.99}, 1), std::length_error);
-  EXPECT_EQ(FuzzyQLearning(rules, {}, 1).n_inputs(), 16U);
+  EXPECT_THROW(Fuzzy(rules, {.discount = 1.0, .trace_decay = 0.99}, 1), std::length_error);
+  EXPECT_EQ(Fuzzy(rules, {}, 1).n_inputs(), 16U);
 }
 
 TEST(FuzzyQLearning, ABadTransitionTeachesNothing) {
-  FuzzyQLearning agent(FuzzyRules({.n_inputs = 2}), {}, 1);
+  Fuzzy agent(FuzzyRules({.n_inputs = 2}), {}, 1);
   const State state = {0.3, 0.6}, other = {0.3, 0.7}, bad = {0.3, 1.7};
   const auto learn = [&agent](const State& s, double a, double r, const State& next) {
     return message([&] { agent.learn(s, a, r, next, false); });
@@ -242,14 +247,14 @@ TEST(FuzzyQLearning, ABadTransitionTeachesNothing) {
   EXPECT_EQ(learn(state, action, 1.0, other), "no error");
 }
 
-FuzzyQLearning traced_agent() {
+Fuzzy traced_agent() {
   return {FuzzyRules({.n_inputs = 2, .n_sets = 4, .n_actions = 5}),
           {.trace_decay = 0.8, .policy = {.epsilon = 0.3, .n_greedy_steps = 2}},
           3};
 }
 
 TEST(FuzzyQLearning, ARewardThatIsTooLargeLeavesTheTraces) {
-  FuzzyQLearning one = traced_agent(), other = traced_agent();
+  Fuzzy one = traced_agent(), other = traced_agent();
   const State state = {0.3, 0.6}, next = {0.3, 0.7};
   for (int step = 0; step < 20; ++step) {
     const double action = one.act(state);
@@ -274,7 +279,7 @@ TEST(FuzzyQLearning, ALifeInSeveralEnvironmentsCanBeCutAnywhere) {
 TEST(FuzzyQLearning, EachEnvironmentHasAnActAndTracesOfItsOwn) {
   const FuzzyQLearningConfig config{.trace_decay = 0.5, .policy = kGreedy};
   const FuzzyRules rules({.n_inputs = 2, .n_sets = 4, .n_actions = 3});
-  FuzzyQLearning both(rules, config, 1), low(rules, config, 1), high(rules, config, 1);
+  Fuzzy both(rules, config, 1), low(rules, config, 1), high(rules, config, 1);
   both.set_n_environments(2);
   EXPECT_EQ(both.n_environments(), 2U);
   core::Random world(4, core::Stream::weights);
@@ -320,7 +325,7 @@ TEST(FuzzyQLearning, ARestoredAgentAllocatesNothing) {
 }
 
 TEST(FuzzyQLearning, AStateWithoutAnActForgetsTheLast) {
-  FuzzyQLearning agent = traced_agent();
+  Fuzzy agent = traced_agent();
   const core::State fresh = core::state_of(agent);
   const State state = {0.3, 0.6};
   const double action = agent.act(state);
@@ -330,7 +335,7 @@ TEST(FuzzyQLearning, AStateWithoutAnActForgetsTheLast) {
 }
 
 TEST(FuzzyQLearning, RefusesAStateThatDoesNotFit) {
-  FuzzyQLearning agent = traced_agent();
+  Fuzzy agent = traced_agent();
   agent.begin_episode();
   for (const State& state : {State{0.3, 0.6}, State{0.9, 0.1}}) {
     const double action = agent.act(state);
@@ -371,6 +376,106 @@ TEST(FuzzyQLearning, RefusesAStateThatDoesNotFit) {
   bad["traced"] = testing::tensor_of(std::vector<std::int64_t>(200000, 0));
   bad["eligibilities"] = testing::tensor_of(std::vector<double>(100000, 1.0));
   refused(bad, "eligibilities must be not too many");
+}
+
+FuzzyRules small_rules() { return FuzzyRules({.n_inputs = 2, .n_sets = 4, .n_actions = 5}); }
+constexpr FuzzyQLearningConfig kTraced{.trace_decay = 0.7,
+                                       .policy = {.epsilon = 0.3, .n_greedy_steps = 0}};
+
+Fuzzy part(std::uint64_t seed) { return {small_rules(), kTraced, seed}; }
+
+FuzzyQLearning agent_of_two() {
+  return {std::vector<FuzzyRules>{small_rules(), small_rules()}, kTraced, 1};
+}
+
+TEST(FuzzyQLearning, OfVectorsEachDimensionLearnsAsAnAgentOfItsOwn) {
+  FuzzyQLearning both = agent_of_two();
+  Fuzzy first = part(1), second = part(seed_of_dimension(1, 1));
+  EXPECT_EQ(both.n_dimensions(), 2U);
+  EXPECT_EQ(both.n_inputs(), 2U);
+  Numbers state = {0.2, 0.9};
+  for (int t = 0; t < 200; ++t) {
+    const Numbers action = testing::copied(both.act(state));
+    ASSERT_EQ(action, (Numbers{first.act(state), second.act(state)}));
+    ASSERT_EQ(testing::copied(both.last_action()), action);
+    ASSERT_EQ(testing::value_of(both, state),
+              (testing::value_of(first, state) + testing::value_of(second, state)) / 2.0);
+    const double reward = action[0] - action[1];
+    const Numbers next = {0.5 + 0.4 * action[0], 0.5 + 0.4 * action[1]};
+    both.learn(state, action, reward, next, t % 9 == 8);
+    first.learn(state, action[0], reward, next, t % 9 == 8);
+    second.learn(state, action[1], reward, next, t % 9 == 8);
+    state = next;
+    if (t % 9 != 8) continue;
+    both.begin_episode();
+    first.begin_episode();
+    second.begin_episode();
+  }
+  EXPECT_EQ(core::state_of(both.dimensions()[0]), core::state_of(first));
+  EXPECT_EQ(core::state_of(both.dimensions()[1]), core::state_of(second));
+}
+
+// It helps that the first is high and the second low, and each is told the sum only.
+TEST(FuzzyQLearning, OfVectorsLearnsWhatEachDimensionIsGoodFor) {
+  FuzzyQLearning agent = agent_of_two();
+  const Numbers state = {0.5, 0.5};
+  for (int t = 0; t < 3000; ++t) {
+    const Numbers action = testing::copied(agent.act(state));
+    agent.learn(state, action, action[0] - action[1], state, true);
+  }
+  const auto greedy = agent.act(state, false);
+  EXPECT_GT(greedy[0], 0.5);
+  EXPECT_LT(greedy[1], -0.5);
+}
+
+TEST(FuzzyQLearning, OfVectorsALifeCanBeCutAnywhere) {
+  testing::expect_that_a_life_can_be_cut(agent_of_two);
+  testing::expect_that_a_life_can_be_cut(agent_of_two, 3);
+}
+
+TEST(FuzzyQLearning, OfVectorsABadTransitionTeachesNothing) {
+  FuzzyQLearning agent = agent_of_two();
+  const Numbers state = {0.2, 0.9};
+  const Numbers action = testing::copied(agent.act(state));
+  const core::State before = core::state_of(agent);
+  for (const Numbers& bad :
+       {Numbers{action[0]}, Numbers{action[0], 0.123}, Numbers{0.123, action[1]}, Numbers{}}) {
+    EXPECT_THROW(agent.learn(state, bad, 1.0, state, false), std::invalid_argument);
+  }
+  EXPECT_THROW(agent.learn(Numbers{0.2, 0.8}, action, 1.0, state, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(state, action, 1.0, Numbers{0.2, 1.1}, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(state, action, 1.0, state, false, 1), std::invalid_argument);
+  EXPECT_EQ(core::state_of(agent), before);
+}
+
+TEST(FuzzyQLearning, NeedsRulesOfTheSameInputs) {
+  const std::vector<FuzzyRules> rules = {FuzzyRules({.n_inputs = 2}), FuzzyRules({.n_inputs = 3})};
+  EXPECT_THROW(FuzzyQLearning(rules, {}, 1), std::invalid_argument);
+  EXPECT_THROW(FuzzyQLearning(std::vector<FuzzyRules>{}, {}, 1), std::invalid_argument);
+}
+
+// Between two updates many threads may ask for values and choose greedy actions.
+TEST(FuzzyQLearning, OfVectorsManyThreadsMayReadIt) {
+  FuzzyQLearning agent = agent_of_two();
+  testing::World<FuzzyQLearning> world(agent.n_inputs(), 7);
+  for (int t = 0; t < 300; ++t) world.tick(agent);
+  const auto read = [](const FuzzyQLearning& learned) {
+    core::Random random(5, core::Stream::sensor_noise), ties(1, core::Stream::evaluation_ties);
+    auto workspace = learned.workspace();
+    std::vector<Numbers> all;
+    Numbers state(learned.n_inputs());
+    for (int i = 0; i < 50; ++i) {
+      for (double& x : state) x = random.uniform();
+      all.push_back(testing::copied(learned.best_action(state, workspace, ties)));
+      all.back().push_back(learned.values(state, workspace, 1)[0]);
+    }
+    return all;
+  };
+  const FuzzyQLearning alone = agent;
+  const auto expected = read(alone);
+  for (const auto& values : testing::in_threads(4, [&](std::size_t) { return read(agent); })) {
+    EXPECT_EQ(values, expected);
+  }
 }
 
 }  // namespace

@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -18,14 +21,29 @@ namespace sdnn::testing {
 template <class Agent>
 double value_of(const Agent& agent, const std::vector<double>& state) {
   auto workspace = agent.workspace();
-  return agent.value(state, workspace);
+  double sum = 0.0;
+  for (std::size_t d = 0; d < agent.n_dimensions(); ++d) {
+    sum += agent.values(state, workspace, d)[0];
+  }
+  return sum / static_cast<double>(agent.n_dimensions());
+}
+
+/// A copy of an action, whose span is valid until the next act.
+template <class Number>
+std::vector<Number> copied(std::span<const Number> action) {
+  return {action.begin(), action.end()};
+}
+template <class Number>
+  requires std::is_arithmetic_v<Number>
+Number copied(Number action) {
+  return action;
 }
 
 /// A world of random states and rewards. Copies go on alike.
 template <class Agent>
 class World {
  public:
-  using Action = decltype(std::declval<Agent&>().act({}));
+  using Action = decltype(copied(std::declval<Agent&>().act({})));
 
   World(std::size_t n_inputs, std::uint64_t seed, std::size_t environment = 0)
       : environment_(environment),
@@ -42,7 +60,7 @@ class World {
     }
     if (!has_acted_) {
       if (random_.below(8) == 0) (void)agent.act(state_, false, environment_);
-      action_ = agent.act(state_, true, environment_);
+      action_ = copied(agent.act(state_, true, environment_));
       has_acted_ = true;
       return action_;
     }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 
 namespace sdnn::agents {
@@ -34,11 +35,11 @@ TEST(Presets, TheRobustOneMakesAnAgentThatLearns) {
   const Preset preset = robust_preset(2);
   constexpr std::uint64_t kSeed = 1;
   QLearning agent(approximators::SDNNC(preset.approximator, kSeed), preset.learning, kSeed);
-  EXPECT_EQ(agent.action_value().n_actions(), 61U);
+  EXPECT_EQ(agent.networks().front().n_actions(), 61U);
   const std::vector<double> state = {0.2, 0.7};
   for (int episode = 0; episode < 20; ++episode) {
     agent.begin_episode();
-    agent.learn(state, 7, 5.0, state, true);
+    agent.learn(state, std::vector<std::size_t>{7}, 5.0, state, true);
   }
   auto workspace = agent.workspace();
   EXPECT_NEAR(agent.values(state, workspace)[7], 5.0, 0.2);

@@ -19,6 +19,7 @@ namespace {
 
 using approximators::LinearSDNN;
 using approximators::LinearSDNNConfig;
+using Indices = std::vector<std::size_t>;
 using State = std::vector<double>;
 
 QLambda agent_of(const QLambdaConfig& config, std::vector<std::size_t> n_actions = {3},
@@ -57,11 +58,11 @@ TEST(QLambda, OneStepTargetsByHand) {
                             .bootstrap = Bootstrap::sarsa,
                             .final_learning_rate = {}});
   const State a{0.1, 0.1}, b{0.9, 0.9};
-  agent.learn(b, {2}, 8.0, b, true);
+  agent.learn(b, Indices{2}, 8.0, b, true);
   EXPECT_NEAR(q(agent, b, 2), 8.0, 1e-3);
-  agent.learn(a, {0}, 1.0, b, false);
+  agent.learn(a, Indices{0}, 1.0, b, false);
   EXPECT_EQ(q(agent, a, 0), 0.0);  // waits for the next action
-  agent.learn(b, {2}, 8.0, b, true);
+  agent.learn(b, Indices{2}, 8.0, b, true);
   EXPECT_NEAR(q(agent, a, 0), 5.0, 0.5);
 }
 
@@ -70,8 +71,8 @@ TEST(QLambda, ALimitBootstrapsFromTheBestValueATerminalStateDoesNot) {
   const State a{0.1, 0.1}, b{0.9, 0.9};
   for (const bool terminated : {false, true}) {
     QLambda agent = agent_of(config);
-    agent.learn(b, {1}, 4.0, b, true);
-    agent.learn(a, {0}, 1.0, b, terminated);
+    agent.learn(b, Indices{1}, 4.0, b, true);
+    agent.learn(a, Indices{0}, 1.0, b, terminated);
     agent.begin_episode();
     EXPECT_NEAR(q(agent, a, 0), terminated ? 1.0 : 5.0, 0.5);
   }
@@ -81,9 +82,9 @@ TEST(QLambda, ATraceCarriesARewardBack) {
   const State a{0.1, 0.1}, b{0.5, 0.5}, c{0.9, 0.9};
   const auto value_of_first = [&](double trace_decay) {
     QLambda agent = agent_of({.trace_decay = trace_decay, .final_learning_rate = {}});
-    agent.learn(a, {0}, 0.0, b, false);
-    agent.learn(b, {1}, 0.0, c, false);
-    agent.learn(c, {2}, 1.0, c, true);
+    agent.learn(a, Indices{0}, 0.0, b, false);
+    agent.learn(b, Indices{1}, 0.0, c, false);
+    agent.learn(c, Indices{2}, 1.0, c, true);
     return q(agent, a, 0);
   };
   EXPECT_NEAR(value_of_first(0.0), 0.0, 0.05);
@@ -120,19 +121,19 @@ TEST(QLambda, TheToleranceOfTiesIsInValues) {
   for (const double scale : {1.0, 1e-300, 1e250}) {
     QLambda agent = agent_of(with_tolerance(0.25 * scale));
     const auto first_after = [&](double reward) {
-      agent.learn(a, {0}, reward * scale, a, true);
+      agent.learn(a, Indices{0}, reward * scale, a, true);
       EXPECT_NEAR(q(agent, a, 0) / scale, reward, 0.01);
       return agent.act(a).front();
     };
     EXPECT_EQ(agent.act(a).front(), 0U);
-    agent.learn(a, {2}, scale, a, true);
+    agent.learn(a, Indices{2}, scale, a, true);
     EXPECT_EQ(first_after(0.8), 0U);
     EXPECT_EQ(first_after(0.7), 2U);
-    const auto exponent = agent.action_value().exponent();
-    agent.learn(a, {1}, 100.0 * scale, a, true);
+    const auto exponent = agent.readout().exponent();
+    agent.learn(a, Indices{1}, 100.0 * scale, a, true);
     EXPECT_EQ(agent.act(a).front(), 1U);
-    agent.learn(a, {1}, 0.0, a, true);
-    EXPECT_GE(*agent.action_value().exponent(), *exponent + 4);
+    agent.learn(a, Indices{1}, 0.0, a, true);
+    EXPECT_GE(*agent.readout().exponent(), *exponent + 4);
     EXPECT_EQ(first_after(0.8), 0U);
     EXPECT_EQ(first_after(0.7), 2U);
   }
@@ -141,7 +142,7 @@ TEST(QLambda, TheToleranceOfTiesIsInValues) {
 TEST(QLambda, ActionsThatAreNotAllowedNeverTie) {
   const State a{0.1, 0.1};
   QLambda agent = agent_of(with_tolerance(1e308));
-  agent.learn(a, {2}, 1e-300, a, true);
+  agent.learn(a, Indices{2}, 1e-300, a, true);
   EXPECT_EQ(agent.act(a, true, 0, std::vector<std::uint8_t>{0, 1, 1}).front(), 1U);
 }
 
@@ -156,10 +157,11 @@ TEST(QLambda, RefusesMasksThatDoNotFit) {
     EXPECT_THROW((void)agent.act(state, false, 0, mask), std::invalid_argument);
     EXPECT_THROW((void)agent.best_action(state, workspace, ties, mask), std::invalid_argument);
     EXPECT_THROW((void)agent.best_of(workspace, mask), std::invalid_argument);
-    EXPECT_THROW(agent.learn(state, {0, 0}, 0.0, state, false, 0, mask), std::invalid_argument);
+    EXPECT_THROW(agent.learn(state, Indices{0, 0}, 0.0, state, false, 0, mask),
+                 std::invalid_argument);
   }
   const std::vector<std::uint8_t> only{0, 0, 1, 1, 0};
-  EXPECT_EQ(agent.best_action(state, workspace, ties, only), (std::vector<std::size_t>{2, 0}));
+  EXPECT_TRUE(std::ranges::equal(agent.best_action(state, workspace, ties, only), Indices{2, 0}));
 }
 
 TEST(QLambda, EpsilonGoesToZeroButStaysWhereStatesAreSymbolsAlone) {
@@ -187,7 +189,7 @@ TEST(QLambda, LearnsTheSameOnEveryInstructionSet) {
     testing::on_every_instruction_set([&](auto) {
       QLambda agent = agent_of({.traces = traces}, {5, 2}, 2);
       live(agent, 300, 2);
-      const auto weights = agent.action_value().weights();
+      const auto weights = agent.readout().weights();
       learned.emplace_back(weights.begin(), weights.end());
     });
     for (const auto& weights : learned) EXPECT_EQ(weights, learned.front());
@@ -210,12 +212,13 @@ TEST(QLambda, ItsStateResumesExactly) {
 /// Steps that the longest one lasted after so many ends.
 int longest_action(QLambda agent, int n_ended) {
   const State state{0.5, 0.5};
-  for (int i = 0; i < n_ended; ++i) agent.learn(state, {0, 0}, 0.0, state, true);
+  for (int i = 0; i < n_ended; ++i) agent.learn(state, Indices{0, 0}, 0.0, state, true);
   agent.set_epsilon(1.0);
-  QLambda::Action last;
+  Indices last;
   int longest = 0, n = 0;
   for (int i = 0; i < 5000; ++i) {
-    const QLambda::Action action = agent.act(state);
+    const auto span = agent.act(state);
+    const Indices action(span.begin(), span.end());
     n = action == last ? n + 1 : 1;  // the next one is another
     last = action;
     longest = std::max(longest, n);
@@ -233,7 +236,7 @@ TEST(QLambda, EndsMakeRandomActionsShorter) {
   EXPECT_EQ(longest_action(agent(100), 40), 5);
   EXPECT_EQ(longest_action(agent(3), 7), 3);
   QLambda ended = agent(100);
-  for (int i = 0; i < 40; ++i) ended.learn({{0.5, 0.5}}, {0, 0}, 0.0, {{0.5, 0.5}}, true);
+  for (int i = 0; i < 40; ++i) ended.learn({{0.5, 0.5}}, Indices{0, 0}, 0.0, {{0.5, 0.5}}, true);
   const core::State good = core::state_of(ended);
   for (const int bad : {-1, 21}) {
     testing::expect_refused(ended, testing::with_number(good, "n_ended", bad),
@@ -245,11 +248,11 @@ TEST(QLambda, EnvironmentsHaveTracesOfTheirOwn) {
   QLambda together = agent_of({});
   together.set_n_environments(2);
   const State a{0.1, 0.1}, b{0.5, 0.5};
-  together.learn(a, {0}, 0.0, b, false, 0);
-  together.learn(b, {1}, 1.0, b, true, 1);  // nobody else's trace carries it back
+  together.learn(a, Indices{0}, 0.0, b, false, 0);
+  together.learn(b, Indices{1}, 1.0, b, true, 1);  // nobody else's trace carries it back
   EXPECT_NEAR(q(together, a, 0), 0.0, 0.3);
   together.set_n_environments(1);
-  EXPECT_THROW(together.learn(a, {0}, 0.0, b, false, 1), std::invalid_argument);
+  EXPECT_THROW(together.learn(a, Indices{0}, 0.0, b, false, 1), std::invalid_argument);
 }
 
 TEST(QLambda, TracesAreReplacingInSeveralEnvironments) {
@@ -260,7 +263,7 @@ TEST(QLambda, TracesAreReplacingInSeveralEnvironments) {
     State state{0.5, 0.5};
     for (int step = 0; step < 100; ++step) {
       const State next{random.uniform(), random.uniform()};
-      agent.learn(state, {random.below(3)}, random.normal(), next, false);
+      agent.learn(state, Indices{random.below(3)}, random.normal(), next, false);
       state = next;
     }
     return core::state_of(agent);
@@ -273,11 +276,11 @@ TEST(QLambda, RefusesWhatCannotBeLearnedAndLearnsNothing) {
   QLambda agent = agent_of({});
   const State a{0.1, 0.1};
   const core::State before = core::state_of(agent);
-  EXPECT_THROW(agent.learn({{0.1}}, {0}, 0.0, a, false), std::invalid_argument);
-  EXPECT_THROW(agent.learn(a, {3}, 0.0, a, false), std::invalid_argument);
-  EXPECT_THROW(agent.learn(a, {0, 0}, 0.0, a, false), std::invalid_argument);
-  EXPECT_THROW(agent.learn(a, {0}, 1e301, a, false), std::invalid_argument);
-  EXPECT_THROW(agent.learn(a, {0}, 0.0, State{0.1, 1.1}, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn({{0.1}}, Indices{0}, 0.0, a, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(a, Indices{3}, 0.0, a, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(a, Indices{0, 0}, 0.0, a, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(a, Indices{0}, 1e301, a, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(a, Indices{0}, 0.0, State{0.1, 1.1}, false), std::invalid_argument);
   EXPECT_THROW(agent.act(State{0.1, 1.1}), std::invalid_argument);
   EXPECT_EQ(core::state_of(agent), before);
   EXPECT_THROW(agent_of({.trace_decay = 1.1}), std::invalid_argument);

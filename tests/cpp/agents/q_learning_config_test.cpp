@@ -35,7 +35,7 @@ TEST(QLearning, RatesGoInAStraightLineWithProgress) {
   EXPECT_EQ(agent.learning_rate(), 0.4375);
   EXPECT_EQ(agent.epsilon(), 0.5625);
   agent.learn(cell(0), 0, 16.0, cell(1), true);
-  EXPECT_EQ(agent.action_value().value(cell(0), 0), 7.0);
+  EXPECT_EQ(agent.network().value(cell(0), 0), 7.0);
   agent.set_progress(1.0);
   EXPECT_EQ(agent.learning_rate(), 0.25);
   EXPECT_EQ(agent.epsilon(), 0.0);
@@ -145,7 +145,7 @@ TEST(QLearning, RatesThatAreSetStayWhateverTheProgress) {
   EXPECT_EQ(agent.learning_rate(), 0.75);
   EXPECT_EQ(agent.epsilon(), 0.0);
   agent.learn(cell(0), 0, 16.0, cell(1), true);
-  EXPECT_EQ(agent.action_value().value(cell(0), 0), 12.0);
+  EXPECT_EQ(agent.network().value(cell(0), 0), 12.0);
   agent.set_epsilon(1.0);
   agent.set_learning_rate(std::nullopt);
   EXPECT_EQ(agent.learning_rate(), 0.25);

@@ -30,7 +30,8 @@ TEST(QLearning, ManyThreadsMayChooseGreedyActions) {
     std::vector<std::vector<std::size_t>> actions;
     for (int i = 0; i < 50; ++i) {
       for (double& x : state) x = random.uniform();
-      actions.push_back(learned.best_action(state, workspace, ties));
+      const auto action = learned.best_action(state, workspace, ties);
+      actions.emplace_back(action.begin(), action.end());
     }
     return actions;
   };
@@ -64,7 +65,7 @@ TEST(QLearning, EachEnvironmentHasStepsThatWait) {
     return std::array{(i + 0.5) / 5.0, environment == 0 ? 0.1 : 0.9};
   };
   const auto q = [&](int i, int environment) {
-    return agent.action_value().value(at(i, environment), 0);
+    return agent.network().value(at(i, environment), 0);
   };
   for (int i = 0; i < 2; ++i) {
     for (const int e : {0, 1}) {
@@ -88,9 +89,9 @@ TEST(QLearning, WhatWaitsOfEnvironmentsThatAreNoMoreIsLearned) {
   Agent agent(LookupTable(1, 5, 2), {.learning_rate = 1.0, .n_steps = 5}, 1);
   agent.set_n_environments(3);
   agent.learn(cell(2), 1, 4.0, cell(3), false, 2);
-  EXPECT_EQ(agent.action_value().value(cell(2), 1), 0.0);
+  EXPECT_EQ(agent.network().value(cell(2), 1), 0.0);
   agent.set_n_environments(2);
-  EXPECT_EQ(agent.action_value().value(cell(2), 1), 4.0);
+  EXPECT_EQ(agent.network().value(cell(2), 1), 4.0);
 }
 
 // All that other environments share with it is drawn and learned here, and in nobody's name.
@@ -125,7 +126,7 @@ TEST(QLearning, RefusesEnvironmentsThatAreNone) {
   EXPECT_THROW(agent.set_n_environments(0), std::invalid_argument);
   EXPECT_THROW(agent.set_n_environments((1U << 20U) + 1U), std::invalid_argument);
   EXPECT_EQ(agent.n_environments(), 2U);
-  EXPECT_EQ(agent.action_value(), LookupTable(1, 5, 2));
+  EXPECT_EQ(agent.network(), LookupTable(1, 5, 2));
 }
 
 TEST(QLearning, RefusesAStateOfEnvironmentsThatDoesNotFit) {
@@ -158,7 +159,7 @@ TEST(QLearning, ARestoredAgentAllocatesNothing) {
 
 TEST(QLearning, RefusesAStateThatDoesNotFit) {
   auto agent = sdnn_agent();
-  testing::World<QLearning<SDNNC>> world(2, 7);
+  testing::World<OneDimension<QLearning<SDNNC>>> world(2, 7);
   const core::State young = core::state_of(agent);
   while (core::state_of(agent).contains("n_random_left")) world.tick(agent);
   while (testing::number_of<std::int32_t>(core::state_of(agent), "n_kept") == 0 ||

@@ -22,7 +22,7 @@ namespace {
 
 TEST(QLearning, EquationOneByHand) {
   Agent agent(LookupTable(1, 5, 2), {}, 1);  // alpha = 0.5, gamma = 0.9
-  const auto q = [&](int s, std::size_t a) { return agent.action_value().value(cell(s), a); };
+  const auto q = [&](int s, std::size_t a) { return agent.network().value(cell(s), a); };
   agent.learn(cell(1), 0, 10.0, cell(2), true);  // 0.5 * 0 + 0.5 * 10
   EXPECT_EQ(q(1, 0), 5.0);
   agent.learn(cell(1), 0, 10.0, cell(2), true);  // 0.5 * 5 + 0.5 * 10
@@ -42,8 +42,8 @@ TEST(QLearning, ATerminatedTransitionDoesNotBootstrapATruncatedOneDoes) {
   Agent truncated(table, {}, 1);
   terminated.learn(cell(1), 0, 1.0, cell(2), true);
   truncated.learn(cell(1), 0, 1.0, cell(2), false);
-  EXPECT_EQ(terminated.action_value().value(cell(1), 0), 0.5);
-  EXPECT_EQ(truncated.action_value().value(cell(1), 0), 9.5);  // 0.5 * (1 + 0.9 * 20)
+  EXPECT_EQ(terminated.network().value(cell(1), 0), 0.5);
+  EXPECT_EQ(truncated.network().value(cell(1), 0), 9.5);  // 0.5 * (1 + 0.9 * 20)
 }
 
 // The next state's value is taken before the correction, also when it is the same state.
@@ -52,7 +52,7 @@ TEST(QLearning, ATransitionToItselfUsesTheOldValue) {
   table.update(cell(3), 0, 4.0);
   Agent agent(table, {}, 1);
   agent.learn(cell(3), 0, 2.0, cell(3), false);
-  EXPECT_DOUBLE_EQ(agent.action_value().value(cell(3), 0), 0.5 * 4.0 + 0.5 * (2.0 + 0.9 * 4.0));
+  EXPECT_DOUBLE_EQ(agent.network().value(cell(3), 0), 0.5 * 4.0 + 0.5 * (2.0 + 0.9 * 4.0));
 }
 
 // Rewards 1, 2, 4, then the goal with 8; gamma = 1/2, alpha = 1: every number is exact.
@@ -60,7 +60,7 @@ TEST(QLearning, OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown) {
   LookupTable table(1, 5, 2);
   table.update(cell(2), 1, 16.0);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
-  const auto q = [&](int s) { return agent.action_value().value(cell(s), 0); };
+  const auto q = [&](int s) { return agent.network().value(cell(s), 0); };
   agent.begin_episode();
   agent.learn(cell(0), 0, 1.0, cell(1), false);
   EXPECT_EQ(q(0), 0.0);  // waits
@@ -72,19 +72,19 @@ TEST(QLearning, OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown) {
   agent.learn(cell(3), 0, 8.0, cell(4), true);
   EXPECT_EQ(q(2), 4.0 + 0.5 * 8.0);
   EXPECT_EQ(q(3), 8.0);
-  const LookupTable learned = agent.action_value();
+  const LookupTable learned = agent.network();
   agent.begin_episode();  // nothing waits after a termination
-  EXPECT_EQ(agent.action_value(), learned);
+  EXPECT_EQ(agent.network(), learned);
 }
 
 TEST(QLearning, WhatWaitsAtTheTimeLimitIsLearnedWhenTheNextEpisodeBegins) {
   LookupTable table(1, 5, 2);
   table.update(cell(2), 1, 16.0);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 5}, 1);
-  const auto q = [&](int s) { return agent.action_value().value(cell(s), 0); };
+  const auto q = [&](int s) { return agent.network().value(cell(s), 0); };
   agent.learn(cell(0), 0, 1.0, cell(1), false);
   agent.learn(cell(1), 0, 2.0, cell(2), false);
-  EXPECT_EQ(agent.action_value(), table);
+  EXPECT_EQ(agent.network(), table);
   agent.begin_episode();
   EXPECT_EQ(q(0), 1.0 + 0.5 * 2.0 + 0.25 * 16.0);
   EXPECT_EQ(q(1), 2.0 + 0.5 * 16.0);
@@ -97,10 +97,10 @@ TEST(QLearning, ATransitionFromElsewhereBeginsAnew) {
   LookupTable table(1, 5, 2);
   table.update(cell(2), 1, 16.0);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 3}, 1);
-  const auto q = [&](int s) { return agent.action_value().value(cell(s), 0); };
+  const auto q = [&](int s) { return agent.network().value(cell(s), 0); };
   agent.learn(cell(0), 0, 1.0, cell(1), false);
   agent.learn(cell(1), 0, 2.0, cell(2), false);
-  EXPECT_EQ(agent.action_value(), table);
+  EXPECT_EQ(agent.network(), table);
   agent.learn(cell(3), 0, 8.0, cell(4), true);  // not from cell 2
   EXPECT_EQ(q(0), 1.0 + 0.5 * 2.0 + 0.25 * 16.0);
   EXPECT_EQ(q(1), 2.0 + 0.5 * 16.0);
@@ -112,7 +112,7 @@ TEST(QLearning, WhatCouldNotBeLearnedLaterIsRefusedAtOnce) {
   EXPECT_THROW(agent.learn(Position{1.5}, 0, 1.0, cell(1), false), std::invalid_argument);
   EXPECT_THROW(agent.learn(cell(0), 0, 1.0, Position{1.5}, false), std::invalid_argument);
   agent.begin_episode();
-  EXPECT_EQ(agent.action_value(), LookupTable(1, 5, 2));
+  EXPECT_EQ(agent.network(), LookupTable(1, 5, 2));
   for (const int bad : {0, -1, 1001}) {
     EXPECT_THROW(Agent(LookupTable(1, 5, 2), {.n_steps = bad}, 1), std::invalid_argument);
   }
@@ -141,8 +141,8 @@ TEST(QLearning, ASmallDecisionProcessIsSolvedExactly) {
   for (const std::size_t s : {2U, 1U, 0U}) best[s] = 0.9 * best[s + 1];
   for (int s = 0; s < 4; ++s) {
     const auto left = static_cast<std::size_t>(Corridor::next(s, 0));
-    EXPECT_EQ(agent.action_value().value(cell(s), 1), best[static_cast<std::size_t>(s)]) << s;
-    EXPECT_EQ(agent.action_value().value(cell(s), 0), 0.9 * best[left]) << s;
+    EXPECT_EQ(agent.network().value(cell(s), 1), best[static_cast<std::size_t>(s)]) << s;
+    EXPECT_EQ(agent.network().value(cell(s), 0), 0.9 * best[left]) << s;
   }
 }
 
@@ -159,7 +159,7 @@ TEST(QLearning, ByActingItFindsTheValuesOfTheSmallProcess) {
     }
   }
   for (int s = 0; s < 4; ++s) {
-    EXPECT_NEAR(agent.action_value().value(cell(s), 1), std::pow(0.9, 3 - s), 1e-9);
+    EXPECT_NEAR(agent.network().value(cell(s), 1), std::pow(0.9, 3 - s), 1e-9);
     EXPECT_EQ(agent.act(cell(s), false), 1U);
   }
 }
@@ -195,12 +195,12 @@ TEST(QLearning, EvaluationDoesNotDisturbLearning) {
       evaluated.learn(state, action, reward, next, false);
     }
   }
-  EXPECT_EQ(alone.action_value(), evaluated.action_value());
+  EXPECT_EQ(alone.network(), evaluated.network());
 }
 
 TEST(QLearning, ABadTransitionTeachesNothing) {
   Agent agent(LookupTable(1, 5, 2), {}, 1);
-  const LookupTable before = agent.action_value();
+  const LookupTable before = agent.network();
   for (const double reward : {std::nan(""), std::numeric_limits<double>::infinity()}) {
     EXPECT_THROW(agent.learn(cell(0), 0, reward, cell(1), false), std::invalid_argument);
   }
@@ -208,14 +208,14 @@ TEST(QLearning, ABadTransitionTeachesNothing) {
   EXPECT_THROW(agent.learn(cell(0), 0, 1.0, Position{-0.1}, false), std::invalid_argument);
   EXPECT_THROW(agent.learn(std::vector<double>{0.1, 0.2}, 0, 1.0, cell(1), false),
                std::invalid_argument);
-  EXPECT_EQ(agent.action_value(), before);
+  EXPECT_EQ(agent.network(), before);
 }
 
 TEST(QLearning, ABadTransitionLeavesTheWholeStateAsItWas) {
-  using Vectors = QLearning<Decoupled<RBFNetwork>>;
-  Vectors agent(Decoupled<RBFNetwork>({RBFNetwork({.n_inputs = 1, .n_actions = 3}),
-                                       RBFNetwork({.n_inputs = 1, .n_actions = 2})}),
-                {.value_range = ValueRange::adaptive}, 1);
+  using Vectors = QLearning<RBFNetwork>;
+  Vectors agent(
+      {RBFNetwork({.n_inputs = 1, .n_actions = 3}), RBFNetwork({.n_inputs = 1, .n_actions = 2})},
+      {.value_range = ValueRange::adaptive}, 1);
   agent.learn(cell(0), Indices{2, 1}, 1.0, cell(1), false);
   const core::State before = core::state_of(agent);
   for (const Indices& bad : {Indices{}, Indices{1}, Indices(40, 0), Indices{3, 0}, Indices{0, 2}}) {
@@ -302,8 +302,8 @@ TEST(QLearning, TheFirstStepsOfALifeAreRandom) {
 }
 
 TEST(QLearning, ABadStateIsNoneOfTheFirstSteps) {
-  QLearning<RBFNetwork> agent(RBFNetwork({.n_inputs = 1}),
-                              {.policy = {.epsilon = 0.0}, .start_steps = 1}, 1);
+  OneDimension<QLearning<RBFNetwork>> agent(RBFNetwork({.n_inputs = 1}),
+                                            {.policy = {.epsilon = 0.0}, .start_steps = 1}, 1);
   EXPECT_THROW((void)agent.act({{2.0}}), std::invalid_argument);
   EXPECT_EQ(testing::number_of<std::int32_t>(core::state_of(agent), "n_random_left"), 1);
   (void)agent.act(cell(0));
@@ -311,8 +311,8 @@ TEST(QLearning, ABadStateIsNoneOfTheFirstSteps) {
 }
 
 TEST(QLearning, WithoutRepetitionsTheirStreamIsNotTouched) {
-  QLearning<RBFNetwork> agent(RBFNetwork({.n_inputs = 1}),
-                              {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}}, 1);
+  OneDimension<QLearning<RBFNetwork>> agent(RBFNetwork({.n_inputs = 1}),
+                                            {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}}, 1);
   const core::State before = core::state_of(agent);
   for (int i = 0; i < 10; ++i) (void)agent.act(cell(0));
   const core::State after = core::state_of(agent);
@@ -322,9 +322,9 @@ TEST(QLearning, WithoutRepetitionsTheirStreamIsNotTouched) {
 
 // gamma = 1/2: the first sum is 8, so the range is 8 and a quarter more.
 TEST(QLearning, TheRangeOfValuesFollowsTheRewards) {
-  QLearning<SDNNC> agent(SDNNC(network(), 1),
-                         {.discount = 0.5, .value_range = ValueRange::adaptive}, 1);
-  const auto scale = [&agent]() -> const auto& { return agent.action_value().output_scale(); };
+  OneDimension<QLearning<SDNNC>> agent(SDNNC(network(), 1),
+                                       {.discount = 0.5, .value_range = ValueRange::adaptive}, 1);
+  const auto scale = [&agent]() -> const auto& { return agent.network().output_scale(); };
   const std::vector<double> state = {0.3, 0.6};
   agent.learn(state, 0, 0.0, state, false);
   EXPECT_EQ(scale().q_low(), -16.0);  // nothing is known yet
@@ -338,29 +338,29 @@ TEST(QLearning, TheRangeOfValuesFollowsTheRewards) {
   EXPECT_EQ(scale().q_low(), 0.0);  // 3/2 and 1 in turn, and a quarter of 3/2 more
   EXPECT_EQ(scale().q_high(), 1.875);
 
-  QLearning<SDNNC> given(SDNNC(network(), 1), {.discount = 0.5}, 1);
+  OneDimension<QLearning<SDNNC>> given(SDNNC(network(), 1), {.discount = 0.5}, 1);
   given.learn(state, 0, 1000.0, state, false);
-  EXPECT_EQ(given.action_value().output_scale().q_high(), 16.0);
+  EXPECT_EQ(given.network().output_scale().q_high(), 16.0);
 }
 
 TEST(QLearning, GreedyActionsFollowTheAverageWhereThereIsOne) {
   approximators::SDNNCConfig config = network();
   config.averaging_interval = 5;
-  QLearning<Decoupled<SDNNC>> averaging(
-      Decoupled<SDNNC>({SDNNC(config, 3), SDNNC(config, 4)}),
-      {.learning_rate = 1.0, .policy = {.tie_rule = TieRule::lowest}}, 3);
+  QLearning<SDNNC> averaging({SDNNC(config, 3), SDNNC(config, 4)},
+                             {.learning_rate = 1.0, .policy = {.tie_rule = TieRule::lowest}}, 3);
   core::Random random(1, core::Stream::weights);
   std::vector<double> state = {0.2, 0.8}, values(7);
-  auto workspaces = averaging.action_value().workspace().parts;
+  auto workspaces = averaging.workspace().networks;
   int n_other = 0;
   for (int t = 0; t < 300; ++t) {
     for (double& x : state) x = random.uniform();
     const double reward = 16.0 * random.uniform() - 8.0;
-    averaging.learn(state, {random.below(7), random.below(7)}, reward, state, true);
-    const auto greedy = averaging.act(state, false);
+    averaging.learn(state, Indices{random.below(7), random.below(7)}, reward, state, true);
+    const auto action = averaging.act(state, false);
+    const Indices greedy(action.begin(), action.end());
     const auto own = averaging.act(state);
     for (std::size_t d = 0; d < 2; ++d) {
-      averaging.action_value().part(d).averaged_values(state, workspaces[d], values);
+      averaging.networks()[d].averaged_values(state, workspaces[d], values);
       ASSERT_EQ(greedy[d], std::ranges::max_element(values) - values.begin());
       n_other += greedy[d] != own[d];
     }
@@ -371,7 +371,8 @@ TEST(QLearning, GreedyActionsFollowTheAverageWhereThereIsOne) {
 TEST(QLearning, BestActionIsThatOfActWithoutExploring) {
   approximators::SDNNCConfig config = network();
   config.averaging_interval = 5;
-  QLearning agent(SDNNC(config, 3), {.policy = {.tie_rule = TieRule::lowest}}, 3);
+  OneDimension<QLearning<SDNNC>> agent(SDNNC(config, 3), {.policy = {.tie_rule = TieRule::lowest}},
+                                       3);
   testing::World<decltype(agent)> world(agent.n_inputs(), 7);
   for (int t = 0; t < 300; ++t) world.tick(agent);
   auto workspace = agent.workspace();
@@ -387,32 +388,39 @@ TEST(QLearning, BestActionIsThatOfActWithoutExploring) {
   EXPECT_GT(taken.size(), 1U);
 }
 
-// All numbers are multiples of 1/4: the errors of one dimension have no rounding.
-TEST(QLearning, OfOneDimensionDoesWhatAnAgentWithoutDimensionsDoes) {
-  const QLearningConfig config{
-      .discount = 0.5, .policy = {.epsilon = 0.3, .n_greedy_steps = 2}, .max_action_repeat = 3};
-  QLearning<SDNNC> plain(SDNNC(network(), 3), config, 3);
-  QLearning<Decoupled<SDNNC>> decoupled(Decoupled<SDNNC>({SDNNC(network(), 3)}), config, 3);
-  testing::World<QLearning<SDNNC>> world(2, 9);
-  testing::World<QLearning<Decoupled<SDNNC>>> same_world(2, 9);
-  for (int t = 0; t < 4000; ++t) {
-    const auto action = world.tick(plain);
-    const auto same = same_world.tick(decoupled);
-    ASSERT_EQ(same, action ? std::optional(Indices{*action}) : std::nullopt) << t;
-  }
-  EXPECT_GT(plain.action_value().correction_counts().changed, 1000U);
-  core::State state;
-  for (const auto& [name, tensor] : core::state_of(decoupled)) {
-    const std::string part = "action_value.0.";
-    state.emplace(name.starts_with(part) ? "action_value." + name.substr(part.size()) : name,
-                  tensor);
-  }
-  EXPECT_EQ(core::state_of(plain), state);
+// Two dimensions, of 2 and 3 actions: Q_0 = 2 and Q_1 = 6 for action (1, 2), whose mean is 4.
+TEST(QLearning, ACorrectionMovesEveryDimensionByTheErrorOfTheMean) {
+  LookupTable first(1, 5, 2), second(1, 5, 3);
+  first.update(cell(0), 1, 2.0);
+  second.update(cell(0), 2, 6.0);
+  QLearning<LookupTable> agent({first, second}, {.learning_rate = 0.5, .discount = 0.5}, 1);
+  agent.learn(cell(0), Indices{1, 2}, 8.0, cell(1), true);
+  EXPECT_EQ(agent.networks()[0].value(cell(0), 1), 4.0);  // half of 2 and half of 2 + 4
+  EXPECT_EQ(agent.networks()[1].value(cell(0), 2), 8.0);  // half of 6 and half of 6 + 4
+  EXPECT_EQ(agent.networks()[0].value(cell(0), 0), 0.0);
+  EXPECT_EQ(agent.networks()[1].value(cell(0), 1), 0.0);
+  agent.learn(cell(1), Indices{0, 0}, 1.0, cell(0), false);  // the best value is (4 + 8) / 2
+  EXPECT_EQ(agent.networks()[0].value(cell(1), 0), 0.5 * (1.0 + 0.5 * 6.0));
+}
+
+TEST(QLearning, EveryDimensionHasAnotherSeedTheFirstThatOfTheWhole) {
+  EXPECT_EQ(seed_of_dimension(7, 0), 7U);
+  std::set<std::uint64_t> seeds;
+  for (std::size_t d = 0; d < 100; ++d) seeds.insert(seed_of_dimension(7, d));
+  for (std::size_t d = 1; d < 100; ++d) seeds.insert(seed_of_dimension(8, d));
+  EXPECT_EQ(seeds.size(), 199U);
+}
+
+TEST(QLearning, NeedsNetworksOfTheSameInputs) {
+  using Tables = std::vector<LookupTable>;
+  EXPECT_THROW(QLearning<LookupTable>(Tables{}, {}, 1), std::invalid_argument);
+  EXPECT_THROW(QLearning<LookupTable>(Tables{LookupTable(1, 2, 2), LookupTable(2, 2, 2)}, {}, 1),
+               std::invalid_argument);
 }
 
 /// Some steps at random states, after each of which `check` is called with the state.
 template <class Check>
-void live(QLearning<SDNNC>& agent, const Check& check) {
+void live(OneDimension<QLearning<SDNNC>>& agent, const Check& check) {
   core::Random random(4, core::Stream::exploration);
   std::vector<double> state(2);
   std::vector<double> next(2);
@@ -432,8 +440,8 @@ TEST(QLearning, TheBestActionByCountsIsThatByValues) {
         auto config = network();
         config.n_actions = n_actions;
         const EpsilonGreedyConfig policy{.tie_rule = rule, .tie_tolerance = tolerance};
-        QLearning<SDNNC> agent(SDNNC(config, 3), {.policy = policy}, 3);
-        ASSERT_TRUE(agent.action_value().values_rise());
+        OneDimension<QLearning<SDNNC>> agent(SDNNC(config, 3), {.policy = policy}, 3);
+        ASSERT_TRUE(agent.network().values_rise());
         auto workspace = agent.workspace();
         const EpsilonGreedy by_values(policy, 1);
         core::Random one(9, core::Stream::ties);
@@ -460,8 +468,8 @@ TEST(QLearning, ValuesThatDoNotRiseAreCompared) {
   auto config = network();
   config.q_low = -7.262490008916344e+16;
   config.q_high = -7.26249000891634e+16;
-  QLearning<SDNNC> agent(SDNNC(config, 3), {}, 3);
-  ASSERT_FALSE(agent.action_value().values_rise());
+  OneDimension<QLearning<SDNNC>> agent(SDNNC(config, 3), {}, 3);
+  ASSERT_FALSE(agent.network().values_rise());
   auto workspace = agent.workspace();
   core::Random ties(9, core::Stream::ties);
   live(agent, [&](const std::vector<double>& state) {

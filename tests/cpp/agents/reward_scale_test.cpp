@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -58,17 +60,17 @@ TEST(QLambda, RefinesItsUnitForSmallerRewards) {
     auto workspace = agent.workspace();
     return agent.values(state, workspace)[action];
   };
-  agent.learn(state, {0}, 0x1p60, state, true);
+  agent.learn(state, std::array{std::size_t{0}}, 0x1p60, state, true);
   EXPECT_GT(value(0), 0x1p50);
-  agent.learn(state, {1}, 1.0, state, true);
+  agent.learn(state, std::array{std::size_t{1}}, 1.0, state, true);
   EXPECT_EQ(value(1), 0.0);
   agent.refine_unit(0, 0);
   EXPECT_LT(value(0), 0x1p20);
-  agent.learn(state, {1}, 1.0, state, true);
+  agent.learn(state, std::array{std::size_t{1}}, 1.0, state, true);
   EXPECT_GT(value(1), 0.1);
-  const auto exponent = agent.action_value().exponent();
+  const auto exponent = agent.readout().exponent();
   agent.refine_unit(0, 0);
-  EXPECT_EQ(agent.action_value().exponent(), exponent);
+  EXPECT_EQ(agent.readout().exponent(), exponent);
 }
 
 }  // namespace

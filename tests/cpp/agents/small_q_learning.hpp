@@ -7,19 +7,19 @@
 #include <string>
 #include <vector>
 
+#include "agents/one_dimension.hpp"
 #include "approximators/lookup_table.hpp"
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 
 namespace sdnn::agents::small_q_learning {
 
-using approximators::Decoupled;
 using approximators::RBFNetwork;
 using approximators::SDNNC;
 using testing::LookupTable;
-using Agent = QLearning<LookupTable>;
+using testing::OneDimension;
+using Agent = OneDimension<QLearning<LookupTable>>;
 using Indices = std::vector<std::size_t>;
 using Position = std::array<double, 1>;
 
@@ -60,25 +60,25 @@ inline QLearningConfig everything() {
           .start_steps = 20};
 }
 
-inline QLearning<SDNNC> sdnn_agent() {
+inline OneDimension<QLearning<SDNNC>> sdnn_agent() {
   approximators::SDNNCConfig config = network();
   config.rounding = approximators::Rounding::random;
   config.averaging_interval = 9;
   return {SDNNC(config, 3), everything(), 3};
 }
 
-inline QLearning<RBFNetwork> rbf_agent() {
+inline OneDimension<QLearning<RBFNetwork>> rbf_agent() {
   return {RBFNetwork({.n_inputs = 2, .n_bases = 3, .n_actions = 7, .gradient_rate = 0.5}),
           everything(), 3};
 }
 
-inline QLearning<Decoupled<SDNNC>> vector_agent() {
+inline QLearning<SDNNC> vector_agent() {
   approximators::SDNNCConfig config = network();
   config.rounding = approximators::Rounding::random;
   std::vector<SDNNC> parts = {SDNNC(config, 3)};
   config.n_actions = 5;
-  parts.emplace_back(config, approximators::seed_of_dimension(3, 1));
-  return {Decoupled<SDNNC>(std::move(parts)), everything(), 3};
+  parts.emplace_back(config, seed_of_dimension(3, 1));
+  return {std::move(parts), everything(), 3};
 }
 
 }  // namespace sdnn::agents::small_q_learning

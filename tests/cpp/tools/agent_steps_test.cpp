@@ -103,8 +103,8 @@ TEST(TimeAgentSteps, TimesEveryAgent) {
 TEST(TimeAgentSteps, EveryStepOfALargeNetworkTakesAFullPass) {
   QLearning<SDNNC> agent(SDNNC({.n_inputs = 6}, 1), {}, 1);
   time_agent_steps(agent, 100, 1);
-  EXPECT_GE(agent.own_workspace().approximator.cache().counts().full, 98U);
-  EXPECT_LE(agent.own_workspace().approximator.cache().counts().full, 101U);
+  EXPECT_GE(agent.agent_workspace().networks.front().cache().counts().full, 98U);
+  EXPECT_LE(agent.agent_workspace().networks.front().cache().counts().full, 101U);
 }
 
 TEST(TimeAgentSteps, PlainAndFactoredAgentsLearnTheSame) {
@@ -113,8 +113,8 @@ TEST(TimeAgentSteps, PlainAndFactoredAgentsLearnTheSame) {
   QLearning<PlainRBFNetwork> plain(PlainRBFNetwork(rbf), {}, 1);
   time_agent_steps(factored, 200, 1);
   time_agent_steps(plain, 200, 1);
-  const auto expected = factored.action_value().weights();
-  const auto weights = plain.action_value().network().weights();
+  const auto expected = factored.networks().front().weights();
+  const auto weights = plain.networks().front().network().weights();
   EXPECT_GT(*std::ranges::max_element(expected), 0.1);
   ASSERT_EQ(weights.size(), expected.size());
   for (std::size_t j = 0; j < weights.size(); ++j) EXPECT_NEAR(weights[j], expected[j], 1e-10);

@@ -137,7 +137,7 @@ def test_rows_without_next_observations_follow_each_other():
     agent, other = new_agent(), new_agent()
     assert learn_from(agent, following) == 39
     learn_from(other, {name: values[:-1] for name, values in columns.items()})
-    assert np.array_equal(agent.core.action_value.weights(), other.core.action_value.weights())
+    assert np.array_equal(agent.readout.weights(), other.readout.weights())
 
 
 def test_a_long_line_is_not_read_whole(tmp_path):

@@ -38,7 +38,8 @@ def positions(rng, d):
 def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
     learning = FuzzyQLearningConfig(tie_rule=tie_rule)
     rules = FuzzyRulesConfig(n_inputs=d)
-    agent = _core.FuzzyQLearning(approximator=rules, learning=learning, seed=6)
+    spaces = gym.spaces.Box(0.0, 1.0, (d,), np.float64), gym.spaces.Box(-1.0, 1.0, (1,), np.float64)
+    agent = FuzzyQLearning(*spaces, learning=learning, seed=6)
     slow = paper.FuzzyQLearning(
         d,
         n_sets=rules.n_sets,
@@ -59,9 +60,9 @@ def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
         action, picked = slow.act(
             state, lambda values, at=in_episode: policy.select(values, at, True)
         )
-        assert agent.act(state) == action, step
+        assert agent.act(state) == [action], step
         reward, terminated = float(rng.integers(-5, 11)), bool(rng.integers(20) == 0)
-        agent.learn(state, action, reward, next_observation, terminated)
+        agent.learn(Transition(state, [action], reward, next_observation, terminated))
         slow.learn(state, picked, reward, next_observation, terminated)
         state = next_observation
         if step % 100 == 0:
@@ -70,7 +71,7 @@ def test_learning_agrees_with_its_definition_bit_for_bit(d, n_steps, tie_rule):
     touched = np.flatnonzero(table.any(axis=1))
     assert touched.size > 50
     for rule in touched:
-        assert np.array_equal(agent.rules.values(rule), table[rule])
+        assert np.array_equal(agent.rule_values(rule), table[rule])
 
 
 # The Python faces.
@@ -176,7 +177,7 @@ def test_an_rbf_network_cuts_a_box_evenly():
 
 # A figure of the paper's: it is learned within about 100 episodes without noise.
 def test_fuzzy_q_learning_swings_up_without_noise():
-    trial = _core.FuzzyAcrobotTrial(
+    trial = _core.AcrobotTrial(
         approximator=_core.FuzzyRulesConfig(),
         learning=_core.FuzzyQLearningConfig(),
         acrobot=_core.AcrobotConfig(),

@@ -56,7 +56,7 @@ def test_equal_lives_leave_equal_weights():
     ]
     for agent in agents[:2]:
         live(env, agent, 450)
-    first, second, fresh = (agent.core.action_value.weights() for agent in agents)
+    first, second, fresh = (agent.networks[0].weights() for agent in agents)
     assert np.array_equal(first, second)
     assert not np.array_equal(first, fresh)
 

@@ -32,7 +32,7 @@ def agent_of(agent_class, missing, space=SPACE, **options):
 
 
 def state(agent, observation):
-    return agent._state(observation).tolist()
+    return agent._controller.state_of(agent.flat_observation(observation)).tolist()
 
 
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNQLearning, RBFQLearning])
@@ -62,7 +62,7 @@ def test_held_readings_are_the_last_of_their_variable_environment_and_episode(ag
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNQLearning])
 def test_coded_readings_have_a_pattern_that_nothing_else_has(agent_class):
     plain, agent = agent_of(agent_class, "error"), agent_of(agent_class, "code")
-    core, plain_core = agent.core.action_value, plain.core.action_value
+    core, plain_core = agent.networks[0], plain.networks[0]
     for i in range(4):
         table = core.table(i)
         assert np.array_equal(table[:-1], plain_core.table(i))

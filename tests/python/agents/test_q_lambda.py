@@ -60,35 +60,37 @@ def test_weights_are_those_of_the_transcription(
         "epsilon": 0.0,
         "final_epsilon": 0.0,
     }
-    agent = _core.QLambda(
+    agent = _core.BareAgent(
         approximator=LinearSDNNConfig(**SMALL, action_window=window),
         n_actions=n_actions,
         learning=QLambdaConfig(**learning),
         seed=seed,
     )
-    slow = QLambda(Code(agent.action_value.code, 2), n_actions, window, learning)
+    (readout,) = agent.networks
+    slow = QLambda(Code(readout.code, 2), n_actions, window, learning)
     for state, action, reward, next_state, end in life(seed, 25, n_actions, scale):
         # Acting keeps sums for learning.
         x = slow.code(state)
-        assert slow.value(x, agent.act(state)) == slow.best_value(x)
+        assert slow.value(x, [int(index) for index in agent.act(state)]) == slow.best_value(x)
         for one in (agent, slow):
             one.learn(state, action, reward, next_state, end == "terminal")
             if end == "limit":
                 one.begin_episode()
-        assert agent.action_value.exponent == slow.exponent
-        np.testing.assert_array_equal(agent.action_value.weights(), slow.weights)
+        assert readout.exponent == slow.exponent
+        np.testing.assert_array_equal(readout.weights(), slow.weights)
 
 
 def test_a_full_step_corrects_the_whole_error_of_a_new_state():
-    agent = _core.QLambda(
+    agent = _core.BareAgent(
         approximator=LinearSDNNConfig(n_inputs=2, n_actions=3),
         n_actions=[3],
         learning=QLambdaConfig(learning_rate=1.0, final_learning_rate=1.0),
         seed=1,
     )
     agent.learn([0.3, 0.7], [1], 5.0, [0.4, 0.7], True)
-    np.testing.assert_allclose(agent.q_values([0.3, 0.7]), [0, 5, 0], rtol=1e-3)
-    assert 0 < agent.q_values([0.35, 0.7])[1] < 5  # a neighbour learns from it
+    (readout,) = agent.networks
+    np.testing.assert_allclose(readout.values([0.3, 0.7]), [0, 5, 0], rtol=1e-3)
+    assert 0 < readout.values([0.35, 0.7])[1] < 5  # a neighbour learns from it
 
 
 def test_listed_states_have_a_table(tmp_path):
@@ -139,19 +141,19 @@ def test_units_are_enough_for_patterns_to_differ_but_fewer_where_inputs_are_many
 @pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])
 def test_the_scale_of_rewards_changes_nothing_but_the_scale_of_values(scale):
     def values(scale):
-        agent = _core.QLambda(
+        agent = _core.BareAgent(
             approximator=LinearSDNNConfig(**SMALL), n_actions=[3], learning=QLambdaConfig(), seed=1
         )
         for state, action, reward, next_state, end in life(3, 200, [3], 2.0):
             agent.learn(state, action, reward * scale, next_state, end == "terminal")
-        return np.array(agent.q_values([0.2, 0.6]))
+        return agent.networks[0].values([0.2, 0.6])
 
     factor = 2.0 ** round(np.log2(scale))  # exact in binary
     np.testing.assert_array_equal(values(factor), values(1.0) * factor)
 
 
 def test_one_enormous_reward_costs_resolution_and_nothing_else():
-    agent = _core.QLambda(
+    agent = _core.BareAgent(
         approximator=LinearSDNNConfig(n_inputs=2),
         n_actions=[2],
         learning=QLambdaConfig(final_learning_rate=1.0, trace_decay=0.0),
@@ -160,7 +162,7 @@ def test_one_enormous_reward_costs_resolution_and_nothing_else():
     agent.learn([0.1, 0.1], [0], -1e6, [0.2, 0.1], True)
     for _ in range(30):
         agent.learn([0.1, 0.1], [0], 1.0, [0.2, 0.1], True)
-    assert agent.q_values([0.1, 0.1])[0] == pytest.approx(1.0, abs=0.5)
+    assert agent.networks[0].values([0.1, 0.1])[0] == pytest.approx(1.0, abs=0.5)
 
 
 @pytest.mark.parametrize("learned", [0, 40, 300])
@@ -190,7 +192,7 @@ def test_a_saved_agent_continues_to_the_same_bits(tmp_path, learned):
             one.learn(Transition(observation, actions[0], 1.0, following, False))
     if not agent.is_warming_up:
         np.testing.assert_array_equal(
-            agent.core.action_value.weights(), loaded.core.action_value.weights()
+            agent.readout.weights(), loaded.readout.weights()
         )
 
 

@@ -49,7 +49,7 @@ def test_a_training_of_the_page_is_a_trial_of_the_core(n_inputs, noise):
         trial.advance(1)
         steps.append(trial.n_decisions - before)
     assert [int(line.split()[2]) for line in lines] == steps
-    core = trial.agent.action_value
+    core = trial.agent.networks[0]
     assert np.array_equal(core.weights(), network.weights)
     assert np.array_equal(core.thresholds(), network.thresholds)
     assert np.abs(core.weights()).max() > 5, "something was learned"
@@ -57,9 +57,10 @@ def test_a_training_of_the_page_is_a_trial_of_the_core(n_inputs, noise):
 
 def learn_side_by_side(network, learning, n_steps, n_sensors=4, noise=0.0):
     """The core and the page live through the same acrobot episodes; how often units changed."""
-    agent = _core.SDNNQLearning(approximator=network, learning=learning, seed=4)
+    agent = _core.BareAgent(approximator=network, learning=learning, seed=4)
+    (core,) = agent.networks
     names = ("learning_rate", "discount", "epsilon", "n_greedy_steps")
-    slow = transcribe(agent.action_value, seed=4, **{n: getattr(learning, n) for n in names})
+    slow = transcribe(core, seed=4, **{n: getattr(learning, n) for n in names})
     slow = page.QLearning(slow, slow.settings)
     acrobot = _core.Acrobot(_core.AcrobotConfig())
     sensors = _core.AcrobotSensors(
@@ -74,25 +75,25 @@ def learn_side_by_side(network, learning, n_steps, n_sensors=4, noise=0.0):
             in_episode = 0
             state = sensors.observe(acrobot.state())
         expected = slow.network.values(state)
-        assert np.array_equal(agent.action_value.values(state), expected), step
-        action = agent.act(state)
+        assert np.array_equal(core.values(state), expected), step
+        (action,) = map(int, agent.act(state))
         assert slow.act(state, in_episode) == action
         if expected[action] != expected.max():
             n_random += 1
             assert in_episode >= learning.n_greedy_steps, "the first steps are greedy"
-        torque = _core.action_value(action, agent.action_value.n_actions, -10.0, 10.0)
+        torque = _core.action_value(action, core.n_actions, -10.0, 10.0)
         reward, terminated, truncated = acrobot.step(torque, 0.05)
         next_state = sensors.observe(acrobot.state())
-        agent.learn(state, action, reward, next_state, terminated)
+        agent.learn(state, [action], reward, next_state, terminated)
         n_corrected += slow.learn(state, action, reward, next_state, terminated)
         if step % 1000 == 0:
-            assert np.array_equal(agent.action_value.weights(), slow.network.weights)
+            assert np.array_equal(core.weights(), slow.network.weights)
         over = terminated or truncated
         state = next_state
         in_episode += 1
-    assert np.array_equal(agent.action_value.weights(), slow.network.weights)
-    assert np.array_equal(agent.action_value.thresholds(), slow.network.thresholds)
-    assert np.array_equal(agent.action_value.potentials(state), slow.network.potentials(state))
+    assert np.array_equal(core.weights(), slow.network.weights)
+    assert np.array_equal(core.thresholds(), slow.network.thresholds)
+    assert np.array_equal(core.potentials(state), slow.network.potentials(state))
     return n_corrected, n_random
 
 
@@ -172,6 +173,12 @@ def disjoint_agent(actions, **options):
     return SDNNQLearning(OBSERVATIONS, actions, approximator=network, learning=learning, **options)
 
 
+def first_index(actions, seed):
+    """Return the index of the first action, which is random, in a space of four numbers."""
+    four = gym.spaces.Discrete(4)
+    return int(disjoint_agent(four, seed=seed).act([0.0, 0.0, 0.0]))
+
+
 def learn_a_lot(agent, action):
     here = [0.0, 0.0, 0.0]
     for _ in range(300):
@@ -193,7 +200,7 @@ def test_the_action_taken_is_learned_as_itself_whatever_the_space_makes_of_it():
     for seed in range(20):
         agent = disjoint_agent(actions, seed=seed)
         taken = agent.act([0.0, 0.0, 0.0])
-        index = disjoint_agent(actions, seed=seed).core.act(np.full(3, 0.5))
+        index = first_index(actions, seed)
         assert taken.tolist() == [int(agent.actions[index])]
         learn_a_lot(agent, taken)
         assert learned_by(agent) == index
@@ -224,7 +231,7 @@ def test_a_changed_array_is_the_action_it_holds_now():
 def test_an_evaluated_action_is_not_the_one_taken():
     agent = disjoint_agent(gym.spaces.Box(0, 2, (1,), np.int8), seed=1)
     taken = agent.act([0.0, 0.0, 0.0])
-    index = disjoint_agent(gym.spaces.Box(0, 2, (1,), np.int8), seed=1).core.act(np.full(3, 0.5))
+    index = first_index(gym.spaces.Box(0, 2, (1,), np.int8), 1)
     for _ in range(20):
         agent.act([1.0, 1.0, 1.0], explore=False)
     learn_a_lot(agent, taken)
@@ -235,7 +242,7 @@ def test_the_configurations_are_those_used():
     agent = small_agent()
     assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=91)
     assert agent.learning == SDNNQLearning.presets["general"].learning
-    assert agent.core.action_value.n_actions == 91
+    assert agent.networks[0].n_actions == 91
     agent = small_agent(BUTTONS)
     assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=4)
 
@@ -292,7 +299,7 @@ def test_observations_are_scaled_by_the_bounds_and_saturate():
     assert np.array_equal(agent.q_values([7.0, -1e300, 0.0]), inside)
     assert np.array_equal(agent.q_values(np.array([2, -2, 0], dtype=np.int8)), inside)
     assert np.array_equal(agent.q_values(np.float32([2.0, -2.0, 0.0])), inside)
-    core = agent.core.action_value
+    (core,) = agent.networks
     assert np.array_equal(core.values([1.0, 0.0, 0.5]), inside)
 
 
@@ -310,7 +317,7 @@ BAD_OBSERVATIONS = [
 def test_bad_observations_are_named_and_teach_nothing(observation, message):
     agent = small_agent()
     good = [0.0, 0.0, 0.0]
-    before = agent.core.action_value.weights()
+    before = agent.networks[0].weights()
     for use in (
         lambda: agent.act(observation),
         lambda: agent.q_values(observation),
@@ -318,7 +325,7 @@ def test_bad_observations_are_named_and_teach_nothing(observation, message):
         lambda: agent.learn(Transition(good, [0.0], 1.0, observation, False)),
     ):
         refuses(message, use)
-    assert np.array_equal(agent.core.action_value.weights(), before)
+    assert np.array_equal(agent.networks[0].weights(), before)
 
 
 @pytest.mark.parametrize(
@@ -342,18 +349,18 @@ def test_bad_observations_are_named_and_teach_nothing(observation, message):
 def test_bad_actions_are_named_and_teach_nothing(actions, action):
     agent = small_agent(actions)
     good = [0.0, 0.0, 0.0]
-    before = agent.core.action_value.weights()
+    before = agent.networks[0].weights()
     refuses("action", agent.learn, Transition(good, action, 1.0, good, False))
-    assert np.array_equal(agent.core.action_value.weights(), before)
+    assert np.array_equal(agent.networks[0].weights(), before)
 
 
 @pytest.mark.parametrize("reward", [np.nan, np.inf, -np.inf])
 def test_bad_rewards_are_named_and_teach_nothing(reward):
     agent = small_agent()
     good = [0.0, 0.0, 0.0]
-    before = agent.core.action_value.weights()
+    before = agent.networks[0].weights()
     refuses("reward", agent.learn, Transition(good, [0.0], reward, good, False))
-    assert np.array_equal(agent.core.action_value.weights(), before)
+    assert np.array_equal(agent.networks[0].weights(), before)
 
 
 def test_evaluation_has_no_effect_on_learning():
@@ -370,7 +377,7 @@ def test_evaluation_has_no_effect_on_learning():
         assert np.array_equal(first, second)
         for agent in agents:
             agent.learn(Transition(observation, first, 1.0, next_observation, False))
-    weights = [agent.core.action_value.weights() for agent in agents]
+    weights = [agent.networks[0].weights() for agent in agents]
     assert np.array_equal(*weights)
 
 
@@ -390,7 +397,7 @@ def test_docstrings():
 def test_an_agent_takes_patterns_of_any_coding():
     tables = [Circular().patterns(40, seed=number) for number in range(3)]
     agent = small_agent(tables=tables)
-    np.testing.assert_array_equal(agent.core.action_value.table(2), tables[2])
+    np.testing.assert_array_equal(agent.networks[0].table(2), tables[2])
     observation = np.array([0.3, -1.0, 1.9])
     for _ in range(20):
         agent.learn(Transition(observation, [0.5], 3.0, observation, True))
@@ -407,6 +414,6 @@ def test_tables_have_a_row_for_each_symbol():
         tables = [Circular().patterns(40, seed=number)[:n] for number, n in enumerate(n_rows)]
         return SDNNQLearning(rooms, BUTTONS, approximator=SMALL, tables=tables)
 
-    assert agent_with(3, 4).core.action_value.table(1).shape == (4, 40)
+    assert agent_with(3, 4).networks[0].table(1).shape == (4, 40)
     refuses("tables[1]", agent_with, 3, 5)
     refuses("tables", agent_with, 3)

@@ -95,7 +95,6 @@ def test_rates_that_are_set_stay_and_are_saved(space, tmp_path):
             one.learn(Transition(seen, one.act(seen), 1.0, seen + 0.1, False))
         assert not one.is_warming_up
         assert (one.learning_rate, one.epsilon) == (0.25, 0.0)
-        assert one.core.learning_rate == 0.25
         one.learning_rate = one.epsilon = None
         assert (one.learning_rate, one.epsilon) == (0.05, 0.02)
 

@@ -213,7 +213,7 @@ def test_a_reward_far_beyond_the_others_is_warned_of_once_and_not_learned():
     with pytest.warns(UserWarning, match=r"reward 1e\+300 of transition 11") as warned:
         agent.train(env, steps=40)
     assert len(warned) == 1
-    assert np.isfinite(agent.core.state()["rules.values"]).all()
+    assert np.isfinite(agent.state()["agent.rules.values"]).all()
 
 
 def test_what_an_environment_raises_is_raised():
@@ -500,7 +500,7 @@ def test_progress_goes_from_0_to_1():
 
     class Note(Callback):
         def on_step(self, training):
-            seen.append((training.agent.progress, training.agent.core.epsilon))
+            seen.append((training.agent.progress, training.agent.epsilon))
 
     corridor_agent().train(Corridor(), steps=10, callbacks=[Note()])
     assert [progress for progress, _ in seen] == pytest.approx(np.arange(1, 11) / 10)

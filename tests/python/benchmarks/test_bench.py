@@ -151,7 +151,7 @@ def test_times_of_the_core_are_nanoseconds_per_repetition():
     times = _core.time_decisions(trial, 3)
     assert times.dtype == np.int64
     assert times.size == trial.n_decisions
-    parts = _core.NetworkParts(trial, 1)
+    parts = _core.NetworkParts(trial.agent.networks[0], 1)
     assert (parts.time_values(3) > 0).all()
     assert _core.DenseProduct(5, 7, 1).run(0).size == 0
     refuses("n_repetitions", parts.time_values, -1)

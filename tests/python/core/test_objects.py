@@ -69,7 +69,7 @@ def big_trial():
 
 def test_a_trial_that_advances_refuses_all_else():
     trial = big_trial()
-    agent, network = trial.agent, trial.agent.action_value
+    agent, network = trial.agent, trial.agent.networks[0]
     n_decisions = trial.n_decisions
     thread, outcome = in_thread(lambda: trial.advance(800))
     uses = [

@@ -293,7 +293,7 @@ def test_names_that_are_none_in_c_are_refused(name):
 
 def test_the_text_is_at_most_three_times_its_bytes_of_flash():
     agent = SDNNQLearning(box(1.0, 2.0, 3.0), Discrete(3), preset="small", seed=1)
-    agent.core.action_value.set_parameters(
+    agent.networks[0].set_parameters(
         np.random.default_rng(1).integers(-50, 50, (900, 240)), np.zeros(900, np.int32)
     )
     header = c_header(agent, "policy")

@@ -149,10 +149,10 @@ def test_the_largest_weights_stay_in_range(target, tmp_path):
         tie_rule="lowest",
     )
     agent = SDNNQLambda(gym.spaces.Discrete(9), gym.spaces.Discrete(4), learning=learning)
-    state = agent.core.state()
+    state = agent.state("agent")
     state["action_value.weights"][:] = 2**23 - 1
     state["action_value.exponent"] = np.array(-10, np.int32)
-    agent.core.restore(state)
+    agent._restore(agent=state)
     header, command = build(tmp_path, agent, target, *SANITIZED)
     values = [round(agent.q_values(symbol)[0] * 2.0**10) for symbol in range(9)]
     symbol, value = min(enumerate(values), key=lambda one: one[1])
@@ -163,7 +163,7 @@ def test_the_largest_weights_stay_in_range(target, tmp_path):
     came, image = lived(command, save_image(agent), lines, 1)
     assert came == live(agent, lines, header.fraction_bits)
     assert image == save_image(agent)
-    assert agent.core.state()["action_value.weights"].max() == 2**22
+    assert agent.state("agent")["action_value.weights"].max() == 2**22
     load_image(agent, image)
 
 
@@ -250,7 +250,7 @@ def test_an_image_of_impossible_numbers_changes_nothing():
         forged[number] = b"\xff" * len(forged[number])
         forged[-4:] = zlib.crc32(forged[:-4]).to_bytes(4, "little")
         refuses("image", load_image, agent, bytes(forged))
-    states = agent.core.state(), same.core.state()
+    states = agent.state("agent"), same.state("agent")
     assert all(np.array_equal(states[0][name], states[1][name]) for name in states[1])
     # Another life in between leaves nothing behind.
     new = discrete()
@@ -338,9 +338,9 @@ def test_other_agents_do_not_learn_in_c():
     )
     refuses("action_space", c_header, vector, "agent", learning=True)
     full = network()
-    weights = full.core.action_value.weights()
+    weights = full.networks[0].weights()
     weights[3, 5] = 128
-    full.core.action_value.set_parameters(weights, full.core.action_value.thresholds())
+    full.networks[0].set_parameters(weights, full.networks[0].thresholds())
     refuses("127", c_header, full, "agent", learning=True)
     radial = RBFQLearning(box(1.0, 1.0), gym.spaces.Discrete(2))
     refuses("agent", c_header, radial, "agent", learning=True, error=TypeError)

@@ -88,33 +88,10 @@ GOOD = {
         "n_threads": 1,
     },
     "EpsilonGreedy": lambda: {"config": core.EpsilonGreedyConfig(), "seed": 1},
-    "SDNNQLearning": lambda: {"approximator": network_config(), "learning": learning(), "seed": 1},
-    "DecoupledSDNNQLearning": lambda: {
-        "approximator": network_config(), "n_actions": [3, 4], "learning": learning(), "seed": 1
-    },
-    "RBFQLearning": lambda: {
-        "approximator": core.RBFNetworkConfig(), "learning": learning(), "seed": 1
-    },
-    "DecoupledRBFQLearning": lambda: {
-        "approximator": core.RBFNetworkConfig(), "n_actions": [3, 4], "learning": learning(),
-        "seed": 1,
-    },
     "LinearSDNN": lambda: {"config": linear_config(), "n_actions": [3, 4], "seed": 1},
-    "QLambda": lambda: {
-        "approximator": linear_config(), "n_actions": [3, 4], "learning": core.QLambdaConfig(),
-        "seed": 1, "tables": [],
-    },
-    "LinearAcrobotTrial": lambda: {
-        "approximator": linear_config(n_inputs=4), **trial_settings(),
-        "learning": core.QLambdaConfig(),
-    },
-    "FuzzyQLearning": lambda: {
-        "approximator": core.FuzzyRulesConfig(), "learning": learning(core.FuzzyQLearningConfig),
-        "seed": 1,
-    },
-    "VectorFuzzyQLearning": lambda: {
-        "approximator": core.FuzzyRulesConfig(), "n_dimensions": 2,
-        "learning": learning(core.FuzzyQLearningConfig), "seed": 1,
+    "BareAgent": lambda: {
+        "approximator": linear_config(), "learning": core.QLambdaConfig(), "seed": 1,
+        "n_actions": [3, 4],
     },
     "Controller": lambda: {
         "approximator": core.RBFNetworkConfig(), "learning": learning(), "seed": 1,
@@ -122,11 +99,6 @@ GOOD = {
         "action": core.ActionConfig(low=[0.0], high=[1.0]),
     },
     "AcrobotTrial": lambda: {"approximator": network_config(n_inputs=4), **trial_settings()},
-    "FuzzyAcrobotTrial": lambda: {
-        "approximator": core.FuzzyRulesConfig(), **trial_settings(),
-        "learning": core.FuzzyQLearningConfig(),
-    },
-    "RBFAcrobotTrial": lambda: {"approximator": core.RBFNetworkConfig(), **trial_settings()},
     "PlainRBFQLearning": lambda: {
         "approximator": core.RBFNetworkConfig(), "learning": learning(), "seed": 1
     },
@@ -174,10 +146,18 @@ METHODS = {
     },
     ("AcrobotBatch", "decisions"): {"index": 1},
     ("EpsilonGreedy", "select"): {"values": [1.0, 2.0], "step": 3, "explore": True},
-    ("SDNNQLearning", "set_n_environments"): {"n": 2},
-    ("SDNNQLearning", "begin_episode"): {"environment": 0},
-    ("SDNNQLearning", "act"): {"state": [0.1, 0.2], "explore": True, "environment": 0},
-    ("SDNNQLearning", "set_progress"): {"progress": 0.5},
+    ("LinearSDNN", "values"): {"state": [0.1, 0.2], "dimension": 1},
+    ("BareAgent", "act"): {"state": [0.1, 0.2], "explore": True},
+    ("BareAgent", "learn"): {
+        "state": [0.1, 0.2], "action": [2, 3], "reward": 1.0, "next_state": [0.2, 0.2],
+        "terminated": False,
+    },
+    ("Controller", "begin_episode"): {"environment": 0},
+    ("Controller", "act"): {
+        "observation": [0.1], "explore": True, "environment": 0, "mask": None
+    },
+    ("Controller", "values"): {"observation": [0.1], "dimension": 0},
+    ("Controller", "restore"): {"state": {}},
     ("AcrobotTrial", "advance"): {"n_episodes": 1},
     ("AcrobotTrial", "advance_together"): {
         "trials": (core.AcrobotTrial(**GOOD["AcrobotTrial"]()),), "n_decisions": 1

@@ -171,9 +171,9 @@ def make_agents(n_inputs, seed):
     fuzzy = _core.FuzzyQLearningConfig()
     network = _core.SDNNCConfig(n_inputs=n_inputs)
     return {
-        "sdnn": _core.SDNNQLearning(approximator=network, learning=learning, seed=seed),
-        "fuzzy": _core.FuzzyQLearning(approximator=rules, learning=fuzzy, seed=seed),
-        "rbf": _core.RBFQLearning(approximator=rbf, learning=learning, seed=seed),
+        "sdnn": _core.BareAgent(approximator=network, learning=learning, seed=seed),
+        "fuzzy": _core.BareAgent(approximator=rules, learning=fuzzy, seed=seed),
+        "rbf": _core.BareAgent(approximator=rbf, learning=learning, seed=seed),
         "plain rbf": _core.PlainRBFQLearning(approximator=rbf, learning=learning, seed=seed),
     }
 
@@ -193,7 +193,7 @@ def test_the_seed_decides_what_the_timed_agent_learns():
     def weights(kind, seed):
         agent = make_agents(2, 5)[kind]
         _core.time_agent_steps(agent, 40, seed)
-        return agent.action_value.weights()
+        return (agent.network if kind == "plain rbf" else agent.networks[0]).weights()
 
     np.testing.assert_array_equal(weights("rbf", 1), weights("rbf", 1))
     assert (weights("rbf", 1) != weights("rbf", 2)).any()

@@ -136,7 +136,7 @@ def test_asking_a_trials_agent_for_values_changes_nothing_that_follows():
     asked, alone = (spec_of("sdnn-c", noise=0.02).make_trial(SEED) for _ in range(2))
     for _ in range(60):
         asked.advance(1)
-        values = asked.agent.action_value.values([0.5, 0.5, 0.5, 0.5])
+        values = asked.agent.networks[0].values([0.5, 0.5, 0.5, 0.5])
         assert values.shape == (601,)
     alone.advance(60)
     for name, column in alone.test_rows().items():

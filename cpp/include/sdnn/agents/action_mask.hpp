@@ -71,6 +71,20 @@ void require_mask(std::string_view name, ActionMask mask, std::size_t n_dimensio
   }
 }
 
+/// Throws std::invalid_argument unless an action has an index for each dimension, below
+/// `n_actions(d)` in dimension d.
+template <class NActions>
+void require_action(std::span<const std::size_t> action, std::size_t n_dimensions,
+                    const NActions& n_actions) {
+  if (action.size() != n_dimensions) {  // only a bad one's text costs memory
+    core::require(false, "action", std::to_string(n_dimensions) + " numbers", action.size());
+  }
+  for (std::size_t d = 0; d < action.size(); ++d) {
+    if (action[d] < n_actions(d)) continue;
+    core::require(false, "action", "less than " + std::to_string(n_actions(d)), action[d]);
+  }
+}
+
 /// Lists a mask that an agent remembers, where there is one; see core/state.hpp.
 template <class Mask, class Archive, class NActions>
 void serialize_mask(std::string_view name, Mask& mask, Archive& archive, std::size_t n_dimensions,

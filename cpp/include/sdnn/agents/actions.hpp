@@ -10,7 +10,6 @@
 #include <string>
 #include <string_view>
 #include <tuple>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -102,20 +101,14 @@ class Actions {
 
   /// Writes an agent's action, an index, or a number in [-1, 1], for each dimension, in the units
   /// of the task, and its indices.
-  template <class Action>
-  void take(const Action& action, std::vector<double>& in_units,
+  template <class Number>
+  void take(std::span<const Number> action, std::vector<double>& in_units,
             std::vector<std::size_t>& indices) const {
     for (std::size_t d = 0; d < in_units.size(); ++d) {
-      const auto number = [&] {
-        if constexpr (std::is_arithmetic_v<Action>)
-          return action;
-        else
-          return action[d];
-      }();
       if (n_actions_[d] == 0) {
-        in_units[d] = of_normalized(static_cast<double>(number), d);
+        in_units[d] = of_normalized(static_cast<double>(action[d]), d);
       } else {
-        indices[d] = static_cast<std::size_t>(number);
+        indices[d] = static_cast<std::size_t>(action[d]);
         in_units[d] = of_index(indices[d], d);
       }
     }

@@ -5,22 +5,17 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <span>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <variant>
 #include <vector>
 
-#include "sdnn/agents/action_mask.hpp"
+#include "sdnn/agents/detail/dimensions.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_lambda.hpp"
 #include "sdnn/agents/q_lambda_config.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
-#include "sdnn/agents/vector_fuzzy_q_learning.hpp"
-#include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/approximators/linear_sdnn.hpp"
 #include "sdnn/approximators/linear_sdnn_config.hpp"
@@ -35,13 +30,10 @@
 namespace sdnn::agents {
 
 /// An agent of any kind.
-using AnyAgent = std::variant<QLearning<approximators::SDNNC>,
-                              QLearning<approximators::Decoupled<approximators::SDNNC>>,
-                              QLearning<approximators::RBFNetwork>,
-                              QLearning<approximators::Decoupled<approximators::RBFNetwork>>,
-                              FuzzyQLearning, VectorFuzzyQLearning, QLambda>;
+using AnyAgent = std::variant<QLearning<approximators::SDNNC>, QLearning<approximators::RBFNetwork>,
+                              FuzzyQLearning, QLambda>;
 
-/// What one reader of such an agent needs.
+/// The memory of one reader of such an agent.
 template <class Agents>
 struct WorkspacesOf;
 template <class... Agent>
@@ -55,11 +47,6 @@ using AnyApproximatorConfig =
     std::variant<approximators::SDNNCConfig, approximators::RBFNetworkConfig,
                  approximators::FuzzyRulesConfig, approximators::LinearSDNNConfig>;
 using AnyLearningConfig = std::variant<QLearningConfig, FuzzyQLearningConfig, QLambdaConfig>;
-
-/// Whether it is one of the two that learn by fuzzy rules.
-template <class Agent>
-inline constexpr bool kIsFuzzy =
-    std::is_same_v<Agent, FuzzyQLearning> || std::is_same_v<Agent, VectorFuzzyQLearning>;
 
 inline bool is_fuzzy(const AnyApproximatorConfig& config) noexcept {
   return std::holds_alternative<approximators::FuzzyRulesConfig>(config);
@@ -140,20 +127,25 @@ void expect_sizes(const Reader& reader, const AnyApproximatorConfig& config,
 
 namespace detail {
 
+/// Makes the approximator of each dimension of actions by `make(config, seed)`: alike but for their
+/// numbers of actions, and all random. Together they have the memory of one.
 template <class Config, class Make>
-AnyAgent make_q_learning(Config config, const QLearningConfig& learning,
-                         const std::vector<std::size_t>& n_actions, std::uint64_t seed,
-                         const Make& make) {
-  if (n_actions.size() == 1) return QLearning(make(config, seed), learning, seed);
+auto each_dimension(Config config, const std::vector<std::size_t>& n_actions, std::uint64_t seed,
+                    const Make& make) {
+  std::vector<decltype(make(config, seed))> parts;
+  parts.reserve(n_actions.size());
   config.max_table_bytes /= n_actions.size();
-  const std::vector<int> numbers(n_actions.begin(), n_actions.end());
-  return QLearning(approximators::make_decoupled(config, numbers, seed, make), learning, seed);
+  for (std::size_t d = 0; d < n_actions.size(); ++d) {
+    if (n_actions.size() > 1 && n_actions[d] > 0) config.n_actions = static_cast<int>(n_actions[d]);
+    parts.push_back(make(config, seed_of_dimension(seed, d)));
+  }
+  return parts;
 }
 
 }  // namespace detail
 
-/// Makes an agent with so many actions in each dimension, and, with SDNN-C and actions of one
-/// dimension, patterns of its own for each input. With a linear readout `n_first` inputs may have
+/// Makes an agent with n_actions[d] actions in each dimension d, and, with SDNN-C and actions of
+/// one dimension, separate patterns for each input. With a linear readout `n_first` inputs may have
 /// come first; see LinearSDNN. Where there are no tables, each input may have a pattern for missing
 /// readings beside the others, of symbols the last one. Throws as the parts do.
 inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearningConfig& learning,
@@ -171,11 +163,11 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
   core::require(tables.empty() || is_linear(config) || (is_sdnn(config) && n_actions.size() == 1),
                 "tables", "None where actions have several dimensions", tables.size());
   if (const auto* const rules = std::get_if<FuzzyRulesConfig>(&config)) {
-    const auto& rule = std::get<FuzzyQLearningConfig>(learning);
-    if (n_actions.size() == 1) return FuzzyQLearning(FuzzyRules(*rules), rule, seed);
-    FuzzyRulesConfig of_dimension = *rules;
-    of_dimension.max_table_bytes /= n_actions.size();
-    return VectorFuzzyQLearning(of_dimension, n_actions.size(), rule, seed);
+    return FuzzyQLearning(detail::each_dimension(*rules, n_actions, seed,
+                                                 [](const FuzzyRulesConfig& part, std::uint64_t) {
+                                                   return FuzzyRules(part);
+                                                 }),
+                          std::get<FuzzyQLearningConfig>(learning), seed);
   }
   if (const auto* const linear = std::get_if<LinearSDNNConfig>(&config)) {
     const auto books = [&, config = with_pattern_units(*linear)] {
@@ -187,90 +179,19 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
   }
   const auto& rule = std::get<QLearningConfig>(learning);
   if (const auto* const rbf = std::get_if<RBFNetworkConfig>(&config)) {
-    return detail::make_q_learning(
-        *rbf, rule, n_actions, seed,
-        [](const RBFNetworkConfig& one, std::uint64_t) { return RBFNetwork(one); });
+    return QLearning(detail::each_dimension(*rbf, n_actions, seed,
+                                            [](const RBFNetworkConfig& part, std::uint64_t) {
+                                              return RBFNetwork(part);
+                                            }),
+                     rule, seed);
   }
-  return detail::make_q_learning(std::get<SDNNCConfig>(config), rule, n_actions, seed,
-                                 [&](const SDNNCConfig& one, std::uint64_t seed_of_part) {
-                                   if (!tables.empty()) return SDNNC(one, tables, seed_of_part);
-                                   if (!codes_missing) return SDNNC(one, seed_of_part);
-                                   return SDNNC(one, code_books_with_missing(one, seed_of_part),
-                                                seed_of_part);
-                                 });
-}
-
-/// Calls what Q-learning is changed by, where there is such an agent.
-template <class Call>
-void with_q_learning(std::optional<AnyAgent>& any, const Call& call) {
-  if (!any) return;
-  std::visit(
-      [&call](auto& agent) {
-        if constexpr (!kIsFuzzy<std::remove_cvref_t<decltype(agent)>>) call(agent);
-      },
-      *any);
-}
-/// What Q-learning returns; `otherwise` where there is no such agent.
-template <class Call>
-double of_q_learning(const std::optional<AnyAgent>& any, const Call& call, double otherwise) {
-  if (!any) return otherwise;
-  return std::visit(
-      [&](const auto& agent) {
-        if constexpr (kIsFuzzy<std::remove_cvref_t<decltype(agent)>>)
-          return otherwise;
-        else
-          return call(agent);
-      },
-      *any);
-}
-
-/// The action to take in a state. Of a fuzzy agent, whose actions have no mask, any.
-template <class Agent>
-auto act(Agent& agent, std::span<const double> state, bool explore, std::size_t environment,
-         ActionMask mask) {
-  if constexpr (kIsFuzzy<Agent>)
-    return agent.act(state, explore, environment);
-  else
-    return agent.act(state, explore, environment, mask);
-}
-template <class Agent>
-auto best_action(const Agent& agent, std::span<const double> state,
-                 typename Agent::Workspace& workspace, core::Random& ties, ActionMask mask) {
-  if constexpr (kIsFuzzy<Agent>)
-    return agent.best_action(state, workspace, ties);
-  else
-    return agent.best_action(state, workspace, ties, mask);
-}
-template <class Agent>
-auto best_of(Agent& agent, typename Agent::Workspace& workspace, ActionMask mask) {
-  if constexpr (kIsFuzzy<Agent>)
-    return agent.best_of(workspace);
-  else
-    return agent.best_of(workspace, mask);
-}
-
-/// Learns a transition between two states; of a fuzzy agent, its last action.
-inline void learn(AnyAgent& any, std::span<const double> state,
-                  const std::vector<std::size_t>& indices, double reward,
-                  std::span<const double> next_state, bool terminated, std::size_t environment,
-                  ActionMask next_mask) {
-  std::visit(
-      [&](auto& agent) {
-        using Agent = std::remove_cvref_t<decltype(agent)>;
-        if constexpr (kIsFuzzy<Agent>) {
-          agent.learn(state, agent.last_action(environment), reward, next_state, terminated,
-                      environment);
-        } else {
-          const auto& action = [&]() -> const auto& {
-            if constexpr (Agent::kDecoupled)
-              return indices;
-            else
-              return indices[0];
-          }();
-          agent.learn(state, action, reward, next_state, terminated, environment, next_mask);
-        }
-      },
-      any);
+  const auto make = [&](const SDNNCConfig& part, std::uint64_t part_seed) {
+    if (!tables.empty()) return SDNNC(part, tables, part_seed);
+    if (!codes_missing) return SDNNC(part, part_seed);
+    return SDNNC(part, code_books_with_missing(part, part_seed), part_seed);
+  };
+  return QLearning(detail::each_dimension(std::get<SDNNCConfig>(config), n_actions, seed, make),
+                   rule, seed);
 }
 
 }  // namespace sdnn::agents

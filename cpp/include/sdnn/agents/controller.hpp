@@ -18,7 +18,6 @@
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller_config.hpp"
 #include "sdnn/agents/detail/approximator_of.hpp"
-#include "sdnn/agents/detail/experience_of.hpp"
 #include "sdnn/agents/detail/saved_tables.hpp"
 #include "sdnn/agents/detail/taken_actions.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
@@ -26,7 +25,6 @@
 #include "sdnn/agents/latest_transitions.hpp"
 #include "sdnn/agents/observations.hpp"
 #include "sdnn/agents/range_use.hpp"
-#include "sdnn/agents/relevance.hpp"
 #include "sdnn/agents/reward_scale.hpp"
 #include "sdnn/agents/schedule_config.hpp"
 #include "sdnn/agents/warm_up.hpp"
@@ -61,7 +59,7 @@ class Controller : public WithRates<Controller> {
   /// With SDNN-C, `tables` are patterns of each input. Throws std::invalid_argument naming the
   /// field that is impossible; std::length_error as the approximator does.
   explicit Controller(ControllerConfig config, std::vector<coding::PatternTable> tables = {})
-      : Controller(std::move(config), std::move(tables), Unborn()) {
+      : Controller(std::move(config), std::move(tables), PrivateTag()) {
     if (observations_.is_fitted()) {
       fit();
       return;
@@ -76,7 +74,7 @@ class Controller : public WithRates<Controller> {
   /// what does not fit, before much memory is asked for; and as the constructor does.
   static Controller restored(ControllerConfig config, const core::State& state) {
     core::StateReader reader(state);
-    Controller controller(std::move(config), detail::tables_in(state), Unborn());
+    Controller controller(std::move(config), detail::tables_in(state), PrivateTag());
     serialize(controller, reader);
     reader.finish();
     return controller;
@@ -97,21 +95,14 @@ class Controller : public WithRates<Controller> {
   AnyAgent& agent() { return agent_.value(); }
   const AnyAgent& agent() const { return agent_.value(); }
 
-  /// Of the agent, once there is one that follows it.
-  double progress() const {
-    return of_q_learning(
-        agent_, [](const auto& agent) { return agent.progress(); }, rates_.progress);
-  }
-  /// Alpha and epsilon as they are now. Require Q-learning.
+  /// Alpha and epsilon as they are now; 0 in fuzzy Q-learning, which has no schedule.
   double learning_rate() const {
-    return of_q_learning(
-        agent_, [](const auto& agent) { return agent.learning_rate(); },
-        planned([this](const auto& config) { return rates_.learning_rate(config); }));
+    return rate([](const auto& agent) { return agent.learning_rate(); },
+                [this](const auto& config) { return rates_.learning_rate(config); });
   }
   double epsilon() const {
-    return of_q_learning(
-        agent_, [](const auto& agent) { return agent.epsilon(); },
-        planned([this](const auto& config) { return rates_.epsilon(config); }));
+    return rate([](const auto& agent) { return agent.epsilon(); },
+                [this](const auto& config) { return rates_.epsilon(config); });
   }
 
   /// How many robots, or environments, the agent learns from at once: each has an episode of its
@@ -164,14 +155,15 @@ class Controller : public WithRates<Controller> {
       const auto is_allowed = [&](const std::vector<double>& action) {
         return actions_.allows_drawn(action, mask);
       };
-      actions_.take(warm_up_->act(draw, is_allowed, explore, environment), action_, indices_);
+      const std::vector<double> drawn = warm_up_->act(draw, is_allowed, explore, environment);
+      actions_.take(std::span(drawn), action_, indices_);
       readings_.note(held_, environment, !explore);
       return action_;
     }
     observations_.scale(held, state_);
     std::visit(
         [&](auto& agent) {
-          actions_.take(agents::act(agent, state_, explore, environment, mask), action_, indices_);
+          actions_.take(agent.act(state_, explore, environment, mask), action_, indices_);
         },
         *agent_);
     if (explore && !is_fuzzy(approximator_)) {
@@ -201,8 +193,7 @@ class Controller : public WithRates<Controller> {
     observations_.scale(readings_.filled(observation, 0, true, workspace.held), workspace.state);
     std::visit(
         [&](const auto& agent) {
-          auto& own = own_workspace(agent, workspace);
-          actions_.take(agents::best_action(agent, workspace.state, own, ties, mask),
+          actions_.take(agent.best_action(workspace.state, part_of(workspace, agent), ties, mask),
                         workspace.action, workspace.indices);
         },
         *agent_);
@@ -222,24 +213,35 @@ class Controller : public WithRates<Controller> {
   /// last. With Missing::hold it is what `hold` returned.
   void read(std::span<const double> observation, Workspace& workspace) const {
     observations_.scale(observation, workspace.state);
-    std::visit(
-        [&](const auto& agent) { agent.read(workspace.state, own_workspace(agent, workspace)); },
-        *agent_);
+    std::visit([&](const auto& agent) { agent.read(workspace.state, part_of(workspace, agent)); },
+               *agent_);
   }
   std::span<const double> best_of(Workspace& workspace, ActionMask mask = {}) {
     actions_.require_mask("mask", mask);
     std::visit(
         [&](auto& agent) {
-          actions_.take(agents::best_of(agent, own_workspace(agent, workspace), mask),
-                        workspace.action, workspace.indices);
+          actions_.take(agent.best_of(part_of(workspace, agent), mask), workspace.action,
+                        workspace.indices);
         },
         *agent_);
     return workspace.action;
   }
 
-  /// How large rewards are, and which one was too large to be learned.
+  /// The values of all actions of dimension d, by which greedy actions are chosen; of fuzzy rules
+  /// the value of the observation alone. Valid until the workspace is used again. Requires that the
+  /// warm-up is over and d < n_dimensions(). Missing readings as in best_action; throws as act.
+  std::span<const double> values(std::span<const double> observation, Workspace& workspace,
+                                 std::size_t d) const {
+    observations_.scale(readings_.filled(observation, 0, true, workspace.held), workspace.state);
+    return std::visit(
+        [&](const auto& agent) {
+          return agent.values(workspace.state, part_of(workspace, agent), d, true);
+        },
+        *agent_);
+  }
+
+  /// The size of rewards, and the one that was too large to be learned.
   const RewardScale& reward_scale() const noexcept { return reward_scale_; }
-  void set_reward_scale(const RewardScale& scale) { reward_scale_ = scale; }
 
   /// Learns a transition, unless its reward is far beyond the recent ones; see RewardScale. The
   /// action is any of the task's, of a box the nearest one that can be taken; of fuzzy Q-learning,
@@ -302,37 +304,16 @@ class Controller : public WithRates<Controller> {
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
-  static void serialize(Self& self, Archive& archive) {
-    detail::serialize_tables(self.tables_, archive);
-    bool is_warming_up = self.is_warming_up();
-    archive.number("is_warming_up", is_warming_up);
-    serialize_rates(self, archive);
-    if constexpr (Archive::kReads) self.begin_reading(is_warming_up, archive);
-    if (is_warming_up) {
-      archive.part("warm_up", *self.warm_up_);
-    } else {
-      archive.part("observations", self.observations_);
-      if constexpr (Archive::kReads) {
-        self.fit(&archive);
-        self.watch();
-      }
-      if (self.latest_) archive.part("latest", *self.latest_);
-      std::visit([&archive](auto& agent) { archive.part("agent", agent); }, *self.agent_);
-      archive.part("reward_scale", self.reward_scale_);
-    }
-    archive.part("taken", self.taken_);
-    if (self.readings_.is_held()) archive.part("readings", self.readings_);
-    if constexpr (Archive::kReads) self.end_reading(archive);
-  }
+  static void serialize(Self& self, Archive& archive);
 
  private:
   friend class WithRates<Controller>;
-  struct Unborn {};
+  struct PrivateTag {};
 
   static constexpr double kLargestReward = 1e300;
   static constexpr double kCaution = 1.5;  // of looking again and again
 
-  Controller(ControllerConfig config, std::vector<coding::PatternTable> tables, Unborn)
+  Controller(ControllerConfig config, std::vector<coding::PatternTable> tables, PrivateTag)
       : config_(std::move(config)),
         tables_(std::move(tables)),
         approximator_(config_.approximator),
@@ -347,45 +328,43 @@ class Controller : public WithRates<Controller> {
     indices_.resize(n_dimensions());
   }
 
-  WarmUp new_warm_up() const {
-    return {n_variables(), n_dimensions(), static_cast<std::size_t>(config_.warm_up_steps),
-            config_.seed, !is_fuzzy(approximator_)};
-  }
+  WarmUp new_warm_up() const;
+  void fit(const core::StateReader* reader = nullptr);
+  void end_warm_up();
+  std::size_t n_first_inputs() const noexcept;
+  void watch();
+  void add_inputs();
+  void replay(const WarmUp::Step& step, LastReadings& readings);
+  template <class Archive>
+  void begin_reading(bool is_warming_up, const Archive& archive);
+  template <class Archive>
+  void end_reading(const Archive& archive);
 
-  /// Makes the agent: all ranges are known. Of a state that is read, sizes are compared first.
-  void fit(const core::StateReader* reader = nullptr) {
-    approximator_ = detail::approximator_of(config_, observations_, actions_, tables_);
-    const auto tables = detail::tables_of(config_, observations_, approximator_, tables_);
-    if (reader != nullptr) {
-      expect_sizes(*reader, approximator_, actions_.n_actions(), !tables.empty());
-    }
-    agent_.emplace(make_agent(approximator_, config_.learning, actions_.n_actions(), config_.seed,
-                              tables, n_first_inputs(), observations_.codes_missing()));
-    if (auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&approximator_)) {
-      if (n_dimensions() == 1) sdnn->n_actions = static_cast<int>(actions_.n_actions().front());
-    }
-    with_q_learning(agent_, [this](auto& agent) { agent.set_rates(rates_); });
-    state_.resize(observations_.n_inputs());
-    next_state_.resize(state_.size());
-  }
-
-  void apply_rates(const auto& change) { with_q_learning(agent_, change); }
-
-  /// What `call` gives of the settings of learning, but for fuzzy Q-learning.
-  template <class Call>
-  double planned(const Call& call) const {
-    return std::visit(
-        [&call](const auto& config) {
-          if constexpr (std::is_same_v<std::remove_cvref_t<decltype(config)>, FuzzyQLearningConfig>)
-            return 0.0;
-          else
-            return call(config);
+  /// Changes the rates of the agent, if there is one that has them.
+  void apply_rates(const auto& change) {
+    if (!agent_) return;
+    std::visit(
+        [&change](auto& agent) {
+          if constexpr (requires { agent.set_progress(0.0); }) change(agent);
         },
-        config_.learning);
+        *agent_);
+  }
+
+  /// Returns of_agent(agent), or of_config(config) during the warm-up; 0 where there are no rates.
+  double rate(const auto& of_agent, const auto& of_config) const {
+    const auto agent_rate = [&of_agent](const auto& agent) {
+      if constexpr (requires { agent.learning_rate(); }) return of_agent(agent);
+      return 0.0;
+    };
+    const auto planned_rate = [&of_config](const auto& config) {
+      if constexpr (requires { config.learning_rate; }) return of_config(config);
+      return 0.0;
+    };
+    return agent_ ? std::visit(agent_rate, *agent_) : std::visit(planned_rate, config_.learning);
   }
 
   template <class Agent>
-  static typename Agent::Workspace& own_workspace(const Agent&, Workspace& workspace) {
+  static typename Agent::Workspace& part_of(Workspace& workspace, const Agent&) {
     return std::get<typename Agent::Workspace>(workspace.agent);
   }
 
@@ -403,98 +382,22 @@ class Controller : public WithRates<Controller> {
   /// fuzzy agent knows that one only.
   void find_indices(std::span<const double> action, std::size_t environment) {
     actions_.require_action(action);
-    if (is_fuzzy(approximator_)) {
-      require_last(action, environment);
+    if (auto* const fuzzy = std::get_if<FuzzyQLearning>(&*agent_)) {
+      actions_.take(fuzzy->last_action(environment), action_, indices_);
+      core::require(fuzzy->explored_in(state_, environment) && std::ranges::equal(action, action_),
+                    "observation and action", "those of the last exploring act", "others");
       return;
     }
     if (taken_.find(environment, action, indices_)) return;
     for (std::size_t d = 0; d < action.size(); ++d) indices_[d] = actions_.index_of(action[d], d);
   }
 
-  /// Throws unless a fuzzy agent chose the action in state_ when it explored last.
-  void require_last(std::span<const double> action, std::size_t environment) {
-    std::visit(
-        [&](auto& agent) {
-          if constexpr (kIsFuzzy<std::remove_cvref_t<decltype(agent)>>) {
-            actions_.take(agent.last_action(environment), action_, indices_);
-            core::require(
-                agent.explored_in(state_, environment) && std::ranges::equal(action, action_),
-                "observation and action", "those of the last exploring act", "others");
-          }
-        },
-        *agent_);
+  /// The action that is learned: in indices_, or the last one of fuzzy rules, which know no other.
+  std::span<const std::size_t> learned_action(const auto& /*agent*/, std::size_t) const {
+    return indices_;
   }
-
-  void end_warm_up() {
-    Observations fitted = observations_;
-    fitted.fit(warm_up_->seen());
-    if (fitted.has_choice()) {
-      fitted.keep(Relevance(detail::experience_of(fitted, *warm_up_, n_dimensions()))
-                      .inputs(fitted.required()));
-    }
-    observations_ = std::move(fitted);
-    fit();
-    const WarmUp warm_up = std::move(*warm_up_);
-    reward_scale_ = RewardScale(warm_up.rewards());
-    warm_up_.reset();
-    set_n_environments(warm_up.n_in_all());
-    if (is_fuzzy(approximator_)) {
-      for (std::size_t i = 0; i < n_environments(); ++i) begin_learned_episode(i);
-    } else {
-      LastReadings readings = observations_.last_readings();
-      for (std::size_t t = 0; t < warm_up.size(); ++t) relive(warm_up.step(t), readings);
-    }
-    set_n_environments(warm_up.n_environments());
-    watch();
-  }
-
-  /// The number of inputs that came first, where others were added; else 0.
-  std::size_t n_first_inputs() const noexcept {
-    const std::size_t n = observations_.n_first_inputs();
-    return n < observations_.n_inputs() ? n : 0;
-  }
-
-  /// Looks for inputs that matter later, where some are left out and can be added.
-  void watch() {
-    latest_.reset();
-    const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&approximator_);
-    const auto kept = observations_.kept_inputs();
-    if (linear == nullptr || linear->max_pairs != 0 || !tables_.empty() ||
-        std::ranges::find(kept, false) == kept.end()) {
-      return;
-    }
-    latest_.emplace(new_warm_up(), static_cast<std::size_t>(config_.warm_up_steps));
-    latest_->set_n_environments(n_environments());
-  }
-
-  void add_inputs() {
-    const std::vector<bool> kept = observations_.kept_inputs();
-    const RandomExperience latest = detail::experience_of(observations_.with_all_inputs(),
-                                                          latest_->transitions(), n_dimensions());
-    const std::vector<bool> found = Relevance(latest, kCaution).inputs(kept);
-    latest_->forget();
-    if (found == kept) return;
-    observations_.keep(found);
-    auto before = std::move(std::get<QLambda>(*agent_));
-    fit();
-    std::get<QLambda>(*agent_).continue_from(std::move(before));
-    identity_ = core::Identity();  // readers have workspaces for fewer inputs
-  }
-
-  /// Learns a transition of the warm-up, after which there were these readings.
-  void relive(const WarmUp::Step& step, LastReadings& readings) {
-    if (step.begins) {
-      begin_learned_episode(step.environment);
-      readings.forget(step.environment);
-    }
-    const auto held = readings.filled(step.observation, step.next_observation, step.environment);
-    readings.note_step(step.environment);
-    observations_.scale(held.observation, state_);
-    observations_.scale(held.next_observation, next_state_, "next_observation");
-    for (std::size_t d = 0; d < n_dimensions(); ++d) {
-      indices_[d] = actions_.index_of(step.action[d], d);
-    }
-    learn_scaled(step.reward, step.terminated, step.environment, step.next_mask);
+  static std::span<const double> learned_action(FuzzyQLearning& agent, std::size_t environment) {
+    return agent.last_action(environment);
   }
 
   /// Learns the transition in state_, indices_ and next_state_.
@@ -504,44 +407,17 @@ class Controller : public WithRates<Controller> {
       reward_scale_ = scale;
       return;
     }
-    agents::learn(*agent_, state_, indices_, reward, next_state_, terminated, environment,
-                  next_mask);
+    std::visit(
+        [&](auto& agent) {
+          agent.learn(state_, learned_action(agent, environment), reward, next_state_, terminated,
+                      environment, next_mask);
+        },
+        *agent_);
     const auto size_in_window = scale.end_window();
     reward_scale_ = scale;
     if (auto* const linear = std::get_if<QLambda>(&*agent_); linear != nullptr && size_in_window) {
       linear->refine_unit(*size_in_window, *scale.size());
     }
-  }
-
-  template <class Archive>
-  void begin_reading(bool is_warming_up, const Archive& archive) {
-    archive.expect(!is_warming_up || observations_.needs_fit(), "is_warming_up",
-                   "0, as all ranges are known");
-    agent_.reset();
-    warm_up_.reset();
-    if (is_warming_up) warm_up_.emplace(new_warm_up());
-  }
-
-  template <class Archive>
-  void end_reading(const Archive& archive) {
-    archive.expect(taken_.fits(n_environments(), actions_), "taken.indices",
-                   "of actions and environments");
-    if (agent_) {
-      rates_.progress = progress();
-      return;
-    }
-    const auto can_be_learned = [&](const WarmUp::Step& step) {
-      actions_.require_action(step.action);
-      actions_.require_mask("next_masks", step.next_mask);
-      observations_.require_readings("observation", step.observation);
-      observations_.require_readings("next_observation", step.next_observation);
-      return std::abs(step.reward) <= kLargestReward;
-    };
-    const auto is_action = [this](const auto& kept) { return actions_.can_be_drawn(kept); };
-    archive.taking("warm_up.actions", [&] {
-      archive.expect(warm_up_->each_is(can_be_learned, is_action), "warm_up",
-                     "of transitions and actions");
-    });
   }
 
   ControllerConfig config_;
@@ -562,3 +438,5 @@ class Controller : public WithRates<Controller> {
 };
 
 }  // namespace sdnn::agents
+
+#include "sdnn/agents/detail/controller_warm_up.hpp"

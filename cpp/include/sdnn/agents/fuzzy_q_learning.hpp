@@ -1,57 +1,25 @@
 /// Fuzzy Q-learning: every fired rule picks an action, the mean of the picks is taken.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
-#include <stdexcept>
-#include <tuple>
+#include <string>
 #include <utility>
 #include <vector>
 
-#include "sdnn/agents/episodes.hpp"
-#include "sdnn/agents/epsilon_greedy.hpp"
+#include "sdnn/agents/action_mask.hpp"
+#include "sdnn/agents/detail/dimensions.hpp"
+#include "sdnn/agents/detail/fuzzy_dimension.hpp"
+#include "sdnn/agents/fuzzy_q_learning_config.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
-#include "sdnn/coding/action_code.hpp"
-#include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/check_fields.hpp"
-#include "sdnn/core/detail/grid_cells.hpp"
-#include "sdnn/core/elementary.hpp"
-#include "sdnn/core/errors.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::agents {
 
-/// The agent's parameters; the defaults are the paper's (method.md, sections 3 and 5).
-struct FuzzyQLearningConfig {
-  double learning_coefficient = 0.5;
-  double discount = 0.9;
-  double trace_decay = 0.0;
-  EpsilonGreedyConfig policy = {};  ///< of every fired rule for itself
-
-  static constexpr auto fields() noexcept {
-    return std::tuple_cat(
-        std::tuple(
-            core::field(
-                "learning_coefficient", &FuzzyQLearningConfig::learning_coefficient,
-                "c_fql. An assumption: the paper does not give it; 0.1 and 1.0 are alternatives.",
-                core::above_up_to(0, 1)),
-            core::field("discount", &FuzzyQLearningConfig::discount, "gamma.", core::within(0, 1)),
-            core::field(
-                "trace_decay", &FuzzyQLearningConfig::trace_decay,
-                "lambda of accumulating eligibility traces; 0: none, as in the paper. At most "
-                "0.99 / discount.",
-                core::within(0, 1))),
-        core::nested_fields(&FuzzyQLearningConfig::policy));
-  }
-  bool operator==(const FuzzyQLearningConfig&) const = default;
-};
-
-/// An agent with a continuous action in [-1, 1], learned by Jouffe's fuzzy Q-learning.
+/// An agent with a number in [-1, 1] for each dimension of its action, by Jouffe's fuzzy
+/// Q-learning.
 ///
 /// Every fired rule i picks one of its actions a_i by the epsilon-greedy policy, all rules drawing
 /// from the same streams in the order of FuzzyRules::fire. The action taken is the mean of the
@@ -69,327 +37,189 @@ struct FuzzyQLearningConfig {
 /// An agent may learn in several environments at once, numbered from 0: what belongs to an episode
 /// (the last exploring act, the traces, the number of steps) is then kept for each.
 ///
+/// Each dimension of an action has separate rules and random streams. It learns from the same
+/// rewards, as if the others were part of the environment. The paper has one dimension.
+///
 /// Source: Jouffe, L. (1998). Fuzzy inference system learning by reinforcement methods. IEEE
 /// Transactions on Systems, Man, and Cybernetics C 28(3), 338-355; method.md, section 3.
 class FuzzyQLearning {
  public:
-  /// Smaller eligibilities count as 0.
-  static constexpr double kForgottenTrace = 1e-3;
+  using Action = std::span<const double>;
 
-  /// Throws std::invalid_argument naming the field that is out of range; std::length_error if what
-  /// fires at once and its traces need more than max_table_bytes.
+  /// The memory of one reader: the rules that fire in a state, for each dimension.
+  struct Workspace {
+    std::vector<approximators::FiredRules> fired;
+    std::vector<double> values;
+    std::vector<double> action;
+  };
+
+  /// With rules for each dimension of actions. Throws std::invalid_argument naming the field that
+  /// is out of range, or unless there are rules and all have the same inputs; std::length_error if
+  /// the rules that fire at once and their traces need more than max_table_bytes.
+  FuzzyQLearning(std::vector<approximators::FuzzyRules> rules, const FuzzyQLearningConfig& config,
+                 std::uint64_t seed)
+      : config_(config) {
+    core::require(!rules.empty(), "rules", "of one dimension or more", rules.size());
+    const std::size_t n = rules.front().n_inputs();
+    dimensions_.reserve(rules.size());
+    for (approximators::FuzzyRules& of_dimension : rules) {
+      core::require(of_dimension.n_inputs() == n, "rules", "of the same inputs",
+                    of_dimension.n_inputs());
+      dimensions_.emplace_back(std::move(of_dimension), config,
+                               seed_of_dimension(seed, dimensions_.size()));
+    }
+    workspace_ = workspace();
+    last_action_.resize(n_dimensions());
+  }
+  /// With actions of one dimension.
   FuzzyQLearning(approximators::FuzzyRules rules, const FuzzyQLearningConfig& config,
                  std::uint64_t seed)
-      : config_(checked(config)),
-        rules_(with_room(std::move(rules))),
-        policy_(config.policy, seed),
-        workspace_(rules_.workspace()),
-        episodes_(new_episode()) {
-    for (std::size_t action = 0; action < rules_.n_actions(); ++action) {
-      actions_.push_back(coding::action_value(action, rules_.n_actions(), -1.0, 1.0));
-    }
-  }
+      : FuzzyQLearning(detail::only(std::move(rules)), config, seed) {}
 
   const FuzzyQLearningConfig& config() const noexcept { return config_; }
-  const approximators::FuzzyRules& rules() const noexcept { return rules_; }
-  approximators::FuzzyRules& rules() noexcept { return rules_; }
-  std::size_t n_inputs() const noexcept { return rules_.n_inputs(); }
+  std::size_t n_inputs() const noexcept { return dimensions_.front().rules().n_inputs(); }
+  std::size_t n_dimensions() const noexcept { return dimensions_.size(); }
+  /// The rules of each dimension, and what they did in the last exploring act.
+  std::span<detail::FuzzyDimension> dimensions() noexcept { return dimensions_; }
+  std::span<const detail::FuzzyDimension> dimensions() const noexcept { return dimensions_; }
 
-  /// In how many environments at once the agent learns: each has an episode of its own. Throws
-  /// std::invalid_argument outside [1, 2^14].
+  /// Sets the number of environments in which the agent learns at once: each has a separate
+  /// episode. Throws std::invalid_argument outside [1, 2^14].
   void set_n_environments(std::size_t n) {
-    episodes_.resize(n, [this] { return new_episode(); });
+    for (auto& dimension : dimensions_) dimension.set_n_environments(n);
   }
-  std::size_t n_environments() const noexcept { return episodes_.size(); }
-
-  /// The rules that fired in the last exploring act in an environment, and the actions they picked.
-  const approximators::FiredRules& fired(std::size_t environment = 0) const {
-    return episodes_.of(environment).fired;
-  }
-  std::span<const std::size_t> picked(std::size_t environment = 0) const {
-    return episodes_.of(environment).picked;
-  }
-  /// The action that came of it.
-  double last_action(std::size_t environment = 0) const { return episodes_.of(environment).action; }
-  /// Whether the last exploring act in an environment was in this state.
-  bool explored_in(std::span<const double> state, std::size_t environment = 0) const {
-    const Episode& episode = episodes_.of(environment);
-    return !episode.picked.empty() && std::ranges::equal(state, episode.state);
-  }
+  std::size_t n_environments() const noexcept { return dimensions_.front().n_environments(); }
 
   /// Starts counting the steps of an episode anew and forgets the traces. The caller decides when:
   /// learning a terminated transition ends the traces only. Throws std::invalid_argument if there
   /// is no such environment.
   void begin_episode(std::size_t environment = 0) {
-    Episode& episode = episodes_.of(environment);
-    episode.step = 0;
-    episode.traces.clear();
+    for (auto& dimension : dimensions_) dimension.begin_episode(environment);
   }
 
-  /// The action to take in `state`, in [-1, 1]. Without `explore` every rule picks a best action
-  /// and nothing is remembered: the learning step uses the last exploring act.
+  /// Returns the action to take in `state`, valid until the next act. Without `explore` every rule
+  /// picks a best action and nothing is remembered: the learning step uses the last exploring act.
+  /// Its actions are no indices, so there is no mask of them.
   ///
-  /// Shape: state (d,) in [0, 1]. Throws std::invalid_argument otherwise, and nothing has changed.
-  double act(std::span<const double> state, bool explore = true, std::size_t environment = 0) {
-    Episode& episode = episodes_.of(environment);
+  /// Shapes: state (d,) in [0, 1], the action (n_dimensions,). Throws std::invalid_argument
+  /// otherwise, and nothing has changed.
+  Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
+             ActionMask /*mask*/ = {}) {
     if (!explore) {
+      static_cast<void>(dimensions_.front().last_action(environment));  // which must be there
       read(state, workspace_);
       return best_of(workspace_);
     }
-    rules_.fire(state, episode.fired);
-    std::copy(state.begin(), state.end(), episode.state.begin());
-    episode.picked.clear();
-    episode.action = clamped_mean(episode.fired, [&](std::size_t i) {
-      return episode.picked.emplace_back(
-          policy_.select(rules_.values(episode.fired.rules[i]), episode.step, true));
-    });
-    ++episode.step;
-    return episode.action;
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      workspace_.action[d] = dimensions_[d].explore(state, environment);
+    }
+    return workspace_.action;
   }
 
-  /// The action itself: act gives a number in [-1, 1].
-  double normalized_action(double action) const noexcept { return action; }
+  /// The number of the first dimension: actions are in [-1, 1].
+  double normalized_action(Action action) const noexcept { return action.front(); }
 
-  /// What one reader needs: as long as the agent neither acts with `explore` nor learns, many
-  /// threads may call value and best_action, with a workspace each.
-  using Workspace = approximators::FiredRules;
-  Workspace workspace() const { return rules_.workspace(); }
-
-  /// The value of `state`, sum max_a v_i[a] alpha_i / sum alpha_i. Throws as act does.
-  double value(std::span<const double> state, Workspace& workspace) const {
-    rules_.fire(state, workspace);
-    return mean_over(workspace, [&](std::size_t i) -> double {
-      return best_value(rules_.values(workspace.rules[i]));
-    });
+  /// Returns the action of the last exploring act in an environment, valid until the next call.
+  Action last_action(std::size_t environment = 0) {
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      last_action_[d] = dimensions_[d].last_action(environment);
+    }
+    return last_action_;
+  }
+  /// Whether that act was in this state.
+  bool explored_in(std::span<const double> state, std::size_t environment = 0) const {
+    return dimensions_.front().explored_in(state, environment);
   }
 
-  /// The action of act without `explore`; `ties` decides between several best ones of a rule.
-  double best_action(std::span<const double> state, Workspace& workspace,
-                     core::Random& ties) const {
-    rules_.fire(state, workspace);
-    return clamped_mean(workspace, [&](std::size_t i) {
-      return policy_.best_action(rules_.values(workspace.rules[i]), ties);
-    });
+  /// A workspace for a reader beside the agent itself: as long as the agent neither acts with
+  /// `explore` nor learns, many threads may call values and best_action, with one each.
+  Workspace workspace() const {
+    Workspace workspace;
+    for (const auto& dimension : dimensions_) {
+      workspace.fired.push_back(dimension.rules().workspace());
+    }
+    workspace.values.resize(1);
+    workspace.action.resize(n_dimensions());
+    return workspace;
   }
 
-  /// The two steps of act without `explore`: `read` is for many threads, as value is; `best_of`
-  /// gives the action in the state that was read last.
+  /// Returns the value of `state` by the rules of dimension d, the only number of the span, which
+  /// is valid until the workspace is used again. Throws as act does.
+  std::span<const double> values(std::span<const double> state, Workspace& workspace,
+                                 std::size_t d = 0, bool /*averaged*/ = false) const {
+    dimensions_[d].rules().fire(state, workspace.fired[d]);
+    workspace.values[0] = dimensions_[d].value(workspace.fired[d]);
+    return workspace.values;
+  }
+
+  /// Returns the action of act without `explore`; `ties` decides between several best ones of a
+  /// rule. The span is valid until the workspace is used again.
+  Action best_action(std::span<const double> state, Workspace& workspace, core::Random& ties,
+                     ActionMask /*mask*/ = {}) const {
+    read(state, workspace);
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      workspace.action[d] = dimensions_[d].best_of(workspace.fired[d], ties);
+    }
+    return workspace.action;
+  }
+
+  /// The two steps of act without `explore`: `read` is for many threads, as values is; `best_of`
+  /// returns the action in the state that was read last.
   void read(std::span<const double> state, Workspace& workspace) const {
-    rules_.fire(state, workspace);
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      dimensions_[d].rules().fire(state, workspace.fired[d]);
+    }
   }
-  double best_of(const Workspace& workspace) {
-    return clamped_mean(workspace, [&](std::size_t i) {
-      return policy_.select(rules_.values(workspace.rules[i]), 0, false);
-    });
+  Action best_of(Workspace& workspace, ActionMask /*mask*/ = {}) {
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      workspace.action[d] =
+          dimensions_[d].best_of(workspace.fired[d], dimensions_[d].evaluation_ties());
+    }
+    return workspace.action;
   }
 
   /// Learns the transition that began with the last exploring act in the environment.
   ///
   /// Throws std::invalid_argument if `state` and `action` are not those of that act (which rule
-  /// picked what is known of no other), for a bad next state or a reward that is not finite;
-  /// std::overflow_error if a value would leave the floats. The table is unchanged then.
-  void learn(std::span<const double> state, double action, double reward,
-             std::span<const double> next_state, bool terminated, std::size_t environment = 0) {
-    Episode& episode = episodes_.of(environment);
+  /// picked which action is known of no other), for a bad next state or a reward that is not
+  /// finite; then nothing is learned. Throws std::overflow_error if a value would leave the floats:
+  /// the dimensions before have learned then.
+  void learn(std::span<const double> state, Action action, double reward,
+             std::span<const double> next_state, bool terminated, std::size_t environment = 0,
+             ActionMask /*next_mask*/ = {}) {
+    if (action.size() != n_dimensions()) {  // only a bad one's text costs memory
+      core::require(false, "action", std::to_string(n_dimensions()) + " numbers", action.size());
+    }
     core::require(explored_in(state, environment), "state", "that of the last exploring act",
                   "another");
-    core::require(action == episode.action, "action", "that of the last exploring act", action);
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      core::require(action[d] == dimensions_[d].last_action(environment), "action",
+                    "that of the last exploring act", action[d]);
+    }
     core::require_finite("reward", reward);
-    const double target =
-        terminated ? reward : reward + config_.discount * value(next_state, workspace_);
-    const double value_of_picks = mean_over(episode.fired, [&](std::size_t i) -> double {
-      return rules_.value(episode.fired.rules[i], episode.picked[i]);
-    });
-    const double step = config_.learning_coefficient * (target - value_of_picks);
-    const bool is_large = !(std::abs(step) < kLargeStep);  // others need no room to go back
-    const std::vector<Trace> before = is_large ? episode.traces : std::vector<Trace>();
-    renew_traces(episode);
-    for (const Trace& trace : episode.traces) {
-      if (std::abs(moved(trace, step)) <= kLargest) continue;
-      if (is_large) episode.traces.assign(before.begin(), before.end());
-      core::fail(std::overflow_error(
-          "reward is too large: a value of a fuzzy rule would leave the range of floats"));
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      dimensions_[d].learn(reward, next_state, terminated, environment, workspace_.fired[d]);
     }
-    for (const Trace& trace : episode.traces) {
-      rules_.set_value(trace.rule, trace.action, static_cast<float>(moved(trace, step)));
-    }
-    if (terminated) episode.traces.clear();
   }
 
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
-    archive.part("rules", self.rules_);
-    archive.part("policy", self.policy_);
-    Episodes<Episode>::serialize(
-        self.episodes_, archive, [&self] { return self.new_episode(); },
-        [&](auto& episode) { serialize_episode(self, episode, archive); });
-    if constexpr (Archive::kReads) self.workspace_ = self.rules_.workspace();  // as new_episode's
+    if (self.n_dimensions() == 1) {
+      detail::FuzzyDimension::serialize(self.dimensions_.front(), archive);
+    } else {
+      for (std::size_t d = 0; d < self.n_dimensions(); ++d) {
+        archive.part(std::to_string(d), self.dimensions_[d]);
+      }
+    }
+    if constexpr (Archive::kReads) self.workspace_ = self.workspace();  // a copy's has no room
   }
 
  private:
-  struct Trace {
-    std::size_t rule;
-    std::size_t action;
-    double eligibility;
-  };
-
-  /// Asked before memory is: the number of rules that fire doubles with every input.
-  approximators::FuzzyRules with_room(approximators::FuzzyRules rules) const {
-    const double per_rule = 2.0 * (sizeof(std::size_t) + sizeof(double)) + sizeof(std::size_t) +
-                            static_cast<double>(trace_lifetime() + 1) * sizeof(Trace);
-    core::require_table_bytes("n_inputs or trace_decay", "rules that fire and their traces",
-                              per_rule * static_cast<double>(rules.max_fired()),
-                              rules.config().max_table_bytes);
-    return rules;
-  }
-
-  /// What belongs to the present episode in one environment.
-  struct Episode {
-    std::vector<double> state;  ///< of the last exploring act, with all below
-    approximators::FiredRules fired;
-    std::vector<std::size_t> picked;
-    double action = 0.0;
-    std::vector<Trace> traces;
-    int step = 0;
-  };
-
-  /// With room for whatever may come: a copy has none.
-  Episode new_episode() const {
-    Episode episode;
-    episode.state.resize(rules_.n_inputs());
-    episode.fired = rules_.workspace();
-    episode.picked.reserve(rules_.max_fired());
-    episode.traces.reserve(most_traces());
-    return episode;
-  }
-
-  template <class Self, class Listed, class Archive>
-  static void serialize_episode(Self& self, Listed& listed, Archive& archive) {
-    archive.number("step", listed.step);
-    archive.fixed("last_state", {listed.state.size()}, listed.state);
-    archive.number("last_action", listed.action);
-    std::vector<std::int64_t> picked(listed.picked.begin(), listed.picked.end());
-    archive.numbers("picked", picked);
-    std::vector<std::int64_t> traced;
-    std::vector<double> eligibilities;
-    for (const Trace& trace : listed.traces) {
-      traced.push_back(static_cast<std::int64_t>(trace.rule));
-      traced.push_back(static_cast<std::int64_t>(trace.action));
-      eligibilities.push_back(trace.eligibility);
-    }
-    archive.numbers("traced", traced);
-    archive.numbers("eligibilities", eligibilities);
-    if constexpr (Archive::kReads) self.take(archive, listed, picked, traced, eligibilities);
-  }
-
-  /// Takes over what was read, after checks.
-  template <class Archive>
-  void take(const Archive& archive, Episode& read, const std::vector<std::int64_t>& picked,
-            const std::vector<std::int64_t>& traced, const std::vector<double>& eligibilities) {
-    const auto is_below = [](std::int64_t number, std::size_t end) {
-      return number >= 0 && static_cast<std::uint64_t>(number) < end;
-    };
-    archive.expect(read.step >= 0, "step", "0 or more");
-    for (const double x : read.state)
-      archive.expect(x >= 0.0 && x <= 1.0, "last_state", "in [0, 1]");
-    archive.expect(read.action >= -1.0 && read.action <= 1.0, "last_action", "in [-1, 1]");
-    Episode episode = new_episode();
-    episode.step = read.step;
-    episode.state = read.state;
-    episode.action = read.action;
-    if (!picked.empty()) {
-      rules_.fire(episode.state, episode.fired);
-      archive.expect(picked.size() == episode.fired.size(), "picked", "one per rule that fired");
-      for (const std::int64_t action : picked) {
-        archive.expect(is_below(action, rules_.n_actions()), "picked", "of actions");
-        episode.picked.push_back(static_cast<std::size_t>(action));
-      }
-    }
-    archive.expect(traced.size() == 2 * eligibilities.size(), "traced", "two per eligibility");
-    archive.expect(eligibilities.size() <= most_traces(), "eligibilities", "not too many");
-    for (std::size_t i = 0; i < eligibilities.size(); ++i) {
-      archive.expect(is_below(traced[2 * i], rules_.n_rules()) &&
-                         is_below(traced[2 * i + 1], rules_.n_actions()),
-                     "traced", "of rules and actions");
-      archive.expect(std::isfinite(eligibilities[i]) && eligibilities[i] >= 0.0, "eligibilities",
-                     "finite and 0 or more");
-      episode.traces.push_back({static_cast<std::size_t>(traced[2 * i]),
-                                static_cast<std::size_t>(traced[2 * i + 1]), eligibilities[i]});
-    }
-    read = std::move(episode);
-  }
-
-  static FuzzyQLearningConfig checked(const FuzzyQLearningConfig& config) {
-    core::check_fields(config);
-    core::require(config.discount * config.trace_decay <= kSlowestFading, "trace_decay",
-                  "at most 0.99 / discount", config.trace_decay);
-    return config;
-  }
-
-  static constexpr double kSlowestFading = 0.99;  // bounds the room for traces
-  static constexpr double kLargest = std::numeric_limits<float>::max();
-  static constexpr double kLargeStep = 1e28;  // smaller ones move no value that is near kLargest
-
-  // sum value(i) alpha_i / sum alpha_i over the fired rules i, in their order.
-  template <class Value>
-  static double mean_over(const approximators::FiredRules& fired, Value&& value) {
-    double weighted = 0.0, total = 0.0;
-    for (std::size_t i = 0; i < fired.size(); ++i) {
-      weighted += value(i) * fired.truth_values[i];
-      total += fired.truth_values[i];
-    }
-    return weighted / total;
-  }
-
-  /// The mean over the fired rules of the actions pick(i).
-  template <class Pick>
-  double clamped_mean(const approximators::FiredRules& fired, const Pick& pick) const {
-    return std::clamp(mean_over(fired, [&](std::size_t i) { return actions_[pick(i)]; }), -1.0,
-                      1.0);
-  }
-
-  double fading() const noexcept { return config_.discount * config_.trace_decay; }
-
-  // Steps after which the largest possible eligibility, 1 / (1 - fading), is forgotten.
-  std::size_t trace_lifetime() const noexcept {
-    if (fading() == 0.0) return 0;
-    return static_cast<std::size_t>(
-        std::ceil(core::log(kForgottenTrace * (1.0 - fading())) / core::log(fading())));
-  }
-
-  std::size_t most_traces() const noexcept { return (trace_lifetime() + 1) * rules_.max_fired(); }
-
-  double moved(const Trace& trace, double step) const noexcept {
-    return static_cast<double>(rules_.value(trace.rule, trace.action)) + step * trace.eligibility;
-  }
-
-  // Fades the old traces and adds those of the picks, which are of different rules.
-  void renew_traces(Episode& episode) {
-    std::vector<Trace>& traces = episode.traces;
-    for (Trace& trace : traces) trace.eligibility *= fading();
-    std::erase_if(traces, [](const Trace& t) { return !(t.eligibility >= kForgottenTrace); });
-    const std::size_t n_old = traces.size();
-    for (std::size_t i = 0; i < episode.fired.size(); ++i) {
-      const std::size_t rule = episode.fired.rules[i], action = episode.picked[i];
-      const auto old_end = traces.begin() + static_cast<std::ptrdiff_t>(n_old);
-      const auto old = std::find_if(traces.begin(), old_end, [&](const Trace& trace) {
-        return trace.rule == rule && trace.action == action;
-      });
-      if (old != old_end) {
-        old->eligibility += episode.fired.truth_values[i];
-      } else {
-        traces.push_back({rule, action, episode.fired.truth_values[i]});
-      }
-    }
-  }
-
   FuzzyQLearningConfig config_;
-  approximators::FuzzyRules rules_;
-  EpsilonGreedy policy_;
-  std::vector<double> actions_;          // the discrete ones, in [-1, 1]
-  approximators::FiredRules workspace_;  // of evaluation and of the next state
-  Episodes<Episode> episodes_;
+  detail::Parts<detail::FuzzyDimension> dimensions_;
+  Workspace workspace_;
+  std::vector<double> last_action_;
 };
 
 }  // namespace sdnn::agents

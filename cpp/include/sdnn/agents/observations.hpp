@@ -14,56 +14,14 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/agents/detail/circles.hpp"
 #include "sdnn/agents/last_readings.hpp"
+#include "sdnn/agents/observation_config.hpp"
 #include "sdnn/agents/observation_scale.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::agents {
-
-/// The observed variables of a task.
-struct ObservationConfig {
-  std::vector<std::optional<double>> low = {};
-  std::vector<std::optional<double>> high = {};
-  bool adaptive = false;
-  bool narrowed = false;
-  std::vector<int> angles = {};
-  std::vector<std::vector<int>> angle_pairs = {};
-  bool find_angle_pairs = false;
-  std::vector<std::vector<int>> symbols = {};
-  bool relevant_only = false;
-  std::vector<int> inputs = {};
-  Missing missing = Missing::error;
-
-  static constexpr auto fields() noexcept {
-    return std::tuple(
-        core::field("low", &ObservationConfig::low,
-                    "Lowest value of each variable; none: not known."),
-        core::field("high", &ObservationConfig::high,
-                    "Highest value of each variable; none: not known."),
-        core::field("adaptive", &ObservationConfig::adaptive,
-                    "Whether ranges of numbers are fitted, within low and high."),
-        core::field("narrowed", &ObservationConfig::narrowed,
-                    "Whether ranges of few inputs that are far wider than what is observed are "
-                    "fitted."),
-        core::field("angles", &ObservationConfig::angles,
-                    "Variables that wrap around in their ranges."),
-        core::field("angle_pairs", &ObservationConfig::angle_pairs,
-                    "Variables that are the cosine and the sine of an angle."),
-        core::field("find_angle_pairs", &ObservationConfig::find_angle_pairs,
-                    "Whether angle_pairs are those that observations have."),
-        core::field("symbols", &ObservationConfig::symbols,
-                    "First variables, and how many there are, of which one is 1."),
-        core::field("relevant_only", &ObservationConfig::relevant_only,
-                    "Whether inputs that have nothing to do with rewards or actions, "
-                    "as the warm-up finds, are left out."),
-        core::field("inputs", &ObservationConfig::inputs, "Variables that are never left out."),
-        core::field("missing", &ObservationConfig::missing,
-                    "Whether readings that are NaN or infinite are refused, the last reading is "
-                    "used instead, or each input has a pattern for them."));
-  }
-  bool operator==(const ObservationConfig&) const = default;
-};
 
 /// Scales observations to states in [0, 1]; see ObservationScale.
 ///
@@ -282,11 +240,6 @@ class Observations {
   static constexpr std::size_t kFewInputs = 4;
   static constexpr std::size_t kAlwaysKept = 2;
   static constexpr std::size_t kRare = 20;
-  static constexpr double kNearCircle = 1e-3;  // single precision and some rounding
-  // Around the circle: with noise of a tenth of the range the correlation of squares is -0.65, and
-  // what moves smoothly is above 0.5 alike.
-  static constexpr std::size_t kFewest = 200;  // steps
-  static constexpr double kLargestBias = 0.15, kLeastOpposed = 0.5, kMostAlike = 0.2;
   static constexpr double kLargest = 1e300;
 
   static bool is_unknown(double x) noexcept { return std::isnan(x); }
@@ -424,50 +377,12 @@ class Observations {
     for (std::size_t i = 0; i + 1 < n_variables(); ++i) {
       if (roles_[i] != Role::number || roles_[i + 1] != Role::number) continue;
       const auto [cosines, sines] = columns(seen, i, i + 1);
-      if (!is_on_circle(cosines, sines) && !is_around_circle(cosines, sines)) continue;
+      if (!detail::is_on_circle(cosines, sines) && !detail::is_around_circle(cosines, sines))
+        continue;
       pairs.push_back({static_cast<int>(i), static_cast<int>(i + 1)});
       ++i;
     }
     return pairs;
-  }
-
-  static bool is_on_circle(const std::vector<double>& cosines, const std::vector<double>& sines) {
-    if (cosines.empty()) return false;
-    for (std::size_t t = 0; t < cosines.size(); ++t) {
-      const double distance = cosines[t] * cosines[t] + sines[t] * sines[t] - 1.0;
-      if (!(std::abs(distance) < kNearCircle)) return false;
-    }
-    const auto moves = [](const std::vector<double>& values) {
-      const auto [least, most] = std::ranges::minmax(values);
-      return most - least > kNearCircle;
-    };
-    return moves(cosines) && moves(sines);
-  }
-
-  /// With noise: the squares are opposed, and their sum is 1 on the average and not, as that of a
-  /// radius that moves would be, alike before and after a step.
-  static bool is_around_circle(const std::vector<double>& cosines,
-                               const std::vector<double>& sines) {
-    const std::size_t n = cosines.size() / 2;
-    if (n < kFewest) return false;
-    const auto mean_of = [](std::size_t count, const auto& term) {
-      double sum = 0.0;  // in this order on every machine
-      for (std::size_t t = 0; t < count; ++t) sum += term(t);
-      return sum / static_cast<double>(count);
-    };
-    const auto square = [](double x) { return x * x; };
-    const double x = mean_of(2 * n, [&](std::size_t t) { return square(cosines[t]); });
-    const double y = mean_of(2 * n, [&](std::size_t t) { return square(sines[t]); });
-    if (!(std::abs(x + y - 1.0) < kLargestBias)) return false;
-    const auto dx = [&](std::size_t t) { return square(cosines[t]) - x; };
-    const auto dy = [&](std::size_t t) { return square(sines[t]) - y; };
-    const auto radius = [&](std::size_t t) { return dx(t) + dy(t); };
-    const double xx = mean_of(2 * n, [&](std::size_t t) { return square(dx(t)); });
-    const double yy = mean_of(2 * n, [&](std::size_t t) { return square(dy(t)); });
-    const double xy = mean_of(2 * n, [&](std::size_t t) { return dx(t) * dy(t); });
-    const double rr = mean_of(2 * n, [&](std::size_t t) { return square(radius(t)); });
-    const double alike = mean_of(n, [&](std::size_t t) { return radius(t) * radius(n + t); });
-    return -xy > kLeastOpposed * std::sqrt(xx * yy) && std::abs(alike) < kMostAlike * rr;
   }
 
   std::vector<ObservedInput> inputs_with(const Pairs& pairs) const {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "sdnn/agents/action_mask.hpp"
+#include "sdnn/agents/detail/q_lambda_episode.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/exploration.hpp"
 #include "sdnn/agents/q_lambda_config.hpp"
@@ -55,19 +56,20 @@ namespace sdnn::agents {
 class QLambda : public WithRates<QLambda> {
  public:
   using Readout = approximators::LinearSDNN;
-  using Action = std::vector<std::size_t>;
-  static constexpr bool kDecoupled = true;
+  using Action = std::span<const std::size_t>;
 
-  /// What one reader needs: the workspace of the readout, and the values of each dimension.
+  /// The memory of one reader: the readout's workspace, the values of each dimension, and the best
+  /// action.
   struct Workspace {
-    Readout::Workspace approximator;
+    Readout::Workspace readout;
     std::vector<std::vector<double>> values;
+    std::vector<std::size_t> action;
   };
 
   /// Throws std::invalid_argument naming the field that is out of range.
-  QLambda(Readout action_value, const QLambdaConfig& config, std::uint64_t seed)
+  QLambda(Readout readout, const QLambdaConfig& config, std::uint64_t seed)
       : config_(checked_schedule(config)),
-        action_value_(std::move(action_value)),
+        readout_(std::move(readout)),
         exploration_(config, seed),
         workspace_(workspace()),
         episodes_(new_episode()) {
@@ -75,14 +77,16 @@ class QLambda : public WithRates<QLambda> {
   }
 
   const QLambdaConfig& config() const noexcept { return config_; }
-  Readout& action_value() noexcept { return action_value_; }
-  const Readout& action_value() const noexcept { return action_value_; }
+  /// The readout of all dimensions.
+  std::span<Readout> networks() noexcept { return {&readout_, 1}; }
+  std::span<const Readout> networks() const noexcept { return {&readout_, 1}; }
+  const Readout& readout() const noexcept { return readout_; }
 
-  std::size_t n_inputs() const { return action_value_.n_inputs(); }
+  std::size_t n_inputs() const { return readout_.n_inputs(); }
   /// Dimensions of an action.
-  std::size_t n_dimensions() const { return action_value_.n_dimensions(); }
+  std::size_t n_dimensions() const { return readout_.n_dimensions(); }
   /// Actions of a dimension.
-  std::size_t n_actions(std::size_t d) const { return action_value_.n_actions(d); }
+  std::size_t n_actions(std::size_t d) const { return readout_.n_actions(d); }
   /// Transitions that were learned.
   std::int64_t n_learned() const noexcept { return n_learned_; }
 
@@ -92,7 +96,7 @@ class QLambda : public WithRates<QLambda> {
   /// Where epsilon goes with schedule_steps: by default to 0. Symbols tell nothing of each other:
   /// where states have nothing else, epsilon stays, so that all of them are tried for good.
   double final_epsilon() const {
-    const std::vector<int>& n_symbols = action_value_.config().n_symbols;
+    const std::vector<int>& n_symbols = readout_.config().n_symbols;
     const bool is_symbol = !n_symbols.empty() && std::ranges::find(n_symbols, 0) == n_symbols.end();
     return config_.final_epsilon.value_or(is_symbol ? config_.policy.epsilon : 0.0);
   }
@@ -115,20 +119,22 @@ class QLambda : public WithRates<QLambda> {
   }
 
   Workspace workspace() const {
-    Workspace workspace{action_value_.workspace(), {}};
+    Workspace workspace{readout_.workspace(), {}, std::vector<std::size_t>(n_dimensions())};
     for (std::size_t d = 0; d < n_dimensions(); ++d) workspace.values.emplace_back(n_actions(d));
     return workspace;
   }
 
-  /// The dimension's part of Q(state, a) for each of its actions. The span is valid until the
-  /// workspace is used again. Shape: state (l,) in [0, 1]. Throws std::invalid_argument.
+  /// The dimension's part of Q(state, a) for each of its actions, from the average of the weights
+  /// where there is one and `averaged`. The span is valid until the workspace is used again. Shape:
+  /// state (l,) in [0, 1]. Throws std::invalid_argument.
   std::span<const double> values(std::span<const double> state, Workspace& workspace,
-                                 std::size_t d = 0) const {
-    action_value_.values(state, workspace.approximator, workspace.values[d], d);
+                                 std::size_t d = 0, bool averaged = false) const {
+    readout_.values(state, workspace.readout, workspace.values[d], d, averaged);
     return workspace.values[d];
   }
 
-  /// A best action, as act without `explore` gives it; `ties` decides between several.
+  /// Returns a best action, as act without `explore` does; `ties` decides between several. The span
+  /// is valid until the workspace is used again.
   Action best_action(std::span<const double> state, Workspace& workspace, core::Random& ties,
                      ActionMask mask = {}) const {
     require_mask("mask", mask);
@@ -147,9 +153,9 @@ class QLambda : public WithRates<QLambda> {
     return best_of(workspace, false, mask);
   }
 
-  /// The action to take in `state`, an allowed one; without `explore` a best one, by the average of
-  /// the weights where there is one. Shapes: state (l,) in [0, 1], mask as ActionMask has it.
-  /// Throws std::invalid_argument.
+  /// Returns an allowed action to take in `state`; without `explore` a best one, by the average of
+  /// the weights where there is one. Valid until the next act. Shapes: state (l,) in [0, 1], mask
+  /// as ActionMask has it. Throws std::invalid_argument.
   Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
              ActionMask mask = {}) {
     Episode& episode = episodes_.of(environment);
@@ -163,13 +169,13 @@ class QLambda : public WithRates<QLambda> {
       read(state, workspace_, true);
       return best_of(workspace_, false, mask);
     }
-    action_value_.read_next(state, episode.next);
+    readout_.read_next(state, episode.next);
     take_values(episode.next, workspace_.values, false);
     return best_of(workspace_, true, mask);
   }
 
   /// The action of the first dimension as a number in [-1, 1]: actions cut the range evenly.
-  double normalized_action(const Action& action) const {
+  double normalized_action(Action action) const {
     return coding::action_value(action.front(), n_actions(0), -1.0, 1.0);
   }
 
@@ -177,7 +183,7 @@ class QLambda : public WithRates<QLambda> {
   /// value of the next state is that of its allowed actions. Throws
   /// std::invalid_argument for a reward that is not finite or beyond +- 1e300 or an environment
   /// that is none; then nothing has been learned.
-  void learn(std::span<const double> state, const Action& action, double reward,
+  void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
              ActionMask next_mask = {}) {
     core::require_unit_values("state", state, n_inputs());
@@ -188,16 +194,16 @@ class QLambda : public WithRates<QLambda> {
     require_mask("next_mask", next_mask);
     Episode& episode = episodes_.of(environment);
     if (episode.waits && !std::ranges::equal(episode.next_state, state)) finish_at_end(episode);
-    action_value_.read_next(state, episode.next);
+    readout_.read_next(state, episode.next);
     if (episode.waits) finish(episode, action);
     std::swap(episode.present, episode.next);
     episode.state.assign(state.begin(), state.end());
-    episode.action = action;
+    episode.action.assign(action.begin(), action.end());
     episode.reward = reward;
     episode.next_state.assign(next_state.begin(), next_state.end());
     episode.next_mask.assign(next_mask.begin(), next_mask.end());
     episode.waits = true;
-    halve_old_values(action_value_.fit_unit(reward));
+    halve_old_values(readout_.fit_unit(reward));
     ++n_learned_;
     apply_rates();
     if (terminated) {
@@ -214,16 +220,16 @@ class QLambda : public WithRates<QLambda> {
   /// could sum up to would fit. Then weights of larger values are clipped. Sizes of rewards are
   /// those of RewardScale, the last window's and the recent one.
   void refine_unit(std::int32_t size_in_window, std::int32_t size) {
-    if (!action_value_.exponent()) return;
-    const std::int32_t exponent = *action_value_.exponent();
-    const std::int64_t n_weights = action_value_.n_weights_of(episodes_.of(0).present.code());
+    if (!readout_.exponent()) return;
+    const std::int32_t exponent = *readout_.exponent();
+    const std::int64_t n_weights = readout_.n_weights_of(episodes_.of(0).present.code());
     const std::int64_t rest = std::max<std::int64_t>(kDiscountOne - discount(), 1);
     const int least_bits =
         Readout::most_bits_of(n_weights) - (kDiscountBits - floor_log2(rest)) - kImplausibleBits;
     const int n_free =
-        std::min(action_value_.spare_bits(), 30 - (size_in_window - exponent)) - kRoomBits;
+        std::min(readout_.spare_bits(), 30 - (size_in_window - exponent)) - kRoomBits;
     const int n_lacking = least_bits - (size - exponent);
-    const int n_refined = action_value_.refine_unit(std::max({n_free, n_lacking, 0}));
+    const int n_refined = readout_.refine_unit(std::max({n_free, n_lacking, 0}));
     for (std::size_t i = 0; i < episodes_.size(); ++i) {
       std::int64_t& old_value = episodes_.of(i).old_value;
       old_value = Readout::refined(old_value, n_refined);
@@ -236,7 +242,7 @@ class QLambda : public WithRates<QLambda> {
     for (std::size_t i = 0; i < fewer.n_environments(); ++i) {
       if (fewer.episodes_.of(i).waits) fewer.finish_at_end(fewer.episodes_.of(i));
     }
-    action_value_.continue_from(fewer.action_value_);
+    readout_.continue_from(fewer.readout_);
     exploration_ = std::move(fewer.exploration_);
     rates_ = fewer.rates_;
     n_learned_ = fewer.n_learned_;
@@ -250,13 +256,15 @@ class QLambda : public WithRates<QLambda> {
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
-    archive.part("action_value", self.action_value_);
+    archive.part("action_value", self.readout_);
     Exploration::serialize(self.exploration_, archive);
     QLambda::serialize_rates(self, archive);
     archive.number("n_learned", self.n_learned_);
     Episodes<Episode>::serialize(
         self.episodes_, archive, [&self] { return self.new_episode(); },
-        [&](auto& episode) { serialize_episode(self, episode, archive); });
+        [&](auto& episode) {
+          detail::serialize_episode(self.readout_, self.exploration_, episode, archive);
+        });
     if constexpr (Archive::kReads) {
       archive.expect(self.n_learned_ >= 0 && self.n_learned_ <= kMostLearned, "n_learned",
                      "in [0, 2^45]");
@@ -267,7 +275,7 @@ class QLambda : public WithRates<QLambda> {
  private:
   friend class WithRates<QLambda>;
 
-  static constexpr double kLargestReward = 1e300;
+  static constexpr double kLargestReward = detail::kLargestReward;
   static constexpr double kMostTolerance = 0x1p62;  ///< in units: above any difference of values
   static constexpr std::int64_t kMostLearned = std::int64_t{1} << 45;
   static constexpr std::int32_t kOne = Readout::kRateOne;
@@ -276,25 +284,12 @@ class QLambda : public WithRates<QLambda> {
   static constexpr int kRoomBits = 8;  ///< that a smaller unit leaves for larger weights
   static constexpr int kImplausibleBits = 10;
 
-  /// What belongs to the present episode in one environment.
-  struct Episode {
-    Readout::Trace trace;
-    Readout::Workspace present;  ///< of state
-    Readout::Workspace next;     ///< of the state after it, or another
-    bool waits = false;  ///< the episode continues; with Sarsa, this transition is to be learned:
-    std::vector<double> state;
-    std::vector<std::size_t> action;
-    double reward = 0.0;
-    std::vector<double> next_state;
-    std::vector<std::uint8_t> next_mask;
-    std::int64_t old_value = 0;  ///< Q_old, in units
-    Exploration::Episode exploration;
-  };
+  using Episode = detail::QLambdaEpisode;
 
   Episode new_episode() const {
-    return {.trace = action_value_.trace(),
-            .present = action_value_.workspace(),
-            .next = action_value_.workspace(),
+    return {.trace = readout_.trace(),
+            .present = readout_.workspace(),
+            .next = readout_.workspace(),
             .state = std::vector<double>(n_inputs()),
             .action = std::vector<std::size_t>(n_dimensions()),
             .next_state = std::vector<double>(n_inputs()),
@@ -302,64 +297,20 @@ class QLambda : public WithRates<QLambda> {
             .exploration = {.kept = std::vector<std::size_t>(n_dimensions())}};
   }
 
-  template <class Self, class Listed, class Archive>
-  static void serialize_episode(Self& self, Listed& episode, Archive& archive) {
-    archive.number("waits", episode.waits);
-    archive.part("trace", episode.trace);
-    archive.number("old_value", episode.old_value);
-    std::vector<std::int64_t> action(episode.action.begin(), episode.action.end());
-    archive.numbers("state", episode.state);
-    archive.numbers("action", action);
-    archive.number("reward", episode.reward);
-    archive.numbers("next_state", episode.next_state);
-    serialize_mask("next_mask", episode.next_mask, archive, self.n_dimensions(),
-                   [&self](std::size_t d) { return self.n_actions(d); });
-    self.exploration_.serialize_episode(episode.exploration, archive,
-                                        [&self](std::size_t d) { return self.n_actions(d); });
-    if constexpr (Archive::kReads) {
-      const auto is_state = [&self](const std::vector<double>& state) {
-        return state.size() == self.n_inputs() &&
-               std::ranges::all_of(state, [](double x) { return x >= 0.0 && x <= 1.0; });
-      };
-      archive.expect(is_state(episode.state), "state", "a state in [0, 1]");
-      archive.expect(is_state(episode.next_state), "next_state", "a state in [0, 1]");
-      archive.expect(action.size() == self.n_dimensions(), "action", "one per dimension");
-      for (std::size_t d = 0; d < action.size(); ++d) {
-        archive.expect(action[d] >= 0 && static_cast<std::uint64_t>(action[d]) < self.n_actions(d),
-                       "action", "an action");
-        episode.action[d] = static_cast<std::size_t>(action[d]);
-      }
-      archive.expect(std::abs(episode.reward) <= kLargestReward, "reward", "a finite number");
-      archive.expect(!Readout::is_too_large(episode.old_value), "old_value", "below 2^33 in size");
-      archive.taking("reward", [&] { self.action_value_.fit_unit(episode.reward); });
-      self.action_value_.read(episode.state, episode.present);
-    }
-  }
-
-  /// The part of the way from the first to the final value that is done, in whole numbers.
-  std::int32_t scheduled(double first, double last) const noexcept {
-    const std::int64_t from = std::lround(first * kOne);
-    const std::int64_t all = std::lround(last * kOne) - from;
-    const std::int64_t end = n_learned_ + config_.schedule_steps;
-    // Halves up; the quotient of a negative number is rounded down likewise.
-    const std::int64_t twice = 2 * all * n_learned_ + end;
-    const std::int64_t quotient = twice / (2 * end) - (twice % (2 * end) < 0 ? 1 : 0);
-    return static_cast<std::int32_t>(from + quotient);
-  }
-
   void apply_rates(const auto& /*change*/) { apply_rates(); }
   void apply_rates() {
     double rate = rates_.learning_rate(config_);
     double epsilon = rates_.epsilon(config_);
     if (config_.schedule_steps > 0) {
-      if (!rates_.set_learning_rate) {
-        rate = scheduled(config_.learning_rate,
-                         config_.final_learning_rate.value_or(config_.learning_rate)) /
+      const auto by_steps = [this](double first, double last) {
+        return detail::scheduled(first, last, n_learned_, config_.schedule_steps, kOne) /
                static_cast<double>(kOne);
+      };
+      if (!rates_.set_learning_rate) {
+        rate = by_steps(config_.learning_rate,
+                        config_.final_learning_rate.value_or(config_.learning_rate));
       }
-      if (!rates_.set_epsilon) {
-        epsilon = scheduled(config_.policy.epsilon, final_epsilon()) / static_cast<double>(kOne);
-      }
+      if (!rates_.set_epsilon) epsilon = by_steps(config_.policy.epsilon, final_epsilon());
     }
     rate_ = std::max(1, static_cast<std::int32_t>(std::lround(rate * kOne)));
     exploration_.policy().set_epsilon(static_cast<double>(std::lround(epsilon * kOne)) /
@@ -379,63 +330,38 @@ class QLambda : public WithRates<QLambda> {
   static void exclude_from(Workspace& workspace, ActionMask mask) {
     for (std::vector<double>& row : workspace.values) exclude(take_part(mask, row.size()), row);
   }
-  void require_action(const Action& action) const {
-    if (action.size() != n_dimensions()) {  // only a bad one's text costs memory
-      core::require(false, "action", std::to_string(n_dimensions()) + " numbers", action.size());
-    }
-    for (std::size_t d = 0; d < action.size(); ++d) {
-      if (action[d] < n_actions(d)) continue;
-      core::require(false, "action", "less than " + std::to_string(n_actions(d)), action[d]);
-    }
+  void require_action(Action action) const {
+    agents::require_action(action, n_dimensions(), [this](auto d) { return n_actions(d); });
   }
 
   void read(std::span<const double> state, Workspace& workspace, bool averaged) const {
-    action_value_.read(state, workspace.approximator);
-    take_values(workspace.approximator, workspace.values, averaged);
+    readout_.read(state, workspace.readout);
+    take_values(workspace.readout, workspace.values, averaged);
   }
   /// Values in units, which are exact and in the same order.
   void take_values(Readout::Workspace& read, std::vector<std::vector<double>>& values,
                    bool averaged) const {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
-      std::ranges::copy(action_value_.sums(read, d, averaged), values[d].begin());
+      std::ranges::copy(readout_.sums(read, d, averaged), values[d].begin());
     }
   }
 
   /// One of the best actions in each dimension. The tolerance is in whole units, as values are.
-  Action each_best(const Workspace& workspace, core::Random& ties) const {
+  Action each_best(Workspace& workspace, core::Random& ties) const {
     const EpsilonGreedy& policy = exploration_.policy();
     const double tolerance =
-        std::ldexp(policy.config().tie_tolerance, -action_value_.exponent().value_or(0));
+        std::ldexp(policy.config().tie_tolerance, -readout_.exponent().value_or(0));
     // Finite, so that actions that are not allowed never tie.
     const double whole = std::floor(std::min(tolerance, kMostTolerance));
-    Action action(workspace.values.size());
-    for (std::size_t d = 0; d < action.size(); ++d) {
+    for (std::size_t d = 0; d < workspace.action.size(); ++d) {
       const std::span<const double> row = workspace.values[d];
-      action[d] = policy.best_action(row, best_value(row) - whole, ties);
+      workspace.action[d] = policy.best_action(row, best_value(row) - whole, ties);
     }
-    return action;
+    return workspace.action;
   }
   Action best_of(Workspace& workspace, bool explore, ActionMask mask) {
     exclude_from(workspace, mask);
     return each_best(workspace, exploration_.policy().ties(explore));
-  }
-
-  std::int64_t best_sum(Readout::Workspace& read, ActionMask mask) const {
-    std::int64_t total = 0;
-    for (std::size_t d = 0; d < n_dimensions(); ++d) {
-      const auto sums = action_value_.sums(read, d);
-      const ActionMask part = take_part(mask, sums.size());
-      if (part.empty()) {
-        total += std::ranges::max(sums);
-        continue;
-      }
-      std::int64_t best = std::numeric_limits<std::int64_t>::min();
-      for (std::size_t a = 0; a < sums.size(); ++a) {
-        if (part[a] != 0) best = std::max(best, sums[a]);
-      }
-      total += best;
-    }
-    return total;
   }
 
   /// After the unit was doubled so often.
@@ -454,7 +380,7 @@ class QLambda : public WithRates<QLambda> {
   std::int64_t in_range(const Compute& compute, std::int64_t* other = nullptr) {
     std::int64_t value = compute();
     while (Readout::is_too_large(value)) {
-      action_value_.double_unit();
+      readout_.double_unit();
       halve_old_values(1);
       if (other != nullptr) *other = approximators::halved(*other);
       value = compute();
@@ -463,12 +389,12 @@ class QLambda : public WithRates<QLambda> {
   }
 
   /// Continues the episode: in the state of episode.next, `action` is taken.
-  void finish(Episode& episode, const Action& action) {
+  void finish(Episode& episode, Action action) {
     if (config_.bootstrap == Bootstrap::q_learning) {
-      const std::int64_t best = best_sum(episode.next, episode.next_mask);
-      if (action_value_.sum(episode.next, action) < best) end(episode);
+      const std::int64_t best = detail::best_sum(readout_, episode.next, episode.next_mask);
+      if (readout_.sum(episode.next, action) < best) end(episode);
     } else {
-      correct(episode, in_range([&] { return action_value_.sum(episode.next, action); }));
+      correct(episode, in_range([&] { return readout_.sum(episode.next, action); }));
     }
     episode.waits = false;
   }
@@ -481,8 +407,9 @@ class QLambda : public WithRates<QLambda> {
 
   /// Learns a transition by the best value of its next state.
   void correct_by_best(Episode& episode) {
-    action_value_.read_next(episode.next_state, episode.next);
-    correct(episode, in_range([&] { return best_sum(episode.next, episode.next_mask); }));
+    readout_.read_next(episode.next_state, episode.next);
+    correct(episode,
+            in_range([&] { return detail::best_sum(readout_, episode.next, episode.next_mask); }));
   }
 
   static void end(Episode& episode) noexcept {
@@ -494,24 +421,24 @@ class QLambda : public WithRates<QLambda> {
   /// One step of learning, `next` being Q' in units.
   void correct(Episode& episode, std::int64_t next) {
     const std::int64_t value =
-        in_range([&] { return action_value_.sum(episode.present, episode.action); }, &next);
-    const std::int64_t target = action_value_.units_of(episode.reward) +
+        in_range([&] { return readout_.sum(episode.present, episode.action); }, &next);
+    const std::int64_t target = readout_.units_of(episode.reward) +
                                 ((next * discount() + (kDiscountOne >> 1)) >> kDiscountBits);
     const bool is_dutch = config_.traces == TraceKind::dutch && n_environments() == 1;
     const std::int64_t drift = is_dutch ? value - episode.old_value : 0;
     episode.old_value = next;
     const auto decay = static_cast<std::int32_t>(
         std::lround(config_.discount * config_.trace_decay * approximators::kDecayOne));
-    halve_old_values(action_value_.learn(episode.present.code(), episode.action, episode.trace,
-                                         {.error = target - value + drift,
-                                          .correction = drift,
-                                          .rate = rate_,
-                                          .decay = decay,
-                                          .is_dutch = is_dutch}));
+    halve_old_values(readout_.learn(episode.present.code(), episode.action, episode.trace,
+                                    {.error = target - value + drift,
+                                     .correction = drift,
+                                     .rate = rate_,
+                                     .decay = decay,
+                                     .is_dutch = is_dutch}));
   }
 
   QLambdaConfig config_;
-  Readout action_value_;
+  Readout readout_;
   Exploration exploration_;
   std::int64_t n_learned_ = 0;
   std::int32_t rate_ = 0;  ///< alpha, kOne for 1

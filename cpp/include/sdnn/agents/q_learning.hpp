@@ -2,18 +2,17 @@
 #pragma once
 
 #include <algorithm>
-#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "sdnn/agents/action_mask.hpp"
+#include "sdnn/agents/detail/dimensions.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/exploration.hpp"
@@ -22,7 +21,6 @@
 #include "sdnn/agents/return_range.hpp"
 #include "sdnn/agents/schedule_config.hpp"
 #include "sdnn/approximators/action_value.hpp"
-#include "sdnn/approximators/decoupled.hpp"
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/check_fields.hpp"
@@ -33,10 +31,16 @@ namespace sdnn::agents {
 /// An agent that learns Q(s, a) by Eq. (1) and acts epsilon-greedily.
 ///
 /// q_hat = (1 - alpha) Q(s, a) + alpha (r + gamma max_a' Q(s', a')); a terminated transition has
-/// target r alone. A time limit is no termination: it bootstraps. An action is an index, or as many
-/// of them as the approximator has dimensions.
+/// target r alone. A time limit is no termination: it bootstraps. An action is an index for each of
+/// its dimensions.
 ///
-/// What follows is not in the paper.
+/// The rest is not in the paper.
+///
+/// Where actions have several dimensions, each dimension d has an approximator, and Q(s, a) is the
+/// mean of all Q_d(s, a_d). The maximum over all actions is then the mean of the maxima: exact, one
+/// pass per dimension. The model cannot express how dimensions act together: to each, the part of
+/// the others is noise. A correction moves every Q_d by the error of the mean. Source: Seyde, T. et
+/// al. (2022). Solving continuous control via Q-learning (Eqs. 2 and 3).
 ///
 /// With n_steps = n > 1 the target is r_1 + gamma r_2 + ... + gamma^n max_a' Q: a transition waits
 /// until n steps are known, or the episode ends, and is then corrected, once, as before. A success
@@ -49,50 +53,45 @@ namespace sdnn::agents {
 /// An agent may learn in several environments at once, numbered from 0: what belongs to an episode
 /// (the steps that wait, the kept action, the number of its steps, its rewards) is then
 /// kept for each, all else is shared. Which of them acts or learns when is the caller's choice.
-template <class Q>
+template <approximators::ActionValue Q>
 class QLearning : public WithRates<QLearning<Q>> {
  public:
-  static constexpr bool kDecoupled = approximators::DecoupledActionValue<Q>;
-  static_assert(kDecoupled || approximators::ActionValue<Q>);
-  using Action = std::conditional_t<kDecoupled, std::vector<std::size_t>, std::size_t>;
+  using Action = std::span<const std::size_t>;
 
-  /// What one reader needs: the workspace of the approximator, and the values of each dimension.
+  /// The memory of one reader: a workspace and the values of each dimension, and the best action.
   struct Workspace {
-    typename Q::Workspace approximator;
+    std::vector<typename Q::Workspace> networks;
     std::vector<std::vector<double>> values;
+    std::vector<std::size_t> action;
   };
 
-  /// Throws std::invalid_argument naming the field that is out of range.
-  QLearning(Q action_value, const QLearningConfig& config, std::uint64_t seed)
+  /// With an approximator for each dimension of actions. Throws std::invalid_argument naming the
+  /// field that is out of range, or unless there is an approximator and all have the same inputs.
+  QLearning(std::vector<Q> networks, const QLearningConfig& config, std::uint64_t seed)
       : config_(checked_schedule(config)),
-        action_value_(std::move(action_value)),
+        networks_(of_same_inputs(std::move(networks))),
         exploration_(config, seed),
         range_(config.discount),
         learning_rate_(config.learning_rate),
         workspace_(workspace()),
+        action_values_(n_dimensions()),
         episodes_(new_episode()) {}
+  /// With actions of one dimension.
+  QLearning(Q network, const QLearningConfig& config, std::uint64_t seed)
+      : QLearning(detail::only(std::move(network)), config, seed) {}
 
   const QLearningConfig& config() const noexcept { return config_; }
-  Q& action_value() noexcept { return action_value_; }
-  const Q& action_value() const noexcept { return action_value_; }
-  /// In which the agent itself acts and learns.
-  const Workspace& own_workspace() const noexcept { return workspace_; }
+  /// The approximator of each dimension of actions.
+  std::span<Q> networks() noexcept { return networks_; }
+  std::span<const Q> networks() const noexcept { return networks_; }
+  /// The workspace in which the agent itself acts and learns.
+  const Workspace& agent_workspace() const noexcept { return workspace_; }
 
-  std::size_t n_inputs() const { return action_value_.n_inputs(); }
+  std::size_t n_inputs() const { return networks_.front().n_inputs(); }
   /// Dimensions of an action.
-  std::size_t n_dimensions() const {
-    if constexpr (kDecoupled) return action_value_.n_dimensions();
-    return 1;
-  }
+  std::size_t n_dimensions() const noexcept { return networks_.size(); }
   /// Actions of a dimension.
-  std::size_t n_actions(std::size_t d) const {
-    if constexpr (kDecoupled) {
-      return action_value_.part(d).n_actions();
-    } else {
-      assert(d == 0);
-      return action_value_.n_actions();
-    }
-  }
+  std::size_t n_actions(std::size_t d) const { return networks_[d].n_actions(); }
 
   /// As they were set, or as progress has made them.
   double learning_rate() const noexcept { return learning_rate_; }
@@ -118,38 +117,51 @@ class QLearning : public WithRates<QLearning<Q>> {
     if (episode.buffer.size() > 0) learn_waiting(episode);
   }
 
-  /// Lets the approximator write to the memory that it will need, where it knows how.
+  /// Lets the approximators write to the memory that they will need, where they know how.
   void warm_caches()
     requires requires(Q& q, typename Q::Workspace& workspace) { q.warm_caches(workspace); }
   {
-    action_value_.warm_caches(workspace_.approximator);
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      networks_[d].warm_caches(workspace_.networks[d]);
+    }
   }
 
   /// A workspace for a reader beside the agent itself: as long as the agent neither acts with
   /// `explore` nor learns, many threads may call values and best_action, with one each.
   Workspace workspace() const {
-    Workspace workspace{action_value_.workspace(), {}};
-    for (std::size_t d = 0; d < n_dimensions(); ++d) workspace.values.emplace_back(n_actions(d));
+    Workspace workspace;
+    for (const Q& network : networks_) {
+      workspace.networks.push_back(network.workspace());
+      workspace.values.emplace_back(network.n_actions());
+    }
+    workspace.action.resize(n_dimensions());
     return workspace;
   }
 
-  /// Q(state, a) for every action of dimension d. The span is valid until the workspace is used
-  /// again. Shape: state (l,) in [0, 1]. Throws as the approximator does.
+  /// Q_d(state, a) for every action a of dimension d, from the average of the weights where the
+  /// approximator keeps one and `averaged`. The span is valid until the workspace is used again.
+  /// Shape: state (l,) in [0, 1]. Throws as the approximator does.
   std::span<const double> values(std::span<const double> state, Workspace& workspace,
-                                 std::size_t d = 0) const {
-    part(d).values(state, part(workspace, d), workspace.values[d]);
-    return workspace.values[d];
+                                 std::size_t d = 0, bool averaged = false) const {
+    const Q& q = networks_[d];
+    std::vector<double>& row = workspace.values[d];
+    if constexpr (requires { q.averaged_values(state, workspace.networks[d], row); }) {
+      if (averaged) {
+        q.averaged_values(state, workspace.networks[d], row);
+        return row;
+      }
+    }
+    q.values(state, workspace.networks[d], row);
+    return row;
   }
 
-  /// A best action, as act without `explore` gives it; `ties` decides between several.
+  /// Returns a best action, as act without `explore` does; `ties` decides between several. The span
+  /// is valid until the workspace is used again.
   Action best_action(std::span<const double> state, Workspace& workspace, core::Random& ties,
                      ActionMask mask = {}) const {
     require_mask("mask", mask);
     read(state, workspace);
-    return each_best([&](std::size_t d) {
-      exclude(take_part(mask, n_actions(d)), workspace, d);
-      return best_of(workspace, d, ties);
-    });
+    return best_of_read(workspace, ties, mask);
   }
 
   /// The two steps of act without `explore`: `read` takes the time and is for many threads, as
@@ -159,16 +171,12 @@ class QLearning : public WithRates<QLearning<Q>> {
   }
   Action best_of(Workspace& workspace, ActionMask mask = {}) {
     require_mask("mask", mask);
-    core::Random& ties = exploration_.policy().ties(false);
-    return each_best([&](std::size_t d) {
-      exclude(take_part(mask, n_actions(d)), workspace, d);
-      return best_of(workspace, d, ties);
-    });
+    return best_of_read(workspace, exploration_.policy().ties(false), mask);
   }
 
-  /// The action to take in `state`, an allowed one; without `explore` a best one, by the average of
-  /// the weights where the approximator keeps one. Shapes: state (l,) in [0, 1], mask as ActionMask
-  /// has it.
+  /// Returns an allowed action to take in `state`; without `explore` a best one, by the average of
+  /// the weights where the approximator keeps one. Valid until the next act. Shapes: state (l,) in
+  /// [0, 1], mask as ActionMask has it.
   Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
              ActionMask mask = {}) {
     Episode& episode = episodes_.of(environment);
@@ -179,31 +187,28 @@ class QLearning : public WithRates<QLearning<Q>> {
     core::require_unit_values("state", state, n_inputs());  // before anything is drawn
     require_mask("mask", mask);
     const auto n_actions_of = [this](std::size_t d) { return n_actions(d); };
-    if (!exploration_.takes_random_action(episode.exploration, n_actions_of, mask)) {
-      return each_best([&](std::size_t d) {
-        read(state, workspace_, d, false);
-        exclude(take_part(mask, n_actions(d)), workspace_, d);
-        return best_of(workspace_, d, exploration_.policy().ties(true));
-      });
+    if (exploration_.takes_random_action(episode.exploration, n_actions_of, mask)) {
+      return episode.exploration.kept;
     }
-    return as_action(episode.exploration.kept);
+    for (std::size_t d = 0; d < n_dimensions(); ++d) read(state, workspace_, d, false);
+    return best_of_read(workspace_, exploration_.policy().ties(true), mask);
   }
 
-  /// The action as a number in [-1, 1]: actions cut the range evenly.
-  double normalized_action(std::size_t action, std::size_t d = 0) const {
-    return coding::action_value(action, n_actions(d), -1.0, 1.0);
+  /// The action of the first dimension as a number in [-1, 1]: actions cut the range evenly.
+  double normalized_action(Action action) const {
+    return coding::action_value(action.front(), n_actions(0), -1.0, 1.0);
   }
 
   /// Learns one transition; the best value of the next state is that of its allowed actions.
   /// Throws std::invalid_argument for a reward that is not finite or beyond
   /// +- 1e300 or an environment that is none; then nothing has been learned. Throws
   /// std::overflow_error as the approximator does; then it may have been learned in part.
-  void learn(std::span<const double> state, const Action& action, double reward,
+  void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
              ActionMask next_mask = {}) {
     // Refuses at once what could not be learned: a correction may come later.
     core::require_unit_values("state", state, n_inputs());
-    require_action(indices(action));
+    require_action(action);
     core::require_finite("reward", reward);
     core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
     core::require_unit_values("next_state", next_state, n_inputs());
@@ -211,14 +216,14 @@ class QLearning : public WithRates<QLearning<Q>> {
     Episode& episode = episodes_.of(environment);
     if constexpr (kHasRange) {
       if (adapts_range() && range_.note(reward, terminated, episode.rewards)) {
-        action_value_.set_output_range(range_.low(), range_.high());
+        for (Q& network : networks_) network.set_output_range(range_.low(), range_.high());
       }
     }
     // The next state first: the network then remembers it, corrected, for the next decision.
     const double next_value = terminated ? 0.0 : state_value(next_state, next_mask);
     NStepBuffer& buffer = episode.buffer;
     if (!buffer.is_continued_by(state)) learn_waiting(episode);
-    buffer.add(state, indices(action), reward, next_state);
+    buffer.add(state, action, reward, next_state);
     episode.next_mask.assign(next_mask.begin(), next_mask.end());
     if (terminated) {
       learn_all(buffer, 0.0);
@@ -230,7 +235,15 @@ class QLearning : public WithRates<QLearning<Q>> {
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
-    archive.part("action_value", self.action_value_);
+    if (self.n_dimensions() == 1) {
+      archive.part("action_value", self.networks_.front());
+    } else {
+      archive.within("action_value", [&] {
+        for (std::size_t d = 0; d < self.n_dimensions(); ++d) {
+          archive.part(std::to_string(d), self.networks_[d]);
+        }
+      });
+    }
     Exploration::serialize(self.exploration_, archive);
     archive.part("range", self.range_);
     QLearning::serialize_rates(self, archive);
@@ -248,14 +261,7 @@ class QLearning : public WithRates<QLearning<Q>> {
 
   static constexpr double kLargestReward = 1e300;  // sums of some, and steps to them, stay finite
   /// Whether numbers that stand for values may be read in their place.
-  static constexpr bool kCounts = [] {
-    if constexpr (kDecoupled) {
-      using Part = std::remove_cvref_t<decltype(std::declval<Q&>().part(0))>;
-      return approximators::CountedActionValue<Part>;
-    } else {
-      return approximators::CountedActionValue<Q>;
-    }
-  }();
+  static constexpr bool kCounts = approximators::CountedActionValue<Q>;
   static constexpr bool kHasRange = requires(Q& q) { q.set_output_range(0.0, 1.0); };
 
   /// What belongs to the present episode in one environment.
@@ -302,80 +308,44 @@ class QLearning : public WithRates<QLearning<Q>> {
     return kHasRange && config_.value_range == ValueRange::adaptive;
   }
 
+  static std::vector<Q> of_same_inputs(std::vector<Q> networks) {
+    core::require(!networks.empty(), "networks", "at least one", networks.size());
+    const std::size_t n = networks.front().n_inputs();
+    for (const Q& network : networks) {
+      core::require(network.n_inputs() == n, "networks", "of the same inputs", network.n_inputs());
+    }
+    return networks;
+  }
+
   void require_mask(const char* name, ActionMask mask) const {
     agents::require_mask(name, mask, n_dimensions(), [this](auto d) { return n_actions(d); });
   }
-  void require_action(std::span<const std::size_t> action) const {
-    if (action.size() != n_dimensions()) {  // only a bad one's text costs memory
-      core::require(false, "action", std::to_string(n_dimensions()) + " numbers", action.size());
-    }
-    for (std::size_t d = 0; d < action.size(); ++d) {
-      if (action[d] < n_actions(d)) continue;
-      core::require(false, "action", "less than " + std::to_string(n_actions(d)), action[d]);
-    }
-  }
-
-  static std::span<const std::size_t> indices(const Action& action) noexcept {
-    if constexpr (kDecoupled) {
-      return action;
-    } else {
-      return {&action, 1};
-    }
-  }
-  static Action as_action(const std::vector<std::size_t>& indices) {
-    if constexpr (kDecoupled) {
-      return indices;
-    } else {
-      return indices.front();
-    }
-  }
-
-  /// The approximator of a dimension, and its workspace.
-  const auto& part(std::size_t d) const {
-    if constexpr (kDecoupled) {
-      return action_value_.part(d);
-    } else {
-      assert(d == 0);
-      return action_value_;
-    }
-  }
-  template <class AWorkspace>
-  static auto& part(AWorkspace& workspace, std::size_t d) {
-    if constexpr (kDecoupled) {
-      return workspace.approximator.parts[d];
-    } else {
-      assert(d == 0);
-      return workspace.approximator;
-    }
+  void require_action(Action action) const {
+    agents::require_action(action, n_dimensions(), [this](auto d) { return n_actions(d); });
   }
 
   /// Reads the values of a dimension; `averaged`: by the average of the weights where the
   /// approximator keeps one.
   void read(std::span<const double> state, Workspace& workspace, std::size_t d,
             bool averaged) const {
-    const auto& q = part(d);
-    auto& own = part(workspace, d);
     if constexpr (kCounts) {
-      if (q.values_rise()) return q.count(state, own, averaged);
+      const Q& q = networks_[d];
+      if (q.values_rise()) return q.count(state, workspace.networks[d], averaged);
     }
-    if constexpr (requires { q.averaged_values(state, own, workspace.values[d]); }) {
-      if (averaged) return q.averaged_values(state, own, workspace.values[d]);
-    }
-    q.values(state, own, workspace.values[d]);
+    static_cast<void>(values(state, workspace, d, averaged));
   }
   /// Makes those of actions that are not allowed lower than all others.
   void exclude(ActionMask mask, Workspace& workspace, std::size_t d) const {
     if constexpr (kCounts) {
-      if (part(d).values_rise()) return part(workspace, d).counts().exclude(mask);
+      if (networks_[d].values_rise()) return workspace.networks[d].counts().exclude(mask);
     }
     agents::exclude(mask, workspace.values[d]);
   }
   /// The largest of the values that were read last.
   double best_value_of(const Workspace& workspace, std::size_t d) const {
     if constexpr (kCounts) {
-      if (part(d).values_rise()) {
-        return part(d).value_of_count(part(workspace, d).counts().largest());
-      }
+      const Q& q = networks_[d];
+      if (q.values_rise()) return q.value_of_count(workspace.networks[d].counts().largest());
     }
     return best_value(std::span<const double>(workspace.values[d]));
   }
@@ -383,27 +353,25 @@ class QLearning : public WithRates<QLearning<Q>> {
   std::size_t best_of(const Workspace& workspace, std::size_t d, core::Random& ties) const {
     const EpsilonGreedy& policy = exploration_.policy();
     if constexpr (kCounts) {
-      if (part(d).values_rise()) {
-        const auto& counts = part(workspace, d).counts();
+      const Q& q = networks_[d];
+      if (q.values_rise()) {
+        const auto& counts = workspace.networks[d].counts();
         const double least = best_value_of(workspace, d) - policy.config().tie_tolerance;
         std::int32_t tied = counts.largest();
-        while (tied > 0 && part(d).value_of_count(tied - 1) >= least) --tied;
+        while (tied > 0 && q.value_of_count(tied - 1) >= least) --tied;
         return policy.best_action(counts.of_actions(), tied, ties);
       }
     }
     return policy.best_action(workspace.values[d], ties);
   }
 
-  /// The action that has best(d) in dimension d.
-  template <class Best>
-  Action each_best(const Best& best) const {
-    if constexpr (kDecoupled) {
-      Action action(n_dimensions());
-      for (std::size_t d = 0; d < action.size(); ++d) action[d] = best(d);
-      return action;
-    } else {
-      return best(0);
+  /// Returns a best one of the allowed actions in the state that was read last.
+  Action best_of_read(Workspace& workspace, core::Random& ties, ActionMask mask) const {
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      exclude(take_part(mask, n_actions(d)), workspace, d);
+      workspace.action[d] = best_of(workspace, d, ties);
     }
+    return workspace.action;
   }
 
   double state_value(std::span<const double> state, ActionMask mask) {
@@ -413,19 +381,27 @@ class QLearning : public WithRates<QLearning<Q>> {
       exclude(take_part(mask, n_actions(d)), workspace_, d);
       sum += best_value_of(workspace_, d);
     }
-    if constexpr (kDecoupled) sum /= static_cast<double>(n_dimensions());
-    return sum;
+    return sum / static_cast<double>(n_dimensions());
   }
 
   void learn_oldest(NStepBuffer& buffer, double value) {
     const double target = buffer.return_of_oldest(value, config_.discount);
     const NStepBuffer::Step& oldest = buffer.take_oldest();
-    typename Q::Workspace& workspace = workspace_.approximator;
-    if constexpr (kDecoupled) {
-      action_value_.update(oldest.state, workspace, oldest.action, target, learning_rate_);
-    } else {
-      action_value_.update(oldest.state, workspace, oldest.action.front(), target, learning_rate_);
+    if (n_dimensions() == 1) {  // not by the error, which has a rounding
+      update(oldest, 0, target);
+      return;
     }
+    double sum = 0.0;
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      action_values_[d] =
+          networks_[d].value(oldest.state, workspace_.networks[d], oldest.action[d]);
+      sum += action_values_[d];
+    }
+    const double error = target - sum / static_cast<double>(n_dimensions());
+    for (std::size_t d = 0; d < n_dimensions(); ++d) update(oldest, d, action_values_[d] + error);
+  }
+  void update(const NStepBuffer::Step& step, std::size_t d, double target) {
+    networks_[d].update(step.state, workspace_.networks[d], step.action[d], target, learning_rate_);
   }
 
   /// Learns the steps that wait, by the best value of the state where the newest one led.
@@ -437,11 +413,12 @@ class QLearning : public WithRates<QLearning<Q>> {
   }
 
   QLearningConfig config_;
-  Q action_value_;
+  detail::Parts<Q> networks_;  ///< one for each dimension of actions
   Exploration exploration_;
   ReturnRange range_;
   double learning_rate_;
   Workspace workspace_;
+  std::vector<double> action_values_;  ///< Q_d of the action that is corrected
   Episodes<Episode> episodes_;
 };
 

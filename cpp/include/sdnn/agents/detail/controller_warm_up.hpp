@@ -1,0 +1,181 @@
+/// How a controller finds its ranges and inputs: in a warm-up, later, and in a saved state.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "sdnn/agents/any_agent.hpp"
+#include "sdnn/agents/controller.hpp"
+#include "sdnn/agents/detail/approximator_of.hpp"
+#include "sdnn/agents/detail/experience_of.hpp"
+#include "sdnn/agents/last_readings.hpp"
+#include "sdnn/agents/observations.hpp"
+#include "sdnn/agents/relevance.hpp"
+#include "sdnn/agents/reward_scale.hpp"
+#include "sdnn/agents/warm_up.hpp"
+#include "sdnn/approximators/linear_sdnn_config.hpp"
+#include "sdnn/approximators/sdnn_c_config.hpp"
+#include "sdnn/core/detail/identity.hpp"
+#include "sdnn/core/state.hpp"
+
+namespace sdnn::agents {
+
+inline WarmUp Controller::new_warm_up() const {
+  return {n_variables(), n_dimensions(), static_cast<std::size_t>(config_.warm_up_steps),
+          config_.seed, !is_fuzzy(approximator_)};
+}
+
+/// Makes the agent: all ranges are known. Of a state that is read, sizes are compared first.
+inline void Controller::fit(const core::StateReader* reader) {
+  approximator_ = detail::approximator_of(config_, observations_, actions_, tables_);
+  const auto tables = detail::tables_of(config_, observations_, approximator_, tables_);
+  if (reader != nullptr) {
+    expect_sizes(*reader, approximator_, actions_.n_actions(), !tables.empty());
+  }
+  agent_.emplace(make_agent(approximator_, config_.learning, actions_.n_actions(), config_.seed,
+                            tables, n_first_inputs(), observations_.codes_missing()));
+  if (auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&approximator_)) {
+    if (n_dimensions() == 1) sdnn->n_actions = static_cast<int>(actions_.n_actions().front());
+  }
+  apply_rates([this](auto& agent) { agent.set_rates(rates_); });
+  state_.resize(observations_.n_inputs());
+  next_state_.resize(state_.size());
+}
+
+inline void Controller::end_warm_up() {
+  Observations fitted = observations_;
+  fitted.fit(warm_up_->seen());
+  if (fitted.has_choice()) {
+    fitted.keep(Relevance(detail::experience_of(fitted, *warm_up_, n_dimensions()))
+                    .inputs(fitted.required()));
+  }
+  observations_ = std::move(fitted);
+  fit();
+  const WarmUp warm_up = std::move(*warm_up_);
+  reward_scale_ = RewardScale(warm_up.rewards());
+  warm_up_.reset();
+  set_n_environments(warm_up.n_in_all());
+  if (is_fuzzy(approximator_)) {
+    for (std::size_t i = 0; i < n_environments(); ++i) begin_learned_episode(i);
+  } else {
+    LastReadings readings = observations_.last_readings();
+    for (std::size_t t = 0; t < warm_up.size(); ++t) replay(warm_up.step(t), readings);
+  }
+  set_n_environments(warm_up.n_environments());
+  watch();
+}
+
+/// The number of inputs that came first, where others were added; else 0.
+inline std::size_t Controller::n_first_inputs() const noexcept {
+  const std::size_t n = observations_.n_first_inputs();
+  return n < observations_.n_inputs() ? n : 0;
+}
+
+/// Looks for inputs that matter later, where some are left out and can be added.
+inline void Controller::watch() {
+  latest_.reset();
+  const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&approximator_);
+  const auto kept = observations_.kept_inputs();
+  if (linear == nullptr || linear->max_pairs != 0 || !tables_.empty() ||
+      std::ranges::find(kept, false) == kept.end()) {
+    return;
+  }
+  latest_.emplace(new_warm_up(), static_cast<std::size_t>(config_.warm_up_steps));
+  latest_->set_n_environments(n_environments());
+}
+
+inline void Controller::add_inputs() {
+  const std::vector<bool> kept = observations_.kept_inputs();
+  const RandomExperience latest = detail::experience_of(observations_.with_all_inputs(),
+                                                        latest_->transitions(), n_dimensions());
+  const std::vector<bool> found = Relevance(latest, kCaution).inputs(kept);
+  latest_->forget();
+  if (found == kept) return;
+  observations_.keep(found);
+  auto before = std::move(std::get<QLambda>(*agent_));
+  fit();
+  std::get<QLambda>(*agent_).continue_from(std::move(before));
+  identity_ = core::Identity();  // readers have workspaces for fewer inputs
+}
+
+/// Learns a transition of the warm-up, after which there were these readings.
+inline void Controller::replay(const WarmUp::Step& step, LastReadings& readings) {
+  if (step.begins) {
+    begin_learned_episode(step.environment);
+    readings.forget(step.environment);
+  }
+  const auto held = readings.filled(step.observation, step.next_observation, step.environment);
+  readings.note_step(step.environment);
+  observations_.scale(held.observation, state_);
+  observations_.scale(held.next_observation, next_state_, "next_observation");
+  for (std::size_t d = 0; d < n_dimensions(); ++d) {
+    indices_[d] = actions_.index_of(step.action[d], d);
+  }
+  learn_scaled(step.reward, step.terminated, step.environment, step.next_mask);
+}
+
+template <class Archive>
+void Controller::begin_reading(bool is_warming_up, const Archive& archive) {
+  archive.expect(!is_warming_up || observations_.needs_fit(), "is_warming_up",
+                 "0, as all ranges are known");
+  agent_.reset();
+  warm_up_.reset();
+  if (is_warming_up) warm_up_.emplace(new_warm_up());
+}
+
+template <class Archive>
+void Controller::end_reading(const Archive& archive) {
+  archive.expect(taken_.fits(n_environments(), actions_), "taken.indices",
+                 "of actions and environments");
+  if (agent_) {
+    std::visit(
+        [this](const auto& agent) {
+          if constexpr (requires { agent.progress(); }) rates_.progress = agent.progress();
+        },
+        *agent_);
+    return;
+  }
+  const auto can_be_learned = [&](const WarmUp::Step& step) {
+    actions_.require_action(step.action);
+    actions_.require_mask("next_masks", step.next_mask);
+    observations_.require_readings("observation", step.observation);
+    observations_.require_readings("next_observation", step.next_observation);
+    return std::abs(step.reward) <= kLargestReward;
+  };
+  const auto is_action = [this](const auto& kept) { return actions_.can_be_drawn(kept); };
+  archive.taking("warm_up.actions", [&] {
+    archive.expect(warm_up_->each_is(can_be_learned, is_action), "warm_up",
+                   "of transitions and actions");
+  });
+}
+
+template <class Self, class Archive>
+void Controller::serialize(Self& self, Archive& archive) {
+  detail::serialize_tables(self.tables_, archive);
+  bool is_warming_up = self.is_warming_up();
+  archive.number("is_warming_up", is_warming_up);
+  serialize_rates(self, archive);
+  if constexpr (Archive::kReads) self.begin_reading(is_warming_up, archive);
+  if (is_warming_up) {
+    archive.part("warm_up", *self.warm_up_);
+  } else {
+    archive.part("observations", self.observations_);
+    if constexpr (Archive::kReads) {
+      self.fit(&archive);
+      self.watch();
+    }
+    if (self.latest_) archive.part("latest", *self.latest_);
+    std::visit([&archive](auto& agent) { archive.part("agent", agent); }, *self.agent_);
+    archive.part("reward_scale", self.reward_scale_);
+  }
+  archive.part("taken", self.taken_);
+  if (self.readings_.is_held()) archive.part("readings", self.readings_);
+  if constexpr (Archive::kReads) self.end_reading(archive);
+}
+
+}  // namespace sdnn::agents
