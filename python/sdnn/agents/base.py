@@ -45,7 +45,7 @@ from sdnn.support.arguments import (
     seed_of,
     whole,
 )
-from sdnn.support.display import Displayed
+from sdnn.support.display import line_of, table_of
 from sdnn.support.state_files import Arrays, Description, write_file
 from sdnn.training.files import CLASSES, read_agent
 from sdnn.training.names import explained
@@ -60,7 +60,7 @@ Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
 
 
-class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
+class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
     """The settings and the state of an agent, and its files; `Agent` adds acting and learning."""
 
     kind: ClassVar[str]
@@ -262,6 +262,12 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
             "inputs": inputs,
             "seed": self.seed,
         }
+
+    def __repr__(self) -> str:
+        return line_of(self, self._facts())
+
+    def _repr_html_(self) -> str:
+        return table_of(self, self._facts())
 
     @property
     def scaling(self) -> Scaling | None:

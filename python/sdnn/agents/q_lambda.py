@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from sdnn import _core
-from sdnn.agents.q_learning import CodedAgent, presets_of
+from sdnn.agents.q_learning import ValueAgent, presets_of
 from sdnn.config import LinearSDNNConfig, QLambdaConfig
 
 
-class SDNNQLambda(CodedAgent[LinearSDNNConfig, QLambdaConfig]):
+class SDNNQLambda(ValueAgent[LinearSDNNConfig, QLambdaConfig]):
     """An agent that learns Q(s, a) linear in the SDNN code, by true-online traces.
 
     Values have no range that must be chosen, nothing depends on a planned end of the training, and

@@ -42,6 +42,45 @@ def presets_of(listed: Mapping[str, Any], **more: Mapping[str, Any]) -> Mapping[
 class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, Learning]):
     """An agent that learns the values of actions, with any approximator."""
 
+    presets: ClassVar[Mapping[str, Preset]]
+    """Settings by name."""
+    default_preset: ClassVar[str] = "general"
+
+    @explained
+    def __init__(
+        self,
+        observation_space: Observed,
+        action_space: gym.Space[Any] | None = None,
+        *,
+        approximator: Approximator | None = None,
+        learning: Learning | None = None,
+        seed: int = 0,
+        tables: Sequence[ArrayLike] | None = None,
+        preset: str | None = None,
+        observation_range: Ranges | None = None,
+        angles: Sequence[int] = (),
+        angle_pairs: AnglePairs | None = None,
+        inputs: Inputs | None = None,
+        warm_up_steps: int = WARM_UP.default,
+        missing: Missing = "error",
+    ) -> None:
+        name = self.default_preset if preset is None else preset
+        chosen = choice("preset", name, self.presets)
+        self._tables = () if tables is None else pattern_tables(tables)
+        super().__init__(
+            observation_space,
+            action_space,
+            approximator=chosen.approximator if approximator is None else approximator,
+            learning=chosen.learning if learning is None else learning,
+            seed=seed,
+            observation_range=observation_range,
+            angles=angles,
+            angle_pairs=chosen.angle_pairs if angle_pairs is None else angle_pairs,
+            inputs=chosen.inputs if inputs is None else inputs,
+            warm_up_steps=warm_up_steps,
+            missing=missing,
+        )
+
     @property
     def learning_rate(self) -> float:
         """Alpha as it is now: as it was set, or as `progress` makes it.
@@ -138,47 +177,7 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         }
 
 
-class CodedAgent(ValueAgent[Approximator, Learning], abc.ABC, Generic[Approximator, Learning]):
-    """An agent whose states have an SDNN code: with presets, and patterns that may be given."""
-
-    presets: ClassVar[Mapping[str, Preset]]
-
-    @explained
-    def __init__(
-        self,
-        observation_space: Observed,
-        action_space: gym.Space[Any] | None = None,
-        *,
-        approximator: Approximator | None = None,
-        learning: Learning | None = None,
-        seed: int = 0,
-        tables: Sequence[ArrayLike] | None = None,
-        preset: str = "general",
-        observation_range: Ranges | None = None,
-        angles: Sequence[int] = (),
-        angle_pairs: AnglePairs | None = None,
-        inputs: Inputs | None = None,
-        warm_up_steps: int = WARM_UP.default,
-        missing: Missing = "error",
-    ) -> None:
-        chosen = choice("preset", preset, self.presets)
-        self._tables = () if tables is None else pattern_tables(tables)
-        super().__init__(
-            observation_space,
-            action_space,
-            approximator=chosen.approximator if approximator is None else approximator,
-            learning=chosen.learning if learning is None else learning,
-            seed=seed,
-            observation_range=observation_range,
-            angles=angles,
-            angle_pairs=chosen.angle_pairs if angle_pairs is None else angle_pairs,
-            inputs=chosen.inputs if inputs is None else inputs,
-            warm_up_steps=warm_up_steps,
-            missing=missing,
-        )
-
-
-class SDNNQLearning(CodedAgent[SDNNCConfig, QLearningConfig]):
+class SDNNQLearning(ValueAgent[SDNNCConfig, QLearningConfig]):
     """An agent that learns Q(s, a) with SDNN-C, one transition at a time.
 
     A ``Box`` of actions is cut evenly into the network's actions, 5 in each dimension by default;
@@ -197,7 +196,7 @@ warm_up_steps, missing
     tables : sequence of array_like, shape (n_bins, n_pattern_units), optional
         Patterns for each input, of any coding; see `sdnn.approximators.SDNNC`. Not where actions
         have several dimensions.
-    preset : {"general", "small", "robust", "paper"}
+    preset : {"general", "small", "robust", "paper"}, optional
         Settings where none are given: for any task, the same with a network for small processors,
         those that stay steady in the paper's task, or the paper's; see `presets`.
 
@@ -267,7 +266,7 @@ class RBFQLearning(ValueAgent[RBFNetworkConfig, QLearningConfig]):
     and action, linear weights, gradient Q-learning. Observations and actions are treated as by
     `SDNNQLearning`; the actions of a ``Discrete`` space are taken as evenly spaced.
 
-    Parameters are those of `Agent`. An angle is scaled like any other variable: the bases know no
+    Parameters are those of `Agent`; there are no ``tables``. An angle is scaled like any other variable: the bases know no
     circle. ValueError for more weights than ``approximator.max_table_bytes`` allows.
 
     Examples
@@ -286,3 +285,5 @@ class RBFQLearning(ValueAgent[RBFNetworkConfig, QLearningConfig]):
     kind = "rbf"
     approximator_type = RBFNetworkConfig
     learning_type = QLearningConfig
+    presets = presets_of({"paper": ("paper", RBFNetworkConfig(), QLearningConfig())})
+    default_preset = "paper"

@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from sdnn._core import __version__
-from sdnn.agents.q_learning import CodedAgent
+from sdnn.agents.q_learning import ValueAgent
 from sdnn.export.tables import Input, Tables, by_dimension, conversions, joined, table_lines
 from sdnn.support.arguments import argument_error, whole
 
@@ -56,7 +56,7 @@ class CHeader:
 class Writer(ABC):
     """Makes the header of one agent; subclasses have its kind of network."""
 
-    def __init__(self, agent: CodedAgent[Any, Any], name: str, fraction_bits: int | None) -> None:
+    def __init__(self, agent: ValueAgent[Any, Any], name: str, fraction_bits: int | None) -> None:
         self.agent, self.name = agent, name
         self.networks = agent.networks  # RuntimeError while warming up
         self.n_dimensions = agent.n_dimensions

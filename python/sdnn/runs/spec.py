@@ -12,7 +12,7 @@ from gymnasium.vector import SyncVectorEnv
 from msgspec import Meta
 
 from sdnn.agents import Agent, Callback, StopTrainingOnRewardThreshold, Training
-from sdnn.agents.q_learning import CodedAgent
+from sdnn.agents.q_learning import ValueAgent
 from sdnn.agents.registry import AGENTS, AgentEntry, agent_entry, label_of, split_label
 from sdnn.config import ProtocolConfig
 from sdnn.runs.environment import (
@@ -372,7 +372,7 @@ class RunSpec(Settings, frozen=True):
     def _agent_arguments(self, env: AnyEnv) -> dict[str, object]:
         """Return the arguments that only some agents have: those that are not the default."""
         arguments, environment = self._optional_settings(), self.environment
-        if _is_class_of(self.entry.agent, CodedAgent):  # by its preset
+        if _is_class_of(self.entry.agent, ValueAgent) and self.entry.presets:  # by its preset
             arguments |= {"angle_pairs": self.agent.angle_pairs, "inputs": self.agent.inputs}
         if not environment.ranges:
             return arguments

@@ -6,6 +6,20 @@ from collections.abc import Mapping
 from html import escape
 
 
+def line_of(thing: object, facts: Mapping[str, object]) -> str:
+    """Return the class of a thing and facts about it, for a terminal."""
+    return f"<{type(thing).__name__}: {', '.join(f'{name} {fact}' for name, fact in facts.items())}>"
+
+
+def table_of(thing: object, facts: Mapping[str, object]) -> str:
+    """Return the class of a thing and facts about it as a table in HTML, for a notebook."""
+    rows = "".join(
+        f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(str(fact))}</td></tr>"
+        for name, fact in facts.items()
+    )
+    return f"<table><caption>{escape(type(thing).__name__)}</caption>{rows}</table>"
+
+
 class Displayed:
     """Shows what `_facts` returns, by name.
 
@@ -21,12 +35,7 @@ class Displayed:
         raise NotImplementedError
 
     def __repr__(self) -> str:
-        facts = ", ".join(f"{name} {value}" for name, value in self._facts().items())
-        return f"<{type(self).__name__}: {facts}>"
+        return line_of(self, self._facts())
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(str(value))}</td></tr>"
-            for name, value in self._facts().items()
-        )
-        return f"<table><caption>{escape(type(self).__name__)}</caption>{rows}</table>"
+        return table_of(self, self._facts())
