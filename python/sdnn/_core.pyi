@@ -109,17 +109,15 @@ class SDNNCConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, n_inputs: int = ..., max_pairs: int = ..., n_pattern_units: int = ..., n_anchor_patterns: int = ..., n_interpolated: int = ..., balanced_anchors: bool = ..., circular: collections.abc.Sequence[bool] = ..., n_symbols: collections.abc.Sequence[int] = ..., n_hidden_units: int = ..., n_active_units: int = ..., n_actions: int = ..., q_low: float = ..., q_high: float = ..., u_low: int | None = ..., u_high: int | None = ..., learning_coefficient: float = ..., lattice: int = ..., initial_threshold: float = ..., initial_weights: typing.Literal['ternary', 'uniform'] = ..., initial_weight_limit: float = ..., rounding: typing.Literal['half_up', 'random', 'away'] = ..., weight_limit: int = ..., averaging_interval: int = ..., max_table_bytes: int = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> SDNNCConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def replace(self, **changes: typing.Any) -> SDNNCConfig:
         """
@@ -383,17 +381,15 @@ class FuzzyRulesConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, n_inputs: int = ..., n_sets: int = ..., n_actions: int = ..., max_table_bytes: int = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> FuzzyRulesConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def replace(self, **changes: typing.Any) -> FuzzyRulesConfig:
         """
@@ -464,17 +460,15 @@ class RBFNetworkConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, n_inputs: int = ..., n_bases: int = ..., n_actions: int = ..., width: float = ..., gradient_rate: float = ..., max_table_bytes: int = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> RBFNetworkConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def replace(self, **changes: typing.Any) -> RBFNetworkConfig:
         """
@@ -579,17 +573,15 @@ class LinearSDNNConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, n_inputs: int = ..., max_pairs: int = ..., n_pattern_units: int = ..., n_anchor_patterns: int = ..., n_interpolated: int = ..., balanced_anchors: bool = ..., circular: collections.abc.Sequence[bool] = ..., n_symbols: collections.abc.Sequence[int] = ..., n_actions: int = ..., action_window: int = ..., averaging_interval: int = ..., max_table_bytes: int = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> LinearSDNNConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def replace(self, **changes: typing.Any) -> LinearSDNNConfig:
         """
@@ -673,6 +665,10 @@ class LinearSDNN:
         """
         Patterns of an input: (n_bins, m) of -1, +1
         """
+    def values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        A dimension's part of Q(state, a) for its actions, by averaged weights if there are any
+        """
     def weights(self) -> numpy.typing.NDArray[numpy.int32]:
         """
         A copy, in units: (n_rows, n_slots), the units of one dimension after the other
@@ -722,17 +718,15 @@ class GoalScheduleConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, kind: typing.Literal['inverse_linear', 'inverse_sqrt', 'constant'] = ..., scale: float = ..., last_episode: int = ..., floor: float = ..., constant_value: float = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> GoalScheduleConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def replace(self, **changes: typing.Any) -> GoalScheduleConfig:
         """
@@ -827,17 +821,15 @@ class AcrobotConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, link_mass_1: float = ..., link_mass_2: float = ..., link_length_1: float = ..., link_length_2: float = ..., center_of_mass_1: float = ..., center_of_mass_2: float = ..., inertia_1: float = ..., inertia_2: float = ..., gravity: float = ..., max_torque: float = ..., decision_interval: float = ..., integration_step: float = ..., max_decisions: int = ..., goal_height: float = ..., goal_velocity_1: float = ..., goal_velocity_2: float = ..., goal_test: typing.Literal['every_step', 'decision_instant'] = ..., goal_reward: float = ..., penalty: float = ..., idle_angle: float = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> AcrobotConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def replace(self, **changes: typing.Any) -> AcrobotConfig:
         """
@@ -1025,17 +1017,15 @@ class SensorConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, n_sensors: int = ..., noise: float = ..., noise_entry: typing.Literal['every_sensor', 'basic_sensors'] = ..., n_constant: int = ..., n_random: int = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> SensorConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def replace(self, **changes: typing.Any) -> SensorConfig:
         """
@@ -1192,17 +1182,15 @@ class EpsilonGreedyConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> EpsilonGreedyConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def replace(self, **changes: typing.Any) -> EpsilonGreedyConfig:
         """
@@ -1280,17 +1268,15 @@ class QLearningConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., n_steps: int = ..., value_range: typing.Literal['fixed', 'adaptive'] = ..., max_action_repeat: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., start_steps: int = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> QLearningConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
         ...
@@ -1418,17 +1404,15 @@ class QLambdaConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., trace_decay: float = ..., bootstrap: typing.Literal['sarsa', 'q_learning'] = ..., traces: typing.Literal['dutch', 'replacing'] = ..., schedule_steps: int = ..., max_action_repeat: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., start_steps: int = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> QLambdaConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
         ...
@@ -1548,17 +1532,15 @@ class FuzzyQLearningConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, learning_coefficient: float = ..., discount: float = ..., trace_decay: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> FuzzyQLearningConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def replace(self, **changes: typing.Any) -> FuzzyQLearningConfig:
         """
@@ -1621,322 +1603,6 @@ class FixedRate:
     @property
     def worst_lateness(self) -> float:
         ...
-class SDNNQLearning:
-    """
-    Q-learning with SDNN-C
-    """
-    @typing.overload
-    def __init__(self, *, approximator: SDNNCConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    @typing.overload
-    def __init__(self, *, approximator: SDNNCConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]]) -> None:
-        """
-        With the patterns of each input: (n_bins, m) of -1, +1
-        """
-    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> int:
-        ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
-        """
-    def restore(self, state: dict) -> None:
-        """
-        Take what `state` of one with the same settings gave; on an error nothing changes
-        """
-    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
-        ...
-    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
-        ...
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    def state(self) -> dict:
-        """
-        What it remembers: arrays by name
-        """
-    @property
-    def action_value(self) -> SDNNC:
-        ...
-    @property
-    def epsilon(self) -> float:
-        ...
-    @property
-    def learning_rate(self) -> float:
-        ...
-    @property
-    def n_environments(self) -> int:
-        ...
-    @property
-    def progress(self) -> float:
-        ...
-class DecoupledSDNNQLearning:
-    """
-    Q-learning with an SDNN-C per dimension
-    """
-    def __init__(self, *, approximator: SDNNCConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[int]:
-        ...
-    def action_value(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> SDNNC:
-        ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
-        """
-    def restore(self, state: dict) -> None:
-        """
-        Take what `state` of one with the same settings gave; on an error nothing changes
-        """
-    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
-        ...
-    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
-        ...
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    def state(self) -> dict:
-        """
-        What it remembers: arrays by name
-        """
-    @property
-    def epsilon(self) -> float:
-        ...
-    @property
-    def learning_rate(self) -> float:
-        ...
-    @property
-    def n_environments(self) -> int:
-        ...
-    @property
-    def progress(self) -> float:
-        ...
-class RBFQLearning:
-    """
-    Q-learning with an RBF network
-    """
-    def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> int:
-        ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
-        """
-    def restore(self, state: dict) -> None:
-        """
-        Take what `state` of one with the same settings gave; on an error nothing changes
-        """
-    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
-        ...
-    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
-        ...
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    def state(self) -> dict:
-        """
-        What it remembers: arrays by name
-        """
-    @property
-    def action_value(self) -> RBFNetwork:
-        ...
-    @property
-    def epsilon(self) -> float:
-        ...
-    @property
-    def learning_rate(self) -> float:
-        ...
-    @property
-    def n_environments(self) -> int:
-        ...
-    @property
-    def progress(self) -> float:
-        ...
-class DecoupledRBFQLearning:
-    """
-    Q-learning with an RBF network per dimension
-    """
-    def __init__(self, *, approximator: RBFNetworkConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[int]:
-        ...
-    def action_value(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> RBFNetwork:
-        ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
-        """
-    def restore(self, state: dict) -> None:
-        """
-        Take what `state` of one with the same settings gave; on an error nothing changes
-        """
-    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
-        ...
-    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
-        ...
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    def state(self) -> dict:
-        """
-        What it remembers: arrays by name
-        """
-    @property
-    def epsilon(self) -> float:
-        ...
-    @property
-    def learning_rate(self) -> float:
-        ...
-    @property
-    def n_environments(self) -> int:
-        ...
-    @property
-    def progress(self) -> float:
-        ...
-class FuzzyQLearning:
-    """
-    Fuzzy Q-learning; actions are numbers in [-1, 1]
-    """
-    def __init__(self, *, approximator: FuzzyRulesConfig, learning: FuzzyQLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> float:
-        ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def last_action(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> float:
-        ...
-    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsFloat | typing.SupportsIndex, reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def restore(self, state: dict) -> None:
-        """
-        Take what `state` of one with the same settings gave; on an error nothing changes
-        """
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def state(self) -> dict:
-        """
-        What it remembers: arrays by name
-        """
-    def value(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> float:
-        """
-        V(state)
-        """
-    @property
-    def n_environments(self) -> int:
-        ...
-    @property
-    def rules(self) -> FuzzyRules:
-        ...
-class VectorFuzzyQLearning:
-    """
-    Fuzzy Q-learning with rules for each dimension
-    """
-    def __init__(self, *, approximator: FuzzyRulesConfig, n_dimensions: typing.SupportsInt | typing.SupportsIndex, learning: FuzzyQLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[float]:
-        ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def last_action(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[float]:
-        ...
-    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def part(self, dimension: typing.SupportsInt | typing.SupportsIndex) -> FuzzyQLearning:
-        ...
-    def restore(self, state: dict) -> None:
-        """
-        Take what `state` of one with the same settings gave; on an error nothing changes
-        """
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def state(self) -> dict:
-        """
-        What it remembers: arrays by name
-        """
-    def value(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> float:
-        """
-        V(state)
-        """
-    @property
-    def n_environments(self) -> int:
-        ...
-class QLambda:
-    """
-    Q(lambda) with a linear readout of the SDNN code
-    """
-    def __init__(self, *, approximator: LinearSDNNConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], learning: QLambdaConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = []) -> None:
-        ...
-    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> list[int]:
-        ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def q_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Q(state, a) of a dimension's actions, as greedy actions follow it; shapes (n_inputs,) -> (n_actions,)
-        """
-    def restore(self, state: dict) -> None:
-        """
-        Take what `state` of one with the same settings gave; on an error nothing changes
-        """
-    def set_epsilon(self, epsilon: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
-        ...
-    def set_learning_rate(self, rate: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
-        ...
-    def set_n_environments(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def set_progress(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    def state(self) -> dict:
-        """
-        What it remembers: arrays by name
-        """
-    @property
-    def action_value(self) -> LinearSDNN:
-        ...
-    @property
-    def epsilon(self) -> float:
-        ...
-    @property
-    def final_epsilon(self) -> float:
-        """
-        Where epsilon goes
-        """
-    @property
-    def learning_rate(self) -> float:
-        ...
-    @property
-    def n_environments(self) -> int:
-        ...
-    @property
-    def n_learned(self) -> int:
-        """
-        Transitions that were learned
-        """
-    @property
-    def progress(self) -> float:
-        ...
 class ObservationConfig:
     """
     The observed variables of a task.
@@ -1975,17 +1641,15 @@ class ObservationConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., narrowed: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., relevant_only: bool = ..., inputs: collections.abc.Sequence[int] = ..., missing: typing.Literal['error', 'hold', 'code'] = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> ObservationConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def replace(self, **changes: typing.Any) -> ObservationConfig:
         """
@@ -2070,17 +1734,15 @@ class ActionConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, low: collections.abc.Sequence[float] = ..., high: collections.abc.Sequence[float] = ..., discrete: bool = ..., number: typing.Literal['float64', 'float32', 'float16', 'whole'] = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> ActionConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def replace(self, **changes: typing.Any) -> ActionConfig:
         """
@@ -2143,6 +1805,10 @@ class Controller:
         """
         Of each variable: the share of its range that it used, and how often it was beyond
         """
+    def restore(self, state: dict) -> None:
+        """
+        Take what `state` of one with the same settings gave; on an error nothing changes
+        """
     def state(self) -> dict:
         """
         What it remembers: arrays by name
@@ -2151,10 +1817,9 @@ class Controller:
         """
         The agent's state, shape (n_inputs,)
         """
-    @property
-    def agent(self) -> typing.Any:
+    def values(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         """
-        The agent in itself, with states in [0, 1]
+        Q of all actions of a dimension, as greedy actions follow it; of fuzzy rules the value of the observation alone
         """
     @property
     def approximator(self) -> SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig:
@@ -2165,6 +1830,11 @@ class Controller:
     @epsilon.setter
     def epsilon(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
         ...
+    @property
+    def final_epsilon(self) -> float | None:
+        """
+        Where epsilon goes with schedule_steps; None without Q(lambda)
+        """
     @property
     def inputs(self) -> list[tuple[str, list[int]]]:
         """
@@ -2192,6 +1862,11 @@ class Controller:
     def n_variables(self) -> int:
         ...
     @property
+    def networks(self) -> list:
+        """
+        Networks or rules of each dimension, or the readout of all; states are in [0, 1]
+        """
+    @property
     def progress(self) -> float:
         ...
     @progress.setter
@@ -2207,14 +1882,6 @@ class Controller:
         """
         The first reward that was too large to be learned, and its number from 1; or None
         """
-    @property
-    def reward_scale(self) -> dict:
-        """
-        How large rewards are: arrays by name
-        """
-    @reward_scale.setter
-    def reward_scale(self, arg1: dict) -> None:
-        ...
     @property
     def reward_size(self) -> int | None:
         """
@@ -2244,17 +1911,15 @@ class ProtocolConfig:
     fields: typing.ClassVar[tuple[typing.Any, ...]]
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> dict:
-        ...
     def __hash__(self) -> int:
         ...
     def __init__(self, *, episodes: int = ..., evaluate_every_episodes: int = ..., limit_bootstraps: bool = ..., noisy_evaluations: bool = ...) -> None:
         ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __replace__(self, **changes: typing.Any) -> ProtocolConfig:
         ...
     def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: dict) -> None:
         ...
     def replace(self, **changes: typing.Any) -> ProtocolConfig:
         """
@@ -2280,16 +1945,33 @@ class ProtocolConfig:
         """
         Whether the sensors are as noisy in evaluations as in learning.
         """
+class BareAgent:
+    """
+    An agent of any kind without a task: states in [0, 1], actions as indices or, of fuzzy rules, numbers in [-1, 1]
+    """
+    def __init__(self, *, approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig, learning: QLearningConfig | FuzzyQLearningConfig | QLambdaConfig, seed: typing.SupportsInt | typing.SupportsIndex, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = []) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> list[float]:
+        ...
+    def begin_episode(self) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
+        ...
+    @property
+    def networks(self) -> list:
+        """
+        Networks or rules of each dimension, or the readout of all
+        """
 class AcrobotTrial:
     """
-    SDNN-C learns the acrobot swing-up
+    An agent learns the acrobot swing-up
     """
     @staticmethod
     def advance_together(trials: tuple[AcrobotTrial, ...], n_decisions: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         Lets each of several trials make n more decisions, or come to its end
         """
-    def __init__(self, *, approximator: SDNNCConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig, learning: QLearningConfig | FuzzyQLearningConfig | QLambdaConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
@@ -2297,113 +1979,14 @@ class AcrobotTrial:
         """
     def cache_counts(self) -> dict[str, int]:
         """
-        How potentials came about so far: full passes, from neighbours, columns added
+        Potentials so far, by their origin: full passes, from neighbours, columns added
         """
     def test_rows(self) -> dict[str, numpy.ndarray]:
         """
         Columns of the test episodes so far
         """
     @property
-    def agent(self) -> SDNNQLearning:
-        """
-        The agent at work: asking for values changes nothing that follows
-        """
-    @property
-    def episode(self) -> int:
-        ...
-    @property
-    def finished(self) -> bool:
-        ...
-    @property
-    def n_decisions(self) -> int:
-        ...
-class FuzzyAcrobotTrial:
-    """
-    Fuzzy Q-learning learns the acrobot swing-up
-    """
-    @staticmethod
-    def advance_together(trials: tuple[FuzzyAcrobotTrial, ...], n_decisions: typing.SupportsInt | typing.SupportsIndex) -> None:
-        """
-        Lets each of several trials make n more decisions, or come to its end
-        """
-    def __init__(self, *, approximator: FuzzyRulesConfig, learning: FuzzyQLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
-        """
-        Runs up to n more learning episodes
-        """
-    def test_rows(self) -> dict[str, numpy.ndarray]:
-        """
-        Columns of the test episodes so far
-        """
-    @property
-    def agent(self) -> FuzzyQLearning:
-        """
-        The agent at work: asking for values changes nothing that follows
-        """
-    @property
-    def episode(self) -> int:
-        ...
-    @property
-    def finished(self) -> bool:
-        ...
-    @property
-    def n_decisions(self) -> int:
-        ...
-class RBFAcrobotTrial:
-    """
-    Q-learning with an RBF network learns the acrobot swing-up
-    """
-    @staticmethod
-    def advance_together(trials: tuple[RBFAcrobotTrial, ...], n_decisions: typing.SupportsInt | typing.SupportsIndex) -> None:
-        """
-        Lets each of several trials make n more decisions, or come to its end
-        """
-    def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
-        """
-        Runs up to n more learning episodes
-        """
-    def test_rows(self) -> dict[str, numpy.ndarray]:
-        """
-        Columns of the test episodes so far
-        """
-    @property
-    def agent(self) -> RBFQLearning:
-        """
-        The agent at work: asking for values changes nothing that follows
-        """
-    @property
-    def episode(self) -> int:
-        ...
-    @property
-    def finished(self) -> bool:
-        ...
-    @property
-    def n_decisions(self) -> int:
-        ...
-class LinearAcrobotTrial:
-    """
-    Q(lambda) with a linear readout of the SDNN code learns the acrobot swing-up
-    """
-    @staticmethod
-    def advance_together(trials: tuple[LinearAcrobotTrial, ...], n_decisions: typing.SupportsInt | typing.SupportsIndex) -> None:
-        """
-        Lets each of several trials make n more decisions, or come to its end
-        """
-    def __init__(self, *, approximator: LinearSDNNConfig, learning: QLambdaConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
-        """
-        Runs up to n more learning episodes
-        """
-    def test_rows(self) -> dict[str, numpy.ndarray]:
-        """
-        Columns of the test episodes so far
-        """
-    @property
-    def agent(self) -> QLambda:
+    def agent(self) -> BareAgent:
         """
         The agent at work: asking for values changes nothing that follows
         """
@@ -2423,7 +2006,7 @@ class PlainRBFQLearning:
     def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
-    def action_value(self) -> RBFNetwork:
+    def network(self) -> RBFNetwork:
         """
         A copy of the network behind it
         """
@@ -2441,12 +2024,6 @@ class NetworkParts:
     """
     The network's parts of a decision
     """
-    @typing.overload
-    def __init__(self, trial: AcrobotTrial, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        """
-        Times a copy of the trial's network
-        """
-    @typing.overload
     def __init__(self, network: SDNNC, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         Times a copy of the network
@@ -2553,22 +2130,7 @@ def sin_cos(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple
 def symbol_patterns(n_symbols: typing.SupportsInt | typing.SupportsIndex, n_units: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
     ...
 @typing.overload
-def time_agent_steps(agent: SDNNQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
-    """
-    The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
-    """
-@typing.overload
-def time_agent_steps(agent: FuzzyQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
-    """
-    The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
-    """
-@typing.overload
-def time_agent_steps(agent: RBFQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
-    """
-    The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
-    """
-@typing.overload
-def time_agent_steps(agent: QLambda, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+def time_agent_steps(agent: BareAgent, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """

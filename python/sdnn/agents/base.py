@@ -331,7 +331,9 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         """
         prefix = part and f"{part}."
         state = self._controller.state()
-        return {name.removeprefix(prefix): a for name, a in state.items() if name.startswith(prefix)}
+        return {
+            name.removeprefix(prefix): a for name, a in state.items() if name.startswith(prefix)
+        }
 
     def _restore(self, **parts: Mapping[str, NDArray[Any]]) -> None:
         """Replace parts of the state; ValueError if they do not fit, and nothing changes."""

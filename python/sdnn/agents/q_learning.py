@@ -266,8 +266,9 @@ class RBFQLearning(ValueAgent[RBFNetworkConfig, QLearningConfig]):
     and action, linear weights, gradient Q-learning. Observations and actions are treated as by
     `SDNNQLearning`; the actions of a ``Discrete`` space are taken as evenly spaced.
 
-    Parameters are those of `Agent`; there are no ``tables``. An angle is scaled like any other variable: the bases know no
-    circle. ValueError for more weights than ``approximator.max_table_bytes`` allows.
+    Parameters are those of `Agent`; there are no ``tables``. An angle is scaled like any other
+    variable: the bases know no circle. ValueError for more weights than
+    ``approximator.max_table_bytes`` allows.
 
     Examples
     --------

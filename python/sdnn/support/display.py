@@ -8,7 +8,8 @@ from html import escape
 
 def line_of(thing: object, facts: Mapping[str, object]) -> str:
     """Return the class of a thing and facts about it, for a terminal."""
-    return f"<{type(thing).__name__}: {', '.join(f'{name} {fact}' for name, fact in facts.items())}>"
+    shown = ", ".join(f"{name} {fact}" for name, fact in facts.items())
+    return f"<{type(thing).__name__}: {shown}>"
 
 
 def table_of(thing: object, facts: Mapping[str, object]) -> str:

@@ -191,9 +191,7 @@ def test_a_saved_agent_continues_to_the_same_bits(tmp_path, learned):
         for one in (agent, loaded):
             one.learn(Transition(observation, actions[0], 1.0, following, False))
     if not agent.is_warming_up:
-        np.testing.assert_array_equal(
-            agent.readout.weights(), loaded.readout.weights()
-        )
+        np.testing.assert_array_equal(agent.readout.weights(), loaded.readout.weights())
 
 
 def test_cartpole_is_learned_in_a_few_thousand_steps():
