@@ -19,7 +19,7 @@ MAX_BINS = 65535
 FINE = 1000  # bins; more make no visible difference
 LONGEST = 1000.0  # the largest length_scale
 FEW_BINS = 8
-MAX_KNOTS = 129  # of a column's distribution; more hardly change the codes
+MAX_KNOTS = 129  # more knots of a column's distribution hardly change the codes
 
 Knots = tuple[tuple[float, float], ...]
 

@@ -53,7 +53,7 @@ from sdnn.estimators.training import (
 Rows = NDArray[np.int64]
 MOST_EPOCHS = 30  # by default
 FEWEST_EPOCHS = 5
-MOST_PRESENTATIONS = 80_000  # of samples in all epochs by default
+MOST_PRESENTATIONS = 80_000  # samples presented in all epochs by default
 
 Self = TypeVar("Self", bound="BaseSDNN")
 
@@ -94,7 +94,9 @@ class BaseSDNN(Fitted, CodedInputs):
         resumes from the last alone.
     correction_share : float
         Share of the missing or superfluous units that a sample corrects, at least one; in (0, 1].
-        Default: 1 in regression; 1/4 in classification, where samples of classes overlap.
+        Default: 1 in regression; 1/4 in classification, where samples of classes overlap. Where
+        inputs repeat, `fit` learns the mean target, and `partial_fit` follows the latest targets;
+        there a share of 0.1 averages over more of them.
     shuffle : bool, default=True
         Whether each epoch has a new random order; from 5,001 samples without weights on, of blocks
         of 512 samples, which are drawn once: half of the time.

@@ -23,8 +23,8 @@ from sdnn.support.arguments import explains_names, require, shown
 
 UNITS_EACH = 60
 MOST_UNITS = 1200
-FIRING_SHARE = 5 / 6  # of a class's units for its samples; the rest fires for other classes
-STEEPNESS = 6.0  # of the softmax of scores
+FIRING_SHARE = 5 / 6  # share of a class's units for its samples; the rest fires for other classes
+STEEPNESS = 6.0  # factor of scores in the softmax
 
 Self = TypeVar("Self", bound="SDNNClassifier")
 

@@ -124,7 +124,7 @@ class CodedInputs(BaseEstimator):
         params: dict[str, Any] = super().get_params(deep)
         if deep:
             is_list = isinstance(self.coding, list | tuple)
-            with contextlib.suppress(ValueError):  # of a coding that `fit` will refuse
+            with contextlib.suppress(ValueError):  # `fit` will refuse this coding
                 for number, (coding, _) in enumerate(coding_entries(self.coding)):
                     prefix = f"coding__{number}__" if is_list else "coding__"
                     params |= {prefix + name: getattr(coding, name) for name in field_names(coding)}

@@ -53,7 +53,7 @@ class Diagonal:
     moments: Floats  # weighted sums of features times targets, shape (n_features, n_outputs)
     to_dual: Floats  # shape (n_components, n_features)
     kernel_mean: Floats  # weighted mean over the samples, shape (n_components,)
-    features: Floats  # of samples to leave out, times the roots of their weights
+    features: Floats  # features of samples to leave out, times the roots of weights
     rows: Rows  # the numbers of these samples
 
 

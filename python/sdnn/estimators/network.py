@@ -111,10 +111,10 @@ class InputCode:
         used, low, high, half_width, sizes = self._even
         values = row[used]
         inside = np.minimum(np.maximum(values, low), high)
-        where = (inside / 2 - low / 2) / half_width  # as in `sdnn.coding.numeric`
+        positions = (inside / 2 - low / 2) / half_width  # as in `sdnn.coding.numeric`
         is_missing = values != values
-        where[is_missing] = 0
-        bins: Ints = np.minimum((where * sizes).astype(np.int32), sizes - 1)
+        positions[is_missing] = 0
+        bins: Ints = np.minimum((positions * sizes).astype(np.int32), sizes - 1)
         bins[is_missing] = sizes[is_missing]
         return bins[None]
 

@@ -18,7 +18,7 @@ from sdnn.estimators.parameters import documents, parameter, wholes, words
 from sdnn.estimators.training import weighted_mean
 from sdnn.support.arguments import explains_names, require, shown
 
-MARGIN = 0.2  # that a learned output range adds on either side
+MARGIN = 0.2  # share of the range of targets that is added on either side
 FURTHEST = 1e300  # largest end of an output range, so that its width is finite
 
 Self = TypeVar("Self", bound="SDNNRegressor")

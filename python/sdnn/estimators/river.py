@@ -28,7 +28,7 @@ WINDOW = 500  # samples whose range is followed
 REMEMBERED = 1000  # last samples, from which new features and categories are learned
 FEWEST = 5  # of these samples must have a new feature or category
 MOST_FEATURES = 1000  # later ones are ignored
-MOST_CATEGORIES = 1000  # of a feature; later ones count as missing values
+MOST_CATEGORIES = 1000  # later categories of a feature count as missing values
 
 
 def cleaned(x: Mapping[Hashable, Any]) -> dict[str, Any]:
@@ -168,8 +168,8 @@ class Waiting:
         self.n_learned = 0
         self.n_before_news: int | None = None  # samples before the first new feature or category
         self.reads: dict[str, Callable[[Any], object]] = {}  # by feature; read its values
-        self.categories: dict[str, set[object]] = {}  # of features whose categories are learned
-        self.most_columns = 0  # of a code that grows
+        self.categories: dict[str, set[object]] = {}  # learned categories by feature
+        self.most_columns = 0  # limit of a growing code
 
     def learn_one(self, x: dict[Hashable, Any], y: Any) -> None:
         """Learn one sample; an error changes nothing."""

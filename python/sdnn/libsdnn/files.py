@@ -18,9 +18,9 @@ from sdnn.libsdnn.network import Library, LibsdnnInput, LibsdnnModel, LibsdnnPar
 from sdnn.support.arguments import path_of, shown
 from sdnn.support.files import read_bytes
 
-MOST_BYTES = 2**20  # of parameters
+MOST_BYTES = 2**20  # size of a parameter file
 MOST_BYTES_OF_MODEL = 2**31
-MOST_ITEMS = 100_000  # of a list, and tags around each other
+MOST_ITEMS = 100_000  # length of a list
 MOST_PAIRS = 1_000_000
 
 OPERATORS: dict[type, Callable[..., float]] = {

@@ -54,7 +54,7 @@ class ProgressBars:
 
         console = _console() if console is None else console
         self._is_notebook = console.is_jupyter
-        self._output: Any = None  # of a notebook, where rich would need ipywidgets
+        self._output: Any = None  # output of a notebook, where rich would need ipywidgets
         self._due = 0.0
         self._progress = Progress(
             TextColumn("{task.description}"),

@@ -106,7 +106,7 @@ inline void select_units(std::span<const std::int32_t> potentials, int deficit,
   const auto n_subsets = static_cast<std::size_t>(std::abs(deficit));
   assert(n_subsets <= potentials.size());
   const detail::DistanceOf of(deficit < 0);
-  const auto begin_of = [&](std::uint64_t i) {  // in 64 bits, where no product overflows
+  const auto begin_of = [&](std::uint64_t i) {  // with 64 bits, so that no product overflows
     return static_cast<std::size_t>(i * potentials.size() / n_subsets);
   };
   for (std::size_t i = 0; i < n_subsets; ++i) {

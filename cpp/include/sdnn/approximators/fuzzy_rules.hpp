@@ -48,7 +48,7 @@ struct FuzzyRulesConfig {
 /// The rules that fire in a state, with their truth values; the workspace of a user.
 struct FiredRules {
   std::vector<std::size_t> rules;
-  std::vector<double> truth_values;  ///< of `rules`; their sum is 1 up to rounding
+  std::vector<double> truth_values;  ///< truth values of `rules`, whose sum is 1 up to rounding
 
   std::size_t size() const noexcept { return rules.size(); }
 };

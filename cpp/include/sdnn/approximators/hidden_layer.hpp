@@ -397,14 +397,14 @@ class HiddenLayer {
   std::size_t n_blocks_ = 0;
   std::int32_t weight_limit_;
   core::AlignedBuffer<std::int8_t> bytes_;       ///< [block][column, then zeros][unit in block]
-  core::AlignedBuffer<std::int8_t> high_bytes_;  ///< the same, in multiples of kHighByte
-  std::vector<ColumnSet> high_columns_;          ///< of each block: those with high bytes
-  std::size_t n_high_columns_ = 0;               ///< in all blocks
-  std::vector<std::uint8_t> may_have_high_;      ///< whether a unit ever had a high byte
+  core::AlignedBuffer<std::int8_t> high_bytes_;  ///< as `bytes_`, multiples of kHighByte
+  std::vector<ColumnSet> high_columns_;          ///< columns with high bytes, by block
+  std::size_t n_high_columns_ = 0;           ///< number of columns with high bytes in all blocks
+  std::vector<std::uint8_t> may_have_high_;  ///< whether a unit ever had a high byte
   std::vector<std::int32_t> thresholds_;
   std::vector<std::int32_t> largest_weight_;  ///< an upper bound of max_j |w_ij|
   std::vector<int> group_of_block_;           ///< columns of a block that may be added in 8 bits
-  std::vector<int> high_group_of_block_;      ///< the same of high bytes
+  std::vector<int> high_group_of_block_;      ///< for high bytes, columns to be added in 8 bits
 };
 
 }  // namespace sdnn::approximators

@@ -52,8 +52,8 @@ class LinearSDNN {
 
   /// The rates of a step of learning; see QLambdaConfig.
   struct Step {
-    std::int64_t error = 0;       ///< in units: what the trace is multiplied by
-    std::int64_t correction = 0;  ///< in units: what the code is multiplied by
+    std::int64_t error = 0;       ///< the factor of the trace, in units
+    std::int64_t correction = 0;  ///< the factor of the code, in units
     std::int32_t rate = 0;        ///< alpha, 2^16 for 1
     std::int32_t decay = 0;       ///< gamma lambda, kDecayOne for 1
     bool is_dutch = true;         ///< else the trace is replaced
@@ -368,7 +368,7 @@ class LinearSDNN {
     std::size_t first_row;
   };
 
-  static constexpr std::int32_t kLeastExponent = -1074;  // that of the least number
+  static constexpr std::int32_t kLeastExponent = -1074;  // the exponent of the smallest number
   static constexpr std::int64_t kLargestValue = std::int64_t{1} << 33;
   static constexpr double kLargestReward = 4294967296.0;
   static constexpr std::int64_t kLargestError = (std::int64_t{1} << 34) - 1;
@@ -426,9 +426,9 @@ class LinearSDNN {
   std::vector<Dimension> dimensions_;
   std::size_t n_rows_ = 0;
   std::vector<std::int32_t> weights_;
-  std::vector<std::int32_t> averaged_;   ///< none without averaging
-  std::vector<std::uint64_t> versions_;  ///< of each row of weights
-  std::uint64_t version_ = 1;            ///< the latest
+  std::vector<std::int32_t> averaged_;   ///< empty without averaging
+  std::vector<std::uint64_t> versions_;  ///< versions of the rows of weights
+  std::uint64_t version_ = 1;            ///< the latest version
   std::optional<std::int32_t> exponent_;
   std::int64_t n_steps_ = 0;
   std::int64_t n_snapshots_ = 0;

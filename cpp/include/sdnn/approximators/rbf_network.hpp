@@ -102,8 +102,8 @@ class RBFNetwork {
     Eigen::ArrayXd one_dimension_;
     Eigen::ArrayXd mixed_;         // phi(s)^T W
     std::vector<double> state_;    // s
-    std::uint64_t network_ = 0;    // the identity of the network that all of it is of ...
-    std::uint64_t n_updates_ = 0;  // ... after so many updates
+    std::uint64_t network_ = 0;    // the identity of the network of these values
+    std::uint64_t n_updates_ = 0;  // the number of updates of that network
   };
   Workspace workspace() const { return Workspace(*this); }
 
@@ -147,7 +147,7 @@ class RBFNetwork {
   ///
   /// Throws std::invalid_argument for a state of wrong size or outside [0, 1].
   void values(std::span<const double> state, Workspace& workspace, std::span<double> out) const {
-    if (out.size() != n_actions()) {  // only then does the message cost memory
+    if (out.size() != n_actions()) {  // only the message allocates
       core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
     }
     const Eigen::ArrayXd& mixed = mix(state, workspace);
@@ -199,7 +199,7 @@ class RBFNetwork {
  private:
   static constexpr int kUnrolled = 4;  // the paper's n_bases
   static constexpr double kLargestStep = 1e305;
-  static constexpr double kLargestWeight = 1e300;  // of given ones: sums of them stay finite
+  static constexpr double kLargestWeight = 1e300;  // limit of given weights, whose sums stay finite
 
   static RBFNetworkConfig checked(const RBFNetworkConfig& config) {
     core::check_fields(config);

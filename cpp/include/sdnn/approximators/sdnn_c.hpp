@@ -39,11 +39,11 @@ namespace sdnn::approximators {
 
 /// The numbers of outcomes of a network's corrections.
 struct CorrectionCounts {
-  std::uint64_t asked = 0;         ///< all of them
+  std::uint64_t asked = 0;         ///< all corrections
   std::uint64_t changed = 0;       ///< units were corrected
-  std::uint64_t rounded_away = 0;  ///< another value was wanted, nearer than the next count's
-  std::uint64_t out_of_range = 0;  ///< wanted were values outside [q_low, q_high]
-  double mean_error = 0.0;  ///< of the last thousand or so: how far targets, clipped, were from Q
+  std::uint64_t rounded_away = 0;  ///< the change was smaller than half a unit
+  std::uint64_t out_of_range = 0;  ///< the target was outside [q_low, q_high]
+  double mean_error = 0.0;         ///< mean |clipped target - Q| of about the last 1000
 };
 
 /// The network of section 3, a model for any number of users.
@@ -87,7 +87,7 @@ class SDNNC {
     }
 
     ActivationCache cache_;
-    std::optional<ActivationCache> averaged_cache_;  ///< made when it is needed
+    std::optional<ActivationCache> averaged_cache_;  ///< made on demand
     std::vector<coding::Bin> bins_;
     WindowCounts counts_;
     std::vector<std::uint32_t> selected_;
@@ -307,7 +307,7 @@ class SDNNC {
  private:
   using Cached = ActivationCache::Entry;
 
-  static constexpr std::uint64_t kMostErrors = 1000;  // that a mean is of
+  static constexpr std::uint64_t kMostErrors = 1000;  // averaged errors
 
   static OutputScale make_scale(const SDNNCConfig& config) {
     const int u_low = config.u_low.value_or(config.n_active_units / 15);
@@ -348,7 +348,7 @@ class SDNNC {
 
   void fill_values(std::span<const double> state, Workspace& workspace, std::span<double> out,
                    bool averaged) const {
-    if (out.size() != n_actions()) {  // only a bad one's text costs memory
+    if (out.size() != n_actions()) {  // only the message allocates
       core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
     }
     count(state, workspace, averaged);
@@ -418,7 +418,7 @@ class SDNNC {
     if (config_.rounding == Rounding::random) {
       return static_cast<int>(std::floor(exact + rounding_.uniform()));
     }
-    constexpr double kNothing = 1e-9;  // what rounding errors may leave of no change
+    constexpr double kNothing = 1e-9;  // largest rounding error of an unchanged value
     return static_cast<int>(exact > n_firing ? std::ceil(exact - kNothing)
                                              : std::floor(exact + kNothing));
   }

@@ -25,9 +25,9 @@ constexpr std::array<std::string_view, 2> words_of(InitialWeights) noexcept {
 
 /// Rounding of a wanted value to a whole number of firing units (an assumption).
 enum class Rounding {
-  half_up,  ///< the nearest; halves up. A change of less than half a unit is lost
-  random,   ///< up or down at random, in proportion: right on average, nothing is lost
-  away,     ///< the next one in the direction of the change: always at least one unit
+  half_up,  ///< to the nearest, halves up; changes of less than half a unit are lost
+  random,   ///< up or down at random, unbiased
+  away,     ///< to the next in the direction of the change, at least one unit
 };
 constexpr std::array<std::string_view, 3> words_of(Rounding) noexcept {
   return {"half_up", "random", "away"};

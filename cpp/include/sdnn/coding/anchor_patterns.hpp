@@ -17,8 +17,8 @@ struct AnchorConfig {
   int n_units = 2000;         ///< units per pattern
   int n_anchor_patterns = 9;  ///< p_1 .. p_9; the last one ends the chain and has no bin
   int n_interpolated = 44;    ///< patterns between two neighbouring anchors
-  bool balanced = true;       ///< anchors have as many +1 as -1; false: independent fair units
-  bool circular = false;      ///< last anchor = first: for angles
+  bool balanced = true;  ///< anchors have equal numbers of +1 and -1; false: independent fair units
+  bool circular = false;  ///< last anchor = first: for angles
 };
 
 /// (n_anchor_patterns - 1) * (n_interpolated + 1) patterns.

@@ -248,7 +248,7 @@ class SelectiveDesensitization {
   std::vector<InputPair> pairs_;
   std::vector<std::size_t> n_bins_;
   std::vector<detail::Gate> gates_;
-  std::vector<detail::TableOfInput> modified_at_;  // of every pair
+  std::vector<detail::TableOfInput> modified_at_;  // places of the modified patterns, by pair
   std::size_t max_active_ = 0;
 };
 

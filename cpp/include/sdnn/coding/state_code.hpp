@@ -127,7 +127,7 @@ class StateCode {
         const std::uint64_t one = positive[w];
         const std::uint64_t other = positive[w + width];
         const std::uint64_t unlike = one ^ other;
-        active[w] ^= unlike;  // half the sum where the signs are alike
+        active[w] ^= unlike;  // half of the sum where the signs are equal
         positive[w] = one & other;
         active[w + width] = unlike;
         positive[w + width] = one & ~other;

@@ -165,7 +165,7 @@ inline double exp(double x) noexcept {
                             z * (0x1.71de0dae63bb3p-19 + 0x1.27e4e1f48534fp-22 * r)) +
                       z4 * (0x1.af38a9b0ec855p-26 + 0x1.1f66df7fca49fp-29 * r);
   const double one_plus = 1.0 + r;
-  const double rest = (1.0 - one_plus) + r;  // what that sum lost
+  const double rest = (1.0 - one_plus) + r;  // the rounding error of the sum
   const double mantissa = one_plus + (rest + (tail + (0.5 * z + (r * z) * poly)));
 
   // 2^n has two factors because n may leave the range of exponents.
@@ -212,7 +212,7 @@ inline double atan2(double y, double x) noexcept {
       eighths = 1;
       const double sum = b + a;
       r = (b - a) / sum;
-      tail = -r * ((b - (sum - a)) / sum);  // of what the sum lost
+      tail = -r * ((b - (sum - a)) / sum);  // corrects the rounding error of the sum
     } else {
       r = b / a;
     }

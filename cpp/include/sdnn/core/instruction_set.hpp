@@ -28,7 +28,7 @@ namespace sdnn::core {
 /// Levels of instruction sets, in rising order for each processor. Results have the same bits on
 /// all of them.
 enum class InstructionSet {
-  portable,  ///< whatever the compiler makes of plain loops
+  portable,  ///< plain loops
   neon,      ///< Arm's Advanced SIMD
   avx2,
   avx512,  ///< AVX-512 F and BW

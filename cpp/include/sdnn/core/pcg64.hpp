@@ -22,7 +22,7 @@ namespace sdnn::core {
 class Pcg64 {
  public:
   explicit Pcg64(std::span<const std::uint64_t> seeds) noexcept {
-    std::vector<std::uint32_t> words;  // as NumPy writes whole numbers: without leading zeros
+    std::vector<std::uint32_t> words;  // integers in the form of NumPy, without leading zeros
     for (const std::uint64_t seed : seeds) {
       words.push_back(static_cast<std::uint32_t>(seed));
       if (seed >> 32U != 0) words.push_back(static_cast<std::uint32_t>(seed >> 32U));

@@ -51,7 +51,7 @@ class Random {
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.fixed("words", {self.state_.size()}, self.state_);
-    if constexpr (Archive::kReads) {  // of zeros alone come zeros for ever
+    if constexpr (Archive::kReads) {  // a state of zeros gives only zeros
       archive.expect(self.state_ != std::array<std::uint64_t, 4>{}, "words", "not all 0");
     }
   }

@@ -291,7 +291,7 @@ inline void write_file(const std::filesystem::path& path, const FileContent& con
   std::vector<const State::value_type*> order;
   for (const auto& named : content.tensors) order.push_back(&named);
   std::ranges::stable_sort(order, {}, [](const State::value_type* named) {
-    return detail::storage_rank(named->second.type);  // so that numbers are aligned; then by name
+    return detail::storage_rank(named->second.type);  // aligns numbers; ties are ordered by name
   });
   const nlohmann::json about = {{"checksum", "00000000"},
                                 {"description", content.description},
@@ -312,7 +312,7 @@ inline void write_file(const std::filesystem::path& path, const FileContent& con
       begin = end;
     }
     text = header.dump();
-  } catch (const nlohmann::json::exception& error) {  // no UTF-8
+  } catch (const nlohmann::json::exception& error) {  // the text is not UTF-8
     throw std::runtime_error(path.string() + ": cannot be written: " + error.what());
   }
   text.append((8 - text.size() % 8) % 8, ' ');

@@ -84,7 +84,7 @@ class Acrobot {
   const AcrobotConfig& config() const noexcept { return dynamics_.config(); }
 
  private:
-  friend class AcrobotTeam;  // which integrates several at once
+  friend class AcrobotTeam;  // it integrates several at once
 
   void check_step(double torque, double goal_tolerance) const {
     core::require_in_range("torque", torque, -config().max_torque, config().max_torque);

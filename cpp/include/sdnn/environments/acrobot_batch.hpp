@@ -166,7 +166,7 @@ class AcrobotBatch {
 
   void require_size(const char* name, std::size_t size, std::size_t width = 1) const {
     const std::size_t expected = width * size_;
-    if (size == expected) return;  // the message costs memory
+    if (size == expected) return;  // only the message allocates
     core::require(false, name, "of " + std::to_string(expected) + " items", size);
   }
 
@@ -177,7 +177,7 @@ class AcrobotBatch {
     const double steps = std::nearbyint(config().decision_interval / config().integration_step);
     const std::size_t part =
         core::round_up(static_cast<std::size_t>(kStepsPerPoint / steps) + 1, kAcrobotLanes);
-    for (std::size_t i = 0; i < size_; ++i) over_[i] = over_[i] || moving[i];  // unless all move
+    for (std::size_t i = 0; i < size_; ++i) over_[i] = over_[i] || moving[i];  // undone if all move
     for (std::size_t first = 0; first < padded_size_; first += part) {
       core::interruption_point();
       move_acrobots(dynamics_,

@@ -92,8 +92,8 @@ class SensorNoise {
 
 /// Variables to which noise is added (an assumption).
 enum class NoiseEntry {
-  every_sensor,   ///< s5 and s6 are computed from the true s1..s4 and have noise of their own
-  basic_sensors,  ///< on s1..s4 alone: s5 and s6 are computed from the noisy ones
+  every_sensor,   ///< s5 and s6 are computed from the true s1..s4 and have separate noise
+  basic_sensors,  ///< on s1..s4 alone; s5 and s6 are computed from noisy values
 };
 constexpr std::array<std::string_view, 2> words_of(NoiseEntry) noexcept {
   return {"every_sensor", "basic_sensors"};

@@ -121,7 +121,7 @@ class PDeltaRule {
   std::vector<std::int32_t> targets_;
   std::vector<std::int32_t> keys_;
   int n_index_bits_ = 0;
-  std::int32_t distance_limit_ = 0;  // at which keys stop telling distances apart
+  std::int32_t distance_limit_ = 0;  // the largest distance that keys distinguish
   std::vector<std::pair<std::int32_t, std::uint32_t>> ranked_;
 };
 
@@ -203,7 +203,7 @@ class PerceptronRule {
  private:
   std::size_t n_units_;
   std::vector<std::int32_t> labels_;
-  std::vector<std::vector<Correction>> wanted_;  // per class: what each of its units should do
+  std::vector<std::vector<Correction>> wanted_;  // required corrections of the units, by class
 };
 
 }  // namespace sdnn::estimators

@@ -68,7 +68,7 @@ class OnlineLayer {
                   rule.n_units());
     TrainingCount count;
     done_.clear();
-    struct Undoes {  // unless all are done
+    struct Undoes {  // unless all corrections succeed
       OnlineLayer& layer;
       std::span<const std::int32_t> bins;
       bool is_done = false;
@@ -141,7 +141,7 @@ class OnlineLayer {
       }
       if (now.units.empty()) continue;
       std::sort(now.units.begin(), now.units.end());  // neighbours share cache lines
-      done_.reserve(done_.size() + 1);  // once it is done, nothing may fail before it is noted
+      done_.reserve(done_.size() + 1);                // so that recording a correction cannot fail
       hidden_.update(now.units, slots_.columns(), direction);
       done_.push_back(std::move(now));
     }
@@ -162,7 +162,7 @@ class OnlineLayer {
   coding::ColumnLists slots_;
   std::vector<std::int32_t> potentials_;
   std::vector<Correction> corrections_;
-  std::vector<Done> done_;  // of the call at hand
+  std::vector<Done> done_;  // corrections of the current call
   bool changed_ = false;    // since the last synchronization
 };
 

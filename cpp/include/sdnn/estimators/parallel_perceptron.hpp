@@ -295,7 +295,7 @@ class ParallelPerceptron {
   /// The weights in 16 bits, which halves the memory to read, if the sums over chunks fit.
   struct Narrow {
     Narrow(const Code& code, const WeightTiles<std::int32_t>& weights) {
-      std::int64_t largest = 1;  // no unit's |weights| in a chunk sum up to more
+      std::int64_t largest = 1;  // bound of the sum of a unit's |weights| in a chunk
       for (const PairChunk& chunk : pair_chunks(code)) {
         std::int64_t norm = 0;
         for (const std::size_t word : chunk.words) {
@@ -309,7 +309,7 @@ class ParallelPerceptron {
       tiles = WeightTiles<std::int16_t>(weights);
       n_per_sum = static_cast<std::size_t>(kLargest / std::max(tiles.largest(), std::int64_t{1}));
     }
-    std::size_t n_chunks;       // whose sums fit together
+    std::size_t n_chunks;       // chunks whose total fits
     std::size_t n_per_sum = 0;  // weights whose sum fits
     WeightTiles<std::int16_t> tiles;
   };
@@ -410,11 +410,11 @@ class ParallelPerceptron {
     }
   }
 
-  static constexpr std::size_t kFewQueries = 8;      // for which no narrow weights are made
-  static constexpr std::size_t kChangesPerWord = 4;  // from which pair by pair is quicker
+  static constexpr std::size_t kFewQueries = 8;      // too few to narrow weights
+  static constexpr std::size_t kChangesPerWord = 4;  // from which pairs are faster
   static constexpr std::uint64_t kSweptAtOnce = std::uint64_t{1} << 32;
   static constexpr std::uint64_t kAddedAtOnce = std::uint64_t{1}
-                                                << 36;  // of which most are skipped
+                                                << 36;  // most of these are skipped
 
   std::shared_ptr<const Code> code_;
   WeightTiles<std::int32_t> weights_;

@@ -21,10 +21,10 @@ namespace sdnn::estimators {
 
 /// Forms of training, all with equal results.
 enum class TrainingForm {
-  automatic,  ///< the fastest of the others that fits into the memory limit
+  automatic,  ///< the fastest form that fits into the memory limit
   dual,       ///< potentials of all training samples, moved by rows of their inner products
   block,      ///< potentials of a block of samples in one pass over the weights
-  plain,      ///< one sample after the other
+  plain,      ///< sample by sample
 };
 
 inline constexpr std::array kTrainingForms{TrainingForm::automatic, TrainingForm::dual,

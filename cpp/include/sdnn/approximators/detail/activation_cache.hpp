@@ -114,7 +114,7 @@ class ActivationCache {
       last_use_.fill(0);
       layer_ = log.identity();
     }
-    for (const std::size_t slot : {latest_, before_latest_}) {  // a decision asks repeatedly
+    for (const std::size_t slot : {latest_, before_latest_}) {  // likely within a decision
       if (last_use_[slot] != 0 && std::ranges::equal(bins_of(slot), bins) &&
           log.size() - up_to_[slot] <= CorrectionLog::kSize) {
         return use(code, log, slot);
@@ -237,7 +237,7 @@ class ActivationCache {
     return entry;
   }
 
-  std::uint64_t layer_ = 0;  ///< the identity of the layer that the slots are of
+  std::uint64_t layer_ = 0;  ///< the identity of the layer of the slots
 
   // The following arrays are ordered by slot.
   std::size_t n_inputs_;
@@ -245,7 +245,7 @@ class ActivationCache {
   std::vector<coding::Bin> bins_;                   ///< [slot][input]
   std::vector<coding::Bin> bins_by_input_;          ///< [input][slot], for quick comparison
   std::vector<std::int32_t> potentials_;            ///< [slot][unit]
-  std::array<std::uint64_t, kEntries> up_to_{};     ///< corrections that are accounted for
+  std::array<std::uint64_t, kEntries> up_to_{};     ///< number of corrections included
   std::array<std::uint64_t, kEntries> last_use_{};  ///< 0: empty
   std::uint64_t clock_ = 0;
   std::size_t latest_ = 0;
@@ -253,7 +253,7 @@ class ActivationCache {
   Words from_;
   Words to_;
   coding::ColumnLists changes_;
-  std::array<Listed, 2> listed_;  ///< the latest first
+  std::array<Listed, 2> listed_;  ///< the latest is the first
 
   // Estimated costs, in columns.
   double columns_per_bin_;

@@ -276,8 +276,8 @@ template <std::size_t Group>
   const std::uint32_t* const end = places.data() + places.size();
   for (const std::uint32_t* begin = places.data(); begin != end;) {
     const std::uint32_t* const part_end = end_of_part<Group>(begin, end);
-    __m512i low = _mm512_setzero_si512();  // of each 16 units the first eight
-    __m512i high = low;                    // and the last eight
+    __m512i low = _mm512_setzero_si512();  // the first eight of each 16 units
+    __m512i high = low;                    // the last eight
     for (; begin != part_end; begin += ColumnPlaces::kAtOnce) {
       prefetch_ahead(block, begin);
       for (std::size_t k = 0; k < ColumnPlaces::kAtOnce; k += 2 * Group) {

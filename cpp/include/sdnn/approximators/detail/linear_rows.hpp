@@ -18,9 +18,9 @@ struct CodeMasks {
 
 /// The change of a row and its trace, in fixed-point numbers whose products fit into 32 bits.
 struct RowStep {
-  std::int32_t decay;       ///< what remains of the trace: in [0, 2^13], 2^13 for all of it
+  std::int32_t decay;       ///< factor of the trace in [0, 2^13], 2^13 for 1
   std::int32_t gain;        ///< the code's part of the new trace, 2^12 for 1; 0 outside the action
-  std::int32_t replace;     ///< all bits: the code replaces the trace where it is not 0
+  std::int32_t replace;     ///< a mask: the code replaces the trace where it is not 0
   std::int32_t step;        ///< weights change by step * trace / 2^shift; below 2^13
   std::int32_t shift;       ///< in [1, 30]
   std::int32_t correction;  ///< subtracted from the weight, times the code
@@ -77,7 +77,7 @@ inline constexpr std::size_t kRowsAtOnce = 4;
 template <std::size_t kRows>
 SDNN_INLINE void sum_rows_at_once(const std::int32_t* const* rows, CodeMasks code,
                                   std::size_t n_columns, std::int64_t* sums) noexcept {
-  constexpr std::size_t kBlock = 256;  // whose sum fits into 32 bits
+  constexpr std::size_t kBlock = 256;  // columns whose sum fits into 32 bits
   std::fill_n(sums, kRows, 0);
   for (std::size_t first = 0; first < n_columns; first += kBlock) {
     const std::size_t last = std::min(n_columns, first + kBlock);

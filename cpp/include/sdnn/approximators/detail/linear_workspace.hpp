@@ -48,8 +48,8 @@ class LinearWorkspace {
   std::vector<coding::Bin> bins_, new_bins_;
   std::vector<std::uint64_t> words_;
   std::vector<std::int64_t> row_sums_;
-  std::vector<std::uint64_t> versions_;  ///< of the rows that were summed; 0: none
-  std::vector<std::int64_t> sums_;       ///< of the actions of a dimension
+  std::vector<std::uint64_t> versions_;  ///< versions of the summed rows; 0: none
+  std::vector<std::int64_t> sums_;       ///< sums of the actions of a dimension
 };
 
 /// The traces of a stream of experience: the weights that contributed to earlier values.
@@ -65,7 +65,7 @@ class LinearTrace {
   /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
-    std::vector<std::int32_t> values;  // none where there is no trace
+    std::vector<std::int32_t> values;  // empty without a trace
     if (std::ranges::find(self.live_, true) != self.live_.end()) values = self.values_;
     archive.numbers("values", values);
     if constexpr (Archive::kReads) {

@@ -73,7 +73,7 @@ std::vector<coding::PatternTable> with_missing_patterns(const Config& config,
                                                         std::vector<coding::PatternTable> tables,
                                                         std::span<const int> symbols,
                                                         std::uint64_t seed) {
-  constexpr std::size_t kFirstStream = 1024;  // those before are of the inputs' other patterns
+  constexpr std::size_t kFirstStream = 1024;  // earlier streams draw the other patterns
   for (std::size_t mu = 0; mu < tables.size(); ++mu) {
     if (mu < symbols.size() && symbols[mu] > 0) continue;
     core::Random random(seed, core::Stream::code_books, kFirstStream + mu);

@@ -101,7 +101,7 @@ class WeightAverage {
 
  private:
   static constexpr int kLogSnapshots = 6;
-  static constexpr int kFewestFractionBits = 1;  // with which every weight fits
+  static constexpr int kFewestFractionBits = 1;  // every weight fits with these
   static_assert(HiddenLayer::kWeightLimit << kFewestFractionBits <= INT16_MAX);
   static constexpr std::int64_t kLargestThreshold = std::int64_t{1} << (30 + kFractionBits);
 

@@ -104,7 +104,7 @@ class WindowCounts {
   std::vector<std::int32_t> of_groups_;
   std::vector<std::int32_t> before_;
   std::vector<std::int32_t> of_windows_;
-  std::vector<std::int32_t> of_actions_;  ///< empty where every window is an action's
+  std::vector<std::int32_t> of_actions_;  ///< empty if every window has an action
   std::int32_t largest_ = 0;
 };
 

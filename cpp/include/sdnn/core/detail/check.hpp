@@ -60,7 +60,7 @@ inline void require_unit_values(std::string_view name, std::span<const double> v
                                 std::size_t size) {
   if (values.size() != size) require(false, name, std::to_string(size) + " values", values.size());
   for (std::size_t i = 0; i < size; ++i) {
-    if (values[i] >= 0.0 && values[i] <= 1.0) continue;  // only a bad one's name costs memory
+    if (values[i] >= 0.0 && values[i] <= 1.0) continue;  // only the name of a bad value allocates
     require_in_range(std::string(name) + '[' + std::to_string(i) + ']', values[i], 0.0, 1.0);
   }
 }

@@ -50,7 +50,7 @@ struct IntegerRegister {
       IntegerRegister sum = *this;
       sum.add(to);
       sum.store(to);
-    } else {  // each integer beside its sign; GCC converts vectors in many small pieces
+    } else {  // interleaves integers with their signs, because GCC converts vectors slowly
       using Twice = std::conditional_t<sizeof(Integer) == 1, std::int16_t, std::int32_t>;
       using Half = IntegerRegister<Twice>;
       static_assert(std::endian::native == std::endian::little, "the sign comes second");

@@ -45,8 +45,7 @@ class WholeFile {
     const int how = is_special_ ? O_TRUNC : O_CREAT | O_EXCL | O_NOFOLLOW;
     file_ = ::open(partial_.c_str(), O_WRONLY | O_CLOEXEC | how, 0666);
     if (file_ < 0) fail("cannot be written");
-    if (!is_special_)
-      (void)::flock(file_, LOCK_EX | LOCK_NB);  // so that nobody thinks it abandoned
+    if (!is_special_) (void)::flock(file_, LOCK_EX | LOCK_NB);  // marks the file as in use
 #else
     file_.open(partial_, std::ios::binary | std::ios::trunc);
     if (!file_) fail("cannot be written");
@@ -82,12 +81,12 @@ class WholeFile {
   void finish() {
 #if SDNN_HAS_POSIX_FILES
     if (!is_special_ && ::fsync(file_) != 0) fail("cannot be written");
-    if (!is_special_) rename();  // while it is locked
+    if (!is_special_) rename();  // still locked
     if (!close()) fail("cannot be written");
     if (is_special_) return;
     const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
     const int descriptor = ::open(folder.c_str(), O_RDONLY | O_CLOEXEC);
-    if (descriptor < 0) return;  // a folder that may not be read: the name is there all the same
+    if (descriptor < 0) return;  // the folder cannot be synchronized without rights to read it
     (void)::fsync(descriptor);
     (void)::close(descriptor);
 #else

@@ -18,7 +18,7 @@ class WorkerTeam {
  public:
   explicit WorkerTeam(std::size_t n_threads) {
 #if SDNN_HAS_THREADS
-    struct EndsWaiting {  // should no more threads be had, those that wait already must end
+    struct EndsWaiting {  // ends the waiting threads if no further thread can be started
       WorkerTeam& team;
       bool has_all = false;
       ~EndsWaiting() {
@@ -89,7 +89,7 @@ class WorkerTeam {
   std::atomic<std::size_t> n_busy_{0};
   std::size_t n_others_ = 0;
 #if SDNN_HAS_THREADS
-  Threads threads_;  // last: joined before the rest goes
+  Threads threads_;  // declared last, so that threads are joined before other members are destroyed
 #endif
 };
 

@@ -17,7 +17,7 @@ struct AcrobotArrays {
   std::array<double*, 4> state;  ///< theta1, theta2, theta1_dot, theta2_dot
   const double* torque;
   const double* goal_tolerance;
-  std::uint64_t* mask;  ///< in: all ones where an acrobot moves, else 0; out: where the goal is
+  std::uint64_t* mask;  ///< in: all ones where an acrobot moves; out: where it reached the goal
 };
 
 /// The number of doubles in the widest register.
@@ -73,7 +73,7 @@ inline void move_acrobots_portable(const AcrobotDynamics& dynamics, const Acrobo
 #if SDNN_NEON_KERNELS
 inline void move_acrobots_neon(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
                                std::size_t n) {
-  move_acrobots_portable(dynamics, arrays, n);  // NEON's two doubles already
+  move_acrobots_portable(dynamics, arrays, n);  // already uses the two doubles of NEON
 }
 #endif
 

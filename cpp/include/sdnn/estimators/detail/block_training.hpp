@@ -94,8 +94,8 @@ class BlockTraining {
            + 64 * size * n_words                         // entries_
            + sizeof(std::int32_t) * size * n_padded      // potentials_
            + PresentationWindow::bytes(n_padded, size)   // window_
-           + ChunkSums<std::int16_t>::bytes(size)        // of a thread
-           + plan_bytes(size)                            // of the block at hand
+           + ChunkSums<std::int16_t>::bytes(size)        // sums of a thread
+           + plan_bytes(size)                            // plan of the current block
            + (keeps_plans ? plan_bytes(n_samples) : 0);  // plans_
   }
 
@@ -130,7 +130,7 @@ class BlockTraining {
 
   /// The constant parts of a block.
   struct Plan {
-    std::vector<CodeWalk> walks;  // of each chunk
+    std::vector<CodeWalk> walks;  // walks by chunk
     std::size_t stride = 0;
     core::AlignedBuffer<Product> products;  // (size, stride), 1 added to each
   };
@@ -192,7 +192,7 @@ class BlockTraining {
     plan->products = core::AlignedBuffer<Product>(samples.size() * plan->stride);
     team_.run([&](std::size_t part) {
       for (std::size_t b = part; b < samples.size(); b += team_.size()) {
-        for (std::size_t e = b; e < samples.size(); ++e) {  // earlier ones are never asked for
+        for (std::size_t e = b; e < samples.size(); ++e) {  // products with later samples
           plan->products[b * plan->stride + e] =
               static_cast<Product>(1 + coding::inner_product(code_of(b), code_of(e), n_words_));
         }
@@ -279,19 +279,19 @@ class BlockTraining {
   std::shared_ptr<ParallelPerceptron> layer_;
   std::vector<std::int32_t> bins_;
   std::vector<PairChunk> chunks_;
-  std::vector<std::size_t> word_order_;  // of the weights
+  std::vector<std::size_t> word_order_;  // order of the words in the weights
   std::size_t n_words_;
   core::WorkerTeam team_;
   std::size_t most_samples_;
   bool keeps_plans_;
-  std::vector<Plan> plans_;                   // of large blocks
+  std::vector<Plan> plans_;                   // plans of large blocks
   std::vector<std::uint64_t> words_;          // (most_samples, active then positive, n_words)
   core::AlignedBuffer<std::int8_t> entries_;  // (chunks, most_samples, kChunkColumns): +1, 0, -1
   core::AlignedBuffer<std::int32_t> potentials_;  // (most_samples, n_padded_units)
   PresentationWindow window_;
-  std::vector<SignedRows<std::int8_t>> pending_;  // of each unit, codes not yet in its weights
+  std::vector<SignedRows<std::int8_t>> pending_;  // codes not yet added to the weights, by unit
   std::variant<Narrow, Wide> weights_;
-  std::int64_t chunk_norm_;  // while they are narrow: no unit's |weights| in a chunk sum up to more
+  std::int64_t chunk_norm_;  // bound of the sum of a unit's |weights| in a chunk, for 16 bits
 };
 
 }  // namespace sdnn::estimators

@@ -124,9 +124,9 @@ struct CodeWalk {
     std::uint16_t n_falling;
     bool from_zero;
   };
-  std::vector<std::uint8_t> columns;  ///< of all steps
+  std::vector<std::uint8_t> columns;  ///< columns of all steps
   std::vector<Step> steps;
-  std::vector<std::uint16_t> places;  ///< of each sample: the step that leads to its code
+  std::vector<std::uint16_t> places;  ///< the step that leads to the code of each sample
 
   /// The largest number of samples that a place can index.
   static constexpr std::size_t kMostSamples = std::size_t{1} << 16;

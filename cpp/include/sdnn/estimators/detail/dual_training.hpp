@@ -234,13 +234,13 @@ class DualTraining {
   std::size_t row_size_;
   std::size_t n_per_sum_;  // products whose sum a Product holds
   core::WorkerTeam team_;
-  core::AlignedBuffer<Product> products_;           // (n_samples, row_size), 1 added to each
-  core::AlignedBuffer<std::int32_t> potentials_;    // (n_units, row_size)
-  std::vector<SignedRows<Product>> pending_;        // of each unit: not in all potentials yet
+  core::AlignedBuffer<Product> products_;         // (n_samples, row_size), 1 added to each
+  core::AlignedBuffer<std::int32_t> potentials_;  // (n_units, row_size)
+  std::vector<SignedRows<Product>> pending_;      // corrections not yet in all potentials, by unit
   core::AlignedBuffer<std::int16_t> coefficients_;  // (n_samples, n_padded_units)
   PresentationWindow window_;
   core::AlignedBuffer<Product> gathered_;  // (kWindow, kWindow): products of scattered samples
-  bool full_ = false;  // another window could take a coefficient beyond its range
+  bool full_ = false;                      // another window could exceed the range of a coefficient
 };
 
 }  // namespace sdnn::estimators

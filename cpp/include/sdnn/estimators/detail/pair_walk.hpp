@@ -31,7 +31,7 @@ struct PairChunk {
   std::size_t one;
   std::size_t other;
   std::vector<std::size_t> words;
-  std::size_t place = 0;  ///< of its first word among those of all chunks
+  std::size_t place = 0;  ///< position of its first word among those of all chunks
 };
 
 /// Divides all words of a code into chunks, large chunks first; both pairs of two inputs are
@@ -118,7 +118,7 @@ class PairWalks {
   struct Input {
     std::vector<std::int32_t> bins;
     std::vector<std::uint32_t> strips;
-    std::vector<std::uint32_t> begins;  // of the strips in an order, and its end
+    std::vector<std::uint32_t> begins;  // beginnings of the strips in an order, and its end
     std::vector<std::uint32_t> sorted;  // samples by bins
   };
 
@@ -218,7 +218,7 @@ void add_codes(const coding::SelectiveDesensitization& code,
         const auto read_rows = [&](std::size_t k, Weight* rows) {
           for (const std::size_t word : chunks[done + k].words) {
             const Weight* row = tiles->tile(t) + 64 * word * tiles->width(t) + first % kTileUnits;
-            const std::size_t n_together = n == tiles->width(t) ? 64 : 1;  // which is quicker
+            const std::size_t n_together = n == tiles->width(t) ? 64 : 1;  // the faster choice
             for (std::size_t slot = 0; slot < 64; slot += n_together) {
               rows = std::copy_n(row, n_together * n, rows);
               row += n_together * tiles->width(t);

@@ -90,17 +90,16 @@ class PresentationWindow {
 
  private:
   struct Recent {
-    std::size_t index;  // in the window, of the sample that corrected
+    std::size_t index;  // position in the window of the corrected sample
     Correction correction;
   };
 
   std::size_t n_padded_units_;
-  std::size_t
-      stride_;  // a little more than the capacity: at a power of two, rows share cache lines
+  std::size_t stride_;  // not a power of two, at which rows would compete for cache sets
   core::AlignedBuffer<std::int32_t> by_unit_;    // (n_padded_units, stride)
   core::AlignedBuffer<std::int32_t> by_sample_;  // (kAtOnce, n_padded_units)
   std::vector<Correction> corrections_;
-  std::vector<Recent> recent_;  // corrections that have reached the next few samples only
+  std::vector<Recent> recent_;  // corrections applied to only the next few samples
 };
 
 }  // namespace sdnn::estimators

@@ -68,7 +68,7 @@ inline std::uint64_t walk_length(std::span<const std::int32_t> bins, std::size_t
 /// sort.
 inline std::vector<std::uint32_t> query_order(std::span<const std::int32_t> bins,
                                               std::size_t n_inputs) {
-  constexpr std::int32_t kCap = 64;  // beyond, patterns have little in common anyway
+  constexpr std::int32_t kCap = 64;  // more distant patterns have little in common
   const std::size_t n_queries = bins.size() / n_inputs;
   std::vector<std::uint32_t> given(n_queries);
   std::iota(given.begin(), given.end(), std::uint32_t{0});

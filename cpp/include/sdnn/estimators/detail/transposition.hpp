@@ -73,7 +73,7 @@ struct ShortBlock {
       std::memcpy(halves, from + r * from_stride, 16);
       std::memcpy(halves + 16, from + (r + 8) * from_stride, 16);
     });
-    Words pairs[8];  // of rows; then of pairs of rows
+    Words pairs[8];  // pairs of rows, then of pairs of rows
     LongWords fours[8];
     core::unrolled<4>([&](std::size_t k) SDNN_INLINE_LAMBDA {
       pairs[k] = as<Words>(low_turns(rows[2 * k], rows[2 * k + 1]));
