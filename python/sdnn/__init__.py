@@ -12,7 +12,7 @@ Packages, from the network up (each is imported when first used):
 - ``sdnn.environments``: the acrobot swing-up, redundant and noisy sensors
 - ``sdnn.export``: trained agents as C headers, also as the command ``sdnn export``
 - ``sdnn.reproduction``: the paper's experiments, also as the command ``sdnn reproduce``
-- ``sdnn.runs``: agents that learn in folders of their own, also as the command ``sdnn train``
+- ``sdnn.runs``: trainings, each in a folder, also as the command ``sdnn train``
 - ``sdnn.benchmarks``: speed on this machine, also as the command ``sdnn bench``
 
 ``sdnn.instruction_set()`` and ``sdnn.set_instruction_set(name)``: which vector instructions the

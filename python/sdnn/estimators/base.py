@@ -87,7 +87,7 @@ class BaseSDNN(Fitted, CodedInputs):
         One table of patterns per input, permuted for each pair, or two tables per pair.
     max_iter : int, optional
         Largest number of epochs of `fit`, which stops early once nothing is corrected. None: 30,
-        or as many as present 80,000 samples, at least 5. Use more for exact targets, say 300.
+        but at most 80,000 samples in all, and at least 5. Exact targets need more, such as 300.
     n_averaged_epochs : int, default=4
         Number of networks whose mean is predicted: that after the last epoch of `fit`, and those
         after every third epoch before it (every epoch from 5,001 samples on). `partial_fit`

@@ -43,9 +43,9 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         Smallest and largest output; None widens the range of the first targets by a fifth on
         either side.
     out_of_range : {"clip", "widen", "error"}, default="clip"
-        Treatment of targets outside the output range; "widen" stretches what was learned, for each
-        sample of a stream by its width and margins at most. Inputs outside their range are clipped
-        unless "error". The first causes an `OutOfRangeWarning`.
+        Treatment of targets outside the output range; "widen" stretches the learned function,
+        for each sample of a stream by its width and margins at most. Inputs outside their range are
+        clipped unless "error". The first causes an `OutOfRangeWarning`.
     refit : bool, default=False
         Whether early stopping trains again on the whole sample, for the best number of epochs.
 

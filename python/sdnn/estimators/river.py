@@ -24,6 +24,9 @@ from sdnn.estimators.outliers import numbers_to_range
 from sdnn.estimators.regressor import SDNNRegressor
 from sdnn.support.arguments import flag, require, shown, whole
 
+Features = Mapping[Hashable, Any]  # a sample of river
+Sample = dict[str, Any]
+Target = Any  # a number or a label
 WINDOW = 500  # samples whose range is followed
 REMEMBERED = 1000  # last samples, from which new features and categories are learned
 FEWEST = 5  # of these samples must have a new feature or category
@@ -31,7 +34,7 @@ MOST_FEATURES = 1000  # later ones are ignored
 MOST_CATEGORIES = 1000  # later categories of a feature count as missing values
 
 
-def cleaned(x: Mapping[Hashable, Any]) -> dict[str, Any]:
+def cleaned(x: Features) -> Sample:
     """Return a sample with strings as names and None for missing values."""
     sample = {str(name): value for name, value in x.items()}
     if len(sample) < len(x):
@@ -163,15 +166,15 @@ class Waiting:
         self.fitted: Any = None
         self.ranges: FollowedRanges | None = None
         most = max(self.grace_period, REMEMBERED)
-        self.samples: collections.deque[dict[str, Any]] = collections.deque(maxlen=most)
-        self.targets: collections.deque[Any] = collections.deque(maxlen=most)
+        self.samples: collections.deque[Sample] = collections.deque(maxlen=most)
+        self.targets: collections.deque[Target] = collections.deque(maxlen=most)
         self.n_learned = 0
         self.n_before_news: int | None = None  # samples before the first new feature or category
         self.reads: dict[str, Callable[[Any], object]] = {}  # by feature; read its values
         self.categories: dict[str, set[object]] = {}  # learned categories by feature
         self.most_columns = 0  # limit of a growing code
 
-    def learn_one(self, x: dict[Hashable, Any], y: Any) -> None:
+    def learn_one(self, x: Features, y: Target) -> None:
         """Learn one sample; an error changes nothing."""
         sample = cleaned(x)
         self._check_target(y)
@@ -196,7 +199,7 @@ class Waiting:
     def _check_target(self, y: object) -> None:
         """Raise ValueError for an impossible target."""
 
-    def _learn(self, sample: dict[str, object], y: Any) -> None:
+    def _learn(self, sample: Sample, y: Target) -> None:
         self.fitted.learn_one(sample, y)
 
     def _sample(self, sample: Mapping[str, object], learns: bool = False) -> dict[str, object]:
@@ -331,9 +334,9 @@ class Waiting:
             categories = [category for other, category in often if other == name]
             if categories:
                 categories.sort(key=lambda category: (isinstance(category, str), category))
-                coding: Any = self.fitted.codings_[index]
-                every = (*coding.base.categories, *categories)[:MOST_CATEGORIES]
-                base = dataclasses.replace(coding.base, categories=every)
+                coding = self.fitted.codings_[index]
+                known = (*coding.base.categories, *categories)[:MOST_CATEGORIES]
+                base = dataclasses.replace(coding.base, categories=known)
                 changed[index] = dataclasses.replace(coding, base=base)
         return new[: MOST_FEATURES - len(self.reads)], changed
 
@@ -373,14 +376,14 @@ class RiverRegressor(Waiting, base.Regressor):
 
     default_model = SDNNRegressor(out_of_range="widen")
 
-    def _check_target(self, y: Any) -> None:
+    def _check_target(self, y: Target) -> None:
         try:
             is_finite = math.isfinite(y)
         except (OverflowError, TypeError, ValueError):
             is_finite = False
         require(is_finite, "y", "be a finite number", y)
 
-    def predict_one(self, x: dict[Hashable, Any]) -> float:
+    def predict_one(self, x: Features) -> float:
         """Predict one target."""
         if self.fitted is None:
             return float(np.mean(self.targets)) if self.targets else 0.0
@@ -416,20 +419,20 @@ class RiverClassifier(Waiting, base.Classifier):
         is_label = not is_missing(y) and isinstance(y, str) == isinstance(first, str)
         require(is_label, "y", f"be a label, like {shown(first)}", y)
 
-    def _learn(self, sample: dict[str, object], y: Any) -> None:
+    def _learn(self, sample: Sample, y: Target) -> None:
         if y not in self.fitted.classes_:
             self.fitted._bins_of_one(sample)  # raises before a class is added
             self.fitted._add_class(y)
         super()._learn(sample, y)
 
-    def predict_one(self, x: dict[Hashable, Any], **_options: object) -> Any:
+    def predict_one(self, x: Features, **_options: object) -> Target:
         """Predict one label; None before the first sample."""
         if self.fitted is not None:
             return self.fitted.predict_one(self._sample(cleaned(x)))
         # Ties go to the label that was observed first.
         return max(dict.fromkeys(self.targets), key=self.targets.count, default=None)
 
-    def predict_proba_one(self, x: dict[Hashable, Any], **_options: object) -> dict[Any, float]:
+    def predict_proba_one(self, x: Features, **_options: object) -> dict[Target, float]:
         """Estimate the probability of each label; none before the first sample.
 
         NotImplementedError for models with one unit per class or pair of classes.

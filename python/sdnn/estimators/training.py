@@ -64,14 +64,14 @@ def sample_weights(
     """
     if weights is None:
         return None
-    wanted = f"{name} must be a number in [0, {LARGEST_WEIGHT}] for each of {n_samples} samples"
+    problem = f"{name} must be a number in [0, {LARGEST_WEIGHT}] for each of {n_samples} samples"
     try:
         each = np.array(weights, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ValueError(f"{wanted}, got {shown(weights)}") from None
+        raise ValueError(f"{problem}, got {shown(weights)}") from None
     each = np.full(n_samples, each) if each.ndim == 0 else each
     if each.shape != (n_samples,) or not np.all((each >= 0) & (each <= LARGEST_WEIGHT)):
-        raise ValueError(f"{wanted}, got {shown(weights)}")
+        raise ValueError(f"{problem}, got {shown(weights)}")
     if not each.any():
         raise ValueError(f"{name} must be above zero for some sample, got zero for all")
     if each.sum() > MOST_PRESENTED:

@@ -1,4 +1,4 @@
-"""Checks of arguments: each message names the argument, what was expected and what was given."""
+"""Checks of arguments; each message names the argument, the expected and the given value."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def array_of(name: str, value: Any, types: str = "fiub", what: str = "numbers") 
     require(not has_mask, name, f"be {what} without a mask", value)
     try:
         array = np.asarray(value)
-    except Exception:  # lists of several lengths, and what arrays of other libraries raise
+    except Exception:  # lists of several lengths, or errors of other libraries
         array = np.empty(0, object)
     require(array.dtype.kind in types, name, f"be {what}", value)
     return array
@@ -310,7 +310,7 @@ HABITS = {habit: meaning for habits, meaning in _MEANINGS.items() for habit in h
 def advice(
     name: str, possible: Iterable[str], elsewhere: Mapping[str, str] = MappingProxyType({})
 ) -> str:
-    """Return what an unknown name may mean, and the possible names, the most similar first.
+    """Suggest a meaning of an unknown name, and list the possible names, the most similar first.
 
     ``elsewhere`` has names that are possible in other places, and how they are written there.
 

@@ -1,4 +1,4 @@
-"""The bounds of what is observed."""
+"""The bounds of observations."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ def csv_bytes(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
 
 
 def csv_pieces(header: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[bytes]:
-    """Yield the same in pieces, for tables that fill the memory."""
+    """Yield comma-separated values in pieces, for tables that are larger than the memory."""
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     for row in chain([header], rows):

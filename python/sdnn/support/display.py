@@ -1,4 +1,4 @@
-"""How agents, runs and results show themselves, in a terminal and in a notebook."""
+"""Representations of agents, runs and results in a terminal and in a notebook."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def table_of(thing: object, facts: Mapping[str, object]) -> str:
 
 
 class Displayed:
-    """Shows what `_facts` returns, by name.
+    """An object that is displayed as the facts that `_facts` returns.
 
     >>> class Room(Displayed):
     ...     def _facts(self):
@@ -32,7 +32,7 @@ class Displayed:
     """
 
     def _facts(self) -> Mapping[str, object]:
-        """Return what is shown."""
+        """Return the facts by name."""
         raise NotImplementedError
 
     def __repr__(self) -> str:

@@ -33,7 +33,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
     """Open a new file in the same folder; at the end it takes the place of ``path``.
 
     Its name is unpredictable. A link or a pipe of the name ``path`` is replaced:
-    nothing is written to where it leads. OSError if the file cannot be written; one that was there
+    its target stays as it was. OSError if the file cannot be written; one that was there
     before stays as it was.
     """
     if path.absolute().parent in _FOLDERS_OF_DEVICES:
@@ -57,7 +57,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Let errors of writing name the file, as those of opening do: a disk may be full."""
+    """Add the name of the file to errors of writing, such as for a full disk."""
     try:
         yield
     except OSError as error:
@@ -116,7 +116,7 @@ def open_to_append(path: Path) -> TextIO:
 
 
 def _open_itself(name: str, flags: int) -> int:
-    """Open a file, and not what a link leads to; never wait for the reader of a pipe."""
+    """Open a file, but not the target of a link; never wait for the reader of a pipe."""
     return os.open(name, flags | _NO_LINK | _NO_WAITING, 0o666)
 
 
@@ -159,7 +159,7 @@ def _new_file(path: Path) -> BinaryIO:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Put names on the disk, where the system and the folder's rights allow it."""
+    """Synchronize the names in a folder, if the system and the folder's rights allow it."""
     if not hasattr(os, "O_DIRECTORY"):
         return
     with suppress(OSError):
@@ -171,7 +171,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def remove_abandoned_files(folder: Path) -> None:
-    """Remove what killed processes left under way in a folder."""
+    """Remove the partial files of killed processes from a folder."""
     for path in folder.glob(f"*{PARTIAL_SUFFIX}"):
         if not _NAME_OF_PARTIAL.search(path.name):
             continue

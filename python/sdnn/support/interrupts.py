@@ -18,7 +18,7 @@ class Interrupts:
     """A context in which a first signal calls ``ask_to_stop``; a second one acts as usual.
 
     Signals with other handlers, and threads other than the main one, are left alone.
-    ``received`` is the signal that came, if any.
+    ``received`` is the received signal, or None.
     """
 
     def __init__(

@@ -44,7 +44,7 @@ def description() -> str:
 
 
 def build() -> dict[str, str]:
-    """Return what a bug report needs: versions, compiler, platform, instruction sets."""
+    """Return facts for bug reports: versions, compiler, platform, instruction sets."""
     import platform
 
     names = ("numpy", "gymnasium", "scikit-learn", "safetensors")
