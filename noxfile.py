@@ -49,9 +49,10 @@ def cmake_build(session, preset, *targets):
 
 
 def cpp_sources():
-    """List all C++ files of our own."""
+    """List all C++ files of our own, and the plain C files that `sdnn export` writes."""
     folders = ("cpp", "tests/cpp", "tests/fuzz", "bench", "docs/examples/cpp")
-    return sorted(str(p) for f in folders for p in (ROOT / f).rglob("*.[ch]pp"))
+    files = [path for folder in folders for path in (ROOT / folder).rglob("*.[ch]pp")]
+    return sorted(map(str, [*files, *(ROOT / "cpp" / "c").glob("*.h")]))
 
 
 @quick()

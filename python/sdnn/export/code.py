@@ -51,25 +51,25 @@ class Code:
         """Of each group the modified units, in the order of those that modify them."""
         return [np.argsort(self.network.permutation(*group)) for group in self.groups]
 
-    def values(self) -> dict[str, Any]:
-        """Return what the templates of a code need."""
-        network, inputs = self.network, range(self.n_inputs)
-        n_ones = [int((network.table(i) > 0).sum(axis=1).max()) for i in inputs]
-        most_columns = sum(n_ones[nu] for _, nu in self.groups[: self.n_double : 2])
-        most_columns += sum(n_ones[nu] for _, nu in self.groups[self.n_double :])
-        is_short = self.n_columns <= 2**16
+    @property
+    def most_columns(self) -> int:
+        """Number of columns that a state can have at most."""
+        n_ones = [int((self.network.table(i) > 0).sum(axis=1).max()) for i in range(self.n_inputs)]
+        modifiers = [*self.groups[: self.n_double : 2], *self.groups[self.n_double :]]
+        return sum(n_ones[nu] for _, nu in modifiers)
+
+    @property
+    def column_bytes(self) -> int:
+        """Bytes of the number of a column."""
+        return 2 if self.n_columns <= 2**16 else 4
+
+    def defines(self) -> dict[str, int]:
+        """Return the sizes of a code."""
         return {
-            "n_pattern_units": self.m,
-            "pattern_bytes": -(-self.m // 8),
-            "n_groups": len(self.groups),
-            "is_double": {0: "0", len(self.groups): "1"}.get(
-                self.n_double, f"group < {self.n_double}"
-            ),
-            "unit_type": "uint8_t" if self.m <= 256 else "uint16_t",
-            "column_type": "uint16_t" if is_short else "uint32_t",
-            "bytes_of_column": 2 if is_short else 4,
-            "n_columns": self.n_columns,
-            "most_columns": most_columns,
+            "N_PATTERN_UNITS": self.m,
+            "N_GROUPS": len(self.groups),
+            "N_DOUBLE_GROUPS": self.n_double,
+            "MOST_COLUMNS": self.most_columns,
         }
 
     def add_tables(self, tables: Tables, ending: str = "") -> list[str]:
@@ -82,7 +82,7 @@ class Code:
             "patterns": ("uint8_t", np.concatenate(patterns).reshape(-1)),
             "modified": ("uint16_t", np.array([mu for mu, _ in self.groups])),
             "modifiers": ("uint16_t", np.array([nu for _, nu in self.groups])),
-            "units": (self.values()["unit_type"], np.concatenate(self.units)),
+            "units": ("uint8_t" if self.m <= 256 else "uint16_t", np.concatenate(self.units)),
         }
         for part, (kind, values) in parts.items():
             tables.add(kind, f"{part}{ending}", values)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sdnn.agents import Agent, SDNNQLambda, SDNNQLearning
-from sdnn.export.linear import LearnerWriter, LinearWriter
+from sdnn.export.q_lambda import QLambdaLearner, QLambdaWriter
 from sdnn.export.sdnn_c import SDNNCWriter
 from sdnn.export.sdnn_c_learning import SDNNCLearner
 from sdnn.export.writer import CHeader
@@ -91,7 +91,7 @@ def c_header(
     >>> header = c_header(agent, "car")
     >>> header.flash_bytes < 2**17
     True
-    >>> "static inline uint32_t car_act_fixed(const int32_t *observation)" in header.text
+    >>> "static inline uint32_t car_act_fixed(const int32_t* observation)" in header.text
     True
     """
     learns = flag("learning", learning)
@@ -116,5 +116,5 @@ def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool)
     if isinstance(agent, SDNNQLearning):
         return (SDNNCLearner if learns else SDNNCWriter)(agent, name, fraction_bits)
     if isinstance(agent, SDNNQLambda):
-        return (LearnerWriter if learns else LinearWriter)(agent, name, fraction_bits)
+        return (QLambdaLearner if learns else QLambdaWriter)(agent, name, fraction_bits)
     raise TypeError(f"agent must be an SDNNQLearning or SDNNQLambda, got {shown(agent)}")

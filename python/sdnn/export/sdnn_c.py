@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sdnn.agents import SDNNQLearning
 from sdnn.export.code import Code
-from sdnn.export.tables import Tables, joined, weight_words
+from sdnn.export.tables import Tables, weight_words
 from sdnn.export.writer import CHeader, Writer, require_few_weights
 from sdnn.support.arguments import argument_error
 
@@ -50,55 +50,49 @@ class SDNNCWriter(Writer):
 
     def header(self) -> CHeader:
         """Make the header."""
-        name, networks, tables = self.name, self.networks, self.tables_of_spaces()
+        networks, tables = self.networks, self.tables_of_spaces()
         codes = [Code(network, self.n_inputs) for network in networks]
-        n_columns = codes[0].n_columns
-        self.require_small(self.agent.approximator.n_hidden_units, n_columns)
+        self.require_small(self.agent.approximator.n_hidden_units, codes[0].n_columns)
         self._add_ranks(tables)
         rows, n_units, n_rows = list[str](), list[int](), 0
         for d, (network, code) in enumerate(zip(networks, codes, strict=True)):
             used, first_units = self.units(network)
             weights, n_bytes = weight_words(code.paired(network.averaged_weights()[used]))
             thresholds = np.pad(network.averaged_thresholds()[used], (0, -used.size % 4))
-            parts = code.add_tables(tables, f"_{d}")
-            for kind, part, constants in (
+            coding = ", ".join(f"{self.name}_{part}" for part in code.add_tables(tables, f"_{d}"))
+            for c_type, part, constants in (
                 ("uint32_t", "weights", weights),
                 ("int32_t", "thresholds", thresholds),
                 ("uint8_t", "n_bytes", n_bytes),
                 ("uint16_t", "first_units", first_units),
             ):
-                parts.append(f"{part}_{d}")
-                tables.add(kind, parts[-1], constants)
+                tables.add(c_type, f"{part}_{d}", constants)
+            parts = ("weights", "thresholds", "n_bytes", "first_units")
+            members = ", ".join(f"{self.name}_{part}_{d}" for part in parts)
+            rows.append(f"{{{{{coding}}}, {members}, {used.size}, {network.n_actions}}},")
             tables.n_bytes += _BYTES_OF_NETWORK
-            members = [
-                *(f"{name}_{part}" for part in parts),
-                str(used.size),
-                str(network.n_actions),
-            ]
-            rows.append(f"  {{{', '.join(members)}}},")
             n_units.append(used.size)
             n_rows += int(n_bytes.sum())
-        declaration = f"static const {name}_network {name}_networks[{len(rows)}] = {{"
-        n_fire_words, most_actions = -(-max(n_units) // 32), max(self.n_actions())
-        shapes = [code.values() for code in codes]
-        most_columns = max(shape["most_columns"] for shape in shapes)
-        ram_bytes = shapes[0]["bytes_of_column"] * most_columns + 8
-        ram_bytes += 4 * n_fire_words + 2 * most_actions + 12 * self.n_inputs
-        values = {
-            **shapes[0],
-            "description": self.describe(" + ".join(map(str, n_units))),
-            "coding": "network->",
-            "most_columns": most_columns,
-            "ram_bytes": ram_bytes,
-            "weight_bytes": 4 * n_rows * n_columns,
-            "n_words": n_rows * most_columns,
-            "networks": joined([declaration, *rows, "};"]),
-            "n_fire_words": n_fire_words,
-            "most_actions": most_actions,
-            "ties": self.ties(),
-            "is_linear": False,
+        most_columns, most_actions = max(code.most_columns for code in codes), max(self.n_actions())
+        defines = {
+            **codes[0].defines(),
+            "MOST_COLUMNS": most_columns,
+            "N_ACTIVE_UNITS": self.agent.approximator.n_active_units,
+            "MOST_UNITS": max(n_units),
+            "MOST_ACTIONS": most_actions,
+            "HAS_TIE_TOLERANCE": int(self.agent.learning.tie_tolerance > 0.0),
+            "NETWORKS": rows,
         }
-        return self.write("c_sdnn_c", values, tables)
+        ram_bytes = codes[0].column_bytes * most_columns + 8 + 4 * -(-max(n_units) // 32)
+        ram_bytes += 2 * most_actions + 12 * self.n_inputs
+        sizes = {
+            "weight_bytes": 4 * n_rows * codes[0].n_columns,
+            "ram_bytes": ram_bytes,
+            "n_words": n_rows * most_columns,
+        }
+        description = self.describe(" + ".join(map(str, n_units)))
+        needs = self.needs(**sizes)
+        return self.write("sdnn_greedy_c.h", description, needs, defines, tables, **sizes)
 
     def _add_ranks(self, tables: Tables) -> None:
         networks = self.networks

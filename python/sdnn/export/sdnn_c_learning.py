@@ -12,7 +12,7 @@ from sdnn.agents import SDNNQLearning
 from sdnn.export.code import Code
 from sdnn.export.sdnn_c import SDNNCWriter
 from sdnn.export.tables import Tables, weight_words
-from sdnn.export.writer import MOST_FRACTION_BITS, SCALE_FIELDS, CHeader, Learner
+from sdnn.export.writer import MOST_FRACTION_BITS, SCALE_FIELDS, CHeader, Learner, learning_needs
 from sdnn.support.arguments import argument_error, whole
 
 _WEIGHTS_STREAM = 3  # see cpp/include/sdnn/core/random.hpp
@@ -20,6 +20,8 @@ _MOST_RETURNS = 256
 MOST_WEIGHT = 127
 _LARGEST = 2.0**100  # of real numbers
 _WORD = 2**64 - 1
+_ROUNDING = {"away": "AWAY", "half_up": "HALF_UP", "random": "AT_RANDOM"}
+_RANGE = ("low", "high", "sum")
 
 
 class SDNNCLearner(Learner, SDNNCWriter):
@@ -182,112 +184,135 @@ class SDNNCLearner(Learner, SDNNCWriter):
             network.thresholds(), new.thresholds()
         )
 
-    def _plans(self, state: dict[str, Any]) -> dict[str, dict[str, str]]:
-        """Return what follows the progress, and how."""
-        learning, plans = self.agent.learning, {}
-        for field, name, fraction in (
-            ("rate", "learning_rate", 1.0),
-            ("epsilon", "epsilon", learning.exploration_fraction),
-        ):
+    def _schedules(self, state: dict[str, Any]) -> dict[str, str]:
+        """Return the ends of the rates that follow the progress."""
+        learning, defines = self.agent.learning, dict[str, str]()
+        for macro, name in (("RATE", "learning_rate"), ("EPSILON", "epsilon")):
             first, last = getattr(learning, name), getattr(learning, f"final_{name}")
-            if last is None or name in state:
-                continue
-            plans[field] = {
-                "first": _real(first),
-                "last": _real(last),
-                "fraction": "" if fraction == 1.0 else _real(fraction),
-            }
-        return plans
+            if last is not None and name not in state:
+                defines |= {f"INITIAL_{macro}": _real(first), f"LAST_{macro}": _real(last)}
+        if "LAST_EPSILON" in defines:
+            defines["EXPLORATION_FRACTION"] = _real(learning.exploration_fraction)
+        return defines
 
     def header(self) -> CHeader:
         """Make the header."""
-        code, state = self.code, self.state()
-        sizes, network = self.agent.approximator, self.network()
-        tables, is_new = self.tables_of_spaces(), self._is_new()
-        code.add_tables(tables)
+        state, tables, is_new = self.state(), self.tables_of_spaces(), self._is_new()
+        self.code.add_tables(tables)
         tables.add("uint32_t", "first_units", self.first_units, "Where windows begin.")
         seeds = [*self.seeds(state)]
         if is_new:
             seeds.append(np.array(_seeded(self.agent.seed, _WEIGHTS_STREAM), np.uint64))
         about = "What the agent begins with: states of its random generators."
         tables.add("uint64_t", "seeds", np.array(seeds), about)
-        n_ranges = self._add_weights(tables, is_new)
-        low, high = network.output_range
-        reals = {
-            "progress": state["progress"],
-            "rate": self.agent.learning_rate,
-            "epsilon": self.agent.epsilon,
+        defines = {
+            **self.code.defines(),
+            **self._network_defines(),
+            **self._schedules(state),
+            **self.learning_defines(state),
+            **self._add_weights(tables, is_new),
+            **self._first_values(state),
         }
-        returns: dict[str, Any] = {}
         if self.adapts:
-            rewards, known = self._rewards(state), state["range.returns"]
-            reals |= {one: state[f"range.{one}"] for one in ("low", "high", "sum")}
-            returns = {"n_rewards": rewards.size, "n_kept_returns": known.size}
-            if rewards.size:
-                tables.add("int32_t", "first_rewards", rewards)
-            if known.size:
-                tables.add("uint64_t", "first_returns", known.view(np.uint64))
-        shape, change = code.values(), "(column < {} ? 2 : 1) * change"
-        values = {
-            **shape,
-            **returns,
-            **self.values_of_learning(state),
-            "description": self.describe(str(self.used.size)),
-            "coding": f"{self.name}_",
-            "is_linear": False,
-            "has_progress": True,
-            "weight_bytes": 0 if is_new else 4 * self.n_words,
-            "n_words": self.n_words,
-            "n_actions": network.n_actions,
-            "n_ranges": n_ranges,
-            "is_new": is_new,
-            "threshold": round(sizes.initial_threshold * sizes.lattice),
-            "q_low": _real(low),
-            "q_high": _real(high),
-            "u_low": network.u_low,
-            "u_high": network.u_high,
-            "change": {"0": "change", "1": "2 * change"}.get(
-                shape["is_double"], change.format(code.n_double * code.m)
-            ),
-            "discount": _real(self.agent.learning.discount),
-            "reals": {field: _real(value) for field, value in reals.items()},
-            "plans": self._plans(state),
-            "stack_bytes": self._stack_bytes(shape),
-            "ram_bytes": self._ram_bytes(shape),
-        }
-        return self.write("c_sdnn_c_learning", values, tables)
+            defines |= self._add_range(tables, state)
+        ram_bytes = self._ram_bytes()
+        memory = (
+            f"{ram_bytes:,} bytes, in one struct that you place, and {self._stack_bytes():,} bytes"
+            " of arrays on the stack."
+        )
+        return self.write(
+            "sdnn_c.h",
+            self.describe(str(self.used.size)),
+            learning_needs("9", memory),
+            defines,
+            tables,
+            weight_bytes=0 if is_new else 4 * self.n_words,
+            ram_bytes=ram_bytes,
+            n_words=self.n_words,
+        )
 
-    def _add_weights(self, tables: Tables, is_new: bool) -> int:
-        """Add the weights or, where they are drawn, ranges of used units; return their number."""
+    def _network_defines(self) -> dict[str, Any]:
+        """Return the sizes of the network and the settings of its learning rule."""
+        sizes, learning, network = self.agent.approximator, self.agent.learning, self.network()
+        return {
+            "N_ACTIONS": network.n_actions,
+            "N_UNITS": self.n_units,
+            "N_ACTIVE_UNITS": sizes.n_active_units,
+            "U_LOW": network.u_low,
+            "U_HIGH": network.u_high,
+            "LATTICE": sizes.lattice,
+            "WEIGHT_LIMIT": sizes.weight_limit,
+            "ROUNDING_RULE": f"{self.name.upper()}_{_ROUNDING[sizes.rounding]}",
+            "N_STEPS": learning.n_steps,
+            "DISCOUNT": _real(learning.discount),
+            "ADAPTS": int(self.adapts),
+            "HORIZON": self.horizon,
+        }
+
+    def _first_values(self, state: dict[str, Any]) -> dict[str, str]:
+        """Return the real numbers that the agent begins with."""
+        low, high = self.network().output_range
+        return {
+            "FIRST_PROGRESS": _real(state["progress"]),
+            "FIRST_RATE": _real(self.agent.learning_rate),
+            "FIRST_EPSILON": _real(self.agent.epsilon),
+            "FIRST_Q_LOW": _real(low),
+            "FIRST_Q_HIGH": _real(high),
+        }
+
+    def _add_range(self, tables: Tables, state: dict[str, Any]) -> dict[str, Any]:
+        """Add the rewards and returns of an adaptive range; return what else it begins with."""
+        rewards, returns = self._rewards(state), state["range.returns"]
+        if rewards.size:
+            tables.add("int32_t", "first_rewards", rewards)
+        if returns.size:
+            tables.add("uint64_t", "first_returns", returns.view(np.uint64))
+        return {
+            **{f"FIRST_{end.upper()}": _real(state[f"range.{end}"]) for end in _RANGE},
+            "FIRST_DUE": state["range.due"],
+            "FIRST_N_RETURNS": state["range.n_returns"],
+            "FIRST_N_PENDING_REWARDS": rewards.size,
+            "FIRST_N_KEPT_RETURNS": returns.size,
+            "FIRST_OLDEST": state["range.oldest"],
+        }
+
+    def _add_weights(self, tables: Tables, is_new: bool) -> dict[str, int]:
+        """Add the weights, or ranges of used units where the agent draws weights."""
         if not is_new:
             words = weight_words(self.columns())[0]
             tables.add("uint32_t", "first_weights", words)
             tables.add("int32_t", "first_thresholds", self.thresholds())
-            return 0
+            return {"IS_NEW": 0}
         breaks = np.flatnonzero(np.diff(self.used) > 1)
         first, last = np.r_[0, breaks + 1], np.r_[breaks, self.used.size - 1]
         ranges = np.stack([self.used[first], self.used[last] + 1], axis=1)
         tables.add("uint16_t", "used", ranges, "Hidden units in use: from, to.")
-        places = [self.code.groups.index(pair) for pair in self.network().pairs]
-        about = "Places of the pairs of inputs, in the order in which weights are drawn."
-        tables.add("uint16_t", "groups", np.array(places), about)
-        return len(ranges)
+        groups = [self.code.groups.index(pair) for pair in self.network().pairs]
+        about = "Groups of the pairs of inputs, in the order in which weights are drawn."
+        tables.add("uint16_t", "groups", np.array(groups), about)
+        sizes = self.agent.approximator
+        return {
+            "IS_NEW": 1,
+            "N_RANGES": len(ranges),
+            "N_HIDDEN_UNITS": sizes.n_hidden_units,
+            "FIRST_THRESHOLD": round(sizes.initial_threshold * sizes.lattice),
+        }
 
-    def _ram_bytes(self, shape: dict[str, Any]) -> int:
+    def _ram_bytes(self) -> int:
         """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
-        n_steps = self.agent.learning.n_steps
-        columns = -(-shape["bytes_of_column"] * shape["most_columns"] // 4) * 4
-        one_state = 8 + 4 * self.n_inputs + columns + 4 + 4 * self.n_units
-        n_bytes = 5 * 32 + 24 + 5 * 8 + (n_steps + 1) * one_state + 12 * n_steps
+        n_steps, code = self.agent.learning.n_steps, self.code
+        columns = -(-code.column_bytes * code.most_columns // 4) * 4
+        state_bytes = 8 + 4 * self.n_inputs + columns + 4 + 4 * self.n_units
+        n_bytes = 5 * 32 + 24 + 5 * 8 + (n_steps + 1) * state_bytes + 12 * n_steps
         n_bytes += 4 * self.n_words + 4 * self.n_units
         n_bytes += 4 * (10 + self.n_inputs + self.n_observed)
         if self.adapts:
             n_bytes += 5 * 8 + 8 * _MOST_RETURNS + 8 * self.horizon + 12
         return int(-(-n_bytes // 8) * 8)
 
-    def _stack_bytes(self, shape: dict[str, Any]) -> int:
+    def _stack_bytes(self) -> int:
         """Return the bytes of the largest arrays that are there at one time."""
-        changes = 2 * shape["bytes_of_column"] * shape["most_columns"] + shape["n_columns"]
+        changes = 2 * self.code.column_bytes * self.code.most_columns + self.code.n_columns
         return int(changes + 4 * self.network().n_actions + 8 * self.n_inputs)
 
 

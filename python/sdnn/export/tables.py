@@ -34,10 +34,6 @@ class Tables:
         stored = values if values.size else np.zeros(1, np.int64)  # C has no empty tables
         self.lines += table_lines(f"static const {kind} {self.prefix}_{name}", stored, form)
 
-    def text(self) -> str:
-        """Return all tables."""
-        return joined(self.lines)
-
 
 def table_lines(declaration: str, values: NDArray[Any], form: str) -> list[str]:
     """Write a table of one or two dimensions in C."""
@@ -97,26 +93,25 @@ class Input:
     high: float
     n_bins: int
 
-    def usage(self) -> Iterator[str]:
-        """Describe it to a reader of the header."""
+    def usage(self, number: int) -> Iterator[str]:
+        """Describe the input to a reader of the header."""
         first = self.at[0]
         if self.kind == "angle":
-            yield f"the angle of cosine observation[{first}] and sine"
-            yield f"  observation[{self.at[1]}], from -pi to pi in {self.n_bins} bins"
+            yield f"  input {number}: the angle of cosine observation[{first}] and sine"
+            yield f"    observation[{self.at[1]}], from -pi to pi in {self.n_bins} bins"
         elif self.kind == "symbol":
-            yield f"which of observation[{first}] to observation[{first + self.n_bins - 1}] is 1"
+            last = first + self.n_bins - 1
+            yield f"  input {number}: which of observation[{first}] to observation[{last}] is 1"
         else:
             turn = ", an angle," if self.kind == "circular" else ""
-            ends = f"from {self.low:.6g} to {self.high:.6g} in {self.n_bins} bins"
-            yield f"observation[{first}]{turn} {ends}"
+            bounds = f"from {self.low:.6g} to {self.high:.6g} in {self.n_bins} bins"
+            yield f"  input {number}: observation[{first}]{turn} {bounds}"
 
 
-def conversions(
-    inputs: Sequence[Input], name: str, fraction_bits: int
-) -> tuple[Tables, list[str], list[str]]:
-    """Write the calls that find the bins of observations, in fixed and in floating point.
+def conversions(inputs: Sequence[Input], name: str, fraction_bits: int) -> tuple[Tables, list[str]]:
+    """Return the tables that find the bins of observations, and a macro call for each input.
 
-    Also return the tables that they use, shared by inputs of one kind and range.
+    Inputs of the same type and range share a table. The macros are those of sdnn_observation.h.
     """
     tables, names = Tables(name), dict[Any, str]()
 
@@ -126,31 +121,25 @@ def conversions(
             tables.add("int32_t", f"{word}_{len(names) - 1}", values, comment)
         return names[key]
 
-    fixed, double = [], []
-    for one in inputs:
-        n_bins, reading = one.n_bins, f"observation[{one.at[0]}]"
-        unit = f"({reading} - ({one.low!r})) / {one.high - one.low!r}"
-        if one.kind == "angle":
+    calls = []
+    for i, source in enumerate(inputs):
+        n_bins, at, low = source.n_bins, source.at[0], source.low
+        width = source.high - low
+        if source.kind == "angle":
             about = "Cosine and sine of the angles where bins begin, from bin 1 on."
             bounds = table(("angle", n_bins), "directions", _directions(n_bins), about)
-            given = f"({bounds}, {n_bins}, {reading}, observation[{one.at[1]}])"
-            fixed.append(f"bin_of_direction{given}")
-            double.append(f"bin_of_doubles{given}")
-        elif one.kind == "symbol":
-            fixed.append(f"symbol_of_fixed(&{reading}, {n_bins})")
-            double.append(f"symbol_of_double(&{reading}, {n_bins})")
-        elif one.kind == "circular":
-            rate, offset = _turns(one.low, one.high, fraction_bits)
-            turn = f"UINT64_C({rate}) * (uint64_t)(int64_t){reading} + UINT64_C({offset})"
-            fixed.append(f"bin_of_turn({turn}, {n_bins})")
-            double.append(f"bin_of_unit({name}_part_of_turn({unit}), {n_bins})")
+            calls.append(f"ANGLE({i}, {at}, {source.at[1]}, {n_bins}, {bounds})")
+        elif source.kind == "symbol":
+            calls.append(f"SYMBOL({i}, {at}, {n_bins})")
+        elif source.kind == "circular":
+            turns = ", ".join(f"UINT64_C({n})" for n in _turns(low, source.high, fraction_bits))
+            calls.append(f"CIRCULAR({i}, {at}, {n_bins}, {low!r}, {width!r}, {turns})")
         else:
-            about = f"The least reading in each bin of {reading}, from bin 1 on."
-            values = _fixed_bounds(one.low, one.high, n_bins, fraction_bits)
-            bounds = table((one.at[0], n_bins), "bounds", values, about)
-            fixed.append(f"bin_between({bounds}, {n_bins}, {reading})")
-            double.append(f"bin_of_unit({unit}, {n_bins})")
-    return tables, fixed, double
+            about = f"The least reading in each bin of observation[{at}], from bin 1 on."
+            values = _fixed_bounds(low, source.high, n_bins, fraction_bits)
+            bounds = table((at, n_bins), "bounds", values, about)
+            calls.append(f"VARIABLE({i}, {at}, {n_bins}, {low!r}, {width!r}, {bounds})")
+    return tables, calls
 
 
 def _fixed_bounds(low: float, high: float, n_bins: int, fraction_bits: int) -> NDArray[Any]:

@@ -7,16 +7,15 @@ import math
 import zlib
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from sdnn._core import __version__
 from sdnn.agents.q_learning import ValueAgent
+from sdnn.export.source import c_source, comment, define_lines
 from sdnn.export.tables import Input, Tables, by_dimension, conversions, joined, table_lines
 from sdnn.support.arguments import argument_error, whole
 
@@ -31,6 +30,7 @@ SCALE_FIELDS = [
     (f"{SCALE}.size_in_window", "<i4"),
     (f"{SCALE}.headroom", "<i4"),
 ]
+_TIES = {"lowest": "LOWEST", "middle": "MIDDLE", "uniform": "DRAWN"}
 MOST_WEIGHTS = 2**26  # some hundred megabytes of text
 
 
@@ -70,6 +70,8 @@ class Writer(ABC):
         self.n_inputs = len(self.inputs)
         self.n_observed = len(agent.observation_range[0])
         self.fraction_bits = self._checked_fraction_bits(fraction_bits)
+
+    title: ClassVar[str] = "the greedy policy of a trained agent"
 
     @abstractmethod
     def network(self) -> Any:
@@ -147,52 +149,145 @@ class Writer(ABC):
         ]
         return zlib.crc32(json.dumps(about).encode())
 
-    def write(self, name: str, values: dict[str, Any], tables: Tables) -> CHeader:
-        """Fill a template in; it also receives this writer's attributes and the agent's settings.
+    def write(
+        self,
+        file: str,
+        description: str,
+        needs: list[str],
+        defines: dict[str, Any],
+        tables: Tables,
+        **sizes: int,
+    ) -> CHeader:
+        """Write settings and tables before the C code of a file, with this agent's names.
 
-        Values have the description, bytes of RAM and of weights, and words read beside what the
-        template names.
+        ``needs`` are lines about memory, and ``sizes`` the other attributes of the `CHeader`.
         """
-        fixed_tables, bins_of_fixed, bins_of_double = conversions(
-            self.inputs, self.name, self.fraction_bits
-        )
-        flash_bytes, scaling = tables.n_bytes + fixed_tables.n_bytes, self.agent.scaling
-        common = {
-            **vars(self),
-            "NAME": self.name.upper(),
-            "version": __version__,
-            "kind": type(self.agent).__name__,
-            "learning": self.agent.learning,
-            "sizes": self.agent.approximator,
-            "flash": f"{flash_bytes:,}",
-            "scaling": None if scaling is None else list(scaling.lines()),
-            "is_box": self.box is not None,
-            "tables": tables.text(),
-            "fixed_tables": fixed_tables.text(),
-            "bins_of_fixed": bins_of_fixed,
-            "float_tables": self._float_tables(),
-            "bins_of_double": bins_of_double,
+        conversion_tables, inputs = conversions(self.inputs, self.name, self.fraction_bits)
+        flash_bytes = tables.n_bytes + conversion_tables.n_bytes
+        macro = self.name.upper()
+        spaces = {
+            "N_OBSERVED": self.n_observed,
+            "N_INPUTS": self.n_inputs,
+            "N_DIMENSIONS": self.n_dimensions,
+            "FRACTION_BITS": self.fraction_bits,
+            "TIES": f"{macro}_{_TIES[self.tie_rule()]}",
         }
+        text = [
+            *self._scaling(),
+            *comment(
+                f"{self.name}.h: {self.title}, in C99 for small processors.",
+                "",
+                f"Made by sdnn {__version__} of an {type(self.agent).__name__} agent with seed"
+                f" {self.agent.seed}:",
+                f"{description}.",
+                "",
+                *(line.format(flash=f"{flash_bytes:,}") for line in needs),
+                "",
+                "Needs <stdint.h> and nothing else of a C library; it is C++ too. It calculates in",
+                "integers. Include it in one source file: its constants are static.",
+                "",
+                *self._usage(),
+                f"An action is a number; {self._action_value()} is its value.",
+                *(line for i, one in enumerate(self.inputs) for line in one.usage(i)),
+                *self.tie_remark(),
+            ),
+            f"#ifndef SDNN_{macro}_H",
+            f"#define SDNN_{macro}_H",
+            "",
+            "#include <stdint.h>",
+            "",
+            *define_lines(macro, {**spaces, **defines}),
+            *define_lines(macro, {"INPUTS": [f"{macro}_{call}" for call in inputs]}),
+            "",
+            *tables.lines,
+            *conversion_tables.lines,
+            *self._float_tables(),
+            "",
+            c_source(file, self.name),
+            f"#endif /* SDNN_{macro}_H */",
+        ]
         return CHeader(
             name=self.name,
-            text=_templates().get_template(f"{name}.h.jinja").render({**common, **values}),
+            text=joined(text),
             fraction_bits=self.fraction_bits,
             flash_bytes=flash_bytes,
-            **{about: values[about] for about in ("weight_bytes", "ram_bytes", "n_words")},
+            **sizes,
         )
 
-    def _float_tables(self) -> str:
-        if self.box is None:
-            return ""
-        is_double = self.box.dtype == np.float64
-        kind, form = ("double", "{!r}") if is_double else ("float", "{!r}f")
-        actions = by_dimension(self.box.astype(np.float64))
-        lines = table_lines(f"static const {kind} {self.name}_action_float", actions, form)
-        return joined(["/* The actions. */", *lines, ""])
+    def _scaling(self) -> list[str]:
+        """Return a comment on observations of a run with noise or redundant variables."""
+        scaling = self.agent.scaling
+        if scaling is None:
+            return []
+        return comment(
+            "What this policy observes is scaled, since its run had noise or redundant variables:",
+            "each variable from its range to [0, 1], (value - low) / (high - low), and what lies",
+            "beyond the range to 0 or 1. Wherever an observation has units below, it is these.",
+            "",
+            *(f"  {line}" for line in scaling.lines()),
+        )
 
-    def ties(self) -> str:
-        """Return how ties are broken where nothing is drawn."""
-        return "lowest" if self.agent.learning.tie_rule == "lowest" else "middle"
+    def _usage(self) -> list[str]:
+        """Return an example of a program."""
+        observation = f"int32_t observation[{self.name.upper()}_N_OBSERVED];"
+        return [
+            f'  #include "{self.name}.h"',
+            f"  {observation} // in its own units, times 2^{self.fraction_bits}",
+            *(f"  {line}" for line in self.calls()),
+            "",
+        ]
+
+    def needs(self, weight_bytes: int, ram_bytes: int, n_words: int) -> list[str]:
+        """Return lines about the memory and time of a greedy policy."""
+        return [
+            f"Flash: {{flash}} bytes of constants, of which {weight_bytes:,} are weights; the code",
+            "       comes to 1 to 2 kB.",
+            f"RAM:   {ram_bytes:,} bytes of arrays on the stack, and at most 256 bytes for all",
+            f"       else there; {self.name}_act_float takes {8 * self.n_observed:,} more.",
+            "       No heap, and nothing static that changes.",
+            f"Time:  a decision reads {n_words:,} words of 32 bits of weights.",
+        ]
+
+    def calls(self) -> list[str]:
+        """Return lines of C that take an action."""
+        if not self.is_vector:
+            return [f"uint32_t action = {self.name}_act_fixed(observation);"]
+        array = f"uint32_t action[{self.name.upper()}_N_DIMENSIONS];"
+        return [array, f"{self.name}_act_fixed(observation, action);"]
+
+    def _action_value(self) -> str:
+        """Return the value of an action in C."""
+        if self.box is None:
+            d, action = ("d", "action[d]") if self.is_vector else ("0", "action")
+            return f"{self.name}_first_action[{d}] + (int32_t){action}"
+        index = "[d][action[d]]" if self.is_vector else "[action]"
+        return f"{self.name}_action_fixed{index} / 2^{self.fraction_bits}"
+
+    def _float_tables(self) -> list[str]:
+        if self.box is None:
+            return []
+        is_double = self.box.dtype == np.float64
+        c_type, form = ("double", "{!r}") if is_double else ("float", "{!r}f")
+        actions = by_dimension(self.box.astype(np.float64))
+        lines = table_lines(f"static const {c_type} {self.name}_action_float", actions, form)
+        condition = f"#ifdef {self.name.upper()}_USE_FLOAT"
+        return [condition, "/* The actions. */", *lines, "#endif"]
+
+    def tie_rule(self) -> str:
+        """Return how the header breaks ties: a greedy policy draws nothing."""
+        rule = self.agent.learning.tie_rule
+        return "middle" if rule == "uniform" else rule
+
+    def tie_remark(self) -> list[str]:
+        """Describe how ties are broken."""
+        rule, own = self.tie_rule(), self.agent.learning.tie_rule
+        choice = {
+            "lowest": "the lowest",
+            "middle": "the middle of the widest run of neighbours",
+            "uniform": "a random one",
+        }[rule]
+        agent = "as the agent does" if rule == own else "where the agent draws one"
+        return [f"Of several best actions it takes {choice}, {agent}."]
 
 
 class Learner(Writer):
@@ -202,6 +297,7 @@ class Learner(Writer):
     most of them by the same names.
     """
 
+    title = "an agent that learns"
     magic: ClassVar[int]
     streams: ClassVar[tuple[str, ...]]
     """Random generators, in the order of the image."""
@@ -256,18 +352,52 @@ class Learner(Writer):
         """Return the states of the random generators, shape (n_streams, 4)."""
         return np.array([state[f"{stream}.words"] for stream in self.streams], np.uint64)
 
-    def values_of_learning(self, state: dict[str, Any]) -> dict[str, Any]:
-        """Return what the templates of all agents that learn need."""
+    def tie_rule(self) -> str:
+        """Return how the agent breaks ties."""
+        return str(self.agent.learning.tie_rule)
+
+    def calls(self) -> list[str]:
+        """Return lines of C in which the agent acts and learns."""
+        name, arguments = self.name, "observation, action, reward, next_observation, terminated"
+        action = [f"uint32_t action = {name}_act(&agent, observation, 1); // 0: the best one"]
+        if self.is_vector:
+            action = [
+                f"uint32_t action[{name.upper()}_N_DIMENSIONS];",
+                f"{name}_act(&agent, observation, 1, action); // 0: the best one",
+            ]
+        return [
+            f"static {name}_agent agent; // everything that it remembers",
+            f"{name}_begin(&agent);",
+            f"{name}_begin_episode(&agent); // whenever the task starts anew",
+            *action,
+            f"{name}_learn(&agent, {arguments});",
+        ]
+
+    def learning_defines(self, state: dict[str, Any]) -> dict[str, Any]:
+        """Return the settings and first values of all agents that learn."""
+        learning = self.agent.learning
         return {
-            "state": state,
-            "size": c_number(state[f"{SCALE}.size"]),
-            "size_in_window": c_number(state[f"{SCALE}.size_in_window"]),
-            "headroom": state[f"{SCALE}.headroom"],
-            "ties": "draw" if self.agent.learning.tie_rule == "uniform" else self.ties(),
-            "image_bytes": self.layout().itemsize + 4,
-            "image_magic": f"0x{self.magic:08x}",
-            "fingerprint": f"0x{self.fingerprint():08x}",
+            "FINGERPRINT": f"UINT32_C(0x{self.fingerprint():08x})",
+            "START_STEPS": learning.start_steps,
+            "N_GREEDY_STEPS": learning.n_greedy_steps,
+            "MAX_ACTION_REPEAT": learning.max_action_repeat,
+            "FIRST_N_RANDOM_LEFT": state.get("n_random_left", 0),
+            "FIRST_N_REWARDS": f"UINT64_C({state[f'{SCALE}.n_rewards']})",
+            "FIRST_SIZE": c_number(state[f"{SCALE}.size"]),
+            "FIRST_SIZE_IN_WINDOW": c_number(state[f"{SCALE}.size_in_window"]),
+            "FIRST_HEADROOM": state[f"{SCALE}.headroom"],
         }
+
+
+def learning_needs(code_kilobytes: str, memory: str) -> list[str]:
+    """Return lines about the memory of an agent that learns."""
+    return [
+        f"Flash: {{flash}} bytes of constants; the code comes to some {code_kilobytes} kB.",
+        f"RAM:   {memory}",
+        "       No heap, and nothing static that changes.",
+        "Where the processor cannot multiply or shift 64 bits by itself, the compiler's library",
+        "does (libgcc); nothing is divided.",
+    ]
 
 
 def c_number(number: Any) -> str:
@@ -282,12 +412,3 @@ def require_few_weights(n_weights: int, settings: str) -> None:
             f"a C header can hold {MOST_WEIGHTS} weights, got {n_weights}: take fewer inputs,"
             f" {settings} or n_pattern_units"
         )
-
-
-@cache
-def _templates() -> Environment:
-    return Environment(
-        loader=PackageLoader("sdnn.export", "."), undefined=StrictUndefined, autoescape=False,
-        variable_start_string="${", variable_end_string="}", line_statement_prefix="@",
-        comment_start_string="@{", keep_trailing_newline=True,
-    )  # fmt: skip

@@ -1,12 +1,17 @@
+#ifndef SDNN_REAL_H
+#define SDNN_REAL_H
+
+#include <stdint.h>
+
 /* Real numbers: the 64 bits of IEEE 754, calculated in integers and rounded to the nearest, ties to
  * even. So they are the library's on every processor and with all options of a compiler. There are
  * no infinities and no NaN. */
-typedef uint64_t ${name}_real;
-#define ${NAME}_MINUS (UINT64_C(1) << 63)
-#define ${NAME}_ONE (UINT64_C(1023) << 52)
+typedef uint64_t sdnn_real;
+#define SDNN_MINUS (UINT64_C(1) << 63)
+#define SDNN_ONE (UINT64_C(1023) << 52)
 
 /* fraction 2^exponent with a sign; the lowest bit is also set where less than that is left over. */
-static inline ${name}_real ${name}_rounded(uint64_t sign, uint64_t fraction, int32_t exponent) {
+static inline sdnn_real sdnn_rounded(uint64_t sign, uint64_t fraction, int32_t exponent) {
   uint64_t shift;
   if (fraction == 0) return sign;
   if (fraction >> 63) {
@@ -27,13 +32,13 @@ static inline ${name}_real ${name}_rounded(uint64_t sign, uint64_t fraction, int
   return sign | (((uint64_t)(exponent - 1) << 52) + fraction);
 }
 
-static inline ${name}_real ${name}_real_of(int64_t value, int32_t exponent) {
-  return value < 0 ? ${name}_rounded(${NAME}_MINUS, 0 - (uint64_t)value, exponent)
-                   : ${name}_rounded(0, (uint64_t)value, exponent);
+static inline sdnn_real sdnn_real_of(int64_t value, int32_t exponent) {
+  return value < 0 ? sdnn_rounded(SDNN_MINUS, 0 - (uint64_t)value, exponent)
+                   : sdnn_rounded(0, (uint64_t)value, exponent);
 }
 
 /* The fraction, from 2^52 on, and the exponent of a number that is not 0. */
-static inline uint64_t ${name}_fraction(${name}_real x, int32_t *exponent) {
+static inline uint64_t sdnn_fraction(sdnn_real x, int32_t* exponent) {
   uint64_t fraction = x & ((UINT64_C(1) << 52) - 1);
   *exponent = (int32_t)(x >> 52 & 2047) - 1075;
   if (*exponent > -1075) return fraction | UINT64_C(1) << 52;
@@ -41,50 +46,50 @@ static inline uint64_t ${name}_fraction(${name}_real x, int32_t *exponent) {
   return fraction;
 }
 
-static inline ${name}_real ${name}_plus(${name}_real a, ${name}_real b) {
+static inline sdnn_real sdnn_plus(sdnn_real a, sdnn_real b) {
   int32_t exponent, other;
   uint64_t x, y, shift;
   if (a << 1 == 0) return b << 1 == 0 ? a & b : b;
   if (b << 1 == 0) return a;
   if (a << 1 < b << 1) {
-    const ${name}_real smaller = a;
+    const sdnn_real smaller = a;
     a = b;
     b = smaller;
   }
-  x = ${name}_fraction(a, &exponent) << 9;
-  y = ${name}_fraction(b, &other) << 9;
+  x = sdnn_fraction(a, &exponent) << 9;
+  y = sdnn_fraction(b, &other) << 9;
   shift = (uint64_t)(exponent - other);
   if (shift > 0) y = shift < 63 ? y >> shift | (y << (64 - shift) != 0) : 1;
-  if (!((a ^ b) >> 63)) return ${name}_rounded(a & ${NAME}_MINUS, x + y, exponent - 9);
-  return x == y ? 0 : ${name}_rounded(a & ${NAME}_MINUS, x - y, exponent - 9);
+  if (!((a ^ b) >> 63)) return sdnn_rounded(a & SDNN_MINUS, x + y, exponent - 9);
+  return x == y ? 0 : sdnn_rounded(a & SDNN_MINUS, x - y, exponent - 9);
 }
 
-static inline ${name}_real ${name}_minus(${name}_real a, ${name}_real b) {
-  return ${name}_plus(a, b ^ ${NAME}_MINUS);
+static inline sdnn_real sdnn_minus(sdnn_real a, sdnn_real b) {
+  return sdnn_plus(a, b ^ SDNN_MINUS);
 }
 
-static inline ${name}_real ${name}_times(${name}_real a, ${name}_real b) {
-  const uint64_t sign = (a ^ b) & ${NAME}_MINUS, low_bits = UINT32_MAX;
+static inline sdnn_real sdnn_times(sdnn_real a, sdnn_real b) {
+  const uint64_t sign = (a ^ b) & SDNN_MINUS, low_bits = UINT32_MAX;
   int32_t exponent, other;
   uint64_t x, y, low, middle, more;
   if (a << 1 == 0 || b << 1 == 0) return sign;
-  x = ${name}_fraction(a, &exponent) << 11;
-  y = ${name}_fraction(b, &other) << 11;
+  x = sdnn_fraction(a, &exponent) << 11;
+  y = sdnn_fraction(b, &other) << 11;
   low = (x & low_bits) * (y & low_bits);
   middle = (x >> 32) * (y & low_bits) + (low >> 32);
   more = (x & low_bits) * (y >> 32) + (middle & low_bits);
   x = (x >> 32) * (y >> 32) + (middle >> 32) + (more >> 32);
   x |= ((low | more) & low_bits) != 0;
-  return ${name}_rounded(sign, x, exponent + other + 42);
+  return sdnn_rounded(sign, x, exponent + other + 42);
 }
 
-static inline ${name}_real ${name}_over(${name}_real a, ${name}_real b) {
-  const uint64_t sign = (a ^ b) & ${NAME}_MINUS;
+static inline sdnn_real sdnn_over(sdnn_real a, sdnn_real b) {
+  const uint64_t sign = (a ^ b) & SDNN_MINUS;
   int32_t exponent, other, i;
   uint64_t x, y, quotient = 0;
   if (a << 1 == 0) return sign;
-  x = ${name}_fraction(a, &exponent);
-  y = ${name}_fraction(b, &other);
+  x = sdnn_fraction(a, &exponent);
+  y = sdnn_fraction(b, &other);
   for (i = 0; i < 56; ++i, x <<= 1) {
     quotient <<= 1;
     if (x >= y) {
@@ -92,22 +97,23 @@ static inline ${name}_real ${name}_over(${name}_real a, ${name}_real b) {
       quotient |= 1;
     }
   }
-  return ${name}_rounded(sign, quotient << 1 | (x != 0), exponent - other - 56);
+  return sdnn_rounded(sign, quotient << 1 | (x != 0), exponent - other - 56);
 }
 
-static inline int ${name}_less(${name}_real a, ${name}_real b) {
+static inline int sdnn_less(sdnn_real a, sdnn_real b) {
   if ((a | b) << 1 == 0) return 0;
   if ((a ^ b) >> 63) return a >> 63 != 0;
   return a >> 63 ? b < a : a < b;
 }
 
-static inline ${name}_real ${name}_between(${name}_real x, ${name}_real low, ${name}_real high) {
-  return ${name}_less(x, low) ? low : ${name}_less(high, x) ? high : x;
+static inline sdnn_real sdnn_between(sdnn_real x, sdnn_real low, sdnn_real high) {
+  return sdnn_less(x, low) ? low : sdnn_less(high, x) ? high : x;
 }
 
 /* The largest integer that is not above a number from 0 to 2^31. */
-static inline int32_t ${name}_whole(${name}_real x) {
+static inline int32_t sdnn_whole(sdnn_real x) {
   const uint32_t shift = 1075 - (uint32_t)(x >> 52 & 2047);
   return shift > 52 ? 0 : (int32_t)(((x & ((UINT64_C(1) << 52) - 1)) | UINT64_C(1) << 52) >> shift);
 }
 
+#endif /* SDNN_REAL_H */

@@ -1,0 +1,709 @@
+/* An agent that learns with SDNN-C, by n-step Q-learning.
+ *
+ *   static sdnn_agent agent; // everything that it remembers
+ *   sdnn_begin(&agent);
+ *   sdnn_begin_episode(&agent); // whenever the task starts anew
+ *   uint32_t action = sdnn_act(&agent, observation, 1); // 0: the best action
+ *   sdnn_learn(&agent, observation, action, reward, next_observation, terminated);
+ *   sdnn_set_progress(&agent, progress); // from 0 to 65536, for rates that follow a schedule
+ *
+ * Observations and rewards are in their units, times 2^SDNN_FRACTION_BITS. sdnn_save and sdnn_load
+ * write and read an image of what was learned, as sdnn.export.load_image and save_image do. */
+#ifndef SDNN_C_H
+#define SDNN_C_H
+
+#include "sdnn_weight_bytes.h"
+
+#define SDNN_IMAGE_MAGIC UINT32_C(0x434e4453) /* "SDNC" */
+#define SDNN_N_RANDOMS 5
+#include "sdnn_learner.h"
+#include "sdnn_real.h"
+
+typedef uint32_t sdnn_score;
+#include "sdnn_ties.h"
+
+#define SDNN_AWAY 0      /* rounded away from the present count */
+#define SDNN_HALF_UP 1   /* rounded to the nearest count */
+#define SDNN_AT_RANDOM 2 /* rounded up with the probability of the fraction */
+
+#define SDNN_N_STATES (SDNN_N_STEPS + 1)
+#define SDNN_N_WORDS (UINT32_C(1) * SDNN_N_UNITS / 4 * SDNN_N_COLUMNS)
+
+static const sdnn_coding sdnn_the_coding = {sdnn_patterns, sdnn_modified, sdnn_modifiers,
+                                            sdnn_units};
+
+static inline sdnn_real sdnn_uniform(sdnn_random* random) {
+  return sdnn_real_of((int64_t)(sdnn_bits(random) >> 11), -53);
+}
+
+/* The change of a weight, which is twice as large for half a sum or half a difference. */
+static inline int32_t sdnn_change(uint32_t column, int32_t change) {
+#if SDNN_N_DOUBLE_GROUPS == 0
+  (void)column;
+  return change;
+#elif SDNN_N_DOUBLE_GROUPS == SDNN_N_GROUPS
+  (void)column;
+  return 2 * change;
+#else
+  return (column < UINT32_C(1) * SDNN_N_DOUBLE_GROUPS * SDNN_N_PATTERN_UNITS ? 2 : 1) * change;
+#endif
+}
+
+/* A state, and the potentials of all hidden units in it, which are kept up to date. */
+typedef struct {
+  sdnn_code code;
+  uint32_t last_use; /* 0: there is no state */
+  int32_t potentials[SDNN_N_UNITS];
+} sdnn_state;
+
+/* A transition that will be learned when SDNN_N_STEPS rewards are known, or at the end. */
+typedef struct {
+  uint32_t state, action;
+  int32_t reward;
+} sdnn_transition;
+
+/* Everything that the agent remembers. Place it where you like: all functions take its address. */
+typedef struct {
+  sdnn_random randoms[SDNN_N_RANDOMS];
+  sdnn_scale scale;
+  sdnn_real progress, rate, epsilon, q_low, q_high;
+#if SDNN_ADAPTS
+  sdnn_real low, high, sum; /* of returns, and the discounted sum of rewards */
+  uint64_t n_returns, due;  /* all, and the next one that is remembered */
+  sdnn_real returns[256];
+#endif
+  sdnn_state states[SDNN_N_STATES];
+  sdnn_transition waiting[SDNN_N_STEPS];
+  uint32_t weights[SDNN_N_WORDS]; /* of four units a word, 128 more than they are */
+  int32_t thresholds[SDNN_N_UNITS];
+#if SDNN_ADAPTS
+  int32_t rewards[2 * SDNN_HORIZON]; /* whose returns are not known yet */
+  uint32_t n_rewards, n_kept_returns, oldest;
+#endif
+  uint32_t latest;           /* which state was used last */
+  uint32_t n_waiting, first; /* transitions, and which is the oldest */
+  uint32_t next_bins[SDNN_N_INPUTS];
+  int32_t next_observation[SDNN_N_OBSERVED];
+  uint32_t clock;         /* of uses of states */
+  uint32_t below, above;  /* ranks of values below and above the range of counts */
+  uint32_t n_random_left; /* steps that will still be random */
+  uint32_t n_kept, kept;  /* the random action, and steps that it will still last */
+  uint32_t step;          /* of the episode */
+} sdnn_agent;
+
+#if SDNN_ADAPTS
+#include "sdnn_return_range.h"
+#endif
+
+/* The columns in which the codes of two states differ: those to add, and at the end those to take
+ * away. What changes from -1 to 1 is there twice. */
+static inline void sdnn_changes(const sdnn_code* from, const sdnn_code* to, sdnn_column* columns,
+                                uint32_t* n_positive, uint32_t* n_negative) {
+  const sdnn_code* const codes[2] = {from, to};
+  int8_t changes[SDNN_N_COLUMNS];
+  uint32_t i, j;
+  for (j = 0; j < SDNN_N_COLUMNS; ++j) {
+    volatile int8_t* const change = &changes[j]; /* else: memset */
+    *change = 0;
+  }
+  for (i = 0; i < 2; ++i) {
+    const int8_t sign = i == 0 ? -1 : 1;
+    const sdnn_column* const negative =
+        codes[i]->columns + SDNN_MOST_COLUMNS - codes[i]->n_negative;
+    for (j = 0; j < codes[i]->n_positive; ++j) {
+      changes[codes[i]->columns[j]] = (int8_t)(changes[codes[i]->columns[j]] + sign);
+    }
+    for (j = 0; j < codes[i]->n_negative; ++j) {
+      changes[negative[j]] = (int8_t)(changes[negative[j]] - sign);
+    }
+  }
+  *n_positive = *n_negative = 0;
+  for (j = 0; j < SDNN_N_COLUMNS; ++j) {
+    for (; changes[j] > 0; --changes[j]) columns[(*n_positive)++] = (sdnn_column)j;
+    for (; changes[j] < 0; ++changes[j])
+      columns[2 * SDNN_MOST_COLUMNS - ++*n_negative] = (sdnn_column)j;
+  }
+}
+
+/* The potentials of a state: from those of a state nearby, or from nothing. */
+static inline void sdnn_evaluate(const sdnn_agent* agent, sdnn_state* state,
+                                 const sdnn_state* from) {
+  sdnn_column changes[2 * SDNN_MOST_COLUMNS];
+  uint32_t n_positive = 0, n_negative = 0, unit, i;
+  const sdnn_column *positive = changes, *negative;
+  if (from) sdnn_changes(&from->code, &state->code, changes, &n_positive, &n_negative);
+  negative = changes + 2 * SDNN_MOST_COLUMNS - n_negative;
+  if (!from || n_positive + n_negative > state->code.n_positive + state->code.n_negative) {
+    from = 0;
+    positive = state->code.columns;
+    n_positive = state->code.n_positive;
+    n_negative = state->code.n_negative;
+    negative = positive + SDNN_MOST_COLUMNS - n_negative;
+  }
+  for (unit = 0; unit < SDNN_N_UNITS; unit += 4) {
+    uint32_t sums[4];
+    for (i = 0; i < 4; ++i) {
+      sums[i] =
+          from ? (uint32_t)from->potentials[unit + i] : 0 - (uint32_t)agent->thresholds[unit + i];
+    }
+    sdnn_add_signed(agent->weights + (unit >> 2) * SDNN_N_COLUMNS, positive, n_positive, negative,
+                    n_negative, sums);
+    for (i = 0; i < 4; ++i) {
+      state->potentials[unit + i] = sums[i] >> 31 ? -(int32_t)~sums[i] - 1 : (int32_t)sums[i];
+    }
+  }
+}
+
+/* A transition that waits, the oldest first. */
+static inline sdnn_transition* sdnn_waiting(sdnn_agent* agent, uint32_t i) {
+  i += agent->first;
+  return &agent->waiting[i < SDNN_N_STEPS ? i : i - SDNN_N_STEPS];
+}
+
+/* The state with these bins, in the place of the one that was not used for longest. */
+static inline sdnn_state* sdnn_state_of(sdnn_agent* agent, const uint32_t* bins) {
+  const sdnn_state* const from = &agent->states[agent->latest];
+  sdnn_state* found = 0;
+  uint32_t i, j;
+  for (i = 0; i < SDNN_N_STATES; ++i) {
+    sdnn_state* const state = &agent->states[i];
+    uint32_t is_free = 1, is_same = state->last_use > 0;
+    for (j = 0; j < SDNN_N_INPUTS; ++j) is_same &= state->code.bins[j] == bins[j];
+    if (is_same) {
+      found = state;
+      break;
+    }
+    for (j = 0; j < agent->n_waiting; ++j) is_free &= sdnn_waiting(agent, j)->state != i;
+    if (is_free && (!found || state->last_use < found->last_use)) found = state;
+  }
+  if (i == SDNN_N_STATES) {
+    sdnn_encode(&sdnn_the_coding, bins, &found->code);
+    sdnn_evaluate(agent, found, from == found || from->last_use == 0 ? 0 : from);
+  }
+  if (++agent->clock == 0) agent->clock = 1;
+  found->last_use = agent->clock;
+  agent->latest = (uint32_t)(found - agent->states);
+  return found;
+}
+
+/* Whether a potential, which is far above -2^31, is above 0. */
+static inline uint32_t sdnn_fires(int32_t potential) {
+  return 1 - (((uint32_t)potential - 1) >> 31);
+}
+
+static inline uint32_t sdnn_count(const sdnn_state* state, uint32_t action) {
+  const int32_t* const potentials = state->potentials + sdnn_first_units[action];
+  uint32_t unit, n_firing = 0;
+  for (unit = 0; unit < SDNN_N_ACTIVE_UNITS; ++unit) n_firing += sdnn_fires(potentials[unit]);
+  return n_firing;
+}
+
+/* The value of a number of firing units. */
+static inline sdnn_real sdnn_value(const sdnn_agent* agent, uint32_t n_firing) {
+  const sdnn_real above = sdnn_real_of((int64_t)SDNN_U_HIGH - n_firing, 0);
+  const sdnn_real below = sdnn_real_of((int64_t)n_firing - SDNN_U_LOW, 0);
+  if (n_firing > SDNN_U_HIGH) return agent->q_high;
+#if SDNN_U_LOW > 0
+  if (n_firing < SDNN_U_LOW) return agent->q_low;
+#endif
+  return sdnn_over(sdnn_plus(sdnn_times(agent->q_low, above), sdnn_times(agent->q_high, below)),
+                   sdnn_real_of(SDNN_U_HIGH - SDNN_U_LOW, 0));
+}
+
+/* Values have ranks: 2 n + 1, and where they no longer grow 2 more or less, or the same: rounding
+ * may part the ends of the line from q_low and q_high. */
+static inline void sdnn_set_range(sdnn_agent* agent, sdnn_real low, sdnn_real high) {
+  sdnn_real end;
+  agent->q_low = low;
+  agent->q_high = high;
+  end = sdnn_value(agent, SDNN_U_LOW);
+  agent->below =
+      UINT32_C(2) * SDNN_U_LOW + 1 - (uint32_t)sdnn_less(low, end) + (uint32_t)sdnn_less(end, low);
+  end = sdnn_value(agent, SDNN_U_HIGH);
+  agent->above = UINT32_C(2) * SDNN_U_HIGH + 1 + (uint32_t)sdnn_less(end, high) -
+                 (uint32_t)sdnn_less(high, end);
+}
+
+/* The rank of each action's value. Returns how many units fire for a best one. */
+static inline uint32_t sdnn_rank(const sdnn_agent* agent, const sdnn_state* state,
+                                 uint32_t* ranks) {
+  const int32_t* const potentials = state->potentials;
+  uint32_t action, unit = 0, n_firing = sdnn_count(state, 0), best = 0, n_best = n_firing;
+  for (action = 0; action < SDNN_N_ACTIONS; ++action) {
+    for (; unit < sdnn_first_units[action]; ++unit) {
+      n_firing += sdnn_fires(potentials[unit + SDNN_N_ACTIVE_UNITS]);
+      n_firing -= sdnn_fires(potentials[unit]);
+    }
+    ranks[action] = 2 * n_firing + 1;
+    if (n_firing > SDNN_U_HIGH) ranks[action] = agent->above;
+#if SDNN_U_LOW > 0
+    if (n_firing < SDNN_U_LOW) ranks[action] = agent->below;
+#endif
+    if (ranks[action] > best) {
+      best = ranks[action];
+      n_best = n_firing;
+    }
+  }
+  return n_best;
+}
+
+static inline sdnn_real sdnn_state_value(sdnn_agent* agent, const uint32_t* bins) {
+  uint32_t ranks[SDNN_N_ACTIONS];
+  return sdnn_value(agent, sdnn_rank(agent, sdnn_state_of(agent, bins), ranks));
+}
+
+/* The number of units to fire for a value, where `n_firing` do. */
+static inline uint32_t sdnn_wanted(sdnn_agent* agent, sdnn_real value, uint32_t n_firing) {
+  const sdnn_real clipped = sdnn_between(value, agent->q_low, agent->q_high);
+  const sdnn_real part =
+      sdnn_times(sdnn_minus(clipped, agent->q_low), sdnn_real_of(SDNN_U_HIGH - SDNN_U_LOW, 0));
+  const sdnn_real exact = sdnn_plus(sdnn_real_of(SDNN_U_LOW, 0),
+                                    sdnn_over(part, sdnn_minus(agent->q_high, agent->q_low)));
+#if SDNN_ROUNDING_RULE == SDNN_HALF_UP
+  (void)n_firing;
+  return (uint32_t)sdnn_whole(sdnn_plus(exact, UINT64_C(1022) << 52));
+#elif SDNN_ROUNDING_RULE == SDNN_AT_RANDOM
+  (void)n_firing;
+  return (uint32_t)sdnn_whole(sdnn_plus(exact, sdnn_uniform(&agent->randoms[SDNN_ROUNDING])));
+#else /* SDNN_AWAY */
+  const sdnn_real nothing = UINT64_C(0x3e112e0be826d695); /* 1e-9 */
+  if (sdnn_less(sdnn_real_of(n_firing, 0), exact)) {
+    const sdnn_real least = sdnn_minus(exact, nothing);
+    const uint32_t whole = least >> 63 ? 0 : (uint32_t)sdnn_whole(least);
+    return whole + (uint32_t)sdnn_less(sdnn_real_of(whole, 0), least);
+  }
+  return (uint32_t)sdnn_whole(sdnn_plus(exact, nothing));
+#endif
+}
+
+/* The weights of a unit move by `step` times the code, those of halves by twice that, unless one
+ * of them would exceed the limit. Returns whether they did. */
+static inline int sdnn_correct_unit(sdnn_agent* agent, const sdnn_code* code, uint32_t unit,
+                                    int32_t step) {
+  uint32_t* const row = agent->weights + (unit >> 2) * SDNN_N_COLUMNS;
+  const uint32_t shift = 8 * (unit & 3);
+  uint32_t part, j, is_second;
+  for (is_second = 0; is_second < 2; ++is_second) {
+    for (part = 0; part < 2; ++part) {
+      const uint32_t n = part == 0 ? code->n_positive : code->n_negative;
+      const sdnn_column* const columns = code->columns + (part == 0 ? 0 : SDNN_MOST_COLUMNS - n);
+      const int32_t change = part == 0 ? step : -step;
+      for (j = 0; j < n; ++j) {
+        const uint32_t column = columns[j];
+        const int32_t weight_change = sdnn_change(column, change);
+        if (is_second) {
+          row[column] += (uint32_t)weight_change << shift;
+        } else if ((uint32_t)((int32_t)(row[column] >> shift & 255) + weight_change -
+                              (128 - SDNN_WEIGHT_LIMIT)) > 2 * SDNN_WEIGHT_LIMIT) {
+          return 0;
+        }
+      }
+    }
+  }
+  agent->thresholds[unit] -= step;
+  return 1;
+}
+
+/* The products of the codes of all states with that of one, and 1 more. */
+static inline void sdnn_products(const sdnn_agent* agent, const sdnn_code* code,
+                                 int32_t* products) {
+  int8_t signs[SDNN_N_COLUMNS];
+  uint32_t i, j;
+  for (j = 0; j < SDNN_N_COLUMNS; ++j) {
+    volatile int8_t* const sign = &signs[j]; /* else: memset */
+    *sign = 0;
+  }
+  for (j = 0; j < code->n_positive; ++j) signs[code->columns[j]] = 1;
+  for (j = 1; j <= code->n_negative; ++j) signs[code->columns[SDNN_MOST_COLUMNS - j]] = -1;
+  for (i = 0; i < SDNN_N_STATES; ++i) {
+    const sdnn_code* const other = &agent->states[i].code;
+    products[i] = 1;
+    if (agent->states[i].last_use == 0) continue;
+    for (j = 0; j < other->n_positive; ++j) {
+      const uint32_t column = other->columns[j];
+      const int32_t change = signs[column];
+      products[i] += sdnn_change(column, change);
+    }
+    for (j = 1; j <= other->n_negative; ++j) {
+      const uint32_t column = other->columns[SDNN_MOST_COLUMNS - j];
+      const int32_t change = signs[column];
+      products[i] -= sdnn_change(column, change);
+    }
+  }
+}
+
+/* Lets `n` units more of an action's window fire, or fewer: in each of n parts the one that is
+ * nearest to its threshold. */
+static inline void sdnn_move_count(sdnn_agent* agent, sdnn_state* state, uint32_t action,
+                                   uint32_t n, int is_more) {
+  const uint32_t first = sdnn_first_units[action];
+  const int32_t step = is_more ? SDNN_LATTICE : -SDNN_LATTICE;
+  int32_t products[SDNN_N_STATES];
+  uint64_t rest;
+  const uint32_t width = (uint32_t)sdnn_quotient(SDNN_N_ACTIVE_UNITS, n, &rest);
+  uint32_t i, j, unit = first, over = 0;
+  sdnn_products(agent, &state->code, products);
+  for (i = 0; i < n; ++i) {
+    uint32_t end = unit + width, nearest = UINT32_C(1) << 31, best = 0;
+    over += (uint32_t)rest;
+    if (over >= n) {
+      over -= n;
+      ++end;
+    }
+    for (; unit < end; ++unit) {
+      const uint32_t potential = (uint32_t)state->potentials[unit];
+      const uint32_t distance = is_more ? 0 - potential : potential - 1;
+      if (distance < nearest) {
+        nearest = distance;
+        best = unit;
+      }
+    }
+    if (nearest >> 31) continue;
+    if (!sdnn_correct_unit(agent, &state->code, best, step)) continue;
+    for (j = 0; j < SDNN_N_STATES; ++j) agent->states[j].potentials[best] += step * products[j];
+  }
+}
+
+/* Learns the oldest transition that waits; `value` is that of what followed the newest. */
+static inline void sdnn_learn_oldest(sdnn_agent* agent, sdnn_real value) {
+  const sdnn_transition* const oldest = sdnn_waiting(agent, 0);
+  sdnn_state* const state = &agent->states[oldest->state];
+  const uint32_t action = oldest->action, n_firing = sdnn_count(state, action);
+  sdnn_real wanted;
+  uint32_t i, n_wanted;
+  for (i = agent->n_waiting; i-- > 0;) {
+    value = sdnn_plus(sdnn_real_of(sdnn_waiting(agent, i)->reward, -SDNN_FRACTION_BITS),
+                      sdnn_times(SDNN_DISCOUNT, value));
+  }
+  --agent->n_waiting;
+  agent->first = agent->first + 1 < SDNN_N_STEPS ? agent->first + 1 : 0;
+  wanted = sdnn_plus(sdnn_times(sdnn_minus(SDNN_ONE, agent->rate), sdnn_value(agent, n_firing)),
+                     sdnn_times(agent->rate, value));
+  n_wanted = sdnn_wanted(agent, wanted, n_firing);
+  if (n_wanted > n_firing) sdnn_move_count(agent, state, action, n_wanted - n_firing, 1);
+  if (n_wanted < n_firing) sdnn_move_count(agent, state, action, n_firing - n_wanted, 0);
+}
+
+static inline void sdnn_learn_all(sdnn_agent* agent, sdnn_real value) {
+  while (agent->n_waiting > 0) sdnn_learn_oldest(agent, value);
+}
+
+/* Begins an episode. Call it before the first action, and whenever the task starts anew. */
+static inline void sdnn_begin_episode(sdnn_agent* agent) {
+  agent->step = 0;
+  agent->n_kept = 0;
+  if (agent->n_waiting > 0) sdnn_learn_all(agent, sdnn_state_value(agent, agent->next_bins));
+}
+
+/* A rate that moves from `first` to `last` while the progress moves from 0 to `fraction`. */
+static inline sdnn_real sdnn_scheduled(sdnn_real progress, sdnn_real fraction, sdnn_real first,
+                                       sdnn_real last) {
+  sdnn_real part = fraction == SDNN_ONE ? progress : sdnn_over(progress, fraction);
+  if (sdnn_less(SDNN_ONE, part)) part = SDNN_ONE;
+  return sdnn_plus(sdnn_times(sdnn_minus(SDNN_ONE, part), first), sdnn_times(part, last));
+}
+
+static inline void sdnn_follow_progress(sdnn_agent* agent, sdnn_real progress) {
+  agent->progress = progress;
+#ifdef SDNN_LAST_RATE
+  agent->rate = sdnn_scheduled(progress, SDNN_ONE, SDNN_INITIAL_RATE, SDNN_LAST_RATE);
+#endif
+#ifdef SDNN_LAST_EPSILON
+  agent->epsilon =
+      sdnn_scheduled(progress, SDNN_EXPLORATION_FRACTION, SDNN_INITIAL_EPSILON, SDNN_LAST_EPSILON);
+#endif
+}
+
+/* How much of the learning is done, from 0 to 65536: alpha and epsilon follow it. */
+static inline void sdnn_set_progress(sdnn_agent* agent, uint32_t progress) {
+  sdnn_follow_progress(agent, sdnn_real_of(progress < 65536 ? (int64_t)progress : 65536, -16));
+}
+
+#if SDNN_IS_NEW
+/* Draws weights as the library does: column by column, two bits for each unit. */
+static inline void sdnn_draw_weights(sdnn_agent* agent) {
+  sdnn_random random;
+  uint32_t unit, group, at, i, j, k;
+  for (i = 0; i < 4; ++i) random.words[i] = sdnn_seeds[SDNN_N_RANDOMS][i];
+  for (i = 0; i < SDNN_N_WORDS; ++i) {
+    volatile uint32_t* const word = &agent->weights[i]; /* else: memset */
+    *word = UINT32_C(0x80808080);
+  }
+  for (group = 0; group < SDNN_N_GROUPS; ++group) {
+    const uint32_t pair = sdnn_groups[group], is_double = sdnn_is_double(pair);
+    const sdnn_unit* const units = sdnn_units + pair * SDNN_N_PATTERN_UNITS;
+    for (k = 0; k < SDNN_N_PATTERN_UNITS; ++k) {
+      uint64_t bits = 0;
+      for (at = 0; units[at] != k; ++at) {
+      }
+      unit = j = 0;
+      for (i = 0; i < SDNN_N_HIDDEN_UNITS; ++i, bits >>= 2) {
+        uint32_t weight, lane;
+        if ((i & 31) == 0) bits = sdnn_bits(&random);
+        while (j < SDNN_N_RANGES && i >= sdnn_used[j][1]) ++j;
+        if (j == SDNN_N_RANGES || i < sdnn_used[j][0]) continue;
+        agent->thresholds[unit] = (i & 1) == 0 ? -SDNN_FIRST_THRESHOLD : SDNN_FIRST_THRESHOLD;
+        weight = (uint32_t)(bits & 1) - (uint32_t)(bits >> 1 & 1);
+        lane =
+            (unit >> 2) * SDNN_N_COLUMNS + (pair - (is_double & pair)) * SDNN_N_PATTERN_UNITS + at;
+        /* Both halves of two groups; the difference is less the second. */
+        agent->weights[lane] += weight << 8 * (unit & 3);
+        if (is_double & pair) weight = 0 - weight;
+        if (is_double) agent->weights[lane + SDNN_N_PATTERN_UNITS] += weight << 8 * (unit & 3);
+        ++unit;
+      }
+    }
+  }
+}
+#endif
+
+/* Makes the agent as it was exported. */
+static inline void sdnn_begin(sdnn_agent* agent) {
+  sdnn_clear(agent, sizeof *agent);
+  sdnn_begin_randoms(agent->randoms);
+  agent->progress = SDNN_FIRST_PROGRESS;
+  agent->rate = SDNN_FIRST_RATE;
+  agent->epsilon = SDNN_FIRST_EPSILON;
+  sdnn_set_range(agent, SDNN_FIRST_Q_LOW, SDNN_FIRST_Q_HIGH);
+#if SDNN_ADAPTS
+  agent->low = SDNN_FIRST_LOW;
+  agent->high = SDNN_FIRST_HIGH;
+  agent->sum = SDNN_FIRST_SUM;
+  agent->due = SDNN_FIRST_DUE;
+  agent->n_returns = SDNN_FIRST_N_RETURNS;
+  agent->n_rewards = SDNN_FIRST_N_PENDING_REWARDS;
+  agent->n_kept_returns = SDNN_FIRST_N_KEPT_RETURNS;
+  agent->oldest = SDNN_FIRST_OLDEST;
+#if SDNN_FIRST_N_PENDING_REWARDS > 0
+  sdnn_copy_32(agent->rewards, sdnn_first_rewards, SDNN_FIRST_N_PENDING_REWARDS);
+#endif
+#if SDNN_FIRST_N_KEPT_RETURNS > 0
+  {
+    uint32_t i;
+    for (i = 0; i < SDNN_FIRST_N_KEPT_RETURNS; ++i) {
+      volatile uint64_t* const value = &agent->returns[i]; /* else: memcpy */
+      *value = sdnn_first_returns[i];
+    }
+  }
+#endif
+#endif
+  agent->n_random_left = SDNN_FIRST_N_RANDOM_LEFT;
+  sdnn_begin_scale(&agent->scale);
+#if SDNN_IS_NEW
+  sdnn_draw_weights(agent);
+#else
+  sdnn_copy_32((int32_t*)agent->weights, (const int32_t*)sdnn_first_weights, SDNN_N_WORDS);
+  sdnn_copy_32(agent->thresholds, sdnn_first_thresholds, SDNN_N_UNITS);
+#endif
+}
+
+static inline int sdnn_explores(sdnn_agent* agent) {
+  const uint32_t step = agent->step++;
+  const int at_random = agent->n_random_left > 0;
+  if (at_random) --agent->n_random_left;
+  if (agent->n_kept > 0) {
+    --agent->n_kept;
+    return 1;
+  }
+  if (!at_random && !(sdnn_may_explore(step) && agent->epsilon > 0 &&
+                      sdnn_less(sdnn_uniform(&agent->randoms[SDNN_EXPLORATION]), agent->epsilon))) {
+    return 0;
+  }
+  agent->kept = (uint32_t)sdnn_below(&agent->randoms[SDNN_EXPLORATION], SDNN_N_ACTIONS);
+#if SDNN_MAX_ACTION_REPEAT > 1
+  agent->n_kept = sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], SDNN_MAX_ACTION_REPEAT) - 1;
+#endif
+  return 1;
+}
+
+/* The number of the action to take; without `explore` a best one. */
+static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation, int explore) {
+  uint32_t bins[SDNN_N_INPUTS], ranks[SDNN_N_ACTIONS], action, best = 0;
+  if (explore && sdnn_explores(agent)) return agent->kept;
+  sdnn_bins_of_fixed(observation, bins);
+  sdnn_rank(agent, sdnn_state_of(agent, bins), ranks);
+  for (action = 0; action < SDNN_N_ACTIONS; ++action) {
+    if (ranks[action] > best) best = ranks[action];
+  }
+#if SDNN_TIES == SDNN_DRAWN
+  return sdnn_tied(ranks, SDNN_N_ACTIONS, best,
+                   &agent->randoms[explore ? SDNN_ACTING : SDNN_EVALUATION]);
+#else
+  return sdnn_tied(ranks, SDNN_N_ACTIONS, best);
+#endif
+}
+
+/* Q(observation, action), times 2^SDNN_FRACTION_BITS, rounded to the nearest. */
+static inline int64_t sdnn_q(sdnn_agent* agent, const int32_t* observation, uint32_t action) {
+  uint32_t bins[SDNN_N_INPUTS];
+  int32_t exponent;
+  uint64_t fraction;
+  sdnn_real value;
+  sdnn_bins_of_fixed(observation, bins);
+  value = sdnn_value(agent, sdnn_count(sdnn_state_of(agent, bins),
+                                       action < SDNN_N_ACTIONS ? action : SDNN_N_ACTIONS - 1));
+  if (value << 1 == 0) return 0;
+  fraction = sdnn_fraction(value, &exponent);
+  exponent += SDNN_FRACTION_BITS;
+  if (exponent < -63) return 0;
+  fraction = exponent > 9    ? UINT64_C(1) << 62
+             : exponent >= 0 ? fraction << exponent
+                             : ((fraction >> (-exponent - 1)) + 1) >> 1;
+  return value >> 63 ? -(int64_t)fraction : (int64_t)fraction;
+}
+
+/* Learns a transition: its reward is a number times 2^SDNN_FRACTION_BITS, and `terminated` says
+ * that nothing follows it (running out of time is no such end). If the next transition does not
+ * begin with the same readings, this one was the last of its episode. */
+static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uint32_t action,
+                              int32_t reward, const int32_t* next_observation, int terminated) {
+  uint32_t bins[SDNN_N_INPUTS], next_bins[SDNN_N_INPUTS], i, is_next = 1;
+  sdnn_transition* newest;
+  sdnn_real next_value;
+  if (!sdnn_accepts(&agent->scale, reward)) return;
+#if SDNN_ADAPTS
+  if (sdnn_note_reward(agent, reward, terminated)) {
+    sdnn_set_range(agent, agent->low, agent->high);
+  }
+#endif
+  sdnn_bins_of_fixed(next_observation, next_bins);
+  next_value = terminated ? 0 : sdnn_state_value(agent, next_bins);
+  for (i = 0; i < SDNN_N_OBSERVED; ++i) is_next &= agent->next_observation[i] == observation[i];
+  if (agent->n_waiting > 0 && !is_next) {
+    sdnn_learn_all(agent, sdnn_state_value(agent, agent->next_bins));
+  }
+  sdnn_bins_of_fixed(observation, bins);
+  newest = sdnn_waiting(agent, agent->n_waiting);
+  newest->state = (uint32_t)(sdnn_state_of(agent, bins) - agent->states);
+  newest->action = action < SDNN_N_ACTIONS ? action : SDNN_N_ACTIONS - 1;
+  newest->reward = reward;
+  ++agent->n_waiting;
+  for (i = 0; i < SDNN_N_INPUTS; ++i) {
+    volatile uint32_t* const bin = &agent->next_bins[i]; /* else: memcpy */
+    *bin = next_bins[i];
+  }
+  for (i = 0; i < SDNN_N_OBSERVED; ++i) {
+    volatile int32_t* const reading = &agent->next_observation[i];
+    *reading = next_observation[i];
+  }
+  if (terminated) {
+    sdnn_learn_all(agent, 0);
+  } else if (agent->n_waiting == SDNN_N_STEPS) {
+    sdnn_learn_oldest(agent, next_value);
+  }
+  sdnn_end_window(&agent->scale);
+}
+
+/* The state as bytes, which the library reads and writes too. The episode is not part of it: call
+ * sdnn_begin_episode before, so that its last transitions are learned. */
+#define SDNN_RETURNS_AT (272 + 8 * SDNN_HORIZON)
+#if SDNN_ADAPTS
+#define SDNN_THRESHOLDS_AT (SDNN_RETURNS_AT + 8 * 256)
+#else
+#define SDNN_THRESHOLDS_AT 220
+#endif
+#define SDNN_WEIGHTS_AT (SDNN_THRESHOLDS_AT + UINT32_C(4) * SDNN_N_UNITS)
+#define SDNN_IMAGE_BYTES (SDNN_WEIGHTS_AT + 4 * SDNN_N_WORDS + 4)
+
+static inline void sdnn_save(const sdnn_agent* agent, uint8_t* image) {
+  uint8_t* at = image;
+  uint32_t i;
+  at = sdnn_put(at, SDNN_IMAGE_MAGIC, 4);
+  at = sdnn_put(at, SDNN_FINGERPRINT, 4);
+  at = sdnn_put(at, SDNN_FRACTION_BITS, 4);
+  at = sdnn_put(at, agent->n_random_left, 4);
+  at = sdnn_put_randoms(at, agent->randoms);
+  at = sdnn_put_scale(at, &agent->scale);
+  at = sdnn_put(at, agent->progress, 8);
+  at = sdnn_put(at, agent->q_low, 8);
+  at = sdnn_put(at, agent->q_high, 8);
+#if SDNN_ADAPTS
+  at = sdnn_put(at, agent->low, 8);
+  at = sdnn_put(at, agent->high, 8);
+  at = sdnn_put(at, agent->sum, 8);
+  at = sdnn_put(at, agent->n_returns, 8);
+  at = sdnn_put(at, agent->due, 8);
+  at = sdnn_put(at, agent->n_rewards, 4);
+  at = sdnn_put(at, agent->n_kept_returns, 4);
+  at = sdnn_put(at, agent->oldest, 4);
+  for (i = 0; i < 2 * SDNN_HORIZON; ++i) {
+    at = sdnn_put(at, i < agent->n_rewards ? (uint32_t)agent->rewards[i] : 0, 4);
+  }
+  for (i = 0; i < 256; ++i) at = sdnn_put(at, agent->returns[i], 8);
+#endif
+  for (i = 0; i < SDNN_N_UNITS; ++i) at = sdnn_put(at, (uint32_t)agent->thresholds[i], 4);
+  for (i = 0; i < SDNN_N_WORDS; ++i) at = sdnn_put(at, agent->weights[i], 4);
+  sdnn_put(at, sdnn_checksum(image, SDNN_IMAGE_BYTES - 4), 4);
+}
+
+/* Whether a number read is one, and at most 2^100 in size. */
+static inline int sdnn_is_real(sdnn_real x) { return x << 1 >> 1 <= UINT64_C(1123) << 52; }
+
+/* Returns whether the image is one of this agent, whole and in range; if not, nothing changes. */
+static inline int sdnn_load(sdnn_agent* agent, const uint8_t* image) {
+  const uint8_t* const thresholds = image + SDNN_THRESHOLDS_AT;
+  const uint8_t* const weights = image + SDNN_WEIGHTS_AT;
+  const sdnn_real q_low = sdnn_get(image + 204, 8), q_high = sdnn_get(image + 212, 8);
+#if SDNN_ADAPTS
+  const uint64_t n_returns = sdnn_get(image + 244, 8), due = sdnn_get(image + 252, 8);
+  const uint32_t n_kept = (uint32_t)sdnn_get(image + 264, 4);
+  const uint32_t oldest = (uint32_t)sdnn_get(image + 268, 4);
+#endif
+  sdnn_scale scale;
+  uint32_t i;
+  if (!sdnn_is_image(image, SDNN_IMAGE_BYTES, image + 16) ||
+      sdnn_get(image + 8, 4) != SDNN_FRACTION_BITS || sdnn_get(image + 12, 4) > SDNN_START_STEPS ||
+      sdnn_get(image + 196, 8) > SDNN_ONE || !sdnn_is_real(q_low) || !sdnn_is_real(q_high) ||
+      !sdnn_less(q_low, q_high) || !sdnn_get_scale(image + 176, &scale)) {
+    return 0;
+  }
+#if SDNN_ADAPTS
+  for (i = 220; i < 244; i += 8) {
+    if (!sdnn_is_real(sdnn_get(image + i, 8))) return 0;
+  }
+  if (sdnn_less(0, sdnn_get(image + 220, 8)) || sdnn_less(sdnn_get(image + 228, 8), 0) ||
+      n_returns >> 62 || due > n_returns + (n_returns < 512 ? 1 : n_returns >> 9) ||
+      sdnn_get(image + 260, 4) >= 2 * SDNN_HORIZON || n_kept > 256 || oldest > 255 ||
+      (n_kept < 256 && oldest > 0) || (n_returns >= 32 && n_kept < 32)) {
+    return 0;
+  }
+  for (i = 0; i < 256; ++i) {
+    if (!sdnn_is_real(sdnn_get(image + SDNN_RETURNS_AT + 8 * i, 8))) return 0;
+  }
+#endif
+  for (i = 0; i < SDNN_N_UNITS; ++i) {
+    const int32_t threshold = sdnn_get_32(thresholds + 4 * i);
+    if (threshold <= -1073741824 || threshold >= 1073741824) return 0;
+  }
+  for (i = 0; i < 4 * SDNN_N_WORDS; ++i) {
+    if (weights[i] == 0) return 0;
+  }
+  sdnn_begin(agent);
+  agent->n_random_left = (uint32_t)sdnn_get(image + 12, 4);
+  sdnn_get_randoms(image + 16, agent->randoms);
+  sdnn_get_scale(image + 176, &agent->scale);
+  sdnn_follow_progress(agent, sdnn_get(image + 196, 8));
+  sdnn_set_range(agent, q_low, q_high);
+#if SDNN_ADAPTS
+  agent->low = sdnn_get(image + 220, 8);
+  agent->high = sdnn_get(image + 228, 8);
+  agent->sum = sdnn_get(image + 236, 8);
+  agent->n_returns = n_returns;
+  agent->due = due;
+  agent->n_rewards = (uint32_t)sdnn_get(image + 260, 4);
+  agent->n_kept_returns = n_kept;
+  agent->oldest = oldest;
+  for (i = 0; i < agent->n_rewards; ++i) agent->rewards[i] = sdnn_get_32(image + 272 + 4 * i);
+  for (i = 0; i < 256; ++i) agent->returns[i] = sdnn_get(image + SDNN_RETURNS_AT + 8 * i, 8);
+#endif
+  for (i = 0; i < SDNN_N_UNITS; ++i) {
+    agent->thresholds[i] = sdnn_get_32(thresholds + 4 * i);
+  }
+  for (i = 0; i < SDNN_N_WORDS; ++i) agent->weights[i] = (uint32_t)sdnn_get(weights + 4 * i, 4);
+  return 1;
+}
+
+#define SDNN_HAS_PROGRESS
+#include "sdnn_learner_class.h"
+
+#endif /* SDNN_C_H */

@@ -1,0 +1,217 @@
+/* Parts of all agents that learn: arithmetic without division, random numbers, images. */
+#ifndef SDNN_LEARNER_H
+#define SDNN_LEARNER_H
+
+#include <stdint.h>
+
+/* Numbers below 0 are shifted to the right as all compilers do it: rounded down. */
+typedef char sdnn_needs_arithmetic_shifts[-1 >> 1 == -1 ? 1 : -1];
+
+/* a / b and the rest, without a division. Requires that b is above 0. */
+static inline uint64_t sdnn_quotient(uint64_t a, uint64_t b, uint64_t* rest) {
+  uint64_t quotient = 0;
+  uint32_t n = 0;
+  for (; b <= a >> 1; b <<= 1) ++n;
+  for (;; --n, b >>= 1) {
+    quotient <<= 1;
+    if (a >= b) {
+      a -= b;
+      quotient |= 1;
+    }
+    if (n == 0) break;
+  }
+  *rest = a;
+  return quotient;
+}
+
+/* xoshiro256** of Blackman and Vigna. */
+typedef struct {
+  uint64_t words[4];
+} sdnn_random;
+
+static inline uint64_t sdnn_bits(sdnn_random* random) {
+  uint64_t* const s = random->words;
+  const uint64_t five = s[1] * 5, shifted = s[1] << 17;
+  const uint64_t result = (five << 7 | five >> 57) * 9;
+  s[2] ^= s[0];
+  s[3] ^= s[1];
+  s[1] ^= s[2];
+  s[0] ^= s[3];
+  s[2] ^= shifted;
+  s[3] = s[3] << 45 | s[3] >> 19;
+  return result;
+}
+
+/* A number below n, all with the same probability. */
+static inline uint64_t sdnn_below(sdnn_random* random, uint64_t n) {
+  uint64_t rejected, drawn, rest;
+  sdnn_quotient(0 - n, n, &rejected);
+  do {
+    drawn = sdnn_bits(random);
+  } while (drawn < rejected);
+  sdnn_quotient(drawn, n, &rest);
+  return rest;
+}
+
+/* Whether an action may be random in this step of an episode. */
+static inline int sdnn_may_explore(uint32_t step) {
+#if SDNN_N_GREEDY_STEPS > 0
+  return step >= SDNN_N_GREEDY_STEPS;
+#else
+  (void)step;
+  return 1;
+#endif
+}
+
+/* The number of steps that a random action lasts: n with probability 1 / (n (n + 1)), at most
+ * `longest`. */
+static inline uint32_t sdnn_repetitions(sdnn_random* random, uint32_t longest) {
+  const uint64_t whole = UINT64_C(1) << 53;
+  uint64_t rest;
+  const uint64_t n = sdnn_quotient(whole, whole - (sdnn_bits(random) >> 11), &rest);
+  return (uint32_t)(n < longest ? n : longest);
+}
+
+/* How large rewards are, in powers of two; INT32_MIN if all were 0. Rewards that are far larger
+ * than recent ones are not learned. See cpp/include/sdnn/agents/reward_scale.hpp. */
+typedef struct {
+  uint64_t n_rewards;
+  int32_t size, size_in_window, headroom;
+} sdnn_scale;
+
+static inline void sdnn_begin_scale(sdnn_scale* scale) {
+  scale->n_rewards = SDNN_FIRST_N_REWARDS;
+  scale->size = SDNN_FIRST_SIZE;
+  scale->size_in_window = SDNN_FIRST_SIZE_IN_WINDOW;
+  scale->headroom = SDNN_FIRST_HEADROOM;
+}
+
+/* Returns whether a reward is to be learned. */
+static inline int sdnn_accepts(sdnn_scale* scale, int32_t reward) {
+  uint32_t bits = reward < 0 ? 0 - (uint32_t)reward : (uint32_t)reward;
+  int32_t size = -1 - SDNN_FRACTION_BITS;
+  ++scale->n_rewards;
+  if (reward == 0) return 1;
+  for (; bits > 0; bits >>= 1) ++size;
+  if (scale->size != INT32_MIN && size > scale->size + scale->headroom) {
+    scale->headroom = scale->headroom + 4 < 2500 ? scale->headroom + 4 : 2500;
+    return 0;
+  }
+  if (size > scale->size) scale->size = size;
+  if (size > scale->size_in_window) scale->size_in_window = size;
+  return 1;
+}
+
+/* Ends a window of 1,024 rewards. Returns the size of its rewards, or INT32_MIN. */
+static inline int32_t sdnn_end_window(sdnn_scale* scale) {
+  const int32_t size = scale->size_in_window;
+  if ((scale->n_rewards & 1023) != 0) return INT32_MIN;
+  if ((scale->n_rewards & 65535) == 0 && scale->headroom > 16) --scale->headroom;
+  if (size == INT32_MIN) return INT32_MIN;
+  scale->size_in_window = INT32_MIN;
+  if (scale->size > size + 16) scale->size = size + 16;
+  scale->size -= (scale->size - size + 3) >> 2;
+  return size;
+}
+
+/* Sets n bytes to 0. The compiler makes no call of memset of a volatile store. */
+static inline void sdnn_clear(void* memory, uint32_t n) {
+  volatile uint8_t* bytes = (volatile uint8_t*)memory;
+  for (; n > 0; --n) *bytes++ = 0;
+}
+
+/* Copies n numbers. The compiler makes no call of memcpy of a volatile store. */
+static inline void sdnn_copy_32(int32_t* to, const int32_t* from, uint32_t n) {
+  volatile int32_t* target = to;
+  for (; n > 0; --n) *target++ = *from++;
+}
+
+static inline uint8_t* sdnn_put(uint8_t* at, uint64_t value, uint32_t n_bytes) {
+  for (; n_bytes > 0; --n_bytes, value >>= 8) *at++ = (uint8_t)(value & 255);
+  return at;
+}
+
+static inline uint64_t sdnn_get(const uint8_t* at, uint32_t n_bytes) {
+  uint64_t value = 0;
+  while (n_bytes-- > 0) value = value << 8 | at[n_bytes];
+  return value;
+}
+
+static inline int32_t sdnn_signed(uint32_t value) {
+  return value >> 31 ? -(int32_t)~value - 1 : (int32_t)value;
+}
+
+static inline int32_t sdnn_get_32(const uint8_t* at) {
+  return sdnn_signed((uint32_t)sdnn_get(at, 4));
+}
+
+static inline uint8_t* sdnn_put_scale(uint8_t* at, const sdnn_scale* scale) {
+  at = sdnn_put(at, scale->n_rewards, 8);
+  at = sdnn_put(at, (uint32_t)scale->size, 4);
+  at = sdnn_put(at, (uint32_t)scale->size_in_window, 4);
+  return sdnn_put(at, (uint32_t)scale->headroom, 4);
+}
+
+/* Returns whether the numbers are possible for a scale. */
+static inline int sdnn_get_scale(const uint8_t* at, sdnn_scale* scale) {
+  scale->n_rewards = sdnn_get(at, 8);
+  scale->size = sdnn_get_32(at + 8);
+  scale->size_in_window = sdnn_get_32(at + 12);
+  scale->headroom = sdnn_get_32(at + 16);
+  return (scale->size == INT32_MIN || (scale->size >= -1100 && scale->size <= 1100)) &&
+         scale->size_in_window <= scale->size &&
+         (scale->size_in_window == INT32_MIN || scale->size_in_window >= -1100) &&
+         scale->headroom >= 16 && scale->headroom <= 2500;
+}
+
+/* CRC-32. */
+static inline uint32_t sdnn_checksum(const uint8_t* bytes, uint32_t n) {
+  uint32_t crc = UINT32_MAX, bit;
+  for (; n > 0; --n) {
+    crc ^= *bytes++;
+    for (bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (crc & 1 ? UINT32_C(0xedb88320) : 0);
+  }
+  return ~crc;
+}
+
+/* The random generators of an agent. SDNN-C rounds at random, too. */
+enum { SDNN_EXPLORATION, SDNN_ACTING, SDNN_EVALUATION, SDNN_REPETITIONS, SDNN_ROUNDING };
+
+static inline void sdnn_begin_randoms(sdnn_random* randoms) {
+  uint32_t i, j;
+  for (i = 0; i < SDNN_N_RANDOMS; ++i) {
+    for (j = 0; j < 4; ++j) randoms[i].words[j] = sdnn_seeds[i][j];
+  }
+}
+
+static inline uint8_t* sdnn_put_randoms(uint8_t* at, const sdnn_random* randoms) {
+  uint32_t i, j;
+  for (i = 0; i < SDNN_N_RANDOMS; ++i) {
+    for (j = 0; j < 4; ++j) at = sdnn_put(at, randoms[i].words[j], 8);
+  }
+  return at;
+}
+
+static inline void sdnn_get_randoms(const uint8_t* at, sdnn_random* randoms) {
+  uint32_t i, j;
+  for (i = 0; i < SDNN_N_RANDOMS; ++i) {
+    for (j = 0; j < 4; ++j, at += 8) randoms[i].words[j] = sdnn_get(at, 8);
+  }
+}
+
+/* Whether an image has the head of this agent, the right checksum and possible generators. */
+static inline int sdnn_is_image(const uint8_t* image, uint32_t n_bytes, const uint8_t* randoms) {
+  uint32_t i, j;
+  if (sdnn_get(image, 4) != SDNN_IMAGE_MAGIC || sdnn_get(image + 4, 4) != SDNN_FINGERPRINT ||
+      sdnn_get(image + n_bytes - 4, 4) != sdnn_checksum(image, n_bytes - 4)) {
+    return 0;
+  }
+  for (i = 0; i < SDNN_N_RANDOMS; ++i) {
+    uint8_t any = 0;
+    for (j = 0; j < 32; ++j) any |= *randoms++;
+    if (any == 0) return 0;
+  }
+  return 1;
+}
+
+#endif /* SDNN_LEARNER_H */

@@ -1,0 +1,40 @@
+/* An agent that learns as a class of C++. */
+#ifndef SDNN_LEARNER_CLASS_H
+#define SDNN_LEARNER_CLASS_H
+
+#ifdef __cplusplus
+class sdnn_learner {
+ public:
+  sdnn_learner() { sdnn_begin(&agent_); }
+  void begin_episode() { sdnn_begin_episode(&agent_); }
+#if SDNN_N_DIMENSIONS == 1
+  typedef uint32_t action_type;
+  uint32_t act(const int32_t (&observation)[SDNN_N_OBSERVED], bool explore = true) {
+    return sdnn_act(&agent_, observation, explore);
+  }
+#else
+  typedef const uint32_t (&action_type)[SDNN_N_DIMENSIONS];
+  void act(const int32_t (&observation)[SDNN_N_OBSERVED], uint32_t (&action)[SDNN_N_DIMENSIONS],
+           bool explore = true) {
+    sdnn_act(&agent_, observation, explore, action);
+  }
+#endif
+  void learn(const int32_t (&observation)[SDNN_N_OBSERVED], action_type action, int32_t reward,
+             const int32_t (&next_observation)[SDNN_N_OBSERVED], bool terminated) {
+    sdnn_learn(&agent_, observation, action, reward, next_observation, terminated);
+  }
+#ifdef SDNN_HAS_PROGRESS
+  void set_progress(uint32_t progress) { sdnn_set_progress(&agent_, progress); }
+#endif
+  int64_t q(const int32_t (&observation)[SDNN_N_OBSERVED], action_type action) {
+    return sdnn_q(&agent_, observation, action);
+  }
+  void save(uint8_t (&image)[SDNN_IMAGE_BYTES]) const { sdnn_save(&agent_, image); }
+  bool load(const uint8_t (&image)[SDNN_IMAGE_BYTES]) { return sdnn_load(&agent_, image) != 0; }
+
+ private:
+  sdnn_agent agent_;
+};
+#endif
+
+#endif /* SDNN_LEARNER_CLASS_H */

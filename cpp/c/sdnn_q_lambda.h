@@ -1,0 +1,625 @@
+/* An agent that learns Q(s, a) linear in the SDNN code, by true-online Q(lambda) or Sarsa(lambda).
+ *
+ *   static sdnn_agent agent; // everything that it remembers
+ *   sdnn_begin(&agent);
+ *   sdnn_begin_episode(&agent); // whenever the task starts anew
+ *   uint32_t action = sdnn_act(&agent, observation, 1); // 0: the best action
+ *   sdnn_learn(&agent, observation, action, reward, next_observation, terminated);
+ *
+ * With several dimensions of actions: sdnn_act(&agent, observation, 1, action), with an array of
+ * SDNN_N_DIMENSIONS numbers, which sdnn_learn takes. Observations are in their units, times
+ * 2^SDNN_FRACTION_BITS, and so are rewards. sdnn_save and sdnn_load write and read an image of what
+ * was learned, as sdnn.export.load_image and save_image do. sdnn_bins_of_fixed gives the bins of
+ * all inputs.
+ *
+ * Where the processor cannot multiply or shift 64 bits, the compiler's own library does (libgcc).
+ * Nothing is divided. See cpp/include/sdnn/agents/q_lambda.hpp. */
+#ifndef SDNN_Q_LAMBDA_H
+#define SDNN_Q_LAMBDA_H
+
+#define SDNN_IMAGE_MAGIC UINT32_C(0x4c4e4453) /* "SDNL" */
+#define SDNN_N_RANDOMS 4
+#include "sdnn_learner.h"
+#include "sdnn_readout.h"
+
+typedef int64_t sdnn_score;
+#include "sdnn_ties.h"
+
+#define SDNN_LARGEST_WEIGHT INT64_C(8388608)    /* 2^23 */
+#define SDNN_LARGEST_VALUE INT64_C(8589934592)  /* 2^33 */
+#define SDNN_LARGEST_ERROR INT64_C(17179869183) /* 2^34 - 1 */
+#define SDNN_LARGEST_TRACE 131071
+#define SDNN_TRACE_ONE 4096
+#define SDNN_MOST_SNAPSHOTS 3072
+#define SDNN_MOST_ENDED 20
+#define SDNN_AVERAGES (SDNN_AVERAGING_INTERVAL > 0)
+#define SDNN_N_WEIGHTS (UINT32_C(1) * SDNN_N_ROWS * SDNN_N_COLUMNS)
+
+/* Everything that the agent remembers. All functions take its address. */
+typedef struct {
+  int64_t n_learned;
+  int64_t n_steps;   /* steps that moved the weights */
+  int64_t old_value; /* of the pending state, before the last step of learning */
+  sdnn_scale scale;
+  sdnn_random randoms[SDNN_N_RANDOMS];
+  int32_t weights[SDNN_N_WEIGHTS];
+#if SDNN_AVERAGES
+  int32_t averaged[SDNN_N_WEIGHTS];
+#endif
+  int32_t traces[SDNN_N_WEIGHTS];
+  int32_t exponent; /* values and weights count units of 2 to this power */
+  int32_t reward;
+  uint32_t rate, epsilon;      /* times 2^16 */
+  uint32_t n_snapshots, phase; /* of the average, and steps since the last one */
+  uint32_t n_random_left;      /* steps that will still be random */
+  uint32_t n_ended;            /* episodes that terminated, up to 20 */
+  uint32_t n_kept;             /* steps that the random action will still last */
+  uint32_t step;               /* of the episode */
+  uint32_t kept[SDNN_N_DIMENSIONS], action[SDNN_N_DIMENSIONS];
+  uint32_t next_bins[SDNN_N_INPUTS];
+  sdnn_code codes[2]; /* of the pending state, and of another one */
+  uint8_t pending;    /* the code of the state of the pending transition */
+  uint8_t is_pending; /* whether a transition is to be learned */
+  uint8_t has_exponent;
+  uint8_t is_live[SDNN_N_ROWS]; /* rows of traces that are not all 0 */
+} sdnn_agent;
+
+/* a b / 2^n, rounded to the nearest, halves up. */
+static inline int64_t sdnn_scaled(int64_t a, int64_t b, uint32_t n) {
+  return n == 0 ? a * b : (a * b + (INT64_C(1) << (n - 1))) >> n;
+}
+static inline int64_t sdnn_size(int64_t x) { return x < 0 ? -x : x; }
+static inline int64_t sdnn_clipped(int64_t x, int64_t most) {
+  return x > most ? most : x < -most ? -most : x;
+}
+
+/* The number of weights that have a part in Q(s, a). */
+static inline uint32_t sdnn_n_active_weights(const sdnn_code* code) {
+  return (code->n_positive + code->n_negative) * SDNN_ACTION_WINDOW * SDNN_N_DIMENSIONS;
+}
+
+/* A rate that moves from `first` to `last`, times 2^16. */
+static inline uint32_t sdnn_scheduled(const sdnn_agent* agent, int32_t first, int32_t last) {
+  const int64_t all = (int64_t)last - first;
+  const uint64_t twice = 2 * ((uint64_t)agent->n_learned + SDNN_SCHEDULE_STEPS);
+  const int64_t product = 2 * all * agent->n_learned + (int64_t)(twice / 2);
+  uint64_t rest;
+  if (first == last) return (uint32_t)first;
+  if (product >= 0) {
+    return (uint32_t)(first + (int64_t)sdnn_quotient((uint64_t)product, twice, &rest));
+  }
+  return (uint32_t)(first - 1 - (int64_t)sdnn_quotient((uint64_t)-product - 1, twice, &rest));
+}
+
+static inline void sdnn_apply_rates(sdnn_agent* agent) {
+  agent->rate = sdnn_scheduled(agent, SDNN_RATE_FIRST, SDNN_RATE_LAST);
+  if (agent->rate == 0) agent->rate = 1;
+  agent->epsilon = sdnn_scheduled(agent, SDNN_EPSILON_FIRST, SDNN_EPSILON_LAST);
+}
+
+/* Makes units twice as large; the numbers that count them become half as large, halves up. */
+static inline void sdnn_double_unit(sdnn_agent* agent) {
+  uint32_t j;
+  ++agent->exponent;
+  agent->old_value = (agent->old_value + 1) >> 1;
+  for (j = 0; j < SDNN_N_WEIGHTS; ++j) {
+    agent->weights[j] = (agent->weights[j] + 1) >> 1;
+#if SDNN_AVERAGES
+    agent->averaged[j] = (agent->averaged[j] + 1) >> 1;
+#endif
+  }
+}
+
+/* The floor of the logarithm to base 2 of a number above 0. */
+static inline int32_t sdnn_log2(uint32_t x) {
+  int32_t log = -1;
+  for (; x > 0; x >>= 1) ++log;
+  return log;
+}
+
+/* Makes units smaller if they are larger than they have to be for rewards of 2^size, which is the
+ * size in a window: see refine_unit of cpp/include/sdnn/agents/q_lambda.hpp. */
+static inline void sdnn_refine_unit(sdnn_agent* agent, int32_t size) {
+  const sdnn_code* const code = &agent->codes[agent->pending];
+  const uint32_t n = sdnn_n_active_weights(code);
+  int32_t least_bits = 23 + sdnn_log2(n > 0 ? n : 1), spare_bits = 23;
+  int32_t n_halvings = 0, n_free = 30 - (size - agent->exponent);
+  uint32_t used = 0, j;
+  if (!agent->has_exponent) return;
+  least_bits = (least_bits < 33 ? least_bits : 33) - SDNN_HORIZON_BITS - 10;
+  for (j = 0; j < SDNN_N_WEIGHTS; ++j) {
+    used |= (uint32_t)(agent->weights[j] ^ agent->weights[j] >> 31);
+#if SDNN_AVERAGES
+    used |= (uint32_t)(agent->averaged[j] ^ agent->averaged[j] >> 31);
+#endif
+  }
+  spare_bits -= sdnn_log2(used) + 1;
+  if (n_free > spare_bits) n_free = spare_bits;
+  if (n_free - 8 > n_halvings) n_halvings = n_free - 8;
+  if (least_bits - (agent->scale.size - agent->exponent) > n_halvings) {
+    n_halvings = least_bits - (agent->scale.size - agent->exponent);
+  }
+  agent->exponent -= n_halvings;
+  for (; n_halvings > 0; --n_halvings) {
+    agent->old_value = sdnn_clipped(2 * agent->old_value, SDNN_LARGEST_VALUE - 1);
+    for (j = 0; j < SDNN_N_WEIGHTS; ++j) {
+      agent->weights[j] = (int32_t)sdnn_clipped(2 * agent->weights[j], SDNN_LARGEST_WEIGHT - 1);
+#if SDNN_AVERAGES
+      agent->averaged[j] = (int32_t)sdnn_clipped(2 * agent->averaged[j], SDNN_LARGEST_WEIGHT - 1);
+#endif
+    }
+  }
+}
+
+/* Makes units large enough for a reward. The first reward that is not 0 gets 31 bits. */
+static inline void sdnn_fit_unit(sdnn_agent* agent, int32_t reward) {
+  const uint64_t size = (uint64_t)sdnn_size(reward);
+  if (reward == 0) return;
+  if (!agent->has_exponent) {
+    agent->has_exponent = 1;
+    agent->exponent = -30 - SDNN_FRACTION_BITS;
+    while (size >> (agent->exponent + 31 + SDNN_FRACTION_BITS)) ++agent->exponent;
+  }
+  for (;;) {
+    const int32_t shift = -SDNN_FRACTION_BITS - agent->exponent;
+    if (shift < 32 && (shift <= 0 || (size << shift) >> 32 == 0)) return;
+    sdnn_double_unit(agent);
+  }
+}
+
+static inline int64_t sdnn_units_of(const sdnn_agent* agent, int32_t reward) {
+  const int32_t shift = -SDNN_FRACTION_BITS - agent->exponent;
+  if (!agent->has_exponent || reward == 0 || shift < -62) return 0;
+  if (shift >= 0) return reward * (INT64_C(1) << shift);
+  return sdnn_scaled(reward, 1, (uint32_t)-shift);
+}
+
+/* Q(s, a) in units, or the same sum of traces. */
+static inline int64_t sdnn_sum(const int32_t* rows, const sdnn_code* code, const uint32_t* action) {
+  int64_t total = 0;
+  uint32_t d, i;
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
+    for (i = 0; i < SDNN_ACTION_WINDOW; ++i) {
+      const uint32_t row = sdnn_first_rows[d] + action[d] + i;
+      total += sdnn_sum_of_row(rows + row * SDNN_N_COLUMNS, code);
+    }
+  }
+  return total;
+}
+
+static inline int64_t sdnn_best_sum(const sdnn_agent* agent, const sdnn_code* code) {
+  int64_t sums[SDNN_MOST_ROWS], total = 0;
+  uint32_t d;
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
+    sdnn_sums(agent->weights, code, d, sums);
+    total += sdnn_largest(sums, sdnn_n_actions[d]);
+  }
+  return total;
+}
+
+/* Returns the value of `action`, or of the best action where it is null, and makes units large
+ * enough for it. `other` is null or a number in units. */
+static inline int64_t sdnn_value(sdnn_agent* agent, const sdnn_code* code, const uint32_t* action,
+                                 int64_t* other) {
+  for (;;) {
+    const int64_t value =
+        action ? sdnn_sum(agent->weights, code, action) : sdnn_best_sum(agent, code);
+    if (sdnn_size(value) < SDNN_LARGEST_VALUE) return value;
+    sdnn_double_unit(agent);
+    if (other) *other = (*other + 1) >> 1;
+  }
+}
+
+/* The code of a state other than the pending one. */
+static inline sdnn_code* sdnn_other(sdnn_agent* agent, const uint32_t* bins) {
+  sdnn_code* const code = &agent->codes[1 - agent->pending];
+  uint32_t i, is_same = code->n_positive + code->n_negative > 0;
+  for (i = 0; i < SDNN_N_INPUTS; ++i) is_same &= code->bins[i] == bins[i];
+  if (!is_same) sdnn_encode(&sdnn_the_coding, bins, code);
+  return code;
+}
+
+#if SDNN_AVERAGES
+/* Moves the average to the weights by 1 / 2^k of the way, with growing k. */
+static inline void sdnn_note_step(sdnn_agent* agent) {
+  uint32_t k = 0, j;
+  int32_t half;
+  ++agent->n_steps;
+  if (++agent->phase < SDNN_AVERAGING_INTERVAL) return;
+  agent->phase = 0;
+  while (3 * ((UINT32_C(2) << k) - 1) <= agent->n_snapshots) ++k;
+  half = k > 0 ? (int32_t)(UINT32_C(1) << (k - 1)) : 0;
+  for (j = 0; j < SDNN_N_WEIGHTS; ++j) {
+    agent->averaged[j] += (agent->weights[j] - agent->averaged[j] + half) >> k;
+  }
+  if (agent->n_snapshots < SDNN_MOST_SNAPSHOTS) ++agent->n_snapshots;
+}
+#endif
+
+/* Adds columns of a code to the traces of a row, or replaces them, and corrects the weights. */
+static inline void sdnn_add_to_trace(int32_t* weights, int32_t* traces, const sdnn_column* column,
+                                     uint32_t n, int32_t gain, int32_t correction) {
+  for (; n > 0; --n, ++column) {
+#if SDNN_IS_DUTCH
+    int32_t trace = traces[*column] + gain;
+#else
+    int32_t trace = gain;
+#endif
+    if (trace > SDNN_LARGEST_TRACE) trace = SDNN_LARGEST_TRACE;
+    if (trace < -SDNN_LARGEST_TRACE) trace = -SDNN_LARGEST_TRACE;
+    traces[*column] = trace;
+    weights[*column] -= correction;
+  }
+}
+
+/* Decays the trace of a row, adds the code to it unless `code` is null, and moves the weights along
+ * it. Returns all bits of the sizes of the weights. */
+static inline uint32_t sdnn_move_row(sdnn_agent* agent, uint32_t row, const sdnn_code* code,
+                                     int32_t gain, int32_t step, uint32_t shift,
+                                     int32_t correction) {
+  int32_t* const weights = &agent->weights[row * SDNN_N_COLUMNS];
+  int32_t* const traces = &agent->traces[row * SDNN_N_COLUMNS];
+  const int32_t half = (int32_t)(UINT32_C(1) << (shift - 1));
+  int32_t used = 0, live = 0;
+  uint32_t j;
+  for (j = 0; j < SDNN_N_COLUMNS; ++j) {
+    const int32_t product = traces[j] * SDNN_TRACE_DECAY;
+    traces[j] = (product + (int32_t)((uint32_t)(product >> 31) >> 19)) >> 13; /* product / 8192 */
+  }
+  if (code) {
+    const uint32_t n = code->n_negative;
+    sdnn_add_to_trace(weights, traces, code->columns, code->n_positive, gain, correction);
+    sdnn_add_to_trace(weights, traces, code->columns + SDNN_MOST_COLUMNS - n, n, -gain,
+                      -correction);
+  }
+  for (j = 0; j < SDNN_N_COLUMNS; ++j) {
+    const int32_t trace = traces[j], weight = weights[j] + ((step * trace + half) >> shift);
+    weights[j] = weight;
+    used |= weight ^ weight >> 31;
+    live |= trace;
+  }
+  agent->is_live[row] = live != 0;
+  return (uint32_t)used;
+}
+
+/* Moves the weights by rate / n times the error along the trace, minus rate / n times the drift
+ * along the code, where n is the number of weights that have a part in Q(s, a). */
+static inline void sdnn_move(sdnn_agent* agent, const sdnn_code* code, int64_t error,
+                             int64_t drift) {
+  const uint32_t n = sdnn_n_active_weights(code);
+  uint64_t rest;
+  const int64_t rate = (int64_t)sdnn_quotient((uint64_t)agent->rate << 12, n > 0 ? n : 1, &rest);
+  int64_t along_trace;
+  int32_t gain = SDNN_TRACE_ONE;
+  uint32_t n_bits = 0, used = 0, d, row = 0;
+#if SDNN_IS_DUTCH
+  const int64_t before = sdnn_scaled(sdnn_sum(agent->traces, code, agent->action), rate, 28);
+  gain -= (int32_t)sdnn_clipped(sdnn_scaled(before, SDNN_TRACE_DECAY, 13), SDNN_LARGEST_TRACE);
+#endif
+  error = sdnn_clipped(error, SDNN_LARGEST_ERROR);
+  drift = sdnn_clipped(drift, SDNN_LARGEST_ERROR);
+  while (sdnn_size(sdnn_scaled(error, rate, 28)) >= SDNN_LARGEST_WEIGHT ||
+         sdnn_size(sdnn_scaled(drift, rate, 28)) >= SDNN_LARGEST_WEIGHT) {
+    sdnn_double_unit(agent);
+    error = (error + 1) >> 1;
+    drift = (drift + 1) >> 1;
+  }
+  along_trace = sdnn_scaled(error, rate, 28);
+  while (sdnn_size(along_trace) >> n_bits >= 8191) ++n_bits;
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
+    const uint32_t first = sdnn_first_rows[d] + agent->action[d];
+    const uint32_t end = sdnn_first_rows[d] + sdnn_n_actions[d] + SDNN_ACTION_WINDOW - 1;
+    for (; row < end; ++row) {
+      const int is_active = row >= first && row < first + SDNN_ACTION_WINDOW;
+      if (!is_active && !agent->is_live[row]) continue;
+      used |= sdnn_move_row(agent, row, is_active ? code : 0, gain,
+                            (int32_t)sdnn_scaled(along_trace, 1, n_bits), 12 - n_bits,
+                            (int32_t)sdnn_scaled(drift, rate, 28));
+    }
+  }
+  while (used >= SDNN_LARGEST_WEIGHT) {
+    sdnn_double_unit(agent);
+    used >>= 1;
+    for (row = 0; row < SDNN_N_WEIGHTS; ++row) { /* halves are rounded up */
+      if (agent->weights[row] == SDNN_LARGEST_WEIGHT) used |= (uint32_t)SDNN_LARGEST_WEIGHT;
+    }
+  }
+#if SDNN_AVERAGES
+  sdnn_note_step(agent);
+#endif
+}
+
+/* Takes a step of learning from the pending transition; `next` is the value of the next state. */
+static inline void sdnn_correct(sdnn_agent* agent, int64_t next) {
+  const sdnn_code* const code = &agent->codes[agent->pending];
+  const int64_t value = sdnn_value(agent, code, agent->action, &next);
+  const int64_t target = sdnn_units_of(agent, agent->reward) + sdnn_scaled(next, SDNN_DISCOUNT, 15);
+  const int64_t drift = SDNN_IS_DUTCH ? value - agent->old_value : 0;
+  agent->old_value = next;
+  sdnn_move(agent, code, target - value + drift, drift);
+}
+
+static inline void sdnn_correct_by_best(sdnn_agent* agent) {
+  const sdnn_code* const next = sdnn_other(agent, agent->next_bins);
+  sdnn_correct(agent, sdnn_value(agent, next, 0, 0));
+}
+
+static inline void sdnn_end(sdnn_agent* agent) {
+  uint32_t row;
+  for (row = 0; row < SDNN_N_ROWS; ++row) {
+    if (agent->is_live[row]) {
+      sdnn_clear(&agent->traces[row * SDNN_N_COLUMNS], 4 * SDNN_N_COLUMNS);
+    }
+    agent->is_live[row] = 0;
+  }
+  agent->old_value = 0;
+  agent->is_pending = 0;
+}
+
+/* Learns the pending transition of an episode that did not terminate. */
+static inline void sdnn_finish_at_end(sdnn_agent* agent) {
+#if SDNN_IS_SARSA
+  sdnn_correct_by_best(agent);
+#endif
+  sdnn_end(agent);
+}
+
+/* Begins an episode. Call it before the first action, and whenever the task starts anew. */
+static inline void sdnn_begin_episode(sdnn_agent* agent) {
+  agent->step = 0;
+  agent->n_kept = 0;
+  if (agent->is_pending) sdnn_finish_at_end(agent);
+}
+
+/* Sets the exponent of units; INT32_MIN where no reward decided it. */
+static inline void sdnn_set_exponent(sdnn_agent* agent, int32_t exponent) {
+  agent->has_exponent = exponent != INT32_MIN;
+  agent->exponent = agent->has_exponent ? exponent : 0;
+}
+
+/* Makes the agent as it was exported. */
+static inline void sdnn_begin(sdnn_agent* agent) {
+  sdnn_clear(agent, sizeof *agent);
+  sdnn_begin_randoms(agent->randoms);
+  agent->n_random_left = SDNN_FIRST_N_RANDOM_LEFT;
+  sdnn_begin_scale(&agent->scale);
+  sdnn_set_exponent(agent, SDNN_FIRST_EXPONENT);
+  agent->n_learned = SDNN_FIRST_N_LEARNED;
+  agent->n_ended = SDNN_FIRST_N_ENDED;
+#if SDNN_AVERAGES
+  agent->n_steps = SDNN_FIRST_N_STEPS;
+  agent->phase = SDNN_FIRST_PHASE;
+  agent->n_snapshots = SDNN_FIRST_N_SNAPSHOTS;
+#endif
+#if SDNN_HAS_FIRST_WEIGHTS
+  sdnn_copy_32(agent->weights, sdnn_first_weights, SDNN_N_WEIGHTS);
+#endif
+#if SDNN_HAS_FIRST_AVERAGED
+  sdnn_copy_32(agent->averaged, sdnn_first_averaged, SDNN_N_WEIGHTS);
+#endif
+  sdnn_apply_rates(agent);
+}
+
+/* Whether the next action is a random one, which is in agent->kept then. */
+static inline int sdnn_explores(sdnn_agent* agent) {
+  const uint32_t step = agent->step++;
+  const int at_random = agent->n_random_left > 0;
+  uint32_t d;
+  if (at_random) --agent->n_random_left;
+  if (agent->n_kept > 0) {
+    --agent->n_kept;
+    return 1;
+  }
+  if (!at_random &&
+      !(sdnn_may_explore(step) && agent->epsilon > 0 &&
+        sdnn_bits(&agent->randoms[SDNN_EXPLORATION]) >> 11 < (uint64_t)agent->epsilon << 37)) {
+    return 0;
+  }
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
+    agent->kept[d] = (uint32_t)sdnn_below(&agent->randoms[SDNN_EXPLORATION], sdnn_n_actions[d]);
+  }
+#if SDNN_MAX_ACTION_REPEAT > 1
+  {
+    const uint32_t most = (uint32_t)SDNN_MAX_ACTION_REPEAT >> agent->n_ended;
+    const uint32_t least = SDNN_MAX_ACTION_REPEAT < 5 ? SDNN_MAX_ACTION_REPEAT : 5;
+    agent->n_kept =
+        sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], most > least ? most : least) - 1;
+  }
+#endif
+  return 1;
+}
+
+/* The tolerance of ties in units. */
+static inline int64_t sdnn_tie_tolerance(const sdnn_agent* agent) {
+#if SDNN_TIE_TOLERANCE > 0
+  const int32_t shift = agent->exponent - (SDNN_TIE_TOLERANCE_EXPONENT);
+  return shift < 0 ? INT64_C(1) << 62 : shift < 63 ? SDNN_TIE_TOLERANCE >> shift : 0;
+#else
+  (void)agent;
+  return 0;
+#endif
+}
+
+/* The action to take in each dimension; without `explore` a best one, by the average of the weights
+ * where there is one. */
+static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observation, int explore,
+                                    uint32_t* action) {
+  uint32_t bins[SDNN_N_INPUTS], d;
+  int64_t sums[SDNN_MOST_ROWS], least;
+  const sdnn_code* code;
+  const int32_t* rows = agent->weights;
+  if (explore && sdnn_explores(agent)) {
+    for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = agent->kept[d];
+    return;
+  }
+  sdnn_bins_of_fixed(observation, bins);
+  code = sdnn_other(agent, bins);
+#if SDNN_AVERAGES
+  if (!explore && agent->n_snapshots > 0) rows = agent->averaged;
+#endif
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
+    sdnn_sums(rows, code, d, sums);
+    least = sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(agent);
+#if SDNN_TIES == SDNN_DRAWN
+    action[d] = sdnn_tied(sums, sdnn_n_actions[d], least,
+                          &agent->randoms[explore ? SDNN_ACTING : SDNN_EVALUATION]);
+#else
+    action[d] = sdnn_tied(sums, sdnn_n_actions[d], least);
+#endif
+  }
+}
+
+/* An action, of which numbers beyond the last count as the last. */
+static inline void sdnn_limit_action(const uint32_t* action, uint32_t* limited) {
+  uint32_t d;
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
+    const uint32_t last = sdnn_n_actions[d] - 1;
+    limited[d] = action[d] < last ? action[d] : last;
+  }
+}
+
+/* Q(observation, action) in units of 2 to the power of agent->exponent. */
+static inline int64_t sdnn_q_of_each(sdnn_agent* agent, const int32_t* observation,
+                                     const uint32_t* action) {
+  uint32_t bins[SDNN_N_INPUTS], limited[SDNN_N_DIMENSIONS];
+  sdnn_limit_action(action, limited);
+  sdnn_bins_of_fixed(observation, bins);
+  return sdnn_sum(agent->weights, sdnn_other(agent, bins), limited);
+}
+
+/* Learns a transition. `terminated` says that nothing follows it; running out of time is no such
+ * end. If the next transition begins elsewhere, this one was the last of its episode. */
+static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observation,
+                                      const uint32_t* action, int32_t reward,
+                                      const int32_t* next_observation, int terminated) {
+  uint32_t bins[SDNN_N_INPUTS], limited[SDNN_N_DIMENSIONS], d, is_next = 1;
+  const sdnn_code* code;
+  int32_t size;
+  if (!sdnn_accepts(&agent->scale, reward)) return;
+  sdnn_limit_action(action, limited);
+  sdnn_bins_of_fixed(observation, bins);
+  for (d = 0; d < SDNN_N_INPUTS; ++d) is_next &= agent->next_bins[d] == bins[d];
+  if (agent->is_pending && !is_next) sdnn_finish_at_end(agent);
+  code = sdnn_other(agent, bins);
+  if (agent->is_pending) {
+#if SDNN_IS_SARSA
+    sdnn_correct(agent, sdnn_value(agent, code, limited, 0));
+#else
+    if (sdnn_sum(agent->weights, code, limited) < sdnn_best_sum(agent, code)) sdnn_end(agent);
+#endif
+    agent->is_pending = 0;
+  }
+  agent->pending = (uint8_t)(1 - agent->pending);
+  sdnn_bins_of_fixed(next_observation, agent->next_bins);
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) agent->action[d] = limited[d];
+  agent->reward = reward;
+  agent->is_pending = 1;
+  sdnn_fit_unit(agent, reward);
+  ++agent->n_learned;
+  sdnn_apply_rates(agent);
+  if (terminated) {
+    sdnn_correct(agent, 0);
+    sdnn_end(agent);
+    if (agent->n_ended < SDNN_MOST_ENDED) ++agent->n_ended;
+  } else if (!SDNN_IS_SARSA) {
+    sdnn_correct_by_best(agent);
+  }
+  size = sdnn_end_window(&agent->scale);
+  if (size != INT32_MIN) sdnn_refine_unit(agent, size);
+}
+
+#if SDNN_N_DIMENSIONS == 1
+static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation, int explore) {
+  uint32_t action;
+  sdnn_act_in_each(agent, observation, explore, &action);
+  return action;
+}
+static inline int64_t sdnn_q(sdnn_agent* agent, const int32_t* observation, uint32_t action) {
+  return sdnn_q_of_each(agent, observation, &action);
+}
+static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uint32_t action,
+                              int32_t reward, const int32_t* next_observation, int terminated) {
+  sdnn_learn_in_each(agent, observation, &action, reward, next_observation, terminated);
+}
+#else
+static inline void sdnn_act(sdnn_agent* agent, const int32_t* observation, int explore,
+                            uint32_t* action) {
+  sdnn_act_in_each(agent, observation, explore, action);
+}
+static inline int64_t sdnn_q(sdnn_agent* agent, const int32_t* observation,
+                             const uint32_t* action) {
+  return sdnn_q_of_each(agent, observation, action);
+}
+static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, const uint32_t* action,
+                              int32_t reward, const int32_t* next_observation, int terminated) {
+  sdnn_learn_in_each(agent, observation, action, reward, next_observation, terminated);
+}
+#endif
+
+/* An image holds the state as bytes, which the library reads and writes too. The episode is not
+ * part of it: call sdnn_begin_episode before, so that its last transition is learned. */
+#define SDNN_IMAGE_HEAD 188
+#define SDNN_IMAGE_BYTES (SDNN_IMAGE_HEAD + 4 * (1 + SDNN_AVERAGES) * SDNN_N_WEIGHTS + 4)
+
+static inline void sdnn_save(const sdnn_agent* agent, uint8_t* image) {
+  uint8_t* at = image;
+  uint32_t j;
+  at = sdnn_put(at, SDNN_IMAGE_MAGIC, 4);
+  at = sdnn_put(at, SDNN_FINGERPRINT, 4);
+  at = sdnn_put(at, agent->has_exponent ? (uint32_t)agent->exponent : UINT32_C(0x80000000), 4);
+  at = sdnn_put(at, agent->n_snapshots, 4);
+  at = sdnn_put(at, agent->n_random_left, 4);
+  at = sdnn_put(at, agent->n_ended, 4);
+  at = sdnn_put(at, (uint64_t)agent->n_learned, 8);
+  at = sdnn_put(at, (uint64_t)agent->n_steps, 8);
+  at = sdnn_put_scale(at, &agent->scale);
+  at = sdnn_put_randoms(at, agent->randoms);
+  for (j = 0; j < SDNN_N_WEIGHTS; ++j) at = sdnn_put(at, (uint32_t)agent->weights[j], 4);
+#if SDNN_AVERAGES
+  for (j = 0; j < SDNN_N_WEIGHTS; ++j) at = sdnn_put(at, (uint32_t)agent->averaged[j], 4);
+#endif
+  sdnn_put(at, sdnn_checksum(image, SDNN_IMAGE_BYTES - 4), 4);
+}
+
+/* Returns whether the image is one of this agent, whole and in range; if not, nothing changes. */
+static inline int sdnn_load(sdnn_agent* agent, const uint8_t* image) {
+  const uint8_t* const weights = image + SDNN_IMAGE_HEAD;
+  const int32_t exponent = sdnn_get_32(image + 8);
+  const uint64_t n_learned = sdnn_get(image + 24, 8), n_steps = sdnn_get(image + 32, 8);
+  sdnn_scale scale;
+  uint64_t rest;
+  uint32_t j;
+  if (!sdnn_is_image(image, SDNN_IMAGE_BYTES, image + 60) ||
+      (exponent != INT32_MIN && (exponent < -1100 || exponent > 1100)) ||
+      sdnn_get(image + 12, 4) > SDNN_MOST_SNAPSHOTS || sdnn_get(image + 16, 4) > SDNN_START_STEPS ||
+      sdnn_get(image + 20, 4) > SDNN_MOST_ENDED || n_learned > UINT64_C(1) << 45 || n_steps >> 62 ||
+      !sdnn_get_scale(image + 40, &scale)) {
+    return 0;
+  }
+  for (j = 0; j < (1 + SDNN_AVERAGES) * SDNN_N_WEIGHTS; ++j) {
+    if (sdnn_size(sdnn_get_32(weights + 4 * j)) >= SDNN_LARGEST_WEIGHT) return 0;
+  }
+  sdnn_begin(agent);
+  sdnn_set_exponent(agent, exponent);
+  agent->n_snapshots = (uint32_t)sdnn_get(image + 12, 4);
+  agent->n_random_left = (uint32_t)sdnn_get(image + 16, 4);
+  agent->n_ended = (uint32_t)sdnn_get(image + 20, 4);
+  agent->n_learned = (int64_t)n_learned;
+  agent->n_steps = (int64_t)n_steps;
+  sdnn_get_scale(image + 40, &agent->scale);
+  sdnn_quotient(n_steps, SDNN_AVERAGES ? SDNN_AVERAGING_INTERVAL : 1, &rest);
+  agent->phase = (uint32_t)rest;
+  sdnn_get_randoms(image + 60, agent->randoms);
+  for (j = 0; j < SDNN_N_WEIGHTS; ++j) agent->weights[j] = sdnn_get_32(weights + 4 * j);
+#if SDNN_AVERAGES
+  for (j = 0; j < SDNN_N_WEIGHTS; ++j) {
+    agent->averaged[j] = sdnn_get_32(weights + 4 * (SDNN_N_WEIGHTS + j));
+  }
+#endif
+  sdnn_apply_rates(agent);
+  return 1;
+}
+
+#include "sdnn_learner_class.h"
+
+#endif /* SDNN_Q_LAMBDA_H */

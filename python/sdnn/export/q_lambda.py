@@ -1,0 +1,246 @@
+"""SDNNQLambda as a C header: its greedy policy, or the agent that learns."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.agents import SDNNQLambda
+from sdnn.export.code import Code
+from sdnn.export.tables import Tables
+from sdnn.export.writer import (
+    NONE,
+    SCALE_FIELDS,
+    CHeader,
+    Learner,
+    Writer,
+    c_number,
+    learning_needs,
+    require_few_weights,
+)
+
+_WEIGHTS = {"weights": "action_value.weights", "averaged": "action_value.averaged_weights"}
+"""Names in the header and in the core's state."""
+_ONE = 1 << 16  # of rates
+_MOST_TOLERANCE = 2**62  # in units: above any difference of values
+
+
+class QLambdaWriter(Writer):
+    """Makes the header of an `SDNNQLambda` agent's greedy policy."""
+
+    agent: SDNNQLambda
+
+    def network(self) -> Any:
+        """Return the readout."""
+        return self.networks[0]
+
+    def code(self) -> Code:
+        """Return the code of its states."""
+        return Code(self.network(), self.n_inputs)
+
+    def columns(self) -> NDArray[np.intp]:
+        """Return the places of the header's columns among those of the weights."""
+        m = self.agent.approximator.n_pattern_units
+        n_groups = len(self.network().pairs)
+        slots = np.arange(n_groups)[:, None] * (-(-m // 64) * 64) + np.arange(m)
+        return slots.reshape(-1)
+
+    def n_rows(self) -> list[int]:
+        """Return the number of readout units of each dimension."""
+        return [n + self.agent.approximator.action_window - 1 for n in self.n_actions()]
+
+    def n_weights(self) -> int:
+        """Return the number of weights; ValueError for too many."""
+        n_weights = sum(self.n_rows()) * self.code().n_columns
+        require_few_weights(n_weights, "n_actions")
+        return n_weights
+
+    def description(self) -> str:
+        """Return the sizes of the agent in words."""
+        return (
+            f"{self.n_inputs} inputs, {self.agent.approximator.n_pattern_units} units per pattern,"
+            f" {' x '.join(map(str, self.n_actions()))} actions"
+        )
+
+    def defines(self) -> dict[str, Any]:
+        """Return the sizes of the readout."""
+        return {
+            **self.code().defines(),
+            "ACTION_WINDOW": self.agent.approximator.action_window,
+            "N_ROWS": sum(self.n_rows()),
+            "MOST_ROWS": max(self.n_rows()),
+        }
+
+    def tolerance(self) -> tuple[int, int]:
+        """Return the tolerance of ties as a number below 2^62, times 2 to a power."""
+        fraction, exponent = math.frexp(self.agent.learning.tie_tolerance)
+        return int(fraction * _MOST_TOLERANCE), exponent - 62
+
+    def tables(self) -> Tables:
+        """Return the constants of the spaces, the code and the readout's rows."""
+        tables, first_rows = self.tables_of_spaces(), np.cumsum([0, *self.n_rows()])[:-1]
+        self.code().add_tables(tables)
+        n_actions = np.array(self.n_actions())
+        tables.add("uint32_t", "n_actions", n_actions, "Actions of each dimension.")
+        tables.add("uint32_t", "first_rows", first_rows, "Readout units of each dimension.")
+        return tables
+
+    def header(self) -> CHeader:
+        """Make the header."""
+        tables, code, n_weights = self.tables(), self.code(), self.n_weights()
+        state = self.agent.state("agent")
+        weights = state["action_value.weights"]
+        if np.any(state.get("action_value.n_snapshots", 0)):
+            weights = state["action_value.averaged_weights"]
+        tables.add("int32_t", "weights", weights[:, self.columns()].reshape(-1))
+        number, exponent = self.tolerance()
+        shift = int(state.get("action_value.exponent", 0)) - exponent
+        tolerance = min(number << max(-shift, 0) >> max(shift, 0), _MOST_TOLERANCE)
+        n_words = min(code.most_columns, code.n_columns) * sum(self.n_rows())
+        ram_bytes = code.most_columns * code.column_bytes + 8 * max(self.n_rows())
+        ram_bytes += 12 * self.n_inputs
+        sizes = {"weight_bytes": 4 * n_weights, "ram_bytes": ram_bytes, "n_words": n_words}
+        defines = {**self.defines(), "TIE_TOLERANCE": f"INT64_C({tolerance})"}
+        description, needs = self.description(), self.needs(**sizes)
+        return self.write("sdnn_greedy_q_lambda.h", description, needs, defines, tables, **sizes)
+
+
+class QLambdaLearner(Learner, QLambdaWriter):
+    """Makes the header of an `SDNNQLambda` agent that learns."""
+
+    magic = 0x4C4E4453  # "SDNL"
+    streams = ("policy.exploration", "policy.ties", "policy.evaluation_ties", "repetitions")
+
+    def fields(self) -> list[tuple[Any, ...]]:
+        """Return names, types and shapes of an image."""
+        shape = sum(self.n_rows()), self.code().n_columns
+        names = [*_WEIGHTS.values()][: 1 + self.averages]
+        return [
+            ("action_value.exponent", "<i4"),
+            ("action_value.n_snapshots", "<u4"),
+            ("n_random_left", "<u4"),
+            ("n_ended", "<u4"),
+            ("n_learned", "<u8"),
+            ("action_value.n_steps", "<u8"),
+            *SCALE_FIELDS,
+            ("words", "<u8", (4, 4)),
+            *((name, "<i4", shape) for name in names),
+        ]
+
+    @property
+    def averages(self) -> bool:
+        """Whether the agent acts by an average of its weights."""
+        return self.agent.approximator.averaging_interval > 0
+
+    def remembered(self, state: dict[str, Any]) -> dict[str, Any]:
+        """Return the fields that are not the same in the core's state."""
+        columns = self.columns()
+        rows = {name: state[name][:, columns] for name in _WEIGHTS.values() if name in state}
+        return {"action_value.exponent": NONE, **state, **rows}
+
+    def recall(self, image: Any, state: dict[str, Any]) -> None:
+        """Put the fields of an image into the core's state; the episode before is over."""
+        for name in ("waits", "reward", "old_value"):
+            state[name] = np.zeros_like(state[name])
+        state["trace.values"] = state["trace.values"][:0]
+        for name in ("action_value.n_steps", "action_value.n_snapshots", "n_learned"):
+            if name in state:
+                state[name] = np.array(image[name], np.int64)
+        for name, nothing in (("action_value.exponent", NONE), ("n_ended", 0)):
+            state.pop(name, None)
+            if image[name] != nothing:
+                state[name] = np.array(image[name], np.int32)
+        for name in _WEIGHTS.values():
+            if name in state:
+                state[name] = np.zeros_like(state[name])
+                state[name][:, self.columns()] = image[name]
+
+    def header(self) -> CHeader:
+        """Make the header."""
+        state, tables = self.state(), self.tables()
+        n_weights = self.n_weights()
+        about = "What the agent begins with: states of its random generators."
+        tables.add("uint64_t", "seeds", self.seeds(state), about)
+        first_weights = {}
+        for word, name in _WEIGHTS.items():
+            rows = state.get(name, np.zeros((1, 1), np.int32))
+            first_weights[f"HAS_FIRST_{word.upper()}"] = int(rows.any())
+            if rows.any():
+                tables.add("int32_t", f"first_{word}", rows[:, self.columns()].reshape(-1))
+        defines = {
+            **self.defines(),
+            **self._learning_rule(),
+            **self.learning_defines(state),
+            **self._first_values(state),
+            **first_weights,
+        }
+        ram_bytes = self._ram_bytes(n_weights)
+        return self.write(
+            "sdnn_q_lambda.h",
+            self.description(),
+            learning_needs("6", f"{ram_bytes:,} bytes, in one struct that you place."),
+            defines,
+            tables,
+            weight_bytes=0,
+            ram_bytes=ram_bytes,
+            n_words=self.code().most_columns * sum(self.n_rows()),
+        )
+
+    def _learning_rule(self) -> dict[str, Any]:
+        """Return the settings of the learning rule."""
+        learning, discount = self.agent.learning, round(self.agent.learning.discount * 32768)
+        number, exponent = self.tolerance()
+        return {
+            "IS_DUTCH": int(learning.traces == "dutch"),
+            "IS_SARSA": int(learning.bootstrap == "sarsa"),
+            "AVERAGING_INTERVAL": self.agent.approximator.averaging_interval,
+            "DISCOUNT": discount,
+            "HORIZON_BITS": 16 - max(32768 - discount, 1).bit_length(),
+            "TRACE_DECAY": round(learning.discount * learning.trace_decay * 8192),
+            "SCHEDULE_STEPS": learning.schedule_steps,
+            **self._rates("RATE", "learning_rate"),
+            **self._rates("EPSILON", "epsilon"),
+            "TIE_TOLERANCE": f"INT64_C({number})",
+            "TIE_TOLERANCE_EXPONENT": f"({exponent})",
+        }
+
+    def _first_values(self, state: dict[str, Any]) -> dict[str, Any]:
+        """Return the numbers that the agent begins with."""
+        values = {
+            "FIRST_EXPONENT": c_number(state.get("action_value.exponent", NONE)),
+            "FIRST_N_LEARNED": f"INT64_C({state['n_learned']})",
+            "FIRST_N_ENDED": state.get("n_ended", 0),
+        }
+        if not self.averages:
+            return values
+        n_steps = state["action_value.n_steps"]
+        return {
+            **values,
+            "FIRST_N_STEPS": f"INT64_C({n_steps})",
+            "FIRST_PHASE": n_steps % self.agent.approximator.averaging_interval,
+            "FIRST_N_SNAPSHOTS": state["action_value.n_snapshots"],
+        }
+
+    def _rates(self, macro: str, name: str) -> dict[str, int]:
+        """Return alpha or epsilon at the beginning and at the end of the schedule."""
+        learning = self.agent.learning
+        if learning.schedule_steps == 0 or name in self.agent.state("agent"):
+            first = last = getattr(self.agent, name)
+        else:
+            first, last = getattr(learning, name), learning.final_learning_rate
+            if name == "epsilon":
+                last = self.agent.final_epsilon
+        last = first if last is None else last
+        return {f"{macro}_FIRST": round(first * _ONE), f"{macro}_LAST": round(last * _ONE)}
+
+    def _ram_bytes(self, n_weights: int) -> int:
+        """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
+        code = self.code()
+        code_bytes = 8 + 4 * self.n_inputs + code.column_bytes * code.most_columns
+        n_bytes = 8 * 3 + 24 + 32 * 4 + 4 * (2 + self.averages) * n_weights + 4 * 10
+        n_bytes += 4 * (2 * self.n_dimensions + self.n_inputs) + 2 * (-(-code_bytes // 4) * 4)
+        n_bytes += 3 + sum(self.n_rows())
+        return -(-n_bytes // 8) * 8
