@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import date
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +59,7 @@ class Effort:
 QUICK = Effort(n_rounds=3, n_repetitions=2, n_episodes=10, n_runs=2)
 
 
-def run_benchmarks(*, quick: bool = False) -> dict[str, Any]:
+def run_benchmarks(*, quick: bool = False) -> dict[str, object]:
     """Measure everything, about half a minute, and return what ``sdnn bench --json`` prints.
 
     With `quick` there are few repetitions, as a check that it works.
@@ -80,7 +80,7 @@ def run_benchmarks(*, quick: bool = False) -> dict[str, Any]:
     }
 
 
-def describe_machine() -> dict[str, Any]:
+def describe_machine() -> dict[str, object]:
     """Describe this machine; ``n_cores`` are those that this process may use."""
     return {
         "processor": processor(),
@@ -113,7 +113,7 @@ def spread(times: Nanoseconds, n_parts: int = 1) -> dict[str, float]:
     return dict(zip(("lower", "median", "upper"), map(float, quartiles), strict=True))
 
 
-def measure_network(n_inputs: int, effort: Effort) -> dict[str, Any]:
+def measure_network(n_inputs: int, effort: Effort) -> dict[str, object]:
     """Time the parts of a network that has learned a little.
 
     Spreads are those of ``values`` (all action values of a new state, by instruction set),
@@ -156,7 +156,7 @@ def network_parts(n_inputs: int, effort: Effort) -> _core.NetworkParts:
     return _core.NetworkParts(trial.agent.networks[0], SEED)
 
 
-def measure_acrobot(effort: Effort) -> dict[str, Any]:
+def measure_acrobot(effort: Effort) -> dict[str, object]:
     """Time the acrobot alone."""
     acrobot = _core.AcrobotDecisions(_core.AcrobotConfig(), SEED)
     times = spread(in_turns({"acrobot": acrobot.run}, effort)["acrobot"])
@@ -168,7 +168,7 @@ def measure_acrobot(effort: Effort) -> dict[str, Any]:
     }
 
 
-def measure_decisions(n_inputs: int, noise: float, effort: Effort) -> dict[str, Any]:
+def measure_decisions(n_inputs: int, noise: float, effort: Effort) -> dict[str, object]:
     """Time whole decisions of a short trial: acting, the acrobot, its sensors, learning.
 
     A trial makes the same decisions whenever it is run; the time of a decision is its median over
@@ -197,7 +197,7 @@ def measure_decisions(n_inputs: int, noise: float, effort: Effort) -> dict[str, 
     }
 
 
-def measure_threads(n_inputs: int, noise: float, effort: Effort) -> dict[str, Any]:
+def measure_threads(n_inputs: int, noise: float, effort: Effort) -> dict[str, object]:
     """Time equal trials alone and at once, in turns; the quickest of the runs.
 
     Wall-clock times depend on the cores that are free; the processor's time per trial shows

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from sdnn.reports.pages import Table
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+Results: TypeAlias = Mapping[str, Any]
+"""The results of `sdnn.benchmarks.run_benchmarks`."""
+
 QUICK_WARNING = "QUICK LOOK: too few repetitions to mean anything."
 
 _OF_THREADS = (("alone_s", 3), ("together_s", 3), ("speedup", 2))  # with their decimals
 
 
-def describe_run(results: Mapping[str, Any]) -> list[str]:
+def describe_run(results: Results) -> list[str]:
     """Describe machine, version and date in a few lines."""
     machine = results["machine"]
     in_use, best = results["instruction_set"], results["best_instruction_set"]
@@ -28,7 +31,7 @@ def describe_run(results: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def tables(results: Mapping[str, Any]) -> list[Table]:
+def tables(results: Results) -> list[Table]:
     """Make all tables, from the parts of a decision to whole trials."""
     decisions, threads = results["decisions"], results["threads"]
     return [
@@ -56,7 +59,7 @@ def tables(results: Mapping[str, Any]) -> list[Table]:
     ]  # fmt: skip
 
 
-def print_results(results: Mapping[str, Any], console: Console) -> None:
+def print_results(results: Results, console: Console) -> None:
     """Print all tables."""
     for line in describe_run(results):
         console.print(line, highlight=False)
@@ -64,7 +67,7 @@ def print_results(results: Mapping[str, Any], console: Console) -> None:
         table.print(console)
 
 
-def _parts_table(results: Mapping[str, Any]) -> Table:
+def _parts_table(results: Results) -> Table:
     networks, acrobot = results["networks"], results["acrobot"]
     n_actions, n_corrected = networks[0]["n_actions"], networks[0]["n_corrected"]
     physics = (

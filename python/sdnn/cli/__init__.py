@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -57,7 +56,7 @@ def _print_cmake_dir(context: click.Context, _parameter: click.Parameter, value:
 
 
 class _Commands(click.Group):
-    def invoke(self, ctx: click.Context) -> Any:
+    def invoke(self, ctx: click.Context) -> object:
         """Run a command; Ctrl-C has its exit code also while nothing has begun.
 
         Errors in reading and writing files, also standard output, become a line.

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from signal import SIGINT, SIGTERM
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import click
 
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from sdnn.runs.engine import Executor
     from sdnn.runs.report import WrittenReport
     from sdnn.runs.sweep import ReportedStudy
+
+Options: TypeAlias = dict[str, Any]
+"""The options of a command by their names."""
 
 EXIT_FAILURE = 1
 PLAIN_WIDTH = 160
@@ -108,7 +111,7 @@ def words_of_run(folder: Path) -> Callable[[ConfigError], str]:
     return words
 
 
-def value_of(text: str) -> Any:
+def value_of(text: str) -> object:
     """Read a value as TOML has it, such as 0.5, true or [1, 2], or True; others are texts."""
     import msgspec
 
@@ -263,7 +266,7 @@ def _where(shares: Sequence[float | None], is_so: Callable[[float], bool]) -> li
     return [i for i, share in enumerate(shares) if share is not None and is_so(share)]
 
 
-def rendered(template: str, **values: Any) -> str:
+def rendered(template: str, **values: object) -> str:
     """Write values by a template of this package; without a line feed at the end."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -276,7 +279,7 @@ def rendered(template: str, **values: Any) -> str:
     return environment.get_template(template).render(values).rstrip("\n")
 
 
-def json_text(values: Any) -> str:
+def json_text(values: object) -> str:
     """Write values as JSON; numbers that it does not have, NaN and infinite ones, as null."""
     import msgspec
 
@@ -406,7 +409,7 @@ def trial_options(command: Function) -> Function:
     """
 
     @functools.wraps(command)
-    def wrapped(*arguments: Any, where: str, jobs: int | None, **options: Any) -> Any:
+    def wrapped(*arguments: object, where: str, jobs: int | None, **options: Any) -> object:
         of_dask = {name: options.pop(name) for name in _OF_DASK}
         given = {name: value for name, value in of_dask.items() if value is not None}
         ways = {name: options.pop(name) for name in ("out", "as_json", "full", "dry_run")}
@@ -418,7 +421,7 @@ def trial_options(command: Function) -> Function:
     return wrapped
 
 
-def _make_executor(where: str, jobs: int | None, of_dask: dict[str, Any]) -> Executor:
+def _make_executor(where: str, jobs: int | None, of_dask: Options) -> Executor:
     if where == "threads":
         if of_dask:
             name = next(iter(of_dask)).replace("_", "-")

@@ -14,6 +14,7 @@ import click
 from sdnn.cli.common import (
     NEW_FILE,
     SEED,
+    Options,
     json_option,
     json_text,
     named_values,
@@ -164,7 +165,7 @@ def export(
             click.echo(f"  {line}")
 
 
-def _check_together(source: Path | None, new: bool, options: dict[str, Any]) -> None:
+def _check_together(source: Path | None, new: bool, options: Options) -> None:
     """Raise UsageError unless there is either a RUN or what a new agent needs."""
     if new and source is not None:
         raise click.UsageError(f"--new makes an agent that needs no RUN: omit {source}, or --new")

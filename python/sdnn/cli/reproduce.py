@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import click
 
 from sdnn._core import presets
-from sdnn.cli.common import SEED, run_or_forecast, trial_options
+from sdnn.cli.common import SEED, Options, run_or_forecast, trial_options
 from sdnn.reproduction.cases import MOST_EPISODES, WORDS
 
 
@@ -48,9 +47,7 @@ from sdnn.reproduction.cases import MOST_EPISODES, WORDS
     help="Draw SDNN-C under these settings beside the paper's; may be repeated.",
 )
 @click.pass_context
-def reproduce(
-    context: click.Context, /, experiment: str, ways: Mapping[str, Any], **options: Any
-) -> None:
+def reproduce(context: click.Context, /, experiment: str, ways: Options, **options: Any) -> None:
     """Run the paper's experiments and write a report with its figures and claims.
 
     a: redundant inputs. b: noisy inputs, against fuzzy Q-learning. cost: time of a step against the

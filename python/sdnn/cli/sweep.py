@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import click
 
-from sdnn.cli.common import OLD_FILE, SEED, run_or_forecast, trial_options
+from sdnn.cli.common import OLD_FILE, SEED, Options, run_or_forecast, trial_options
 
 
 @click.command(short_help="Run a study: variants of any setting, trial by trial.")
@@ -31,7 +29,7 @@ def sweep(
     trials: int | None,
     seed: int | None,
     only: tuple[str, ...],
-    ways: Mapping[str, Any],
+    ways: Options,
 ) -> None:
     """Run the study in FILE: variants of any setting, compared trial by trial.
 

@@ -13,6 +13,7 @@ import click
 from sdnn.cli.common import (
     KEYS,
     OLD_FILE,
+    Options,
     json_option,
     named_values,
     option_of,
@@ -80,7 +81,7 @@ def _option_type(kind: Mapping[str, Any]) -> Any:
     return click.STRING
 
 
-def given_values(options: dict[str, Any]) -> dict[str, Any]:
+def given_values(options: Options) -> Options:
     """Take the options of a specification out of those of a command: given values by their keys."""
     found = {key: options.pop(key.replace(".", "_")) for key in KEYS}
     return {key: value for key, value in found.items() if value is not None and value is not False}
@@ -174,14 +175,14 @@ def train(
         train_run(run, as_json)
 
 
-def _given(env_id: str | None, options: dict[str, Any]) -> dict[str, Any]:
+def _given(env_id: str | None, options: Options) -> Options:
     """Return the values of the options by their keys; UsageError if two options set the same."""
     from sdnn.runs.settings import KEYS_BY_NAME
 
     given = given_values(options)
     by_option = {key: (option_of(key), value) for key, value in given.items()}
 
-    def give(option: str, key: str, value: Any) -> None:
+    def give(option: str, key: str, value: object) -> None:
         other, before = by_option.setdefault(key, (option, value))
         if other != option:
             raise click.UsageError(

@@ -28,7 +28,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cache, reduce
 from importlib.resources import files
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import msgspec
 import numpy as np
@@ -176,7 +176,7 @@ class CheckOutcome:
     samples: tuple[FloatArray, ...] = field(default=(), compare=False, repr=False)
     last_episode: int = PAPER_EPISODES
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return it as values that JSON can hold; what is censored becomes ``">last_episode"``."""
         return {
             "measured": str(self.check),
@@ -218,7 +218,7 @@ class ClaimOutcome:
             return Verdict.HOLDS
         return Verdict.FAILS if self.chance.value <= NEVER else Verdict.INCONCLUSIVE
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return it as values that JSON can hold."""
         return {
             "number": self.claim.number,

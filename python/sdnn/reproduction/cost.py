@@ -43,7 +43,7 @@ class CostSeries:
     agent: str
     growth: str  # what the number of operations is proportional to (mathtext)
     core_agent: Callable[..., Any]
-    settings: Mapping[str, Any] = field(default_factory=dict)  # that are not the default
+    settings: Mapping[str, int] = field(default_factory=dict)  # that are not the default
     is_plain: bool = False  # its product structure is unused: seconds a step with many inputs
 
 
@@ -79,7 +79,7 @@ class CostRecord(msgspec.Struct, frozen=True):
     machine: str
     version: str
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return it as values that JSON can hold, without its settings."""
         return {k: v for k, v in msgspec.structs.asdict(self).items() if k != "config_hash"}
 

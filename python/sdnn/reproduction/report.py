@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -182,7 +181,7 @@ class Report:
                 (f"{title_of(one.agent)}, {one.title}", one) for one in self.results
             )
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return the results as values that JSON can hold.
 
         A censored value is the text ``">n"`` with n the last episode; an interval that one trial
@@ -273,7 +272,7 @@ def _more_table(claims: Iterable[ClaimOutcome]) -> Table:
     return Table("With more trials", header, rows, VERDICT_KINDS)
 
 
-def _case_json(experiment: Experiment, result: CaseResult) -> dict[str, Any]:
+def _case_json(experiment: Experiment, result: CaseResult) -> dict[str, object]:
     figure = next(c.paper_figure for c in experiment.cases if c.id == result.case_id)
     names = {"case": result.case_id, "title": result.title, "paper_figure": figure}
     return names | result.to_json()

@@ -114,9 +114,9 @@ class PaperStudy(ReportedStudy):
         """Measure the costs that are not stored."""
         cost.measure_costs(self.costs, self.cost_config, store, observe)
 
-    def other_work(self, out: Path) -> dict[str, Any]:
+    def other_work(self, out: Path) -> dict[str, object]:
         """Count the costs that are asked for, and those that are stored."""
-        measured: dict[str, Any] = {}
+        measured: dict[str, object] = {}
         if (out / STORE_NAME).exists():
             with ResultStore(out, read_only=True) as store:
                 measured = store.measurements(cost.KIND)

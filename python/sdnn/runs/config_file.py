@@ -56,7 +56,7 @@ class ConfigFile:
             raise ConfigError(dotted(deep[:3]), TOO_DEEP, str(path))
         return cls(path, text, values)
 
-    def specification(self) -> dict[str, Any]:
+    def specification(self) -> dict[str, object]:
         """Return the values of a specification: all but what only a run's configuration has.
 
         ConfigError if it is the configuration of a run of another format.

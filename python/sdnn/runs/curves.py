@@ -6,13 +6,14 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
+from sdnn.training.loop import Row
 
 WINDOW = 20
 """Episodes in the running median of the returns, or all so far where they are fewer."""
@@ -55,7 +56,7 @@ def groups_of(runs: Sequence[Run]) -> list[Group]:
     return groups
 
 
-def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+def _flat(values: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
     for name, value in values.items():
         if f"{prefix}{name}" in _CHANGES_NOTHING:
             continue
@@ -128,13 +129,14 @@ def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
         notes.append(f"{folders}: drawn to step {steps[-1]}, which all of them have reached")
     values = np.array([means[np.isin(own, steps)] for own, means in evaluated.values()])
     low, middle, high = np.percentile(values, (25, 50, 75), axis=0)
-    names: dict[str, Any] = {"task": group.task, "agent": group.agent, "n_runs": len(evaluated)}
-    return [
-        Curve(**names, kind="evaluation", steps=steps, values=middle, low=low, high=high)
-    ], notes
+    curve = Curve(
+        task=group.task, agent=group.agent, n_runs=len(evaluated),
+        kind="evaluation", steps=steps, values=middle, low=low, high=high,
+    )  # fmt: skip
+    return [curve], notes
 
 
-def _curves_of_run(group: Group, run: Run, rows: Sequence[Any]) -> Iterator[Curve]:
+def _curves_of_run(group: Group, run: Run, rows: Sequence[Row]) -> Iterator[Curve]:
     for kind in get_args(Kind):
         steps, values = _series(rows, kind)
         bounds = {}
@@ -143,11 +145,13 @@ def _curves_of_run(group: Group, run: Run, rows: Sequence[Any]) -> Iterator[Curv
             low, high = np.array([np.percentile(one, (25, 75)) for one in evaluations]).T
             bounds = {"low": low, "high": high}
         if len(steps):
-            names: dict[str, Any] = {"task": group.task, "agent": group.agent, "kind": kind}
-            yield Curve(**names, run=str(run.folder), steps=steps, values=values, **bounds)
+            yield Curve(
+                task=group.task, agent=group.agent, run=str(run.folder),
+                kind=kind, steps=steps, values=values, **bounds,
+            )  # fmt: skip
 
 
-def _series(rows: Sequence[Any], kind: Kind) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _series(rows: Sequence[Row], kind: Kind) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the steps of a curve of a run, and its values."""
     wanted, name = "episode", "return"
     if kind == "evaluation":

@@ -29,6 +29,7 @@ from sdnn.environments import (
 )
 from sdnn.environments.paper_acrobot import PAPER_ACROBOT
 from sdnn.environments.sensors import in_own_units
+from sdnn.environments.types import Array, Data, Env
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.settings import Settings, changed, doc
 from sdnn.support.arguments import blamed, shown
@@ -41,8 +42,6 @@ Ends = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 Stream: TypeAlias = Literal["sensor_noise", "evaluation_sensor_noise"]
 
-AnyEnv: TypeAlias = gym.Env[Any, Any]
-
 
 class PaperSettings(NamedTuple):
     """The arguments of the paper's acrobot as the core has them."""
@@ -52,7 +51,7 @@ class PaperSettings(NamedTuple):
     sensors: SensorConfig
 
 
-def mean_of(first: int, second: int, observation: NDArray[Any]) -> float:
+def mean_of(first: int, second: int, observation: Array) -> float:
     """Observe the mean of two variables, by their numbers: a redundant sensor."""
     return 0.5 * (float(observation[first]) + float(observation[second]))
 
@@ -177,7 +176,7 @@ class EnvironmentSpec(Settings, frozen=True):
         """Whether the agent's observations differ from the environment's."""
         return self.noise > 0.0 or self.redundant > 0
 
-    def make(self, stream: Stream = "sensor_noise", render_mode: str | None = None) -> AnyEnv:
+    def make(self, stream: Stream = "sensor_noise", render_mode: str | None = None) -> Env:
         """Make the environment; every reset with a seed starts its noise.
 
         ConfigError if there is no such environment, it cannot be made, or ranges are missing or
@@ -223,7 +222,7 @@ class EnvironmentSpec(Settings, frozen=True):
             env.close()
             raise
 
-    def _masked(self, env: AnyEnv) -> AnyEnv:
+    def _masked(self, env: Env) -> Env:
         try:
             return ActionMasks(env)
         except ValueError as error:
@@ -245,7 +244,7 @@ class EnvironmentSpec(Settings, frozen=True):
             raise ConfigError("environment.id", words) from error
         return True
 
-    def scaling(self, env: AnyEnv | None = None) -> Scaling | None:
+    def scaling(self, env: Env | None = None) -> Scaling | None:
         """Return how observations are scaled; None: not at all.
 
         Where the agent acts without the noisy or redundant sensors of its run, it needs
@@ -275,7 +274,7 @@ class EnvironmentSpec(Settings, frozen=True):
         pairs = zip(env.observation_low.tolist(), env.observation_high.tolist(), strict=True)
         return Scaling(ranges=tuple(pairs), n_redundant=self.redundant)
 
-    def ends(self, env: AnyEnv) -> Ends:
+    def ends(self, env: Env) -> Ends:
         """Return the lowest and highest values of the flattened observation; infinite: not known.
 
         ConfigError if a range is given of a variable that is not there, or observations are no
@@ -302,7 +301,7 @@ class EnvironmentSpec(Settings, frozen=True):
             low[int(key)], high[int(key)] = ends
         return low, high
 
-    def _bare(self, stream: Stream, render_mode: str | None) -> AnyEnv:
+    def _bare(self, stream: Stream, render_mode: str | None) -> Env:
         options = {"disable_env_checker": True, **self.kwargs}
         if self.is_paper_acrobot:
             options["stream"] = stream
@@ -338,12 +337,12 @@ class EnvironmentSpec(Settings, frozen=True):
 _PAPER_DEFAULTS = PaperSettings(AcrobotConfig(), GoalScheduleConfig(), SensorConfig())
 
 
-def takes_episode(env: AnyEnv) -> bool:
+def takes_episode(env: Env) -> bool:
     """Return whether resets take the number of the learning episode as an option."""
     return bool(env.metadata.get("reset_episode"))
 
 
-def episode_option(episode: int) -> dict[str, Any]:
+def episode_option(episode: int) -> Data:
     """Return the option of resets that has the number of the learning episode, from 1."""
     return {"episode": max(1, episode)}
 
@@ -351,13 +350,11 @@ def episode_option(episode: int) -> dict[str, Any]:
 class SeedFirstReset(gym.Wrapper[Any, Any, Any, Any]):
     """Gives the first reset a seed, so that the random streams of all others follow from it."""
 
-    def __init__(self, env: AnyEnv, seed: int) -> None:
+    def __init__(self, env: Env, seed: int) -> None:
         super().__init__(env)
         self._seed: int | None = seed
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Any, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Data | None = None) -> tuple[Any, Data]:
         """Reset the environment."""
         if seed is None:
             seed, self._seed = self._seed, None
@@ -384,7 +381,7 @@ def find_module(name: str) -> None:
         sys.path += [folder for folder in _folders if folder not in sys.path]
 
 
-def render_modes(env: AnyEnv) -> tuple[str, ...]:
+def render_modes(env: Env) -> tuple[str, ...]:
     """Return the render modes in the metadata of an environment; none where there are none."""
     return tuple((env.metadata or {}).get("render_modes") or ())
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents import UnusableStepError
-from sdnn.runs.environment import AnyEnv, render_modes
+from sdnn.environments.types import Env
+from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
 from sdnn.runs.spec import RunSpec
@@ -84,7 +85,7 @@ def record(
     return recording
 
 
-def _rendered(env: AnyEnv) -> Iterator[NDArray[np.uint8]]:
+def _rendered(env: Env) -> Iterator[NDArray[np.uint8]]:
     """Yield the pictures of the present step, shape (height, width, 3)."""
     try:
         rendered: Any = env.render()
@@ -99,7 +100,7 @@ def _rendered(env: AnyEnv) -> Iterator[NDArray[np.uint8]]:
         yield frame
 
 
-def _filmed(spec: RunSpec) -> AnyEnv:
+def _filmed(spec: RunSpec) -> Env:
     env = spec.make_env("evaluation_sensor_noise", render_mode="rgb_array")
     if "rgb_array_list" not in render_modes(env):
         return env

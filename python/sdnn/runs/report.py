@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class WrittenReport:
     outcome: TrialsOutcome
     page: Page | None = None
     files: tuple[Path, ...] = ()
-    table: dict[str, Any] = field(default_factory=dict)
+    table: dict[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +50,7 @@ class Content:
     """
 
     page: Page
-    table: dict[str, Any]
+    table: dict[str, object]
     files: Mapping[str, bytes | Iterable[bytes]]
     shown: Sequence[TrialRecord]
 

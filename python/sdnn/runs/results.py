@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -224,7 +224,7 @@ class CaseResult(TrialMeasures):
         seconds = sum(record.seconds for record in self.records)
         return 1e6 * seconds / self.n_decisions if self.n_decisions else math.nan
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return it as values that JSON can hold; censored ones are ``">last_episode"``."""
         last = self.last_episode
         of_median = episodes_to_learn(self.episode, self.quartiles[1])

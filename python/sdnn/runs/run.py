@@ -10,7 +10,7 @@ import weakref
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import gymnasium as gym
 import msgspec
@@ -31,8 +31,9 @@ from sdnn.agents import (
 )
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.environments.matching import require_same_kind
+from sdnn.environments.types import Data, Env
 from sdnn.runs.config_file import FORMAT, ConfigFile, read_spec
-from sdnn.runs.environment import AnyEnv, episode_option, render_modes, takes_episode
+from sdnn.runs.environment import episode_option, render_modes, takes_episode
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
 from sdnn.runs.outcome import RunEvaluation, RunOutcome
 from sdnn.runs.settings import BudgetSpec, read
@@ -53,6 +54,8 @@ from sdnn.training.training import listed
 
 if TYPE_CHECKING:
     from typing import Self
+
+AnyAgent: TypeAlias = Agent[Any, Any]
 
 CONFIG = "config.json"
 LOCK = ".lock"
@@ -232,7 +235,7 @@ class Run(Displayed):
             scaling=agent.scaling,
         )
 
-    def agent(self) -> Agent[Any, Any]:
+    def agent(self) -> AnyAgent:
         """Load the agent of the last checkpoint; RunError if there is none or it is damaged."""
         return agent_of(self.folder)
 
@@ -257,14 +260,14 @@ class Run(Displayed):
                 raise RunError(f"{self.spec.task}: {error}") from error
         return RunEvaluation(**vars(evaluation), is_warming_up=agent.is_warming_up)
 
-    def check_spaces(self, agent: Agent[Any, Any], env: AnyEnv) -> None:
+    def check_spaces(self, agent: AnyAgent, env: Env) -> None:
         """Check that the environment still is what the agent learned in; RunError if not."""
         try:
             require_same_kind(agent, env)
         except ValueError as error:
             raise RunError(f"{self.spec.task} has changed: {error}") from error
 
-    def reset_options(self, env: AnyEnv) -> dict[str, Any] | None:
+    def reset_options(self, env: Env) -> Data | None:
         """Return the options of resets in an evaluation now, if the environment takes any."""
         if not takes_episode(env):
             return None
@@ -293,7 +296,7 @@ class Run(Displayed):
 
     def write_config(self) -> None:
         """Write the configuration and the goals."""
-        values: dict[str, Any] = {"format": FORMAT, "version": __version__, **self.spec.values()}
+        values: dict[str, object] = {"format": FORMAT, "version": __version__, **self.spec.values()}
         if self.goals:
             goals = map(msgspec.structs.asdict, self.goals)
             values["goals"] = [{k: v for k, v in goal.items() if v is not None} for goal in goals]
@@ -403,7 +406,7 @@ class _StoredCheckpoints(CheckpointCallback):
         return self._clock - before
 
 
-def agent_of(folder: Path, *, best: bool = False) -> Agent[Any, Any]:
+def agent_of(folder: Path, *, best: bool = False) -> AnyAgent:
     """Load the agent of a run, as `Run.agent`, whatever the run's configuration has."""
     if not (folder / CONFIG).exists():
         raise RunError(f"{folder} holds no run: there is no {folder / CONFIG}")

@@ -90,13 +90,13 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             if made is not value:
                 msgspec.structs.force_setattr(self, name, made)
 
-    def replace(self: AnySettings, **changes: Any) -> AnySettings:
+    def replace(self: AnySettings, **changes: object) -> AnySettings:
         """Return a copy with other values of some fields."""
         return msgspec.structs.replace(self, **changes)
 
 
 @functools.cache
-def _kinds_of(kind: type[Any]) -> Mapping[str, Any]:
+def _kinds_of(kind: type[object]) -> Mapping[str, Any]:
     """Return the types of the fields of a class, with their bounds."""
     try:
         hints = typing.get_type_hints(kind, include_extras=True)
@@ -120,7 +120,7 @@ def names_of(kind: type[Any]) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(kind) if field.init)
 
 
-def checked(kind: Any, value: Any, key: str) -> Any:
+def checked(kind: object, value: object, key: str) -> Any:
     """Return a value as its type has it: arrays as tuples, 1 as 1.0, tables as settings.
 
     ConfigError if it does not fit.
@@ -149,7 +149,7 @@ def checked(kind: Any, value: Any, key: str) -> Any:
     return made
 
 
-def _alternatives(kind: Any) -> tuple[Any, ...]:
+def _alternatives(kind: object) -> tuple[object, ...]:
     """Return the types of a union, or the only one, without annotations."""
     origin, inner = get_origin(kind), get_args(kind)
     if origin is Annotated:
@@ -159,7 +159,7 @@ def _alternatives(kind: Any) -> tuple[Any, ...]:
     return (kind,)
 
 
-def _problem(possible: Iterable[Any], text: str) -> str:
+def _problem(possible: Iterable[object], text: str) -> str:
     words = [repr(w) for one in possible if get_origin(one) is Literal for w in get_args(one)]
     if words:
         others = " or an array" if any(get_origin(one) is tuple for one in possible) else ""
@@ -395,7 +395,7 @@ class OutputSpec(Settings, frozen=True):
     tensorboard: Annotated[bool, doc("Write the numbers for TensorBoard, too.")] = False
 
 
-_TABLES: dict[str, tuple[Any, ...]] = {
+_TABLES: dict[str, tuple[type[object], ...]] = {
     "approximator": tuple(entry.approximator for entry in AGENTS.values()),
     "learning": tuple(entry.learning for entry in AGENTS.values()),
     "agent": (AgentSpec,), "protocol": (ProtocolSpec,), "budget": (BudgetSpec,),
@@ -420,7 +420,7 @@ _REPLACED = {
 """Keys of a file that an option replaces besides its own."""
 
 
-def overridden(values: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
+def overridden(values: Mapping[str, object], options: Mapping[str, object]) -> dict[str, Any]:
     """Return the values of a specification with others in their place.
 
     Parameters
@@ -430,7 +430,7 @@ def overridden(values: Mapping[str, Any], options: Mapping[str, Any]) -> dict[st
     options
         Values by their keys, with dots between tables.
     """
-    made = copy.deepcopy(dict(values))
+    made: dict[str, Any] = copy.deepcopy(dict(values))
     for name, key in SHORTHANDS.items():
         if isinstance(made.get(name), str):
             made[name] = {key: made[name]}

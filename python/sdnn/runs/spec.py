@@ -15,8 +15,8 @@ from sdnn.agents import Agent, Callback, StopTrainingOnRewardThreshold, Training
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.agents.registry import AGENTS, AgentEntry, agent_entry, label_of, split_label
 from sdnn.config import ProtocolConfig
+from sdnn.environments.types import Env
 from sdnn.runs.environment import (
-    AnyEnv,
     EnvironmentSpec,
     SeedFirstReset,
     Stream,
@@ -275,7 +275,7 @@ class RunSpec(Settings, frozen=True):
             if self.is_evaluated:
                 evaluation_env = self._make_evaluation_env()
                 environments.callback(evaluation_env.close)
-            single: AnyEnv = env.envs[0] if isinstance(env, SyncVectorEnv) else env
+            single: Env = env.envs[0] if isinstance(env, SyncVectorEnv) else env
             options = episode_option if takes_episode(single) else None
             if options is not None and protocol.n_envs > 1:
                 problem = f"must be 1: resets of {self.task} take the number of the episode"
@@ -302,16 +302,14 @@ class RunSpec(Settings, frozen=True):
                 )
             return TrainingTrial(training, environments.pop_all(), target)
 
-    def _make_evaluation_env(self) -> AnyEnv:
+    def _make_evaluation_env(self) -> Env:
         try:
             return self.make_env("evaluation_sensor_noise")
         except ConfigError as error:  # there may be one robot only
             problem = f"needs a second environment, or must be 0: {error.problem}"
             raise ConfigError("protocol.evaluate_every", problem) from error
 
-    def make_env(
-        self, stream: Stream = "sensor_noise", *, render_mode: str | None = None
-    ) -> AnyEnv:
+    def make_env(self, stream: Stream = "sensor_noise", *, render_mode: str | None = None) -> Env:
         """Make an environment to learn in or, of the other stream, to be evaluated in.
 
         Each reset with a seed starts the sensors' noise. Where episodes have no seeds, the first
@@ -332,12 +330,12 @@ class RunSpec(Settings, frozen=True):
         env = environment.make(stream, render_mode)
         return env if self.protocol.seeded_episodes else SeedFirstReset(env, self.seed)
 
-    def make_training_env(self) -> AnyEnv | SyncVectorEnv:
+    def make_training_env(self) -> Env | SyncVectorEnv:
         """Make what the agent learns in, as `make_env`, or a vector of ``protocol.n_envs``."""
         n_envs = self.protocol.n_envs
         return self.make_env() if n_envs == 1 else SyncVectorEnv([self.make_env] * n_envs)
 
-    def make_agent(self, env: AnyEnv) -> Learner:
+    def make_agent(self, env: Env) -> Learner:
         """Make the agent for an environment such as `make_env` makes.
 
         ConfigError if a setting is out of its range, or the agent cannot work with the spaces.
@@ -369,7 +367,7 @@ class RunSpec(Settings, frozen=True):
         defaults = AgentSpec(angle_pairs="none", inputs="all")
         return {k: value for k, value in values.items() if value != getattr(defaults, k)}
 
-    def _agent_arguments(self, env: AnyEnv) -> dict[str, object]:
+    def _agent_arguments(self, env: Env) -> dict[str, object]:
         """Return the arguments that only some agents have: those that are not the default."""
         arguments, environment = self._optional_settings(), self.environment
         if _is_class_of(self.entry.agent, ValueAgent) and self.entry.presets:  # by its preset

@@ -17,7 +17,7 @@ from sdnn.runs.spec import RunSpec
 PAPER_ARGUMENTS: dict[str, Any] = get_type_hints(PaperSettings)
 """The core's settings that are arguments of the paper's acrobot."""
 
-PARTS: dict[str, tuple[Any, ...]] = {
+PARTS: dict[str, tuple[type[object], ...]] = {
     part: tuple(
         dict.fromkeys(getattr(entry, part) for entry in AGENTS.values() if entry.core_trial)
     )

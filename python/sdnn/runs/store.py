@@ -17,7 +17,7 @@ from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from sdnn.runs.connection import as_store_error, connect, foreign_journal, has_r
 from sdnn.runs.errors import StoreError
 from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows, config_hash as hash_of
 from sdnn.support.files import is_there, open_regular
+
+if TYPE_CHECKING:
+    from hashlib import _Hash as Hash
 
 STORE_NAME = "results.sqlite"
 SCHEMA_VERSION = 6
@@ -87,7 +90,7 @@ class ResultStore:
         self.path = folder / STORE_NAME
         if folder.exists() and not folder.is_dir():
             raise StoreError(f"the output must be a folder, but {folder} is a file")
-        self._hashes: dict[int, Any] = {}  # of the rows of runs in progress
+        self._hashes: dict[int, Hash] = {}  # of the rows of runs in progress
         with as_store_error(self.path):
             if not read_only:
                 folder.mkdir(parents=True, exist_ok=True)
@@ -258,9 +261,9 @@ class ResultStore:
     def _read(
         self,
         table: str,
-        columns: Mapping[str, tuple[type[Any], ...]],
+        columns: Mapping[str, tuple[type[object], ...]],
         rest: str = "",
-        values: tuple[Any, ...] = (),
+        values: tuple[object, ...] = (),
     ) -> list[tuple[Any, ...]]:
         """Read columns of a table; every value has a type that its column may have."""
         found = self._connection.execute(
@@ -327,7 +330,7 @@ class ResultStore:
             raise StoreError(f"{self.path} is damaged: the rows of {run.key} have changed")
         return rows
 
-    def _hash_before(self, run: _Run, first: int) -> Any:
+    def _hash_before(self, run: _Run, first: int) -> Hash | None:
         """Return the hash of a run's rows before a number, and remove the others."""
         hashed = self._hashes.get(run.id)
         later = "FROM rows WHERE run_id = ? AND number >= ?"
@@ -340,7 +343,7 @@ class ResultStore:
         self._connection.execute(f"DELETE {later}", (run.id, first))
         return TrialRows(rows[rows["number"] < first]).hashed()
 
-    def put(self, kind: str, key: str, content: Mapping[str, Any]) -> None:
+    def put(self, kind: str, key: str, content: Mapping[str, object]) -> None:
         """Store a measurement as JSON; one that another process stored first stays."""
         values = (kind, key, json.dumps(content))
         with self._writing():
@@ -365,7 +368,7 @@ class ResultStore:
             return {key: json.loads(content) for of, key, content in rows if of == kind}
 
 
-def _crc(values: tuple[Any, ...]) -> int:
+def _crc(values: tuple[object, ...]) -> int:
     return zlib.crc32(repr(values).encode("utf-8", "surrogatepass"))
 
 

@@ -125,7 +125,7 @@ class Study:
         rounds = zip(*(self.combinations[pair].trials for pair in self.pairs), strict=True)
         return tuple({one.key: one for trials in rounds for one in trials}.values())
 
-    def other_work(self, out: Path) -> dict[str, Any]:
+    def other_work(self, out: Path) -> dict[str, object]:
         """Count what is asked for besides trials, as values that JSON can hold."""
         return {}
 

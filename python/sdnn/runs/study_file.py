@@ -90,7 +90,7 @@ class KnownCase(NamedTuple):
     """A case that studies may name: its title and settings, which a study cannot change."""
 
     title: str
-    settings: Mapping[str, Any]
+    settings: Mapping[str, object]
 
 
 class StudyFile(ReportedStudy):
@@ -226,14 +226,14 @@ class StudyFile(ReportedStudy):
                 raise self.file.error(where[:number], f"must be a table, got {values!r}")
         return dict(values)
 
-    def _layer(self, where: KeyPath, table: Mapping[str, Any]) -> Layer:
+    def _layer(self, where: KeyPath, table: Mapping[str, object]) -> Layer:
         """Read a table of settings: nested, with dotted keys, or with quoted dotted keys."""
         found: Layer = {}
         self._collect(where, table, (), found)
         return found
 
     def _collect(
-        self, where: KeyPath, table: Mapping[str, Any], prefix: tuple[str, ...], found: Layer
+        self, where: KeyPath, table: Mapping[str, object], prefix: tuple[str, ...], found: Layer
     ) -> None:
         for key, value in table.items():
             name, place = (*prefix, *key.split(".")), (*where, key)

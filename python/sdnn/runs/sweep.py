@@ -6,7 +6,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from sdnn import _core
 from sdnn.agents.registry import title_of
@@ -113,7 +113,7 @@ def run_study(
     return content.write(outcome, lambda name: out / study.file_name(name), call)
 
 
-Addition: TypeAlias = tuple[Sequence[Section], Mapping[str, Any]]
+Addition: TypeAlias = tuple[Sequence[Section], Mapping[str, object]]
 """Additions to a report, such as verdicts: sections of the page, and values of the JSON."""
 
 
@@ -222,7 +222,7 @@ def _measures(comparison: Comparison) -> Section:
     return measures_section((name for name in MEASURES if name in shown), notes)
 
 
-def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[str, Any]:
+def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[str, object]:
     """Return the results as values that JSON can hold; see `CaseResult.to_json`."""
     study, copies = comparison.study, comparison.study.copies()
     return {

@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
-from typing import Any, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,9 @@ from sdnn._core import __version__
 from sdnn.agents import Evaluation, StopTrainingOnRewardThreshold, Training
 from sdnn.support.arguments import whole
 from sdnn.training.loop import Row
+
+if TYPE_CHECKING:
+    from hashlib import _Hash as Hash
 
 ROW_HEADER = (
     "case", "agent", "trial", "seed", "config_hash", "version", "episode", "steps",
@@ -39,6 +42,9 @@ class TrialKey(NamedTuple):
     seed: int
     config_hash: str
 
+
+Column: TypeAlias = NDArray[Any]
+"""A column of rows, of any type of numbers."""
 
 HASH_DIGITS = 16
 """Hexadecimal digits kept of a text's SHA-256: 64 bits."""
@@ -121,7 +127,7 @@ class TrialRows:
     @classmethod
     def from_training(cls, rows: Sequence[Row], first: int = 0) -> TrialRows:
         """Make it from rows of a `sdnn.agents.Training`, of which the first has this number."""
-        listed: list[tuple[Any, ...]] = []
+        listed: list[tuple[object, ...]] = []
         for number, row in enumerate(rows, first):
             start = (row["kind"], row["episode"], row["step"])
             if row["kind"] == "episode":
@@ -138,7 +144,7 @@ class TrialRows:
         starts = np.flatnonzero(self.table["part"] == 0)
         for own in np.split(self.table, starts[1:]) if len(starts) else []:
             first = own[0]
-            row: dict[str, Any] = {
+            row: dict[str, object] = {
                 "kind": str(first["kind"]), "step": int(first["step"]),
                 "episode": int(first["episode"]),
             }  # fmt: skip
@@ -161,32 +167,32 @@ class TrialRows:
         tests = self.table[self.table["kind"] == "evaluation"]
         return tests, np.flatnonzero(tests["part"] == 0)
 
-    def _column(self, name: str, kind: type[Any]) -> NDArray[Any]:
+    def _column(self, name: str, kind: type[np.generic]) -> Column:
         tests, starts = self._tests
         if len(starts) == len(tests):
             return tests[name].astype(kind)
         sums = np.add.reduceat(tests[name].astype(np.float64), starts)
-        means: NDArray[Any] = sums / np.diff([*starts, len(tests)])
+        means: Column = sums / np.diff([*starts, len(tests)])
         return means
 
     @cached_property
-    def episode(self) -> NDArray[Any]:
+    def episode(self) -> Column:
         """Learning episodes done before each evaluation, (n_tests,) int32."""
         tests, starts = self._tests
         return tests["episode"][starts].astype(np.int32)
 
     @cached_property
-    def steps(self) -> NDArray[Any]:
+    def steps(self) -> Column:
         """Decisions until the goal, or the limit where it was not reached, (n_tests,) int32."""
         return self._column("length", np.int32)
 
     @cached_property
-    def episode_return(self) -> NDArray[Any]:
+    def episode_return(self) -> Column:
         """Sum of rewards, (n_tests,) float64."""
         return self._column("return", np.float64)
 
     @cached_property
-    def solved(self) -> NDArray[Any]:
+    def solved(self) -> Column:
         """Whether the goal was reached, (n_tests,) bool; of larger evaluations the share."""
         return self._column("terminated", np.bool_)
 
@@ -207,7 +213,7 @@ class TrialRows:
         """Return the SHA-256 of all rows."""
         return str(self.hashed().hexdigest())
 
-    def hashed(self, before: Any = None) -> Any:
+    def hashed(self, before: Hash | None = None) -> Hash:
         """Return the hash whose digest is `checksum`, of rows that follow hashed ones if given."""
         sha = hashlib.sha256() if before is None else before.copy()
         sha.update(self.table.astype(ROW.newbyteorder("<")).tobytes())
@@ -277,7 +283,7 @@ class Trial(Protocol):
     def advance(self, n_episodes: int, /) -> None:
         """Run ``n_episodes`` more learning episodes and the test episodes due among them."""
 
-    def test_rows(self) -> dict[str, NDArray[Any]]:
+    def test_rows(self) -> dict[str, Column]:
         """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
 
 
