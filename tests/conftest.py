@@ -74,7 +74,7 @@ def cmake(skip_unless_ci):
         skip_unless_ci("needs cmake: pip install cmake")
     if all(_tool(compiler) is None for compiler in (os.environ.get("CXX", "c++"), "g++")):
         skip_unless_ci("needs a C++ compiler")
-    # As in an activated environment: ninja, and the Python that knows where Eigen is.
+    # Extend the path like an activated environment: ninja and the Python that knows where Eigen is.
     beside = str(Path(sys.executable).parent)
 
     def _run(*arguments, tool="cmake"):

@@ -31,7 +31,7 @@ SEEDS = {"agent_file_fuzz": ["agents", "files"], "safetensors_fuzz": ["agents", 
 """Folders of tests/data, beside the target's corpus."""
 
 MOST_SECONDS = 5.0
-"""Of processor time, of an execution."""
+"""Limit of the processor time of an execution."""
 MOST_BYTES = 2**28
 HANG_SECONDS = 300.0
 """Without an execution's end, whatever the machine does."""

@@ -1,4 +1,4 @@
-/// What the targets share: values made of an input's bytes, and errors that a caller may get.
+/// Parts of all targets: values made of an input's bytes, and errors that a caller may get.
 #pragma once
 
 #include <fuzzer/FuzzedDataProvider.h>

@@ -302,7 +302,7 @@ WRONG = {
     8: os.abort,
     10: lambda: "" * len(b"x" * 2**29),
 }
-"""What the executions of a reader of none do that fail in every way."""
+"""Executions that fail in every way, without a reader."""
 
 
 def execute(name, number):

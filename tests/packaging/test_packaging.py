@@ -1,4 +1,4 @@
-"""What is installed, shipped and imported."""
+"""Installed files, shipped files and imports."""
 
 import os
 import re
@@ -37,7 +37,7 @@ def run_example(cmake, configure, build, *options, target="all"):
 
 
 def rows_of_trial():
-    """What the example should print: a trial of the same length and seed."""
+    """Return the expected output of the example: a trial of the same length and seed."""
     approximator, learning = _core.presets()["robust"][1:]
     trial = _core.AcrobotTrial(
         approximator=approximator,
@@ -83,7 +83,7 @@ def test_the_cpp_example_builds_against_an_installed_prefix(
 
 
 def pkg_config_flags(prefix):
-    """What pkg-config returns for an installed library, with Eigen as a package or a wheel."""
+    """Run pkg-config for an installed library, with Eigen as a package or a wheel."""
     eigen = Path(sysconfig.get_path("purelib"), "cmeel.prefix", "share", "pkgconfig")
     path = os.pathsep.join([f"{prefix}/share/pkgconfig", str(eigen)])
     command = ["pkg-config", "--cflags", "sdnn"]
@@ -197,7 +197,7 @@ def test_the_type_stub_is_up_to_date():
     assert STUB.read_text() == core_stub.generate(), f"regenerate it: {STUB_COMMAND}"
 
 
-# What is shipped.
+# The shipped files.
 
 SHIPPED = (
     r"PKG-INFO|CMakeLists\.txt|pyproject\.toml|LICENSE|CITATION\.cff|[A-Z_]+\.md",

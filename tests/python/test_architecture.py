@@ -1,11 +1,14 @@
-"""The C++ headers: includes point down, and the umbrella has what is public.
+"""The C++ headers and Python packages: dependencies point down and are few.
 
 The layers of the Python package are contracts in pyproject.toml (``nox -s style``); cycles and
 missing includes of headers are found by clang-tidy (``nox -s tidy``).
 """
 
+import graphlib
 import re
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[2]
 INCLUDE = ROOT / "cpp" / "include" / "sdnn"
@@ -64,3 +67,47 @@ def test_headers_with_floating_point_refuse_options_that_change_results():
         if header != guard and guard not in reached(header, set())
     ]
     assert unguarded == []
+
+
+@pytest.fixture(scope="module")
+def imports():
+    """Return the graph of all imports, those for types too."""
+    grimp = pytest.importorskip("grimp", reason="pip install import-linter")
+    return grimp.build_graph("sdnn", cache_dir=None)
+
+
+def arrows_between_children(graph, package):
+    """Return which children of a package import which others, ``{child: {child, ...}}``."""
+    children = graph.find_children(package)
+    arrows = {child: set() for child in children}
+
+    def child_of(module):
+        return next((c for c in children if f"{module}.".startswith(f"{c}.")), None)
+
+    for module in graph.modules:
+        for imported in graph.find_modules_directly_imported_by(module):
+            importer, target = child_of(module), child_of(imported)
+            if importer and target and importer != target:
+                arrows[importer].add(target)
+    return arrows
+
+
+def test_the_packages_are_few_and_import_few_others(imports):
+    arrows = arrows_between_children(imports, "sdnn")
+    assert len(arrows) <= 18
+    assert sum(map(len, arrows.values())) <= 55
+
+
+def test_siblings_import_each_other_in_no_circle(imports):
+    packages = [module for module in imports.modules if imports.find_children(module)]
+    assert len(packages) > 10
+    for package in packages:
+        arrows = arrows_between_children(imports, package)
+        graphlib.TopologicalSorter(arrows).prepare()  # raises CycleError with the circle
+
+
+@pytest.mark.parametrize("pattern", ["python/sdnn/**/*.py", "cpp/**/*.[ch]pp"])
+def test_source_files_are_short(pattern):
+    lengths = {path: len(path.read_text("utf-8").splitlines()) for path in ROOT.glob(pattern)}
+    assert len(lengths) > 50
+    assert {path.name for path, n_lines in lengths.items() if n_lines > 450} == set()

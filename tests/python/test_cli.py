@@ -302,7 +302,7 @@ def test_costs_of_other_agents(invoke, no_costs):
 
 @dataclass(frozen=True)
 class PumpingConfig:
-    """Nothing to set but what every agent is told."""
+    """No settings but those of every agent."""
 
     n_inputs: int = 4
 

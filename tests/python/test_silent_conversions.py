@@ -1,4 +1,4 @@
-"""What NumPy would turn into two numbers without a word is refused wherever two are expected."""
+"""Values that NumPy would silently turn into two numbers are refused where two are expected."""
 
 import gymnasium as gym
 import numpy as np

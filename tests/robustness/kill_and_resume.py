@@ -50,7 +50,7 @@ CRASHES = ("terminate called", "Fatal Python error", "FATAL:", "core dumped")
 
 
 def content(folder: Path) -> dict[str, object]:
-    """What must not depend on kills: rows, keys of costs, and names of files."""
+    """Results that must not depend on kills: rows, keys of costs, and names of files."""
     kept: dict[str, object] = {"files": sorted(path.name for path in folder.iterdir())}
     for path in folder.glob("results*.csv"):
         kept["rows"] = path.read_bytes()

@@ -48,7 +48,7 @@ class Code:
 
     @property
     def units(self) -> list[NDArray[np.intp]]:
-        """Of each group the modified units, in the order of those that modify them."""
+        """The modified units of each group, in the order of those that modify them."""
         return [np.argsort(self.network.permutation(*group)) for group in self.groups]
 
     @property

@@ -1,4 +1,4 @@
-"""What an agent in C has learned, as bytes."""
+"""Images: the learned state of an agent in C, as bytes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the headers of all agents share: observations, actions and the frame of the file."""
+"""Parts of the headers of all agents: observations, actions and the frame of the file."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Experiment:
-    """One figure with a panel for each case."""
+    """A figure with a panel for each case."""
 
     id: str
     title: str

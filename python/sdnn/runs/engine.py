@@ -80,7 +80,7 @@ def trials_of(
     )
 
 
-# What happens, as executors report it and observers receive it.
+# Events that executors report and observers receive.
 
 
 class Begun(NamedTuple):

@@ -143,7 +143,7 @@ class ResultStore:
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("PRAGMA foreign_keys = ON")
         if is_new:
-            # One transaction: a killed process leaves an empty file or a whole schema.
+            # A single transaction: a killed process leaves an empty file or a whole schema.
             try:
                 connection.executescript(
                     f"BEGIN IMMEDIATE; {_SCHEMA} PRAGMA application_id = {APPLICATION_ID};"

@@ -13,7 +13,7 @@
 namespace sdnn::agents {
 namespace {
 
-/// A clock that moves when it is told to, and by sleeping `oversleep` too long.
+/// A clock that the test moves, and that sleeps `oversleep` too long.
 struct HandClock {
   double now = 100.0;
   double oversleep = 0.0;

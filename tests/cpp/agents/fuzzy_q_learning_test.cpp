@@ -31,7 +31,7 @@ std::vector<float> table(const Fuzzy& agent) {
   return {values.data(), values.data() + values.size()};
 }
 
-// One input, sets at 0, 1/2, 1; actions -1, 0, 1. At 0.125 rules 0 and 1 are true 3/4 and 1/4.
+// A single input, sets at 0, 1/2, 1; actions -1, 0, 1. At 0.125 rules 0 and 1 are true 3/4 and 1/4.
 TEST(FuzzyQLearning, OneStepByHand) {
   FuzzyRules rules({.n_inputs = 1, .n_sets = 3, .n_actions = 3});
   rules.set_value(0, 2, 4.0F);  // rule 0 picks +1
@@ -415,7 +415,7 @@ TEST(FuzzyQLearning, OfVectorsEachDimensionLearnsAsAnAgentOfItsOwn) {
   EXPECT_EQ(core::state_of(both.dimensions()[1]), core::state_of(second));
 }
 
-// It helps that the first is high and the second low, and each is told the sum only.
+// It helps that the first is high and the second low, and each receives the sum only.
 TEST(FuzzyQLearning, OfVectorsLearnsWhatEachDimensionIsGoodFor) {
   FuzzyQLearning agent = agent_of_two();
   const Numbers state = {0.5, 0.5};

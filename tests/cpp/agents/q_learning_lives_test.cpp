@@ -54,7 +54,7 @@ TEST(QLearning, ALifeInSeveralEnvironmentsCanBeCutAnywhere) {
   testing::expect_that_a_life_can_be_cut(vector_agent, 3);
 }
 
-// As OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown, while another environment goes its
+// See OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown, while another environment goes its
 // way.
 TEST(QLearning, EachEnvironmentHasStepsThatWait) {
   LookupTable table(2, 5, 2);

@@ -13,7 +13,7 @@
 namespace sdnn::agents {
 namespace {
 
-/// One environment that the range follows.
+/// An environment that the range follows.
 struct Stream {
   explicit Stream(double discount) : range(discount), rewards(range.no_rewards()) {}
 

@@ -26,7 +26,7 @@ def weights(agent):
 
 
 def learned(space, action):
-    """What an agent has learned of one action."""
+    """The learned value of an action."""
     agent = agent_of(space)
     agent.learn(Transition(HERE, action, -5.0, HERE, True))
     return weights(agent)

@@ -1,4 +1,4 @@
-"""What an environment returns from `step` and `reset` is as the interface says, or refused."""
+"""Results of `step` and `reset` that the interface does not allow are refused."""
 
 import gymnasium as gym
 import numpy as np

@@ -38,7 +38,7 @@ def logged(seed=1, n_episodes=4, length=10):
 
 
 def transitions():
-    """The same as transitions, and whether each was the last of a truncated episode."""
+    """Return the log as transitions, and whether each was the last of a truncated episode."""
     for one in logged():
         for t, reward in enumerate(one.rewards):
             here, after = one.observations[t], one.observations[t + 1]

@@ -75,7 +75,7 @@ def test_it_lives_in_cart_pole_with_bounds_that_matter():
 
 
 def test_a_discrete_observation_is_a_symbol():
-    """What is right in one room says nothing of the next one."""
+    """The right action in a room has nothing to do with the next room."""
     right = np.random.default_rng(1).integers(0, 4, 40)
     agent = SDNNQLearning(gym.spaces.Discrete(40), gym.spaces.Discrete(4), seed=1)
     assert agent.approximator.n_inputs == 2

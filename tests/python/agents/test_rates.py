@@ -110,7 +110,7 @@ def test_impossible_rates_are_named(space):
 
 
 class Anneal(Callback):
-    """What users write: from the last value to the next."""
+    """The spelling of users: from the last value to the next."""
 
     def on_step(self, training):
         training.agent.epsilon *= 0.97

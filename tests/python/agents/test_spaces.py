@@ -15,7 +15,7 @@ PLANE = Box(-1.0, 1.0, (2,))
 
 
 class Spaces:
-    """What is looked at of an agent and of an environment."""
+    """The attributes that are compared of an agent and an environment."""
 
     def __init__(self, observation_space, action_space=PLANE):
         self.observation_space, self.action_space = observation_space, action_space

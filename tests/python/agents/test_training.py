@@ -579,7 +579,7 @@ def test_an_unbounded_environment_is_warmed_up_and_learned(tmp_path):
 @pytest.mark.parametrize("missing", ["hold", "code"])
 def test_a_training_goes_on_from_an_observation_that_is_missing(missing, tmp_path):
     class Echo(Corridor):
-        """Nothing comes back from ahead where the corridor goes on, as of a sonar."""
+        """Nothing comes back from ahead where the corridor continues, as of a sonar."""
 
         observation_space = gym.spaces.Box(0.0, np.inf, (1,), dtype=np.float64)
 
@@ -615,7 +615,7 @@ def test_new_episodes_begin_where_none_are_repeated(tmp_path):
     training = Training.load(
         tmp_path / "t", new, callbacks=[JSONLines(path)], repeat_episodes=False
     )
-    assert new.seeds == [], "nothing happens in the environment before it goes on"
+    assert new.seeds == [], "nothing happens in the environment before it resumes"
     assert states_equal(training.agent, first)
     assert training.n_steps == 20
     assert training.run().n_steps == 200

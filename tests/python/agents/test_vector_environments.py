@@ -1,4 +1,4 @@
-"""One agent in several environments: who learns what and when, and going on exactly."""
+"""An agent in several environments: order of learning, and exact resume."""
 
 import gymnasium as gym
 import numpy as np

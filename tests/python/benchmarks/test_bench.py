@@ -1,4 +1,4 @@
-"""What is measured and how it is written down; never how quick anything is."""
+"""Measurements and how they are stored; never how quick anything is."""
 
 import doctest
 import importlib.util
@@ -77,7 +77,7 @@ def check_like(value, stored, path):
 
 
 BY_NAME = {("caches",), ("values",), ("ratio_to_dense",)}
-"""What has a field for each cache or instruction set."""
+"""Measurements with a field for each cache or instruction set."""
 
 
 def test_quick_run_has_all_fields(quick, with_yardsticks):

@@ -69,7 +69,7 @@ def test_every_stored_trial_is_whole(scripts):
 
 
 def quick(spec, case):
-    """The same in 40 steps, but for those that learn in pieces of their own."""
+    """The study in 40 steps, but for those that learn in pieces of their own."""
     budget = spec.budget.replace(steps=40)
     return spec.replace(
         budget=budget, protocol=spec.protocol.replace(evaluate_every=20, evaluation_episodes=1)
@@ -83,7 +83,7 @@ PHYSICS = {
 
 
 def test_every_agent_learns_on_the_engine(scripts, monkeypatch):
-    """As it is specified, but for its budget: those that need no other library."""
+    """The study as specified but for its budget: those that need no other library."""
     monkeypatch.setattr(scripts.studies, "N_MILESTONE_EPISODES", 2)
     study, tried = scripts.study, set()
     for (case, variant), one in study.combinations.items():
@@ -312,7 +312,7 @@ def test_swift_sarsa_is_true_online_where_step_sizes_are_fixed(scripts):
     ],
 )
 def test_swift_sarsa_has_the_values_of_its_author(scripts, settings, values):
-    """Of SwiftTDBinaryFeatures, compiled with doubles, after 10, 100, 1,000 and 3,000 steps."""
+    """SwiftTDBinaryFeatures, compiled with doubles, after 10, 100, 1,000 and 3,000 steps."""
     tiles = sys.modules["tile_coding"]
     names = ("step_size", "meta_step_size", "largest_rate", "step_size_decay")
     learning = tiles.SwiftConfig(**dict(zip(names, settings, strict=True)))

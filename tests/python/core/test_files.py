@@ -1,4 +1,4 @@
-"""One format for every kind of file: what is read is what was written, and no damage is missed."""
+"""A format for every kind of file: files are read as written, and no damage is missed."""
 
 import json
 import os

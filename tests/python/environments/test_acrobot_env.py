@@ -129,7 +129,7 @@ def test_truncates_by_itself_after_50_decisions():
 
 
 def tolerances(env, **reset):
-    """What an environment has from its next reset on, and in the episode that begins."""
+    """Settings from the next reset of an environment on, and in the episode that begins."""
     before = env.goal_tolerance
     return before, env.reset(**reset)[1]["goal_tolerance"]
 

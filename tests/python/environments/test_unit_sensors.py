@@ -7,7 +7,7 @@ from sdnn.environments import NoisySensors, UnitSensors
 
 
 class Fixed(gym.Env):
-    """Observes what it is told to."""
+    """An environment with given observations."""
 
     def __init__(self, low, high, observation=None):
         self.observation_space = gym.spaces.Box(

@@ -25,7 +25,7 @@ OPTIONS = {"n_pattern_units": 16, "max_iter": 2, "random_state": 0}
 
 
 class InjectedError(BaseException):
-    """As hard to swallow as KeyboardInterrupt."""
+    """An error that is as hard to swallow as KeyboardInterrupt."""
 
 
 class FailAtCall:

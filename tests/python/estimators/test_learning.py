@@ -1,4 +1,4 @@
-"""What the estimators learn: order, options, forms of training, both schemes, several outputs."""
+"""Learning of the estimators: order, options, forms of training, both schemes, several outputs."""
 
 import itertools
 

@@ -36,7 +36,7 @@ def problem(random, n=N):
 
 
 def with_outlier(random, X, y):
-    """The same with one value, one row or one target that is far from all others."""
+    """Return the samples with a value, a row or a target that is far from all others."""
     X, y = X.copy(), y.copy()
     row, far = random.randint(len(y)), 10 ** random.uniform(0.7, 6) * random.choice([-1, 1])
     where = random.randint(3)

@@ -190,7 +190,7 @@ def test_two_headers_share_a_program_and_cpp_takes_them(needs, tmp_path):
 
 
 def balance(agent, scale):
-    """What docs/examples/c/main.c does, with the agent itself."""
+    """Do what docs/examples/c/main.c does, with the agent itself."""
     x, v, a, w = 0.01, -0.02, 0.03, 0.0
     for step in range(500):
         if abs(x) > 2.4 or abs(a) > 12.0 / 180.0 * 3.141592653589793:

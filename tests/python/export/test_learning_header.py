@@ -297,7 +297,7 @@ int main(void) {
 
 
 def test_real_numbers_are_ieee_754(target, tmp_path):
-    """Of all sizes, subnormal ones too, and such as are nearly equal."""
+    """Numbers of all sizes, subnormal ones too, and such as are nearly equal."""
     (tmp_path / "agent.h").write_text(c_header(network(), "agent", learning=True).text)
     (tmp_path / "real.c").write_text(REAL_NUMBERS)
     run(target.compiler, *STRICT, *SANITIZED, tmp_path / "real.c", "-o", tmp_path / "real")

@@ -176,7 +176,7 @@ ENOUGH = 40
 
 
 class EnoughError(Exception):
-    """What was asked for is done, as far as a test wants to see it."""
+    """Check that a request was fulfilled."""
 
 
 class Slope(gym.Env):
@@ -232,7 +232,7 @@ def memory(agent):
 
 
 def insanity(agent):
-    """What is wrong with an agent that was made or has learned; "" if nothing."""
+    """Return what is wrong with an agent that was made or has learned, or ""."""
     observations = [sampled(agent.observation_space) for _ in range(36)]
     observation = observations[0]
     n_steps = 35 if agent.is_warming_up else 6
@@ -516,7 +516,7 @@ def arguments(agent, parameters):
 
 
 def result_fault(agent, result, given):
-    """What is wrong with what a method gave."""
+    """Return what is wrong with the result of a method, or ""."""
     if isinstance(result, agents.Agent):
         return insanity(result)
     if "observation" in given and "explore" in given:

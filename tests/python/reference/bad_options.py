@@ -102,7 +102,7 @@ def _cell(command, parameter, text):
 
 
 def fault_of(result, parameter, text):
-    """What is wrong with how a command ended; "" if nothing."""
+    """Return what is wrong with how a command ended, or ""."""
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         return f"raised {type(result.exception).__name__}: {str(result.exception)[:200]}"
     if result.exit_code == 0:

@@ -111,7 +111,7 @@ def pairs_agent():
 
 
 def lone_agent():
-    """One variable, which is two inputs, all windows, and a range of values given."""
+    """A single variable, which is two inputs, all windows, and a range of values given."""
     approximator = replace(SMALL, n_actions=0, u_low=3, q_low=-0.3, q_high=0.1)
     own = learning(tie_rule="lowest", value_range="fixed")
     return SDNNQLearning(box(3.0), box(1.0), approximator=approximator, learning=own, seed=5)
@@ -189,7 +189,7 @@ AGENTS = {
 
 @functools.cache
 def agents():
-    """One of each kind, which has learned."""
+    """An agent of each kind, which has learned."""
     return {name: learned(make()) for name, make in AGENTS.items()}
 
 
@@ -211,7 +211,7 @@ def observations_of(agent, n, seed=0):
 
 @dataclass(frozen=True)
 class Expected:
-    """What is asked, and in each dimension the actions that tie and the agent's own."""
+    """The queries, and in each dimension the actions that tie and the agent's own."""
 
     kind: str
     given: np.ndarray
@@ -344,7 +344,7 @@ def actions_of(command, kind, observations, n_dimensions):
 
 @functools.cache
 def expectations(name):
-    """What an agent does, asked once for all targets."""
+    """The actions of an agent, computed once for all targets."""
     return all_expected(name, agents()[name])
 
 

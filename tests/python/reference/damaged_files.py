@@ -118,7 +118,7 @@ SPECIAL = {
     "link to a terminal": lambda path: path.symlink_to("/dev/tty"),
     "a terabyte": sparse,
 }
-"""What is no file of a size that fits: always refused."""
+"""Files of sizes that cannot fit: always refused."""
 
 MIB = 2**20
 HEADERS = (b"[study]\n", b"[base]\n", b"[base.learning]\n", b"[axes]\n", b"[cases]\n", b"")

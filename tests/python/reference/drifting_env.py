@@ -79,7 +79,7 @@ class OnlyEnv(DriftingEnv):
 
 
 class UnseenEnv(gym.Env):
-    """As in docs/how-to/agents.md: nothing is said about rendering."""
+    """Like docs/how-to/agents.md: nothing is said about rendering."""
 
     observation_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
     action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)

@@ -65,7 +65,7 @@ class ParallelPerceptron:
 
 
 class Trainer:
-    """What both rules share: present samples in order, correct some units by +-x_SD at once."""
+    """Both rules share this: present samples in order, correct some units by +-x_SD at once."""
 
     def __init__(self, layer, bins):
         self.layer = layer

@@ -27,7 +27,7 @@ def in_order(terms: Sequence[float] | NDArray[np.float64]) -> float:
 
 
 class FuzzyQLearning:
-    """One value per rule and action, all in one array of n_sets^d x n_actions floats."""
+    """A value per rule and action, all in one array of n_sets^d x n_actions floats."""
 
     def __init__(
         self, d: int, *, n_sets: int, n_actions: int, coefficient: float, discount: float
@@ -146,6 +146,6 @@ class RBFNetwork:
         return np.add.accumulate(self.psi * u, axis=1)[:, -1]
 
     def update(self, state: NDArray[np.float64], action: int, target: float) -> None:
-        """One gradient step of (target - Q)^2 / 2."""
+        """A gradient step of (target - Q)^2 / 2."""
         step = self.rate * (target - float(self.values(state)[action]))
         self.w += np.outer(self.phi(state), step * self.psi[action])

@@ -15,7 +15,7 @@ import random_lives
 
 AGENTS = [kind.__name__ for kind in bad_inputs.SETTINGS]
 N_MUTATIONS = 300
-"""Of each kind of file."""
+"""Mutations of each kind of file."""
 
 MATRICES = {
     "agents": [

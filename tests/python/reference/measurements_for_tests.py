@@ -1,4 +1,4 @@
-"""What tests of benchmarks measure: a module that processes of their own can import."""
+"""Measurements for tests of benchmarks: a module that processes of their own can import."""
 
 import os
 

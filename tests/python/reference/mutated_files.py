@@ -42,7 +42,7 @@ class Reader:
 
 
 def written(*makers):
-    """What each maker writes to the path that it is given."""
+    """Writers of each kind of file."""
     contents = []
     for make in makers:
         with tempfile.TemporaryDirectory() as folder:
@@ -198,7 +198,7 @@ def good_files(name):
 
 
 def read_mutation(name, number):
-    """What is wrong with how a reader takes a mutation, or ""."""
+    """Return what is wrong with how a reader takes a mutation, or ""."""
     reader = READERS[name]
     random = np.random.RandomState(number)
     data = good_files(name)[number % len(good_files(name))]

@@ -155,7 +155,7 @@ def _predict_cell(cls, value):
 
 
 def _without_name(call):
-    """As scikit-learn refuses data: typed, in its own words."""
+    """Check that data are refused as scikit-learn does: typed, in its own words."""
     fault = judged("", call)
     is_typed = fault.startswith(("did not name", "said ValueError: Complex"))
     return "" if is_typed else fault

@@ -8,7 +8,7 @@ import time
 import warnings
 
 CELL_SECONDS = 30.0
-"""Of processor time, where 10 are allowed: others on the machine lengthen it up to three times."""
+"""Limit of processor time. Cells take 10 s; others on the machine lengthen it up to three times."""
 
 HANG_SECONDS = 120.0
 START_SECONDS = 120.0

@@ -164,7 +164,7 @@ def test_costs_of_some_agents():
 
 
 def make_agents(n_inputs, seed):
-    """One agent of every bound kind, by name."""
+    """An agent of every kind, by name."""
     learning = _core.QLearningConfig()
     rbf = _core.RBFNetworkConfig(n_inputs=n_inputs, n_actions=21)
     rules = _core.FuzzyRulesConfig(n_inputs=n_inputs)

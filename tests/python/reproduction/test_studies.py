@@ -1,4 +1,4 @@
-"""What hand-made trials say: measures, paired differences, ends solved, claims, tables, figure."""
+"""Hand-made trials: measures, paired differences, ends solved, claims, tables, figure."""
 
 import json
 import math
@@ -209,7 +209,7 @@ agent = "fuzzy"
 
 
 def claimed_records(study, n_trials=10):
-    """As the paper's curves: Case II collapses at about 7,500; but not with `new`."""
+    """The paper's curves: Case II collapses at about 7,500; but not with `new`."""
     good, lost = steps_of((1500, 4)), steps_of((750, 4), (750, 50))
     for variant in ("old", "new", "fuzzy"):
         for case in ("s4", "s4-noise", "s5-noise", "s6-noise"):

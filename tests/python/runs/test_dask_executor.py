@@ -1,4 +1,4 @@
-"""What `DaskExecutor` and its options refuse without a cluster; tests/cluster has the others."""
+"""Refusals of `DaskExecutor` and its options without a cluster; tests/cluster has the others."""
 
 import dataclasses
 import importlib.util

@@ -210,7 +210,7 @@ def test_jobs_must_be_positive():
 
 
 class Scripted:
-    """Says what it is told to say, about the trials in their order."""
+    """Executors that report given events about the trials in their order."""
 
     def __init__(self, *script):
         self.script = script

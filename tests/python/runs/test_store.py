@@ -147,7 +147,7 @@ def test_a_run_in_progress_grows_and_is_finished(tmp_path):
         store.extend(key, TrialRows.from_training(TRAINED[:2]), 0, **told)
         assert (store.keys(), store.load()) == (set(), ())
         assert store.rows(key).to_training() == TRAINED[:2]
-        # As after a kill: what was stored after the last checkpoint is stored again.
+        # After a kill, what was stored after the last checkpoint is stored again.
         store.extend(key, TrialRows.from_training(TRAINED[1:], 1), 1, **told)
         assert store.rows(key).to_training() == TRAINED
         nothing = TrialRows.from_training([])
@@ -161,7 +161,7 @@ def test_a_run_in_progress_grows_and_is_finished(tmp_path):
         assert record.rows.episode_return.tolist() == [1.5]
         assert record.rows.solved.tolist() == [0.5]
         store.extend(key, nothing, 3, **told)
-        assert store.keys() == set(), "it goes on"
+        assert store.keys() == set()
 
 
 def test_rows_of_several_environments_say_which():

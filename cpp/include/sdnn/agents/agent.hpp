@@ -1,4 +1,4 @@
-/// What a trial needs of an agent: the concept every agent models.
+/// The interface of agents that trials use: the concept every agent models.
 #pragma once
 
 #include <concepts>

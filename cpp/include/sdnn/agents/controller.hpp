@@ -49,7 +49,7 @@ namespace sdnn::agents {
 /// Thread safety: const functions may be called by many threads at once, with a workspace each.
 class Controller : public WithRates<Controller> {
  public:
-  /// What one reader owns, once the warm-up is over: for that controller and what it becomes.
+  /// The state of a reader, once the warm-up is over: for that controller and what it becomes.
   struct Workspace {
     AnyWorkspace agent;
     std::vector<double> state, action, held;
@@ -81,7 +81,7 @@ class Controller : public WithRates<Controller> {
   }
 
   const ControllerConfig& config() const noexcept { return config_; }
-  /// As it is used: sizes that follow from the task are known once the warm-up is over.
+  /// The settings as used: sizes that follow from the task are known once the warm-up is over.
   const AnyApproximatorConfig& approximator() const noexcept { return approximator_; }
   const Observations& observations() const noexcept { return observations_; }
   const Actions& actions() const noexcept { return actions_; }

@@ -1,4 +1,4 @@
-/// What belongs to an agent's present episode, once for each environment that it learns in.
+/// The state of an agent's present episodes, one for each environment that it learns in.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ class Episodes {
   auto begin() const noexcept { return episodes_.begin(); }
   auto end() const noexcept { return episodes_.end(); }
 
-  /// That of an environment, from 0. Throws std::invalid_argument if there is none.
+  /// The state of an environment, from 0. Throws std::invalid_argument if there is none.
   Episode& of(std::size_t environment) {
     require_environment(environment);
     return episodes_[environment];
@@ -33,8 +33,8 @@ class Episodes {
     return episodes_[environment];
   }
 
-  /// Of more environments, whose episodes `make()` makes, or of fewer. Throws std::invalid_argument
-  /// unless 1 <= n <= kMost.
+  /// Changes to more environments, whose episodes `make()` makes, or of fewer. Throws
+  /// std::invalid_argument unless 1 <= n <= kMost.
   template <class Make>
   void resize(std::size_t n, const Make& make) {
     core::require_in_range("n_environments", n, 1, kMost);

@@ -28,7 +28,7 @@ namespace sdnn::agents {
 /// Spinning up in deep reinforcement learning, kept for some steps as above.
 class Exploration {
  public:
-  /// What belongs to the present episode in one environment.
+  /// The present episode in an environment.
   struct Episode {
     std::vector<std::size_t> kept;  ///< the random action
     int n_kept = 0;                 ///< steps that it will still last
@@ -40,7 +40,7 @@ class Exploration {
     }
   };
 
-  /// Of the fields of a learning configuration. Throws std::invalid_argument naming the field.
+  /// Takes the fields of a learning configuration. Throws std::invalid_argument naming the field.
   template <class Config>
   Exploration(const Config& config, std::uint64_t seed)
       : policy_(config.policy, seed),

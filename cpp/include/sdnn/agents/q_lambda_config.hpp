@@ -12,7 +12,7 @@
 
 namespace sdnn::agents {
 
-/// What a target bootstraps from.
+/// The value that a target bootstraps from.
 enum class Bootstrap {
   sarsa,       ///< the value of the action that is taken next
   q_learning,  ///< the best value; traces end where a worse action is taken
@@ -21,7 +21,7 @@ constexpr std::array<std::string_view, 2> words_of(Bootstrap) noexcept {
   return {"sarsa", "q_learning"};
 }
 
-/// What a trace becomes in a state that returns.
+/// The rule of a trace in a state that returns.
 enum class TraceKind {
   dutch,      ///< such that learning equals the forward view at every step (true online)
   replacing,  ///< as if it were the first time

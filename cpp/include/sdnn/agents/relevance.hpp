@@ -196,7 +196,7 @@ class Relevance {
     }
   }
 
-  /// What is left of the values without the means of the bins.
+  /// The residuals of the values without the means of the bins.
   static std::vector<double> without_means(std::vector<double> values, const Bins& bins) {
     double sums[kMostBins] = {};
     double counts[kMostBins] = {};

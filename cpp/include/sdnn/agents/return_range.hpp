@@ -29,7 +29,7 @@ namespace sdnn::agents {
 /// sums of past rewards, z = r + gamma z: their extremes are those of returns, and known at once.
 class ReturnRange {
  public:
-  /// What belongs to one environment.
+  /// The rewards of an environment.
   struct Rewards {
     std::vector<double> waiting;  ///< the first n are rewards whose returns are not known yet
     std::size_t n = 0;
@@ -134,7 +134,7 @@ class ReturnRange {
     return true;
   }
 
-  /// Of the first n_known rewards; `are_all` that the episode has.
+  /// Computes the returns of the first n_known rewards; `are_all` that the episode has.
   void note_returns(std::span<const double> rewards, std::size_t n_known, bool are_all) {
     const double width = n_returns_ < kFewReturns ? kLargest : high_ - low_;
     const double low = clipped(low_ - width), high = clipped(high_ + width);

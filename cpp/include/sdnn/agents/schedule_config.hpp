@@ -1,4 +1,5 @@
-/// What is scheduled over a training, for every configuration that has a learning rate and epsilon.
+/// The settings that are scheduled over a training, for every configuration that has a learning
+/// rate and epsilon.
 #pragma once
 
 #include <algorithm>
@@ -117,7 +118,7 @@ Config checked_schedule(const Config& config) {
   return config;
 }
 
-/// What alpha and epsilon follow: the progress, unless they were set.
+/// The values that alpha and epsilon follow: the progress, unless they were set.
 struct Rates {
   double progress = 0.0;
   std::optional<double> set_learning_rate, set_epsilon;

@@ -162,7 +162,7 @@ class FuzzyDimension {
     return rules;
   }
 
-  /// What belongs to the present episode in one environment.
+  /// The present episode in an environment.
   struct Episode {
     std::vector<double> state;  ///< of the last exploring act, with all below
     approximators::FiredRules fired;

@@ -16,7 +16,7 @@ namespace sdnn::agents::detail {
 
 inline constexpr double kLargestReward = 1e300;
 
-/// What belongs to the present episode.
+/// The present episode in an environment.
 struct QLambdaEpisode {
   approximators::LinearSDNN::Trace trace;
   approximators::LinearSDNN::Workspace present;  ///< of state
