@@ -55,7 +55,8 @@ def test_a_network_is_as_large_as_given_and_learns_at_once():
     agent = new_agent(SPACE, TWO, kind="sdnn-c", ram_bytes=10**6, approximator=config)
     assert agent.approximator.n_pattern_units == 16
     assert agent.learning == SDNNQLearning.presets["small"].learning
-    assert "first_weights" not in c_header(agent, "agent", learning=True).text  # drawn on the chip
+    text = c_header(agent, "agent", learning=True).text
+    assert "agent_first_weights[" not in text  # drawn on the chip
 
 
 def test_a_network_may_have_few_units():
