@@ -116,7 +116,7 @@ class ReleasedGIL {
 /// Lets other threads run Python while objects are worked on.
 ///
 /// Objects given as const are read, the others are changed, with all that they hold in themselves.
-/// As long as it lives, every use of an object that is being changed is refused with a
+/// While it lives, every use of an object that is being changed is refused with a
 /// RuntimeError, and every change of one that is being read. What a call reads of arrays must be a
 /// copy: arrays have no owner that could refuse.
 class WithoutGIL {

@@ -17,7 +17,7 @@ namespace sdnn::tools {
 /// The times of all decisions in the next `n_episodes` learning episodes of a trial: choosing an
 /// action, the acrobot, its sensors, and learning from it. Test episodes among them count too.
 ///
-/// The same trial makes the same decisions whenever it is run, so several runs can be compared
+/// Equal trials make the same decisions whenever it is run, so several runs can be compared
 /// decision by decision. Throws as the trial's advance does.
 template <agents::Agent Agent>
 Times time_decisions(tools::AcrobotTrial<Agent>& trial, int n_episodes) {

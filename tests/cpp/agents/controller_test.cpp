@@ -207,7 +207,7 @@ TEST(Controller, OfSeveralRobotsDoesWhatItsAgentDoes) {
   EXPECT_THROW(controller.begin_episode(3), std::invalid_argument);
 }
 
-// Among 5 actions on 0, 1 and 2 the second and the third are 1; alone it is the third, the nearest.
+// With 5 actions on 0, 1 and 2 the second and the third are 1; alone it is the third, the nearest.
 TEST(Controller, RemembersWhichIndexAWholeActionWasWhileItsRobotIsThere) {
   const Numbers observed = {1.0, 0.0, 4.0, 11.0}, state = {0.5, 0.75, 0.25};
   for (const bool leaves : {false, true}) {

@@ -31,7 +31,7 @@ std::vector<float> table(const Fuzzy& agent) {
   return {values.data(), values.data() + values.size()};
 }
 
-// A single input, sets at 0, 1/2, 1; actions -1, 0, 1. At 0.125 rules 0 and 1 are true 3/4 and 1/4.
+// With one input, sets at 0, 1/2, 1; actions -1, 0, 1. At 0.125 rules 0 and 1 are true 3/4 and 1/4.
 TEST(FuzzyQLearning, OneStepByHand) {
   FuzzyRules rules({.n_inputs = 1, .n_sets = 3, .n_actions = 3});
   rules.set_value(0, 2, 4.0F);  // rule 0 picks +1

@@ -103,7 +103,7 @@ TEST(Observations, NarrowedRangesOfFewInputsAreFittedWhereTheFixedOneIsMoreThanT
     const auto observations = fitted(config, rows);
     return std::pair(observations.low().front(), observations.high().front());
   };
-  // A variable observed from 0 to 4 has a fitted range of -1 to 5, of a width of 6.
+  // Observations of 0 to 4 have a fitted range of -1 to 5, of a width of 6.
   EXPECT_EQ(range(-6.0, 6.0, {0.0, 4.0}), std::pair(-6.0, 6.0));
   EXPECT_EQ(range(-6.0, 6.1, {0.0, 4.0}), std::pair(-1.0, 5.0));
   EXPECT_EQ(range(0.0, 100.0, {0.0, 4.0}), std::pair(0.0, 5.0));

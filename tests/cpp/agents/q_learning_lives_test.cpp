@@ -54,8 +54,8 @@ TEST(QLearning, ALifeInSeveralEnvironmentsCanBeCutAnywhere) {
   testing::expect_that_a_life_can_be_cut(vector_agent, 3);
 }
 
-// See OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown, while another environment goes its
-// way.
+// Repeats OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown, while another environment goes
+// its way.
 TEST(QLearning, EachEnvironmentHasStepsThatWait) {
   LookupTable table(2, 5, 2);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);

@@ -78,7 +78,7 @@ class Actions {
 
   const ActionConfig& config() const noexcept { return config_; }
   std::size_t n_dimensions() const noexcept { return config_.low.size(); }
-  /// The numbers of actions in each dimension; 0: any number in [-1, 1].
+  /// The number of actions of each dimension; 0: any number in [-1, 1].
   const std::vector<std::size_t>& n_actions() const noexcept { return n_actions_; }
 
   /// The action with an index in dimension d.

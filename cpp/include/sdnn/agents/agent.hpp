@@ -1,4 +1,4 @@
-/// The interface of agents that trials use: the concept every agent models.
+/// The concept that every agent models, for trials.
 #pragma once
 
 #include <concepts>

@@ -165,7 +165,7 @@ Config config_from_json(const nlohmann::json& object, const std::string& name) {
 
 namespace detail {
 
-/// The names of agents in files, and their classes in Python, in the order of
+/// The names of the kinds of agents in files, and of their classes in Python, in the order of
 /// AnyApproximatorConfig.
 struct AgentKind {
   std::string_view name, class_in_python;

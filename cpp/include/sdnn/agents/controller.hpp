@@ -49,7 +49,7 @@ namespace sdnn::agents {
 /// Thread safety: const functions may be called by many threads at once, with a workspace each.
 class Controller : public WithRates<Controller> {
  public:
-  /// The state of a reader, once the warm-up is over: for that controller and what it becomes.
+  /// The memory of one reader, once the warm-up is over: for that controller and what it becomes.
   struct Workspace {
     AnyWorkspace agent;
     std::vector<double> state, action, held;

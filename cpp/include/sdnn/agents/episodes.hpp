@@ -1,4 +1,4 @@
-/// The state of an agent's present episodes, one for each environment that it learns in.
+/// The state of an agent's present episode, once for each environment that it learns in.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ class Episodes {
   auto begin() const noexcept { return episodes_.begin(); }
   auto end() const noexcept { return episodes_.end(); }
 
-  /// The state of an environment, from 0. Throws std::invalid_argument if there is none.
+  /// The episode of an environment, from 0. Throws std::invalid_argument if there is none.
   Episode& of(std::size_t environment) {
     require_environment(environment);
     return episodes_[environment];

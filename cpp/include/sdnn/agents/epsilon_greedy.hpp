@@ -111,16 +111,16 @@ class EpsilonGreedy {
   std::size_t random_action(std::size_t n_actions) noexcept {
     return static_cast<std::size_t>(exploration_.below(n_actions));
   }
-  /// Chooses one of the best actions; `ties` decides between several. Shape: values (n_actions,).
-  /// Throws as select does.
+  /// Returns a best action; `ties` decides between several. Shape: values (n_actions,). Throws as
+  /// select does.
   std::size_t best_action(std::span<const double> values, core::Random& ties) const {
     return greedy(values, ties);
   }
   std::size_t best_action(std::span<const float> values, core::Random& ties) const {
     return greedy(values, ties);
   }
-  /// Chooses as above where numbers that rise with the values stand for them: `least` is the least
-  /// one that ties with the best.
+  /// Returns a best action where numbers that rise with the values stand for them: `least` is the
+  /// least one that ties with the best.
   template <class Number>
   std::size_t best_action(std::span<const Number> numbers, Number least, core::Random& ties) const {
     return one_of(numbers, least, ties);
@@ -153,7 +153,7 @@ class EpsilonGreedy {
     return one_of(values, static_cast<Value>(best - config_.tie_tolerance), ties);
   }
 
-  /// Chooses one of the values that are at least `least`, by the rule.
+  /// Returns the index of a value that is at least `least`, by the rule.
   template <class Value>
   std::size_t one_of(std::span<const Value> values, Value least, core::Random& ties) const {
     switch (config_.tie_rule) {

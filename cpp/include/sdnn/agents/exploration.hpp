@@ -28,7 +28,7 @@ namespace sdnn::agents {
 /// Spinning up in deep reinforcement learning, kept for some steps as above.
 class Exploration {
  public:
-  /// The present episode in an environment.
+  /// The state of the present episode in one environment.
   struct Episode {
     std::vector<std::size_t> kept;  ///< the random action
     int n_kept = 0;                 ///< steps that it will still last

@@ -22,7 +22,7 @@ namespace sdnn::agents {
 ///     }
 ///
 /// Tick k is at start + k / hz, whatever was before: nothing adds up, so the loop does not drift.
-/// What follows a tick has until the next one. If it takes longer, that is a miss: the ticks that
+/// The work after a tick has until the next one. If it takes longer, that is a miss: the ticks that
 /// have passed are left out, and the loop continues with the next one. It never catches up in
 /// a burst. A wait that ends too late by a whole period is a miss, too.
 ///

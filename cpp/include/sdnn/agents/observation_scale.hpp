@@ -27,7 +27,7 @@ constexpr std::array<std::string_view, 3> words_of(Missing) noexcept {
   return {"error", "hold", "code"};
 }
 
-/// The source of an input of an agent; its value where x is what is observed:
+/// The origin of an input of an agent; its value where x is what is observed:
 ///
 /// | kind     | first, second | value                                                          |
 /// |----------|---------------|----------------------------------------------------------------|

@@ -173,7 +173,7 @@ class Observations {
     for (const std::int32_t i : kept_) inputs.push_back(all[static_cast<std::size_t>(i)]);
     take_inputs(std::move(inputs));
   }
-  /// The inputs that are kept, by their number among all.
+  /// Whether each of all possible inputs is kept.
   std::vector<bool> kept_inputs() const {
     std::vector<bool> kept(inputs_with(pairs_).size(), kept_.empty());
     for (const std::int32_t i : kept_) kept[static_cast<std::size_t>(i)] = true;
@@ -181,7 +181,7 @@ class Observations {
   }
   /// How many inputs there were before the first one was added.
   std::size_t n_first_inputs() const noexcept { return kept_.empty() ? n_inputs() : n_first_; }
-  /// The scale with all inputs that there are.
+  /// A copy with all possible inputs.
   Observations with_all_inputs() const {
     Observations all = *this;
     all.take(ranges_, pairs_);
@@ -321,8 +321,8 @@ class Observations {
     return {low - kHeadroom * width, high + kHeadroom * width};
   }
 
-  /// Values that are rarely observed are left out of adaptive ranges; a variable that hardly moves
-  /// has its fixed range.
+  /// Adaptive ranges leave out rare observations; a variable that hardly moves has its
+  /// fixed range.
   std::pair<double, double> fitted_range(std::vector<double> seen, std::size_t i) const {
     std::ranges::sort(seen);
     auto [low, high] = widened(seen.front(), seen.back());

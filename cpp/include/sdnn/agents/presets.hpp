@@ -16,7 +16,7 @@ struct Preset {
   QLearningConfig learning = {};
 };
 
-/// The defaults, as in the paper (section 4.2).
+/// The paper's settings (section 4.2): the defaults.
 inline Preset paper_preset(int n_inputs) { return {.approximator = {.n_inputs = n_inputs}}; }
 
 /// For any task: a full step each time, then, as progress is set, ever smaller ones, which

@@ -90,7 +90,7 @@ class QLambda : public WithRates<QLambda> {
   /// Transitions that were learned.
   std::int64_t n_learned() const noexcept { return n_learned_; }
 
-  /// The present rates, in steps of 2^-16.
+  /// Alpha and epsilon at present, in steps of 2^-16.
   double learning_rate() const noexcept { return static_cast<double>(rate_) / kOne; }
   double epsilon() const noexcept { return exploration_.policy().config().epsilon; }
   /// Where epsilon goes with schedule_steps: by default to 0. Symbols tell nothing of each other:
@@ -346,8 +346,7 @@ class QLambda : public WithRates<QLambda> {
     }
   }
 
-  /// Chooses one of the best actions in each dimension. The tolerance is in whole units, as values
-  /// are.
+  /// Returns a best action of each dimension. The tolerance is in whole units, as values are.
   Action each_best(Workspace& workspace, core::Random& ties) const {
     const EpsilonGreedy& policy = exploration_.policy();
     const double tolerance =
@@ -419,7 +418,7 @@ class QLambda : public WithRates<QLambda> {
     episode.waits = false;
   }
 
-  /// Learns a step, `next` being Q' in units.
+  /// Learns one step; `next` is Q' in units.
   void correct(Episode& episode, std::int64_t next) {
     const std::int64_t value =
         in_range([&] { return readout_.sum(episode.present, episode.action); }, &next);

@@ -21,7 +21,7 @@ constexpr std::array<std::string_view, 2> words_of(Bootstrap) noexcept {
   return {"sarsa", "q_learning"};
 }
 
-/// The rule of a trace in a state that returns.
+/// The change of a trace in a state that returns.
 enum class TraceKind {
   dutch,      ///< such that learning equals the forward view at every step (true online)
   replacing,  ///< as if it were the first time

@@ -93,7 +93,7 @@ class QLearning : public WithRates<QLearning<Q>> {
   /// Actions of a dimension.
   std::size_t n_actions(std::size_t d) const { return networks_[d].n_actions(); }
 
-  /// The present rates: as set, or as progress has made them.
+  /// Alpha and epsilon: as set, or as progress has made them.
   double learning_rate() const noexcept { return learning_rate_; }
   double epsilon() const noexcept { return exploration_.policy().config().epsilon; }
 
@@ -264,7 +264,7 @@ class QLearning : public WithRates<QLearning<Q>> {
   static constexpr bool kCounts = approximators::CountedActionValue<Q>;
   static constexpr bool kHasRange = requires(Q& q) { q.set_output_range(0.0, 1.0); };
 
-  /// The present episode in an environment.
+  /// The state of the present episode in one environment.
   struct Episode {
     NStepBuffer buffer;
     std::vector<std::uint8_t> next_mask;  ///< of the state where the newest step led

@@ -43,8 +43,8 @@ class RangeNotes {
     }
   }
 
-  /// The use of each variable's range; none for parts of angles and symbols, and before there are
-  /// enough notes.
+  /// The use of each variable; none for parts of angles and symbols, and before there are enough
+  /// notes.
   std::vector<std::optional<RangeUse>> use(const Observations& observations) const {
     std::vector<std::optional<RangeUse>> use(n_variables_);
     for (const ObservedInput& input : observations.inputs()) {
@@ -73,7 +73,7 @@ class RangeNotes {
   static constexpr std::size_t kMostNoted = 256;
   static constexpr std::size_t kMostValues = 1 << 20;
 
-  /// Random gaps avoid sampling in phase with the episodes.
+  /// Random gaps, which avoid sampling in phase with the episodes.
   std::uint32_t gap() noexcept { return 1 + gaps_.below(15); }
 
   std::size_t n_variables_, most_;

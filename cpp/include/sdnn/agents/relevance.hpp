@@ -196,7 +196,7 @@ class Relevance {
     }
   }
 
-  /// The residuals of the values without the means of the bins.
+  /// The rest of the values without the means of the bins.
   static std::vector<double> without_means(std::vector<double> values, const Bins& bins) {
     double sums[kMostBins] = {};
     double counts[kMostBins] = {};

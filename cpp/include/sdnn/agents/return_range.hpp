@@ -22,14 +22,14 @@ namespace sdnn::agents {
 /// should not be better than they are. It moves when it no longer holds the returns or has become
 /// twice as wide as it need be.
 ///
-/// What is rare is thus outside, and sums are clipped one width beyond the range: otherwise a
+/// Rare sums are thus outside, and sums are clipped one width beyond the range: otherwise a
 /// single huge reward would be in many returns, one for each step before it.
 ///
 /// Until 32 returns are known, and any reward other than 0, the range grows to hold the discounted
 /// sums of past rewards, z = r + gamma z: their extremes are those of returns, and known at once.
 class ReturnRange {
  public:
-  /// The rewards of an environment.
+  /// The rewards of one environment.
   struct Rewards {
     std::vector<double> waiting;  ///< the first n are rewards whose returns are not known yet
     std::size_t n = 0;

@@ -13,7 +13,7 @@ namespace sdnn::agents {
 
 class AgentFile;
 
-/// The part that a robot needs of an AgentFile and its controller, with the same bits.
+/// The part of an AgentFile and its controller that a robot needs, with the same bits.
 ///
 /// Programs that include this header are compiled in a second and linked to the CMake target
 /// sdnn::saved_agent, which is compiled once. Shapes, units and errors are those of Controller.

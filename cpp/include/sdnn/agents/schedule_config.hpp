@@ -1,5 +1,5 @@
-/// The settings that are scheduled over a training, for every configuration that has a learning
-/// rate and epsilon.
+/// Settings that are scheduled over a training, for every configuration that has a learning rate
+/// and epsilon.
 #pragma once
 
 #include <algorithm>
@@ -118,7 +118,7 @@ Config checked_schedule(const Config& config) {
   return config;
 }
 
-/// The values that alpha and epsilon follow: the progress, unless they were set.
+/// Alpha and epsilon follow the progress, unless they were set.
 struct Rates {
   double progress = 0.0;
   std::optional<double> set_learning_rate, set_epsilon;

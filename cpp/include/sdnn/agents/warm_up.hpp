@@ -171,7 +171,7 @@ class WarmUp {
   }
 
  private:
-  /// The present episode in an environment.
+  /// The state of the present episode in one environment.
   struct Episode {
     explicit Episode(std::size_t n_dimensions) : kept(n_dimensions) {}
     bool begins = true;        ///< with its next transition

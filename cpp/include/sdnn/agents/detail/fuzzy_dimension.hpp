@@ -162,7 +162,7 @@ class FuzzyDimension {
     return rules;
   }
 
-  /// The present episode in an environment.
+  /// The state of the present episode in one environment.
   struct Episode {
     std::vector<double> state;  ///< of the last exploring act, with all below
     approximators::FiredRules fired;

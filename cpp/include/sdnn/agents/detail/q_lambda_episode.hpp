@@ -16,7 +16,7 @@ namespace sdnn::agents::detail {
 
 inline constexpr double kLargestReward = 1e300;
 
-/// The present episode in an environment.
+/// The state of the present episode.
 struct QLambdaEpisode {
   approximators::LinearSDNN::Trace trace;
   approximators::LinearSDNN::Workspace present;  ///< of state
