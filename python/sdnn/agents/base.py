@@ -323,17 +323,14 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             **more,
         }
 
-    def state(self, part: str = "") -> Arrays:
-        """Return all that the agent remembers, as arrays by name.
+    def state(self) -> Arrays:
+        """Return all that the agent remembers, as arrays by name."""
+        return self._controller.state()
 
-        With ``part`` those whose names begin with ``part.``, by the rest of the name: ``"agent"``
-        is the learning agent, without the ranges of its observations.
-        """
-        prefix = part and f"{part}."
-        state = self._controller.state()
-        return {
-            name.removeprefix(prefix): a for name, a in state.items() if name.startswith(prefix)
-        }
+    def _state_of(self, part: str) -> Arrays:
+        """Return the arrays of a part, such as ``"agent"``, by their names in it."""
+        arrays, prefix = self.state().items(), f"{part}."
+        return {name.removeprefix(prefix): a for name, a in arrays if name.startswith(prefix)}
 
     def _restore(self, **parts: Mapping[str, NDArray[Any]]) -> None:
         """Replace parts of the state; ValueError if they do not fit, and nothing changes."""

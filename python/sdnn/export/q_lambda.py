@@ -91,7 +91,7 @@ class QLambdaWriter(Writer):
     def header(self) -> CHeader:
         """Make the header."""
         tables, code, n_weights = self.tables(), self.code(), self.n_weights()
-        state = self.agent.state("agent")
+        state = self.agent._state_of("agent")
         weights = state["action_value.weights"]
         if np.any(state.get("action_value.n_snapshots", 0)):
             weights = state["action_value.averaged_weights"]
@@ -227,7 +227,7 @@ class QLambdaLearner(Learner, QLambdaWriter):
     def _rates(self, macro: str, name: str) -> dict[str, int]:
         """Return alpha or epsilon at the beginning and at the end of the schedule."""
         learning = self.agent.learning
-        if learning.schedule_steps == 0 or name in self.agent.state("agent"):
+        if learning.schedule_steps == 0 or name in self.agent._state_of("agent"):
             first = last = getattr(self.agent, name)
         else:
             first, last = getattr(learning, name), learning.final_learning_rate

@@ -321,8 +321,9 @@ class Learner(Writer):
 
     def state(self) -> dict[str, Any]:
         """Return the core's state, and the scale of rewards, with all of its numbers."""
-        scale = {"size": NONE, "size_in_window": NONE, **self.agent.state("reward_scale")}
-        return {**self.agent.state("agent"), **{f"{SCALE}.{name}": n for name, n in scale.items()}}
+        scale = {"size": NONE, "size_in_window": NONE, **self.agent._state_of("reward_scale")}
+        state = self.agent._state_of("agent")
+        return state | {f"{SCALE}.{name}": number for name, number in scale.items()}
 
     def image(self) -> bytes:
         """Return the state as the header's bytes."""
@@ -336,7 +337,7 @@ class Learner(Writer):
 
     def restore(self, whole: bytes) -> None:
         """Give the agent the state of an image, whole and of this agent."""
-        (image,), state = np.frombuffer(whole, self.layout(), 1), self.agent.state("agent")
+        (image,), state = np.frombuffer(whole, self.layout(), 1), self.agent._state_of("agent")
         for stream, words in zip(self.streams, image["words"], strict=True):
             state[f"{stream}.words"] = words.copy()
         state.pop("n_random_left", None)

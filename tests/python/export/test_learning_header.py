@@ -149,7 +149,7 @@ def test_the_largest_weights_stay_in_range(target, tmp_path):
         tie_rule="lowest",
     )
     agent = SDNNQLambda(gym.spaces.Discrete(9), gym.spaces.Discrete(4), learning=learning)
-    state = agent.state("agent")
+    state = agent._state_of("agent")
     state["action_value.weights"][:] = 2**23 - 1
     state["action_value.exponent"] = np.array(-10, np.int32)
     agent._restore(agent=state)
@@ -163,7 +163,7 @@ def test_the_largest_weights_stay_in_range(target, tmp_path):
     came, image = lived(command, save_image(agent), lines, 1)
     assert came == live(agent, lines, header.fraction_bits)
     assert image == save_image(agent)
-    assert agent.state("agent")["action_value.weights"].max() == 2**22
+    assert agent._state_of("agent")["action_value.weights"].max() == 2**22
     load_image(agent, image)
 
 
@@ -250,7 +250,7 @@ def test_an_image_of_impossible_numbers_changes_nothing():
         forged[number] = b"\xff" * len(forged[number])
         forged[-4:] = zlib.crc32(forged[:-4]).to_bytes(4, "little")
         refuses("image", load_image, agent, bytes(forged))
-    states = agent.state("agent"), same.state("agent")
+    states = agent._state_of("agent"), same._state_of("agent")
     assert all(np.array_equal(states[0][name], states[1][name]) for name in states[1])
     # Another life in between leaves nothing behind.
     new = discrete()
