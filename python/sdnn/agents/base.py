@@ -22,6 +22,7 @@ from sdnn.environments.matching import (
     require_unbatched,
     spaces_of,
 )
+from sdnn.environments.space_data import space_data, space_of
 from sdnn.environments.spaces import (
     Actions,
     AnglePairs,
@@ -31,8 +32,6 @@ from sdnn.environments.spaces import (
     Ranges,
     action_space_of,
     observation_space_of,
-    space_data,
-    space_of,
     space_of_error,
 )
 from sdnn.support.arguments import (
@@ -100,7 +99,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         self._take_spaces(observations, actions)
         require_unbatched(observations, actions)
         try:
-            space_data(observations)  # what could not be saved had better not be learned
+            space_data(observations)  # refuse spaces that cannot be saved
         except TypeError as error:
             raise TypeError(f"observation_space {error}") from None
         self._take_settings(

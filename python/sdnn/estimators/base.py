@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from collections.abc import Sequence
 from numbers import Real
 from typing import Any, TypeVar
 
@@ -16,7 +15,6 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 
 from sdnn import _core
-from sdnn.coding import Coding
 from sdnn.estimators.columns import (
     Array,
     Floats,
@@ -32,8 +30,8 @@ from sdnn.estimators.network import (
     FEW_SAMPLES,
     Network,
     Rule,
-    code_bytes,
     draw_input_code,
+    require_memory,
     units_for_pairs,
 )
 from sdnn.estimators.outliers import warn_caller
@@ -42,18 +40,16 @@ from sdnn.estimators.parameters import SHARE, RandomState, parameter, wholes, wo
 from sdnn.estimators.training import (
     LARGE_SAMPLE,
     History,
+    Rows,
     Trainer,
     averaged_every,
+    held_out,
+    most_epochs,
     presented,
     run_epochs,
     sample_weights,
     without_absent,
 )
-
-Rows = NDArray[np.int64]
-MOST_EPOCHS = 30  # by default
-FEWEST_EPOCHS = 5
-MOST_PRESENTATIONS = 80_000  # samples presented in all epochs by default
 
 Self = TypeVar("Self", bound="BaseSDNN")
 
@@ -235,7 +231,8 @@ class BaseSDNN(Fitted, CodedInputs):
             random = self._begin(X, table, observed, pairs, self._n_networks(len(table)))
         targets = self._targets(observed, at_once=True)
         bins = self.network_.input_code.bins(table)
-        held, kept = self._split(random, len(table))
+        share = self.validation_fraction if self.early_stopping else 0.0
+        held, kept = held_out(share, random, len(table))
         held_bins, held_targets = bins[held], targets[held]
         held_weights = None if weights is None else weights[held]
 
@@ -261,7 +258,7 @@ class BaseSDNN(Fitted, CodedInputs):
 
         is_refitted = self.refit and self.early_stopping
         n_averaged = 1 if is_refitted else self.n_averaged_epochs
-        trainer, history = train(kept, self._most_epochs(len(table)), n_averaged)
+        trainer, history = train(kept, most_epochs(self.max_iter, len(table)), n_averaged)
         self.n_iter_ = len(history.n_corrected)
         self.n_corrected_ = np.array(history.n_corrected, dtype=np.int64)
         self.validation_scores_ = np.array(history.scores)
@@ -342,7 +339,8 @@ class BaseSDNN(Fitted, CodedInputs):
         if n_pattern_units % 2:
             raise ValueError(f"n_pattern_units must be even, got {n_pattern_units}")
         fitted = self._fit_codings(codings, table, n_pattern_units)
-        self._require_memory(n_units, n_networks, n_pattern_units, fitted, pairs)
+        limit = self.memory_limit
+        require_memory(limit, n_units, n_networks, n_pattern_units, fitted, pairs)
         code = draw_input_code(fitted, pairs, n_pattern_units, self.tables, code_seed)
         self.network_ = Network(code, n_units, seed=weight_seed)
         self._weight_seed = weight_seed
@@ -357,9 +355,8 @@ class BaseSDNN(Fitted, CodedInputs):
         network = self.network_
         n_networks, code = self._n_networks(len(table)), network.input_code
         if n_networks > 1:
-            self._require_memory(
-                network.n_units, n_networks, code.n_units, code.codings, code.pairs
-            )
+            limit, n_units = self.memory_limit, network.n_units
+            require_memory(limit, n_units, n_networks, code.n_units, code.codings, code.pairs)
         self._note_inputs(self._finite(table, self.codings_))
         self.network_ = network.copy()
         random: np.random.RandomState = check_random_state(self.random_state)
@@ -379,49 +376,12 @@ class BaseSDNN(Fitted, CodedInputs):
             model.set_params(coding=[(coding, [index]) for index, coding in enumerate(complete)])
         return select_pairs(model, X, y, weights, table.shape[1], seed)
 
-    def _most_epochs(self, n_samples: int) -> int:
-        """Return the largest number of epochs of `fit`."""
-        if self.max_iter is not None:
-            return self.max_iter
-        return min(MOST_EPOCHS, max(FEWEST_EPOCHS, MOST_PRESENTATIONS // n_samples))
-
     def _n_networks(self, n_samples: int) -> int:
         """Return the most networks that `fit` keeps, averaged ones included."""
-        n_kept = (self._most_epochs(n_samples) - 1) // averaged_every(n_samples)
+        n_kept = (most_epochs(self.max_iter, n_samples) - 1) // averaged_every(n_samples)
         n_earlier = min(self.n_averaged_epochs - 1, n_kept)
         has_best = self.early_stopping and not self.refit
         return 1 + (2 if has_best else 1) * n_earlier  # the best ones beside the last ones
-
-    def _require_memory(
-        self,
-        n_units: int,
-        n_networks: int,
-        n_pattern_units: int,
-        codings: Sequence[Coding],
-        pairs: Sequence[tuple[int, int]],
-    ) -> None:
-        """Raise ValueError if weights and patterns exceed the limit."""
-        n_bytes = 4 * n_networks * n_units * len(pairs) * n_pattern_units
-        n_bytes += code_bytes(codings, pairs, n_pattern_units)
-        if n_bytes > self.memory_limit:
-            averaged = ""
-            if n_networks > 1:
-                averaged = f" in {n_networks} networks, as n_averaged_epochs has it"
-            raise ValueError(
-                f"n_pattern_units={n_pattern_units} of {len(pairs)} pairs, read by {n_units} "
-                f"units{averaged}, need {n_bytes} bytes for weights and patterns, more than "
-                f"memory_limit={self.memory_limit}"
-            )
-
-    def _split(self, random: np.random.RandomState, n_samples: int) -> tuple[Rows, Rows]:
-        """Return the indices of the held-out samples and of the others."""
-        if not self.early_stopping:
-            return np.empty(0, dtype=np.int64), np.arange(n_samples)
-        n_held = max(1, round(self.validation_fraction * n_samples))
-        if n_held >= n_samples:
-            raise ValueError(f"n_samples={n_samples} is too few for early stopping")
-        order = random.permutation(n_samples)
-        return np.sort(order[:n_held]), np.sort(order[n_held:])
 
     def _n_threads(self) -> int:
         return int(effective_n_jobs(self.n_jobs))
@@ -487,5 +447,4 @@ class BaseSDNN(Fitted, CodedInputs):
 
     def transform_code(self, X: ArrayLike) -> NDArray[np.int8]:
         """Return the code of samples: +1, 0, -1, shape (n_samples, n_pairs * n_pattern_units)."""
-        bins = self._bins(X)
-        return self.network_.input_code.core.transform(bins)
+        return self.network_.input_code.core.transform(self._bins(X))

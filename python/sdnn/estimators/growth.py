@@ -11,7 +11,7 @@ from sdnn import _core
 from sdnn.coding import Coding
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.columns import PAIR_BUDGET, Pairs
-from sdnn.estimators.network import InputCode, Network
+from sdnn.estimators.network import InputCode, Network, require_memory
 
 Table = NDArray[np.int8]
 
@@ -60,7 +60,7 @@ def grow(
         return False
     codings = [changed.get(index, coding) for index, coding in enumerate(before.codings)]
     codings += new.values()
-    model._require_memory(network.n_units, 1, n_units, codings, pairs)
+    require_memory(model.memory_limit, network.n_units, 1, n_units, codings, pairs)
     tables: dict[int, Table] = {}  # by identity: pairs share them
 
     def lengthened(table: Table, index: int) -> Table:

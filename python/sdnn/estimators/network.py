@@ -293,3 +293,23 @@ class Network:
             counts: Ints = firing.reshape(len(bins), n_groups, -1).sum(axis=2, dtype=np.int32)
             return counts
         return self.layer.counts(bins, n_groups=n_groups, n_threads=n_threads)
+
+
+def require_memory(
+    memory_limit: int,
+    n_units: int,
+    n_networks: int,
+    n_pattern_units: int,
+    codings: Sequence[Coding],
+    pairs: Sequence[tuple[int, int]],
+) -> None:
+    """Raise ValueError if weights and patterns of networks exceed the limit, in bytes."""
+    n_bytes = 4 * n_networks * n_units * len(pairs) * n_pattern_units
+    n_bytes += code_bytes(codings, pairs, n_pattern_units)
+    if n_bytes > memory_limit:
+        averaged = f" in {n_networks} networks, as n_averaged_epochs has it" * (n_networks > 1)
+        raise ValueError(
+            f"n_pattern_units={n_pattern_units} of {len(pairs)} pairs, read by {n_units} "
+            f"units{averaged}, need {n_bytes} bytes for weights and patterns, more than "
+            f"memory_limit={memory_limit}"
+        )

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from sklearn.utils import _safe_indexing
 from sklearn.utils.class_weight import compute_sample_weight
 from sklearn.utils.validation import _num_samples
@@ -27,6 +27,12 @@ MOST_PRESENTED = 2**28  # samples in an epoch: their indices take a GiB
 
 ClassWeight = str | Mapping[Any, float] | None
 Trainer = _core.PDeltaTrainer | _core.PerceptronTrainer
+
+
+Rows = NDArray[np.int64]
+MOST_EPOCHS = 30  # by default
+FEWEST_EPOCHS = 5
+MOST_PRESENTATIONS = 80_000  # samples presented in all epochs by default
 
 
 @dataclasses.dataclass
@@ -149,6 +155,24 @@ def epochs_to_present_all(weights: Floats | None) -> int:
         return 1
     least = float(np.min(weights, where=weights > 0, initial=1.0))
     return int(min(np.ceil(1 / least), 2**62))
+
+
+def most_epochs(max_iter: int | None, n_samples: int) -> int:
+    """Return the largest number of epochs of a fit."""
+    if max_iter is not None:
+        return max_iter
+    return min(MOST_EPOCHS, max(FEWEST_EPOCHS, MOST_PRESENTATIONS // n_samples))
+
+
+def held_out(share: float, random: np.random.RandomState, n_samples: int) -> tuple[Rows, Rows]:
+    """Return the rows of a share of the samples, drawn, and the others; ValueError if too few."""
+    if share == 0.0:
+        return np.empty(0, dtype=np.int64), np.arange(n_samples)
+    n_held = max(1, round(share * n_samples))
+    if n_held >= n_samples:
+        raise ValueError(f"n_samples={n_samples} is too few for early stopping")
+    order = random.permutation(n_samples)
+    return np.sort(order[:n_held]), np.sort(order[n_held:])
 
 
 def averaged_every(n_samples: int) -> int:

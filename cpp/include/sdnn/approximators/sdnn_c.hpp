@@ -50,13 +50,12 @@ struct CorrectionCounts {
 ///
 /// Wiring (code books, permutations) is fixed by config and seed and shared by copies. Each user
 /// reads the network through a separate Workspace, which caches the potentials of recent states and
-/// keeps them exact while the network learns (see ActivationCache), so that one decision needs at
-/// most one pass over the weights. A workspace affects the time of a call, but not its result.
+/// keeps them exact while the network learns (see ActivationCache), so that a decision needs at
+/// most one pass over the weights. It affects the time of a call, but not its result. Many threads
+/// may call const functions at once, with a workspace each.
 ///
 /// With averaging_interval > 0 it also keeps an average of its weights (see WeightAverage), used by
 /// averaged_values. Learning uses the weights themselves. The average is not in the paper.
-///
-/// Thread safety: const functions may be called by many threads at once, with a workspace each.
 class SDNNC {
  public:
   /// The workspace of a user who reads or trains a network: the potentials of recent states, and
