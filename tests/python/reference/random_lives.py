@@ -205,7 +205,9 @@ ENTRIES = {
     "act": lambda agent, x, y, env: agent.act(x),
     "greedy act": lambda agent, x, y, env: agent.act(x, explore=False),
     "predict": lambda agent, x, y, env: agent.predict(x),
-    "values": lambda agent, x, y, env: getattr(agent, "q_values", agent._state)(x),
+    "values": lambda agent, x, y, env: (
+        agent.q_values if hasattr(agent, "q_values") else agent.value
+    )(x),
     "learn": lambda agent, x, y, env: agent.learn(Transition(x, agent.act(x), 1.0, y, False)),
     "learn next": lambda agent, x, y, env: agent.learn(Transition(y, agent.act(y), 1.0, x, False)),
     "evaluate": lambda agent, x, y, env: evaluate(agent, env, 1),
