@@ -4,7 +4,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from refusals import refuses
 from sdnn.agents import FuzzyQLearning, QLearningConfig, SDNNQLearning, Transition
 from sdnn.approximators import SDNNCConfig
 from sdnn.environments.spaces import Actions
@@ -118,19 +117,3 @@ def test_many_actions_are_told_apart():
     )
     assert np.allclose(agent.actions, np.linspace(-1, 1, 3001))
     assert len(set(agent.actions.tolist())) == 3001
-
-
-@pytest.mark.parametrize(
-    ("space", "error"),
-    [
-        (gym.spaces.Text(3), TypeError),
-        (gym.spaces.Box(0, np.inf, (1,)), ValueError),
-        (gym.spaces.Box(0, 2**60, (1,), np.int64), ValueError),
-        (gym.spaces.Box(0, 1, (0,)), ValueError),
-        (gym.spaces.Box(0, 1, (1025,)), ValueError),
-        (gym.spaces.Discrete(2**20 + 1), ValueError),
-        (gym.spaces.Discrete(2, start=2**60), ValueError),
-    ],
-)
-def test_impossible_spaces_are_named(space, error):
-    refuses("action_space", agent_of, space, error=error)

@@ -99,16 +99,6 @@ def test_rates_that_are_set_stay_and_are_saved(space, tmp_path):
         assert (one.learning_rate, one.epsilon) == (0.05, 0.02)
 
 
-@pytest.mark.parametrize("space", [PLANE, UNBOUNDED], ids=["born", "warming up"])
-def test_impossible_rates_are_named(space):
-    agent = new_agent(space, **FALLING)
-    for bad in (-0.1, 1.1, np.nan, np.inf, "much", [0.1]):
-        refuses("learning_rate", setattr, agent, "learning_rate", bad)
-        refuses("epsilon", setattr, agent, "epsilon", bad)
-    refuses("learning_rate", setattr, agent, "learning_rate", 0)
-    assert (agent.learning_rate, agent.epsilon) == (0.8, 0.5)
-
-
 class Anneal(Callback):
     """The spelling of users: from the last value to the next."""
 

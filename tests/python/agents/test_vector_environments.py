@@ -445,23 +445,6 @@ def test_new_episodes_begin_in_any_number_of_environments(tmp_path):
         assert training.agent.n_environments == training.n_environments
 
 
-@pytest.mark.parametrize("agent", [sdnn_agent(), fuzzy_agent(), sdnn_agent(Unbounded())])
-def test_impossible_environments_are_named(agent):
-    agent.n_environments = 2
-    seen = np.zeros(2)
-    action = agent.act(seen)
-    before = agent.state()
-    for bad in (2, -1, 1.5, "first", 2**70):
-        refuses("environment", agent.act, seen, environment=bad)
-        refuses("environment", agent.begin_episode, bad)
-        refuses("environment", agent.learn, Transition(seen, action, 0.0, seen, False), bad)
-    for bad in (0, -1, 1.5, None, 2**14 + 1):
-        refuses("n_environments", setattr, agent, "n_environments", bad)
-    assert agent.n_environments == 2
-    after = agent.state()
-    assert all(np.array_equal(before[name], after[name]) for name in before)
-
-
 def test_a_callback_with_an_interval_is_called_after_its_multiples_only():
     class Rare(Callback):
         step_interval = 7

@@ -37,7 +37,6 @@ SMALL = (
 )  # fmt: skip
 SHORT = ("--steps", 150, "--evaluate-every", 70, "--evaluation-episodes", 2, *SMALL)
 DRIFTING = "drifting_env:tests/Drifting-v0"
-AGENT_FILES = ("agent.safetensors", "checkpoint.safetensors")
 
 
 @pytest.fixture
