@@ -176,7 +176,7 @@ def test_all_is_the_default_and_reuses_what_is_stored(invoke, tmp_path, no_costs
     assert len(no_costs) == 3 * 7 + 4
 
 
-def test_report_covers_what_is_stored_not_only_what_was_asked(invoke, tmp_path, no_costs):
+def test_report_covers_all_stored_trials(invoke, tmp_path, no_costs):
     invoke("reproduce", "b", "--quick")
     table = json.loads(invoke("reproduce", "cost", "--quick", "--json").stdout)
     assert [experiment["id"] for experiment in table["experiments"]] == ["b"]
@@ -433,7 +433,7 @@ def test_failing_trials_are_exit_code_1(invoke, tmp_path, fake):
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_command_that_a_signal_ends_has_its_exit_code_and_goes_on(invoke, fake, number, code):
+def test_a_signal_gives_its_exit_code_and_the_command_resumes(invoke, fake, number, code):
     class Interrupting(fake.FakeTrial):
         """Interrupts the run when it starts, and never ends by itself."""
 

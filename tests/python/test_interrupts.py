@@ -75,7 +75,7 @@ class Count(Callback):
 
 
 @pytest.mark.parametrize(("times", "saved_at"), [(1, 47), (2, 30)])
-def test_an_interrupted_training_goes_on_exactly(tmp_path, times, saved_at):
+def test_an_interrupted_training_resumes_exactly(tmp_path, times, saved_at):
     def make(env, name):
         agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)
         return Training(agent, env, steps=120, seed=2, callbacks=callbacks(name))

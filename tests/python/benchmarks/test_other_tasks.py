@@ -173,7 +173,7 @@ def fail_in_store(measured, folder):
         raise RuntimeError
 
 
-def test_what_fails_ends_nothing_else_and_leaves_the_packed_store(scripts, tmp_path, capsys):
+def test_a_failed_trial_stops_no_other_and_keeps_the_packed_store(scripts, tmp_path, capsys):
     measured = scripts.measured
     keys = [("a", 1), ("a b", 2)]
     measured.measure_missing("squares", squared, [*keys, ("bad", -1)], given(tmp_path))
@@ -219,7 +219,7 @@ def test_tables_go_between_their_marks(scripts):
     assert page.with_tables(text, {"here": table}) == expected
 
 
-def test_what_was_never_reached_is_written_so(scripts):
+def test_an_unreached_target_is_written_as_never(scripts):
     estimate = Estimate(1234.5, 1.0, np.inf)
     assert scripts.page.interval(estimate, 1) == "1,234.5 [1.0, never]"
 

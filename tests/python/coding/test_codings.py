@@ -192,7 +192,7 @@ def test_numbers_are_checked():
 @pytest.mark.parametrize(
     "coding", [RandomInverse(), RandomInverse(spacing="quantile"), Anchor(), WithMissing()]
 )
-def test_what_was_learned_is_not_learned_again(coding, column):
+def test_a_fitted_coding_is_unchanged_by_fit(coding, column):
     learned = coding.fit(column, 400)
     assert not learned.learns
     assert learned.fit(np.array(learned.ends()), 400) == learned
@@ -229,7 +229,7 @@ def test_knots_are_values_and_their_mean_ranks():
     assert (levels[0], levels[-1]) == (0, 1)
 
 
-def test_what_is_missing_has_the_last_bin():
+def test_missing_values_have_the_last_bin():
     numbers = np.array([4.0, None, 0.0, np.nan, pd.NA], dtype=object)
     coding = WithMissing(base=Anchor(n_anchor_patterns=3, n_interpolated=1)).fit(numbers, 8)
     assert (coding.base.low, coding.base.high, coding.size) == (0.0, 4.0, 5)
@@ -254,7 +254,7 @@ def test_what_is_missing_has_the_last_bin():
         (WithMissing(), np.array(["a", None], dtype=object), "convert"),
     ],
 )
-def test_what_cannot_be_coded_with_missing_values(coding, column, message):
+def test_errors_of_codings_with_missing_values(coding, column, message):
     refuses(message, coding.fit, column, 8)
 
 

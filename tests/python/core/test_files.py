@@ -48,7 +48,7 @@ def saved(tmp_path_factory):
     return {kind: ((folder / kind).read_bytes(), read[kind]) for kind in KINDS}
 
 
-def test_what_is_read_is_what_was_written(tmp_path):
+def test_a_file_is_read_as_written(tmp_path):
     path = tmp_path / "file"
     write_file(path, "agent", ARRAYS, DESCRIPTION)
     description, arrays = read_file(path, "training", "agent")
@@ -132,7 +132,7 @@ def test_files_of_other_programs_and_versions_are_refused(tmp_path):
         (b"[1,2]", b"[1,3]"),
     ],
 )
-def test_what_is_wrong_under_the_right_checksum_is_damage_too(part, other, tmp_path):
+def test_invalid_content_with_a_valid_checksum_is_damage(part, other, tmp_path):
     path = tmp_path / "crafted"
     write_file(path, "agent", ARRAYS, {})
     content = path.read_bytes()

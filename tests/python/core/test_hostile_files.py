@@ -67,7 +67,7 @@ def content_of(folder, **options):
         )
 
 
-def test_no_flipped_bit_changes_what_a_store_gives(tmp_path):
+def test_no_flipped_bit_changes_the_rows_of_a_store(tmp_path):
     path = make_store(tmp_path)
     content, expected = path.read_bytes(), content_of(tmp_path)
     rng = np.random.default_rng(5)

@@ -12,7 +12,7 @@ def test_the_processor_has_the_name_that_the_system_gives(tmp_path, monkeypatch)
     assert machine.description() == f"Fast One @ 1 GHz, {machine.instruction_set()}"
 
 
-def test_a_system_that_tells_nothing(tmp_path, monkeypatch):
+def test_a_processor_without_a_name_is_unknown(tmp_path, monkeypatch):
     monkeypatch.setattr(machine, "_PROCESSOR_FILE", tmp_path / "none")
     monkeypatch.setattr(platform, "processor", lambda: "")
     assert machine.processor() == "unknown"

@@ -193,7 +193,7 @@ else:
     assert seconds < 3.0  # the machine may be busy
 
 
-def test_a_trial_goes_on_after_ctrl_c_between_episodes():
+def test_a_trial_continues_after_ctrl_c_between_episodes():
     trial = big_trial()
     timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
     timer.start()

@@ -48,7 +48,7 @@ def test_a_file_that_cannot_be_written_stays_as_it_was(tmp_path):
         write_whole(tmp_path / "no" / "folder", b"")
 
 
-def test_only_what_a_killed_process_left_is_removed(tmp_path):
+def test_only_files_of_killed_processes_are_removed(tmp_path):
     write_whole(tmp_path / "rows.csv", b"old")
     foreign = tmp_path / f"notes{PARTIAL_SUFFIX}"  # whose name we never gave
     foreign.write_bytes(b"mine")
@@ -145,7 +145,7 @@ def test_two_writers_of_one_file_leave_one_of_their_files(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
 
-def test_csv_quotes_what_needs_it():
+def test_csv_quotes_special_characters():
     assert csv_bytes(("a", "b"), [(1, "x, y"), (2.5, "µ")]) == 'a,b\n1,"x, y"\n2.5,µ\n'.encode()
 
 

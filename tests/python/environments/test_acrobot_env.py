@@ -67,7 +67,7 @@ def test_importing_the_environments_makes_them_known(imports, prefix):
     assert done.returncode == 0, done.stderr
 
 
-def test_sdnn_without_gymnasium_says_so():
+def test_a_missing_gymnasium_is_named():
     code = "import sys, sdnn; sys.modules['gymnasium'] = None; sdnn.environments"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert "gymnasium" in done.stderr.splitlines()[-1]
@@ -183,7 +183,7 @@ def test_bad_arguments():
     refuses("integration_step", AcrobotSwingUpEnv, config=AcrobotConfig(integration_step=0.03))
 
 
-def test_renders_what_happens():
+def test_frames_show_the_state():
     env = AcrobotSwingUpEnv(render_mode="rgb_array")
     env.reset()
     hanging = env.render()

@@ -165,7 +165,7 @@ def test_a_goal_tolerance_that_is_set_holds_from_each_ones_next_episode_on():
     assert envs.reset()[1]["goal_tolerance"].tolist() == [0.1, 0.2]
 
 
-def test_what_it_returns_is_the_callers():
+def test_returned_arrays_belong_to_the_caller():
     envs = AcrobotSwingUpVectorEnv(2)
     first = envs.reset()
     kept = [first[0].copy(), first[1]["state"].copy(), first[1]["goal_tolerance"].copy()]

@@ -103,7 +103,7 @@ def test_classification(problem, scheme):
 
 
 @pytest.mark.parametrize("regression", [True, False])
-def test_fit_presents_the_orders_it_says(regression):
+def test_fit_draws_seeds_and_then_a_permutation_per_epoch(regression):
     """A whole fit: seeds of code and weights first, then one permutation per epoch."""
     random = np.random.RandomState(5)
     X = random.uniform(size=(30, 2))

@@ -90,21 +90,21 @@ def test_settings_may_be_of_numpy_and_pandas(model, tmp_path):
     np.testing.assert_array_equal(again[0].weights_, again[1].weights_)
 
 
-def test_what_a_search_has_found_can_be_saved(tmp_path):
+def test_the_best_estimator_of_a_search_can_be_saved(tmp_path):
     grid = {"coding__n_bins": np.arange(20, 50, 10), "coding__length_scale": NUMPY[1:2]}
     found = GridSearchCV(SDNNRegressor(**SMALL), grid, cv=2).fit(X, Y).best_estimator_
     found.save(tmp_path / "model.safetensors")
     assert SDNNRegressor.load(tmp_path / "model.safetensors").coding == found.coding
 
 
-def test_what_has_no_values_cannot_be_saved(tmp_path):
+def test_columns_chosen_by_functions_or_iterators_cannot_be_saved(tmp_path):
     for columns in (lambda _: [0], iter([0]), b"a"):
         model = SDNNRegressor(**SMALL).fit(X, Y).set_params(coding=[("anchor", columns)])
         refuses("parameter", model.save, tmp_path / "model.safetensors", error=TypeError)
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_what_is_loaded_is_what_was_saved(name, tmp_path):
+def test_a_loaded_estimator_equals_the_saved_estimator(name, tmp_path):
     model, samples, targets = MODELS[name]
     model.fit(samples, targets)
     path = tmp_path / "model.safetensors"
@@ -180,7 +180,7 @@ def test_a_file_that_cannot_be_written_is_named_and_the_old_one_stays(tmp_path, 
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 
-def test_what_cannot_be_written_as_data_is_refused(tmp_path):
+def test_custom_codings_and_functions_cannot_be_saved(tmp_path):
     class Own(RandomInverse):
         """A coding of one's own."""
 

@@ -182,7 +182,7 @@ def test_shared_tables_are_permuted_and_separate_ones_are_fresh():
     assert len({table.tobytes() for table in tables}) == 12
 
 
-def test_values_beyond_the_range_count_as_its_ends():
+def test_values_outside_the_range_are_clipped():
     x = np.random.RandomState(0).uniform(size=(80, 2))
     model = SDNNRegressor(Anchor(low=0.0, high=1.0), max_iter=3, **SMALL).fit(x, x.sum(axis=1))
     np.testing.assert_array_equal(model.predict([[-5, 1e300]]), model.predict([[0, 1]]))

@@ -88,7 +88,7 @@ def test_epochs_are_passes_of_partial_fit():
     ("kind", "options", "targets"),
     [(SDNNRegressor, REGRESSOR, Y), (SDNNClassifier, {**GIVEN, "n_units_per_class": 8}, LABELS)],
 )
-def test_a_warm_start_goes_on_where_fit_ended(kind, options, targets):
+def test_a_warm_start_continues_where_fit_ended(kind, options, targets):
     model = kind(**options, shuffle=False, warm_start=True, max_iter=2).fit(X, targets)
     first, weights = model.network_, model.weights_
     assert model.set_params(max_iter=3).fit(X, targets).n_iter_ == 3
@@ -100,7 +100,7 @@ def test_a_warm_start_goes_on_where_fit_ended(kind, options, targets):
     np.testing.assert_array_equal(model.weights_, now)
 
 
-def test_a_warm_start_keeps_what_the_network_was_made_for():
+def test_a_warm_start_keeps_features_outputs_and_classes():
     model = SDNNRegressor(**REGRESSOR, warm_start=True).fit(X, Y)
     refuses("features", model.fit, X[:, :1], Y)
     refuses("outputs", model.fit, X, np.column_stack([Y, Y]))
@@ -115,7 +115,7 @@ def test_several_labels_a_sample_are_learned_by_a_classifier_each():
     assert (model.predict(X) == both).mean() > 0.95
 
 
-def test_partial_fit_goes_on_after_fit():
+def test_partial_fit_continues_after_fit():
     model = SDNNClassifier(**GIVEN, max_iter=2, shuffle=False).fit(X, LABELS)
     same(
         model.partial_fit(X, LABELS),
@@ -326,7 +326,7 @@ def test_weights_of_samples_and_classes_are_multiplied():
     same(both, SDNNClassifier(**options).fit(X, labels, np.where(labels == 0, 1.0, 0.5)))
 
 
-def test_weights_of_samples_count_in_what_is_held_out_refitted_and_selected():
+def test_sample_weights_count_in_validation_refitting_and_selection():
     weights = np.where(X[:, 0] > 0.5, 1.0, 1e-3)
     wrong = np.where(X[:, 0] > 0.5, Y, 5.0)
     options = {**GIVEN, "early_stopping": True, "max_iter": 20, "n_iter_no_change": 20}

@@ -198,7 +198,7 @@ def test_bad_rows_are_named(bad):
     refuses("x", model.predict_one, bad)
 
 
-def test_values_beyond_a_range_are_counted_and_said_once():
+def test_values_outside_a_range_are_counted_and_warned_about_once():
     model = regressor().fit(X, Y)
     with pytest.warns(OutOfRangeWarning, match="column 2"):
         model.learn_one(X[0] + np.array([0, 0, 9, 0]), 0.0)
@@ -234,7 +234,7 @@ def test_a_range_that_widens_follows_a_drift():
     assert widening.score(X, Y + 10) > 0.9
 
 
-def test_fit_counts_and_says_what_widens_a_range():
+def test_fit_counts_and_warns_about_values_that_widen_a_range():
     targets = np.stack([9 * Y, Y], axis=1)
     beyond = int(np.count_nonzero(abs(targets) > 1.5))
     model = regressor(out_of_range="widen")
@@ -469,7 +469,7 @@ def test_probabilities_of_one_have_the_bits_of_those_of_many(n_classes):
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_river_measures_and_wraps_what_has_probabilities():
+def test_river_measures_and_wraps_classifiers_with_probabilities():
     pytest.importorskip("river")
     from river import ensemble, evaluate, metrics, multiclass
 

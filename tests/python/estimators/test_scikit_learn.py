@@ -195,7 +195,7 @@ def test_a_network_that_no_memory_holds_is_refused_with_its_size(monkeypatch):
     refuses("430080", SDNNRegressor(**SMALL).fit, X, Y, error=MemoryError)
 
 
-def test_too_little_memory_for_a_form_is_said(estimator):
+def test_too_little_memory_for_a_training_form_is_an_error(estimator):
     refuses(
         "memory_limit",
         estimator.set_params(training="dual", memory_limit=1000).fit,
@@ -279,7 +279,7 @@ def test_progress_is_shown_when_asked_for(estimator, capsys):
     assert capsys.readouterr().out == ""
 
 
-def test_the_rooms_name_what_they_hold():
+def test_the_package_lists_its_public_names():
     assert set(sdnn.estimators.__all__) <= set(dir(sdnn.estimators))
     for name in sdnn.estimators.__all__:
         assert getattr(sdnn.estimators, name) is not None

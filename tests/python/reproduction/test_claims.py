@@ -91,7 +91,7 @@ def test_a_range_has_two_ends():
         (("not judged", "not judged"), "not judged"),
     ],
 )
-def test_a_claim_is_as_good_as_its_checks(parts, whole):
+def test_the_verdict_of_a_claim_follows_from_its_checks(parts, whole):
     check = CLAIMS[0].checks[0]
     outcomes = tuple(CheckOutcome(check, None, Verdict(part)) for part in parts)
     assert ClaimOutcome(Claim(1, "", ()), outcomes).verdict == Verdict(whole)

@@ -65,7 +65,7 @@ def test_keys_are_all_series_in_ascending_inputs():
     assert asdict(QUICK_COST)["n_inputs"] == asdict(CostConfig())["n_inputs"]
 
 
-def test_what_is_stored_is_not_measured_again(tmp_path, measured):
+def test_stored_measurements_are_not_repeated(tmp_path, measured):
     class KilledError(Exception):
         pass
 
@@ -149,7 +149,7 @@ def test_real_agents_are_measured(series):
     assert table_bytes == sizes[series.agent]
 
 
-def test_what_there_is_no_memory_for_is_left_out():
+def test_agents_that_exceed_the_memory_are_omitted():
     def refuse(*_arguments, **_options):
         raise MemoryError
 

@@ -79,7 +79,7 @@ def test_only_the_planned_trials_are_drawn(results):
     assert [result.n_trials for result in results] == [3, 3]
 
 
-def test_figure_says_what_it_is(results):
+def test_a_figure_names_its_trials_and_settings(results):
     text = all_text(draw_experiment(EXPERIMENT, results))
     assert "3 trials x 3,000 episodes instead of 10 x 15,000" in text
     assert "quick" not in text.lower()
@@ -97,7 +97,7 @@ def test_figures_are_repeatable_to_the_byte(results):
     assert (png, svg) == figure_bytes(draw_experiment(EXPERIMENT, results))
 
 
-def test_missing_matplotlib_is_told_before_any_trial(monkeypatch, tmp_path):
+def test_a_missing_matplotlib_is_an_error_before_any_trial(monkeypatch, tmp_path):
     monkeypatch.setattr("sdnn.runs.report.find_spec", lambda name: None)
     with pytest.raises(PlotUnavailableError, match="pip install matplotlib"):
         run_study(PaperStudy("a", quick=True), tmp_path / "out")
@@ -213,7 +213,7 @@ def test_a_terminal_shows_claims_and_all_tables_on_demand(report):
     assert len(all_lines) > 3 * len(few)
 
 
-def test_json_is_valid_and_marks_what_is_censored(report):
+def test_json_is_valid_and_marks_censored_values(report):
     first = report.results[0]
     never = replace(first, values=first.values | {"episodes_to_learn": np.array([math.inf])})
     table = replace(report, experiments=((EXPERIMENT, (never,)),)).to_json()

@@ -122,7 +122,7 @@ def test_chances_need_trials_of_every_subject():
         ("not run", "holds", 1.0, "not run"),
     ],
 )
-def test_what_settles_a_claim(own, more, share, settled):
+def test_a_claim_is_settled_by_more_trials_or_by_chance(own, more, share, settled):
     def outcome(word, **found):
         checked = CheckOutcome(CLAIMS[0].checks[0], None, Verdict(word))
         return ClaimOutcome(CLAIMS[0], (checked,), **found)
@@ -183,7 +183,7 @@ def fake_results(tmp_path, run, collected):
     return collected(EXPERIMENTS[0], tmp_path, 12)
 
 
-def test_what_is_written_of_trials_is_read_again(monkeypatch, tmp_path, fake_results):
+def test_written_trials_are_read_back(monkeypatch, tmp_path, fake_results):
     content = script.reference_csv(fake_results, 7)
     (tmp_path / "kept.csv").write_bytes(content)
     assert tuple(content.decode().splitlines()[0].split(",")) == HEADER
@@ -211,7 +211,7 @@ def report_of(results, kept=()):
     )  # fmt: skip
 
 
-def test_reports_tell_what_reference_results_say(fake_results):
+def test_reports_show_the_reference_results(fake_results):
     picture = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
     alone = report_of(fake_results)
     assert "With more trials" not in [table.title for table in alone.page(picture).tables]

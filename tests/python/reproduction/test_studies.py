@@ -185,7 +185,7 @@ def test_few_trials_are_never_called_different(study):
         assert not found.differs("mean_return")
 
 
-def test_what_is_not_complete_is_left_out_and_said_so(study):
+def test_incomplete_studies_are_omitted_and_named(study):
     mine = study(TWO)
     records = records_of_two(mine)
     found = compare(mine, records[:-1])
@@ -374,7 +374,7 @@ def test_the_figure_is_the_same_each_time_and_shows_every_trial(mixed):
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["a", "b", "c"]
 
 
-def test_many_cases_go_on_below(study):
+def test_many_cases_wrap_to_the_next_row(study):
     mine = study(OWN + "[study]\ntrials = 1\n" + "".join(f"[cases.c{i}]\n" for i in range(7)))
     records = [record(mine, f"c{i}", "base", 0, steps_of((60, 4))) for i in range(7)]
     figure = draw_study(compare(mine, records), "")

@@ -162,7 +162,7 @@ SCALED_LINES = [
 ]
 
 
-def test_what_a_noisy_or_redundant_run_observes_is_said_where_it_is_used_elsewhere(invoke):
+def test_runs_and_exports_name_the_scaling_of_observations(invoke):
     done = invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one")
     told = done.stdout.splitlines()[-2]
     assert "0 from -4 to 4, 1 from -2 to 3, and means of neighbours (1)" in told
@@ -179,7 +179,7 @@ def test_what_a_noisy_or_redundant_run_observes_is_said_where_it_is_used_elsewhe
     assert told["scaling"] == {"ranges": [[-4.0, 4.0], [-2.0, 3.0]], "redundant": 1}
 
 
-def test_a_copied_agents_file_says_what_its_run_scaled(invoke):
+def test_a_copied_agent_file_names_the_scaling_of_its_run(invoke):
     assert invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one").exit_code == 0
     Path("agent.safetensors").write_bytes(Path("one/agent.safetensors").read_bytes())
     Path("config.json").write_text("of another program")
@@ -195,7 +195,7 @@ def test_a_copied_agents_file_says_what_its_run_scaled(invoke):
         refuses("4", use, agent, gym.make("tests/Drifting-v0"))
 
 
-def test_the_scaling_that_an_agent_tells_is_what_it_needs(invoke):
+def test_the_named_scaling_gives_the_observations_of_the_agent(invoke):
     noisy = ("--noise", 0.01, "--range", "-4:4")
     assert invoke("train", DRIFTING, *SHORT, *noisy, "--out", "one").exit_code == 0
     agent = load_agent("one/agent.safetensors")
@@ -213,7 +213,7 @@ def test_a_run_is_exported_where_its_environment_cannot_be_made(invoke):
     assert SCALED_LINES[0] in invoke("export", "one", "--c-header", "a.h").stdout
 
 
-def test_export_says_what_is_wrong(invoke, tmp_path):
+def test_errors_of_export_name_the_problem(invoke, tmp_path):
     space = gym.spaces.Box(-1.0, 1.0, (2,))
     SDNNQLearning(space, space).save("sdnn.safetensors")
     RBFQLearning(space, gym.spaces.Box(-1.0, 1.0, (1,))).save("rbf.safetensors")
@@ -249,7 +249,7 @@ def test_several_runs_are_drawn_where_one_is(invoke, tmp_path):
     assert {(one["kind"], one["n_runs"], one["run"]) for one in drawn} == {("evaluation", "2", "")}
 
 
-def test_what_a_figure_leaves_out_is_told(invoke, tmp_path):
+def test_plot_names_what_a_figure_omits(invoke, tmp_path):
     for seed in (1, 2):
         short = SHORT if seed == 1 else ("--dry-run", *SHORT)
         values = invoke("train", DRIFTING, *short, "--seed", seed, "--out", f"run{seed}").stdout
@@ -464,7 +464,7 @@ def test_wrong_usage_is_exit_code_2_and_names_the_option(invoke, tmp_path, argum
     assert list(tmp_path.iterdir()) == []
 
 
-def test_tensorboard_that_is_missing_is_told_before_anything_is_written(
+def test_a_missing_tensorboard_is_an_error_before_anything_is_written(
     invoke, tmp_path, monkeypatch
 ):
     monkeypatch.setitem(sys.modules, "tensorboardX", None)
@@ -551,9 +551,7 @@ discount = 0.5
         ),
     ],
 )
-def test_mistakes_in_a_file_are_told_apart_from_those_in_options(
-    invoke, tmp_path, text, arguments, words
-):
+def test_errors_in_a_file_differ_from_errors_in_options(invoke, tmp_path, text, arguments, words):
     (tmp_path / "mine.toml").write_text(text)
     result = invoke("train", "--config", "mine.toml", *arguments)
     assert result.exit_code == 2
@@ -561,7 +559,7 @@ def test_mistakes_in_a_file_are_told_apart_from_those_in_options(
     assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
 
 
-def test_mistakes_in_a_runs_own_configuration_name_its_file(invoke, tmp_path):
+def test_errors_in_the_configuration_of_a_run_name_its_file(invoke, tmp_path):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
     path = Path("one/config.json")
     path.write_text(path.read_text().replace("Drifting-v0", "Gone-v0"))
@@ -619,7 +617,7 @@ def test_an_environment_that_differs_now_is_one_line(invoke, monkeypatch, kind, 
 BROKEN = "drifting_env:tests/Broken-v0"
 
 
-def test_a_reward_that_is_none_is_told_with_its_step_and_what_is_saved(invoke):
+def test_an_unusable_reward_is_reported_with_its_step_and_checkpoint(invoke):
     often = ("--steps", 400, "--evaluate-every", 0, *SMALL)
     result = invoke("train", BROKEN, *often, "--out", "one run")
     assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
@@ -688,7 +686,7 @@ def test_an_environment_that_does_not_repeat_itself_begins_a_new_episode(invoke)
 
 
 @pytest.mark.parametrize("kind", ["RuntimeError", "TimeoutError", "BrokenPipeError"])
-def test_an_environment_that_raises_is_told_as_it_is(invoke, kind):
+def test_an_error_of_an_environment_is_reported_unchanged(invoke, kind):
     failing = ("--env-arg", "error=stalled", "--env-arg", f"kind={kind}")
     short = ("--steps", 400, "--evaluate-every", 0, *SMALL)
     arguments = [str(one) for one in ("train", BROKEN, *failing, *short, "--out", "one run")]
@@ -703,7 +701,7 @@ def test_an_environment_that_raises_is_told_as_it_is(invoke, kind):
     assert Training.load(run.folder / "checkpoint.safetensors", env).n_steps == 249
 
 
-def test_what_cannot_be_printed_is_one_line(invoke, tmp_path):
+def test_an_output_that_cannot_be_written_is_one_line(invoke, tmp_path):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
     command = f"{sys.executable} -m sdnn resume one --json"
     for out, errors in (("> /dev/full", "Error: [Errno 28] No space left"), ("| true", "")):
@@ -726,7 +724,7 @@ def test_a_run_is_not_overwritten(invoke):
     assert (result.exit_code, Path("file").read_text()) == (1, "mine")
 
 
-def test_the_best_agent_is_kept_where_it_is_asked_for(invoke):
+def test_keep_best_saves_the_best_agent(invoke):
     invoke("train", DRIFTING, *SHORT, "--out", "kept", "--keep-best")
     invoke("train", DRIFTING, *SHORT, "--out", "plain")
     best = load_agent("kept/best.safetensors")
@@ -758,7 +756,7 @@ def test_ranges_that_do_not_suit_are_named(invoke):
     assert "left the range" not in lines
 
 
-def test_nothing_is_said_of_ranges_where_the_task_is_solved(invoke, monkeypatch):
+def test_no_hint_about_ranges_when_the_task_is_solved(invoke, monkeypatch):
     monkeypatch.setattr(gym.spec("MountainCarContinuous-v0"), "reward_threshold", -1e9)
     narrow = ["--agent", "sdnn-c", "--range", "1=0:0.0001", "--set", "protocol.evaluate_every=200"]
     options = [*narrow, "--steps", 400, "--out", "one"]
@@ -789,7 +787,7 @@ def test_observations_that_are_left_out_are_named(invoke):
     assert "of 6 observations" not in lines
 
 
-def test_a_warm_up_that_is_not_over_is_told(invoke):
+def test_an_unfinished_warm_up_is_reported(invoke):
     told = WARMING_UP
     begun = ("--steps", 59, "--evaluate-every", 50, "--evaluation-episodes", 1, *SMALL)
     lines = invoke("train", DRIFTING, *begun, "--out", "one").stdout.splitlines()
@@ -885,7 +883,7 @@ def environment():
     ("number", "code", "word"),
     [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
 )
-def test_a_signal_ends_the_step_and_the_run_goes_on_exactly(invoke, tmp_path, number, code, word):
+def test_a_signal_stops_a_run_which_resumes_exactly(invoke, tmp_path, number, code, word):
     long = (
         DRIFTING, "--steps", 3000, "--evaluate-every", 700, "--evaluation-episodes", 2,
         "--range", "-4:4", "--noise", 0.01, "--checkpoint-every", 300, *SMALL,

@@ -232,7 +232,7 @@ def test_runs_of_other_lengths_are_not_cut(tmp_path):
     assert [curve.steps[-1] for curve in curves_of(runs)[0]] == [40, 100]
 
 
-def test_what_is_left_out_of_several_runs_is_told(tmp_path):
+def test_a_figure_names_runs_that_it_omits(tmp_path):
     seeds = [run_spec(CONFIG, seed=seed) for seed in range(4)]
     whole = make(tmp_path / "whole", seeds[0], [1], [[2], [4], [6]])
     short = make(tmp_path / "short", seeds[1], [1], [[0], [2]])
@@ -268,7 +268,7 @@ def test_files_hold_the_numbers(tmp_path):
     refuses(".png", write_curves, curves_of([run])[0], tmp_path / "x.doc", error=RunError)
 
 
-def test_what_cannot_be_drawn(tmp_path, monkeypatch):
+def test_curves_need_rows_and_matplotlib(tmp_path, monkeypatch):
     run = make(tmp_path / "run", CONFIG)
     with pytest.raises(RunError, match="nothing to draw"):
         curves_of([run])

@@ -73,7 +73,7 @@ def test_a_bad_address_is_named(tmp_path, closed_port, kind):
     assert scheduler in str(caught.value)
 
 
-def test_dask_missing_says_what_to_install(monkeypatch, tmp_path):
+def test_a_missing_dask_names_the_package_to_install(monkeypatch, tmp_path):
     find = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == "distributed" else find(name)

@@ -74,7 +74,7 @@ def test_trials_in_teams_have_the_rows_of_each_by_itself(tmp_path):
         assert records[one.key].seconds > 0
 
 
-def test_a_failure_in_a_team_is_of_its_trial_alone(tmp_path, monkeypatch):
+def test_a_failure_in_a_batch_affects_its_trial_alone(tmp_path, monkeypatch):
     plan = plan_of_small_agents(1, 20)
     spec = plan[0].spec
     kwargs = spec.environment.kwargs
@@ -144,7 +144,7 @@ def test_failing_trial_does_not_stop_the_others(tmp_path, fake, run):
 
 
 @pytest.mark.parametrize("kind", [SystemExit, KeyboardInterrupt, GeneratorExit])
-def test_what_ends_a_thread_without_a_word_is_a_failure(tmp_path, fake, run, kind):
+def test_a_thread_that_ends_silently_is_a_failure(tmp_path, fake, run, kind):
     class Leaving(fake.FakeTrial):
         def __init__(self, **_parts):
             raise kind("left")
@@ -155,7 +155,7 @@ def test_what_ends_a_thread_without_a_word_is_a_failure(tmp_path, fake, run, kin
     assert {str(f.error) for f in outcome.failures} == {f"the trial raised {kind('left')!r}"}
 
 
-def test_interruption_keeps_what_is_finished(tmp_path, fake, run):
+def test_interruption_keeps_finished_trials(tmp_path, fake, run):
     """Ctrl-C comes while the second trial runs: it is given up, the first stays stored."""
     made = []
     before = signal.getsignal(signal.SIGINT)
@@ -231,7 +231,7 @@ def record(fake, tmp_path, run):
         return store.load([fake.make_plan(1)[0].key])[0]
 
 
-def test_an_executor_tells_and_the_engine_stores(tmp_path, fake, run, record):
+def test_an_executor_reports_and_the_engine_stores(tmp_path, fake, run, record):
     plan = fake.make_plan(1)
     lost = WorkerLostError("gone")
     script = (

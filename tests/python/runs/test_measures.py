@@ -27,7 +27,7 @@ def test_learned_at_the_first_test():
     assert learned([10] * 10) == 10.0
 
 
-def test_never_learned_is_infinite():
+def test_measures_of_unlearned_tasks_are_infinite():
     assert learned([50] * 100) == math.inf
     assert learned([11] * 100) == math.inf
 
@@ -81,7 +81,7 @@ def test_mended_relapse_is_no_collapse():
     assert collapse([7] * 60 + [50] * 100 + [7] * 60 + [50] * 100) == 10.0 * (60 + 100 + 60 + 24)
 
 
-def test_what_was_never_mastered_collapses_at_once():
+def test_lifetime_without_mastery_is_zero():
     assert collapse([50] * 200) == 0.0
     assert collapse([7, 50] * 100) == 0.0
 

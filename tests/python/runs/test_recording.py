@@ -73,7 +73,7 @@ def test_an_environment_need_not_say_how_it_is_rendered(run, tmp_path, monkeypat
     assert run.train(steps=101).has_pictures is False
 
 
-def test_what_moves_between_decisions_is_filmed(tmp_path):
+def test_recordings_show_frames_between_decisions(tmp_path):
     config = run_spec(
         environment=EnvironmentSpec(id="sdnn/AcrobotSwingUp-v0"), agent="rbf", steps=60
     )
@@ -91,7 +91,7 @@ def test_a_missing_package_is_named(run, tmp_path, monkeypatch):
     refuses("imageio-ffmpeg", record, run, tmp_path / "x.gif", error=RunError)
 
 
-def test_what_cannot_be_recorded(run, tmp_path, monkeypatch):
+def test_other_formats_and_missing_frames_cannot_be_recorded(run, tmp_path, monkeypatch):
     refuses(".gif", record, run, tmp_path / "x.avi", error=RunError)
     for picture in (None, "text", np.zeros((3, 3)), []):
         monkeypatch.setattr(drifting_env.DriftingEnv, "render", lambda self, p=picture: p)

@@ -86,7 +86,7 @@ class StopAt(Callback):
             training.stop()
 
 
-def test_a_run_is_the_training_that_its_configuration_says(whole, tmp_path):
+def test_a_run_equals_the_training_of_its_configuration(whole, tmp_path):
     run = whole(CONFIG)
     env, evaluation_env = (
         CONFIG.environment.make(stream) for stream in ("sensor_noise", "evaluation_sensor_noise")
@@ -115,7 +115,7 @@ SEVERAL = run_spec(WARMING_UP, n_envs=3)
 @pytest.mark.parametrize(
     "config", [CONFIG, WARMING_UP, SEVERAL], ids=["noise", "warm-up", "several"]
 )
-def test_stopped_anywhere_a_run_goes_on_exactly(whole, tmp_path, config):
+def test_a_run_stopped_at_any_step_resumes_exactly(whole, tmp_path, config):
     expected = contents(whole(config))
     steps = sorted(random.Random(5).sample(range(1, 400), 12))
     run = Run.create(tmp_path / "run", config)
@@ -145,7 +145,7 @@ class FailAt(Callback):
             raise ZeroDivisionError
 
 
-def test_after_an_error_a_run_goes_on_from_the_last_checkpoint(whole, tmp_path):
+def test_after_an_error_a_run_resumes_from_the_last_checkpoint(whole, tmp_path):
     run = Run.create(tmp_path / "run", CONFIG)
     with pytest.raises(ZeroDivisionError):
         run.train(callbacks=[FailAt(155)])
@@ -157,7 +157,7 @@ def test_after_an_error_a_run_goes_on_from_the_last_checkpoint(whole, tmp_path):
     assert contents(run) == contents(whole(CONFIG))
 
 
-def test_killed_at_any_instant_a_run_goes_on_exactly(whole, tmp_path):
+def test_a_run_killed_at_any_instant_resumes_exactly(whole, tmp_path):
     config = run_spec(CONFIG, steps=1500, checkpoint_every=13)
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(config.values()))
@@ -212,7 +212,7 @@ def test_a_new_run_makes_each_environment_once(tmp_path, monkeypatch):
     assert sorted(made) == ["evaluation_sensor_noise", "sensor_noise"]
 
 
-def test_what_is_there_is_not_overwritten(whole, tmp_path):
+def test_existing_files_are_not_overwritten(whole, tmp_path):
     run = whole(CONFIG)
     before = contents(run)
     with pytest.raises(RunError, match="sdnn resume"):
@@ -224,7 +224,7 @@ def test_what_is_there_is_not_overwritten(whole, tmp_path):
     refuses("run", Run.create, tmp_path / "mine" / "thesis.txt", CONFIG, error=RunError)
 
 
-def test_what_was_learned_is_not_written_over_by_a_new_beginning(tmp_path):
+def test_a_run_whose_checkpoint_is_missing_does_not_start_again(tmp_path):
     run = Run.create(tmp_path / "run", CONFIG)
     with ResultStore(run.folder):  # killed before the first checkpoint
         pass
@@ -262,7 +262,7 @@ def test_episodes_without_seeds_are_no_run_in_a_folder(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
-def test_nothing_is_written_for_what_cannot_work(tmp_path):
+def test_nothing_is_written_for_impossible_settings(tmp_path):
     wrong = run_spec(CONFIG, environment=EnvironmentSpec(id="Nothing-v0"))
     with pytest.raises(ConfigError):
         Run.create(tmp_path / "run", wrong)
@@ -357,7 +357,7 @@ def normalized_cart_pole():
     return gym.wrappers.NormalizeObservation(gym.make("CartPole-v1").unwrapped)
 
 
-def test_a_run_keeps_what_wrappers_have_learned(tmp_path):
+def test_a_run_keeps_statistics_of_wrappers(tmp_path):
     gym.register("tests/Normalized-v0", entry_point=normalized_cart_pole, max_episode_steps=60)
     spec = RunSpec.from_values(
         {

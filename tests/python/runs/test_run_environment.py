@@ -9,7 +9,7 @@ from sdnn.environments import NoisySensors, UnitSensors
 from sdnn.runs import ConfigError, EnvironmentSpec
 
 
-def test_without_noise_the_agent_gets_what_there_is():
+def test_without_noise_the_agent_gets_the_observation():
     env = EnvironmentSpec(id="CartPole-v1", kwargs={"max_episode_steps": 7}).make()
     assert env.observation_space == gym.make("CartPole-v1").observation_space
     assert env.spec.max_episode_steps == 7

@@ -71,7 +71,7 @@ def test_the_paper_s_task_has_the_paper_s_settings():
     assert general.make_agent(general.make_env()).approximator.n_inputs == 4
 
 
-def test_the_hash_is_that_of_what_fixes_the_rows():
+def test_the_hash_covers_all_settings_that_change_rows():
     spec = RunSpec(environment=CART_POLE)
     assert spec.replace(seed=5).config_hash == spec.config_hash
     assert spec.replace(output=OutputSpec(tensorboard=True)).config_hash == spec.config_hash
@@ -158,7 +158,7 @@ def test_angle_pairs_are_not_found_in_scaled_observations():
     )
 
 
-def test_pairs_are_declared_in_own_units_of_noisy_sensors():
+def test_pairs_are_declared_in_units_of_the_environment():
     environment = EnvironmentSpec(id="Pendulum-v1", noise=0.02, redundant=1, own_units=True)
     spec = RunSpec(environment=environment, agent=AgentSpec(name="rbf", angle_pairs=((0, 1),)))
     assert RunSpec.from_values(spec.values()) == spec
@@ -203,7 +203,7 @@ def test_inputs_are_chosen_in_a_run(inputs):
         ("paper", 0.0, {}, ("none", "all")),
     ],
 )
-def test_what_an_agent_finds_follows_from_its_preset(preset, noise, given, found):
+def test_preprocessing_follows_from_the_preset(preset, noise, given, found):
     environment = EnvironmentSpec(id="Pendulum-v1", noise=noise)
     agent = AgentSpec(name="q-lambda", preset=preset, **given)
     spec = RunSpec(environment=environment, agent=agent)
@@ -212,7 +212,7 @@ def test_what_an_agent_finds_follows_from_its_preset(preset, noise, given, found
     assert spec.make_agent(spec.make_env()).is_warming_up == (found != ("none", "all"))
 
 
-def test_an_agent_brings_its_own_training():
+def test_an_agent_may_register_its_training():
     class Told(Training):
         def pieces(self, seconds):
             self.n_steps = self.steps
@@ -231,7 +231,7 @@ def test_an_agent_brings_its_own_training():
         del AGENTS["told"]
 
 
-def test_ranges_are_given_or_seen():
+def test_ranges_are_fixed_or_adaptive():
     seen = AgentSpec(name="sdnn-c", observation_range="adaptive", warm_up_steps=20)
     environment = EnvironmentSpec(id="MountainCar-v0")
     env = environment.make()
@@ -250,7 +250,7 @@ def test_ranges_are_given_or_seen():
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
-def test_given_ranges_are_not_narrowed(noise):
+def test_fixed_ranges_are_not_narrowed(noise):
     environment = EnvironmentSpec(id="CartPole-v1", noise=noise)
     given = {str(i): (-100.0, 100.0) for i in range(4)}
     spec = RunSpec(environment=environment.replace(ranges=given), agent="q-lambda")
@@ -297,7 +297,7 @@ def test_agents_are_made_with_preset_and_settings():
         ({"agent": "fuzzy"}, "environment.id", "action_space must be a Box"),
     ],
 )
-def test_what_only_the_agent_knows_names_the_setting(values, key, words):
+def test_errors_of_an_agent_name_the_setting(values, key, words):
     with pytest.raises(ConfigError) as caught:
         RunSpec.from_values({"environment": "CartPole-v1", **values}).make_agent(CART_POLE.make())
     assert caught.value.key == key

@@ -27,7 +27,7 @@ def test_bootstrap_of_the_median_agrees_with_the_asymptotic_interval():
     assert found.lower < found.value < found.upper
 
 
-def test_bootstrap_is_its_own_and_repeatable():
+def test_the_bootstrap_is_repeatable_and_keeps_the_global_state():
     state = np.random.get_state()[1].copy()  # noqa: NPY002
     values = [120.0, 90.0, 150.0, math.inf]
     assert estimate_median(values) == estimate_median(values)
@@ -93,7 +93,7 @@ def test_bootstrap_of_the_mean_agrees_with_the_normal_interval():
     )
 
 
-def test_means_refuse_what_has_none():
+def test_means_need_trials_with_finite_values():
     one = estimate_mean([2.0])
     assert (one.value, math.isnan(one.lower), math.isnan(one.upper)) == (2.0, True, True)
     refuses("infinite", estimate_mean, [1.0, math.inf])

@@ -70,7 +70,7 @@ def test_settings_live_side_by_side(tmp_path):
         assert len(store.keys()) == 2
 
 
-def test_a_folder_that_is_only_looked_at_stays_as_it_is(tmp_path):
+def test_reading_a_store_changes_no_file(tmp_path):
     path, digest = filled(tmp_path / "full", 3)
     (tmp_path / "empty").mkdir()
     (tmp_path / "empty" / path.name).touch()

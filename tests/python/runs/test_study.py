@@ -178,7 +178,7 @@ def test_axes_of_the_same_last_word_have_whole_names(study):
     assert configs(found)["Pendulum-v1", "g=5.0"].environment.kwargs == {"g": 5.0}
 
 
-def test_an_environment_is_a_case_of_its_own(study):
+def test_each_environment_is_a_case(study):
     found = study(
         """
         [base]
@@ -289,7 +289,7 @@ register(AgentEntry(id="strict", title="Strict", approximator=Strict,
 
 
 @pytest.mark.parametrize("error", ["ValueError('size is small')", "AssertionError", "TypeError"])
-def test_what_own_settings_refuse_is_told_with_its_place(study, tmp_path, error):
+def test_errors_of_registered_settings_name_file_and_line(study, tmp_path, error):
     (tmp_path / "strict_agents.py").write_text(STRICT.replace("ERROR", error))
     text = "[study]\nimports = ['strict_agents']\ncases = ['s4']\n[base]\nagent = 'strict'\n"
     try:
@@ -506,15 +506,13 @@ def test_errors_name_file_line_and_key(study, name, tmp_path):
         ),
     ],
 )  # fmt: skip
-def test_what_the_core_refuses_is_refused_before_anything_runs(
-    study, tmp_path, text, line, message
-):
+def test_errors_of_the_core_are_raised_before_any_trial(study, tmp_path, text, line, message):
     with pytest.raises(ConfigError) as caught:
         study(text).check()
     assert str(caught.value).startswith(f"{tmp_path / 'mine.toml'}:{line}: {message}")
 
 
-def test_what_is_stored_is_not_tried_again(study, monkeypatch):
+def test_only_trials_that_are_not_stored_are_checked(study, monkeypatch):
     text = "[cases.s4]\n[variants.a]\nenvironment.kwargs.acrobot.integration_step = 0.3\n"
     found = study(text, n_trials=2)
     found.check(stored=found.keys("s4", "a"))

@@ -39,7 +39,7 @@ def invoke(monkeypatch, tmp_path, fake):
     return _invoke
 
 
-def test_a_run_writes_its_files_and_goes_on_where_it_was(invoke, tmp_path):
+def test_a_sweep_writes_its_files_and_resumes(invoke, tmp_path):
     result = invoke("sweep", "mine.toml", "--out", "out")
     assert result.exit_code == 0
     assert result.stderr == ""
@@ -190,7 +190,7 @@ def test_dry_run_counts_and_estimates_without_making_a_file(invoke, tmp_path):
     assert {t["source"] for t in done["trials"]} == {"2 stored trials"}
 
 
-def test_a_trial_that_raises_is_told_by_a_dry_run(invoke, fake):
+def test_a_dry_run_reports_a_trial_that_raises(invoke, fake):
     class Raising(fake.FakeTrial):
         def advance(self, n):
             raise OverflowError("a weight would leave its range")
@@ -202,7 +202,7 @@ def test_a_trial_that_raises_is_told_by_a_dry_run(invoke, fake):
     assert result.stderr.count("\n") == 1
 
 
-def test_an_own_environment_from_a_module_beside_the_file(invoke, tmp_path, monkeypatch):
+def test_a_custom_environment_from_a_module_beside_the_file(invoke, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "my_line_world.py").write_text(
         """
