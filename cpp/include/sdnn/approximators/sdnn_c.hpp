@@ -207,9 +207,8 @@ class SDNNC {
     if (average_ && average_->note(counts_.asked, hidden_layer_)) averaged_.reset();
   }
 
-  /// Writes the inner potentials in lattice steps (c / lattice), by a full pass. Shape: out (n,).
-  ///
-  /// It needs no workspace, but allocates.
+  /// Writes the inner potentials in lattice steps (c / lattice), by a full pass without a
+  /// workspace. Shape: out (n,). Allocates.
   void potentials(std::span<const double> state, std::span<std::int32_t> out) const {
     core::require(out.size() == hidden_layer_.n_units(), "out",
                   std::to_string(hidden_layer_.n_units()) + " values", out.size());
