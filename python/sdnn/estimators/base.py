@@ -447,4 +447,4 @@ class BaseSDNN(Fitted, CodedInputs):
 
     def transform_code(self, X: ArrayLike) -> NDArray[np.int8]:
         """Return the code of samples: +1, 0, -1, shape (n_samples, n_pairs * n_pattern_units)."""
-        return self.network_.input_code.core.transform(self._bins(X))
+        return self._fitted_network.input_code.core.transform(self._bins(X))

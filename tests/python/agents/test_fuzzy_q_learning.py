@@ -1,6 +1,3 @@
-import doctest
-import importlib
-
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -188,9 +185,3 @@ def test_fuzzy_q_learning_swings_up_without_noise():
     )
     trial.advance(300)
     assert trial.test_rows()["solved"][10:].mean() > 0.8
-
-
-def test_the_examples_run():
-    module = importlib.import_module("sdnn.agents.fuzzy_q_learning")
-    assert doctest.testmod(module).failed == 0
-    assert doctest.testmod(module).attempted > 0

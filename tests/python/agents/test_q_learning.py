@@ -1,6 +1,4 @@
 import dataclasses
-import doctest
-import importlib
 
 import gymnasium as gym
 import numpy as np
@@ -351,13 +349,6 @@ def test_a_bad_row_of_values_is_refused():
     policy = _core.EpsilonGreedy(_core.EpsilonGreedyConfig(), seed=1)
     refuses("values", policy.select, [], 0)
     refuses("values", policy.select, [np.nan, np.nan], 0)
-
-
-def test_docstrings():
-    module = importlib.import_module("sdnn.agents.q_learning")
-    result = doctest.testmod(module)
-    assert result.failed == 0
-    assert result.attempted > 0
 
 
 def test_an_agent_takes_patterns_of_any_coding():

@@ -1,6 +1,3 @@
-import doctest
-import importlib
-
 import numpy as np
 import pytest
 import sdnn_q_learning as page
@@ -360,13 +357,6 @@ def test_returned_arrays_are_copies():
         array = read()
         array += 1.0
         assert not np.array_equal(array, read())
-
-
-def test_docstrings():
-    module = importlib.import_module("sdnn.approximators.sdnn_c")
-    result = doctest.testmod(module)
-    assert result.failed == 0
-    assert result.attempted > 0
 
 
 def test_patterns_of_any_coding_can_be_given():

@@ -1,6 +1,5 @@
 """Measurements and how they are stored; never how quick anything is."""
 
-import doctest
 import importlib.util
 import json
 import math
@@ -182,7 +181,3 @@ def test_the_page_shows_the_stored_run():
     assert sys.modules["page"].with_tables(text, module.page_tables()) == text, (
         "docs/evidence/performance.md is not what is stored: run bench/performance_tables.py"
     )
-
-
-def test_examples():
-    assert doctest.testmod(measurements).failed == 0

@@ -1,9 +1,5 @@
 """The kernel is the limit of the codes, and the pictures can be drawn."""
 
-import doctest
-import importlib
-import sys
-
 import numpy as np
 import pytest
 
@@ -87,24 +83,3 @@ def test_samples_of_another_shape_are_refused(bad):
     analytic = kernel.AnalyticKernel("anchor", n_inputs=2)
     refuses("X", analytic, bad)
     refuses("Y", analytic, np.zeros((1, 2)), bad)
-
-
-DOCUMENTED = (
-    "sdnn.coding",
-    "sdnn.coding.base",
-    "sdnn.coding.numeric",
-    "sdnn.coding.symbols",
-    "sdnn.estimators.classifier",
-    "sdnn.estimators.inputs",
-    "sdnn.estimators.network",
-    "sdnn.estimators.regressor",
-    "sdnn.estimators.training",
-    "sdnn.coding.kernel",
-)
-
-
-@pytest.mark.parametrize("name", DOCUMENTED)
-def test_examples_in_docstrings(name):
-    importlib.import_module(name)
-    result = doctest.testmod(sys.modules[name], optionflags=doctest.NORMALIZE_WHITESPACE)
-    assert result.failed == 0

@@ -1,5 +1,3 @@
-import doctest
-
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -10,12 +8,6 @@ from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
 from sdnn.support import arguments
 
 BOX = gym.spaces.Box(-1.0, 1.0, (4,))
-
-
-def test_the_examples_run():
-    result = doctest.testmod(arguments)
-    assert result.failed == 0
-    assert result.attempted > 0
 
 
 @pytest.mark.parametrize("value", [2, np.int8(2), np.uint64(2)])

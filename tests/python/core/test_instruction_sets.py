@@ -1,4 +1,3 @@
-import doctest
 import os
 import subprocess
 import sys
@@ -9,7 +8,6 @@ import pytest
 import sdnn
 from refusals import refuses
 from sdnn import _core
-from sdnn.support import machine
 from sdnn.support.machine import (
     available_instruction_sets,
     instruction_set,
@@ -105,10 +103,6 @@ def test_the_environment_variable_chooses(value, said):
     )
     assert said in done.stdout + done.stderr
     assert (done.returncode == 0) == (value == "portable")
-
-
-def test_examples():
-    assert doctest.testmod(machine).failed == 0
 
 
 def test_an_unusable_level_in_the_environment_is_an_error_not_an_abort():

@@ -2,7 +2,6 @@
 
 import ast
 import compileall
-import doctest
 import importlib
 import shutil
 import subprocess
@@ -13,7 +12,6 @@ import pytest
 
 import sdnn
 from sdnn import _core
-from sdnn.support import lazy
 
 PACKAGES = ("sdnn", "sdnn.estimators", "sdnn.reproduction", "sdnn.runs")
 
@@ -54,7 +52,3 @@ def test_an_installation_without_sources_works(tmp_path):
     code += "print(sdnn.runs.BudgetSpec().steps, sdnn.SDNNRegressor(), sdnn.SDNNKernelRidge())"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout == "None SDNNRegressor() SDNNKernelRidge()\n", done.stderr
-
-
-def test_docstrings():
-    assert doctest.testmod(lazy) == (0, 2)

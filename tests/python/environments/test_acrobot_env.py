@@ -1,7 +1,5 @@
 """The acrobot swing-up as a Gymnasium environment."""
 
-import doctest
-import importlib
 import itertools
 import subprocess
 import sys
@@ -298,11 +296,3 @@ def test_render_without_a_mode_warns():
     env.reset()
     with pytest.warns(UserWarning, match="render_mode"):
         assert env.render() is None
-
-
-@pytest.mark.parametrize("name", ["", ".acrobot", ".goal", ".sensors"])
-def test_doctests(name):
-    module = importlib.import_module(f"sdnn.environments{name}")
-    result = doctest.testmod(module)
-    assert result.attempted > 0
-    assert result.failed == 0

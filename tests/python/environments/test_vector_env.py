@@ -1,7 +1,5 @@
 """Many acrobots at once: the same as so many single ones."""
 
-import doctest
-import importlib
 import threading
 import time
 
@@ -296,9 +294,3 @@ def test_takes_actions_as_lists_and_keeps_double_precision():
         assert infos["tip_height"][0] == info["tip_height"]
         if terminated:
             break
-
-
-def test_doctests():
-    result = doctest.testmod(importlib.import_module("sdnn.environments.vector_env"))
-    assert result.attempted > 0
-    assert result.failed == 0

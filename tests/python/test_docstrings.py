@@ -1,0 +1,28 @@
+"""The examples in docstrings of the package."""
+
+import doctest
+import importlib
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+import sdnn
+
+FOLDER = Path(sdnn.__file__).parent
+EXAMPLE = re.compile(r"^ *>>> ", re.MULTILINE)
+FILES = [path for path in sorted(FOLDER.rglob("*.py")) if EXAMPLE.search(path.read_text("utf-8"))]
+MODULES = [
+    ".".join(path.relative_to(FOLDER.parent).with_suffix("").parts).removesuffix(".__init__")
+    for path in FILES
+]
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_in_docstrings_run(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    importlib.import_module(name)
+    result = doctest.testmod(sys.modules[name], optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert result.failed == 0
+    assert result.attempted > 0
