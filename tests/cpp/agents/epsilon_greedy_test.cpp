@@ -166,18 +166,6 @@ std::string message(const EpsilonGreedyConfig& config) {
   return "no error";
 }
 
-TEST(EpsilonGreedy, NamesWhatIsImpossible) {
-  EXPECT_EQ(message({.epsilon = 1.5}), "epsilon must be in [0, 1], got 1.5");
-  EXPECT_EQ(message({.epsilon = std::nan("")}), "epsilon must be in [0, 1], got nan");
-  EXPECT_EQ(message({.n_greedy_steps = -1}), "n_greedy_steps must be in [0, 1073741824], got -1");
-  EpsilonGreedy policy({}, 1);
-  EXPECT_THROW((void)policy.select(Row{}, 0, true), std::invalid_argument);
-  for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
-    EXPECT_THROW((void)best_by(rule, Row(3, std::numeric_limits<double>::quiet_NaN())),
-                 std::invalid_argument);
-  }
-}
-
 // Which of numbers and NaN is the best one Eigen leaves open: a number of the row, or refused.
 TEST(EpsilonGreedy, ANaNIsNeverTaken) {
   for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {

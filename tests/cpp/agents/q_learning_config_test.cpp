@@ -51,14 +51,6 @@ TEST(QLearning, RatesGoInAStraightLineWithProgress) {
   EXPECT_EQ(steady.epsilon(), 0.1);
 }
 
-TEST(QLearning, NamesWhatIsImpossibleOfWhatIsNotInThePaper) {
-  EXPECT_EQ(message({.max_action_repeat = 0}), "max_action_repeat must be in [1, 1000000], got 0");
-  EXPECT_EQ(message({.final_learning_rate = 0.0}), "final_learning_rate must be in (0, 1], got 0");
-  EXPECT_EQ(message({.final_learning_rate = testing::kNaN}),
-            "final_learning_rate must be in (0, 1], got nan");
-  EXPECT_EQ(message({.final_epsilon = 1.5}), "final_epsilon must be in [0, 1], got 1.5");
-}
-
 TEST(QLearning, RatesFallByEqualFactorsWithAnExponentialSchedule) {
   const QLearningConfig config{.learning_rate = 1.0,
                                .policy = {.epsilon = 0.5},

@@ -24,10 +24,7 @@ from sdnn.environments import ActionMasks
 
 SMALL = SDNNCConfig(n_hidden_units=60, n_active_units=20, n_pattern_units=20)
 AGENTS = [SDNNQLambda, SDNNQLearning]
-SPACES = {
-    "discrete": gym.spaces.Discrete(5, start=-1),
-    "several": gym.spaces.MultiDiscrete([3, 4]),
-}
+SPACES = {"discrete": gym.spaces.Discrete(5, start=-1), "several": gym.spaces.MultiDiscrete([3, 4])}
 
 
 class Masked(gym.Env):

@@ -118,8 +118,7 @@ def test_observations_of_parts_and_a_warm_up_from_the_data(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "line",
-    ["", "7", "{}", "[" * 9999, '{"observation": [0, 0]}', "nonsense", "\x00", "NaN"],
+    "line", ["", "7", "{}", "[" * 9999, '{"observation": [0, 0]}', "nonsense", "\x00", "NaN"]
 )
 def test_lines_that_are_no_transition_are_named(tmp_path, line):
     path = lines(tmp_path / "log.jsonl")

@@ -4,12 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from sdnn.agents import (
-    FuzzyQLearning,
-    RBFQLearning,
-    SDNNQLearning,
-    Transition,
-)
+from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, Transition
 from sdnn.approximators import SDNNCConfig
 
 SMALL = SDNNCConfig(n_pattern_units=40, n_hidden_units=120, n_active_units=30)

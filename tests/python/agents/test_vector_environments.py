@@ -406,10 +406,7 @@ def test_cart_poles_that_gymnasium_makes_by_itself_are_learned():
 
 @pytest.mark.parametrize(
     "make",
-    [
-        lambda: Opaque(2, "NEXT_STEP"),
-        lambda: AsyncVectorEnv([Walk] * 2, shared_memory=False),
-    ],
+    [lambda: Opaque(2, "NEXT_STEP"), lambda: AsyncVectorEnv([Walk] * 2, shared_memory=False)],
 )
 def test_what_cannot_be_repeated_goes_on_with_new_episodes_only(make, tmp_path):
     vector = make()

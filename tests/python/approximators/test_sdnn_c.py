@@ -9,12 +9,7 @@ from sdnn import _core
 from sdnn.approximators import SDNNC, SDNNCConfig
 from sdnn.coding import Circular, Symbolic
 
-SMALL = {
-    "n_inputs": 3,
-    "n_pattern_units": 40,
-    "n_hidden_units": 120,
-    "n_active_units": 30,
-}
+SMALL = {"n_inputs": 3, "n_pattern_units": 40, "n_hidden_units": 120, "n_active_units": 30}
 
 ODD_SIZES = {
     "two inputs": {"n_inputs": 2, "n_pattern_units": 37, "n_hidden_units": 101},
@@ -360,10 +355,7 @@ def test_returned_arrays_are_copies():
 
 
 def test_patterns_of_any_coding_can_be_given():
-    tables = [
-        Circular().patterns(40, seed=1),
-        Symbolic(categories=("a", "b")).patterns(40, seed=2),
-    ]
+    tables = [Circular().patterns(40, seed=1), Symbolic(categories=("a", "b")).patterns(40, seed=2)]
     config = SDNNCConfig(n_inputs=2, n_pattern_units=40, n_hidden_units=90, n_active_units=30)
     network = SDNNC(config, seed=3, tables=tables)
     for _ in range(20):
@@ -380,10 +372,7 @@ def test_patterns_of_any_coding_can_be_given():
     ("tables", "message"),
     [
         ([np.ones((3, 40))], "tables"),
-        (
-            [np.ones((3, 40)), np.ones((3, 41))],
-            "tables",
-        ),
+        ([np.ones((3, 40)), np.ones((3, 41))], "tables"),
         ([np.ones((3, 40)), np.zeros((3, 40))], "tables[1]"),
         ([np.ones(40), np.ones((3, 40))], "tables[0]"),
     ],
@@ -394,11 +383,7 @@ def test_patterns_that_do_not_fit_are_refused(tables, message):
 
 def test_the_average_agrees_with_its_formula():
     config = SDNNCConfig(
-        n_inputs=3,
-        n_pattern_units=12,
-        n_hidden_units=90,
-        n_active_units=30,
-        averaging_interval=5,
+        n_inputs=3, n_pattern_units=12, n_hidden_units=90, n_active_units=30, averaging_interval=5
     )
     network, other = _core.SDNNC(config, 3), _core.SDNNC(config, 3)
     rng = np.random.default_rng(1)

@@ -8,11 +8,7 @@ import pytest
 import sdnn
 from refusals import refuses
 from sdnn import _core
-from sdnn.support.machine import (
-    available_instruction_sets,
-    instruction_set,
-    set_instruction_set,
-)
+from sdnn.support.machine import available_instruction_sets, instruction_set, set_instruction_set
 
 
 @pytest.fixture
@@ -88,10 +84,7 @@ def test_levels_beyond_the_processor():
         refuses("processor", set_instruction_set, name)
 
 
-@pytest.mark.parametrize(
-    ("value", "said"),
-    [("portable", "portable"), ("sse9", "sse9")],
-)
+@pytest.mark.parametrize(("value", "said"), [("portable", "portable"), ("sse9", "sse9")])
 def test_the_environment_variable_chooses(value, said):
     environment = os.environ | {
         "PYTHONPATH": os.pathsep.join(p for p in sys.path if p),

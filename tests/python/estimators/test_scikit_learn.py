@@ -47,11 +47,7 @@ def targets_of(estimator):
         SDNNClassifier(),
         SDNNClassifier(scheme="one_vs_one", n_pattern_units=100),
         SDNNRegressor(
-            "anchor",
-            early_stopping=True,
-            tables="separate",
-            n_pattern_units=100,
-            n_output_units=70,
+            "anchor", early_stopping=True, tables="separate", n_pattern_units=100, n_output_units=70
         ),
         SDNNClassifier(RandomInverse(spacing="quantile"), early_stopping=True, n_pattern_units=100),
     ],

@@ -58,12 +58,7 @@ def test_the_actions_are_the_agents(name, target, tmp_path):
 
 @pytest.mark.parametrize(
     ("reward", "tie_tolerance", "expected"),
-    [
-        (1.0, 0.25, 2**21),
-        (1.0, 2.0**-24, 0),
-        (1e-30, 0.0, 0),
-        (1e-30, 1.0, 2**62),
-    ],
+    [(1.0, 0.25, 2**21), (1.0, 2.0**-24, 0), (1e-30, 0.0, 0), (1e-30, 1.0, 2**62)],
 )
 def test_the_tolerance_of_ties_is_in_units_of_values(reward, tie_tolerance, expected):
     """A reward of 1 is that of two weights of 23 bits: a unit is 2^-23."""

@@ -113,11 +113,7 @@ def test_the_two_libraries_draw_different_weights(parameter_file):
 
 
 @pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("one_vs_one", "2a1aa1d6"),
-        ("one_vs_rest", "60d6ed36"),
-    ],
+    ("name", "expected"), [("one_vs_one", "2a1aa1d6"), ("one_vs_rest", "60d6ed36")]
 )
 def test_a_classifiers_model_file_is_read_and_trained_again(name, expected):
     model = libsdnn.read_model_file(FILES / f"{name}.bin", "libstdc++")
@@ -159,10 +155,7 @@ def test_bins_are_cut_as_libsdnn_cuts_them(parameter_file):
         (("input_number = 2", "% input_number"), "input_number"),
         (("n = 2000", "n = 2001"), "n"),
         (("n = 2000", "n = 8"), "RANDOM_INVERSE"),
-        (
-            ("[NUMERICAL(RANDOM_INVERSE(1001,5)):2]", "[NUMERICAL(TREE(1)):2]"),
-            "TREE",
-        ),
+        (("[NUMERICAL(RANDOM_INVERSE(1001,5)):2]", "[NUMERICAL(TREE(1)):2]"), "TREE"),
         (("[NUMERICAL(RANDOM_INVERSE(1001,5)):2]", "NUMERICAL"), "NUMERICAL"),
         (("function_approximation", "clustering"), "clustering"),
         (("[-0.2, 1.2]", "[1.2, -0.2]"), "output_range"),

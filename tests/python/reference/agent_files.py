@@ -25,12 +25,7 @@ from sdnn.agents import (
     Training,
     Transition,
 )
-from sdnn.approximators import (
-    FuzzyRulesConfig,
-    LinearSDNNConfig,
-    RBFNetworkConfig,
-    SDNNCConfig,
-)
+from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 
 FOLDER = Path(__file__).parents[2] / "data"
 OBSERVATIONS = gym.spaces.Box(

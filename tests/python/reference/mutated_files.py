@@ -131,10 +131,7 @@ READERS = {
     ),
     "store": Reader("results.sqlite", store, read_store, (StoreError,)),
     "study": Reader(
-        "study.toml",
-        lambda: contents_of("docs/studies", "*.toml"),
-        ClaimStudy,
-        (RunError,),
+        "study.toml", lambda: contents_of("docs/studies", "*.toml"), ClaimStudy, (RunError,)
     ),
     "run": Reader("run.toml", lambda: [RUN], read_spec, (RunError,)),
 }

@@ -29,22 +29,10 @@ from sdnn.environments import (
     PaperAcrobotEnv,
     SensorConfig,
 )
-from sdnn.estimators import (
-    SDNNClassifier,
-    SDNNKernelClassifier,
-    SDNNKernelRidge,
-    SDNNRegressor,
-)
+from sdnn.estimators import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.export import save_image
 from sdnn.reproduction.cases import EXPERIMENTS, PAPER_CASES
-from sdnn.runs import (
-    BudgetSpec,
-    ConfigError,
-    EnvironmentSpec,
-    ProtocolSpec,
-    RunSpec,
-    agent_entry,
-)
+from sdnn.runs import BudgetSpec, ConfigError, EnvironmentSpec, ProtocolSpec, RunSpec, agent_entry
 
 PACKAGES = (
     "agents",

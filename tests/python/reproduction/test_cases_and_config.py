@@ -7,13 +7,7 @@ from refusals import refuses
 from sdnn.agents import FuzzyQLearningConfig
 from sdnn.approximators import FuzzyRulesConfig
 from sdnn.environments import SensorConfig
-from sdnn.reproduction import (
-    EXPERIMENTS,
-    case_spec,
-    paper_spec,
-    plan_trials,
-    select_experiments,
-)
+from sdnn.reproduction import EXPERIMENTS, case_spec, paper_spec, plan_trials, select_experiments
 from sdnn.runs import AGENTS, ProtocolSpec, trial_seed
 
 
@@ -63,10 +57,6 @@ def test_rows_that_share_an_id_observe_the_same():
                 case.noise,
             )
             assert set(case.agents) <= set(AGENTS)
-
-
-def test_unknown_experiment_is_named():
-    refuses("z", select_experiments, "z")
 
 
 def test_presets_run_beside_the_agents_of_a_case():

@@ -182,12 +182,7 @@ def test_estimates_as_text():
 
 @pytest.fixture
 def report(results):
-    return Report(
-        experiments=((EXPERIMENT, results),),
-        costs=(),
-        quick=False,
-        seed=0,
-    )
+    return Report(experiments=((EXPERIMENT, results),), costs=(), quick=False, seed=0)
 
 
 def test_tables_hold_cases_and_claims(report):

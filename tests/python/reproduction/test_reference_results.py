@@ -9,11 +9,7 @@ import pytest
 import sdnn.reproduction.claims as reference_module
 import sdnn.reproduction.reproduce as reproduce_module
 from refusals import refuses
-from sdnn.reproduction import (
-    EXPERIMENTS,
-    PaperStudy,
-    plan_trials,
-)
+from sdnn.reproduction import EXPERIMENTS, PaperStudy, plan_trials
 from sdnn.reproduction.cases import PAPER_EPISODES
 from sdnn.reproduction.claims import (
     CLAIMS,

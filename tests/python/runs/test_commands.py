@@ -17,13 +17,7 @@ from click.testing import CliRunner
 
 import drifting_env
 from refusals import refuses
-from sdnn.agents import (
-    RBFQLearning,
-    SDNNQLearning,
-    Training,
-    evaluate,
-    load_agent,
-)
+from sdnn.agents import RBFQLearning, SDNNQLearning, Training, evaluate, load_agent
 from sdnn.cli import main
 from sdnn.cli.common import WARMING_UP, option_of, value_of
 from sdnn.environments import UnitSensors
@@ -393,23 +387,10 @@ def test_several_environments_are_learned_in(invoke):
         (["CartPole-v1", "--agent", "dqn"], "--agent"),
         (["CartPole-v1", "--agent", "fuzzy"], "ENV_ID: action_space must be a Box"),
         (["CartPole-v1", "--preset", "best"], "--preset"),
-        (
-            ["CartPole-v1", "--agent", "rbf", "--preset", "paper"],
-            "--preset: must be omitted",
-        ),
-        (["CartPole-v1", "--steps", 0], "--steps"),
-        (["CartPole-v1", "--steps", "many"], "--steps"),
-        (["CartPole-v1", "--episodes", 0], "--episodes"),
+        (["CartPole-v1", "--agent", "rbf", "--preset", "paper"], "--preset: must be omitted"),
         (["CartPole-v1", "--steps", 5, "--episodes", 5], "--steps and --episodes"),
-        (["CartPole-v1", "--seed", -1], "--seed"),
-        (["CartPole-v1", "--seed", 2**64], "--seed"),
-        (["CartPole-v1", "--n-envs", 0], "--n-envs"),
-        (["CartPole-v1", "--n-envs", 5000], "--n-envs"),
         (["CartPole-v1", "--config", "missing.toml"], "--config"),
-        (["CartPole-v1", "--noise", -1], "--noise"),
-        (["CartPole-v1", "--noise", "nan"], "--noise"),
         (["CartPole-v1", "--noise", 0.1], "--range 1: must be given"),
-        (["CartPole-v1", "--redundant", -1], "--redundant"),
         (["CartPole-v1", "--redundant", 5000, "--range", "0:1"], "--redundant"),
         (
             ["CartPole-v1", "--range", "5"],
@@ -440,19 +421,8 @@ def test_several_environments_are_learned_in(invoke):
         (["CartPole-v1", "--set", "agent.inputs=\udcff"], "--inputs: must be one of"),
         (["CartPole-v1", "--env-arg", "5"], "--env-arg must be NAME=VALUE"),
         (["CartPole-v1", "--env-arg", "color=5"], "--env-arg: CartPole-v1 cannot be made"),
-        (["CartPole-v1", "--evaluate-every", -1], "--evaluate-every"),
-        (["CartPole-v1", "--evaluation-episodes", 0], "--evaluation-episodes"),
-        (["CartPole-v1", "--checkpoint-every", 0], "--checkpoint-every"),
-        (["CartPole-v1", "--target-return", "high"], "--target-return"),
-        (
-            ["CartPole-v1", "--target-return", 5, "--evaluate-every", 0],
-            "--target-return: ",
-        ),
-        (["CartPole-v1", "--angle-pairs", "all"], "--angle-pairs"),
-        (
-            ["CartPole-v1", "--angle-pairs", "find", "--redundant", 1],
-            "--angle-pairs: ",
-        ),
+        (["CartPole-v1", "--target-return", 5, "--evaluate-every", 0], "--target-return: "),
+        (["CartPole-v1", "--angle-pairs", "find", "--redundant", 1], "--angle-pairs: "),
         (["CartPole-v1", "--fast"], "--fast"),
     ],
 )

@@ -95,11 +95,7 @@ def test_observations_of_any_shape_are_flattened():
         ({"id": "CartPole-v1", "kwargs": {"colour": 1}}, "environment.kwargs", "colour"),
         ({"id": "CartPole-v1", "noise": 0.1}, "environment.ranges.1", "1, 3"),
         ({"id": "CartPole-v1", "redundant": 1}, "environment.ranges.1", "lowest and highest"),
-        (
-            {"id": "CartPole-v1", "noise": 0.1, "ranges": {"4": (0, 1)}},
-            "environment.ranges.4",
-            "4",
-        ),
+        ({"id": "CartPole-v1", "noise": 0.1, "ranges": {"4": (0, 1)}}, "environment.ranges.4", "4"),
     ],
 )
 def test_environments_that_cannot_be_made(environment, key, words):
