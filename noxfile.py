@@ -62,7 +62,7 @@ def style(session):
     session.run("ruff", "format", "--check", ".")
     session.run("clang-format", "--dry-run", "-Werror", *cpp_sources(), log=False)
     session.run("codespell", "python", "cpp/include", "docs", "bench", *(ROOT.glob("*.md")))
-    pytest(session, "-q", "tests/docs/test_words.py")
+    pytest(session, "-q", "tests/docs/test_words.py", "tests/python/test_architecture.py")
     session.run("lint-imports", env={"PYTHONPATH": str(ROOT / "python")})
 
 
