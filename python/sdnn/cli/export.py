@@ -223,7 +223,7 @@ def _new_agent(
     from sdnn.runs.settings import changed
     from sdnn.support.arguments import blamed
 
-    ends = [(-math.pi, math.pi) if one == "angle" else _ends("--range", one) for one in ranges]
+    bounds = [(-math.pi, math.pi) if text == "angle" else _ends("--range", text) for text in ranges]
     tables: dict[str, dict[str, Any]] = {"approximator": {}, "learning": {}}
     for name, text in named_values("--set", settings):
         table, _, key = name.partition(".")
@@ -235,7 +235,7 @@ def _new_agent(
         tables[table][key] = value_of(text)
     kind = kind or "q-lambda"
     parts = {name: changed(new_settings(kind)[name], tables[name], name) for name in tables}
-    low, high = np.array(ends).T
+    low, high = np.array(bounds).T
     try:
         return new_agent(
             gym.spaces.Box(low, high, dtype=np.float64),
@@ -243,33 +243,37 @@ def _new_agent(
             kind=kind,
             ram_bytes=ram,
             seed=seed or 0,
-            angles=[i for i, one in enumerate(ranges) if one == "angle"],
+            angles=[i for i, text in enumerate(ranges) if text == "angle"],
             **parts,
         )
     except (ValueError, OverflowError, MemoryError) as error:
         name, problem = blamed(error)
-        places = {"ram_bytes": "--ram", "observation_space": "--range", "action_space": "--actions"}
+        options_of = {
+            "ram_bytes": "--ram",
+            "observation_space": "--range",
+            "action_space": "--actions",
+        }
         for table, part in parts.items():
             if hasattr(part, name):
-                places[name] = option_of(f"{table}.{name}")
+                options_of[name] = option_of(f"{table}.{name}")
         raise click.UsageError(
-            f"{places[name]} {problem}" if name in places else str(error)
+            f"{options_of[name]} {problem}" if name in options_of else str(error)
         ) from error
 
 
-def _action_space(given: Sequence[str]) -> gym.Space[Any]:
+def _action_space(texts: Sequence[str]) -> gym.Space[Any]:
     import gymnasium as gym
     import numpy as np
 
-    if all(":" in one for one in given):
-        low, high = np.array([_ends("--actions", one) for one in given]).T
+    if all(":" in text for text in texts):
+        low, high = np.array([_ends("--actions", text) for text in texts]).T
         return gym.spaces.Box(low, high, dtype=np.float64)
-    if any(not one.isdecimal() or not 2 <= float(one) <= _MOST_ACTIONS for one in given):
+    if any(not text.isdecimal() or not 2 <= float(text) <= _MOST_ACTIONS for text in texts):
         raise click.UsageError(
             f"--actions must be numbers of actions, 2 to {_MOST_ACTIONS}, or all ranges LOW:HIGH,"
-            f" got {', '.join(given)!r}"
+            f" got {', '.join(texts)!r}"
         )
-    sizes = [int(one) for one in given]
+    sizes = [int(text) for text in texts]
     return gym.spaces.Discrete(sizes[0]) if len(sizes) == 1 else gym.spaces.MultiDiscrete(sizes)
 
 
@@ -277,15 +281,15 @@ def _ends(option: str, text: str) -> tuple[float, float]:
     """Read LOW:HIGH."""
     low, _, high = text.partition(":")
     try:
-        ends = float(low), float(high)
+        bounds = float(low), float(high)
     except ValueError:
-        ends = math.nan, math.nan
-    if not -_LARGEST < ends[0] < ends[1] < _LARGEST:
+        bounds = math.nan, math.nan
+    if not -_LARGEST < bounds[0] < bounds[1] < _LARGEST:
         word = " or angle" if option == "--range" else ""
         raise click.UsageError(
             f"{option} must be LOW:HIGH{word}, LOW below HIGH and both within 2^31, got {text!r}"
         )
-    return ends
+    return bounds
 
 
 def _usage_error(error: ValueError, is_named: bool) -> click.ClickException:

@@ -41,8 +41,8 @@ class SpecCommand(click.Command):
         return self._made
 
     @params.setter
-    def params(self, own: list[click.Parameter]) -> None:
-        self._own = own
+    def params(self, parameters: list[click.Parameter]) -> None:
+        self._own = parameters
         self._made = None
 
 
@@ -53,20 +53,22 @@ def _options() -> Iterator[click.Option]:
 
     schemas = schemas_of(RunSpec)
     for key in KEYS:
-        found: dict[str, Any] = {"$ref": "RunSpec"}
+        schema: dict[str, Any] = {"$ref": "RunSpec"}
         for name in key.split("."):
-            parts = (found, *found.get("anyOf", ()))
-            table = next(one["$ref"] for one in parts if "$ref" in one).rpartition("/")[2]
-            found = schemas[table]["properties"][name]
-        kind = next((one for one in found.get("anyOf", ()) if one.get("type") != "null"), found)
-        is_flag, default = kind.get("type") == "boolean", found.get("default")
+            parts = (schema, *schema.get("anyOf", ()))
+            reference = next(part["$ref"] for part in parts if "$ref" in part)
+            table = reference.rpartition("/")[2]
+            schema = schemas[table]["properties"][name]
+        types = (part for part in schema.get("anyOf", ()) if part.get("type") != "null")
+        kind = next(types, schema)
+        is_flag, default = kind.get("type") == "boolean", schema.get("default")
         shown = "" if default is None or is_flag else f"  [default: {default}]"
         yield click.Option(
             [option_of(key), key.replace(".", "_")],
             type=None if is_flag else _option_type(kind),
             is_flag=is_flag,
             default=None,
-            help=found["description"].replace("`", "") + shown,
+            help=schema["description"].replace("`", "") + shown,
         )
 
 
@@ -83,8 +85,8 @@ def _option_type(kind: Mapping[str, Any]) -> Any:
 
 def given_values(options: Options) -> Options:
     """Take the options of a specification out of those of a command: given values by their keys."""
-    found = {key: options.pop(key.replace(".", "_")) for key in KEYS}
-    return {key: value for key, value in found.items() if value is not None and value is not False}
+    values = {key: options.pop(key.replace(".", "_")) for key in KEYS}
+    return {key: value for key, value in values.items() if value is not None and value is not False}
 
 
 @click.command(cls=SpecCommand, short_help="Learn in a Gymnasium environment.")
@@ -150,23 +152,23 @@ def train(
     from sdnn.runs.run import resume_command
     from sdnn.runs.settings import overridden
 
-    given = _given(env_id, options)
+    settings = _given(env_id, options)
     with run_command(option_words):
         source = None if file is None else ConfigFile.read(file)
 
-    def words(error: ConfigError) -> str:
-        located = error if source is None else source.located(error, given)
+    def located_message(error: ConfigError) -> str:
+        located = error if source is None else source.located(error, settings)
         return str(located) if located.place else option_words(error)
 
-    with run_command(words):
+    with run_command(located_message):
         values = {} if source is None else source.specification()
-        spec = RunSpec.from_values(overridden(values, given))
+        spec = RunSpec.from_values(overridden(values, settings))
         folder = out or _folder_of(spec)
         if dry_run:
             Run(folder, spec).check()
             click.echo(json.dumps({"folder": str(folder), **spec.values()}, indent=2))
             return
-    with run_command(words, folder=folder):
+    with run_command(located_message, folder=folder):
         if (folder / "config.json").exists():
             raise click.UsageError(
                 f"--out: {folder} holds a run already: {resume_command(folder)} continues it"
@@ -179,8 +181,8 @@ def _given(env_id: str | None, options: Options) -> Options:
     """Return the values of the options by their keys; UsageError if two options set the same."""
     from sdnn.runs.settings import KEYS_BY_NAME
 
-    given = given_values(options)
-    by_option = {key: (option_of(key), value) for key, value in given.items()}
+    values = given_values(options)
+    by_option = {key: (option_of(key), value) for key, value in values.items()}
 
     def give(option: str, key: str, value: object) -> None:
         other, before = by_option.setdefault(key, (option, value))
@@ -188,7 +190,7 @@ def _given(env_id: str | None, options: Options) -> Options:
             raise click.UsageError(
                 f"{option} must not set {key}, which {other} sets: got {value!r} and {before!r}"
             )
-        given[key] = value
+        values[key] = value
 
     if env_id is not None:
         give("ENV_ID", "environment.id", env_id)
@@ -198,22 +200,22 @@ def _given(env_id: str | None, options: Options) -> Options:
         if text == "adaptive":
             give("--range", "agent.observation_range", "adaptive")
         else:
-            name, ends = _range(text)
-            give(f"--range {name}", f"environment.ranges.{name}", ends)
+            name, bounds = _range(text)
+            give(f"--range {name}", f"environment.ranges.{name}", bounds)
     for name, text in named_values("--set", options["settings"]):
         if "." not in name:
             example = advice(name, (), KEYS_BY_NAME) or "such as learning.discount"
             raise click.UsageError(f"--set {name}: must be TABLE.NAME; {example}")
         give(f"--set {name}", name, value_of(text))
-    both = [by_option[key][0] for key in ("budget.steps", "budget.episodes") if key in given]
+    both = [by_option[key][0] for key in ("budget.steps", "budget.episodes") if key in values]
     if len(both) == 2:
         raise click.UsageError(f"{' and '.join(both)} must not be given together")
-    return given
+    return values
 
 
 def _range(text: str) -> tuple[str, list[float]]:
-    name, _, ends = text.rpartition("=")
-    low, colon, high = ends.partition(":")
+    name, _, bounds = text.rpartition("=")
+    low, colon, high = bounds.partition(":")
     try:
         if not colon:
             raise ValueError

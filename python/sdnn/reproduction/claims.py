@@ -91,9 +91,9 @@ class Check(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             title = next(series.title for series in SERIES if series.id == self.series)
             return f"time per step, {self.n_inputs} inputs / {self.n_fewer} inputs: {title}"
         first, *other = map(subject_words, self.subjects)
-        words = f"{self.measure.replace('_', ' ')}: {first}"
+        label = f"{self.measure.replace('_', ' ')}: {first}"
         return " minus ".join(
-            [words, *(o.removeprefix(f"{title_of(self.agent)}, ") for o in other)]
+            [label, *(o.removeprefix(f"{title_of(self.agent)}, ") for o in other)]
         )
 
     @property
@@ -104,10 +104,10 @@ class Check(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     def samples(self, measured: Mapping[Subject, TrialMeasures]) -> tuple[FloatArray, ...]:
         """Return the trials' values of each subject, (n_trials,)."""
         assert self.measure is not None
-        found = [measured[subject] for subject in self.subjects]
+        results = [measured[subject] for subject in self.subjects]
         if self.minus:
-            return on_equal_terms(self.measure, *found)
-        return (found[0].values[self.measure],)
+            return on_equal_terms(self.measure, *results)
+        return (results[0].values[self.measure],)
 
     def contains(self, values: FloatArray) -> NDArray[np.bool_]:
         """Return where values lie in the range."""
@@ -156,10 +156,10 @@ def is_paper_scale(measured: TrialMeasures) -> bool:
 
 def verdict_of(check: Check, estimate: Estimate) -> Verdict:
     """Judge one check by the rule of this module."""
-    ends = np.array([estimate.lower, estimate.upper])
-    if check.contains(ends).all():
+    interval = np.array([estimate.lower, estimate.upper])
+    if check.contains(interval).all():
         return Verdict.HOLDS
-    return Verdict.FAILS if check.excludes(ends[:1], ends[1:]).all() else Verdict.UNDECIDED
+    return Verdict.FAILS if check.excludes(interval[:1], interval[1:]).all() else Verdict.UNDECIDED
 
 
 @dataclass(frozen=True)
@@ -238,16 +238,17 @@ def judge_claims(
     A case that experiments share may come more than once. Beside each claim comes what more trials
     say, if all that it speaks of is among the reference results.
     """
-    by_subject = {(one.case_id, one.agent): one for one in measured}
-    more = {(one.case_id, one.agent): one for one in reference}
+    by_subject = {(result.case_id, result.agent): result for result in measured}
+    more = {(result.case_id, result.agent): result for result in reference}
     draws = TenTrials(more.values())
     outcomes = []
     for claim in CLAIMS:
-        own = ClaimOutcome(claim, tuple(_judge(one, by_subject, costs) for one in claim.checks))
-        better = ClaimOutcome(claim, tuple(_judge(one, more, ()) for one in claim.checks))
+        checks = tuple(_judge(check, by_subject, costs) for check in claim.checks)
+        outcome = ClaimOutcome(claim, checks)
+        better = ClaimOutcome(claim, tuple(_judge(check, more, ()) for check in claim.checks))
         if better.verdict is not Verdict.NOT_RUN:
-            own = replace(own, more=better, chance=draws.chance(claim))
-        outcomes.append(own)
+            outcome = replace(outcome, more=better, chance=draws.chance(claim))
+        outcomes.append(outcome)
     return tuple(o for o in outcomes if any(check.estimate is not None for check in o.checks))
 
 
@@ -259,21 +260,23 @@ def _judge(
         if not {check.n_inputs, check.n_fewer} <= times.keys():
             return CheckOutcome(check, None, Verdict.NOT_RUN)
         estimate = estimate_contrast(times[check.n_inputs], times[check.n_fewer], np.divide)
-        is_full = all(one.config_hash == CostConfig().config_hash for one in costs)
+        is_full = all(cost.config_hash == CostConfig().config_hash for cost in costs)
         return CheckOutcome(
             check, estimate, verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
         )
     if not measured.keys() >= set(check.subjects):
         return CheckOutcome(check, None, Verdict.NOT_RUN)
-    found = [measured[subject] for subject in check.subjects]
+    results = [measured[subject] for subject in check.subjects]
     samples = check.samples(measured)
     estimate = (
         estimate_contrast(samples[0], samples[1])
         if check.minus
-        else found[0].medians[check.measure]
+        else results[0].medians[check.measure]
     )
-    verdict = verdict_of(check, estimate) if all(map(is_paper_scale, found)) else Verdict.NOT_JUDGED
-    return CheckOutcome(check, estimate, verdict, samples, min(one.last_episode for one in found))
+    is_judged = all(map(is_paper_scale, results))
+    verdict = verdict_of(check, estimate) if is_judged else Verdict.NOT_JUDGED
+    last_episode = min(result.last_episode for result in results)
+    return CheckOutcome(check, estimate, verdict, samples, last_episode)
 
 
 class TenTrials:
@@ -285,7 +288,7 @@ class TenTrials:
     """
 
     def __init__(self, measured: Iterable[TrialMeasures]) -> None:
-        self._measured = {(one.case_id, one.agent): one for one in measured}
+        self._measured = {(result.case_id, result.agent): result for result in measured}
         self._draws = cache(self._draw)
         self._met = cache(self._is_met)
 
@@ -358,20 +361,20 @@ def reference_results() -> tuple[ReferenceResult, ...]:
             case_id=case_id,
             agent=agent,
             last_episode=PAPER_EPISODES,
-            values={name: np.array([float(row[name]) for row in own]) for name in STEP_MEASURES},
+            values={name: np.array([float(row[name]) for row in group]) for name in STEP_MEASURES},
             config_hash=config_hash,
             root_seed=int(root_seed),
-            rows_digests=tuple(row["rows_digest"] for row in own),
+            rows_digests=tuple(row["rows_digest"] for row in group),
         )
-        for (case_id, agent, config_hash, root_seed), own in groups.items()
+        for (case_id, agent, config_hash, root_seed), group in groups.items()
     )
 
 
 def more_trials(results: Iterable[CaseResult]) -> tuple[ReferenceResult, ...]:
     """Return the reference results that have more trials of the same settings than given ones."""
-    run = {(one.case_id, one.agent, one.config_hash): one.n_trials for one in results}
+    run = {(r.case_id, r.agent, r.config_hash): r.n_trials for r in results}
     return tuple(
-        one
-        for one in reference_results()
-        if one.n_trials > run.get((one.case_id, one.agent, one.config_hash), math.inf)
+        result
+        for result in reference_results()
+        if result.n_trials > run.get((result.case_id, result.agent, result.config_hash), math.inf)
     )

@@ -156,20 +156,20 @@ class Report:
             folded.append(Section(table=table, notes=[RULE_NOTE]))
         more = _more_table(self.claims)
         if more.rows:
-            seeds = sorted({one.root_seed for one in self.reference})
+            seeds = sorted({result.root_seed for result in self.reference})
             note = (
                 "The same settings with more trials on other seeds (root"
                 f" seed{'s' if len(seeds) > 1 else ''} {' and '.join(map(str, seeds))}), whose"
                 f" measures are kept with the library. {CHANCE_NOTE}"
             )
             folded.append(Section(table=more, notes=[note]))
-        words = tuple(name.replace("_", " ") for name in STEP_MEASURES)
-        header = ("case", "agent", "trials", *words, *MEASURE_END)
+        names = tuple(name.replace("_", " ") for name in STEP_MEASURES)
+        header = ("case", "agent", "trials", *names, *MEASURE_END)
         for experiment, results in self.experiments:
             rows = [
-                (one.title, title_of(one.agent), str(one.n_trials),
-                 *measure_cells(one, STEP_MEASURES))
-                for one in results
+                (result.title, title_of(result.agent), str(result.n_trials),
+                 *measure_cells(result, STEP_MEASURES))
+                for result in results
             ]  # fmt: skip
             folded.append(Section(table=Table(f"{experiment.title}: medians", header, rows)))
         if self.costs:
@@ -178,7 +178,7 @@ class Report:
         if self.experiments:
             yield measures_section(STEP_MEASURES)
             yield settings_section(
-                (f"{title_of(one.agent)}, {one.title}", one) for one in self.results
+                (f"{title_of(result.agent)}, {result.title}", result) for result in self.results
             )
 
     def to_json(self) -> dict[str, object]:
@@ -203,12 +203,12 @@ class Report:
             "costs": [cost.to_json() for cost in self.costs],
             "claims": [
                 {
-                    **one.to_json(),
-                    "with_more_trials": one.more and one.more.to_json(),
-                    "ten_trials_show_it": one.chance and one.chance.to_json(PAPER_EPISODES),
-                    "decided": one.decided.value,
+                    **claim.to_json(),
+                    "with_more_trials": claim.more and claim.more.to_json(),
+                    "ten_trials_show_it": claim.chance and claim.chance.to_json(PAPER_EPISODES),
+                    "decided": claim.decided.value,
                 }
-                for one in self.claims
+                for claim in self.claims
             ],
         }
 
@@ -216,15 +216,15 @@ class Report:
 def _claim_table(claims: Iterable[ClaimOutcome]) -> Table:
     """Return a line for each claim, with its verdict by the whole rule where one is judged."""
     claims = list(claims)
-    is_judged = any(one.decided not in (Verdict.NOT_JUDGED, Verdict.NOT_RUN) for one in claims)
+    is_judged = any(claim.decided not in (Verdict.NOT_JUDGED, Verdict.NOT_RUN) for claim in claims)
     rows = []
     for claim in claims:
-        found: dict[str, list[str]] = {}
-        for one in claim.checks:
-            if (text := format_quantity(one)) != "-":
-                found.setdefault(_name(one.check), []).append(text)
-        ours = "; ".join(f"{name}: {', '.join(values)}" for name, values in found.items())
-        paper = "; ".join(dict.fromkeys(one.check.paper for one in claim.checks))
+        quantities: dict[str, list[str]] = {}
+        for check in claim.checks:
+            if (text := format_quantity(check)) != "-":
+                quantities.setdefault(_name(check.check), []).append(text)
+        ours = "; ".join(f"{name}: {', '.join(values)}" for name, values in quantities.items())
+        paper = "; ".join(dict.fromkeys(check.check.paper for check in claim.checks))
         row = (str(claim.claim.number), claim.claim.text, paper, ours or "-")
         rows.append((*row, claim.decided.value) if is_judged else row)
     header = ("claim", "the paper says", "paper", "ours" if is_judged else "ours, so far")
@@ -250,9 +250,9 @@ CHECKS_HEADER = ("claim", "measured", "paper", "ours", "verdict")
 def check_rows(claims: Iterable[ClaimOutcome]) -> Iterator[tuple[str, ...]]:
     """Yield the verdict on each check by these trials alone, under `CHECKS_HEADER`."""
     for claim in claims:
-        for one in claim.checks:
-            words = (str(claim.claim.number), str(one.check), one.check.paper)
-            yield (*words, format_quantity(one), one.verdict.value)
+        for check in claim.checks:
+            cells = (str(claim.claim.number), str(check.check), check.check.paper)
+            yield (*cells, format_quantity(check), check.verdict.value)
 
 
 def _more_table(claims: Iterable[ClaimOutcome]) -> Table:
@@ -263,9 +263,9 @@ def _more_table(claims: Iterable[ClaimOutcome]) -> Table:
             continue
         start = (str(claim.claim.number), claim.claim.text, "", "", "")
         rows.append((*start, claim.decided.value, format_share(claim.chance)))
-        for one in claim.more.checks:
-            words = (str(one.check), str(min(s.size for s in one.samples)))
-            rows.append(("", "", *words, format_quantity(one), one.verdict.value, ""))
+        for check in claim.more.checks:
+            cells = (str(check.check), str(min(samples.size for samples in check.samples)))
+            rows.append(("", "", *cells, format_quantity(check), check.verdict.value, ""))
     header = (
         "claim", "the paper says", "measured", "trials", "ours", "verdict", "ten trials show it"
     )  # fmt: skip
@@ -296,9 +296,10 @@ def cost_table(costs: Sequence[CostRecord]) -> Table:
     for n_inputs in sorted({cost.n_inputs for cost in costs}):
         table = by_key.get(("fuzzy", n_inputs))
         size = "-" if table is None else f"{table.table_bytes / 1e6:,.3g} MB"
-        found = [(by_key.get((s.id, n_inputs)), by_key.get((s.id, n_inputs - 1))) for s in SERIES]
-        rows.append((str(n_inputs), *(_cost(*pair) for pair in found), size))
-    return Table("Cost of a step", ("inputs", *(one.title for one in SERIES), "FQL's table"), rows)
+        pairs = [(by_key.get((s.id, n_inputs)), by_key.get((s.id, n_inputs - 1))) for s in SERIES]
+        rows.append((str(n_inputs), *(_cost(*pair) for pair in pairs), size))
+    header = ("inputs", *(series.title for series in SERIES), "FQL's table")
+    return Table("Cost of a step", header, rows)
 
 
 def _cost(cost: CostRecord | None, with_one_less: CostRecord | None) -> str:

@@ -42,11 +42,11 @@ def groups_of(runs: Sequence[Run]) -> list[Group]:
         settings = dict(_flat(run.spec.full_values())) | {"goals": ", then ".join(_goals(run))}
         members.setdefault(tuple(sorted(settings.items())), []).append(run)
     groups = []
-    for own, same in members.items():
+    for key_values, same in members.items():
         spec = same[0].spec
         task, agent = [spec.task], [f"{spec.agent.name} {spec.agent.preset or ''}".strip()]
         alike = [(dict(s), r[0].spec) for s, r in members.items() if r[0].spec.task == spec.task]
-        for key, value in own:
+        for key, value in key_values:
             is_of_task = key.startswith("environment.")
             others = (s for s, other in alike if is_of_task or other.label == spec.label)
             if any(other.get(key) != value for other in others):
@@ -104,8 +104,8 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
     is nothing to draw yet, or rows cannot be read.
     """
     made = [_curves_of_group(group) for group in groups_of(runs)]
-    curves = [curve for own, _ in made for curve in own]
-    notes = [note for _, own in made for note in own]
+    curves = [curve for run_curves, _ in made for curve in run_curves]
+    notes = [note for _, run_notes in made for note in run_notes]
     if not curves:
         raise RunError("; ".join(notes) + ": nothing to draw")
     return curves, notes
@@ -114,20 +114,20 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
 def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
     """Make the curves of each run, or the one of several that have evaluations, and notes."""
     rows = {run: run.rows() for run in group.runs}
-    series = {run: _series(own, "evaluation") for run, own in rows.items()}
-    evaluated = {run: one for run, one in series.items() if len(one[0])}
+    series = {run: _series(run_rows, "evaluation") for run, run_rows in rows.items()}
+    evaluated = {run: pair for run, pair in series.items() if len(pair[0])}
     what = "no evaluation" if evaluated else "no episode and no evaluation"
-    shown = [*evaluated] or [run for run, own in rows.items() if own]
+    shown = [*evaluated] or [run for run, run_rows in rows.items() if run_rows]
     notes = [f"{run.folder}: {what} is whole yet" for run in group.runs if run not in shown]
     if len(evaluated) < 2:
         return [curve for run in shown for curve in _curves_of_run(group, run, rows[run])], notes
     folders = ", ".join(str(run.folder) for run in evaluated)
-    steps = reduce(np.intersect1d, [own for own, _ in evaluated.values()])
+    steps = reduce(np.intersect1d, [run_steps for run_steps, _ in evaluated.values()])
     if not len(steps):
         return [], [*notes, f"{folders}: they have no step in common"]
-    if any(own[-1] > steps[-1] for own, _ in evaluated.values()):
+    if any(run_steps[-1] > steps[-1] for run_steps, _ in evaluated.values()):
         notes.append(f"{folders}: drawn to step {steps[-1]}, which all of them have reached")
-    values = np.array([means[np.isin(own, steps)] for own, means in evaluated.values()])
+    values = np.array([means[np.isin(run_steps, steps)] for run_steps, means in evaluated.values()])
     low, middle, high = np.percentile(values, (25, 50, 75), axis=0)
     curve = Curve(
         task=group.task, agent=group.agent, n_runs=len(evaluated),
@@ -142,7 +142,7 @@ def _curves_of_run(group: Group, run: Run, rows: Sequence[Row]) -> Iterator[Curv
         bounds = {}
         if kind == "evaluation" and len(steps):
             evaluations = (row["returns"] for row in rows if row["kind"] == "evaluation")
-            low, high = np.array([np.percentile(one, (25, 75)) for one in evaluations]).T
+            low, high = np.array([np.percentile(means, (25, 75)) for means in evaluations]).T
             bounds = {"low": low, "high": high}
         if len(steps):
             yield Curve(
@@ -156,10 +156,10 @@ def _series(rows: Sequence[Row], kind: Kind) -> tuple[NDArray[np.int64], NDArray
     wanted, name = "episode", "return"
     if kind == "evaluation":
         wanted, name = "evaluation", "mean_return"
-    own = [row for row in rows if row["kind"] == wanted]
-    steps = np.array([row["step"] for row in own], np.int64)
-    values = np.array([row[name] for row in own], np.float64)
+    matching = [row for row in rows if row["kind"] == wanted]
+    steps = np.array([row["step"] for row in matching], np.int64)
+    values = np.array([row[name] for row in matching], np.float64)
     if kind == "running median":
-        ends = range(1, len(values) + 1)
-        values = np.array([np.median(values[max(0, end - WINDOW) : end]) for end in ends])
+        lengths = range(1, len(values) + 1)
+        values = np.array([np.median(values[max(0, end - WINDOW) : end]) for end in lengths])
     return steps, values

@@ -59,9 +59,9 @@ def probe(planned: PlannedTrial) -> str:
 
 def probes_of(planned: Sequence[PlannedTrial]) -> list[tuple[bytes, str]]:
     """Make probes of the first trial of each kind; ClusterError if one cannot be sent."""
-    kinds = {(one.key.agent, one.spec.is_compiled): one for one in reversed(planned)}
+    kinds = {(trial.key.agent, trial.spec.is_compiled): trial for trial in reversed(planned)}
     try:
-        return [(pickle.dumps(one), probe(one)) for one in kinds.values()]
+        return [(pickle.dumps(trial), probe(trial)) for trial in kinds.values()]
     except Exception as error:  # of whatever settings an agent has
         raise ClusterError(f"trials cannot be sent to workers: {error}") from error
 
@@ -155,8 +155,8 @@ class DaskExecutor:
                 if time.monotonic() > end:
                     raise self.failure(f"no scheduler at {self.scheduler}: {error}") from error
             except ValueError as error:
-                words = f"an address or a scheduler file, got {self.scheduler} ({error})"
-                raise ClusterError(f"scheduler must be {words}") from error
+                expected = f"an address or a scheduler file, got {self.scheduler} ({error})"
+                raise ClusterError(f"scheduler must be {expected}") from error
             if not waits:
                 yield Noted(f"waiting for the scheduler at {self.scheduler}")
             waits = True
@@ -198,7 +198,7 @@ class _Run:
         self.executor = executor
         self.client = client
         self.probes = probes_of(planned)
-        self.waiting = deque((one, 1) for one in planned)  # with the number of the submission
+        self.waiting = deque((trial, 1) for trial in planned)  # with the number of the submission
         self.placed: dict[str, _Placed] = {}  # by key
         self.threads: dict[str, int] = {}  # of the workers that fit
         self.problems: dict[str, str] = {}  # why workers get no trials; "" where they fit
@@ -234,11 +234,11 @@ class _Run:
         """Admit new workers that fit, and take back what waits for lost ones only."""
         client = self.client
         threads = client.sync(client.scheduler.ncores, callback_timeout=ANSWER_SECONDS)
-        self.problems = {one: why for one, why in self.problems.items() if one in threads}
+        self.problems = {worker: why for worker, why in self.problems.items() if worker in threads}
         answers: dict[str, Any] = {}
-        if new := [one for one in threads if one not in self.problems]:
-            given = {"version": _core.__version__, "probes": self.probes}
-            answers = client.run(eval, MISMATCH, given, workers=new, on_error="return")
+        if new := [worker for worker in threads if worker not in self.problems]:
+            build = {"version": _core.__version__, "probes": self.probes}
+            answers = client.run(eval, MISMATCH, build, workers=new, on_error="return")
         for worker, answer in answers.items():
             if isinstance(answer, OSError):  # it was lost meanwhile
                 continue
@@ -247,7 +247,9 @@ class _Run:
             self.problems[worker] = answer and f"worker {worker} was refused, {answer}"
             if answer:
                 yield Noted(self.problems[worker])
-        self.threads = {one: n for one, n in threads.items() if self.problems.get(one) == ""}
+        self.threads = {
+            worker: n for worker, n in threads.items() if self.problems.get(worker) == ""
+        }
         for key, (trial, n, workers, future) in list(self.placed.items()):
             if workers.isdisjoint(self.threads):
                 del self.placed[key]
@@ -281,11 +283,11 @@ def ended(placed: _Placed, result: Any) -> Message:
 
     if placed.future.status == "finished":
         planned = placed.planned
-        given = (result.version, result.key, result.config)
-        if given != (_core.__version__, planned.key, planned.spec.canonical_json()):
+        identity = (result.version, result.key, result.config)
+        if identity != (_core.__version__, planned.key, planned.spec.canonical_json()):
             # Its worker began anew, with other code, after it had been admitted.
-            words = f"its worker's sdnn {result.version} ran other settings than were asked for"
-            return Failed(planned, ClusterError(words))
+            problem = f"its worker's sdnn {result.version} ran other settings than were asked for"
+            return Failed(planned, ClusterError(problem))
         return Finished(planned, result)
     if placed.future.status != "error":
         raise OSError("it does not know the trials any more")

@@ -317,7 +317,7 @@ class Team:
 
     def __init__(self, planned: Iterable[PlannedTrial]) -> None:
         self.trials: dict[PlannedTrial, Any] = {
-            one: one.spec.make_trial(one.key.seed) for one in planned
+            trial: trial.spec.make_trial(trial.key.seed) for trial in planned
         }
         self._n_decisions = dict.fromkeys(self.trials, 0)
         self._seconds = dict.fromkeys(self.trials, 0.0)
@@ -333,10 +333,10 @@ class Team:
         trials = tuple(self.trials.values())
         trials[0].advance_together(trials, n_decisions)
         seconds = time.thread_time() - begin
-        made = {one: t.n_decisions - self._n_decisions[one] for one, t in self.trials.items()}
-        for one, n in made.items():
-            self._n_decisions[one] += n
-            self._seconds[one] += seconds * n / sum(made.values())
+        n_new = {k: t.n_decisions - self._n_decisions[k] for k, t in self.trials.items()}
+        for key, n in n_new.items():
+            self._n_decisions[key] += n
+            self._seconds[key] += seconds * n / sum(n_new.values())
 
     def take_finished(self) -> Generator[Finished, None, None]:
         """Yield every trial that has come to its end, and let it go."""
@@ -366,16 +366,16 @@ def teams_of(planned: Iterable[PlannedTrial], jobs: int) -> Iterable[list[Planne
     Trials that are not faster together are teams of one.
     """
     by_task: dict[object, list[PlannedTrial]] = {}
-    for one in planned:
-        task: object = one.key
-        if _joins_a_team(one.spec):
-            task = one.spec.agent.name, one.spec.environment.paper_settings().acrobot
-        by_task.setdefault(task, []).append(one)
+    for trial in planned:
+        task: object = trial.key
+        if _joins_a_team(trial.spec):
+            task = trial.spec.agent.name, trial.spec.environment.paper_settings().acrobot
+        by_task.setdefault(task, []).append(trial)
     teams: dict[PlannedTrial, list[PlannedTrial]] = {}
     for alike in by_task.values():
         size = min(MOST_TOGETHER, -(-len(alike) // jobs))
         teams |= {alike[k]: alike[k : k + size] for k in range(0, len(alike), size)}
-    return [teams[one] for one in planned if one in teams]
+    return [teams[trial] for trial in planned if trial in teams]
 
 
 class ThreadExecutor:
@@ -424,8 +424,8 @@ def _run_team(
                     del left[finished.planned]
                 if stop.is_set():
                     break
-    for one in left:
-        _run_one(one, messages, stop)
+    for trial in left:
+        _run_one(trial, messages, stop)
 
 
 def _run_one(

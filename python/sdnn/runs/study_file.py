@@ -138,7 +138,7 @@ class StudyFile(ReportedStudy):
         if reference not in known:
             problem = f"no variant {reference!r}; {advice(reference, known)}"
             raise self.file.error(("study", "reference"), problem)
-        variants = tuple(sorted(variants, key=lambda one: one.id != reference))
+        variants = tuple(sorted(variants, key=lambda variant: variant.id != reference))
         pairs = [
             pair
             for pair in itertools.product(cases, variants)
@@ -149,8 +149,8 @@ class StudyFile(ReportedStudy):
             raise self.file.error(("variants",), problem)
         n_trials = header.trials if n_trials is None else n_trials
         if n_trials * len(pairs) > MOST_TRIALS:
-            given = f"{n_trials} of {len(pairs)} each"
-            problem = f"must be at most {MOST_TRIALS} in all, got {given}"
+            number = f"{n_trials} of {len(pairs)} each"
+            problem = f"must be at most {MOST_TRIALS} in all, got {number}"
             raise self.file.error(("study", "trials"), problem)
         super().__init__(
             header.title or path.stem,
@@ -182,8 +182,8 @@ class StudyFile(ReportedStudy):
 
         ConfigError if a setting is unknown, has the wrong type or does not go with another.
         """
-        own = (case.settings, variant.settings, variant.case_settings.get(case.id, {}))
-        settings = reduce(or_, (self.base, *own))
+        layers = (case.settings, variant.settings, variant.case_settings.get(case.id, {}))
+        settings = reduce(or_, (self.base, *layers))
         try:
             label = str(self._values(case, settings).get("agent", {}).get("name", DEFAULT_AGENT))
             try:
@@ -191,7 +191,7 @@ class StudyFile(ReportedStudy):
             except ValueError:  # refused with the specification
                 names = []
             agents = (self.agents.get(name, {}) for name in names)
-            settings = reduce(or_, (self.base, *agents, *own))
+            settings = reduce(or_, (self.base, *agents, *layers))
             return RunSpec.from_values(self._values(case, settings)), settings
         except ConfigError as error:
             raise self.refusal(case, variant, settings, error) from error
@@ -210,10 +210,10 @@ class StudyFile(ReportedStudy):
         """Make the error about a variant in a case, at the setting that has the error's key."""
         text = f"{error.problem} (case {case.id}, variant {variant.id})"
         name = tuple(error.key.partition("[")[0].split("."))
-        for own in (name, *settings):
-            if own in settings and (own[: len(name)] == name or name[: len(own)] == own):
-                return self.file.error(settings[own].where, text)
-        near = [setting.where for own, setting in settings.items() if own[0] == name[0]]
+        for key in (name, *settings):
+            if key in settings and (key[: len(name)] == name or name[: len(key)] == key):
+                return self.file.error(settings[key].where, text)
+        near = [setting.where for key, setting in settings.items() if key[0] == name[0]]
         where = next(iter(near), variant.where or case.where)
         return ConfigError(error.key, text, self.file.place(where))
 
@@ -228,33 +228,33 @@ class StudyFile(ReportedStudy):
 
     def _layer(self, where: KeyPath, table: Mapping[str, object]) -> Layer:
         """Read a table of settings: nested, with dotted keys, or with quoted dotted keys."""
-        found: Layer = {}
-        self._collect(where, table, (), found)
-        return found
+        layer: Layer = {}
+        self._collect(where, table, (), layer)
+        return layer
 
     def _collect(
-        self, where: KeyPath, table: Mapping[str, object], prefix: tuple[str, ...], found: Layer
+        self, where: KeyPath, table: Mapping[str, object], prefix: tuple[str, ...], layer: Layer
     ) -> None:
         for key, value in table.items():
             name, place = (*prefix, *key.split(".")), (*where, key)
             depth = _DEPTHS.get(name[:2], 2)
             if isinstance(value, dict) and len(name) < depth:
-                self._collect(place, value, name, found)
+                self._collect(place, value, name, layer)
                 continue
             if len(name) > depth:
-                words = "SECTION.NAME, or environment.kwargs.NAME"
-                raise self.file.error(place, f"must be {words}, got {'.'.join(name)}")
+                expected = "SECTION.NAME, or environment.kwargs.NAME"
+                raise self.file.error(place, f"must be {expected}, got {'.'.join(name)}")
             if name[0] in ("seed", "output"):
                 raise self.file.error(place, "is no setting of a study: see [study]")
             if len(name) == 1:
                 if name[0] not in SHORTHANDS:
                     raise self.file.error(place, f"must be a table, got {value!r}")
                 name = (*name, SHORTHANDS[name[0]])
-            if name in found:
+            if name in layer:
                 raise self.file.error(place, f"{'.'.join(name)} is set twice")
-            if len(found) == MOST_SETTINGS:
+            if len(layer) == MOST_SETTINGS:
                 raise self.file.error(where, f"must have at most {MOST_SETTINGS} settings")
-            found[name] = Setting(value, place)
+            layer[name] = Setting(value, place)
 
     def _import(self) -> None:
         search_folder(self.file.path.resolve().parent)
@@ -294,7 +294,9 @@ class StudyFile(ReportedStudy):
             if case_id not in ids:
                 raise self.file.error(("cases", case_id), "is not among the cases of [study]")
         if ids:
-            return tuple(self._read_case(one, known_cases.get(one)) for one in dict.fromkeys(ids))
+            return tuple(
+                self._read_case(case_id, known_cases.get(case_id)) for case_id in dict.fromkeys(ids)
+            )
         if ("environment", "id") in self.base:
             # A place for the only task there is.
             name = str(self.base["environment", "id"].value)
@@ -316,13 +318,13 @@ class StudyFile(ReportedStudy):
         fixed = {tuple(name.split(".")): value for name, value in known.settings.items()}
         for name, setting in settings.items():
             if setting.value != fixed.get(name, setting.value):
-                words = ", ".join(f"{key} = {value}" for key, value in known.settings.items())
+                texts = (f"{key} = {value}" for key, value in known.settings.items())
                 raise self.file.error(
                     setting.where,
-                    f"{case_id} is a case with {words}: give another one another name",
+                    f"{case_id} is a case with {', '.join(texts)}: give another one another name",
                 )
-        own = {name: Setting(value, where) for name, value in fixed.items()}
-        return StudyCase(case_id, title, own | settings, where)
+        fixed_settings = {name: Setting(value, where) for name, value in fixed.items()}
+        return StudyCase(case_id, title, fixed_settings | settings, where)
 
     def _read_variants(self, cases: Sequence[StudyCase]) -> tuple[StudyVariant, ...]:
         variants: dict[str, StudyVariant] = {}
@@ -348,8 +350,8 @@ class StudyFile(ReportedStudy):
             variants[name] = StudyVariant(name, title, settings, where, in_cases, only)
         for variant in self._axis_variants():
             if variant.id in variants:
-                words = f"there is a variant {variant.id!r} already"
-                raise self.file.error(variant.where, words)
+                problem = f"there is a variant {variant.id!r} already"
+                raise self.file.error(variant.where, problem)
             variants[variant.id] = variant
         return tuple(variants.values()) or (StudyVariant(BASE, BASE),)
 
@@ -369,8 +371,8 @@ class StudyFile(ReportedStudy):
                 raise self.file.error(("axes", "combine"), problem)
             for chosen in itertools.product(*values):
                 layer = {name: setting for _, part in chosen for name, setting in part.items()}
-                words = ", ".join(word for word, _ in chosen)
-                yield StudyVariant(words, words, layer, ("axes",))
+                label = ", ".join(word for word, _ in chosen)
+                yield StudyVariant(label, label, layer, ("axes",))
             return
         yield StudyVariant(BASE, BASE, {}, ("axes",))
         for word, layer in itertools.chain.from_iterable(values):
@@ -385,8 +387,8 @@ class StudyFile(ReportedStudy):
         shown = name[:1] if name == ("agent", "name") else name
         word = shown[-1] if lasts[name[-1]] == 1 else ".".join(shown)
         texts = (v if isinstance(v, str) else json.dumps(v, default=str) for v in axis.value)
-        words = [f"{word}={text}" for text in texts]
-        if len(set(words)) < len(words):
+        labels = [f"{word}={text}" for text in texts]
+        if len(set(labels)) < len(labels):
             raise self.file.error(axis.where, f"must be different values, got {axis.value!r}")
         for number, value in enumerate(axis.value):
-            yield words[number], {name: Setting(value, (*axis.where, number))}
+            yield labels[number], {name: Setting(value, (*axis.where, number))}
