@@ -207,7 +207,7 @@ SHIPPED = (
     r"cpp/include/sdnn/([a-z_]+/){0,2}[a-z0-9_]+\.hpp",
     r"cpp/compiled/[a-z_]+\.cpp|cpp/tools/[a-z_]+\.hpp|cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
     r"python/sdnn/([a-z_]+/){0,2}[a-z_]+\.pyi?|python/sdnn/py\.typed",
-    r"python/sdnn/(cli/[a-z]+\.txt|page\.(html|md))\.jinja|cpp/c/sdnn_[a-z_]+\.h",
+    r"python/sdnn/(cli/[a-z]+\.txt|reports/page\.(html|md))\.jinja|cpp/c/sdnn_[a-z_]+\.h",
     r"python/sdnn/runs/schema\.sql|python/sdnn/reproduction/(claims\.toml|reference-results\.csv)",
     r"(tests|bench|docs)/.*\.(py|c|cpp|hpp|ino|conf|txt|md|json|csv|png|gif|svg|css|toml|ipynb|bin|safetensors)",
 )
