@@ -32,7 +32,7 @@ void bind_agents(py::module_& module) {
   bindings::bind_config<agents::EpsilonGreedyConfig>(
       module, "EpsilonGreedyConfig",
       "The parameters of the policy; the defaults are the paper's (section 4.2).");
-  py::class_<agents::EpsilonGreedy>(module, "EpsilonGreedy", "The policy, over rows of values")
+  bindings::Class<agents::EpsilonGreedy>(module, "EpsilonGreedy", "The policy, over rows of values")
       .def(py::init<const agents::EpsilonGreedyConfig&, std::uint64_t>(), py::arg("config"),
            py::arg("seed"))
       .def(
@@ -79,7 +79,7 @@ void bind_agents(py::module_& module) {
       },
       "The presets of Q(lambda), by name");
 
-  py::class_<agents::FixedRate>(module, "FixedRate", "Waits for ticks at a fixed rate")
+  bindings::Class<agents::FixedRate>(module, "FixedRate", "Waits for ticks at a fixed rate")
       .def(py::init<double, agents::FixedRate::Clock, agents::FixedRate::Sleep>(), py::arg("hz"),
            py::arg("clock"), py::arg("sleep"))
       .def("wait", &agents::FixedRate::wait, "Waits for the next tick and returns its number")

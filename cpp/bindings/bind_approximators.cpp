@@ -124,7 +124,7 @@ py::array_t<double> output_values(const SDNNC& network) {
 /// Binds the members of all networks that give Q(s, a) for every action.
 template <class Network>
 py::class_<Network> bind_network(py::module_& module, const char* name, const char* doc) {
-  return py::class_<Network>(module, name, doc)
+  return bindings::Class<Network>(module, name, doc)
       .def_property_readonly("config", [](const Network& net) { return net.config(); })
       .def_property_readonly("n_actions", &Network::n_actions)
       .def(
@@ -153,7 +153,7 @@ void bind_fuzzy_rules(py::module_& module) {
       module, "FuzzyRulesConfig",
       "The sizes of a table of fuzzy rules; the defaults are the paper's.");
 
-  py::class_<FuzzyRules>(module, "FuzzyRules", "Rules over a grid of triangular sets")
+  bindings::Class<FuzzyRules>(module, "FuzzyRules", "Rules over a grid of triangular sets")
       .def(py::init<const FuzzyRulesConfig&>(), py::arg("config"))
       .def_property_readonly("n_rules", &FuzzyRules::n_rules)
       .def(
@@ -182,8 +182,8 @@ void bind_linear_sdnn(py::module_& module) {
       module, "LinearSDNNConfig",
       "Everything that defines a linear readout of the SDNN code; not in the paper.");
 
-  py::class_<LinearSDNN> linear(module, "LinearSDNN",
-                                "Q(s, a) linear in the SDNN code, in integers");
+  bindings::Class<LinearSDNN> linear(module, "LinearSDNN",
+                                     "Q(s, a) linear in the SDNN code, in integers");
   bind_code(linear);
   linear
       .def(py::init([](const LinearSDNNConfig& config, const std::vector<std::size_t>& n_actions,

@@ -112,8 +112,8 @@ void bind_coding(py::module_& module) {
             n_units, values, static_cast<std::size_t>(correlations.shape(0)), random));
       },
       py::arg("n_units"), py::arg("correlations"), py::arg("seed"));
-  py::class_<Code, std::shared_ptr<Code>>(module, "SelectiveDesensitization",
-                                          "The desensitized code of a sample, from its bins")
+  bindings::Class<Code, std::shared_ptr<Code>>(module, "SelectiveDesensitization",
+                                               "The desensitized code of a sample, from its bins")
       .def(py::init(&make_code), py::arg("modified"), py::arg("modifiers"), py::arg("pairs"))
       .def_property_readonly("n_inputs", &Code::n_inputs)
       .def_property_readonly("n_pairs", &Code::n_pairs)

@@ -323,7 +323,7 @@ pybind11::class_<Config> bind_config(pybind11::module_& module, const char* name
   namespace py = pybind11;
   const Config defaults;
   const auto fields = fields_of(defaults);
-  py::class_<Config> type(module, name, docstring(doc, fields).c_str());
+  bindings::Class<Config> type(module, name, docstring(doc, fields).c_str());
   type.def(py::init([](const py::kwargs& values) { return changed(Config{}, values); }));
   for (std::size_t i = 0; i < fields.size(); ++i) {
     type.def_property_readonly(

@@ -167,7 +167,7 @@ void bind_controller(py::module_& module) {
   const auto ends_of = [array_of](const Controller& self) {
     return std::pair(array_of(self.observations().low()), array_of(self.observations().high()));
   };
-  py::class_<Controller> type(module, "Controller", "An agent in the units of its task");
+  bindings::Class<Controller> type(module, "Controller", "An agent in the units of its task");
   type.attr("fields") = bindings::described_fields(bindings::fields_of(ControllerConfig{}));
   type.def(py::init([config_of](const agents::AnyApproximatorConfig& approximator,
                                 const agents::AnyLearningConfig& learning, std::uint64_t seed,

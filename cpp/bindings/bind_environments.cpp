@@ -53,7 +53,8 @@ void bind_goal_schedule(py::module_& module) {
   bindings::bind_config<GoalScheduleConfig>(
       module, "GoalScheduleConfig",
       "How the goal tolerance lambda(k) falls with the learning episode k (section 4.1).");
-  py::class_<GoalSchedule>(module, "GoalSchedule", "lambda as a function of the learning episode")
+  bindings::Class<GoalSchedule>(module, "GoalSchedule",
+                                "lambda as a function of the learning episode")
       .def(py::init<const GoalScheduleConfig&>(), py::arg("config"))
       .def("__call__", &GoalSchedule::operator(), py::arg("episode"));
 }
@@ -63,7 +64,7 @@ void bind_acrobot(py::module_& module) {
       module, "AcrobotConfig",
       "The numbers of the acrobot's task; the defaults are the paper's (section 4.1).");
 
-  py::class_<Acrobot>(module, "Acrobot", "Dynamics, reward and episode end of the acrobot")
+  bindings::Class<Acrobot>(module, "Acrobot", "Dynamics, reward and episode end of the acrobot")
       .def(py::init<const AcrobotConfig&>(), py::arg("config"))
       .def("reset", &Acrobot::reset)
       .def(
@@ -98,7 +99,7 @@ void bind_acrobot_batch(py::module_& module) {
       return result;
     };
   };
-  py::class_<AcrobotBatch>(module, "AcrobotBatch", "Many acrobots in step, in vector lanes")
+  bindings::Class<AcrobotBatch>(module, "AcrobotBatch", "Many acrobots in step, in vector lanes")
       .def(py::init<const AcrobotConfig&, std::size_t>(), py::arg("config"), py::arg("n_acrobots"))
       .def("__len__", &AcrobotBatch::size)
       .def(
@@ -150,7 +151,7 @@ void bind_sensors(py::module_& module) {
       py::arg("state"), "s1..s4 of a state");
   module.def("energy_sensor", &energy_sensor, py::arg("s3"), py::arg("s4"));
   module.def("height_sensor", &height_sensor, py::arg("s1"), py::arg("s2"));
-  py::class_<SensorNoise>(module, "SensorNoise", "Gaussian noise on every channel")
+  bindings::Class<SensorNoise>(module, "SensorNoise", "Gaussian noise on every channel")
       .def(py::init<double, std::vector<SensorEdge>, std::uint64_t, core::Stream>(),
            py::arg("sigma"), py::arg("edges"), py::arg("seed"), py::arg("stream"))
       .def(
@@ -167,7 +168,7 @@ void bind_sensors(py::module_& module) {
   bindings::bind_config<SensorConfig>(module, "SensorConfig",
                                       "What the agent observes (section 4.3).")
       .def_property_readonly("n_inputs", &SensorConfig::n_inputs, "Numbers in an observation.");
-  py::class_<AcrobotSensors>(module, "AcrobotSensors", "s1..s4, s5 and s6 with their noise")
+  bindings::Class<AcrobotSensors>(module, "AcrobotSensors", "s1..s4, s5 and s6 with their noise")
       .def(py::init<const SensorConfig&, std::uint64_t, core::Stream>(), py::arg("config"),
            py::arg("seed"), py::arg("stream"))
       .def(

@@ -14,6 +14,9 @@
 #include "sdnn/estimators/parallel_perceptron.hpp"
 #include "sdnn/estimators/trainer.hpp"
 
+template <class Rule>
+constexpr bool sdnn::bindings::kIsComposed<sdnn::estimators::Trainer<Rule>> = false;
+
 namespace py = pybind11;
 using namespace sdnn;
 using bindings::ArrayArgument;
@@ -161,7 +164,7 @@ std::pair<std::size_t, std::size_t> present_online(estimators::OnlineLayer& laye
 
 void bind_online_layer(py::module_& module) {
   using estimators::OnlineLayer;
-  py::class_<OnlineLayer>(
+  bindings::Class<OnlineLayer>(
       module, "OnlineLayer",
       "Weights in bytes, for samples that come one at a time; the layer lags behind")
       .def(py::init<std::shared_ptr<ParallelPerceptron>>(), py::arg("layer"))
@@ -229,7 +232,7 @@ void bind_trainer_methods(py::class_<Trainer, std::shared_ptr<Trainer>>& trainer
 }  // namespace
 
 void bind_estimators(py::module_& module) {
-  py::class_<ParallelPerceptron, std::shared_ptr<ParallelPerceptron>>(
+  bindings::Class<ParallelPerceptron, std::shared_ptr<ParallelPerceptron>>(
       module, "ParallelPerceptron", "Units over a code, with integer weights")
       .def(py::init(&make_layer), py::arg("code"), py::arg("n_units"), py::arg("seed") = 0,
            py::arg("weights") = py::none(), py::arg("thresholds") = py::none(),
@@ -259,7 +262,7 @@ void bind_estimators(py::module_& module) {
       py::arg("scheme"), py::arg("n_classes"), "Units that separate so many classes");
 
   using estimators::PDeltaTrainer;
-  py::class_<PDeltaTrainer, std::shared_ptr<PDeltaTrainer>> p_delta(
+  bindings::Class<PDeltaTrainer, std::shared_ptr<PDeltaTrainer>> p_delta(
       module, "PDeltaTrainer", "Trains groups of units to fire in given numbers");
   p_delta.def(
       py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
@@ -276,7 +279,7 @@ void bind_estimators(py::module_& module) {
   bind_trainer_methods(p_delta);
 
   using estimators::PerceptronTrainer;
-  py::class_<PerceptronTrainer, std::shared_ptr<PerceptronTrainer>> perceptron(
+  bindings::Class<PerceptronTrainer, std::shared_ptr<PerceptronTrainer>> perceptron(
       module, "PerceptronTrainer", "Trains units to separate classes");
   perceptron.def(
       py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,

@@ -93,9 +93,10 @@ py::typing::Dict<py::str, py::int_> cache_counts(const Trial& trial) {
 
 void bind_bare_agent(py::module_& module) {
   using tools::BareAgent;
-  py::class_<BareAgent>(module, "BareAgent",
-                        "An agent of any kind without a task: states in [0, 1], actions as indices "
-                        "or, of fuzzy rules, numbers in [-1, 1]")
+  bindings::Class<BareAgent>(
+      module, "BareAgent",
+      "An agent of any kind without a task: states in [0, 1], actions as indices "
+      "or, of fuzzy rules, numbers in [-1, 1]")
       .def(py::init([](const agents::AnyApproximatorConfig& approximator,
                        const agents::AnyLearningConfig& learning, std::uint64_t seed,
                        const std::vector<std::size_t>& n_actions) {
@@ -131,7 +132,7 @@ void bind_bare_agent(py::module_& module) {
 }
 
 void bind_trial(py::module_& module) {
-  py::class_<Trial>(module, "AcrobotTrial", "An agent learns the acrobot swing-up")
+  bindings::Class<Trial>(module, "AcrobotTrial", "An agent learns the acrobot swing-up")
       .def(py::init([](const agents::AnyApproximatorConfig& approximator,
                        const agents::AnyLearningConfig& learning, const AcrobotConfig& acrobot,
                        const GoalScheduleConfig& goal, const SensorConfig& sensors,
@@ -185,9 +186,9 @@ void bind_trials(py::module_& module) {
   bind_trial(module);
   def_time_agent_steps<tools::BareAgent>(module);
 
-  py::class_<PlainRBFAgent>(module, "PlainRBFQLearning",
-                            "Q-learning with an RBF network evaluated without its product "
-                            "structure; only to be timed")
+  bindings::Class<PlainRBFAgent>(module, "PlainRBFQLearning",
+                                 "Q-learning with an RBF network evaluated without its product "
+                                 "structure; only to be timed")
       .def(py::init([](const RBFNetworkConfig& approximator, const QLearningConfig& learning,
                        std::uint64_t seed) {
              return PlainRBFAgent(PlainRBFNetwork(approximator), learning, seed);
@@ -200,7 +201,8 @@ void bind_trials(py::module_& module) {
 }
 
 void bind_times(py::module_& module) {
-  py::class_<tools::DenseProduct>(module, "DenseProduct", "A dense float32 matrix-vector product")
+  bindings::Class<tools::DenseProduct>(module, "DenseProduct",
+                                       "A dense float32 matrix-vector product")
       .def(py::init<std::size_t, std::size_t, std::uint64_t>(), py::arg("n_rows"),
            py::arg("n_columns"), py::arg("seed"))
       .def(
@@ -209,7 +211,7 @@ void bind_times(py::module_& module) {
             return bindings::times_of(product, [&] { return product.run(n); });
           },
           py::arg("n_repetitions"), "Nanoseconds per product: (n_repetitions,)");
-  py::class_<tools::NetworkParts>(module, "NetworkParts", "The network's parts of a decision")
+  bindings::Class<tools::NetworkParts>(module, "NetworkParts", "The network's parts of a decision")
       .def(py::init<SDNNC, std::uint64_t>(), py::arg("network"), py::arg("seed"),
            "Times a copy of the network")
       .def(
@@ -239,8 +241,8 @@ void bind_times(py::module_& module) {
           },
           py::arg("n_repetitions"), py::arg("n_selections"), py::arg("n_selected"),
           "n_selections selections of units per repetition");
-  py::class_<tools::AcrobotDecisions>(module, "AcrobotDecisions",
-                                      "The acrobot under random torques")
+  bindings::Class<tools::AcrobotDecisions>(module, "AcrobotDecisions",
+                                           "The acrobot under random torques")
       .def(py::init<const environments::AcrobotConfig&, std::uint64_t>(), py::arg("config"),
            py::arg("seed"))
       .def_property_readonly("n_integration_steps", &tools::AcrobotDecisions::n_integration_steps)

@@ -17,24 +17,28 @@
 #include <utility>
 #include <vector>
 
-// Declared only to be found by the arguments' namespaces.
-namespace sdnn::agents {
+// Declared only to be found by the arguments' namespaces: one function, so that a class that is
+// made of classes of several of them finds no two.
+namespace sdnn::library {
 void is_of_library(const void*);
+}
+namespace sdnn::agents {
+using library::is_of_library;
 }
 namespace sdnn::approximators {
-void is_of_library(const void*);
+using library::is_of_library;
 }
 namespace sdnn::coding {
-void is_of_library(const void*);
+using library::is_of_library;
 }
 namespace sdnn::environments {
-void is_of_library(const void*);
+using library::is_of_library;
 }
 namespace sdnn::estimators {
-void is_of_library(const void*);
+using library::is_of_library;
 }
 namespace sdnn::tools {
-void is_of_library(const void*);
+using library::is_of_library;
 }
 
 namespace sdnn::bindings {
@@ -50,6 +54,10 @@ inline constexpr bool kIsComposed<Template<Types...>> = true;
 template <class T>
 concept LibraryClass =
     std::is_class_v<T> && !kIsComposed<T> && requires(T* object) { is_of_library(object); };
+
+/// A class of the library in Python. Others do not compile: their objects would not be checked.
+template <LibraryClass T, class... Options>
+using Class = pybind11::class_<T, Options...>;
 
 /// Memory that a call reads or changes without the GIL. The GIL guards the list of them.
 struct Use {

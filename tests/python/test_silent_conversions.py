@@ -8,6 +8,7 @@ from sdnn.agents import RBFQLearning, Transition
 from sdnn.coding import RandomInverse
 from sdnn.coding.kernel import AnalyticKernel
 from sdnn.environments import AcrobotSwingUpVectorEnv, NoisySensors, RedundantSensors, UnitSensors
+from sdnn.runs import RunSpec, trial_seed
 from sdnn.runs.settings import checked
 
 OTHERS = {
@@ -103,3 +104,21 @@ def test_settings_are_numbers_of_their_kind(kind):
     for word, value in {**NUMBERS, **BOOLS, "not finite": np.nan}.items():
         with pytest.raises(Exception, match="must be"):
             assert checked(kind, value, "key") is None, word
+
+
+def test_fields_of_runs_are_of_their_type():
+    for given in (
+        {"environment": 5}, {"agent": 5}, {"budget": 5}, {"budget": {"target_return": np.nan}},
+        {"budget": {"target_return": "abc"}}, {"output": {"tensorboard": "yes"}},
+        {"learning": 5}, {"approximator": []}, {"output": True}, {"protocol": "abc"},
+    ):  # fmt: skip
+        with pytest.raises(Exception, match=next(iter(given))):
+            RunSpec(**{"environment": "CartPole-v1"} | given)
+
+
+def test_seeds_of_trials_are_whole_numbers():
+    for value in (*NUMBERS.values(), *BOOLS.values(), 0.5, 1.0, [1]):
+        with pytest.raises(ValueError, match="root_seed"):
+            trial_seed(value, "s4", 0)
+        with pytest.raises(ValueError, match=r"\btrial\b"):
+            trial_seed(0, "s4", value)

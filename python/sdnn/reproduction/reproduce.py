@@ -214,7 +214,8 @@ def case_spec(case: Case, agent: str, n_episodes: int = PAPER_EPISODES) -> RunSp
     """
     one_of("agent", agent, case.agents)
     split_label(agent)
-    settings = {**case.settings, "agent.name": agent, "budget.episodes": n_episodes}
+    episodes = whole("episodes", n_episodes, 1, 2**53)
+    settings = {**case.settings, "agent.name": agent, "budget.episodes": episodes}
     return paper_spec(**overridden({}, settings))
 
 

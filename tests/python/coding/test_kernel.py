@@ -76,3 +76,10 @@ def test_it_can_be_drawn(coding, tmp_path):
     figure = kernel.plot_similarity(coding, n_units=200)
     figure.savefig(tmp_path / "similarity.png")
     assert (tmp_path / "similarity.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize("bad", [np.zeros((3, 1)), np.zeros((3, 3)), np.zeros(2)])
+def test_samples_of_another_shape_are_refused(bad):
+    analytic = kernel.AnalyticKernel("anchor", n_inputs=2)
+    refuses("X", analytic, bad)
+    refuses("Y", analytic, np.zeros((1, 2)), bad)

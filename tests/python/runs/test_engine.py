@@ -6,6 +6,7 @@ import time
 import pytest
 from rich.console import Console
 
+from refusals import refuses
 from sdnn.reproduction import EXPERIMENTS, plan_trials
 from sdnn.runs import ResultStore, StoreError, WorkerLostError, run_trials
 from sdnn.runs.engine import (
@@ -202,6 +203,10 @@ def test_unwritable_store_stops_the_run(tmp_path, fake, use_trial):
     with Full(tmp_path) as store, pytest.raises(StoreError, match="disk full"):
         run_trials(fake.make_plan(10, 50), store, executor=ThreadExecutor(1))
     assert len(made) < 20
+
+
+def test_jobs_must_be_positive():
+    refuses("jobs", ThreadExecutor, 0)
 
 
 class Scripted:
