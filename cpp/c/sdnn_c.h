@@ -163,27 +163,27 @@ static inline sdnn_transition* sdnn_waiting(sdnn_agent* agent, uint32_t i) {
 /* The state with these bins, in the place of the one that was not used for longest. */
 static inline sdnn_state* sdnn_state_of(sdnn_agent* agent, const uint32_t* bins) {
   const sdnn_state* const from = &agent->states[agent->latest];
-  sdnn_state* found = 0;
+  sdnn_state* chosen = 0;
   uint32_t i, j;
   for (i = 0; i < SDNN_N_STATES; ++i) {
     sdnn_state* const state = &agent->states[i];
     uint32_t is_free = 1, is_same = state->last_use > 0;
     for (j = 0; j < SDNN_N_INPUTS; ++j) is_same &= state->code.bins[j] == bins[j];
     if (is_same) {
-      found = state;
+      chosen = state;
       break;
     }
     for (j = 0; j < agent->n_waiting; ++j) is_free &= sdnn_waiting(agent, j)->state != i;
-    if (is_free && (!found || state->last_use < found->last_use)) found = state;
+    if (is_free && (!chosen || state->last_use < chosen->last_use)) chosen = state;
   }
   if (i == SDNN_N_STATES) {
-    sdnn_encode(&sdnn_the_coding, bins, &found->code);
-    sdnn_evaluate(agent, found, from == found || from->last_use == 0 ? 0 : from);
+    sdnn_encode(&sdnn_the_coding, bins, &chosen->code);
+    sdnn_evaluate(agent, chosen, from == chosen || from->last_use == 0 ? 0 : from);
   }
   if (++agent->clock == 0) agent->clock = 1;
-  found->last_use = agent->clock;
-  agent->latest = (uint32_t)(found - agent->states);
-  return found;
+  chosen->last_use = agent->clock;
+  agent->latest = (uint32_t)(chosen - agent->states);
+  return chosen;
 }
 
 /* Whether a potential, which is far above -2^31, is above 0. */

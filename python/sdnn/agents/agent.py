@@ -123,8 +123,8 @@ class Agent(BaseAgent[Approximator, Learning]):
         self._check_environment(environment)
         variables = self._observations.vector("observation", observation)
         allowed = self._actions.mask("mask", mask)
-        taken = self._controller.act(variables, explore, environment, allowed)
-        return self._actions.elements(taken)[0]
+        numbers = self._controller.act(variables, explore, environment, allowed)
+        return self._actions.elements(numbers)[0]
 
     def flat_observation(self, observation: Any) -> NDArray[np.float64]:
         """Return the observed variables as a vector, shape (n_variables,), in their own units.
@@ -198,10 +198,10 @@ class Agent(BaseAgent[Approximator, Learning]):
 
     def core_parts(self) -> tuple[Any, ...] | None:
         """Return the core and functions around it, unless `act` or `learn` has been replaced."""
-        own = [getattr(method, "__func__", None) for method in (self.act, self.learn)]
+        functions = [getattr(method, "__func__", None) for method in (self.act, self.learn)]
         actions = self._actions
         parts = self._controller, self._observations.rows, actions.elements, actions.mask
-        return parts if own == [Agent.act, Agent.learn] else None
+        return parts if functions == [Agent.act, Agent.learn] else None
 
     @explained
     def predict(
@@ -240,7 +240,9 @@ class Agent(BaseAgent[Approximator, Learning]):
         expected = f"be one for each of {len(several)} observations"
         require(are_as_many, "action_masks", expected, action_masks)
         pairs = zip(several, masks, strict=True)
-        return np.stack([self._masked_action(one, explore, mask) for one, mask in pairs]), None
+        return np.stack(
+            [self._masked_action(element, explore, mask) for element, mask in pairs]
+        ), None
 
     def _masked_action(self, observation: Any, explore: bool, mask: Any) -> Any:
         try:

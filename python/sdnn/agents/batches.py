@@ -31,6 +31,6 @@ def unbatched(space: gym.Space[Any], observation: Any) -> Sequence[Any] | None:
 def _columns(parts: Iterable[tuple[gym.Space[Any], Any]]) -> list[Sequence[Any]] | None:
     """Return the elements of each part of a batch; None if these are not equally many."""
     columns = [unbatched(space, part) for space, part in parts]
-    found = [column for column in columns if column is not None]
-    is_batch = len(found) == len(columns) and len({len(column) for column in found}) == 1
-    return found if is_batch else None
+    present = [column for column in columns if column is not None]
+    is_batch = len(present) == len(columns) and len({len(column) for column in present}) == 1
+    return present if is_batch else None

@@ -172,8 +172,8 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         return {
             "left_out": [i for i in range(len(use)) if i not in inside],
             "fitted": [i for i, ends in enumerate(ranges) if ends != declared[i]],
-            "share_of_range": [one and one[0] for one in use],
-            "share_beyond_range": [one and one[1] for one in use],
+            "share_of_range": [shares and shares[0] for shares in use],
+            "share_beyond_range": [shares and shares[1] for shares in use],
         }
 
 

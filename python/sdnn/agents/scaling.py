@@ -60,8 +60,8 @@ class Scaling:
         """Return it as a line of text."""
         most = 8
         ranges = [f"{i} from {low:.6g} to {high:.6g}" for i, (low, high) in enumerate(self.ranges)]
-        words = ", ".join(ranges[:most]) + (", ..." if len(ranges) > most else "")
-        return words + (f", and means of neighbours ({self.n_redundant})" * (self.n_redundant > 0))
+        text = ", ".join(ranges[:most]) + (", ..." if len(ranges) > most else "")
+        return text + (f", and means of neighbours ({self.n_redundant})" * (self.n_redundant > 0))
 
     def lines(self) -> Iterator[str]:
         """Yield a line about each observed number."""

@@ -129,8 +129,10 @@ def measure_network(n_inputs: int, effort: Effort) -> dict[str, object]:
         "selection": lambda n: parts.time_selections(n, SELECTIONS_PER_REPETITION, N_CORRECTED),
     }
     n_parts = {"selection": SELECTIONS_PER_REPETITION}
-    taken = in_turns(runs, effort)
-    times = {name: spread(one, n_parts.get(name, 1)) for name, one in taken.items()}
+    times_by_name = in_turns(runs, effort)
+    times = {
+        name: spread(run_times, n_parts.get(name, 1)) for name, run_times in times_by_name.items()
+    }
     # Afterwards, because corrections change the weights.
     corrections = in_turns(
         {"correction": lambda n: parts.time_corrections(n, N_CORRECTED)}, effort

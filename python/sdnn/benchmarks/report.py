@@ -42,9 +42,9 @@ def tables(results: Results) -> list[Table]:
             f" {decisions[0]['n_runs']} runs",
             ("inputs, noise", "decisions", "mean", "p50", "p99", "max", "max / p50"),
             [
-                (f"{one['n_inputs']}, {one['noise']:g}", f"{one['n_decisions']:,}",
-                 *(f"{one[name]:.1f}" for name in ("mean", "p50", "p99", "max", "max_over_p50")))
-                for one in decisions
+                (f"{times['n_inputs']}, {times['noise']:g}", f"{times['n_decisions']:,}",
+                 *(f"{times[name]:.1f}" for name in ("mean", "p50", "p99", "max", "max_over_p50")))
+                for times in decisions
             ],
         ),
         Table(

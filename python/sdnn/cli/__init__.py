@@ -36,8 +36,8 @@ def _print_version(context: click.Context, _parameter: click.Parameter, value: b
         from sdnn.support.machine import build
 
         _check_instruction_set()
-        for name, found in build().items():
-            click.echo(f"{name} {found}")
+        for name, text in build().items():
+            click.echo(f"{name} {text}")
         context.exit()
 
 
@@ -48,9 +48,9 @@ def _print_cmake_dir(context: click.Context, _parameter: click.Parameter, value:
 
     # An editable install has two folders: the sources and the installed files.
     for folder in sdnn.__path__:
-        found = Path(folder) / "share" / "cmake" / "sdnn"
-        if found.is_dir():
-            click.echo(found)
+        cmake_folder = Path(folder) / "share" / "cmake" / "sdnn"
+        if cmake_folder.is_dir():
+            click.echo(cmake_folder)
             context.exit()
     raise click.ClickException("this copy of sdnn has no CMake package; install it with pip")
 

@@ -344,12 +344,12 @@ def _print_forecast(study: ReportedStudy, out: Path, jobs: int, *, as_json: bool
     from sdnn.reports.pages import duration_words
     from sdnn.runs.forecast import forecast
 
-    found = forecast(study, out, jobs)
+    estimate = forecast(study, out, jobs)
     if as_json:
-        click.echo(json.dumps(found, indent=2))
+        click.echo(json.dumps(estimate, indent=2))
     else:
-        words = rendered("forecast.txt.jinja", out=out, duration=duration_words, **found)
-        click.echo(words, nl=bool(words))
+        text = rendered("forecast.txt.jinja", out=out, duration=duration_words, **estimate)
+        click.echo(text, nl=bool(text))
 
 
 def make_console() -> Console:
@@ -411,9 +411,9 @@ def trial_options(command: Function) -> Function:
     @functools.wraps(command)
     def wrapped(*arguments: object, where: str, jobs: int | None, **options: Any) -> object:
         of_dask = {name: options.pop(name) for name in _OF_DASK}
-        given = {name: value for name, value in of_dask.items() if value is not None}
+        options_of_dask = {name: value for name, value in of_dask.items() if value is not None}
         ways = {name: options.pop(name) for name in ("out", "as_json", "full", "dry_run")}
-        ways["executor"] = _make_executor(where, jobs, given)
+        ways["executor"] = _make_executor(where, jobs, options_of_dask)
         return command(*arguments, ways=ways, **options)
 
     for option in reversed(_OPTIONS):

@@ -36,25 +36,27 @@ def evaluate(folder: Path, episodes: int, best: bool, seed: int | None, as_json:
     from sdnn.runs import Run
 
     with run_command(words_of_run(folder)):
-        found = Run.open(folder).evaluate(episodes, seed, best=best)
-    returns = found.returns
+        evaluation = Run.open(folder).evaluate(episodes, seed, best=best)
+    returns = evaluation.returns
     low, median, high = np.percentile(returns, (25, 50, 75)).tolist()
     values = {
         "folder": str(folder),
         "n_episodes": episodes,
-        "mean_return": found.mean_return,
+        "mean_return": evaluation.mean_return,
         "standard_deviation": float(returns.std(ddof=1)) if episodes > 1 else None,
         "median_return": median,
         "quartiles": [low, high],
         "range": [float(returns.min()), float(returns.max())],
-        "mean_length": float(found.lengths.mean()),
-        "share_terminated": float(found.terminated.mean()),
-        "is_warming_up": found.is_warming_up,
+        "mean_length": float(evaluation.lengths.mean()),
+        "share_terminated": float(evaluation.terminated.mean()),
+        "is_warming_up": evaluation.is_warming_up,
     }
     if as_json:
         click.echo(json_text({**values, "returns": returns.tolist()}))
         return
-    click.echo(f"{folder}: mean return {found.mean_return:.6g} over {episodes} greedy episodes")
+    click.echo(
+        f"{folder}: mean return {evaluation.mean_return:.6g} over {episodes} greedy episodes"
+    )
     click.echo(
         f"median {median:.6g}, quartiles {low:.6g} to {high:.6g}, all {returns.min():.6g} to"
         f" {returns.max():.6g}"
@@ -63,5 +65,5 @@ def evaluate(folder: Path, episodes: int, best: bool, seed: int | None, as_json:
         f"{values['mean_length']:.6g} steps on average,"
         f" {values['share_terminated']:.0%} of the episodes terminated"
     )
-    if found.is_warming_up:
+    if evaluation.is_warming_up:
         click.echo(WARMING_UP)

@@ -177,14 +177,14 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[Array, ArrayLike, Array]):
         return chosen
 
     def _tolerances_of(self, values: ArrayLike) -> NDArray[np.float64]:
-        given = array_of("goal_tolerance", values, "fiu")
-        if given.shape not in ((), (self.num_envs,)):
+        tolerances = array_of("goal_tolerance", values, "fiu")
+        if tolerances.shape not in ((), (self.num_envs,)):
             raise ValueError(
                 f"goal_tolerance must be a number or of shape ({self.num_envs},), "
-                f"got shape {given.shape}"
+                f"got shape {tolerances.shape}"
             )
-        require((given >= 0.0).all(), "goal_tolerance", "be at least 0", values)
-        return np.full(self.num_envs, given, np.float64)
+        require((tolerances >= 0.0).all(), "goal_tolerance", "be at least 0", values)
+        return np.full(self.num_envs, tolerances, np.float64)
 
     def _begin(self, mask: NDArray[np.bool_]) -> None:
         self._tolerances[mask] = self._goal_tolerance[mask]

@@ -69,8 +69,8 @@ def new_agent(
     """
     agent_type = choice("kind", kind, _KINDS)
     most = _RAM_BYTES[kind] if ram_bytes is None else whole("ram_bytes", ram_bytes, 1, 2**31)
-    given = {**new_settings(kind), "inputs": "all", "angle_pairs": [], **options}
-    config = given["approximator"] if approximator is None else approximator
+    settings = {**new_settings(kind), "inputs": "all", "angle_pairs": [], **options}
+    config = settings["approximator"] if approximator is None else approximator
     if not isinstance(config, agent_type.approximator_type):
         expected = agent_type.approximator_type.__name__
         raise TypeError(
@@ -78,7 +78,7 @@ def new_agent(
         )
 
     def made(size: Any) -> SDNNQLambda | SDNNQLearning:
-        return agent_type(observation_space, action_space, **{**given, "approximator": size})
+        return agent_type(observation_space, action_space, **{**settings, "approximator": size})
 
     def needed(size: Any) -> int:
         return c_header(made(size), "agent", learning=True).ram_bytes

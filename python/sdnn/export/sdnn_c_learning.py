@@ -57,7 +57,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
         """Raise ValueError for settings that the header cannot have."""
         learning, sizes = self.agent.learning, self.agent.approximator
         has_finals = learning.final_learning_rate is not None or learning.final_epsilon is not None
-        words = {"weight_limit": f"1 to {MOST_WEIGHT}"}
+        ranges = {"weight_limit": f"1 to {MOST_WEIGHT}"}
         limits = range(1, MOST_WEIGHT + 1)
         for table, name, is_wrong, expected in (
             ("approximator", "weight_limit", sizes.weight_limit not in limits, f"{MOST_WEIGHT}"),
@@ -66,11 +66,11 @@ class SDNNCLearner(Learner, SDNNCWriter):
             ("learning", "schedule", has_finals and learning.schedule != "linear", "linear"),
         ):
             if is_wrong:
-                given = getattr(getattr(self.agent, table), name)
+                value = getattr(getattr(self.agent, table), name)
                 raise argument_error(
                     name,
-                    f"must be {words.get(name, expected)} for an SDNNQLearning that learns in C,"
-                    f" got {given}: train with --set {table}.{name}={expected}",
+                    f"must be {ranges.get(name, expected)} for an SDNNQLearning that learns in C,"
+                    f" got {value}: train with --set {table}.{name}={expected}",
                 )
 
     def _check_values(self) -> None:
@@ -161,8 +161,8 @@ class SDNNCLearner(Learner, SDNNCWriter):
             raise ValueError("progress must be 0 to 1, and weights -127 to 127")
         known = {"thresholds": image["thresholds"], "weights": self.code.unpaired(columns)}
         for name, values in known.items():
-            own = state[f"action_value.{name}"] = state[f"action_value.{name}"].copy()
-            own[self.used] = values[: self.used.size]
+            part = state[f"action_value.{name}"] = state[f"action_value.{name}"].copy()
+            part[self.used] = values[: self.used.size]
 
     def restore(self, whole: bytes) -> None:
         """Give the agent the state of an image, whole and of this agent."""

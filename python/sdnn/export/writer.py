@@ -63,7 +63,7 @@ class Writer(ABC):
         self.is_vector = self.n_dimensions > 1
         self.box = self._box()
         first = [agent.actions_of(d)[0] for d in range(agent.n_dimensions)]
-        self.start: list[int] = [] if self.box is not None else [int(one) for one in first]
+        self.start: list[int] = [] if self.box is not None else [int(number) for number in first]
         if any(not -(2**31) <= start < 2**31 for start in self.start):
             raise ValueError(f"actions must begin within 32 bits, got {self.start}")
         self.inputs = self._inputs()
@@ -96,8 +96,8 @@ class Writer(ABC):
         return np.stack(actions, axis=1).astype(self.agent.action_space.dtype)
 
     def _checked_fraction_bits(self, given: int | None) -> int:
-        ranges = [one for one in self.inputs if one.kind in ("variable", "circular")]
-        numbers = [abs(end) for one in ranges for end in (one.low, one.high)]
+        ranges = [source for source in self.inputs if source.kind in ("variable", "circular")]
+        numbers = [abs(end) for source in ranges for end in (source.low, source.high)]
         if self.box is not None:
             numbers += np.abs(self.box.astype(np.float64)).reshape(-1).tolist()
         largest = max(numbers, default=0.0)
@@ -120,7 +120,7 @@ class Writer(ABC):
     def tables_of_spaces(self) -> Tables:
         """Write the constants of observations and actions."""
         tables = Tables(self.name)
-        n_bins = np.array([one.n_bins for one in self.inputs])
+        n_bins = np.array([source.n_bins for source in self.inputs])
         tables.add("uint32_t", "n_bins", n_bins, "Bins of each input.")
         if self.box is None:
             about = "The action that has the number 0."
@@ -144,7 +144,10 @@ class Writer(ABC):
             str(learning),
             self.agent.seed,
             self.n_actions(),
-            [(one.kind, list(one.at), one.low, one.high, one.n_bins) for one in self.inputs],
+            [
+                (source.kind, list(source.at), source.low, source.high, source.n_bins)
+                for source in self.inputs
+            ],
             [zlib.crc32(network.permutation(*pair).tobytes()) for pair in network.pairs],
         ]
         return zlib.crc32(json.dumps(about).encode())
@@ -188,7 +191,7 @@ class Writer(ABC):
                 "",
                 *self._usage(),
                 f"An action is a number; {self._action_value()} is its value.",
-                *(line for i, one in enumerate(self.inputs) for line in one.usage(i)),
+                *(line for i, source in enumerate(self.inputs) for line in source.usage(i)),
                 *self.tie_remark(),
             ),
             f"#ifndef SDNN_{macro}_H",
@@ -280,13 +283,13 @@ class Writer(ABC):
 
     def tie_remark(self) -> list[str]:
         """Describe how ties are broken."""
-        rule, own = self.tie_rule(), self.agent.learning.tie_rule
+        rule, agent_rule = self.tie_rule(), self.agent.learning.tie_rule
         choice = {
             "lowest": "the lowest",
             "middle": "the middle of the widest run of neighbours",
             "uniform": "a random one",
         }[rule]
-        agent = "as the agent does" if rule == own else "where the agent draws one"
+        agent = "as the agent does" if rule == agent_rule else "where the agent draws one"
         return [f"Of several best actions it takes {choice}, {agent}."]
 
 

@@ -61,10 +61,10 @@ class Experiment:
 
     def with_agents(self, agents: Iterable[str], presets: Iterable[str] = ()) -> Experiment:
         """Return it with other agents, if any, in all cases, and SDNN-C under presets beside."""
-        own = tuple(agents)
+        chosen = tuple(agents)
         names = [f"sdnn-c-{name}".removesuffix("-paper") for name in presets]
         cases = (
-            replace(case, agents=tuple(dict.fromkeys((*(own or case.agents), *names))))
+            replace(case, agents=tuple(dict.fromkeys((*(chosen or case.agents), *names))))
             for case in self.cases
         )
         return replace(self, cases=tuple(cases))

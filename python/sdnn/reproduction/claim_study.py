@@ -48,11 +48,11 @@ class ClaimStudy(StudyFile):
         values = [
             {
                 "variant": variant,
-                "ten_trials_show_it": one.chance and one.chance.to_json(PAPER_EPISODES),
-                **one.to_json(),
+                "ten_trials_show_it": outcome.chance and outcome.chance.to_json(PAPER_EPISODES),
+                **outcome.to_json(),
             }
             for variant, claims in judged.items()
-            for one in claims.values()
+            for outcome in claims.values()
         ]
         numbers = sorted({number for claims in judged.values() for number in claims})
         if not numbers:
@@ -66,11 +66,11 @@ class ClaimStudy(StudyFile):
                 for variant, claims in judged.items()
             ]
 
-        verdicts = rows(lambda one: one.verdict.value)
+        verdicts = rows(lambda outcome: outcome.verdict.value)
         table = Table("The paper's claims", header, verdicts, {"-": "none", **VERDICT_KINDS})
         sections = [Section(table=table, notes=[CLAIMS_NOTE, RULE_NOTE])]
         if self.n_trials >= MIN_TRIALS_TO_DRAW:
-            chances = rows(lambda one: format_share(one.chance))
+            chances = rows(lambda outcome: format_share(outcome.chance))
             table = Table("How often ten trials show the claims", header, chances)
             sections.append(Section(level=3, table=table, notes=[CHANCES_NOTE]))
         checks = [
@@ -93,10 +93,10 @@ def judge_variants(comparison: Comparison) -> dict[str, dict[int, ClaimOutcome]]
     judged = {}
     for variant in comparison.variants:
         results = [
-            one.result
-            for (case, name), one in comparison.measured.items()
+            measured.result
+            for (case, name), measured in comparison.measured.items()
             if name == variant.id and case in PAPER_CASES
-            if one.combination.spec.environment.is_paper_acrobot
+            if measured.combination.spec.environment.is_paper_acrobot
         ]
         draws = TenTrials(results if comparison.study.n_trials >= MIN_TRIALS_TO_DRAW else ())
         judged[variant.id] = {

@@ -95,8 +95,8 @@ def round_rows(costs: Iterable[CostRecord]) -> Iterator[tuple[object, ...]]:
 def load_costs(store: ResultStore, config_hash: str) -> tuple[CostRecord, ...]:
     """Read the stored measurements under the given settings, by series and number of inputs."""
     records = msgspec.convert([*store.measurements(KIND).values()], list[CostRecord])
-    found = [one for one in records if one.config_hash == config_hash]
-    return tuple(sorted(found, key=lambda record: (record.series, record.n_inputs)))
+    matching = [record for record in records if record.config_hash == config_hash]
+    return tuple(sorted(matching, key=lambda record: (record.series, record.n_inputs)))
 
 
 @dataclass(frozen=True, kw_only=True)

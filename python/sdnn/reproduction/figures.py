@@ -72,12 +72,12 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
     axes = figure.add_subplot()
     colors = [color_of(place) for place in range(len(SERIES))]
     for number, series in enumerate(SERIES):
-        own = sorted((c for c in costs if c.series == series.id), key=lambda c: c.n_inputs)
-        if not own:
+        series_costs = sorted((c for c in costs if c.series == series.id), key=lambda c: c.n_inputs)
+        if not series_costs:
             continue
-        x = [cost.n_inputs for cost in own]
+        x = [cost.n_inputs for cost in series_costs]
         lower, middle, upper = np.transpose(
-            [np.percentile(cost.microseconds, (25, 50, 75)) for cost in own]
+            [np.percentile(cost.microseconds, (25, 50, 75)) for cost in series_costs]
         )
         axes.errorbar(
             x, middle, (middle - lower, upper - middle), color=colors[number],
@@ -137,6 +137,8 @@ def _label(
         if smooth
         else "Line: median over trials; band: quartiles."
     )
-    versions = ", ".join(sorted({one.version for result in results for one in result.records}))
+    versions = ", ".join(
+        sorted({record.version for result in results for record in result.records})
+    )
     footer = f"{lines_are} {scale} per case and agent.\nsdnn {versions}; configuration "
     label(figure, title, below, footer + ",\n".join(lines), _WARNING_COLOR)

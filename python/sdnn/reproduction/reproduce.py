@@ -82,13 +82,20 @@ class PaperStudy(ReportedStudy):
     ) -> None:
         defaults = (QUICK_TRIALS, QUICK_EPISODES) if quick else (PAPER_TRIALS, PAPER_EPISODES)
         trials, episodes = n_trials or defaults[0], n_episodes or defaults[1]
-        asked = {one.id for one in select_experiments(word)}
+        asked = {experiment.id for experiment in select_experiments(word)}
         self.quick, self.agents, presets = quick, dict.fromkeys(agents), dict.fromkeys(presets)
-        self.experiments = [one.with_agents(self.agents, presets) for one in EXPERIMENTS]
-        cases = [case for one in self.experiments for case in one.cases]
+        self.experiments = [
+            experiment.with_agents(self.agents, presets) for experiment in EXPERIMENTS
+        ]
+        cases = [case for experiment in self.experiments for case in experiment.cases]
         whole("episodes", episodes, PAPER_INTERVAL, MOST_EPISODES)
         super().__init__("", specs_of(cases, episodes), n_trials=trials, seed=seed)
-        wanted = {pair for one in self.experiments if one.id in asked for pair in one.pairs}
+        wanted = {
+            pair
+            for experiment in self.experiments
+            if experiment.id in asked
+            for pair in experiment.pairs
+        }
         self.pairs = tuple(pair for pair in self.combinations if pair in wanted)
         self.cost_config = cost.QUICK_COST if quick else CostConfig()
         self.costs = {}
@@ -136,20 +143,20 @@ class PaperStudy(ReportedStudy):
         if not comparison.measured.keys() >= set(self.pairs):
             return None
         stored = comparison.measured.keys()
-        found = [(e, collect(e, comparison)) for e in self.experiments if e.pairs <= stored]
+        collected = [(e, collect(e, comparison)) for e in self.experiments if e.pairs <= stored]
         stored_costs = cost.load_costs(store, self.cost_config.config_hash)
         shown = {series.id for series in cost.cost_series(self.agents or None)}
         report = Report(
-            experiments=tuple(found),
-            costs=tuple(one for one in stored_costs if one.series in shown),
+            experiments=tuple(collected),
+            costs=tuple(cost for cost in stored_costs if cost.series in shown),
             quick=self.quick,
             seed=self.seed,
             agents=tuple(self.agents),
-            reference=more_trials(result for _, results in found for result in results),
+            reference=more_trials(result for _, results in collected for result in results),
         )
         drawn = {
             f"experiment-{experiment.id}": draw_experiment(experiment, results, quick=self.quick)
-            for experiment, results in found
+            for experiment, results in collected
         }
         files: dict[str, bytes] = {}
         if report.costs:

@@ -74,7 +74,7 @@ class Comparison:
     @property
     def records(self) -> tuple[TrialRecord, ...]:
         """All trials; see `records_of`."""
-        return records_of(one.result for one in self.measured.values())
+        return records_of(m.result for m in self.measured.values())
 
     @property
     def cases(self) -> tuple[StudyCase, ...]:
@@ -90,7 +90,7 @@ class Comparison:
 
     def of_case(self, case_id: str) -> tuple[Measured, ...]:
         """List what is measured in a case, in the order of the variants."""
-        return tuple(one for (case, _), one in self.measured.items() if case == case_id)
+        return tuple(m for (case, _), m in self.measured.items() if case == case_id)
 
 
 def compare(study: Study, records: Iterable[TrialRecord]) -> Comparison:

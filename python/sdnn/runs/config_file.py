@@ -61,8 +61,8 @@ class ConfigFile:
 
         ConfigError if it is the configuration of a run of another format.
         """
-        if (found := self.values.get("format", FORMAT)) != FORMAT:
-            raise ConfigError("format", f"must be {FORMAT}, got {found!r}: begin a new run")
+        if (version := self.values.get("format", FORMAT)) != FORMAT:
+            raise ConfigError("format", f"must be {FORMAT}, got {version!r}: begin a new run")
         others = ("format", "version", "goals")
         return {name: value for name, value in self.values.items() if name not in others}
 

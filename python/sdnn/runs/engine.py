@@ -340,10 +340,10 @@ class Team:
 
     def take_finished(self) -> Generator[Finished, None, None]:
         """Yield every trial that has come to its end, and let it go."""
-        for one, trial in tuple(self.trials.items()):
+        for planned, trial in tuple(self.trials.items()):
             if trial.finished:
-                yield Finished(one, _record(one, trial, self._seconds[one]))
-                del self.trials[one]
+                yield Finished(planned, _record(planned, trial, self._seconds[planned]))
+                del self.trials[planned]
 
 
 MOST_TOGETHER = 8
@@ -417,8 +417,8 @@ def _run_team(
         with suppress(BaseException):  # whoever it concerns raises it again
             team = Team(planned)
             for _ in _pieces(team):
-                for one, trial in team.trials.items():
-                    messages.put(Advanced(one, int(trial.episode)))
+                for member, trial in team.trials.items():
+                    messages.put(Advanced(member, int(trial.episode)))
                 for finished in team.take_finished():
                     messages.put(finished)
                     del left[finished.planned]

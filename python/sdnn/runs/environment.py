@@ -240,8 +240,8 @@ class EnvironmentSpec(Settings, frozen=True):
         try:
             importlib.import_module(module)
         except Exception as error:  # whatever is in a user's module
-            words = f"no environment {self.id!r}: {type(error).__name__}: {error}"
-            raise ConfigError("environment.id", words) from error
+            problem = f"no environment {self.id!r}: {type(error).__name__}: {error}"
+            raise ConfigError("environment.id", problem) from error
         return True
 
     def scaling(self, env: Env | None = None) -> Scaling | None:

@@ -108,20 +108,20 @@ def _draw_case(
     measured = comparison.of_case(case_id)
     lines = {variant.id: line for line, variant in enumerate(comparison.variants)}
     reference = comparison.study.reference
-    colors = agent_colors(one.result.agent for one in comparison.measured.values())
+    colors = agent_colors(m.result.agent for m in comparison.measured.values())
     names = _OF_STEPS if "final_steps" in measured[0].result.values else _OF_RETURNS
     for axes, name in zip(pair, names, strict=True):
         axes.set_visible(True)
-        for one in measured:
-            if name in one.result.values:
+        for m in measured:
+            if name in m.result.values:
                 _draw_variant(
-                    axes, one, name, lines[one.variant.id], colors[one.result.agent],
-                    one.variant.id == reference,
+                    axes, m, name, lines[m.variant.id], colors[m.result.agent],
+                    m.variant.id == reference,
                 )  # fmt: skip
-        _label_case(axes, name, max(one.result.last_episode for one in measured))
+        _label_case(axes, name, max(m.result.last_episode for m in measured))
         axes.set_ylim(len(lines) - 0.4, -0.6)
-        words = [v.title if with_names else "" for v in comparison.variants]
-        axes.set_yticks(range(len(lines)), words)
+        labels = [v.title if with_names else "" for v in comparison.variants]
+        axes.set_yticks(range(len(lines)), labels)
         if reference in lines:
             axes.get_yticklabels()[lines[reference]].set_fontweight("bold")
 

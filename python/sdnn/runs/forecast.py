@@ -35,15 +35,15 @@ def forecast(study: Study, out: Path, jobs: int) -> dict[str, Any]:
     for pair in study.pairs:
         keys, spec = study.keys(*pair), study.combinations[pair].spec
         left = [key for key in keys if key not in stored]
-        own = [stored[key] for key in keys if key in stored]
-        source = f"{len(own)} stored trial{'s' if len(own) > 1 else ''}"
-        if not own:
+        times = [stored[key] for key in keys if key in stored]
+        source = f"{len(times)} stored trial{'s' if len(times) > 1 else ''}"
+        if not times:
             kind = (*keys[0][:2], spec.budget.steps is None)  # a rate is by the budget's unit
             if kind not in probes:
                 probes[kind] = _probe(PlannedTrial(keys[0], spec))
             rate, n_episodes = probes[kind]
-            own, source = [rate * spec.length], f"the first {n_episodes} episodes of one"
-        seconds = sum(own) / len(own)
+            times, source = [rate * spec.length], f"the first {n_episodes} episodes of one"
+        seconds = sum(times) / len(times)
         missing |= dict.fromkeys(left, (seconds, spec.is_compiled))
         works.append(
             {

@@ -55,7 +55,7 @@ def draw_curves(curves: Sequence[Curve]) -> Figure:
     figure = new_figure(7.5, 3.6 * len(tasks))
     panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
     for task, axes in zip(tasks, panels, strict=True):
-        for curve in (one for one in curves if one.task == task):
+        for curve in (c for c in curves if c.task == task):
             _draw_curve(axes, curve, colors[curve.agent])
         axes.set_title(task, fontsize=10)
         axes.set(xlabel="steps", ylabel="return")

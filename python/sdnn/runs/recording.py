@@ -91,8 +91,8 @@ def _rendered(env: Env) -> Iterator[NDArray[np.uint8]]:
         rendered: Any = env.render()
     except gym.error.DependencyNotInstalled as error:
         raise RunError(f"pictures of this environment need more: {error}") from error
-    for one in rendered if isinstance(rendered, list) else [rendered]:
-        frame = np.asarray(one)
+    for picture in rendered if isinstance(rendered, list) else [rendered]:
+        frame = np.asarray(picture)
         if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
             raise RunError(
                 f"render() must give a picture of red, green and blue, got {frame!r:.80}"

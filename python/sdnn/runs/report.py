@@ -100,8 +100,8 @@ def settings_section(results: Iterable[tuple[str, CaseResult]]) -> Section:
         Section(
             title=f"{title} · configuration {result.config_hash}",
             notes=[
-                f"sdnn {', '.join(sorted({one.version for one in result.records}))}; seeds of the"
-                f" trials: {', '.join(str(one.key.seed) for one in result.records)}"
+                f"sdnn {', '.join(sorted({r.version for r in result.records}))}; seeds of the"
+                f" trials: {', '.join(str(r.key.seed) for r in result.records)}"
             ],
             text=json.dumps(json.loads(result.records[0].config), indent=2),
         )

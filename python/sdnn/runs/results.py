@@ -103,10 +103,10 @@ def final_share_solved(solved: ArrayLike) -> float:
 
 def _medians_of_windows(steps: ArrayLike, window: int) -> FloatArray:
     """Return the medians of all runs of tests, (n_tests - window + 1,), or (0,)."""
-    taken = np.asarray(steps, np.float64)
-    if taken.size < window:
+    numbers = np.asarray(steps, np.float64)
+    if numbers.size < window:
         return np.empty(0)
-    return np.asarray(np.median(sliding_window_view(taken, window), axis=1))
+    return np.asarray(np.median(sliding_window_view(numbers, window), axis=1))
 
 
 _GOOD = f"{GOOD_STEPS:g}"
@@ -274,7 +274,7 @@ def measure(
 
 def records_of(results: Iterable[CaseResult]) -> tuple[TrialRecord, ...]:
     """Return all trials of results, each once, sorted: equal settings share them."""
-    records = {one.key: one for result in results for one in result.records}
+    records = {record.key: record for result in results for record in result.records}
     return tuple(records[key] for key in sorted(records))
 
 
@@ -283,5 +283,5 @@ def on_equal_terms(name: MeasureName, *measured: TrialMeasures) -> tuple[FloatAr
 
     Otherwise what only lasts longer would seem to differ.
     """
-    last_episode = min(one.last_episode for one in measured)
-    return tuple(one.uncensored(name, last_episode) for one in measured)
+    last_episode = min(result.last_episode for result in measured)
+    return tuple(result.uncensored(name, last_episode) for result in measured)

@@ -132,12 +132,12 @@ def checked(kind: object, value: object, key: str) -> Any:
             raise ConfigError(key, f"must be numbers or texts, got {shown(value)}")
         value = value.tolist()
     if isinstance(value, Mapping):
-        for one in _alternatives(kind):
-            if isinstance(one, type) and issubclass(one, Settings):
-                return read(one, value, key)
-            if get_origin(one) is dict:
+        for form in _alternatives(kind):
+            if isinstance(form, type) and issubclass(form, Settings):
+                return read(form, value, key)
+            if get_origin(form) is dict:
                 for name, item in value.items():
-                    checked(get_args(one)[1], item, f"{key}.{name}")
+                    checked(get_args(form)[1], item, f"{key}.{name}")
     try:
         made = msgspec.convert(value, kind)
     except (msgspec.ValidationError, UnicodeEncodeError) as error:  # any bytes of a command line
@@ -155,15 +155,15 @@ def _alternatives(kind: object) -> tuple[object, ...]:
     if origin is Annotated:
         return _alternatives(inner[0])
     if origin in (typing.Union, types.UnionType):
-        return tuple(one for part in inner for one in _alternatives(part))
+        return tuple(form for part in inner for form in _alternatives(part))
     return (kind,)
 
 
 def _problem(possible: Iterable[object], text: str) -> str:
-    words = [repr(w) for one in possible if get_origin(one) is Literal for w in get_args(one)]
-    if words:
-        others = " or an array" if any(get_origin(one) is tuple for one in possible) else ""
-        return f"must be one of {', '.join(words)}{others}"
+    choices = [repr(w) for form in possible if get_origin(form) is Literal for w in get_args(form)]
+    if choices:
+        others = " or an array" if any(get_origin(form) is tuple for form in possible) else ""
+        return f"must be one of {', '.join(choices)}{others}"
     expected = text.partition(", got")[0].replace("Object missing required field", "a table with")
     for name, word in _WORDS.items():
         expected = expected.replace(name, word)

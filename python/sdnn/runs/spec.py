@@ -112,12 +112,14 @@ class RunSpec(Settings, frozen=True):
         if preset is None and entry.presets:
             preset = "general"
         if preset is not None and preset not in entry.presets:
-            words = f"one of {', '.join(map(repr, entry.presets))}" if entry.presets else "omitted"
+            expected = (
+                f"one of {', '.join(map(repr, entry.presets))}" if entry.presets else "omitted"
+            )
             others = [other.id for other in AGENTS.values() if preset in other.presets]
             hint = f", a preset of {' and '.join(others)}" if others else ""
             raise ConfigError(
                 "agent.preset",
-                f"must be {words} for the agent {entry.id!r}, got {shown(preset)}{hint}",
+                f"must be {expected} for the agent {entry.id!r}, got {shown(preset)}{hint}",
             )
         defaults = entry.settings(preset)
         for name in ("approximator", "learning"):

@@ -61,7 +61,11 @@ def _struct(kind: Any) -> Any:
     """Make a class of the fields of the core's settings, without the number of inputs."""
     return msgspec.defstruct(
         kind.__name__,
-        [(one.name, _type(one), one.default) for one in fields_of(kind) if one.name != "n_inputs"],
+        [
+            (field.name, _type(field), field.default)
+            for field in fields_of(kind)
+            if field.name != "n_inputs"
+        ],
         forbid_unknown_fields=True,
     )
 

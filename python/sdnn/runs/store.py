@@ -237,9 +237,9 @@ class ResultStore:
         StoreError if the rows of a trial are not the ones that were stored.
         """
         with as_store_error(self.path):
-            found = {run.key: run for run in self._runs() if run.finished_at is not None}
-            wanted = sorted(found if keys is None else found.keys() & set(keys))
-            return tuple(self._record(found[key]) for key in wanted)
+            finished = {run.key: run for run in self._runs() if run.finished_at is not None}
+            wanted = sorted(finished if keys is None else finished.keys() & set(keys))
+            return tuple(self._record(finished[key]) for key in wanted)
 
     def _record(self, run: _Run) -> TrialRecord:
         return TrialRecord(
@@ -266,15 +266,15 @@ class ResultStore:
         values: tuple[object, ...] = (),
     ) -> list[tuple[Any, ...]]:
         """Read columns of a table; every value has a type that its column may have."""
-        found = self._connection.execute(
+        cursor = self._connection.execute(
             f"SELECT {', '.join(columns)} FROM {table} {rest}", values
         ).fetchall()
-        read = list(zip(*found, strict=True)) or [()] * len(columns)
+        read = list(zip(*cursor, strict=True)) or [()] * len(columns)
         for (name, kinds), column in zip(columns.items(), read, strict=True):
             wrong = set(map(type, column)).difference(kinds)
             if wrong:
-                words = f"{kinds[0].__name__}, got {wrong.pop().__name__}"
-                raise StoreError(f"{self.path} is damaged: {table}.{name} must be {words}")
+                expected = f"{kinds[0].__name__}, got {wrong.pop().__name__}"
+                raise StoreError(f"{self.path} is damaged: {table}.{name} must be {expected}")
         return read
 
     def _runs(self, key: TrialKey | None = None) -> list[_Run]:
@@ -426,8 +426,8 @@ def _inspect(path: Path) -> bool:
 
 
 def _objects(connection: sqlite3.Connection) -> set[tuple[str | None, ...]]:
-    found = connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master")
-    return set(found.fetchall())
+    cursor = connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master")
+    return set(cursor.fetchall())
 
 
 @cache

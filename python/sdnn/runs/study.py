@@ -102,12 +102,16 @@ class Study:
         self.combinations: dict[Pair, Combination] = {}
         for case, variant, spec, settings in specs:
             trials = trials_of(case.id, spec, n_trials, seed)
-            one = Combination(case, variant, spec, settings, trials)
-            self.combinations.setdefault((case.id, variant.id), one)
+            combination = Combination(case, variant, spec, settings, trials)
+            self.combinations.setdefault((case.id, variant.id), combination)
         self.pairs = tuple(self.combinations)
-        found = self.combinations.values()
-        self.cases = tuple({one.case.id: one.case for one in found}.values())
-        self.variants = tuple({one.variant.id: one.variant for one in found}.values())
+        combinations = self.combinations.values()
+        self.cases = tuple(
+            {combination.case.id: combination.case for combination in combinations}.values()
+        )
+        self.variants = tuple(
+            {combination.variant.id: combination.variant for combination in combinations}.values()
+        )
 
     def keys(self, case_id: str, variant_id: str) -> tuple[TrialKey, ...]:
         """List where the results of the trials of a variant in a case are stored."""
@@ -123,7 +127,7 @@ class Study:
         The first trial of each comes first, so an interrupted run covers all evenly.
         """
         rounds = zip(*(self.combinations[pair].trials for pair in self.pairs), strict=True)
-        return tuple({one.key: one for trials in rounds for one in trials}.values())
+        return tuple({trial.key: trial for trials in rounds for trial in trials}.values())
 
     def other_work(self, out: Path) -> dict[str, object]:
         """Count what is asked for besides trials, as values that JSON can hold."""
@@ -135,8 +139,8 @@ class Study:
         for case, variant in self.combinations:
             hashes[variant].append(self.keys(case, variant)[0])
         firsts: dict[tuple[TrialKey, ...], str] = {}
-        found = {name: firsts.setdefault(tuple(keys), name) for name, keys in hashes.items()}
-        return {name: first for name, first in found.items() if first != name}
+        first_of = {name: firsts.setdefault(tuple(keys), name) for name, keys in hashes.items()}
+        return {name: first for name, first in first_of.items() if first != name}
 
     def check(self, stored: Collection[TrialKey] = ()) -> None:
         """Make a trial of every specification once, so that nothing is run that could not be.
@@ -145,17 +149,19 @@ class Study:
         setting if one is refused.
         """
         tried: set[str] = set()
-        for (case_id, variant_id), one in self.combinations.items():
+        for (case_id, variant_id), combination in self.combinations.items():
             keys = self.keys(case_id, variant_id)
             if keys[0].config_hash in tried or all(key in stored for key in keys):
                 continue
             tried.add(keys[0].config_hash)
             try:
-                with opened(one.spec.make_trial(keys[0].seed)):
-                    _require_comparable(one.spec)
+                with opened(combination.spec.make_trial(keys[0].seed)):
+                    _require_comparable(combination.spec)
             except Exception as error:  # of whatever agent or environment
-                refusal = one.spec.refusal(error)
-                raise self.refusal(one.case, one.variant, one.settings, refusal) from error
+                refusal = combination.spec.refusal(error)
+                raise self.refusal(
+                    combination.case, combination.variant, combination.settings, refusal
+                ) from error
 
     def refusal(
         self, case: StudyCase, variant: StudyVariant, settings: Layer, error: ConfigError

@@ -149,7 +149,7 @@ def study_page(comparison: Comparison, digest: str, addition: Addition, picture:
     n_all, n_measured = len(study.combinations), len(comparison.measured)
     counts = {"variant": study.variants, "case": study.cases, "trial": range(study.n_trials)}
     variants, cases, trials = (
-        f"{len(found)} {word}{'' if len(found) == 1 else 's'}" for word, found in counts.items()
+        f"{len(items)} {word}{'' if len(items) == 1 else 's'}" for word, items in counts.items()
     )
     missing = (
         f"Not complete: {n_all - n_measured} of {n_all} combinations of case and variant lack"
@@ -187,21 +187,21 @@ def _case_sections(comparison: Comparison) -> Iterator[Section]:
     for case in comparison.cases:
         measured = comparison.of_case(case.id)
         names = [n for n in MEASURES if any(n in m.result.values for m in measured)]
-        words = tuple(name.replace("_", " ") for name in names)
+        measures = tuple(name.replace("_", " ") for name in names)
         end = ("end solved",) if any(m.solved_at_end is not None for m in measured) else ()
         rows = [
             (m.variant.title, title_of(m.result.agent), str(m.result.n_trials),
              *(m.end_solved for _ in end), *measure_cells(m.result, names))
             for m in measured
         ]  # fmt: skip
-        header = ("variant", "agent", "trials", *end, *words, *MEASURE_END)
-        brief = ("variant", *end, *(word for word in words if word not in ONLY_IN_FULL))
+        header = ("variant", "agent", "trials", *end, *measures, *MEASURE_END)
+        brief = ("variant", *end, *(word for word in measures if word not in ONLY_IN_FULL))
         yield Section(table=Table(case.title, header, rows, brief=brief))
         title = f"{case.title}: minus {comparison.study.reference}, trial by trial"
         compared = [m for m in measured if m.differences]
         rows = [(m.variant.title, *(_difference(m, n) for n in names)) for m in compared]
         if rows:
-            yield Section(level=0, table=Table(title, ("variant", *words), rows, brief=brief))
+            yield Section(level=0, table=Table(title, ("variant", *measures), rows, brief=brief))
 
 
 def _difference(measured: Measured, name: MeasureName) -> str:
@@ -213,12 +213,12 @@ def _difference(measured: Measured, name: MeasureName) -> str:
 
 def _measures(comparison: Comparison) -> Section:
     """Explain the measures shown, and which variants are the same."""
-    found, study = comparison.measured.values(), comparison.study
+    measured, study = comparison.measured.values(), comparison.study
     copies = study.copies().items()
     notes = [f"The variant {variant} is the same as {first}." for variant, first in copies]
-    notes += [DIFFERENCE_NOTE] if any(m.differences for m in found) else []
-    notes += [SOLVED_NOTE] if any(m.solved_at_end is not None for m in found) else []
-    shown = {name for m in found for name in m.result.values}
+    notes += [DIFFERENCE_NOTE] if any(m.differences for m in measured) else []
+    notes += [SOLVED_NOTE] if any(m.solved_at_end is not None for m in measured) else []
+    shown = {name for m in measured for name in m.result.values}
     return measures_section((name for name in MEASURES if name in shown), notes)
 
 
@@ -256,8 +256,8 @@ def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[
 
 def trial_table(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
     """Header and rows of the measures of each trial; what a task does not have is empty."""
-    found = comparison.measured.items()
-    names = list(dict.fromkeys(name for _, one in found for name in one.result.values))
+    pairs = comparison.measured.items()
+    names = list(dict.fromkeys(name for _, pair in pairs for name in pair.result.values))
     header = (
         "case", "variant", "agent", "trial", "seed", "config_hash", "version", *names, "decisions",
         "seconds",
@@ -266,7 +266,7 @@ def trial_table(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[obj
         (case, variant, r.key.agent, r.key.trial, r.key.seed, r.key.config_hash, r.version,
          *(values[name][n] if name in values else "" for name in names),
          r.n_decisions, round(r.seconds, 3))
-        for (case, variant), measured in found
+        for (case, variant), measured in pairs
         for values in [measured.result.values]
         for n, r in enumerate(measured.result.records)
     ]  # fmt: skip

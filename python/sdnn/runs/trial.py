@@ -142,8 +142,8 @@ class TrialRows:
         """Return the rows that `from_training` received."""
         rows: list[Row] = []
         starts = np.flatnonzero(self.table["part"] == 0)
-        for own in np.split(self.table, starts[1:]) if len(starts) else []:
-            first = own[0]
+        for episode in np.split(self.table, starts[1:]) if len(starts) else []:
+            first = episode[0]
             row: dict[str, object] = {
                 "kind": str(first["kind"]), "step": int(first["step"]),
                 "episode": int(first["episode"]),
@@ -155,8 +155,8 @@ class TrialRows:
                 row["length"] = int(first["length"])
                 row["terminated"] = bool(first["terminated"])
             else:
-                returns, lengths = own["return"].copy(), own["length"].copy()
-                ends = own["terminated"].copy()
+                returns, lengths = episode["return"].copy(), episode["length"].copy()
+                ends = episode["terminated"].copy()
                 row |= Evaluation(returns=returns, lengths=lengths, terminated=ends).row()
             rows.append(row)
         return rows
