@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "sdnn/core/random.hpp"
@@ -155,15 +154,6 @@ TEST(EpsilonGreedy, TheSameSeedGivesTheSameActionsAndAnotherSeedOthers) {
     differ += action != other.select(tied, i, true);
   }
   EXPECT_GT(differ, 90);
-}
-
-std::string message(const EpsilonGreedyConfig& config) {
-  try {
-    EpsilonGreedy(config, 1);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 // Which of numbers and NaN is the best one Eigen leaves open: a number of the row, or refused.
