@@ -75,13 +75,17 @@ void sdnn_c(FuzzedDataProvider& input) {
   config.max_table_bytes = kMostBytes;
   agents::QLearningConfig learning;
   fuzz::change(learning, input);
-  agents::QLearning agent(approximators::SDNNC(config, 1), learning, 1);
+  const std::vector networks(input.ConsumeIntegralInRange<std::size_t>(1, 2),
+                             approximators::SDNNC(config, 1));
+  agents::QLearning agent(networks, learning, 1);
   use(agent, input);
   auto workspace = agent.workspace();
-  const auto values = agent.values(std::vector<double>(agent.n_inputs(), 0.5), workspace);
-  const auto& scale = agent.action_value().output_scale();
-  for (const double value : values) {
-    fuzz::expect(value >= scale.q_low() && value <= scale.q_high(), "a value out of range");
+  const std::vector<double> state(agent.n_inputs(), 0.5);
+  for (std::size_t d = 0; d < agent.n_dimensions(); ++d) {
+    const auto& scale = agent.networks()[d].output_scale();
+    for (const double value : agent.values(state, workspace, d)) {
+      fuzz::expect(value >= scale.q_low() && value <= scale.q_high(), "a value out of range");
+    }
   }
 }
 
@@ -98,7 +102,7 @@ void rbf(FuzzedDataProvider& input) {
   }
   agents::QLearning agent(std::move(network), learning, 1);
   use(agent, input);
-  for (const double weight : agent.action_value().weights()) {
+  for (const double weight : agent.networks().front().weights()) {
     fuzz::expect(std::isfinite(weight), "a weight is not finite");
   }
 }
@@ -109,7 +113,9 @@ void fuzzy(FuzzedDataProvider& input) {
   rules.max_table_bytes = kMostBytes;
   agents::FuzzyQLearningConfig learning;
   fuzz::change(learning, input);
-  agents::FuzzyQLearning agent(approximators::FuzzyRules(rules), learning, 1);
+  const std::vector dimensions(input.ConsumeIntegralInRange<std::size_t>(1, 2),
+                               approximators::FuzzyRules(rules));
+  agents::FuzzyQLearning agent(dimensions, learning, 1);
   use(agent, input);
 }
 
