@@ -142,8 +142,7 @@ def collected():
     from sdnn.reproduction import plan_trials
     from sdnn.reproduction.reproduce import collect, specs_of
     from sdnn.runs import ResultStore
-    from sdnn.runs.comparison import compare
-    from sdnn.runs.study import Study
+    from sdnn.runs.study import Study, compare
 
     def _collected(experiment, folder, n_trials, n_episodes=15_000):
         study = Study("", specs_of(experiment.cases, n_episodes), n_trials=n_trials, seed=0)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sdnn.runs import ConfigError, Run, RunOutcome
     from sdnn.runs.engine import Executor
     from sdnn.runs.report import WrittenReport
-    from sdnn.runs.sweep import ReportedStudy
+    from sdnn.runs.study import Study
 
 Options: TypeAlias = dict[str, Any]
 """The options of a command by their names."""
@@ -287,7 +287,7 @@ def json_text(values: object) -> str:
 
 
 def run_or_forecast(
-    context: click.Context, study: ReportedStudy, *, out: Path, executor: Executor, as_json: bool,
+    context: click.Context, study: Study, *, out: Path, executor: Executor, as_json: bool,
     full: bool, dry_run: bool,
 ) -> None:  # fmt: skip
     """Run a study with a line of progress and print its results, or only what is to be run."""
@@ -307,7 +307,7 @@ def run_or_forecast(
 
 def _print_report(
     context: click.Context,
-    study: ReportedStudy,
+    study: Study,
     done: WrittenReport,
     out: Path,
     *,
@@ -339,7 +339,7 @@ def _print_report(
         context.exit(EXIT_FAILURE)
 
 
-def _print_forecast(study: ReportedStudy, out: Path, jobs: int, *, as_json: bool) -> None:
+def _print_forecast(study: Study, out: Path, jobs: int, *, as_json: bool) -> None:
     """Print what is still to be run and how long that takes."""
     from sdnn.reports.pages import duration_words
     from sdnn.runs.forecast import forecast

@@ -26,8 +26,7 @@ def plot(folders: tuple[Path, ...], out: Path | None) -> None:
     anything else stay apart. A panel per task.
     """
     from sdnn.runs import Run
-    from sdnn.runs.curves import curves_of
-    from sdnn.runs.plot import SUFFIXES, write_curves
+    from sdnn.runs.curves import SUFFIXES, curves_of, write_curves
 
     if out is not None:
         check_ending("--out", out, SUFFIXES)

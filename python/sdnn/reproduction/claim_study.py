@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from sdnn.reports.pages import Section, Table
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
 from sdnn.reproduction.claims import ClaimOutcome, TenTrials, judge_claims
 from sdnn.reproduction.report import CHECKS_HEADER, RULE_NOTE, VERDICT_KINDS, check_rows
 from sdnn.reproduction.reproduce import with_paper_defaults
-from sdnn.runs.comparison import Comparison
 from sdnn.runs.report import format_share
-from sdnn.runs.study import StudyCase
+from sdnn.runs.study import Comparison, StudyCase
 from sdnn.runs.study_file import KnownCase, StudyFile
 from sdnn.runs.sweep import Addition
 
@@ -32,11 +30,9 @@ CHANCES_NOTE = (
 class ClaimStudy(StudyFile):
     """A study that may name the paper's cases, and whose report has verdicts on its claims."""
 
-    def __init__(self, path: Path, **options: Any) -> None:
-        known_cases = {
-            case.id: KnownCase(case.title, case.settings) for case in PAPER_CASES.values()
-        }
-        super().__init__(path, known_cases=known_cases, **options)
+    known_cases: ClassVar[dict[str, KnownCase]] = {
+        case.id: KnownCase(case.title, case.settings) for case in PAPER_CASES.values()
+    }
 
     def completed(self, case: StudyCase, values: dict[str, Any]) -> dict[str, Any]:
         """Return the values of a specification, in the paper's cases with the paper's defaults."""

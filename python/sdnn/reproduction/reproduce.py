@@ -26,15 +26,13 @@ from sdnn.reproduction.claims import more_trials
 from sdnn.reproduction.cost import CostConfig
 from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.report import Report
-from sdnn.runs.comparison import Comparison
 from sdnn.runs.engine import Observer, PlannedTrial
 from sdnn.runs.report import Content
 from sdnn.runs.results import CaseResult
 from sdnn.runs.settings import overridden
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.study import Layer, Study, StudyCase, StudyVariant
-from sdnn.runs.sweep import ReportedStudy
+from sdnn.runs.study import Comparison, Layer, Study, StudyCase, StudyVariant
 from sdnn.runs.trial import ROW_HEADER, trial_rows
 from sdnn.support.arguments import one_of, whole
 from sdnn.support.csv_files import csv_bytes
@@ -43,7 +41,7 @@ QUICK_TRIALS = 2
 QUICK_EPISODES = 300
 
 
-class PaperStudy(ReportedStudy):
+class PaperStudy(Study):
     """The paper's experiments: agents as variants in its cases.
 
     Files of other agents, presets, trials, episodes or seeds than the default have these in their

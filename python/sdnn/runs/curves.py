@@ -1,4 +1,4 @@
-"""Learning curves: which runs differ in their seeds only, and the numbers of their rows."""
+"""Learning curves of runs, in numbers and figures; runs that differ in seeds only become one."""
 
 from __future__ import annotations
 
@@ -6,17 +6,33 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import Literal, TypeAlias, get_args
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.reports.plots import color_of, new_figure
 from sdnn.runs.errors import RunError
+from sdnn.runs.report import require_matplotlib
 from sdnn.runs.run import Run
+from sdnn.support.csv_files import csv_bytes
+from sdnn.support.files import write_whole
+from sdnn.support.interrupts import stay_interrupts
 from sdnn.training.loop import Row
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 WINDOW = 20
 """Episodes in the running median of the returns, or all so far where they are fewer."""
+
+SUFFIXES = (".png", ".svg", ".pdf")
+"""Kinds of figures that the curves of runs may be written as."""
+
+HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "high")
 
 Kind: TypeAlias = Literal["return", "running median", "evaluation"]
 
@@ -96,6 +112,14 @@ class Curve:
     low: NDArray[np.float64] | None = None
     high: NDArray[np.float64] | None = None
 
+    def rows(self) -> Iterator[tuple[object, ...]]:
+        """Yield the numbers under `HEADER`."""
+        names = (self.task, self.agent, self.kind, self.n_runs, self.run)
+        empty = [""] * len(self.steps)
+        columns = [empty if c is None else c.tolist() for c in (self.values, self.low, self.high)]
+        for step, *numbers in zip(self.steps.tolist(), *columns, strict=True):
+            yield (*names, step, *numbers)
+
 
 def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
     """Make the curves of runs; those that differ in their seeds only become one.
@@ -163,3 +187,57 @@ def _series(rows: Sequence[Row], kind: Kind) -> tuple[NDArray[np.int64], NDArray
         lengths = range(1, len(values) + 1)
         values = np.array([np.median(values[max(0, end - WINDOW) : end]) for end in lengths])
     return steps, values
+
+
+def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
+    """Draw the curves of runs into a file, and write their numbers beside it as CSV; return both.
+
+    Raises RunError if the name has another ending than those of `SUFFIXES`.
+    """
+    if path.suffix not in SUFFIXES:
+        raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
+    content = BytesIO()
+    figure = draw_curves(curves)
+    with stay_interrupts():
+        figure.savefig(content, format=path.suffix[1:], dpi=150)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    numbers = path.with_suffix(".csv")
+    write_whole(path, content.getvalue())
+    write_whole(numbers, csv_bytes(HEADER, (row for curve in curves for row in curve.rows())))
+    return path, numbers
+
+
+def draw_curves(curves: Sequence[Curve]) -> Figure:
+    """Draw the curves of runs: a panel per task, a color per agent.
+
+    Raises a `PlotUnavailableError` if matplotlib is not installed.
+    """
+    require_matplotlib()
+    tasks = list(dict.fromkeys(curve.task for curve in curves))
+    agents = list(dict.fromkeys(curve.agent for curve in curves))
+    colors = {agent: color_of(place) for place, agent in enumerate(agents)}
+    figure = new_figure(7.5, 3.6 * len(tasks))
+    panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
+    for task, axes in zip(tasks, panels, strict=True):
+        for curve in (c for c in curves if c.task == task):
+            _draw_curve(axes, curve, colors[curve.agent])
+        axes.set_title(task, fontsize=10)
+        axes.set(xlabel="steps", ylabel="return")
+        axes.grid(alpha=0.25)
+        axes.legend(fontsize=8, frameon=False)
+    return figure
+
+
+def _draw_curve(axes: Axes, curve: Curve, color: str) -> None:
+    of = f" ({curve.n_runs} runs)" if curve.n_runs > 1 else ""
+    label = f"{curve.agent}: {curve.kind}{of}"
+    if curve.kind == "return":
+        axes.plot(curve.steps, curve.values, ".", ms=2, color=color, alpha=0.25, label=label)
+        return
+    is_main = curve.kind == "evaluation"
+    width, dashes, marker = (1.8, "-", "o") if is_main else (1.0, "--", "")
+    axes.plot(
+        curve.steps, curve.values, dashes, lw=width, marker=marker, ms=3, color=color, label=label
+    )
+    if curve.low is not None and curve.high is not None:
+        axes.fill_between(curve.steps, curve.low, curve.high, color=color, alpha=0.2, lw=0)

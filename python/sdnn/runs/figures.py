@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from sdnn.agents.registry import labels, title_of
 from sdnn.reports.plots import FAINT, INK, color_of, label, new_figure, style
 from sdnn.reports.statistics import estimate_mean, running_median
-from sdnn.runs.comparison import Comparison, Measured
 from sdnn.runs.results import CaseResult, MeasureName
+from sdnn.runs.study import Comparison, Measured
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,8 +17,9 @@ from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple, get_args, get_type_hints
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias, TypeVar
 
+import msgspec
 import numpy as np
 
 from sdnn.runs.connection import as_store_error, connect, foreign_journal, has_rows, is_hot
@@ -28,6 +29,8 @@ from sdnn.support.files import is_there, open_regular
 
 if TYPE_CHECKING:
     from hashlib import _Hash as Hash
+
+Rows = TypeVar("Rows")
 
 STORE_NAME = "results.sqlite"
 SCHEMA_VERSION = 6
@@ -40,12 +43,11 @@ MOST_MEASUREMENTS = 10**5  # a report has some hundreds
 _SCHEMA = files("sdnn.runs").joinpath("schema.sql").read_text("utf-8")
 
 _KEY = "case_id = ? AND agent = ? AND trial = ? AND seed = ? AND config_hash = ?"
-_ROW_COLUMNS = {
-    "number": (int,), "part": (int,), "kind": (str,), "episode": (int,),
-    "ifnull(step, -1)": (int,), "length": (int,), '"return"': (float,), "terminated": (int,),
-    "ifnull(environment, -1)": (int,),
-}  # fmt: skip
-_MEASUREMENT_COLUMNS = {"kind": (str,), "key": (str,), "content": (str,), "crc": (int,)}
+_ROW_COLUMNS = (
+    'number, part, kind, episode, ifnull(step, -1), length, "return", terminated,'
+    " ifnull(environment, -1)"
+)
+_Rows: TypeAlias = list[tuple[int, int, str, int, int, int, float, int, int]]
 
 
 class _Run(NamedTuple):
@@ -70,9 +72,6 @@ class _Run(NamedTuple):
         """Its key, whose seed has no sign."""
         key = TrialKey(*self[1:6])
         return key._replace(seed=key.seed % 2**64)
-
-
-_RUN_COLUMNS = {name: get_args(kind) or (kind,) for name, kind in get_type_hints(_Run).items()}
 
 
 class ResultStore:
@@ -221,8 +220,7 @@ class ResultStore:
     def keys(self, *, unfinished: bool = False) -> set[TrialKey]:
         """Return the keys of all finished trials, and if wanted of those in progress."""
         with as_store_error(self.path):
-            runs = self._runs()
-            return {run.key for run in runs if unfinished or run.finished_at is not None}
+            return {run.key for run in self._runs() if unfinished or run.finished_at is not None}
 
     def seconds(self) -> dict[TrialKey, float]:
         """Return the processor times of the finished trials, without reading their rows."""
@@ -239,18 +237,18 @@ class ResultStore:
         with as_store_error(self.path):
             finished = {run.key: run for run in self._runs() if run.finished_at is not None}
             wanted = sorted(finished if keys is None else finished.keys() & set(keys))
-            return tuple(self._record(finished[key]) for key in wanted)
-
-    def _record(self, run: _Run) -> TrialRecord:
-        return TrialRecord(
-            key=run.key,
-            config=run.config,
-            version=run.version,
-            n_decisions=run.n_decisions,
-            seconds=run.seconds,
-            finished_at=str(run.finished_at),
-            rows=self._rows(run),
-        )
+            return tuple(
+                TrialRecord(
+                    key=key,
+                    config=finished[key].config,
+                    version=finished[key].version,
+                    n_decisions=finished[key].n_decisions,
+                    seconds=finished[key].seconds,
+                    finished_at=str(finished[key].finished_at),
+                    rows=self._rows(finished[key]),
+                )
+                for key in wanted
+            )
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -259,29 +257,21 @@ class ResultStore:
             yield
 
     def _read(
-        self,
-        table: str,
-        columns: Mapping[str, tuple[type[object], ...]],
-        rest: str = "",
-        values: tuple[object, ...] = (),
-    ) -> list[tuple[Any, ...]]:
-        """Read columns of a table; every value has a type that its column may have."""
-        cursor = self._connection.execute(
-            f"SELECT {', '.join(columns)} FROM {table} {rest}", values
-        ).fetchall()
-        read = list(zip(*cursor, strict=True)) or [()] * len(columns)
-        for (name, kinds), column in zip(columns.items(), read, strict=True):
-            wrong = set(map(type, column)).difference(kinds)
-            if wrong:
-                expected = f"{kinds[0].__name__}, got {wrong.pop().__name__}"
-                raise StoreError(f"{self.path} is damaged: {table}.{name} must be {expected}")
-        return read
+        self, kind: type[Rows], columns: str, table: str, rest: str, *arguments: object
+    ) -> Rows:
+        """Read columns of a table as a list of tuples, with a type for each column."""
+        cursor = self._connection.execute(f"SELECT {columns} FROM {table} {rest}", arguments)
+        try:
+            return msgspec.convert(cursor.fetchall(), kind)
+        except msgspec.ValidationError as error:
+            problem, _, place = str(error).partition(" - at ")  # `$[row][column]`
+            column = cursor.description[int(place.rpartition("[")[2].rstrip("]`"))][0]
+            raise StoreError(f"{self.path} is damaged: {table}.{column}: {problem}") from None
 
     def _runs(self, key: TrialKey | None = None) -> list[_Run]:
         """Read the run of a key, if it is stored; by default all runs."""
         rest = "ORDER BY id" if key is None else f"WHERE {_KEY}"
-        read = self._read("runs", _RUN_COLUMNS, rest, () if key is None else _stored(key))
-        runs = list(map(_Run, *read))
+        runs = self._read(list[_Run], "*", "runs", rest, *([] if key is None else _stored(key)))
         for run in runs:
             problem = _problem_of_config(run.config, run.config_hash)
             if run.crc != _crc(run[:-1]):
@@ -294,13 +284,10 @@ class ResultStore:
         """Return a run, which is begun if it is not there."""
         for run in self._runs(key):
             return run
-        nothing = (config, version, 0, 0.0, None, TrialRows(np.zeros(0, ROW)).checksum())
-        names = ", ".join(_Run._fields[1:])
-        marks = ", ".join("?" * len(_Run._fields[1:]))
-        values = (*_stored(key), *nothing)
-        cursor = self._connection.execute(
-            f"INSERT INTO runs ({names}) VALUES ({marks})", (*values, 0)
-        )
+        nothing = (0, 0.0, None, TrialRows(np.zeros(0, ROW)).checksum())
+        values = (*_stored(key), config, version, *nothing)
+        marks = ", ".join("?" * len(_Run._fields))
+        cursor = self._connection.execute(f"INSERT INTO runs VALUES ({marks})", (None, *values, 0))
         run = _Run(cursor.lastrowid or 0, *values, crc=0)
         self._update(run)
         return run
@@ -321,11 +308,9 @@ class ResultStore:
         )
 
     def _rows(self, run: _Run) -> TrialRows:
-        read = self._read("rows", _ROW_COLUMNS, "WHERE run_id = ? ORDER BY number, part", run[:1])
-        table = np.zeros(len(read[0]), ROW)
-        for name, column in zip(table.dtype.names or (), read, strict=True):
-            table[name] = column
-        rows = TrialRows(table)
+        order = "WHERE run_id = ? ORDER BY number, part"
+        values = self._read(_Rows, _ROW_COLUMNS, "rows", order, run.id)
+        rows = TrialRows(np.array(values, ROW))
         if rows.checksum() != run.checksum:
             raise StoreError(f"{self.path} is damaged: the rows of {run.key} have changed")
         return rows
@@ -351,21 +336,21 @@ class ResultStore:
                 "INSERT OR IGNORE INTO measurements VALUES (?, ?, ?, ?)", (*values, _crc(values))
             )
 
-    def measurements(self, kind: str) -> dict[str, Any]:
+    def measurements(self, kind: str) -> dict[str, object]:
         """Return the contents of all measurements of a kind, by their sorted keys."""
         with as_store_error(self.path):
             (n,) = self._connection.execute("SELECT count(*) FROM measurements").fetchone()
             if n > MOST_MEASUREMENTS:
                 raise StoreError(f"{self.path} holds {n} measurements, over {MOST_MEASUREMENTS}")
-            read = self._read("measurements", _MEASUREMENT_COLUMNS, "ORDER BY kind, key")
-            for *values, crc in zip(*read, strict=True):
-                if crc != _crc(tuple(values)):
-                    row = f"measurements, kind {values[0]}, key {values[1]}"
+            rows_type = list[tuple[str, str, str, int]]
+            rows = self._read(rows_type, "*", "measurements", "ORDER BY kind, key")
+            for row in rows:
+                if row[-1] != _crc(row[:-1]):
+                    place = f"measurements, kind {row[0]}, key {row[1]}"
                     raise StoreError(
-                        f"{self.path} is damaged: {row}: a value does not fit its checksum, crc"
+                        f"{self.path} is damaged: {place}: a value does not fit its checksum, crc"
                     )
-            rows = zip(*read[:3], strict=True)
-            return {key: json.loads(content) for of, key, content in rows if of == kind}
+            return {key: json.loads(content) for of, key, content, _ in rows if of == kind}
 
 
 def _crc(values: tuple[object, ...]) -> int:

@@ -8,15 +8,16 @@ import json
 import math
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeAlias
 
+import msgspec
 from msgspec import Meta
 
 from sdnn.agents.registry import labels, split_label
-from sdnn.runs.comparison import Comparison
 from sdnn.runs.config_file import ConfigFile
 from sdnn.runs.environment import find_module, search_folder
 from sdnn.runs.errors import ConfigError
@@ -33,8 +34,8 @@ from sdnn.runs.settings import (
 )
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
-from sdnn.runs.study import Layer, Setting, StudyCase, StudyVariant
-from sdnn.runs.sweep import Addition, ReportedStudy, study_content
+from sdnn.runs.study import Comparison, Layer, Setting, Study, StudyCase, StudyVariant
+from sdnn.runs.sweep import Addition, study_content
 from sdnn.support.arguments import advice
 from sdnn.support.toml import KeyPath, dotted
 
@@ -49,7 +50,6 @@ MOST_COMBINATIONS = 5_000
 MOST_SETTINGS = 5_000
 """Most settings of a table."""
 
-TABLES = ("study", "base", "agents", "cases", "variants", "axes")
 _DEPTHS: dict[tuple[str, ...], int] = {("environment", "kwargs"): 4, ("environment", "ranges"): 3}
 """Parts of the longest keys in tables with any keys; elsewhere keys have two."""
 
@@ -86,6 +86,20 @@ class StudyHeader(Settings, frozen=True):
     ] = ()
 
 
+_Table: TypeAlias = dict[str, object]
+
+
+class StudyTables(Settings, frozen=True):
+    """The tables of a study's file."""
+
+    study: StudyHeader = StudyHeader()
+    base: _Table = msgspec.field(default_factory=dict)
+    agents: dict[str, _Table] = msgspec.field(default_factory=dict)
+    cases: dict[str, _Table] = msgspec.field(default_factory=dict)
+    variants: dict[str, _Table] = msgspec.field(default_factory=dict)
+    axes: _Table = msgspec.field(default_factory=dict)
+
+
 class KnownCase(NamedTuple):
     """A case that studies may name: its title and settings, which a study cannot change."""
 
@@ -93,7 +107,7 @@ class KnownCase(NamedTuple):
     settings: Mapping[str, object]
 
 
-class StudyFile(ReportedStudy):
+class StudyFile(Study):
     """A study, read from a file; modules that it imports are looked for beside it, too.
 
     ConfigError if the file cannot be read, or has something unknown or impossible; the message
@@ -103,19 +117,19 @@ class StudyFile(ReportedStudy):
     ----------
     path
         A TOML file; ``docs/how-to/studies.md`` describes it.
-    known_cases
-        Cases that the file may name, by their ids.
     n_trials, seed
         See `Study`; instead of the file's.
     only
         Ids of the variants to run; none: all. A ValueError if there is no variant of a name.
     """
 
+    known_cases: ClassVar[Mapping[str, KnownCase]] = {}
+    """Cases that the file may name, by their ids."""
+
     def __init__(
         self,
         path: Path,
         *,
-        known_cases: Mapping[str, KnownCase] | None = None,
         n_trials: int | None = None,
         seed: int | None = None,
         only: Collection[str] = (),
@@ -123,12 +137,12 @@ class StudyFile(ReportedStudy):
         self.file = ConfigFile.read(path)
         self.source, self.text = path.name, self.file.text
         try:
-            check_names(self.file.values, TABLES)
-            self.header = header = read(StudyHeader, self.file.values.get("study", {}), "study")
+            self.tables = read(StudyTables, self.file.values)
+            header = self.tables.study
             self._import()
-            self.base = self._layer((BASE,), self._table(BASE))
+            self.base = self._layer((BASE,), self.tables.base)
             self.agents = dict(self._read_agents())
-            cases = self._read_cases(known_cases or {})
+            cases = self._read_cases()
             variants = self._read_variants(cases)
         except ConfigError as error:
             raise self.file.located(error) from error
@@ -185,12 +199,10 @@ class StudyFile(ReportedStudy):
         layers = (case.settings, variant.settings, variant.case_settings.get(case.id, {}))
         settings = reduce(or_, (self.base, *layers))
         try:
-            label = str(self._values(case, settings).get("agent", {}).get("name", DEFAULT_AGENT))
-            try:
-                names = [split_label(label)[0], label]
-            except ValueError:  # refused with the specification
-                names = []
-            agents = (self.agents.get(name, {}) for name in names)
+            label = self._values(case, settings).get("agent", {}).get("name", DEFAULT_AGENT)
+            agents: list[Layer] = []
+            with suppress(ValueError):  # of another name, which the specification refuses
+                agents = [self.agents.get(name, {}) for name in (split_label(label)[0], label)]
             settings = reduce(or_, (self.base, *agents, *layers))
             return RunSpec.from_values(self._values(case, settings)), settings
         except ConfigError as error:
@@ -216,15 +228,6 @@ class StudyFile(ReportedStudy):
         near = [setting.where for key, setting in settings.items() if key[0] == name[0]]
         where = next(iter(near), variant.where or case.where)
         return ConfigError(error.key, text, self.file.place(where))
-
-    def _table(self, *where: str) -> dict[str, Any]:
-        """Return a table of the file; an empty one where there is none."""
-        values: Any = self.file.values
-        for number, key in enumerate(where, 1):
-            values = values.get(key, {})
-            if not isinstance(values, dict):
-                raise self.file.error(where[:number], f"must be a table, got {values!r}")
-        return dict(values)
 
     def _layer(self, where: KeyPath, table: Mapping[str, object]) -> Layer:
         """Read a table of settings: nested, with dotted keys, or with quoted dotted keys."""
@@ -258,7 +261,7 @@ class StudyFile(ReportedStudy):
 
     def _import(self) -> None:
         search_folder(self.file.path.resolve().parent)
-        for number, module in enumerate(self.header.imports):
+        for number, module in enumerate(self.tables.study.imports):
             find_module(module)
             try:
                 importlib.import_module(module)
@@ -269,19 +272,19 @@ class StudyFile(ReportedStudy):
                 ) from error
 
     def _read_agents(self) -> Iterator[tuple[str, Layer]]:
-        for agent in self._table("agents"):
+        for agent, table in self.tables.agents.items():
             if agent not in labels():
                 hint = advice(agent, labels())
                 raise self.file.error(("agents", agent), f"no such agent; {hint}")
-            layer = self._layer(("agents", agent), self._table("agents", agent))
+            layer = self._layer(("agents", agent), table)
             if ("agent", "name") in layer:
                 place = layer["agent", "name"].where
                 raise self.file.error(place, "settings of an agent cannot choose another one")
             yield agent, layer
 
-    def _read_cases(self, known_cases: Mapping[str, KnownCase]) -> tuple[StudyCase, ...]:
-        tables, listed = self._table("cases"), self.header.cases
-        known = list(dict.fromkeys([*tables, *known_cases]))
+    def _read_cases(self) -> tuple[StudyCase, ...]:
+        tables, listed = self.tables.cases, self.tables.study.cases
+        known = list(dict.fromkeys([*tables, *self.known_cases]))
         for number, case_id in enumerate(listed or ()):
             if case_id not in known:
                 raise self.file.error(
@@ -294,9 +297,7 @@ class StudyFile(ReportedStudy):
             if case_id not in ids:
                 raise self.file.error(("cases", case_id), "is not among the cases of [study]")
         if ids:
-            return tuple(
-                self._read_case(case_id, known_cases.get(case_id)) for case_id in dict.fromkeys(ids)
-            )
+            return tuple(map(self._read_case, dict.fromkeys(ids)))
         if ("environment", "id") in self.base:
             # A place for the only task there is.
             name = str(self.base["environment", "id"].value)
@@ -307,9 +308,9 @@ class StudyFile(ReportedStudy):
             ' of your own, or [base] environment = "a Gymnasium id"',
         )
 
-    def _read_case(self, case_id: str, known: KnownCase | None) -> StudyCase:
+    def _read_case(self, case_id: str) -> StudyCase:
         where: KeyPath = ("cases", case_id)
-        table = self._table("cases", case_id)
+        table, known = dict(self.tables.cases.get(case_id, {})), self.known_cases.get(case_id)
         default = known.title if known else case_id
         title = checked(str, table.pop("title", default), dotted((*where, "title")))
         settings = self._layer(where, table)
@@ -328,22 +329,20 @@ class StudyFile(ReportedStudy):
 
     def _read_variants(self, cases: Sequence[StudyCase]) -> tuple[StudyVariant, ...]:
         variants: dict[str, StudyVariant] = {}
-        for name in self._table("variants"):
-            where = ("variants", name)
-            table, of_cases = self._table(*where), self._table(*where, "cases")
-            table.pop("cases", None)
-            known = [case.id for case in cases]
+        known = [case.id for case in cases]
+        for name, given in self.tables.variants.items():
+            where, table = ("variants", name), dict(given)
+            of_cases = dotted((*where, "cases"))
+            tables = checked(dict[str, _Table], table.pop("cases", {}), of_cases)
             only = checked(tuple[str, ...], table.pop("only", ()), dotted((*where, "only")))
             for number, case_id in enumerate(only):
                 if case_id not in known:
                     problem = f"no case {case_id!r}; {advice(case_id, known)}"
                     raise self.file.error((*where, "only", number), problem)
-            check_names(of_cases, only or known, dotted((*where, "cases")))
+            check_names(tables, only or known, of_cases)
             in_cases = {
-                case_id: self._layer(
-                    (*where, "cases", case_id), self._table(*where, "cases", case_id)
-                )
-                for case_id in of_cases
+                case_id: self._layer((*where, "cases", case_id), table_of_case)
+                for case_id, table_of_case in tables.items()
             }
             title = checked(str, table.pop("title", name), dotted((*where, "title")))
             settings = self._layer(where, table)
@@ -357,7 +356,7 @@ class StudyFile(ReportedStudy):
 
     def _axis_variants(self) -> Iterator[StudyVariant]:
         """Make the variants of the axes: the base and every value alone, or all combinations."""
-        table = self._table("axes")
+        table = dict(self.tables.axes)
         ways = Literal["one_at_a_time", "product"]
         combine = checked(ways, table.pop("combine", "one_at_a_time"), "axes.combine")
         axes = self._layer(("axes",), table)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TypeAlias
@@ -12,7 +11,6 @@ from sdnn import _core
 from sdnn.agents.registry import title_of
 from sdnn.reports.pages import Page, Section, Table
 from sdnn.reports.plots import figure_bytes
-from sdnn.runs.comparison import MIN_TRIALS_TO_DIFFER, Comparison, Measured, compare
 from sdnn.runs.engine import Executor, Observer, run_trials
 from sdnn.runs.figures import draw_study
 from sdnn.runs.report import (
@@ -27,14 +25,9 @@ from sdnn.runs.report import (
     require_matplotlib,
     settings_section,
 )
-from sdnn.runs.results import (
-    FINAL_WINDOW,
-    MEASURES,
-    SHARE_STABLE,
-    MeasureName,
-)
+from sdnn.runs.results import FINAL_WINDOW, MEASURES, SHARE_STABLE, MeasureName
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.study import Study
+from sdnn.runs.study import MIN_TRIALS_TO_DIFFER, Comparison, Measured, Study, compare
 from sdnn.runs.trial import ROW_HEADER, records_digest, trial_rows
 from sdnn.support.csv_files import csv_pieces, gzip_pieces
 from sdnn.support.files import remove_abandoned_files
@@ -51,23 +44,8 @@ SOLVED_NOTE = (
 )
 
 
-class ReportedStudy(Study, ABC):
-    """A study with a report of what is complete of it."""
-
-    def measure(self, store: ResultStore, observe: Observer) -> None:
-        """Measure and store what is asked for besides trials."""
-
-    @abstractmethod
-    def report(self, comparison: Comparison, store: ResultStore) -> Content | None:
-        """Make the report of what is complete; None if there is nothing."""
-
-    def file_name(self, name: str) -> str:
-        """Return the name of a file of the report in a folder that others share."""
-        return name
-
-
 def run_study(
-    study: ReportedStudy,
+    study: Study,
     out: Path,
     *,
     executor: Executor | None = None,

@@ -15,9 +15,8 @@ import pytest
 from made_records import hash_of, make_record
 from sdnn.agents import load_agent
 from sdnn.runs import EnvironmentSpec, ResultStore, Run, RunSpec, StoreError, TrialRows
-from sdnn.runs.curves import curves_of
+from sdnn.runs.curves import curves_of, write_curves
 from sdnn.runs.errors import RunError
-from sdnn.runs.plot import write_curves
 from sdnn.runs.run import tensorboard_in
 from sdnn.runs.store import STORE_NAME
 from sdnn.support.files import write_whole

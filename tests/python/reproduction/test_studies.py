@@ -10,9 +10,9 @@ from sdnn.reports.plots import figure_bytes
 from sdnn.reports.statistics import Estimate
 from sdnn.reproduction.claim_study import judge_variants
 from sdnn.reproduction.claims import Verdict
-from sdnn.runs.comparison import compare
 from sdnn.runs.figures import draw_study
 from sdnn.runs.report import format_estimate
+from sdnn.runs.study import compare
 from sdnn.runs.sweep import study_json, study_page
 from sdnn.runs.trial import TrialRecord, TrialRows
 

@@ -7,8 +7,7 @@ import pytest
 from refusals import refuses
 from run_specs import run_spec
 from sdnn.runs import EnvironmentSpec, Goal, Run, RunError
-from sdnn.runs.curves import curves_of, groups_of
-from sdnn.runs.plot import draw_curves, write_curves
+from sdnn.runs.curves import curves_of, draw_curves, groups_of, write_curves
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrialRows
 

@@ -12,8 +12,8 @@ from markdown_it import MarkdownIt
 
 from sdnn.reports.pages import Page, Section, Table
 from sdnn.reports.plots import figure_bytes
-from sdnn.runs.comparison import compare
 from sdnn.runs.figures import draw_study
+from sdnn.runs.study import compare
 from sdnn.runs.sweep import study_json, study_page, trial_table
 from sdnn.runs.trial import TrialRecord, TrialRows
 from sdnn.support.csv_files import csv_bytes
