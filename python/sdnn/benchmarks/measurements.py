@@ -128,26 +128,20 @@ def measure_network(n_inputs: int, effort: Effort) -> dict[str, object]:
         "remembered_values": parts.time_remembered_values,
         "selection": lambda n: parts.time_selections(n, SELECTIONS_PER_REPETITION, N_CORRECTED),
     }
-    n_parts = {"selection": SELECTIONS_PER_REPETITION}
-    times_by_name = in_turns(runs, effort)
-    times = {
-        name: spread(run_times, n_parts.get(name, 1)) for name, run_times in times_by_name.items()
-    }
+    times = in_turns(runs, effort)
     # Afterwards, because corrections change the weights.
-    corrections = in_turns(
-        {"correction": lambda n: parts.time_corrections(n, N_CORRECTED)}, effort
-    )["correction"]
+    corrected = in_turns({"": lambda n: parts.time_corrections(n, N_CORRECTED)}, effort)
     return {
         "n_inputs": n_inputs,
         "n_hidden_units": config.n_hidden_units,
         "n_columns": config.n_pattern_units * n_inputs * (n_inputs - 1),
         "n_actions": config.n_hidden_units - config.n_active_units + 1,
         "n_episodes": effort.n_episodes,
-        "values": {level: times[level] for level in levels},
-        "remembered_values": times["remembered_values"],
-        "correction": spread(corrections),
+        "values": {level: spread(times[level]) for level in levels},
+        "remembered_values": spread(times["remembered_values"]),
+        "correction": spread(corrected[""]),
         "n_corrected": N_CORRECTED,
-        "selection": times["selection"],
+        "selection": spread(times["selection"], SELECTIONS_PER_REPETITION),
     }
 
 

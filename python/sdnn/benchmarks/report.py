@@ -70,34 +70,26 @@ def print_results(results: Results, console: Console) -> None:
 def _parts_table(results: Results) -> Table:
     networks, acrobot = results["networks"], results["acrobot"]
     n_actions, n_corrected = networks[0]["n_actions"], networks[0]["n_corrected"]
-    physics = (
+    levels = results["instruction_sets"]
+    times: dict[str, list[Mapping[str, float]]] = {
+        **{
+            f"all {n_actions} values of a new state, {level}": [
+                n["values"][level] for n in networks
+            ]
+            for level in levels
+        },
+        "values of a remembered state": [n["remembered_values"] for n in networks],
+        f"learning step, {n_corrected} units": [n["correction"] for n in networks],
+        f"selecting {n_corrected} units, in it": [n["selection"] for n in networks],
         f"acrobot, {acrobot['n_integration_steps']} Runge-Kutta steps"
-        f" of {acrobot['integration_step_ns']:.0f} ns"
-    )
+        f" of {acrobot['integration_step_ns']:.0f} ns": [acrobot["decision"]],
+    }
     return Table(
         "The parts of a decision (us: median, quartiles)",
         ("part", *(f"{network['n_inputs']} inputs" for network in networks)),
         [
-            *(
-                (
-                    f"all {n_actions} values of a new state, {level}",
-                    *(time_words(n["values"][level]) for n in networks),
-                )
-                for level in results["instruction_sets"]
-            ),
-            (
-                "values of a remembered state",
-                *(time_words(n["remembered_values"]) for n in networks),
-            ),
-            (
-                f"learning step, {n_corrected} units",
-                *(time_words(n["correction"]) for n in networks),
-            ),
-            (
-                f"selecting {n_corrected} units, in it",
-                *(time_words(n["selection"]) for n in networks),
-            ),
-            (physics, time_words(acrobot["decision"]), *("",) * (len(networks) - 1)),
+            (part, *map(time_words, row), *[""] * (len(networks) - len(row)))
+            for part, row in times.items()
         ],
     )
 

@@ -16,7 +16,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from queue import SimpleQueue
 from signal import SIGINT, SIGTERM
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -64,20 +64,6 @@ class PlannedTrial:
     def title(self) -> str:
         """Its name for a reader, such as ``"SDNN-C s4, trial 1"``; trials count from 1."""
         return f"{title_of(self.key.agent)} {self.key.case_id}, trial {self.key.trial + 1}"
-
-
-def trials_of(
-    case_id: str, spec: RunSpec, n_trials: int, root_seed: int
-) -> tuple[PlannedTrial, ...]:
-    """List the trials of a specification in a case."""
-    label, config_hash = spec.label, spec.config_hash
-    return tuple(
-        PlannedTrial(
-            TrialKey(case_id, label, number, trial_seed(root_seed, case_id, number), config_hash),
-            spec,
-        )
-        for number in range(whole("n_trials", n_trials, 0, 10**6))
-    )
 
 
 # Events that executors report and observers receive.
@@ -276,7 +262,7 @@ def run_to_end(
     with opened(planned.spec.make_trial(planned.key.seed)) as trial:
         with closing(_pieces(trial)) as pieces:
             for _ in pieces:
-                advanced(trial.done if isinstance(trial, TrainingTrial) else int(trial.episode))
+                advanced(trial.done if isinstance(trial, TrainingTrial) else trial.episode)
                 if not wanted():
                     return None
         if not trial.finished:
@@ -316,8 +302,8 @@ class Team:
     """Compiled trials that advance together: the same acrobot and agent, other sensors or seeds."""
 
     def __init__(self, planned: Iterable[PlannedTrial]) -> None:
-        self.trials: dict[PlannedTrial, Any] = {
-            trial: trial.spec.make_trial(trial.key.seed) for trial in planned
+        self.trials = {
+            trial: trial.spec.replace(seed=trial.key.seed).core_trial() for trial in planned
         }
         self._n_decisions = dict.fromkeys(self.trials, 0)
         self._seconds = dict.fromkeys(self.trials, 0.0)
@@ -353,13 +339,6 @@ MOST_TABLE_BYTES = 2**26
 """Memory of the table of an agent that runs in a team."""
 
 
-def _joins_a_team(spec: RunSpec) -> bool:
-    entry = spec.entry
-    if not (entry.advances_together and entry.table_bytes and spec.is_compiled):
-        return False
-    return entry.table_bytes(spec.core_settings()["approximator"]) <= MOST_TABLE_BYTES
-
-
 def teams_of(planned: Iterable[PlannedTrial], jobs: int) -> Iterable[list[PlannedTrial]]:
     """Divide trials into teams for ``jobs`` threads, in the order of their first trials.
 
@@ -367,9 +346,12 @@ def teams_of(planned: Iterable[PlannedTrial], jobs: int) -> Iterable[list[Planne
     """
     by_task: dict[object, list[PlannedTrial]] = {}
     for trial in planned:
+        spec = trial.spec
         task: object = trial.key
-        if _joins_a_team(trial.spec):
-            task = trial.spec.agent.name, trial.spec.environment.paper_settings().acrobot
+        if spec.entry.advances_together and spec.entry.table_bytes and spec.is_compiled:
+            approximator = spec.core_settings()["approximator"]
+            if spec.entry.table_bytes(approximator) <= MOST_TABLE_BYTES:
+                task = spec.agent.name, spec.environment.paper_settings().acrobot
         by_task.setdefault(task, []).append(trial)
     teams: dict[PlannedTrial, list[PlannedTrial]] = {}
     for alike in by_task.values():
@@ -417,8 +399,8 @@ def _run_team(
         with suppress(BaseException):  # whoever it concerns raises it again
             team = Team(planned)
             for _ in _pieces(team):
-                for member, trial in team.trials.items():
-                    messages.put(Advanced(member, int(trial.episode)))
+                for member, running in team.trials.items():
+                    messages.put(Advanced(member, running.episode))
                 for finished in team.take_finished():
                     messages.put(finished)
                     del left[finished.planned]

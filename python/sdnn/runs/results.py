@@ -16,10 +16,10 @@ from typing import Literal
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sdnn.reports.statistics import Estimate, FloatArray, estimate_median, json_number
-from sdnn.runs.trial import TrialRecord, TrialRows
+from sdnn.runs.trial import Column, TrialRecord, TrialRows
 
 MeasureName = Literal[
     "episodes_to_learn",
@@ -199,12 +199,12 @@ class CaseResult(TrialMeasures):
         return self.records[0].key.config_hash
 
     @property
-    def episode(self) -> NDArray[np.int32]:
+    def episode(self) -> Column:
         """Learning episodes done before each test, (n_tests,)."""
         return self.records[0].rows.episode
 
     @cached_property
-    def steps(self) -> NDArray[np.int32]:
+    def steps(self) -> Column:
         """Steps of the test episodes, (n_trials, n_tests)."""
         return np.stack([record.rows.steps for record in self.records])
 

@@ -237,18 +237,18 @@ class ResultStore:
         with as_store_error(self.path):
             finished = {run.key: run for run in self._runs() if run.finished_at is not None}
             wanted = sorted(finished if keys is None else finished.keys() & set(keys))
-            return tuple(
-                TrialRecord(
-                    key=key,
-                    config=finished[key].config,
-                    version=finished[key].version,
-                    n_decisions=finished[key].n_decisions,
-                    seconds=finished[key].seconds,
-                    finished_at=str(finished[key].finished_at),
-                    rows=self._rows(finished[key]),
-                )
-                for key in wanted
-            )
+            return tuple(self._record(finished[key]) for key in wanted)
+
+    def _record(self, run: _Run) -> TrialRecord:
+        return TrialRecord(
+            key=run.key,
+            config=run.config,
+            version=run.version,
+            n_decisions=run.n_decisions,
+            seconds=run.seconds,
+            finished_at=str(run.finished_at),
+            rows=self._rows(run),
+        )
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.reports.statistics import Estimate, estimate_mean
-from sdnn.runs.engine import Observer, PlannedTrial, trials_of
+from sdnn.runs.engine import Observer, PlannedTrial, trial_seed
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.report import Content
 from sdnn.runs.results import (
@@ -27,6 +27,7 @@ from sdnn.runs.results import (
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrialKey, TrialRecord, opened
+from sdnn.support.arguments import whole
 from sdnn.support.toml import KeyPath
 
 MIN_TRIALS_TO_DIFFER = 6
@@ -119,8 +120,12 @@ class Study:
         self.title, self.n_trials, self.seed = title, n_trials, seed
         self.reference = reference
         self.combinations: dict[Pair, Combination] = {}
+        whole("n_trials", n_trials, 0, 10**6)
         for case, variant, spec, settings in specs:
-            trials = trials_of(case.id, spec, n_trials, seed)
+            label, config_hash = spec.label, spec.config_hash
+            seeds = (trial_seed(seed, case.id, number) for number in range(n_trials))
+            keys = (TrialKey(case.id, label, *pair, config_hash) for pair in enumerate(seeds))
+            trials = tuple(PlannedTrial(key, spec) for key in keys)
             combination = Combination(case, variant, spec, settings, trials)
             self.combinations.setdefault((case.id, variant.id), combination)
         self.pairs = tuple(self.combinations)

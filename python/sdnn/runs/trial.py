@@ -13,11 +13,12 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sdnn import _core
 from sdnn._core import __version__
 from sdnn.agents import Evaluation, StopTrainingOnRewardThreshold, Training
 from sdnn.support.arguments import whole
@@ -43,8 +44,8 @@ class TrialKey(NamedTuple):
     config_hash: str
 
 
-Column: TypeAlias = NDArray[Any]
-"""A column of rows, of any type of numbers."""
+Column: TypeAlias = NDArray[np.int32 | np.float64 | np.bool_]
+"""A column of rows: numbers of evaluations of one episode, or means of larger ones."""
 
 HASH_DIGITS = 16
 """Hexadecimal digits kept of a text's SHA-256: 64 bits."""
@@ -91,6 +92,9 @@ solved. ``environment`` is `UNKNOWN` where there is one only.
 
 UNKNOWN = -1
 
+_COLUMNS = {"episode": "<i4", "length": "<i4", "return": "<f8", "terminated": "u1"}
+"""Columns of test episodes, and the types under which they are hashed."""
+
 
 @dataclass(frozen=True, eq=False)
 class TrialRows:
@@ -108,19 +112,14 @@ class TrialRows:
         cls, episode: ArrayLike, steps: ArrayLike, episode_return: ArrayLike, solved: ArrayLike
     ) -> TrialRows:
         """Make it from the columns of test episodes, each (n_tests,), of a compiled trial."""
-        columns = {
-            "episode": np.asarray(episode),
-            "length": np.asarray(steps),
-            "return": np.asarray(episode_return),
-            "terminated": np.asarray(solved),
-        }
-        shapes = {column.shape for column in columns.values()}
-        if shapes != {(columns["episode"].size,)}:
+        columns = episode, steps, episode_return, solved
+        shapes = set(map(np.shape, columns))
+        if shapes != {(np.size(episode),)}:
             raise ValueError(f"test rows must be columns of one length, got shapes {shapes}")
-        table = np.zeros(columns["episode"].size, ROW)
+        table = np.zeros(np.size(episode), ROW)
         table["number"], table["kind"] = np.arange(table.size), "evaluation"
         table["step"] = table["environment"] = UNKNOWN
-        for name, column in columns.items():
+        for name, column in zip(_COLUMNS, columns, strict=True):
             table[name] = column
         return cls(table)
 
@@ -172,8 +171,7 @@ class TrialRows:
         if len(starts) == len(tests):
             return tests[name].astype(kind)
         sums = np.add.reduceat(tests[name].astype(np.float64), starts)
-        means: Column = sums / np.diff([*starts, len(tests)])
-        return means
+        return np.asarray(sums / np.diff([*starts, len(tests)]))
 
     @cached_property
     def episode(self) -> Column:
@@ -205,7 +203,7 @@ class TrialRows:
         """Return the SHA-256 of the test episodes, independent of the machine's byte order."""
         tests, _ = self._tests
         sha = hashlib.sha256()
-        for name, kind in zip(("episode", "length", "return", "terminated"), _BYTES, strict=True):
+        for name, kind in _COLUMNS.items():
             sha.update(tests[name].astype(kind).tobytes())
         return sha.hexdigest()
 
@@ -218,9 +216,6 @@ class TrialRows:
         sha = hashlib.sha256() if before is None else before.copy()
         sha.update(self.table.astype(ROW.newbyteorder("<")).tobytes())
         return sha
-
-
-_BYTES = ("<i4", "<i4", "<f8", "u1")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -265,27 +260,8 @@ def trial_rows(records: Iterable[TrialRecord]) -> Iterator[tuple[object, ...]]:
             yield (*start, *row)
 
 
-class Trial(Protocol):
-    """The interface of compiled trials; the sizes of pieces do not change the outcome."""
-
-    @property
-    def episode(self) -> int:
-        """Learning episodes done."""
-
-    @property
-    def finished(self) -> bool:
-        """Whether all learning episodes are done."""
-
-    @property
-    def n_decisions(self) -> int:
-        """Decisions made so far, in learning and test episodes."""
-
-    def advance(self, n_episodes: int, /) -> None:
-        """Run ``n_episodes`` more learning episodes and the test episodes due among them."""
-
-    def test_rows(self) -> dict[str, Column]:
-        """Test episodes so far: arrays `episode`, `steps`, `episode_return`, `solved`, (n,)."""
-
+Trial: TypeAlias = _core.AcrobotTrial
+"""A compiled trial; the sizes of the pieces in which it advances do not change the outcome."""
 
 _AnyTrial = TypeVar("_AnyTrial")
 
