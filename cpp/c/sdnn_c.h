@@ -1,14 +1,5 @@
-/* An agent that learns with SDNN-C, by n-step Q-learning.
- *
- *   static sdnn_agent agent; // everything that it remembers
- *   sdnn_begin(&agent);
- *   sdnn_begin_episode(&agent); // whenever the task starts anew
- *   uint32_t action = sdnn_act(&agent, observation, 1); // 0: the best action
- *   sdnn_learn(&agent, observation, action, reward, next_observation, terminated);
- *   sdnn_set_progress(&agent, progress); // from 0 to 65536, for rates that follow a schedule
- *
- * Observations and rewards are in their units, times 2^SDNN_FRACTION_BITS. sdnn_save and sdnn_load
- * write and read an image of what was learned, as sdnn.export.load_image and save_image do. */
+/* An agent that learns with SDNN-C, by n-step Q-learning: see
+ * cpp/include/sdnn/agents/q_learning.hpp. */
 #ifndef SDNN_C_H
 #define SDNN_C_H
 
@@ -38,15 +29,8 @@ static inline sdnn_real sdnn_uniform(sdnn_random* random) {
 
 /* The change of a weight, which is twice as large for half a sum or half a difference. */
 static inline int32_t sdnn_change(uint32_t column, int32_t change) {
-#if SDNN_N_DOUBLE_GROUPS == 0
-  (void)column;
-  return change;
-#elif SDNN_N_DOUBLE_GROUPS == SDNN_N_GROUPS
-  (void)column;
-  return 2 * change;
-#else
-  return (column < UINT32_C(1) * SDNN_N_DOUBLE_GROUPS * SDNN_N_PATTERN_UNITS ? 2 : 1) * change;
-#endif
+  const uint32_t n = UINT32_C(1) * SDNN_N_DOUBLE_GROUPS * SDNN_N_PATTERN_UNITS;
+  return n == SDNN_N_COLUMNS || column < n ? 2 * change : change;
 }
 
 /* A state, and the potentials of all hidden units in it, which are kept up to date. */
@@ -102,10 +86,7 @@ static inline void sdnn_changes(const sdnn_code* from, const sdnn_code* to, sdnn
   const sdnn_code* const codes[2] = {from, to};
   int8_t changes[SDNN_N_COLUMNS];
   uint32_t i, j;
-  for (j = 0; j < SDNN_N_COLUMNS; ++j) {
-    volatile int8_t* const change = &changes[j]; /* else: memset */
-    *change = 0;
-  }
+  sdnn_clear(changes, SDNN_N_COLUMNS);
   for (i = 0; i < 2; ++i) {
     const int8_t sign = i == 0 ? -1 : 1;
     const sdnn_column* const negative =
@@ -202,10 +183,9 @@ static inline uint32_t sdnn_count(const sdnn_state* state, uint32_t action) {
 static inline sdnn_real sdnn_value(const sdnn_agent* agent, uint32_t n_firing) {
   const sdnn_real above = sdnn_real_of((int64_t)SDNN_U_HIGH - n_firing, 0);
   const sdnn_real below = sdnn_real_of((int64_t)n_firing - SDNN_U_LOW, 0);
+  const uint32_t u_low = SDNN_U_LOW;
   if (n_firing > SDNN_U_HIGH) return agent->q_high;
-#if SDNN_U_LOW > 0
-  if (n_firing < SDNN_U_LOW) return agent->q_low;
-#endif
+  if (n_firing < u_low) return agent->q_low;
   return sdnn_over(sdnn_plus(sdnn_times(agent->q_low, above), sdnn_times(agent->q_high, below)),
                    sdnn_real_of(SDNN_U_HIGH - SDNN_U_LOW, 0));
 }
@@ -228,6 +208,7 @@ static inline void sdnn_set_range(sdnn_agent* agent, sdnn_real low, sdnn_real hi
 static inline uint32_t sdnn_rank(const sdnn_agent* agent, const sdnn_state* state,
                                  uint32_t* ranks) {
   const int32_t* const potentials = state->potentials;
+  const uint32_t u_low = SDNN_U_LOW;
   uint32_t action, unit = 0, n_firing = sdnn_count(state, 0), best = 0, n_best = n_firing;
   for (action = 0; action < SDNN_N_ACTIONS; ++action) {
     for (; unit < sdnn_first_units[action]; ++unit) {
@@ -236,9 +217,7 @@ static inline uint32_t sdnn_rank(const sdnn_agent* agent, const sdnn_state* stat
     }
     ranks[action] = 2 * n_firing + 1;
     if (n_firing > SDNN_U_HIGH) ranks[action] = agent->above;
-#if SDNN_U_LOW > 0
-    if (n_firing < SDNN_U_LOW) ranks[action] = agent->below;
-#endif
+    if (n_firing < u_low) ranks[action] = agent->below;
     if (ranks[action] > best) {
       best = ranks[action];
       n_best = n_firing;
@@ -259,21 +238,19 @@ static inline uint32_t sdnn_wanted(sdnn_agent* agent, sdnn_real value, uint32_t 
       sdnn_times(sdnn_minus(clipped, agent->q_low), sdnn_real_of(SDNN_U_HIGH - SDNN_U_LOW, 0));
   const sdnn_real exact = sdnn_plus(sdnn_real_of(SDNN_U_LOW, 0),
                                     sdnn_over(part, sdnn_minus(agent->q_high, agent->q_low)));
-#if SDNN_ROUNDING_RULE == SDNN_HALF_UP
-  (void)n_firing;
-  return (uint32_t)sdnn_whole(sdnn_plus(exact, UINT64_C(1022) << 52));
-#elif SDNN_ROUNDING_RULE == SDNN_AT_RANDOM
-  (void)n_firing;
-  return (uint32_t)sdnn_whole(sdnn_plus(exact, sdnn_uniform(&agent->randoms[SDNN_ROUNDING])));
-#else /* SDNN_AWAY */
   const sdnn_real nothing = UINT64_C(0x3e112e0be826d695); /* 1e-9 */
+  if (SDNN_ROUNDING_RULE == SDNN_HALF_UP) {
+    return (uint32_t)sdnn_whole(sdnn_plus(exact, UINT64_C(1022) << 52));
+  }
+  if (SDNN_ROUNDING_RULE == SDNN_AT_RANDOM) {
+    return (uint32_t)sdnn_whole(sdnn_plus(exact, sdnn_uniform(&agent->randoms[SDNN_ROUNDING])));
+  }
   if (sdnn_less(sdnn_real_of(n_firing, 0), exact)) {
     const sdnn_real least = sdnn_minus(exact, nothing);
     const uint32_t whole = least >> 63 ? 0 : (uint32_t)sdnn_whole(least);
     return whole + (uint32_t)sdnn_less(sdnn_real_of(whole, 0), least);
   }
   return (uint32_t)sdnn_whole(sdnn_plus(exact, nothing));
-#endif
 }
 
 /* The weights of a unit move by `step` times the code, those of halves by twice that, unless one
@@ -309,10 +286,7 @@ static inline void sdnn_products(const sdnn_agent* agent, const sdnn_code* code,
                                  int32_t* products) {
   int8_t signs[SDNN_N_COLUMNS];
   uint32_t i, j;
-  for (j = 0; j < SDNN_N_COLUMNS; ++j) {
-    volatile int8_t* const sign = &signs[j]; /* else: memset */
-    *sign = 0;
-  }
+  sdnn_clear(signs, SDNN_N_COLUMNS);
   for (j = 0; j < code->n_positive; ++j) signs[code->columns[j]] = 1;
   for (j = 1; j <= code->n_negative; ++j) signs[code->columns[SDNN_MOST_COLUMNS - j]] = -1;
   for (i = 0; i < SDNN_N_STATES; ++i) {
@@ -395,23 +369,22 @@ static inline void sdnn_begin_episode(sdnn_agent* agent) {
   if (agent->n_waiting > 0) sdnn_learn_all(agent, sdnn_state_value(agent, agent->next_bins));
 }
 
-/* A rate that moves from `first` to `last` while the progress moves from 0 to `fraction`. */
+/* A rate that moves from `first` to `last` while the progress moves from 0 to `fraction`; where
+ * that is 0 it stays `first`. */
 static inline sdnn_real sdnn_scheduled(sdnn_real progress, sdnn_real fraction, sdnn_real first,
                                        sdnn_real last) {
-  sdnn_real part = fraction == SDNN_ONE ? progress : sdnn_over(progress, fraction);
+  sdnn_real part = progress;
+  if (fraction == 0) return first;
+  if (fraction != SDNN_ONE) part = sdnn_over(progress, fraction);
   if (sdnn_less(SDNN_ONE, part)) part = SDNN_ONE;
   return sdnn_plus(sdnn_times(sdnn_minus(SDNN_ONE, part), first), sdnn_times(part, last));
 }
 
 static inline void sdnn_follow_progress(sdnn_agent* agent, sdnn_real progress) {
   agent->progress = progress;
-#ifdef SDNN_LAST_RATE
-  agent->rate = sdnn_scheduled(progress, SDNN_ONE, SDNN_INITIAL_RATE, SDNN_LAST_RATE);
-#endif
-#ifdef SDNN_LAST_EPSILON
+  agent->rate = sdnn_scheduled(progress, SDNN_RATE_FRACTION, SDNN_RATE_FIRST, SDNN_RATE_LAST);
   agent->epsilon =
-      sdnn_scheduled(progress, SDNN_EXPLORATION_FRACTION, SDNN_INITIAL_EPSILON, SDNN_LAST_EPSILON);
-#endif
+      sdnn_scheduled(progress, SDNN_EPSILON_FRACTION, SDNN_EPSILON_FIRST, SDNN_EPSILON_LAST);
 }
 
 /* How much of the learning is done, from 0 to 65536: alpha and epsilon follow it. */
@@ -424,7 +397,7 @@ static inline void sdnn_set_progress(sdnn_agent* agent, uint32_t progress) {
 static inline void sdnn_draw_weights(sdnn_agent* agent) {
   sdnn_random random;
   uint32_t unit, group, at, i, j, k;
-  for (i = 0; i < 4; ++i) random.words[i] = sdnn_seeds[SDNN_N_RANDOMS][i];
+  for (i = 0; i < 4; ++i) random.words[i] = sdnn_seed_of_weights[i];
   for (i = 0; i < SDNN_N_WORDS; ++i) {
     volatile uint32_t* const word = &agent->weights[i]; /* else: memset */
     *word = UINT32_C(0x80808080);
@@ -457,46 +430,6 @@ static inline void sdnn_draw_weights(sdnn_agent* agent) {
 }
 #endif
 
-/* Makes the agent as it was exported. */
-static inline void sdnn_begin(sdnn_agent* agent) {
-  sdnn_clear(agent, sizeof *agent);
-  sdnn_begin_randoms(agent->randoms);
-  agent->progress = SDNN_FIRST_PROGRESS;
-  agent->rate = SDNN_FIRST_RATE;
-  agent->epsilon = SDNN_FIRST_EPSILON;
-  sdnn_set_range(agent, SDNN_FIRST_Q_LOW, SDNN_FIRST_Q_HIGH);
-#if SDNN_ADAPTS
-  agent->low = SDNN_FIRST_LOW;
-  agent->high = SDNN_FIRST_HIGH;
-  agent->sum = SDNN_FIRST_SUM;
-  agent->due = SDNN_FIRST_DUE;
-  agent->n_returns = SDNN_FIRST_N_RETURNS;
-  agent->n_rewards = SDNN_FIRST_N_PENDING_REWARDS;
-  agent->n_kept_returns = SDNN_FIRST_N_KEPT_RETURNS;
-  agent->oldest = SDNN_FIRST_OLDEST;
-#if SDNN_FIRST_N_PENDING_REWARDS > 0
-  sdnn_copy_32(agent->rewards, sdnn_first_rewards, SDNN_FIRST_N_PENDING_REWARDS);
-#endif
-#if SDNN_FIRST_N_KEPT_RETURNS > 0
-  {
-    uint32_t i;
-    for (i = 0; i < SDNN_FIRST_N_KEPT_RETURNS; ++i) {
-      volatile uint64_t* const value = &agent->returns[i]; /* else: memcpy */
-      *value = sdnn_first_returns[i];
-    }
-  }
-#endif
-#endif
-  agent->n_random_left = SDNN_FIRST_N_RANDOM_LEFT;
-  sdnn_begin_scale(&agent->scale);
-#if SDNN_IS_NEW
-  sdnn_draw_weights(agent);
-#else
-  sdnn_copy_32((int32_t*)agent->weights, (const int32_t*)sdnn_first_weights, SDNN_N_WORDS);
-  sdnn_copy_32(agent->thresholds, sdnn_first_thresholds, SDNN_N_UNITS);
-#endif
-}
-
 static inline int sdnn_explores(sdnn_agent* agent) {
   const uint32_t step = agent->step++;
   const int at_random = agent->n_random_left > 0;
@@ -510,9 +443,9 @@ static inline int sdnn_explores(sdnn_agent* agent) {
     return 0;
   }
   agent->kept = (uint32_t)sdnn_below(&agent->randoms[SDNN_EXPLORATION], SDNN_N_ACTIONS);
-#if SDNN_MAX_ACTION_REPEAT > 1
-  agent->n_kept = sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], SDNN_MAX_ACTION_REPEAT) - 1;
-#endif
+  if (SDNN_MAX_ACTION_REPEAT > 1) {
+    agent->n_kept = sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], SDNN_MAX_ACTION_REPEAT) - 1;
+  }
   return 1;
 }
 
@@ -525,12 +458,8 @@ static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation, i
   for (action = 0; action < SDNN_N_ACTIONS; ++action) {
     if (ranks[action] > best) best = ranks[action];
   }
-#if SDNN_TIES == SDNN_DRAWN
   return sdnn_tied(ranks, SDNN_N_ACTIONS, best,
                    &agent->randoms[explore ? SDNN_ACTING : SDNN_EVALUATION]);
-#else
-  return sdnn_tied(ranks, SDNN_N_ACTIONS, best);
-#endif
 }
 
 /* Q(observation, action), times 2^SDNN_FRACTION_BITS, rounded to the nearest. */
@@ -578,14 +507,8 @@ static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uin
   newest->action = action < SDNN_N_ACTIONS ? action : SDNN_N_ACTIONS - 1;
   newest->reward = reward;
   ++agent->n_waiting;
-  for (i = 0; i < SDNN_N_INPUTS; ++i) {
-    volatile uint32_t* const bin = &agent->next_bins[i]; /* else: memcpy */
-    *bin = next_bins[i];
-  }
-  for (i = 0; i < SDNN_N_OBSERVED; ++i) {
-    volatile int32_t* const reading = &agent->next_observation[i];
-    *reading = next_observation[i];
-  }
+  sdnn_copy_32((int32_t*)agent->next_bins, (const int32_t*)next_bins, SDNN_N_INPUTS);
+  sdnn_copy_32(agent->next_observation, next_observation, SDNN_N_OBSERVED);
   if (terminated) {
     sdnn_learn_all(agent, 0);
   } else if (agent->n_waiting == SDNN_N_STEPS) {
@@ -605,101 +528,116 @@ static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uin
 #define SDNN_WEIGHTS_AT (SDNN_THRESHOLDS_AT + UINT32_C(4) * SDNN_N_UNITS)
 #define SDNN_IMAGE_BYTES (SDNN_WEIGHTS_AT + 4 * SDNN_N_WORDS + 4)
 
-static inline void sdnn_save(const sdnn_agent* agent, uint8_t* image) {
-  uint8_t* at = image;
-  uint32_t i;
-  at = sdnn_put(at, SDNN_IMAGE_MAGIC, 4);
-  at = sdnn_put(at, SDNN_FINGERPRINT, 4);
-  at = sdnn_put(at, SDNN_FRACTION_BITS, 4);
-  at = sdnn_put(at, agent->n_random_left, 4);
-  at = sdnn_put_randoms(at, agent->randoms);
-  at = sdnn_put_scale(at, &agent->scale);
-  at = sdnn_put(at, agent->progress, 8);
-  at = sdnn_put(at, agent->q_low, 8);
-  at = sdnn_put(at, agent->q_high, 8);
+/* Reads the head of an image, or writes it: all numbers before rewards, returns, thresholds and
+ * weights. */
+static inline void sdnn_carry_head(sdnn_agent* agent, uint8_t* image, int reads) {
+  uint8_t* at = sdnn_carry_32(image + 12, &agent->n_random_left, 1, reads);
+  at = sdnn_carry_64(at, agent->randoms, 4 * SDNN_N_RANDOMS, reads);
+  at = sdnn_carry_scale(at, &agent->scale, reads);
+  at = sdnn_carry_64(at, &agent->progress, 1, reads);
+  at = sdnn_carry_64(at, &agent->q_low, 1, reads);
+  at = sdnn_carry_64(at, &agent->q_high, 1, reads);
 #if SDNN_ADAPTS
-  at = sdnn_put(at, agent->low, 8);
-  at = sdnn_put(at, agent->high, 8);
-  at = sdnn_put(at, agent->sum, 8);
-  at = sdnn_put(at, agent->n_returns, 8);
-  at = sdnn_put(at, agent->due, 8);
-  at = sdnn_put(at, agent->n_rewards, 4);
-  at = sdnn_put(at, agent->n_kept_returns, 4);
-  at = sdnn_put(at, agent->oldest, 4);
-  for (i = 0; i < 2 * SDNN_HORIZON; ++i) {
-    at = sdnn_put(at, i < agent->n_rewards ? (uint32_t)agent->rewards[i] : 0, 4);
-  }
-  for (i = 0; i < 256; ++i) at = sdnn_put(at, agent->returns[i], 8);
+  at = sdnn_carry_64(at, &agent->low, 1, reads);
+  at = sdnn_carry_64(at, &agent->high, 1, reads);
+  at = sdnn_carry_64(at, &agent->sum, 1, reads);
+  at = sdnn_carry_64(at, &agent->n_returns, 1, reads);
+  at = sdnn_carry_64(at, &agent->due, 1, reads);
+  at = sdnn_carry_32(at, &agent->n_rewards, 1, reads);
+  at = sdnn_carry_32(at, &agent->n_kept_returns, 1, reads);
+  sdnn_carry_32(at, &agent->oldest, 1, reads);
 #endif
-  for (i = 0; i < SDNN_N_UNITS; ++i) at = sdnn_put(at, (uint32_t)agent->thresholds[i], 4);
-  for (i = 0; i < SDNN_N_WORDS; ++i) at = sdnn_put(at, agent->weights[i], 4);
-  sdnn_put(at, sdnn_checksum(image, SDNN_IMAGE_BYTES - 4), 4);
+}
+
+/* Makes an agent with the head of an image, and nothing learned. */
+static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
+  sdnn_clear(agent, sizeof *agent);
+  sdnn_carry_head(agent, (uint8_t*)head, 1);
+  sdnn_follow_progress(agent, agent->progress);
+  sdnn_set_range(agent, agent->q_low, agent->q_high);
+}
+
+/* Makes the agent as it was exported. */
+static inline void sdnn_begin(sdnn_agent* agent) {
+  sdnn_begin_as(agent, sdnn_first_head);
+#if SDNN_ADAPTS
+  sdnn_copy_32(agent->rewards, sdnn_first_rewards, agent->n_rewards);
+  sdnn_copy_returns(agent->returns, sdnn_first_returns, agent->n_kept_returns);
+#endif
+#if SDNN_IS_NEW
+  sdnn_draw_weights(agent);
+#else
+  sdnn_copy_32((int32_t*)agent->weights, (const int32_t*)sdnn_first_weights, SDNN_N_WORDS);
+  sdnn_copy_32(agent->thresholds, sdnn_first_thresholds, SDNN_N_UNITS);
+#endif
+}
+
+/* Reads what follows the head of an image, or writes it. */
+static inline void sdnn_carry_rest(sdnn_agent* agent, uint8_t* image, int reads) {
+#if SDNN_ADAPTS
+  sdnn_carry_32(image + 272, agent->rewards, 2 * SDNN_HORIZON, reads);
+  sdnn_carry_64(image + SDNN_RETURNS_AT, agent->returns, 256, reads);
+#endif
+  sdnn_carry_32(image + SDNN_THRESHOLDS_AT, agent->thresholds, SDNN_N_UNITS, reads);
+  sdnn_carry_32(image + SDNN_WEIGHTS_AT, agent->weights, SDNN_N_WORDS, reads);
+}
+
+static inline void sdnn_save(const sdnn_agent* agent, uint8_t* image) {
+  sdnn_put(image + 8, SDNN_FRACTION_BITS, 4);
+  sdnn_carry_head((sdnn_agent*)agent, image, 0);
+  sdnn_carry_rest((sdnn_agent*)agent, image, 0);
+#if SDNN_ADAPTS
+  sdnn_clear(image + 272 + 4 * agent->n_rewards, 4 * (2 * SDNN_HORIZON - agent->n_rewards));
+#endif
+  sdnn_seal(image, SDNN_IMAGE_BYTES);
 }
 
 /* Whether a number read is one, and at most 2^100 in size. */
 static inline int sdnn_is_real(sdnn_real x) { return x << 1 >> 1 <= UINT64_C(1123) << 52; }
 
-/* Returns whether the image is one of this agent, whole and in range; if not, nothing changes. */
-static inline int sdnn_load(sdnn_agent* agent, const uint8_t* image) {
-  const uint8_t* const thresholds = image + SDNN_THRESHOLDS_AT;
-  const uint8_t* const weights = image + SDNN_WEIGHTS_AT;
-  const sdnn_real q_low = sdnn_get(image + 204, 8), q_high = sdnn_get(image + 212, 8);
 #if SDNN_ADAPTS
+/* Whether an image has a possible range, rewards and returns. */
+static inline int sdnn_is_range(const uint8_t* image) {
   const uint64_t n_returns = sdnn_get(image + 244, 8), due = sdnn_get(image + 252, 8);
   const uint32_t n_kept = (uint32_t)sdnn_get(image + 264, 4);
   const uint32_t oldest = (uint32_t)sdnn_get(image + 268, 4);
-#endif
-  sdnn_scale scale;
   uint32_t i;
-  if (!sdnn_is_image(image, SDNN_IMAGE_BYTES, image + 16) ||
-      sdnn_get(image + 8, 4) != SDNN_FRACTION_BITS || sdnn_get(image + 12, 4) > SDNN_START_STEPS ||
-      sdnn_get(image + 196, 8) > SDNN_ONE || !sdnn_is_real(q_low) || !sdnn_is_real(q_high) ||
-      !sdnn_less(q_low, q_high) || !sdnn_get_scale(image + 176, &scale)) {
-    return 0;
-  }
-#if SDNN_ADAPTS
   for (i = 220; i < 244; i += 8) {
     if (!sdnn_is_real(sdnn_get(image + i, 8))) return 0;
-  }
-  if (sdnn_less(0, sdnn_get(image + 220, 8)) || sdnn_less(sdnn_get(image + 228, 8), 0) ||
-      n_returns >> 62 || due > n_returns + (n_returns < 512 ? 1 : n_returns >> 9) ||
-      sdnn_get(image + 260, 4) >= 2 * SDNN_HORIZON || n_kept > 256 || oldest > 255 ||
-      (n_kept < 256 && oldest > 0) || (n_returns >= 32 && n_kept < 32)) {
-    return 0;
   }
   for (i = 0; i < 256; ++i) {
     if (!sdnn_is_real(sdnn_get(image + SDNN_RETURNS_AT + 8 * i, 8))) return 0;
   }
+  return !sdnn_less(0, sdnn_get(image + 220, 8)) && !sdnn_less(sdnn_get(image + 228, 8), 0) &&
+         n_returns >> 62 == 0 && due <= n_returns + (n_returns < 512 ? 1 : n_returns >> 9) &&
+         sdnn_get(image + 260, 4) < 2 * SDNN_HORIZON && n_kept <= 256 && oldest <= 255 &&
+         (n_kept == 256 || oldest == 0) && (n_returns < 32 || n_kept >= 32);
+}
+#endif
+
+/* Returns whether the image is one of this agent, whole and in range; if not, nothing changes. */
+static inline int sdnn_load(sdnn_agent* agent, const uint8_t* image) {
+  const uint8_t* const weights = image + SDNN_WEIGHTS_AT;
+  const sdnn_real q_low = sdnn_get(image + 204, 8), q_high = sdnn_get(image + 212, 8);
+  uint32_t i;
+  if (!sdnn_is_image(image, SDNN_IMAGE_BYTES, image + 16) ||
+      sdnn_get(image + 8, 4) != SDNN_FRACTION_BITS || sdnn_get(image + 12, 4) > SDNN_START_STEPS ||
+      sdnn_get(image + 196, 8) > SDNN_ONE || !sdnn_is_real(q_low) || !sdnn_is_real(q_high) ||
+      !sdnn_less(q_low, q_high) || !sdnn_is_scale(image + 176)) {
+    return 0;
+  }
+#if SDNN_ADAPTS
+  if (!sdnn_is_range(image)) return 0;
 #endif
   for (i = 0; i < SDNN_N_UNITS; ++i) {
-    const int32_t threshold = sdnn_get_32(thresholds + 4 * i);
+    const int32_t threshold = sdnn_get_32(image + SDNN_THRESHOLDS_AT + 4 * i);
     if (threshold <= -1073741824 || threshold >= 1073741824) return 0;
   }
   for (i = 0; i < 4 * SDNN_N_WORDS; ++i) {
     if (weights[i] == 0) return 0;
   }
-  sdnn_begin(agent);
-  agent->n_random_left = (uint32_t)sdnn_get(image + 12, 4);
-  sdnn_get_randoms(image + 16, agent->randoms);
-  sdnn_get_scale(image + 176, &agent->scale);
-  sdnn_follow_progress(agent, sdnn_get(image + 196, 8));
-  sdnn_set_range(agent, q_low, q_high);
-#if SDNN_ADAPTS
-  agent->low = sdnn_get(image + 220, 8);
-  agent->high = sdnn_get(image + 228, 8);
-  agent->sum = sdnn_get(image + 236, 8);
-  agent->n_returns = n_returns;
-  agent->due = due;
-  agent->n_rewards = (uint32_t)sdnn_get(image + 260, 4);
-  agent->n_kept_returns = n_kept;
-  agent->oldest = oldest;
-  for (i = 0; i < agent->n_rewards; ++i) agent->rewards[i] = sdnn_get_32(image + 272 + 4 * i);
-  for (i = 0; i < 256; ++i) agent->returns[i] = sdnn_get(image + SDNN_RETURNS_AT + 8 * i, 8);
-#endif
-  for (i = 0; i < SDNN_N_UNITS; ++i) {
-    agent->thresholds[i] = sdnn_get_32(thresholds + 4 * i);
-  }
-  for (i = 0; i < SDNN_N_WORDS; ++i) agent->weights[i] = (uint32_t)sdnn_get(weights + 4 * i, 4);
+  sdnn_begin_as(agent, image);
+  sdnn_carry_rest(agent, (uint8_t*)image, 1);
   return 1;
 }
 

@@ -65,7 +65,7 @@ static inline uint32_t sdnn_best(const sdnn_network* network, const uint32_t* bi
 #if SDNN_HAS_TIE_TOLERANCE
   best = sdnn_ties[best];
 #endif
-  return sdnn_tied(ranks, network->n_actions, (sdnn_score)best);
+  return sdnn_tied(ranks, network->n_actions, (sdnn_score)best, 0);
 }
 
 static inline void sdnn_act_in_each(const uint32_t* bins, uint32_t* action) {

@@ -12,7 +12,7 @@ static inline uint32_t sdnn_best(const sdnn_code* code, uint32_t d) {
   int64_t sums[SDNN_MOST_ROWS];
   sdnn_sums(sdnn_weights, code, d, sums);
   return sdnn_tied(sums, sdnn_n_actions[d],
-                   sdnn_largest(sums, sdnn_n_actions[d]) - SDNN_TIE_TOLERANCE);
+                   sdnn_largest(sums, sdnn_n_actions[d]) - SDNN_TIE_TOLERANCE, 0);
 }
 
 static inline void sdnn_act_in_each(const uint32_t* bins, uint32_t* action) {

@@ -25,7 +25,7 @@ static inline uint64_t sdnn_quotient(uint64_t a, uint64_t b, uint64_t* rest) {
 }
 
 /* xoshiro256** of Blackman and Vigna. */
-typedef struct {
+typedef struct sdnn_random {
   uint64_t words[4];
 } sdnn_random;
 
@@ -55,12 +55,8 @@ static inline uint64_t sdnn_below(sdnn_random* random, uint64_t n) {
 
 /* Whether an action may be random in this step of an episode. */
 static inline int sdnn_may_explore(uint32_t step) {
-#if SDNN_N_GREEDY_STEPS > 0
-  return step >= SDNN_N_GREEDY_STEPS;
-#else
-  (void)step;
-  return 1;
-#endif
+  const uint32_t n = SDNN_N_GREEDY_STEPS;
+  return step >= n;
 }
 
 /* The number of steps that a random action lasts: n with probability 1 / (n (n + 1)), at most
@@ -78,13 +74,6 @@ typedef struct {
   uint64_t n_rewards;
   int32_t size, size_in_window, headroom;
 } sdnn_scale;
-
-static inline void sdnn_begin_scale(sdnn_scale* scale) {
-  scale->n_rewards = SDNN_FIRST_N_REWARDS;
-  scale->size = SDNN_FIRST_SIZE;
-  scale->size_in_window = SDNN_FIRST_SIZE_IN_WINDOW;
-  scale->headroom = SDNN_FIRST_HEADROOM;
-}
 
 /* Returns whether a reward is to be learned. */
 static inline int sdnn_accepts(sdnn_scale* scale, int32_t reward) {
@@ -145,23 +134,45 @@ static inline int32_t sdnn_get_32(const uint8_t* at) {
   return sdnn_signed((uint32_t)sdnn_get(at, 4));
 }
 
-static inline uint8_t* sdnn_put_scale(uint8_t* at, const sdnn_scale* scale) {
-  at = sdnn_put(at, scale->n_rewards, 8);
-  at = sdnn_put(at, (uint32_t)scale->size, 4);
-  at = sdnn_put(at, (uint32_t)scale->size_in_window, 4);
-  return sdnn_put(at, (uint32_t)scale->headroom, 4);
+/* Reads n numbers of 32 bits from an image, or writes them to it; returns where it continues. */
+static inline uint8_t* sdnn_carry_32(uint8_t* at, void* numbers, uint32_t n, int reads) {
+  uint32_t* number = (uint32_t*)numbers;
+  for (; n > 0; --n, at += 4, ++number) {
+    if (reads) {
+      *number = (uint32_t)sdnn_get(at, 4);
+    } else {
+      sdnn_put(at, *number, 4);
+    }
+  }
+  return at;
 }
 
-/* Returns whether the numbers are possible for a scale. */
-static inline int sdnn_get_scale(const uint8_t* at, sdnn_scale* scale) {
-  scale->n_rewards = sdnn_get(at, 8);
-  scale->size = sdnn_get_32(at + 8);
-  scale->size_in_window = sdnn_get_32(at + 12);
-  scale->headroom = sdnn_get_32(at + 16);
-  return (scale->size == INT32_MIN || (scale->size >= -1100 && scale->size <= 1100)) &&
-         scale->size_in_window <= scale->size &&
-         (scale->size_in_window == INT32_MIN || scale->size_in_window >= -1100) &&
-         scale->headroom >= 16 && scale->headroom <= 2500;
+static inline uint8_t* sdnn_carry_64(uint8_t* at, void* numbers, uint32_t n, int reads) {
+  uint64_t* number = (uint64_t*)numbers;
+  for (; n > 0; --n, at += 8, ++number) {
+    if (reads) {
+      *number = sdnn_get(at, 8);
+    } else {
+      sdnn_put(at, *number, 8);
+    }
+  }
+  return at;
+}
+
+static inline uint8_t* sdnn_carry_scale(uint8_t* at, sdnn_scale* scale, int reads) {
+  at = sdnn_carry_64(at, &scale->n_rewards, 1, reads);
+  at = sdnn_carry_32(at, &scale->size, 1, reads);
+  at = sdnn_carry_32(at, &scale->size_in_window, 1, reads);
+  return sdnn_carry_32(at, &scale->headroom, 1, reads);
+}
+
+/* Whether an image has possible numbers of a scale at this place. */
+static inline int sdnn_is_scale(const uint8_t* at) {
+  const int32_t size = sdnn_get_32(at + 8), size_in_window = sdnn_get_32(at + 12);
+  const int32_t headroom = sdnn_get_32(at + 16);
+  return (size == INT32_MIN || (size >= -1100 && size <= 1100)) && size_in_window <= size &&
+         (size_in_window == INT32_MIN || size_in_window >= -1100) && headroom >= 16 &&
+         headroom <= 2500;
 }
 
 /* CRC-32. */
@@ -177,26 +188,10 @@ static inline uint32_t sdnn_checksum(const uint8_t* bytes, uint32_t n) {
 /* The random generators of an agent. SDNN-C rounds at random, too. */
 enum { SDNN_EXPLORATION, SDNN_ACTING, SDNN_EVALUATION, SDNN_REPETITIONS, SDNN_ROUNDING };
 
-static inline void sdnn_begin_randoms(sdnn_random* randoms) {
-  uint32_t i, j;
-  for (i = 0; i < SDNN_N_RANDOMS; ++i) {
-    for (j = 0; j < 4; ++j) randoms[i].words[j] = sdnn_seeds[i][j];
-  }
-}
-
-static inline uint8_t* sdnn_put_randoms(uint8_t* at, const sdnn_random* randoms) {
-  uint32_t i, j;
-  for (i = 0; i < SDNN_N_RANDOMS; ++i) {
-    for (j = 0; j < 4; ++j) at = sdnn_put(at, randoms[i].words[j], 8);
-  }
-  return at;
-}
-
-static inline void sdnn_get_randoms(const uint8_t* at, sdnn_random* randoms) {
-  uint32_t i, j;
-  for (i = 0; i < SDNN_N_RANDOMS; ++i) {
-    for (j = 0; j < 4; ++j, at += 8) randoms[i].words[j] = sdnn_get(at, 8);
-  }
+/* Writes an image's first bytes and its checksum. */
+static inline void sdnn_seal(uint8_t* image, uint32_t n_bytes) {
+  sdnn_put(sdnn_put(image, SDNN_IMAGE_MAGIC, 4), SDNN_FINGERPRINT, 4);
+  sdnn_put(image + n_bytes - 4, sdnn_checksum(image, n_bytes - 4), 4);
 }
 
 /* Whether an image has the head of this agent, the right checksum and possible generators. */

@@ -42,15 +42,8 @@ static inline uint32_t sdnn_bit(const uint8_t* bits, uint32_t k) {
 
 /* Whether a group and the next one are stored as half their sum and half their difference. */
 static inline uint32_t sdnn_is_double(uint32_t group) {
-#if SDNN_N_DOUBLE_GROUPS == 0
-  (void)group;
-  return 0;
-#elif SDNN_N_DOUBLE_GROUPS == SDNN_N_GROUPS
-  (void)group;
-  return 1;
-#else
-  return group < SDNN_N_DOUBLE_GROUPS;
-#endif
+  const uint32_t n = SDNN_N_DOUBLE_GROUPS;
+  return n == SDNN_N_GROUPS || group < n;
 }
 
 /* The desensitized code: for each pair of inputs the pattern of one, neutral where the pattern of
@@ -150,10 +143,6 @@ static inline void sdnn_bins_of_fixed(const int32_t* observation, uint32_t* bins
   bins[i] = sdnn_bin_of_direction(bounds, n_bins, observation[cosine], observation[sine]);
 #define SDNN_SYMBOL(i, at, n) bins[i] = sdnn_symbol_of_fixed(&observation[at], n);
   SDNN_INPUTS
-#undef SDNN_VARIABLE
-#undef SDNN_CIRCULAR
-#undef SDNN_ANGLE
-#undef SDNN_SYMBOL
 }
 
 #endif /* SDNN_OBSERVATION_H */

@@ -13,12 +13,6 @@
 
 #include "sdnn_observation.h"
 
-static inline void sdnn_act_in_each_fixed(const int32_t* observation, uint32_t* action) {
-  uint32_t bins[SDNN_N_INPUTS];
-  sdnn_bins_of_fixed(observation, bins);
-  sdnn_act_in_each(bins, action);
-}
-
 #ifdef SDNN_USE_FLOAT
 /* Floating point gives the bins of the agent where doubles are IEEE 754 and not reordered (no
  * -ffast-math, no x87). NaN counts as the lowest reading. A cosine and sine of which one is NaN or
@@ -62,6 +56,10 @@ static inline uint32_t sdnn_symbol_of_double(const double* readings, uint32_t n)
 
 /* The bins of all inputs, from an observation in its own units. */
 static inline void sdnn_bins_of_double(const double* observation, uint32_t* bins) {
+#undef SDNN_VARIABLE
+#undef SDNN_CIRCULAR
+#undef SDNN_ANGLE
+#undef SDNN_SYMBOL
 #define SDNN_VARIABLE(i, at, n_bins, low, width, bounds) \
   bins[i] = sdnn_bin_of_unit((observation[at] - (low)) / (width), n_bins);
 #define SDNN_CIRCULAR(i, at, n_bins, low, width, rate, offset) \
@@ -70,23 +68,13 @@ static inline void sdnn_bins_of_double(const double* observation, uint32_t* bins
   bins[i] = sdnn_bin_of_doubles(bounds, n_bins, observation[cosine], observation[sine]);
 #define SDNN_SYMBOL(i, at, n) bins[i] = sdnn_symbol_of_double(&observation[at], n);
   SDNN_INPUTS
-#undef SDNN_VARIABLE
-#undef SDNN_CIRCULAR
-#undef SDNN_ANGLE
-#undef SDNN_SYMBOL
 }
 
-static inline void sdnn_act_in_each_double(const double* observation, uint32_t* action) {
-  uint32_t bins[SDNN_N_INPUTS];
-  sdnn_bins_of_double(observation, bins);
-  sdnn_act_in_each(bins, action);
-}
-
-static inline void sdnn_act_in_each_float(const float* observation, uint32_t* action) {
+static inline void sdnn_bins_of_float(const float* observation, uint32_t* bins) {
   double doubles[SDNN_N_OBSERVED];
   uint32_t i;
   for (i = 0; i < SDNN_N_OBSERVED; ++i) doubles[i] = (double)observation[i];
-  sdnn_act_in_each_double(doubles, action);
+  sdnn_bins_of_double(doubles, bins);
 }
 #endif /* SDNN_USE_FLOAT */
 
@@ -96,38 +84,28 @@ static inline uint32_t sdnn_act_bins(const uint32_t* bins) {
   sdnn_act_in_each(bins, &action);
   return action;
 }
-static inline uint32_t sdnn_act_fixed(const int32_t* observation) {
-  uint32_t action;
-  sdnn_act_in_each_fixed(observation, &action);
-  return action;
-}
-#ifdef SDNN_USE_FLOAT
-static inline uint32_t sdnn_act_double(const double* observation) {
-  uint32_t action;
-  sdnn_act_in_each_double(observation, &action);
-  return action;
-}
-static inline uint32_t sdnn_act_float(const float* observation) {
-  uint32_t action;
-  sdnn_act_in_each_float(observation, &action);
-  return action;
-}
-#endif
-#else /* several dimensions */
+#define SDNN_POLICY(name, reading, bins_of)                 \
+  static inline uint32_t name(const reading* observation) { \
+    uint32_t bins[SDNN_N_INPUTS];                           \
+    bins_of(observation, bins);                             \
+    return sdnn_act_bins(bins);                             \
+  }
+#else
 static inline void sdnn_act_bins(const uint32_t* bins, uint32_t* action) {
   sdnn_act_in_each(bins, action);
 }
-static inline void sdnn_act_fixed(const int32_t* observation, uint32_t* action) {
-  sdnn_act_in_each_fixed(observation, action);
-}
-#ifdef SDNN_USE_FLOAT
-static inline void sdnn_act_double(const double* observation, uint32_t* action) {
-  sdnn_act_in_each_double(observation, action);
-}
-static inline void sdnn_act_float(const float* observation, uint32_t* action) {
-  sdnn_act_in_each_float(observation, action);
-}
+#define SDNN_POLICY(name, reading, bins_of)                               \
+  static inline void name(const reading* observation, uint32_t* action) { \
+    uint32_t bins[SDNN_N_INPUTS];                                         \
+    bins_of(observation, bins);                                           \
+    sdnn_act_in_each(bins, action);                                       \
+  }
 #endif
+
+SDNN_POLICY(sdnn_act_fixed, int32_t, sdnn_bins_of_fixed)
+#ifdef SDNN_USE_FLOAT
+SDNN_POLICY(sdnn_act_double, double, sdnn_bins_of_double)
+SDNN_POLICY(sdnn_act_float, float, sdnn_bins_of_float)
 #endif
 
 #endif /* SDNN_POLICY_H */

@@ -1,19 +1,5 @@
 /* An agent that learns Q(s, a) linear in the SDNN code, by true-online Q(lambda) or Sarsa(lambda).
- *
- *   static sdnn_agent agent; // everything that it remembers
- *   sdnn_begin(&agent);
- *   sdnn_begin_episode(&agent); // whenever the task starts anew
- *   uint32_t action = sdnn_act(&agent, observation, 1); // 0: the best action
- *   sdnn_learn(&agent, observation, action, reward, next_observation, terminated);
- *
- * With several dimensions of actions: sdnn_act(&agent, observation, 1, action), with an array of
- * SDNN_N_DIMENSIONS numbers, which sdnn_learn takes. Observations are in their units, times
- * 2^SDNN_FRACTION_BITS, and so are rewards. sdnn_save and sdnn_load write and read an image of what
- * was learned, as sdnn.export.load_image and save_image do. sdnn_bins_of_fixed gives the bins of
- * all inputs.
- *
- * Where the processor cannot multiply or shift 64 bits, the compiler's own library does (libgcc).
- * Nothing is divided. See cpp/include/sdnn/agents/q_lambda.hpp. */
+ * See cpp/include/sdnn/agents/q_lambda.hpp. */
 #ifndef SDNN_Q_LAMBDA_H
 #define SDNN_Q_LAMBDA_H
 
@@ -34,6 +20,7 @@ typedef int64_t sdnn_score;
 #define SDNN_MOST_ENDED 20
 #define SDNN_AVERAGES (SDNN_AVERAGING_INTERVAL > 0)
 #define SDNN_N_WEIGHTS (UINT32_C(1) * SDNN_N_ROWS * SDNN_N_COLUMNS)
+#define SDNN_N_AVERAGED (SDNN_AVERAGES * SDNN_N_WEIGHTS)
 
 /* Everything that the agent remembers. All functions take its address. */
 typedef struct {
@@ -42,10 +29,7 @@ typedef struct {
   int64_t old_value; /* of the pending state, before the last step of learning */
   sdnn_scale scale;
   sdnn_random randoms[SDNN_N_RANDOMS];
-  int32_t weights[SDNN_N_WEIGHTS];
-#if SDNN_AVERAGES
-  int32_t averaged[SDNN_N_WEIGHTS];
-#endif
+  int32_t weights[SDNN_N_WEIGHTS + SDNN_N_AVERAGED]; /* and after them their averages, if any */
   int32_t traces[SDNN_N_WEIGHTS];
   int32_t exponent; /* values and weights count units of 2 to this power */
   int32_t reward;
@@ -102,11 +86,8 @@ static inline void sdnn_double_unit(sdnn_agent* agent) {
   uint32_t j;
   ++agent->exponent;
   agent->old_value = (agent->old_value + 1) >> 1;
-  for (j = 0; j < SDNN_N_WEIGHTS; ++j) {
+  for (j = 0; j < SDNN_N_WEIGHTS + SDNN_N_AVERAGED; ++j) {
     agent->weights[j] = (agent->weights[j] + 1) >> 1;
-#if SDNN_AVERAGES
-    agent->averaged[j] = (agent->averaged[j] + 1) >> 1;
-#endif
   }
 }
 
@@ -127,11 +108,8 @@ static inline void sdnn_refine_unit(sdnn_agent* agent, int32_t size) {
   uint32_t used = 0, j;
   if (!agent->has_exponent) return;
   least_bits = (least_bits < 33 ? least_bits : 33) - SDNN_HORIZON_BITS - 10;
-  for (j = 0; j < SDNN_N_WEIGHTS; ++j) {
+  for (j = 0; j < SDNN_N_WEIGHTS + SDNN_N_AVERAGED; ++j) {
     used |= (uint32_t)(agent->weights[j] ^ agent->weights[j] >> 31);
-#if SDNN_AVERAGES
-    used |= (uint32_t)(agent->averaged[j] ^ agent->averaged[j] >> 31);
-#endif
   }
   spare_bits -= sdnn_log2(used) + 1;
   if (n_free > spare_bits) n_free = spare_bits;
@@ -142,11 +120,8 @@ static inline void sdnn_refine_unit(sdnn_agent* agent, int32_t size) {
   agent->exponent -= n_halvings;
   for (; n_halvings > 0; --n_halvings) {
     agent->old_value = sdnn_clipped(2 * agent->old_value, SDNN_LARGEST_VALUE - 1);
-    for (j = 0; j < SDNN_N_WEIGHTS; ++j) {
+    for (j = 0; j < SDNN_N_WEIGHTS + SDNN_N_AVERAGED; ++j) {
       agent->weights[j] = (int32_t)sdnn_clipped(2 * agent->weights[j], SDNN_LARGEST_WEIGHT - 1);
-#if SDNN_AVERAGES
-      agent->averaged[j] = (int32_t)sdnn_clipped(2 * agent->averaged[j], SDNN_LARGEST_WEIGHT - 1);
-#endif
     }
   }
 }
@@ -219,32 +194,28 @@ static inline sdnn_code* sdnn_other(sdnn_agent* agent, const uint32_t* bins) {
   return code;
 }
 
-#if SDNN_AVERAGES
 /* Moves the average to the weights by 1 / 2^k of the way, with growing k. */
 static inline void sdnn_note_step(sdnn_agent* agent) {
-  uint32_t k = 0, j;
+  const uint32_t interval = SDNN_AVERAGING_INTERVAL;
+  int32_t* const averaged = agent->weights + SDNN_N_WEIGHTS;
   int32_t half;
+  uint32_t k = 0, j;
   ++agent->n_steps;
-  if (++agent->phase < SDNN_AVERAGING_INTERVAL) return;
+  if (++agent->phase < interval) return;
   agent->phase = 0;
   while (3 * ((UINT32_C(2) << k) - 1) <= agent->n_snapshots) ++k;
   half = k > 0 ? (int32_t)(UINT32_C(1) << (k - 1)) : 0;
   for (j = 0; j < SDNN_N_WEIGHTS; ++j) {
-    agent->averaged[j] += (agent->weights[j] - agent->averaged[j] + half) >> k;
+    averaged[j] += (agent->weights[j] - averaged[j] + half) >> k;
   }
   if (agent->n_snapshots < SDNN_MOST_SNAPSHOTS) ++agent->n_snapshots;
 }
-#endif
 
 /* Adds columns of a code to the traces of a row, or replaces them, and corrects the weights. */
 static inline void sdnn_add_to_trace(int32_t* weights, int32_t* traces, const sdnn_column* column,
                                      uint32_t n, int32_t gain, int32_t correction) {
   for (; n > 0; --n, ++column) {
-#if SDNN_IS_DUTCH
-    int32_t trace = traces[*column] + gain;
-#else
-    int32_t trace = gain;
-#endif
+    int32_t trace = SDNN_IS_DUTCH ? traces[*column] + gain : gain;
     if (trace > SDNN_LARGEST_TRACE) trace = SDNN_LARGEST_TRACE;
     if (trace < -SDNN_LARGEST_TRACE) trace = -SDNN_LARGEST_TRACE;
     traces[*column] = trace;
@@ -292,10 +263,10 @@ static inline void sdnn_move(sdnn_agent* agent, const sdnn_code* code, int64_t e
   int64_t along_trace;
   int32_t gain = SDNN_TRACE_ONE;
   uint32_t n_bits = 0, used = 0, d, row = 0;
-#if SDNN_IS_DUTCH
-  const int64_t before = sdnn_scaled(sdnn_sum(agent->traces, code, agent->action), rate, 28);
-  gain -= (int32_t)sdnn_clipped(sdnn_scaled(before, SDNN_TRACE_DECAY, 13), SDNN_LARGEST_TRACE);
-#endif
+  if (SDNN_IS_DUTCH) {
+    const int64_t before = sdnn_scaled(sdnn_sum(agent->traces, code, agent->action), rate, 28);
+    gain -= (int32_t)sdnn_clipped(sdnn_scaled(before, SDNN_TRACE_DECAY, 13), SDNN_LARGEST_TRACE);
+  }
   error = sdnn_clipped(error, SDNN_LARGEST_ERROR);
   drift = sdnn_clipped(drift, SDNN_LARGEST_ERROR);
   while (sdnn_size(sdnn_scaled(error, rate, 28)) >= SDNN_LARGEST_WEIGHT ||
@@ -324,9 +295,7 @@ static inline void sdnn_move(sdnn_agent* agent, const sdnn_code* code, int64_t e
       if (agent->weights[row] == SDNN_LARGEST_WEIGHT) used |= (uint32_t)SDNN_LARGEST_WEIGHT;
     }
   }
-#if SDNN_AVERAGES
-  sdnn_note_step(agent);
-#endif
+  if (SDNN_AVERAGES) sdnn_note_step(agent);
 }
 
 /* Takes a step of learning from the pending transition; `next` is the value of the next state. */
@@ -358,9 +327,7 @@ static inline void sdnn_end(sdnn_agent* agent) {
 
 /* Learns the pending transition of an episode that did not terminate. */
 static inline void sdnn_finish_at_end(sdnn_agent* agent) {
-#if SDNN_IS_SARSA
-  sdnn_correct_by_best(agent);
-#endif
+  if (SDNN_IS_SARSA) sdnn_correct_by_best(agent);
   sdnn_end(agent);
 }
 
@@ -369,35 +336,6 @@ static inline void sdnn_begin_episode(sdnn_agent* agent) {
   agent->step = 0;
   agent->n_kept = 0;
   if (agent->is_pending) sdnn_finish_at_end(agent);
-}
-
-/* Sets the exponent of units; INT32_MIN where no reward decided it. */
-static inline void sdnn_set_exponent(sdnn_agent* agent, int32_t exponent) {
-  agent->has_exponent = exponent != INT32_MIN;
-  agent->exponent = agent->has_exponent ? exponent : 0;
-}
-
-/* Makes the agent as it was exported. */
-static inline void sdnn_begin(sdnn_agent* agent) {
-  sdnn_clear(agent, sizeof *agent);
-  sdnn_begin_randoms(agent->randoms);
-  agent->n_random_left = SDNN_FIRST_N_RANDOM_LEFT;
-  sdnn_begin_scale(&agent->scale);
-  sdnn_set_exponent(agent, SDNN_FIRST_EXPONENT);
-  agent->n_learned = SDNN_FIRST_N_LEARNED;
-  agent->n_ended = SDNN_FIRST_N_ENDED;
-#if SDNN_AVERAGES
-  agent->n_steps = SDNN_FIRST_N_STEPS;
-  agent->phase = SDNN_FIRST_PHASE;
-  agent->n_snapshots = SDNN_FIRST_N_SNAPSHOTS;
-#endif
-#if SDNN_HAS_FIRST_WEIGHTS
-  sdnn_copy_32(agent->weights, sdnn_first_weights, SDNN_N_WEIGHTS);
-#endif
-#if SDNN_HAS_FIRST_AVERAGED
-  sdnn_copy_32(agent->averaged, sdnn_first_averaged, SDNN_N_WEIGHTS);
-#endif
-  sdnn_apply_rates(agent);
 }
 
 /* Whether the next action is a random one, which is in agent->kept then. */
@@ -418,26 +356,20 @@ static inline int sdnn_explores(sdnn_agent* agent) {
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     agent->kept[d] = (uint32_t)sdnn_below(&agent->randoms[SDNN_EXPLORATION], sdnn_n_actions[d]);
   }
-#if SDNN_MAX_ACTION_REPEAT > 1
-  {
+  if (SDNN_MAX_ACTION_REPEAT > 1) {
     const uint32_t most = (uint32_t)SDNN_MAX_ACTION_REPEAT >> agent->n_ended;
     const uint32_t least = SDNN_MAX_ACTION_REPEAT < 5 ? SDNN_MAX_ACTION_REPEAT : 5;
     agent->n_kept =
         sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], most > least ? most : least) - 1;
   }
-#endif
   return 1;
 }
 
 /* The tolerance of ties in units. */
 static inline int64_t sdnn_tie_tolerance(const sdnn_agent* agent) {
-#if SDNN_TIE_TOLERANCE > 0
   const int32_t shift = agent->exponent - (SDNN_TIE_TOLERANCE_EXPONENT);
+  if (SDNN_TIE_TOLERANCE == 0) return 0;
   return shift < 0 ? INT64_C(1) << 62 : shift < 63 ? SDNN_TIE_TOLERANCE >> shift : 0;
-#else
-  (void)agent;
-  return 0;
-#endif
 }
 
 /* The action to take in each dimension; without `explore` a best one, by the average of the weights
@@ -454,18 +386,12 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
   }
   sdnn_bins_of_fixed(observation, bins);
   code = sdnn_other(agent, bins);
-#if SDNN_AVERAGES
-  if (!explore && agent->n_snapshots > 0) rows = agent->averaged;
-#endif
+  if (SDNN_AVERAGES && !explore && agent->n_snapshots > 0) rows += SDNN_N_WEIGHTS;
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     sdnn_sums(rows, code, d, sums);
     least = sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(agent);
-#if SDNN_TIES == SDNN_DRAWN
     action[d] = sdnn_tied(sums, sdnn_n_actions[d], least,
                           &agent->randoms[explore ? SDNN_ACTING : SDNN_EVALUATION]);
-#else
-    action[d] = sdnn_tied(sums, sdnn_n_actions[d], least);
-#endif
   }
 }
 
@@ -502,11 +428,11 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   if (agent->is_pending && !is_next) sdnn_finish_at_end(agent);
   code = sdnn_other(agent, bins);
   if (agent->is_pending) {
-#if SDNN_IS_SARSA
-    sdnn_correct(agent, sdnn_value(agent, code, limited, 0));
-#else
-    if (sdnn_sum(agent->weights, code, limited) < sdnn_best_sum(agent, code)) sdnn_end(agent);
-#endif
+    if (SDNN_IS_SARSA) {
+      sdnn_correct(agent, sdnn_value(agent, code, limited, 0));
+    } else if (sdnn_sum(agent->weights, code, limited) < sdnn_best_sum(agent, code)) {
+      sdnn_end(agent);
+    }
     agent->is_pending = 0;
   }
   agent->pending = (uint8_t)(1 - agent->pending);
@@ -542,81 +468,73 @@ static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uin
   sdnn_learn_in_each(agent, observation, &action, reward, next_observation, terminated);
 }
 #else
-static inline void sdnn_act(sdnn_agent* agent, const int32_t* observation, int explore,
-                            uint32_t* action) {
-  sdnn_act_in_each(agent, observation, explore, action);
-}
-static inline int64_t sdnn_q(sdnn_agent* agent, const int32_t* observation,
-                             const uint32_t* action) {
-  return sdnn_q_of_each(agent, observation, action);
-}
-static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, const uint32_t* action,
-                              int32_t reward, const int32_t* next_observation, int terminated) {
-  sdnn_learn_in_each(agent, observation, action, reward, next_observation, terminated);
-}
+#define sdnn_act sdnn_act_in_each
+#define sdnn_q sdnn_q_of_each
+#define sdnn_learn sdnn_learn_in_each
 #endif
 
 /* An image holds the state as bytes, which the library reads and writes too. The episode is not
  * part of it: call sdnn_begin_episode before, so that its last transition is learned. */
 #define SDNN_IMAGE_HEAD 188
-#define SDNN_IMAGE_BYTES (SDNN_IMAGE_HEAD + 4 * (1 + SDNN_AVERAGES) * SDNN_N_WEIGHTS + 4)
+#define SDNN_IMAGE_BYTES (SDNN_IMAGE_HEAD + 4 * (SDNN_N_WEIGHTS + SDNN_N_AVERAGED) + 4)
+
+/* Reads the head of an image, or writes it. */
+static inline void sdnn_carry_head(sdnn_agent* agent, uint8_t* image, int reads) {
+  int32_t exponent = agent->has_exponent ? agent->exponent : INT32_MIN;
+  uint8_t* at = sdnn_carry_32(image + 8, &exponent, 1, reads);
+  if (reads && exponent != INT32_MIN) {
+    agent->has_exponent = 1;
+    agent->exponent = exponent;
+  }
+  at = sdnn_carry_32(at, &agent->n_snapshots, 1, reads);
+  at = sdnn_carry_32(at, &agent->n_random_left, 1, reads);
+  at = sdnn_carry_32(at, &agent->n_ended, 1, reads);
+  at = sdnn_carry_64(at, &agent->n_learned, 1, reads);
+  at = sdnn_carry_64(at, &agent->n_steps, 1, reads);
+  at = sdnn_carry_scale(at, &agent->scale, reads);
+  sdnn_carry_64(at, agent->randoms, 4 * SDNN_N_RANDOMS, reads);
+}
+
+/* Makes an agent with the head of an image, without weights. */
+static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
+  uint64_t rest;
+  sdnn_clear(agent, sizeof *agent);
+  sdnn_carry_head(agent, (uint8_t*)head, 1);
+  sdnn_quotient((uint64_t)agent->n_steps, SDNN_AVERAGES ? SDNN_AVERAGING_INTERVAL : 1, &rest);
+  agent->phase = (uint32_t)rest;
+  sdnn_apply_rates(agent);
+}
+
+/* Makes the agent as it was exported. */
+static inline void sdnn_begin(sdnn_agent* agent) {
+  sdnn_begin_as(agent, sdnn_first_head);
+  sdnn_copy_32(agent->weights, sdnn_first_weights, SDNN_N_FIRST_WEIGHTS);
+}
 
 static inline void sdnn_save(const sdnn_agent* agent, uint8_t* image) {
-  uint8_t* at = image;
-  uint32_t j;
-  at = sdnn_put(at, SDNN_IMAGE_MAGIC, 4);
-  at = sdnn_put(at, SDNN_FINGERPRINT, 4);
-  at = sdnn_put(at, agent->has_exponent ? (uint32_t)agent->exponent : UINT32_C(0x80000000), 4);
-  at = sdnn_put(at, agent->n_snapshots, 4);
-  at = sdnn_put(at, agent->n_random_left, 4);
-  at = sdnn_put(at, agent->n_ended, 4);
-  at = sdnn_put(at, (uint64_t)agent->n_learned, 8);
-  at = sdnn_put(at, (uint64_t)agent->n_steps, 8);
-  at = sdnn_put_scale(at, &agent->scale);
-  at = sdnn_put_randoms(at, agent->randoms);
-  for (j = 0; j < SDNN_N_WEIGHTS; ++j) at = sdnn_put(at, (uint32_t)agent->weights[j], 4);
-#if SDNN_AVERAGES
-  for (j = 0; j < SDNN_N_WEIGHTS; ++j) at = sdnn_put(at, (uint32_t)agent->averaged[j], 4);
-#endif
-  sdnn_put(at, sdnn_checksum(image, SDNN_IMAGE_BYTES - 4), 4);
+  sdnn_carry_head((sdnn_agent*)agent, image, 0);
+  sdnn_carry_32(image + SDNN_IMAGE_HEAD, (int32_t*)agent->weights, SDNN_N_WEIGHTS + SDNN_N_AVERAGED,
+                0);
+  sdnn_seal(image, SDNN_IMAGE_BYTES);
 }
 
 /* Returns whether the image is one of this agent, whole and in range; if not, nothing changes. */
 static inline int sdnn_load(sdnn_agent* agent, const uint8_t* image) {
   const uint8_t* const weights = image + SDNN_IMAGE_HEAD;
   const int32_t exponent = sdnn_get_32(image + 8);
-  const uint64_t n_learned = sdnn_get(image + 24, 8), n_steps = sdnn_get(image + 32, 8);
-  sdnn_scale scale;
-  uint64_t rest;
   uint32_t j;
   if (!sdnn_is_image(image, SDNN_IMAGE_BYTES, image + 60) ||
       (exponent != INT32_MIN && (exponent < -1100 || exponent > 1100)) ||
       sdnn_get(image + 12, 4) > SDNN_MOST_SNAPSHOTS || sdnn_get(image + 16, 4) > SDNN_START_STEPS ||
-      sdnn_get(image + 20, 4) > SDNN_MOST_ENDED || n_learned > UINT64_C(1) << 45 || n_steps >> 62 ||
-      !sdnn_get_scale(image + 40, &scale)) {
+      sdnn_get(image + 20, 4) > SDNN_MOST_ENDED || sdnn_get(image + 24, 8) > UINT64_C(1) << 45 ||
+      sdnn_get(image + 32, 8) >> 62 || !sdnn_is_scale(image + 40)) {
     return 0;
   }
-  for (j = 0; j < (1 + SDNN_AVERAGES) * SDNN_N_WEIGHTS; ++j) {
+  for (j = 0; j < SDNN_N_WEIGHTS + SDNN_N_AVERAGED; ++j) {
     if (sdnn_size(sdnn_get_32(weights + 4 * j)) >= SDNN_LARGEST_WEIGHT) return 0;
   }
-  sdnn_begin(agent);
-  sdnn_set_exponent(agent, exponent);
-  agent->n_snapshots = (uint32_t)sdnn_get(image + 12, 4);
-  agent->n_random_left = (uint32_t)sdnn_get(image + 16, 4);
-  agent->n_ended = (uint32_t)sdnn_get(image + 20, 4);
-  agent->n_learned = (int64_t)n_learned;
-  agent->n_steps = (int64_t)n_steps;
-  sdnn_get_scale(image + 40, &agent->scale);
-  sdnn_quotient(n_steps, SDNN_AVERAGES ? SDNN_AVERAGING_INTERVAL : 1, &rest);
-  agent->phase = (uint32_t)rest;
-  sdnn_get_randoms(image + 60, agent->randoms);
-  for (j = 0; j < SDNN_N_WEIGHTS; ++j) agent->weights[j] = sdnn_get_32(weights + 4 * j);
-#if SDNN_AVERAGES
-  for (j = 0; j < SDNN_N_WEIGHTS; ++j) {
-    agent->averaged[j] = sdnn_get_32(weights + 4 * (SDNN_N_WEIGHTS + j));
-  }
-#endif
-  sdnn_apply_rates(agent);
+  sdnn_begin_as(agent, image);
+  sdnn_carry_32((uint8_t*)weights, agent->weights, SDNN_N_WEIGHTS + SDNN_N_AVERAGED, 1);
   return 1;
 }
 

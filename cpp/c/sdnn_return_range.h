@@ -14,6 +14,12 @@ static inline sdnn_real sdnn_quarter(sdnn_real a, sdnn_real b) {
   return sdnn_times(UINT64_C(1021) << 52, sdnn_minus(a, b));
 }
 
+/* Copies n numbers, as sdnn_copy_32 does. */
+static inline void sdnn_copy_returns(sdnn_real* to, const sdnn_real* from, uint32_t n) {
+  volatile sdnn_real* target = to;
+  for (; n > 0; --n) *target++ = *from++;
+}
+
 /* Grows by a quarter more than it must. */
 static inline int sdnn_hold(sdnn_agent* agent, sdnn_real sum) {
   if (sdnn_less(agent->high, sum)) {
@@ -90,7 +96,7 @@ static inline int sdnn_follow(sdnn_agent* agent) {
 /* Notes a reward; returns whether the range has moved. */
 static inline int sdnn_note_reward(sdnn_agent* agent, int32_t reward, int terminated) {
   int grows;
-  uint32_t i, n_known;
+  uint32_t n_known;
   agent->sum = sdnn_clipped(
       sdnn_plus(sdnn_real_of(reward, -SDNN_FRACTION_BITS), sdnn_times(SDNN_DISCOUNT, agent->sum)));
   grows = (agent->n_returns < 32 || !sdnn_less(agent->low, agent->high)) &&
@@ -100,11 +106,8 @@ static inline int sdnn_note_reward(sdnn_agent* agent, int32_t reward, int termin
   if (!terminated && agent->n_rewards < 2 * SDNN_HORIZON) return grows;
   n_known = terminated ? agent->n_rewards : agent->n_rewards - SDNN_HORIZON;
   sdnn_note_returns(agent, n_known, terminated);
-  for (i = n_known; i < agent->n_rewards; ++i) {
-    volatile int32_t* const to = &agent->rewards[i - n_known]; /* else: memmove */
-    *to = agent->rewards[i];
-  }
   agent->n_rewards -= n_known;
+  sdnn_copy_32(agent->rewards, agent->rewards + n_known, agent->n_rewards);
   return sdnn_follow(agent) || grows;
 }
 

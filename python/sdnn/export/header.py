@@ -91,7 +91,7 @@ def c_header(
     >>> header = c_header(agent, "car")
     >>> header.flash_bytes < 2**17
     True
-    >>> "static inline uint32_t car_act_fixed(const int32_t* observation)" in header.text
+    >>> "uint32_t action = car_act_fixed(observation);" in header.text
     True
     """
     learns = flag("learning", learning)

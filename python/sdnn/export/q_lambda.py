@@ -17,13 +17,11 @@ from sdnn.export.writer import (
     CHeader,
     Learner,
     Writer,
-    c_number,
     learning_needs,
     require_few_weights,
 )
 
-_WEIGHTS = {"weights": "action_value.weights", "averaged": "action_value.averaged_weights"}
-"""Names in the header and in the core's state."""
+_WEIGHTS = ("action_value.weights", "action_value.averaged_weights")
 _ONE = 1 << 16  # of rates
 _MOST_TOLERANCE = 2**62  # in units: above any difference of values
 
@@ -117,7 +115,7 @@ class QLambdaLearner(Learner, QLambdaWriter):
     def fields(self) -> list[tuple[Any, ...]]:
         """Return names, types and shapes of an image."""
         shape = sum(self.n_rows()), self.code().n_columns
-        names = [*_WEIGHTS.values()][: 1 + self.averages]
+        names = _WEIGHTS[: 1 + self.averages]
         return [
             ("action_value.exponent", "<i4"),
             ("action_value.n_snapshots", "<u4"),
@@ -138,7 +136,7 @@ class QLambdaLearner(Learner, QLambdaWriter):
     def remembered(self, state: dict[str, Any]) -> dict[str, Any]:
         """Return the fields that are not the same in the core's state."""
         columns = self.columns()
-        rows = {name: state[name][:, columns] for name in _WEIGHTS.values() if name in state}
+        rows = {name: state[name][:, columns] for name in _WEIGHTS if name in state}
         return {"action_value.exponent": NONE, **state, **rows}
 
     def recall(self, image: Any, state: dict[str, Any]) -> None:
@@ -153,7 +151,7 @@ class QLambdaLearner(Learner, QLambdaWriter):
             state.pop(name, None)
             if image[name] != nothing:
                 state[name] = np.array(image[name], np.int32)
-        for name in _WEIGHTS.values():
+        for name in _WEIGHTS:
             if name in state:
                 state[name] = np.zeros_like(state[name])
                 state[name][:, self.columns()] = image[name]
@@ -162,20 +160,17 @@ class QLambdaLearner(Learner, QLambdaWriter):
         """Make the header."""
         state, tables = self.state(), self.tables()
         n_weights = self.n_weights()
-        about = "What the agent begins with: states of its random generators."
-        tables.add("uint64_t", "seeds", self.seeds(state), about)
-        first_weights = {}
-        for word, name in _WEIGHTS.items():
-            rows = state.get(name, np.zeros((1, 1), np.int32))
-            first_weights[f"HAS_FIRST_{word.upper()}"] = int(rows.any())
-            if rows.any():
-                tables.add("int32_t", f"first_{word}", rows[:, self.columns()].reshape(-1))
+        self.add_head(tables, _WEIGHTS[0])
+        rows = [state[name][:, self.columns()].reshape(-1) for name in _WEIGHTS if name in state]
+        while rows and not rows[-1].any():
+            rows.pop()
+        first_weights = np.concatenate([*rows, np.zeros(0, np.int32)])
+        tables.add("int32_t", "first_weights", first_weights)
         defines = {
             **self.defines(),
             **self._learning_rule(),
-            **self.learning_defines(state),
-            **self._first_values(state),
-            **first_weights,
+            **self.learning_defines(),
+            "N_FIRST_WEIGHTS": first_weights.size,
         }
         ram_bytes = self._ram_bytes(n_weights)
         return self.write(
@@ -205,23 +200,6 @@ class QLambdaLearner(Learner, QLambdaWriter):
             **self._rates("EPSILON", "epsilon"),
             "TIE_TOLERANCE": f"INT64_C({number})",
             "TIE_TOLERANCE_EXPONENT": f"({exponent})",
-        }
-
-    def _first_values(self, state: dict[str, Any]) -> dict[str, Any]:
-        """Return the numbers that the agent begins with."""
-        values = {
-            "FIRST_EXPONENT": c_number(state.get("action_value.exponent", NONE)),
-            "FIRST_N_LEARNED": f"INT64_C({state['n_learned']})",
-            "FIRST_N_ENDED": state.get("n_ended", 0),
-        }
-        if not self.averages:
-            return values
-        n_steps = state["action_value.n_steps"]
-        return {
-            **values,
-            "FIRST_N_STEPS": f"INT64_C({n_steps})",
-            "FIRST_PHASE": n_steps % self.agent.approximator.averaging_interval,
-            "FIRST_N_SNAPSHOTS": state["action_value.n_snapshots"],
         }
 
     def _rates(self, macro: str, name: str) -> dict[str, int]:

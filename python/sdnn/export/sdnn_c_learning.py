@@ -21,7 +21,6 @@ MOST_WEIGHT = 127
 _LARGEST = 2.0**100  # of real numbers
 _WORD = 2**64 - 1
 _ROUNDING = {"away": "AWAY", "half_up": "HALF_UP", "random": "AT_RANDOM"}
-_RANGE = ("low", "high", "sum")
 
 
 class SDNNCLearner(Learner, SDNNCWriter):
@@ -184,15 +183,18 @@ class SDNNCLearner(Learner, SDNNCWriter):
             network.thresholds(), new.thresholds()
         )
 
-    def _schedules(self, state: dict[str, Any]) -> dict[str, str]:
-        """Return the ends of the rates that follow the progress."""
+    def _rates(self, state: dict[str, Any]) -> dict[str, str]:
+        """Return how alpha and epsilon follow the progress, those that do."""
         learning, defines = self.agent.learning, dict[str, str]()
+        fractions = {"learning_rate": 1.0, "epsilon": learning.exploration_fraction}
         for macro, name in (("RATE", "learning_rate"), ("EPSILON", "epsilon")):
             first, last = getattr(learning, name), getattr(learning, f"final_{name}")
-            if last is not None and name not in state:
-                defines |= {f"INITIAL_{macro}": _real(first), f"LAST_{macro}": _real(last)}
-        if "LAST_EPSILON" in defines:
-            defines["EXPLORATION_FRACTION"] = _real(learning.exploration_fraction)
+            fraction = fractions[name]
+            if last is None or name in state:
+                first = last = getattr(self.agent, name)
+                fraction = 0.0
+            numbers = {"FIRST": first, "LAST": last, "FRACTION": fraction}
+            defines |= {f"{macro}_{word}": _real(number) for word, number in numbers.items()}
         return defines
 
     def header(self) -> CHeader:
@@ -200,21 +202,17 @@ class SDNNCLearner(Learner, SDNNCWriter):
         state, tables, is_new = self.state(), self.tables_of_spaces(), self._is_new()
         self.code.add_tables(tables)
         tables.add("uint32_t", "first_units", self.first_units, "Where windows begin.")
-        seeds = [*self.seeds(state)]
-        if is_new:
-            seeds.append(np.array(_seeded(self.agent.seed, _WEIGHTS_STREAM), np.uint64))
-        about = "What the agent begins with: states of its random generators."
-        tables.add("uint64_t", "seeds", np.array(seeds), about)
+        self.add_head(tables, "range.rewards" if self.adapts else "thresholds")
+        if self.adapts:
+            tables.add("int32_t", "first_rewards", self._rewards(state))
+            tables.add("uint64_t", "first_returns", state["range.returns"].view(np.uint64))
         defines = {
             **self.code.defines(),
             **self._network_defines(),
-            **self._schedules(state),
-            **self.learning_defines(state),
+            **self._rates(state),
+            **self.learning_defines(),
             **self._add_weights(tables, is_new),
-            **self._first_values(state),
         }
-        if self.adapts:
-            defines |= self._add_range(tables, state)
         ram_bytes = self._ram_bytes()
         memory = (
             f"{ram_bytes:,} bytes, in one struct that you place, and {self._stack_bytes():,} bytes"
@@ -249,33 +247,6 @@ class SDNNCLearner(Learner, SDNNCWriter):
             "HORIZON": self.horizon,
         }
 
-    def _first_values(self, state: dict[str, Any]) -> dict[str, str]:
-        """Return the real numbers that the agent begins with."""
-        low, high = self.network().output_range
-        return {
-            "FIRST_PROGRESS": _real(state["progress"]),
-            "FIRST_RATE": _real(self.agent.learning_rate),
-            "FIRST_EPSILON": _real(self.agent.epsilon),
-            "FIRST_Q_LOW": _real(low),
-            "FIRST_Q_HIGH": _real(high),
-        }
-
-    def _add_range(self, tables: Tables, state: dict[str, Any]) -> dict[str, Any]:
-        """Add the rewards and returns of an adaptive range; return what else it begins with."""
-        rewards, returns = self._rewards(state), state["range.returns"]
-        if rewards.size:
-            tables.add("int32_t", "first_rewards", rewards)
-        if returns.size:
-            tables.add("uint64_t", "first_returns", returns.view(np.uint64))
-        return {
-            **{f"FIRST_{end.upper()}": _real(state[f"range.{end}"]) for end in _RANGE},
-            "FIRST_DUE": state["range.due"],
-            "FIRST_N_RETURNS": state["range.n_returns"],
-            "FIRST_N_PENDING_REWARDS": rewards.size,
-            "FIRST_N_KEPT_RETURNS": returns.size,
-            "FIRST_OLDEST": state["range.oldest"],
-        }
-
     def _add_weights(self, tables: Tables, is_new: bool) -> dict[str, int]:
         """Add the weights, or ranges of used units where the agent draws weights."""
         if not is_new:
@@ -290,6 +261,8 @@ class SDNNCLearner(Learner, SDNNCWriter):
         groups = [self.code.groups.index(pair) for pair in self.network().pairs]
         about = "Groups of the pairs of inputs, in the order in which weights are drawn."
         tables.add("uint16_t", "groups", np.array(groups), about)
+        seed = np.array(_seeded(self.agent.seed, _WEIGHTS_STREAM), np.uint64)
+        tables.add("uint64_t", "seed_of_weights", seed)
         sizes = self.agent.approximator
         return {
             "IS_NEW": 1,

@@ -6,6 +6,7 @@ import json
 import math
 import zlib
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -332,7 +333,8 @@ class Learner(Writer):
         """Return the state as the header's bytes."""
         state, image = self.state(), np.zeros((), self.layout())
         known = {"magic": self.magic, "fingerprint": self.fingerprint(), **state}
-        known |= {"words": self.seeds(state), **self.remembered(state)}
+        words = np.array([state[f"{stream}.words"] for stream in self.streams], np.uint64)
+        known |= {"words": words, **self.remembered(state)}
         for name in image.dtype.names or ():
             image[name] = known.get(name, 0)
         content = image.tobytes()
@@ -351,10 +353,6 @@ class Learner(Writer):
         kept = {name: np.array(image[name]) for name in names if image[name] != NONE}
         scale = {name.removeprefix(f"{SCALE}."): number for name, number in kept.items()}
         self.agent._restore(agent=state, reward_scale=scale)
-
-    def seeds(self, state: dict[str, Any]) -> NDArray[np.uint64]:
-        """Return the states of the random generators, shape (n_streams, 4)."""
-        return np.array([state[f"{stream}.words"] for stream in self.streams], np.uint64)
 
     def tie_rule(self) -> str:
         """Return how the agent breaks ties."""
@@ -377,19 +375,20 @@ class Learner(Writer):
             f"{name}_learn(&agent, {arguments});",
         ]
 
-    def learning_defines(self, state: dict[str, Any]) -> dict[str, Any]:
-        """Return the settings and first values of all agents that learn."""
+    def add_head(self, tables: Tables, end: str) -> None:
+        """Add the head of the agent's image, which ends with the field ``end``."""
+        fields: Mapping[str, Any] = self.layout().fields or {}
+        head = np.frombuffer(self.image()[: fields[end][1]], np.uint8)
+        tables.add("uint8_t", "first_head", head, "What the agent begins with, as in an image.")
+
+    def learning_defines(self) -> dict[str, Any]:
+        """Return the settings of all agents that learn."""
         learning = self.agent.learning
         return {
             "FINGERPRINT": f"UINT32_C(0x{self.fingerprint():08x})",
             "START_STEPS": learning.start_steps,
             "N_GREEDY_STEPS": learning.n_greedy_steps,
             "MAX_ACTION_REPEAT": learning.max_action_repeat,
-            "FIRST_N_RANDOM_LEFT": state.get("n_random_left", 0),
-            "FIRST_N_REWARDS": f"UINT64_C({state[f'{SCALE}.n_rewards']})",
-            "FIRST_SIZE": c_number(state[f"{SCALE}.size"]),
-            "FIRST_SIZE_IN_WINDOW": c_number(state[f"{SCALE}.size_in_window"]),
-            "FIRST_HEADROOM": state[f"{SCALE}.headroom"],
         }
 
 
@@ -402,11 +401,6 @@ def learning_needs(code_kilobytes: str, memory: str) -> list[str]:
         "Where the processor cannot multiply or shift 64 bits by itself, the compiler's library",
         "does (libgcc); nothing is divided.",
     ]
-
-
-def c_number(number: Any) -> str:
-    """Write a number of 32 bits in C."""
-    return "INT32_MIN" if number == NONE else str(int(number))
 
 
 def require_few_weights(n_weights: int, settings: str) -> None:
