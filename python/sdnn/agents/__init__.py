@@ -1,11 +1,12 @@
 """Agents: ``agent.train(env, steps=...)``, or ``act(observation)`` and ``learn(transition)``."""
 
 from sdnn.agents.agent import Agent, load_agent
+from sdnn.agents.base import Preset
 from sdnn.agents.datasets import learn_from
 from sdnn.agents.fixed_rate import FixedRate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.q_lambda import SDNNQLambda
-from sdnn.agents.q_learning import Preset, RBFQLearning, SDNNQLearning
+from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.scaling import Scaling
 from sdnn.config import FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
 from sdnn.training.callbacks import (

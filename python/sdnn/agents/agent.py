@@ -56,6 +56,11 @@ class Agent(BaseAgent[Approximator, Learning]):
         all variables but angles, without a twentieth at each end.
     angles : sequence of int
         Variables that are angles: their ranges wrap around.
+    tables : sequence of array_like, shape (n_bins, n_pattern_units), optional
+        Patterns for each input, of any coding; see `sdnn.approximators.SDNNC`. For agents with an
+        SDNN code; with SDNN-C not where actions have several dimensions.
+    preset : str, optional
+        The name of settings where none are given, of the agent's `presets`.
     angle_pairs : "none", "find" or sequence of (int, int)
         Pairs of variables that are the cosine and the sine of an angle, which becomes one input.
         ``"find"``: those that the warm-up finds on the unit circle, but for noise.

@@ -6,15 +6,17 @@ import abc
 import secrets
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import gymnasium as gym
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.agents.scaling import Scaling
+from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.config import WARM_UP, values_of
 from sdnn.environments.matching import (
     Observed,
@@ -37,6 +39,7 @@ from sdnn.environments.spaces import (
 from sdnn.support.arguments import (
     argument_error,
     blamed,
+    choice,
     is_of_class,
     path_of,
     real,
@@ -59,6 +62,23 @@ Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
 
 
+class Preset(NamedTuple):
+    """Settings that belong together, with a title of a few words."""
+
+    title: str
+    approximator: Any
+    learning: Any
+    angle_pairs: AnglePairs = "none"
+    inputs: Inputs = "all"
+
+
+def presets_of(listed: Mapping[str, Any], **more: Mapping[str, Any]) -> Mapping[str, Preset]:
+    """Return the settings that the core lists, by name, with more of some of them."""
+    return MappingProxyType(
+        {name: Preset(*settings, **more.get(name, {})) for name, settings in listed.items()}
+    )
+
+
 class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
     """The settings and the state of an agent, and its files; `Agent` adds acting and learning."""
 
@@ -66,6 +86,9 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
     """The word for this approximator and learning rule in files."""
     approximator_type: ClassVar[type[Any]]
     learning_type: ClassVar[type[Any]]
+    presets: ClassVar[Mapping[str, Preset]]
+    """Settings by name."""
+    default_preset: ClassVar[str] = "general"
     narrows_ranges: ClassVar[bool] = False
     """Whether a warm-up narrows bounds of the space that are far wider than what it sees."""
     wrappers: Sequence[Statistics] = ()
@@ -73,7 +96,6 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
     learning: Learning
     _approximator: Approximator
     _controller: _core.Controller
-    _tables: Sequence[NDArray[np.int8]] = ()
     _scaling: Scaling | None = None
     _next_episode = 0  # of `train` without a seed
     has_bounds = True
@@ -88,13 +110,17 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         approximator: Approximator | None = None,
         learning: Learning | None = None,
         seed: int | None = 0,
+        tables: Sequence[ArrayLike] | None = None,
+        preset: str | None = None,
         observation_range: Ranges | None = None,
         angles: Sequence[int] = (),
-        angle_pairs: AnglePairs = "none",
-        inputs: Inputs = "all",
+        angle_pairs: AnglePairs | None = None,
+        inputs: Inputs | None = None,
         warm_up_steps: int = WARM_UP.default,
         missing: Missing = "error",
     ) -> None:
+        chosen = choice("preset", self.default_preset if preset is None else preset, self.presets)
+        made_of = () if tables is None else pattern_tables(tables)
         observations, actions = spaces_of(observation_space, action_space)
         self._take_spaces(observations, actions)
         require_unbatched(observations, actions)
@@ -103,21 +129,21 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         except TypeError as error:
             raise TypeError(f"observation_space {error}") from None
         self._take_settings(
-            self.approximator_type() if approximator is None else approximator,
-            self.learning_type() if learning is None else learning,
+            chosen.approximator if approximator is None else approximator,
+            chosen.learning if learning is None else learning,
             seed,
             warm_up_steps,
         )
         self._observation = self._observations.config(
             observation_range,
             angles,
-            angle_pairs,
-            inputs,
+            chosen.angle_pairs if angle_pairs is None else angle_pairs,
+            chosen.inputs if inputs is None else inputs,
             missing=missing,
             narrows=self.narrows_ranges,
         )
         self._action = self._actions.config
-        self._make(tables=list(self._tables))
+        self._make(tables=list(made_of))
 
     def _take_spaces(self, observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
         self._observations = Observations(observations)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.agents.agent import Agent
+from sdnn.agents.base import presets_of
 from sdnn.config import FuzzyQLearningConfig, FuzzyRulesConfig
 from sdnn.support.arguments import whole
 
@@ -24,8 +25,8 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     Only the transition of the last exploring `act` in an environment can be learned: which rule
     picked what is known of no other. What a warm-up did is therefore not learned.
 
-    Parameters are those of `Agent`; ``action_space`` must be a Box. An angle is scaled like any
-    other variable: the rules know no circle. ValueError for a larger table than
+    Parameters are those of `Agent`, without ``tables``; ``action_space`` must be a Box. An angle is
+    scaled like any other variable: the rules know no circle. ValueError for a larger table than
     ``approximator.max_table_bytes`` allows.
 
     Examples
@@ -43,6 +44,8 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     kind = "fuzzy"
     approximator_type = FuzzyRulesConfig
     learning_type = FuzzyQLearningConfig
+    presets = presets_of({"paper": ("paper", FuzzyRulesConfig(), FuzzyQLearningConfig())})
+    default_preset = "paper"
 
     def _take_spaces(self, observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
         if not isinstance(actions, gym.spaces.Box):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from sdnn import _core
-from sdnn.agents.q_learning import ValueAgent, presets_of
+from sdnn.agents.base import presets_of
+from sdnn.agents.q_learning import ValueAgent
 from sdnn.config import LinearSDNNConfig, QLambdaConfig
 
 
@@ -21,7 +22,7 @@ class SDNNQLambda(ValueAgent[LinearSDNNConfig, QLambdaConfig]):
 
     Parameters
     ----------
-    observation_space, action_space, seed, observation_range, angles, warm_up_steps, missing
+    observation_space, action_space, seed, tables, observation_range, angles, warm_up_steps, missing
         See `Agent`.
     angle_pairs, inputs
         See `Agent`; by default ``"find"`` and ``"relevant"``, with the preset ``"paper"``
@@ -30,8 +31,6 @@ class SDNNQLambda(ValueAgent[LinearSDNNConfig, QLambdaConfig]):
     approximator : LinearSDNNConfig, optional
         ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces.
     learning : QLambdaConfig, optional
-    tables : sequence of array_like, shape (n_bins, n_pattern_units), optional
-        Patterns for each input, of any coding; see `sdnn.approximators.SDNNC`.
     preset : {"general", "paper"}
         Settings where none are given: for any task, or the paper's rule in the paper's task; see
         `presets`.

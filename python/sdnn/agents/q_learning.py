@@ -3,83 +3,20 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
-from typing import Any, ClassVar, Generic, NamedTuple
+from typing import Any, Generic
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.agents.agent import Agent
-from sdnn.agents.base import Approximator, Learning
-from sdnn.approximators.sdnn_c import pattern_tables
-from sdnn.config import WARM_UP, QLearningConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.environments.matching import Observed
-from sdnn.environments.spaces import AnglePairs, Inputs, Missing, Ranges
-from sdnn.support.arguments import choice, real
-from sdnn.training.names import explained
-
-
-class Preset(NamedTuple):
-    """Settings that belong together, with a title of a few words."""
-
-    title: str
-    approximator: Any
-    learning: Any
-    angle_pairs: AnglePairs = "none"
-    inputs: Inputs = "all"
-
-
-def presets_of(listed: Mapping[str, Any], **more: Mapping[str, Any]) -> Mapping[str, Preset]:
-    """Return the settings that the core lists, by name, with more of some of them."""
-    return MappingProxyType(
-        {name: Preset(*settings, **more.get(name, {})) for name, settings in listed.items()}
-    )
+from sdnn.agents.base import Approximator, Learning, presets_of
+from sdnn.config import QLearningConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.support.arguments import real
 
 
 class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, Learning]):
     """An agent that learns the values of actions, with any approximator."""
-
-    presets: ClassVar[Mapping[str, Preset]]
-    """Settings by name."""
-    default_preset: ClassVar[str] = "general"
-
-    @explained
-    def __init__(
-        self,
-        observation_space: Observed,
-        action_space: gym.Space[Any] | None = None,
-        *,
-        approximator: Approximator | None = None,
-        learning: Learning | None = None,
-        seed: int = 0,
-        tables: Sequence[ArrayLike] | None = None,
-        preset: str | None = None,
-        observation_range: Ranges | None = None,
-        angles: Sequence[int] = (),
-        angle_pairs: AnglePairs | None = None,
-        inputs: Inputs | None = None,
-        warm_up_steps: int = WARM_UP.default,
-        missing: Missing = "error",
-    ) -> None:
-        name = self.default_preset if preset is None else preset
-        chosen = choice("preset", name, self.presets)
-        self._tables = () if tables is None else pattern_tables(tables)
-        super().__init__(
-            observation_space,
-            action_space,
-            approximator=chosen.approximator if approximator is None else approximator,
-            learning=chosen.learning if learning is None else learning,
-            seed=seed,
-            observation_range=observation_range,
-            angles=angles,
-            angle_pairs=chosen.angle_pairs if angle_pairs is None else angle_pairs,
-            inputs=chosen.inputs if inputs is None else inputs,
-            warm_up_steps=warm_up_steps,
-            missing=missing,
-        )
 
     @property
     def learning_rate(self) -> float:
@@ -187,15 +124,12 @@ class SDNNQLearning(ValueAgent[SDNNCConfig, QLearningConfig]):
 
     Parameters
     ----------
-    observation_space, action_space, seed, observation_range, angles, angle_pairs, inputs, \
+    observation_space, action_space, seed, tables, observation_range, angles, angle_pairs, inputs, \
 warm_up_steps, missing
         See `Agent`.
     approximator : SDNNCConfig, optional
         ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces.
     learning : QLearningConfig, optional
-    tables : sequence of array_like, shape (n_bins, n_pattern_units), optional
-        Patterns for each input, of any coding; see `sdnn.approximators.SDNNC`. Not where actions
-        have several dimensions.
     preset : {"general", "small", "robust", "paper"}, optional
         Settings where none are given: for any task, the same with a network for small processors,
         those that stay steady in the paper's task, or the paper's; see `presets`.

@@ -14,9 +14,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sdnn import _core
+from sdnn.agents.base import Preset
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.q_lambda import SDNNQLambda
-from sdnn.agents.q_learning import Preset, RBFQLearning, SDNNQLearning
+from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.config import FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
 from sdnn.support.arguments import argument_error, shown
