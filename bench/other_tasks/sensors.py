@@ -7,7 +7,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from sdnn.support.bounds import flat_bounds
+from sdnn.environments.space_kinds import flat_bounds
 
 RANGES = {"CartPole-v1": ((-2.4, -3.0, -0.21, -3.5), (2.4, 3.0, 0.21, 3.5))}
 """Ends that noise is measured by, of tasks whose space has infinite ones."""

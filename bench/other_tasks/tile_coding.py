@@ -15,7 +15,7 @@ import gymnasium as gym
 import numpy as np
 
 from sdnn.agents.registry import AgentEntry, register
-from sdnn.support.bounds import flat_bounds
+from sdnn.environments.space_kinds import flat_bounds
 
 try:
     from numba import njit

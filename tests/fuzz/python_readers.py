@@ -37,7 +37,7 @@ from sdnn.agents import (
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig
 from sdnn.runs import ResultStore, StoreError, TrialRows
 from sdnn.runs.trial import HASH_DIGITS, ROW
-from sdnn.training.statistics import read_statistics
+from sdnn.training.files import read_statistics
 
 BOX = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
 GEAR = gym.spaces.Discrete(3)

@@ -20,8 +20,7 @@ from sdnn.training.callbacks import (
 )
 from sdnn.training.episodes import UnrepeatedEpisodeError
 from sdnn.training.evaluation import Evaluation, evaluate
-from sdnn.training.learners import Transition
-from sdnn.training.steps import UnusableStepError
+from sdnn.training.interfaces import Transition, UnusableStepError
 from sdnn.training.training import Callback, Training, TrainingResult
 
 __all__ = [

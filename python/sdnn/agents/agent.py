@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.base import Approximator, BaseAgent, Learning
-from sdnn.agents.batches import unbatched
 from sdnn.support.arguments import (
     argument_error,
     blamed,
@@ -26,7 +25,7 @@ from sdnn.support.arguments import (
 from sdnn.support.progress import is_shown
 from sdnn.training.callbacks import ProgressBarCallback
 from sdnn.training.files import read_agent
-from sdnn.training.learners import Transition
+from sdnn.training.interfaces import Transition
 from sdnn.training.names import explained
 from sdnn.training.training import Callback, Training, TrainingResult, listed
 
@@ -316,3 +315,30 @@ def load_agent(path: str | Path) -> Agent[Any, Any]:
     """Read an agent of any kind that `Agent.save` wrote; see `Agent.load`."""
     agent: Agent[Any, Any] = read_agent(path_of("path", path), "agent", "training")[0]
     return agent
+
+
+def unbatched(space: gym.Space[Any], observation: Any) -> Sequence[Any] | None:
+    """Return the elements of a batch of observations; None if it is no batch."""
+    if isinstance(space, gym.spaces.Dict):
+        if not isinstance(observation, Mapping) or set(observation) != set(space):
+            return None
+        columns = _columns((space[name], observation[name]) for name in space)
+        if columns is None:
+            return None
+        return [dict(zip(space, row, strict=True)) for row in zip(*columns, strict=True)]
+    if isinstance(space, gym.spaces.Tuple):
+        if not isinstance(observation, tuple) or len(observation) != len(space):
+            return None
+        columns = _columns(zip(space, observation, strict=True))
+        return None if columns is None else list(zip(*columns, strict=True))
+    is_array = isinstance(observation, np.ndarray) and space.shape is not None
+    is_batch = is_array and observation.ndim == len(space.shape or ()) + 1
+    return observation if is_batch else None
+
+
+def _columns(parts: Iterable[tuple[gym.Space[Any], Any]]) -> list[Sequence[Any]] | None:
+    """Return the elements of each part of a batch; None if these are not equally many."""
+    columns = [unbatched(space, part) for space, part in parts]
+    present = [column for column in columns if column is not None]
+    is_batch = len(present) == len(columns) and len({len(column) for column in present}) == 1
+    return present if is_batch else None

@@ -18,13 +18,14 @@ from sdnn import _core
 from sdnn.agents.scaling import Scaling
 from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.config import WARM_UP, values_of
-from sdnn.environments.matching import (
+from sdnn.environments.space_kinds import (
     Observed,
     require_same_variables,
     require_unbatched,
+    space_data,
+    space_of,
     spaces_of,
 )
-from sdnn.environments.space_data import space_data, space_of
 from sdnn.environments.spaces import (
     Actions,
     AnglePairs,
@@ -49,9 +50,8 @@ from sdnn.support.arguments import (
 )
 from sdnn.support.display import line_of, table_of
 from sdnn.support.state_files import Arrays, Description, write_file
-from sdnn.training.files import CLASSES, read_agent
+from sdnn.training.files import CLASSES, Statistics, read_agent, read_statistics
 from sdnn.training.names import explained
-from sdnn.training.statistics import Statistics, read_statistics
 
 if TYPE_CHECKING:
     from typing import Self

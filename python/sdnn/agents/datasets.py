@@ -13,7 +13,7 @@ from sdnn.agents.agent import Agent
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.logs import Logged, reader_of
 from sdnn.support.arguments import is_of_class, require, whole
-from sdnn.training.learners import Transition
+from sdnn.training.interfaces import Transition
 from sdnn.training.names import explained
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from sdnn.support.arguments import advice, argument_error, array_of, path_of, require, shown
 from sdnn.support.files import open_regular
-from sdnn.training.learners import Transition
+from sdnn.training.interfaces import Transition
 
 _MOST_BYTES = 2**20
 """The longest line of a file that is read, so that memory stays bounded."""

@@ -21,7 +21,7 @@ from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.config import FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
 from sdnn.support.arguments import argument_error, shown
-from sdnn.training.learners import Learner
+from sdnn.training.interfaces import Learner
 from sdnn.training.training import Training
 
 

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.config import SensorConfig
+from sdnn.environments.space_kinds import with_infinities
 from sdnn.environments.types import Array
 from sdnn.support.arguments import array_of, choice, one_of, require, seed_of
-from sdnn.support.bounds import with_infinities
 
 Observation = Array
 Env = gym.Env[Observation, Any]

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
+from sdnn.environments.space_kinds import flat_bounds, in_a_line, wholes_of, with_infinities
 from sdnn.environments.types import Array, Space
 from sdnn.support.arguments import argument_error, array_of, blamed, require, shown
-from sdnn.support.bounds import flat_bounds, with_infinities
 
 Inputs: TypeAlias = Literal["all", "relevant"] | Sequence[int]
 """The inputs of a state; a list of variables is used in any case, beside the relevant ones."""
@@ -334,23 +334,6 @@ def space_of_error(error: ValueError, observations: Observations, actions: Actio
         return "of action_space"
     matches = [reason for word, reason in reasons.items() if word in str(error)]
     return ", ".join(matches if argument else ())
-
-
-def wholes_of(space: Space) -> list[tuple[int, int]] | None:
-    """Return the first and the last whole number of each dimension; None for other spaces."""
-    if isinstance(space, gym.spaces.Discrete):
-        return [(int(space.start), int(space.start) + int(space.n) - 1)]
-    if isinstance(space, gym.spaces.MultiDiscrete):
-        first, n = np.ravel(space.start).tolist(), np.ravel(space.nvec).tolist()
-        return [(a, a + k - 1) for a, k in zip(first, n, strict=True)]
-    if isinstance(space, gym.spaces.MultiBinary):
-        return [(0, 1)] * int(np.prod(space.shape))
-    return None
-
-
-def in_a_line(space: Space) -> str:
-    """Return a space in one line, for a message."""
-    return " ".join(str(space).split())
 
 
 def observation_space_of(config: _core.ObservationConfig) -> Space:

@@ -29,11 +29,11 @@ from sdnn.environments import (
 )
 from sdnn.environments.paper_acrobot import PAPER_ACROBOT
 from sdnn.environments.sensors import in_own_units
+from sdnn.environments.space_kinds import flat_bounds
 from sdnn.environments.types import Array, Data, Env
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.settings import Settings, changed, doc
 from sdnn.support.arguments import blamed, shown
-from sdnn.support.bounds import flat_bounds
 
 ALL = "all"
 """The key of the range of all variables that have no other."""

@@ -30,7 +30,7 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.agents.q_learning import ValueAgent
-from sdnn.environments.matching import require_same_kind
+from sdnn.environments.space_kinds import require_same_kind
 from sdnn.environments.types import Data, Env
 from sdnn.runs.config_file import FORMAT, ConfigFile, read_spec
 from sdnn.runs.environment import episode_option, render_modes, takes_episode

@@ -15,6 +15,7 @@ from sdnn.agents import Agent, Callback, StopTrainingOnRewardThreshold, Training
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.agents.registry import AGENTS, AgentEntry, agent_entry, label_of, split_label
 from sdnn.config import ProtocolConfig
+from sdnn.environments.space_kinds import flat_bounds
 from sdnn.environments.types import Env
 from sdnn.runs.environment import (
     EnvironmentSpec,
@@ -43,8 +44,7 @@ from sdnn.runs.settings import (
 )
 from sdnn.runs.trial import TrainingTrial, Trial, canonical_json, config_hash
 from sdnn.support.arguments import blamed, shown
-from sdnn.support.bounds import flat_bounds
-from sdnn.training.learners import Learner
+from sdnn.training.interfaces import Learner
 
 DEFAULT_STEPS, DEFAULT_INTERVAL = 200_000, 10_000
 

@@ -10,11 +10,13 @@ import gymnasium as gym
 import numpy as np
 
 from sdnn.environments.types import Array, Data
-from sdnn.training.environments import EnvironmentAdapter, OneEnvironment
-from sdnn.training.files import SavedEpisode
-from sdnn.training.learners import EachLearner
-from sdnn.training.statistics import Statistics, learning_wrappers, names_of, statistics_of
-from sdnn.training.steps import UnusableStepError
+from sdnn.training.files import SavedEpisode, Statistics, learning_wrappers, names_of, statistics_of
+from sdnn.training.interfaces import (
+    EachLearner,
+    EnvironmentAdapter,
+    OneEnvironment,
+    UnusableStepError,
+)
 
 _LEARNING, EVALUATION = 0, 1
 """The kinds of episodes that `episode_seed` gives seeds to."""

@@ -11,14 +11,13 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.environments.matching import require_same_kind
+from sdnn.environments.space_kinds import require_same_kind
 from sdnn.environments.types import Data, Env
 from sdnn.support.arguments import has_methods, require, seed_of, whole
 from sdnn.support.display import Displayed
 from sdnn.training.episodes import EVALUATION, episode_seed
-from sdnn.training.names import explained
-from sdnn.training.statistics import fixed
-from sdnn.training.steps import (
+from sdnn.training.files import fixed
+from sdnn.training.interfaces import (
     UnusableStepError,
     checked_outcome,
     has_action_masks,
@@ -27,6 +26,7 @@ from sdnn.training.steps import (
     reset_env,
     step_env,
 )
+from sdnn.training.names import explained
 
 _LONG = 100_000
 """Warn after this many steps in one episode."""

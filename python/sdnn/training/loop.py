@@ -17,9 +17,8 @@ from sdnn.environments.types import Data
 from sdnn.support.interrupts import Interrupts
 from sdnn.training.episodes import Episodes
 from sdnn.training.evaluation import evaluate
-from sdnn.training.learners import EachLearner
-from sdnn.training.statistics import share_statistics, statistics_of
-from sdnn.training.steps import UnusableStepError
+from sdnn.training.files import share_statistics, statistics_of
+from sdnn.training.interfaces import EachLearner, UnusableStepError
 
 Row: TypeAlias = Mapping[str, Any]
 """An episode (``kind``, ``step``, ``episode``, ``return``, ``length``, ``terminated``, and with

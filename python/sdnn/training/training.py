@@ -11,17 +11,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.environments.matching import require_same_kind
+from sdnn.environments.space_kinds import require_same_kind
 from sdnn.environments.types import Data, Env, VectorEnv
 from sdnn.support.arguments import flag, has_methods, path_of, require, shown, whole
 from sdnn.support.display import Displayed
 from sdnn.training.episodes import Episodes, adapter_for
-from sdnn.training.files import SavedTraining, read_training, write_training
-from sdnn.training.learners import Learner, each_learner
+from sdnn.training.files import (
+    SavedTraining,
+    read_training,
+    share_statistics,
+    take_statistics,
+    write_training,
+)
+from sdnn.training.interfaces import Learner, each_learner, require_single
 from sdnn.training.loop import Row, TrainingLoop
 from sdnn.training.names import explained
-from sdnn.training.statistics import share_statistics, take_statistics
-from sdnn.training.steps import require_single
 
 if TYPE_CHECKING:
     from typing import Self

@@ -13,8 +13,17 @@ from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 from sdnn.environments.spaces import has_mask
 from sdnn.environments.types import VectorEnv
 from sdnn.support.arguments import array_of
-from sdnn.training.environments import EnvironmentAdapter, OneEnvironment, Options, Seeds
-from sdnn.training.steps import UnusableStepError, has_action_masks, mask_in, reset_env, step_env
+from sdnn.training.interfaces import (
+    EnvironmentAdapter,
+    OneEnvironment,
+    Options,
+    Seeds,
+    UnusableStepError,
+    has_action_masks,
+    mask_in,
+    reset_env,
+    step_env,
+)
 
 
 def vector_adapter(env: VectorEnv) -> EnvironmentAdapter:

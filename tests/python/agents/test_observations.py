@@ -7,8 +7,8 @@ import pytest
 from refusals import refuses
 from sdnn.agents import RBFQLearning, SDNNQLearning, Transition, load_agent
 from sdnn.approximators import SDNNCConfig
+from sdnn.environments.space_kinds import flat_bounds
 from sdnn.environments.spaces import Observations
-from sdnn.support.bounds import flat_bounds
 
 BOX = gym.spaces.Box(np.array([-1.0, 0.0]), np.array([3.0, 10.0]), dtype=np.float64)
 UNBOUNDED = gym.spaces.Box(-np.inf, np.inf, (3,), dtype=np.float64)

@@ -9,7 +9,7 @@ from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Tu
 
 from refusals import refuses
 from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, load_agent
-from sdnn.environments.matching import require_same_kind
+from sdnn.environments.space_kinds import require_same_kind
 
 PLANE = Box(-1.0, 1.0, (2,))
 

@@ -13,7 +13,7 @@ from sdnn.agents import (
     evaluate,
     load_agent,
 )
-from sdnn.training.statistics import learning_wrappers, statistics_of
+from sdnn.training.files import learning_wrappers, statistics_of
 from stopped_training import Stop, states_equal
 
 

@@ -1,18 +1,184 @@
-"""Whether an environment is one that an agent was made for: spaces compared."""
+"""Kinds of spaces: their bounds, their data in files, and which of them are alike."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, TypeAlias
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.environments.spaces import in_a_line, wholes_of
-from sdnn.environments.types import Env, Space, VectorEnv
-from sdnn.support.arguments import require
-from sdnn.support.bounds import with_infinities
+from sdnn.environments.types import Array, Data, Env, Space, VectorEnv
+from sdnn.support.arguments import require, shown
+
+_MOST_VARIABLES = 2**20
+_LEAST_INTEGER_BYTES = 4
+"""Least size of whole numbers whose limits are those of the type, not of the observations."""
+
+
+def with_infinities(bounds: Array) -> NDArray[np.float64]:
+    """Replace the largest float, which some environments write for infinity, by infinity.
+
+    >>> with_infinities(np.array([1.0, -3.4028235e38]))
+    array([  1., -inf])
+    """
+    values = bounds.astype(np.float64)
+    is_bounded = np.abs(values) < np.finfo(np.float32).max
+    return np.where(is_bounded | np.isnan(values), values, np.copysign(np.inf, values))
+
+
+def flat_bounds(space: Space) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the bounds of the vector to which Gymnasium flattens a space, perhaps infinite.
+
+    TypeError if Gymnasium does not flatten the space to a vector; ValueError for more than 2**20
+    variables.
+    """
+    n_variables = _n_variables(space)
+    if n_variables == 0:
+        return np.empty(0), np.empty(0)
+    if n_variables > _MOST_VARIABLES:  # before memory is allocated
+        raise ValueError(
+            f"observation_space must have at most {_MOST_VARIABLES} variables, got {n_variables}"
+        )
+    if not isinstance(gym.spaces.flatten_space(space), gym.spaces.Box):
+        raise TypeError(_no_vector(space))
+    low, high = map(np.concatenate, zip(*_bounds_of_parts(space), strict=True))
+    return low, high
+
+
+def _bounds_of_parts(space: Space) -> Iterator[tuple[Array, Array]]:
+    """Yield the bounds of the parts in the order in which Gymnasium flattens them."""
+    if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
+        parts = space.spaces.values() if isinstance(space, gym.spaces.Dict) else space.spaces
+        for part in parts:
+            yield from _bounds_of_parts(part)
+        return
+    flat: Any = gym.spaces.flatten_space(space)
+    low, high = with_infinities(flat.low), with_infinities(flat.high)
+    if flat.dtype.kind in "iu" and flat.dtype.itemsize >= _LEAST_INTEGER_BYTES:
+        # Gymnasium writes infinity as the last integer of the type, or up to two before it.
+        limits = np.iinfo(flat.dtype)
+        high[flat.high >= limits.max - 2] = np.inf
+        if limits.min < 0:
+            low[flat.low <= limits.min + 2] = -np.inf
+    yield low, high
+
+
+def _n_variables(space: Space) -> int:
+    if not isinstance(space, gym.Space):
+        raise TypeError(
+            f"observation_space must be a Gymnasium space, such as env.observation_space, got"
+            f" {shown(space)}"
+        )
+    try:
+        return gym.spaces.flatdim(space)
+    except (NotImplementedError, ValueError):
+        raise TypeError(_no_vector(space)) from None
+
+
+def _no_vector(space: Space) -> str:
+    return (
+        "observation_space must be a space that Gymnasium flattens to a vector,"
+        f" got {type(space).__name__}"
+    )
+
+
+def wholes_of(space: Space) -> list[tuple[int, int]] | None:
+    """Return the first and the last whole number of each dimension; None for other spaces."""
+    if isinstance(space, gym.spaces.Discrete):
+        return [(int(space.start), int(space.start) + int(space.n) - 1)]
+    if isinstance(space, gym.spaces.MultiDiscrete):
+        first, n = np.ravel(space.start).tolist(), np.ravel(space.nvec).tolist()
+        return [(a, a + k - 1) for a, k in zip(first, n, strict=True)]
+    if isinstance(space, gym.spaces.MultiBinary):
+        return [(0, 1)] * int(np.prod(space.shape))
+    return None
+
+
+def in_a_line(space: Space) -> str:
+    """Return a space in one line, for a message."""
+    return " ".join(str(space).split())
+
+
+def space_data(space: Space) -> Data:
+    """Return a space as data that JSON can hold; TypeError for other kinds of spaces."""
+    dtype = np.dtype(space.dtype).str
+    if isinstance(space, gym.spaces.Box):
+        ends = [_finite(space.low), _finite(space.high)]
+        return {"box": ends, "shape": list(space.shape), "dtype": dtype}
+    if isinstance(space, gym.spaces.Discrete):
+        return {"discrete": int(space.n), "start": int(space.start), "dtype": dtype}
+    if isinstance(space, gym.spaces.MultiDiscrete):
+        n, start = space.nvec.tolist(), space.start.tolist()
+        return {"multi_discrete": n, "start": start, "dtype": dtype}
+    if isinstance(space, gym.spaces.MultiBinary):
+        return {"multi_binary": list(space.shape)}
+    if isinstance(space, gym.spaces.Dict):
+        return {"dict": [[_key(key), space_data(part)] for key, part in space.spaces.items()]}
+    if isinstance(space, gym.spaces.Tuple):
+        return {"tuple": [space_data(part) for part in space.spaces]}
+    raise TypeError(
+        "must be a Box, Discrete, MultiDiscrete or MultiBinary, or a Dict or Tuple of such,"
+        f" got {space}"
+    )
+
+
+def _key(key: Any) -> Any:
+    """Return a key of a Dict as JSON has it: a tuple as a list; TypeError for others."""
+    if type(key) is tuple:
+        return [_key(part) for part in key]
+    if type(key) not in (str, int, bool):
+        raise TypeError(
+            "must have keys that are texts, whole numbers or tuples of such, got the key"
+            f" {shown(key)}"
+        )
+    return key
+
+
+def _key_of(data: Any) -> Any:
+    return tuple(map(_key_of, data)) if isinstance(data, list) else data
+
+
+_TYPES = ["|b1", "|i1", "<i2", "<i4", "<i8", "|u1", "<u2", "<u4", "<u8", "<f2", "<f4", "<f8"]
+_MOST_VALUES = 2**20
+"""Most values of a space in a file: more would only take memory."""
+
+
+def _finite(values: Array) -> list[Any]:
+    """Return numbers in a row, infinite ones as words: JSON has none."""
+    return [str(x) if np.isinf(x) else x for x in values.reshape(-1).tolist()]
+
+
+def space_of(data: Mapping[str, Any]) -> Space:
+    """Make the space that `space_data` described; ValueError if there is none."""
+    kind = data.get("dtype", "<f4")
+    require(kind in _TYPES, "dtype", "be that of numbers", kind)
+    sizes = [data.get("discrete", 0), *np.ravel(data.get("multi_discrete", 0)).tolist()]
+    sizes += [int(np.prod(data.get("multi_binary", 0)))]
+    if not all(isinstance(size, int) and 0 <= size <= _MOST_VALUES for size in sizes):
+        raise ValueError(f"a space must have at most {_MOST_VALUES} values, got {sizes}")
+    dtype: Any = np.dtype(kind)
+    if "box" in data:
+        low, high = (
+            np.array([float(x) if isinstance(x, str) else x for x in end], dtype).reshape(
+                data["shape"]
+            )
+            for end in data["box"]
+        )
+        return gym.spaces.Box(low, high, dtype=dtype.type)
+    if "discrete" in data:
+        options = {} if dtype == np.int64 else {"dtype": dtype.type}  # Gymnasium 1.1 has no dtype
+        return gym.spaces.Discrete(data["discrete"], start=data["start"], **options)
+    if "multi_discrete" in data:
+        n, start = np.array(data["multi_discrete"]), np.array(data["start"])
+        return gym.spaces.MultiDiscrete(n, dtype=dtype.type, start=start)
+    if "multi_binary" in data:
+        return gym.spaces.MultiBinary(data["multi_binary"])
+    if "dict" in data:
+        return gym.spaces.Dict([(_key_of(key), space_of(part)) for key, part in data["dict"]])
+    return gym.spaces.Tuple([space_of(part) for part in data["tuple"]])
+
 
 Observed: TypeAlias = Space | Env | VectorEnv
 """An observation space, or an environment that has one."""

@@ -1,0 +1,323 @@
+"""Environments and learners as a training calls them, both checked."""
+
+from __future__ import annotations
+
+import abc
+import copy
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sdnn.environments.types import Array, Data, Env
+from sdnn.support.arguments import flag, has_methods, reward_of, shown
+
+if TYPE_CHECKING:
+    from sdnn._core import Controller
+
+_SCALARS = (np.generic, int, float)
+
+_OLD_API = (
+    "; an environment of Gym before 0.26 can be wrapped:"
+    " shimmy.GymV21CompatibilityV0(env=env), from pip install shimmy"
+)
+
+
+def require_single(name: str, env: Any) -> None:
+    """Check that a value is one environment; TypeError that names the argument."""
+    has_methods(name, env, "an environment, as of gymnasium.make(id)", "reset", "step")
+    if isinstance(env, gym.vector.VectorEnv):
+        raise TypeError(
+            f"{name} must be a single environment, got a vector of them, {type(env).__name__}"
+        )
+
+
+class UnusableStepError(ValueError):
+    """A step or reset of an environment cannot be used; the message names it and the reason."""
+
+
+def has_action_masks(env: Any) -> bool:
+    """Return whether an environment, or a vector, tells which actions are allowed."""
+    return bool((getattr(env, "metadata", None) or {}).get("action_masks"))
+
+
+def mask_in(info: Mapping[str, Any]) -> Any:
+    """Return the mask in an info; UnusableStepError if there is none."""
+    if "action_mask" not in info:
+        raise UnusableStepError(
+            "info must have 'action_mask', as metadata['action_masks'] of env is True,"
+            f" got {shown(sorted(map(str, info)))}"
+        )
+    return info["action_mask"]
+
+
+def reset_env(env: Any, seed: Any, options: Data | None) -> tuple[Any, Any]:
+    """Reset an environment, or a vector; return what is observed first, and the info.
+
+    UnusableStepError if it returns something else than an observation and a dictionary.
+    """
+    made = env.reset(seed=seed, options=options)
+    if not (isinstance(made, tuple | list) and len(made) == 2 and isinstance(made[1], Mapping)):
+        raise UnusableStepError(
+            f"env.reset must return (observation, info), info a dictionary, got {shown(made)}"
+            f"{_OLD_API}"
+        )
+    return made[0], made[1]
+
+
+def step_env(env: Any, action: Any) -> tuple[Any, Any, Any, Any, Any]:
+    """Step an environment, or a vector; UnusableStepError if it does not return five values."""
+    made = env.step(action)
+    if not (isinstance(made, (tuple, list)) and len(made) == 5):
+        n = len(made) if isinstance(made, (tuple, list)) else 1
+        raise UnusableStepError(
+            "env.step must return five values, (observation, reward, terminated, truncated, info),"
+            f" got {n}{_OLD_API}"
+        )
+    return made  # type: ignore[return-value]
+
+
+def checked_outcome(reward: Any, terminated: Any, truncated: Any) -> tuple[float, bool, bool]:
+    """Return a finite float and bools; UnusableStepError for something else."""
+    try:
+        if type(reward) is not float:
+            reward = reward_of(reward)
+        if not math.isfinite(reward):
+            raise ValueError(f"reward must be finite, got {reward}")
+        if not type(terminated) is bool is type(truncated):
+            terminated, truncated = flag("terminated", terminated), flag("truncated", truncated)
+    except (TypeError, ValueError) as error:
+        raise UnusableStepError(str(error)) from error
+    return reward, terminated, truncated
+
+
+def copied(value: Any) -> Any:
+    """Copy what others may write to: environments may keep their state, or change an action."""
+    if type(value) is np.ndarray:
+        return value.copy()
+    return value if isinstance(value, _SCALARS) else copy.deepcopy(value)
+
+
+Seeds: TypeAlias = Mapping[int, int | None]
+Options: TypeAlias = Data | None
+
+
+class EnvironmentAdapter(abc.ABC):
+    """The interface of all environments, single and vectorized.
+
+    ``can_repeat`` is whether each environment can be reset at any time, with a seed of its own.
+    ``rewards``, ``terminated`` and ``truncated`` are those of the last step in each. ``masks`` are
+    those of the actions allowed after the last reset or step in each, None where it has none; None
+    altogether where `has_action_masks` is False.
+    """
+
+    n_environments: int
+    can_repeat: bool
+    rewards: list[float]
+    terminated: list[bool]
+    truncated: list[bool]
+    masks: list[Any] | None
+
+    @abc.abstractmethod
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+        """Begin episodes in some environments, with seeds; return their first observations.
+
+        Where one is missing, the episode begins with the next `step`, which returns it.
+        """
+
+    @abc.abstractmethod
+    def step(self, actions: Sequence[Any]) -> Any:
+        """Take an action in each, any one where the episode has not begun.
+
+        Returns what is observed, in an array or a list: the last observations where episodes end.
+        """
+
+
+class OneEnvironment(EnvironmentAdapter):
+    """A single environment."""
+
+    n_environments = 1
+    can_repeat = True
+
+    def __init__(self, env: Env) -> None:
+        self._env = env
+        self.rewards, self.terminated, self.truncated = [0.0], [False], [False]
+        self.masks = [None] if has_action_masks(env) else None
+
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+        """Begin its episode."""
+        first, info = reset_env(self._env, seeds[0], options)
+        if self.masks is not None:
+            self.masks = [mask_in(info)]
+        return {0: first}
+
+    def take(self, action: Any) -> tuple[Any, float, bool, bool]:
+        """Take an action; return what a step gives but for the info."""
+        observation, reward, terminated, truncated, info = step_env(self._env, copied(action))
+        reward, terminated, truncated = checked_outcome(reward, terminated, truncated)
+        if self.masks is not None:
+            self.masks = [None if terminated else mask_in(info)]
+        return observation, reward, terminated, truncated
+
+    def step(self, actions: Sequence[Any]) -> Any:
+        """Take the only action."""
+        observation, self.rewards[0], self.terminated[0], self.truncated[0] = self.take(actions[0])
+        return observation[np.newaxis] if type(observation) is np.ndarray else [observation]
+
+
+class Transition(NamedTuple):
+    """A step of an environment.
+
+    ``terminated`` is Gymnasium's: the episode ended in a terminal state. An episode cut off by a
+    time limit (``truncated``) is not terminated; its last transition is learned like any other.
+    ``next_mask`` has 1 for the actions that are allowed in a next state, as `Agent.act` has it.
+    """
+
+    observation: ArrayLike
+    action: Any
+    reward: float
+    next_observation: ArrayLike
+    terminated: bool
+    next_mask: Any = None
+
+
+class Learner(Protocol):
+    """The interface of what is trained: every `sdnn.agents.Agent` has it.
+
+    An agent that learns in one environment and is not saved needs only these methods, without the
+    arguments ``environment`` and ``mask``. Where it has an attribute ``progress``, that is kept up
+    to date.
+    """
+
+    def begin_episode(self) -> None:
+        """Note that an episode begins."""
+
+    def act(self, observation: Any, explore: bool = True) -> Any:
+        """Choose an action; without `explore` nothing may be learned or remembered."""
+
+    def learn(self, transition: Transition) -> None:
+        """Learn a step."""
+
+
+class EachLearner:
+    """A learner in all environments of a training: it acts and learns in one after the other."""
+
+    def __init__(self, learner: Any, n_environments: int) -> None:
+        self._learner = learner
+        self.progressing: Any = learner if hasattr(learner, "progress") else None
+        """The object whose ``progress`` follows that of the training."""
+        self.arguments: list[dict[str, int]] = [{}]
+        """Arguments that name an environment, where there are several."""
+        if n_environments > 1:
+            self.arguments = [{"environment": i} for i in range(n_environments)]
+
+    def begin_episode(self, environment: int) -> None:
+        """Note that an episode begins."""
+        self._learner.begin_episode(**self.arguments[environment])
+
+    def read(self, name: str, observations: Any) -> Any:
+        """Return observations as `act` and `learn` take them, copied; ValueError names them."""
+        return [copied(observation) for observation in observations]
+
+    def flat(self, observation: Any) -> NDArray[np.float64]:
+        """Return the numbers of an observation that was read, for a file."""
+        return np.asarray(self._learner.flat_observation(observation))
+
+    def masks(self, masks: list[Any]) -> Any:
+        """Return masks of all environments as `act` and `learn` take them; ValueError names one."""
+        return masks
+
+    def act(
+        self, observations: Any, actions: Sequence[Any], environments: list[int], masks: Any = None
+    ) -> Any:
+        """Return actions as `learn` takes them: new ones in these, the others as they were."""
+        chosen = list(actions)
+        for i in environments:
+            mask = {} if masks is None else {"mask": masks[i]}
+            chosen[i] = self._learner.act(observations[i], **self.arguments[i], **mask)
+        return chosen
+
+    def elements(self, actions: Any) -> Any:
+        """Return the elements of the action space that `act` has chosen."""
+        return actions
+
+    def learn(
+        self,
+        observations: Any,
+        actions: Any,
+        rewards: list[float],
+        next_observations: Any,
+        terminated: list[bool],
+        environments: list[int],
+        progress: list[float],
+        next_masks: Any = None,
+    ) -> int:
+        """Learn steps in the first of these environments or more; return in how many.
+
+        ``progress`` is the learner's between two of them; it may be empty.
+        """
+        i = environments[0]
+        reward, terminates, _ = checked_outcome(rewards[i], terminated[i], False)
+        mask = None if next_masks is None else next_masks[i]
+        step = Transition(
+            observations[i], actions[i], reward, next_observations[i], terminates, mask
+        )
+        self._learner.learn(step, **self.arguments[i])
+        return 1
+
+
+class _CoreLearner(EachLearner):
+    """An agent of the core, which acts or learns in all environments with one call."""
+
+    def __init__(
+        self,
+        learner: Any,
+        n_environments: int,
+        core: Controller,
+        read: Callable[[str, Any], NDArray[np.float64]],
+        elements: Callable[[NDArray[np.float64]], Array],
+        mask: Callable[[str, Any], NDArray[np.uint8] | None],
+    ) -> None:
+        super().__init__(learner, n_environments)
+        self.progressing = self._core = core
+        self._read, self._elements, self._mask = read, elements, mask
+        self._n_actions = sum(core.n_actions)
+
+    def read(self, name: str, observations: Any) -> NDArray[np.float64]:
+        return self._read(name, observations)
+
+    def flat(self, observation: Any) -> NDArray[np.float64]:
+        return np.array(observation)
+
+    def masks(self, masks: list[Any]) -> NDArray[np.uint8]:
+        rows = np.ones((len(masks), self._n_actions), np.uint8)
+        for i, mask in enumerate(masks):
+            if (row := self._mask("action_mask", mask)) is not None:
+                rows[i] = row
+        return rows
+
+    def act(
+        self, observations: Any, actions: Sequence[Any], environments: list[int], masks: Any = None
+    ) -> NDArray[np.float64]:
+        chosen = self._core.act_each(observations, environments, masks)
+        if len(environments) < len(chosen):
+            for i in set(range(len(chosen))).difference(environments):
+                chosen[i] = np.ravel(actions[i])  # an element of the space after a replay
+        return chosen
+
+    def elements(self, actions: NDArray[np.float64]) -> Array:
+        return self._elements(actions)
+
+    def learn(self, *outcomes: Any) -> int:
+        return self._core.learn_each(*outcomes)
+
+
+def each_learner(learner: Any, n_environments: int) -> EachLearner:
+    """Return a learner in all environments; an agent of the core acts and learns in one call."""
+    core_parts = getattr(type(learner), "core_parts", None)
+    parts = core_parts and core_parts(learner)
+    learner_class = _CoreLearner if parts else EachLearner
+    return learner_class(learner, n_environments, *(parts or ()))
