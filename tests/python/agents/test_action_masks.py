@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from sdnn.agents import (
-    Callback,
     FuzzyQLearning,
     QLambdaConfig,
     QLearningConfig,
@@ -21,6 +20,7 @@ from sdnn.agents import (
 )
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.environments import ActionMasks
+from stopped_training import goes_on_exactly, states_equal
 
 SMALL = SDNNCConfig(n_hidden_units=60, n_active_units=20, n_pattern_units=20)
 AGENTS = [SDNNQLambda, SDNNQLearning]
@@ -78,13 +78,6 @@ def new_agent(kind, env, **settings):
     return kind(*spaces, approximator=approximator, seed=3, warm_up_steps=60, **settings)
 
 
-def same_state(one, other):
-    first, second = one.state(), other.state()
-    assert first.keys() == second.keys()
-    for name, values in first.items():
-        np.testing.assert_array_equal(values, second[name], name)
-
-
 @pytest.mark.parametrize("unbounded", [False, True], ids=["bounds", "warm-up"])
 @pytest.mark.parametrize("actions", SPACES)
 @pytest.mark.parametrize("kind", AGENTS)
@@ -106,10 +99,10 @@ def test_vectors_of_every_mode_learn_the_same(actions, mode):
         agent.train(own, steps=200)
         return agent
 
-    same_state(trained(3, mode), trained(3, "NEXT_STEP"))
+    assert states_equal(trained(3, mode), trained(3, "NEXT_STEP"))
     single = new_agent(SDNNQLambda, new_env(actions))
     single.train(new_env(actions), steps=200)
-    same_state(trained(1, mode), single)
+    assert states_equal(trained(1, mode), single)
 
 
 def test_vectors_that_reset_themselves_take_allowed_actions(monkeypatch):
@@ -183,29 +176,12 @@ def test_a_training_is_resumed_exactly(kind, actions, unbounded, at, n, tmp_path
             return new_env(actions, unbounded)
         return gym.vector.SyncVectorEnv([lambda: new_env(actions, unbounded)] * n)
 
-    def training(steps, *callbacks):
+    def begun(*callbacks):
         env = own_env()
         agent = new_agent(kind, env, learning=learning)
-        return Training(agent, env, steps=steps, callbacks=callbacks)
+        return Training(agent, env, steps=150, callbacks=callbacks)
 
-    whole = training(150)
-    whole.run()
-    part = training(150, StopAt(at))
-    part.run()
-    assert part.n_steps == at
-    part.save(tmp_path / "part.safetensors")
-    rest = Training.load(tmp_path / "part.safetensors", own_env())
-    rest.run()
-    same_state(rest.agent, whole.agent)
-
-
-class StopAt(Callback):
-    def __init__(self, step):
-        self.every, self.step = 1, step
-
-    def on_step(self, training):
-        if training.n_steps == self.step:
-            training.stop()
+    goes_on_exactly(begun, own_env, tmp_path / "part", [at])
 
 
 def test_logged_masks_are_learned(tmp_path):
@@ -216,30 +192,28 @@ def test_logged_masks_are_learned(tmp_path):
         for step in steps:
             file.write(json.dumps(step._asdict()) + "\n")
     learn_from(agents[1], tmp_path / "log.jsonl")
-    same_state(*agents)
+    assert states_equal(*agents)
 
 
-@pytest.mark.parametrize(
-    "mask",
-    [[1, 0], [1] * 6, [0] * 5, [2, 1, 0, 0, 0], [0.5] * 5, "ones", (), [], ([1, 0], [1, 0, 1])],
-    ids=str,
-)
-def test_masks_that_do_not_fit_are_refused(mask):
-    agent = new_agent(SDNNQLambda, Masked())
-    before = agent.state()
-    with pytest.raises(ValueError, match=r"^mask "):
-        agent.act([0.0, 0.0], mask=mask)
-    with pytest.raises(ValueError, match=r"^next_mask "):
-        agent.learn(Transition([0.0, 0.0], 1, 0.0, [0.5, 0.5], False, mask))
-    for name, values in agent.state().items():
-        np.testing.assert_array_equal(values, before[name])
+BAD_MASKS = {
+    "discrete": [
+        [1, 0], [1] * 6, [0] * 5, [2, 1, 0, 0, 0], [0.5] * 5, "ones", (), [], ([1, 0], [1, 0, 1]),
+    ],
+    "several": [([1, 0, 0, 0], [0, 0, 1]), [[1, 0, 0]], ([1, 0, 0], 1), [1] * 6],
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("mask", [([1, 0, 0, 0], [0, 0, 1]), [[1, 0, 0]], ([1, 0, 0], 1), [1] * 6])
-def test_masks_of_several_dimensions_that_do_not_fit_are_refused(mask):
-    agent = new_agent(SDNNQLambda, Masked("several"))
-    with pytest.raises(ValueError, match=r"^mask "):
-        agent.act([0.0, 0.0], mask=mask)
+@pytest.mark.parametrize("actions", SPACES)
+def test_masks_that_do_not_fit_are_refused(actions):
+    agent, same = (new_agent(SDNNQLambda, Masked(actions)) for _ in range(2))
+    action = same.act([0.0, 0.0], explore=False)
+    for mask in BAD_MASKS[actions]:
+        with pytest.raises(ValueError, match=r"^mask "):
+            agent.act([0.0, 0.0], mask=mask)
+        with pytest.raises(ValueError, match=r"^next_mask "):
+            agent.learn(Transition([0.0, 0.0], action, 0.0, [0.5, 0.5], False, mask))
+    assert agent.act([0.0, 0.0], explore=False).tolist() == action.tolist()
+    assert states_equal(agent, same)
 
 
 def test_forms_of_a_mask():

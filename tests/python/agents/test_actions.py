@@ -107,13 +107,3 @@ def test_what_is_done_to_an_action_does_not_change_the_next():
     expected = first.copy()
     first[:] = 0.5
     assert np.array_equal(agent.act(HERE, explore=False), expected)
-
-
-def test_many_actions_are_told_apart():
-    agent = SDNNQLearning(
-        PLANE,
-        gym.spaces.Box(-1.0, 1.0, (1,)),
-        approximator=SDNNCConfig(n_pattern_units=20, n_hidden_units=3100, n_active_units=100),
-    )
-    assert np.allclose(agent.actions, np.linspace(-1, 1, 3001))
-    assert len(set(agent.actions.tolist())) == 3001

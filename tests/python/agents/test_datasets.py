@@ -11,6 +11,7 @@ from hypothesis import given, settings, strategies as st
 from refusals import refuses
 from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLambda, Transition, learn_from
 from sdnn.approximators import LinearSDNNConfig
+from stopped_training import states_equal
 
 PLACE = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
 PARTS = gym.spaces.Dict({"at": PLACE, "gear": gym.spaces.Discrete(3)})
@@ -62,11 +63,6 @@ def lines(path):
     return path
 
 
-def same_weights(one, other):
-    for name, values in one.state().items():
-        np.testing.assert_array_equal(values, other.state()[name])
-
-
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_a_dataset_of_minari(tmp_path, monkeypatch):
     minari = pytest.importorskip("minari")
@@ -87,7 +83,7 @@ def test_a_dataset_of_minari(tmp_path, monkeypatch):
     )
     agent, other = new_agent(), new_agent()
     assert learn_from(agent, dataset, epochs=2) == learn_from(other, arrays(), epochs=2)
-    same_weights(agent, other)
+    assert states_equal(agent, other)
 
 
 def test_observations_of_parts_and_a_warm_up_from_the_data(tmp_path):
@@ -126,7 +122,7 @@ def test_lines_that_are_no_transition_are_named(tmp_path, line):
     agent = new_agent()
     error = refuses("41", learn_from, agent, path)
     assert "line" in str(error)
-    same_weights(agent, new_agent())  # nothing is learned
+    assert states_equal(agent, new_agent())  # nothing is learned
 
 
 def test_rows_without_next_observations_follow_each_other():
@@ -186,4 +182,4 @@ def test_truncated_episodes_are_learned_as_episodes_that_begin_anew(cuts, epochs
             if cuts[t]:
                 by_hand.begin_episode()
         by_hand.begin_episode()
-    same_weights(agent, by_hand)
+    assert states_equal(agent, by_hand)

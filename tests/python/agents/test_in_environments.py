@@ -43,32 +43,6 @@ def test_it_lives_in_pendulum(kind, options):
     assert first != live(env, born(seed=4), 450)
 
 
-def test_equal_lives_leave_equal_weights():
-    env = gym.make("Pendulum-v1")
-    agents = [
-        SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL, seed=3)
-        for _ in range(3)
-    ]
-    for agent in agents[:2]:
-        live(env, agent, 450)
-    first, second, fresh = (agent.networks[0].weights() for agent in agents)
-    assert np.array_equal(first, second)
-    assert not np.array_equal(first, fresh)
-
-
-def test_it_lives_in_cart_pole_with_bounds_that_matter():
-    env = gym.make("CartPole-v1")
-    bounds = np.array([2.4, 3.0, 0.21, 3.0])
-    agent = SDNNQLearning(
-        gym.spaces.Box(-bounds, bounds, dtype=np.float64),
-        env.action_space,
-        approximator=SMALL,
-        seed=3,
-    )
-    assert agent.n_actions == 2
-    assert set(live(env, agent, 300)) == {0, 1}
-
-
 def test_a_discrete_observation_is_a_symbol():
     """The right action in a room has nothing to do with the next room."""
     right = np.random.default_rng(1).integers(0, 4, 40)

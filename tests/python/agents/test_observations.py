@@ -130,10 +130,6 @@ def test_what_tells_a_symbol_is_no_angle():
     refuses("angle_pairs", sdnn_agent, GEAR, angle_pairs=[(4, 5)])
 
 
-def test_an_angle_needs_a_range():
-    refuses("angles", sdnn_agent, UNBOUNDED, angles=[1])
-
-
 @pytest.mark.parametrize(
     "space",
     [
@@ -172,10 +168,6 @@ def test_a_space_without_a_range_names_a_remedy():
         (gym.spaces.MultiDiscrete([3, 2]), [-1, 0]),
         (gym.spaces.MultiBinary(2), [1]),
         (gym.spaces.Discrete(3), "one"),
-        (BOX, [[0.0], [1.0]]),
-        (BOX, [0.0]),
-        (BOX, [None, None]),
-        (BOX, [[1.0], [2.0, 3.0]]),
     ],
 )
 def test_elements_of_other_spaces_are_refused_by_name(space, observation):

@@ -105,19 +105,6 @@ def test_listed_states_have_a_table(tmp_path):
         np.testing.assert_array_equal(values[:, 0], 0)
 
 
-@pytest.mark.parametrize(
-    ("tie_rule", "tie_tolerance", "expected"),
-    [("lowest", 0.0, 3), ("lowest", 0.25, 1), ("middle", 0.25, 2), ("lowest", 0.35, 0)],
-)
-def test_values_within_the_tolerance_tie(tie_rule, tie_tolerance, expected):
-    learning = QLambdaConfig(epsilon=0.0, tie_rule=tie_rule, tie_tolerance=tie_tolerance)
-    agent = SDNNQLambda(gym.spaces.Discrete(2), gym.spaces.Discrete(4), learning=learning)
-    for action, reward in enumerate([0.7, 0.8, 0.9, 1.0]):
-        agent.learn(Transition(0, action, reward, 1, terminated=True))
-    np.testing.assert_allclose(agent.q_values(0), [0.7, 0.8, 0.9, 1.0], atol=0.01)
-    assert agent.act(0) == agent.act(0, explore=False) == expected
-
-
 @pytest.mark.parametrize(("n_states", "n_units"), [(1, 0), (2000, 0), (5, 40)])
 def test_too_many_states_or_given_units_have_patterns(n_states, n_units):
     agent = SDNNQLambda(
@@ -163,35 +150,6 @@ def test_one_enormous_reward_costs_resolution_and_nothing_else():
     for _ in range(30):
         agent.learn([0.1, 0.1], [0], 1.0, [0.2, 0.1], True)
     assert agent.networks[0].values([0.1, 0.1])[0] == pytest.approx(1.0, abs=0.5)
-
-
-@pytest.mark.parametrize("learned", [0, 40, 300])
-def test_a_saved_agent_continues_to_the_same_bits(tmp_path, learned):
-    env = gym.make("CartPole-v1")
-
-    def agent_of(steps):
-        agent = SDNNQLambda(env.observation_space, env.action_space, seed=3, warm_up_steps=50)
-        agent.train(env, steps=steps, seed=5)
-        return agent
-
-    agent = (
-        agent_of(learned)
-        if learned
-        else SDNNQLambda(env.observation_space, env.action_space, seed=3, warm_up_steps=50)
-    )
-    agent.save(tmp_path / "agent.safetensors")
-    loaded = load_agent(tmp_path / "agent.safetensors")
-    rng = np.random.default_rng(1)
-    for one in (agent, loaded):
-        one.begin_episode()
-    for _ in range(100):
-        observation, following = rng.normal(size=(2, 4)).astype(np.float32) / 20
-        actions = [one.act(observation) for one in (agent, loaded)]
-        assert actions[0] == actions[1]
-        for one in (agent, loaded):
-            one.learn(Transition(observation, actions[0], 1.0, following, False))
-    if not agent.is_warming_up:
-        np.testing.assert_array_equal(agent.readout.weights(), loaded.readout.weights())
 
 
 def test_cartpole_is_learned_in_a_few_thousand_steps():

@@ -20,7 +20,7 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
-from stopped_training import Stop
+from stopped_training import goes_on_exactly
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
 FALLING = {"learning_rate": 0.8, "final_learning_rate": 0.05, "epsilon": 0.5, "final_epsilon": 0.02}
@@ -33,52 +33,6 @@ def new_agent(space=PLANE, **learning):
     return SDNNQLearning(
         space, TORQUE, approximator=SMALL, learning=QLearningConfig(**learning), warm_up_steps=30
     )
-
-
-@pytest.mark.parametrize("space", [PLANE, UNBOUNDED], ids=["born", "warming up"])
-@pytest.mark.parametrize("schedule", ["linear", "exponential"])
-def test_rates_follow_the_progress(schedule, space):
-    agent = new_agent(space, schedule=schedule, **FALLING)
-    progress = np.linspace(0.0, 1.0, 41)
-    found = []
-    for agent.progress in progress:
-        found.append((agent.learning_rate, agent.epsilon))
-    for rates, name in zip(np.transpose(found), ("learning_rate", "epsilon"), strict=True):
-        first, last = FALLING[name], FALLING["final_" + name]
-        expected = (
-            first + (last - first) * progress
-            if schedule == "linear"
-            else first * (last / first) ** progress
-        )
-        np.testing.assert_allclose(rates, expected, rtol=1e-14)
-        assert (rates[0], rates[-1]) == (first, last)
-
-
-def test_without_final_values_rates_stay():
-    for schedule in ("linear", "exponential"):
-        agent = new_agent(schedule=schedule, learning_rate=0.3, epsilon=0.0)
-        agent.progress = 0.7
-        assert (agent.learning_rate, agent.epsilon) == (0.3, 0.0)
-
-
-@pytest.mark.parametrize("space", [PLANE, UNBOUNDED], ids=["born", "warming up"])
-def test_epsilon_may_reach_its_final_value_before_the_end(space):
-    agent = new_agent(space, exploration_fraction=0.25, **FALLING)
-    whole = new_agent(space, **FALLING)
-    for progress in (0.0, 0.1, 0.25, 0.26, 1.0):
-        agent.progress, whole.progress = progress, min(1.0, progress / 0.25)
-        assert agent.epsilon == whole.epsilon
-        whole.progress = progress
-        assert agent.learning_rate == whole.learning_rate
-    assert agent.epsilon == FALLING["final_epsilon"]
-
-
-def test_impossible_schedules_are_named():
-    for bad in (0.0, 1.5, float("nan")):
-        refuses("exploration_fraction", new_agent, exploration_fraction=bad)
-    refuses("schedule", new_agent, schedule="cosine")
-    refuses("final_epsilon", new_agent, schedule="exponential", final_epsilon=0.0)
-    refuses("epsilon", new_agent, schedule="exponential", epsilon=0.0, final_epsilon=0.1)
 
 
 @pytest.mark.parametrize("space", [PLANE, UNBOUNDED], ids=["born", "warming up"])
@@ -121,19 +75,13 @@ def test_a_training_whose_rates_are_set_goes_on_exactly(make, env_id, tmp_path):
         agent = SDNNQLearning(
             env.observation_space, env.action_space, approximator=SMALL, warm_up_steps=50
         )
-        return Training(agent, env, steps=200, callbacks=callbacks)
+        return Training(agent, env, steps=200, callbacks=[make(), *callbacks])
 
-    whole = begun(make())
-    whole.run()
-    state = whole.agent.state()
-    assert {"agent.learning_rate", "agent.epsilon"} <= state.keys()
-    for cut in (1, 30, 49, 50, 51, 120, 199):
-        begun(make(), Stop(cut, tmp_path / "t")).run()
-        again = Training.load(tmp_path / "t", gym.make(env_id), callbacks=[make()])
-        again.run()
-        found = again.agent.state()
-        assert found.keys() == state.keys()
-        assert all(np.array_equal(found[name], state[name]) for name in state)
+    cuts = (1, 30, 49, 50, 51, 120, 199)
+    whole = goes_on_exactly(
+        begun, lambda: gym.make(env_id), tmp_path / "t", cuts, callbacks=[make()]
+    )
+    assert {"agent.learning_rate", "agent.epsilon"} <= whole.agent.state().keys()
 
 
 def test_a_schedule_gives_the_rates_of_every_step():

@@ -15,9 +15,7 @@ OBSERVATIONS = gym.spaces.Box(0.0, 1.0, (N_INPUTS,), np.float64)
 ONE = gym.spaces.Box(-1.0, 1.0, (1,), np.float64)
 TWO = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
 SIZES = SDNNCConfig(n_pattern_units=50, n_hidden_units=200, n_active_units=60, n_actions=9)
-AVERAGING = SDNNCConfig(
-    n_pattern_units=50, n_hidden_units=200, n_active_units=60, n_actions=9, averaging_interval=10
-)
+AVERAGING = SIZES.replace(averaging_interval=10)
 AGENTS = {
     "sdnn": partial(SDNNQLearning, OBSERVATIONS, ONE, approximator=SIZES, seed=1),
     "averaging": partial(SDNNQLearning, OBSERVATIONS, ONE, approximator=AVERAGING, seed=1),
@@ -70,23 +68,15 @@ def in_threads(*works):
 
 
 @pytest.mark.parametrize("kind", AGENTS)
-def test_threads_read_what_one_reads_alone(kind):
-    agent = AGENTS[kind]()
-    for round_number in range(3):
-        live(agent, 40, round_number)
-        expected = read(agent)
-        for values in in_threads(*[lambda: read(agent)] * 4):
-            np.testing.assert_array_equal(values, expected)
-
-
-@pytest.mark.parametrize("kind", AGENTS)
-def test_threads_take_the_actions_that_one_takes_alone(kind):
+def test_threads_read_and_take_what_one_reads_and_takes_alone(kind):
     # Without draws, whose order would be that of the threads.
     agent = AGENTS[kind](learning=AGENTS[kind]().learning.replace(tie_rule="middle"))
-    live(agent, 100, 1)
-    expected = greedy(agent)
-    for actions in in_threads(*[lambda: greedy(agent)] * 4):
-        np.testing.assert_array_equal(actions, expected)
+    for round_number in range(3):
+        live(agent, 40, round_number)
+        for ask in (read, greedy):
+            expected = ask(agent)
+            for values in in_threads(*[lambda ask=ask: ask(agent)] * 4):
+                np.testing.assert_array_equal(values, expected)
 
 
 @pytest.mark.parametrize("kind", AGENTS)

@@ -20,6 +20,7 @@ from sdnn.agents import (
     FuzzyQLearningConfig,
     QLearningConfig,
     RBFQLearning,
+    SDNNQLambda,
     SDNNQLearning,
     Training,
     Transition,
@@ -36,6 +37,7 @@ UNBOUNDED = gym.spaces.Box(-np.inf, np.inf, (3,), dtype=np.float64)
 TORQUE = gym.spaces.Box(-2.0, 2.0, (1,), dtype=np.float32)
 GEARS = gym.spaces.Box(-1, 1, (2,), dtype=np.int64)  # of 5 actions each two are one gear
 TWO_TORQUES = gym.spaces.Box(-2.0, 2.0, (2,), dtype=np.float32)
+BUTTONS = gym.spaces.Discrete(3, start=2)
 MIXED = gym.spaces.Dict({"at": PLANE, "lamp": gym.spaces.Discrete(2)})
 GENERAL = QLearningConfig(
     n_steps=3,
@@ -58,9 +60,7 @@ KINDS = {
     "sdnn, vector": lambda: SDNNQLearning(
         PLANE, TWO_TORQUES, approximator=SMALL, learning=GENERAL, seed=5
     ),
-    "sdnn, buttons": lambda: SDNNQLearning(
-        MIXED, gym.spaces.Discrete(3, start=2), approximator=SMALL, learning=GENERAL
-    ),
+    "sdnn, buttons": lambda: SDNNQLearning(MIXED, BUTTONS, approximator=SMALL, learning=GENERAL),
     "sdnn, switches": lambda: SDNNQLearning(
         PLANE, gym.spaces.MultiDiscrete([2, 3]), approximator=SMALL, learning=GENERAL
     ),
@@ -84,6 +84,7 @@ KINDS = {
     "sdnn, tables": lambda: SDNNQLearning(
         PLANE, TORQUE, approximator=SMALL, tables=[np.sign(np.eye(20) - 0.5)] * 2
     ),
+    "q-lambda": lambda: SDNNQLambda(UNBOUNDED, BUTTONS, warm_up_steps=60, seed=3),
     "rbf": lambda: RBFQLearning(
         PLANE, TORQUE, approximator=RBFNetworkConfig(n_actions=7), learning=GENERAL
     ),
@@ -132,11 +133,7 @@ def lived(agent, first, last, cut=None):
 
 
 def same_state(first, second):
-    one, other = first.state(), second.state()
-    assert one.keys() == other.keys()
-    for name in one:
-        assert one[name].dtype == other[name].dtype, name
-        assert np.array_equal(one[name], other[name]), name
+    assert states_equal(first, second)
     assert first.description() == second.description()
 
 

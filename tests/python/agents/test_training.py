@@ -32,7 +32,7 @@ from sdnn.agents import (
 )
 from sdnn.approximators import SDNNCConfig
 from sdnn.support.state_files import read_file, write_file
-from stopped_training import Stop, states_equal
+from stopped_training import Stop, goes_on_exactly, states_equal
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
 KINDS = {
@@ -177,9 +177,6 @@ class Broken(Corridor):
 
 BROKEN = [
     ({"reward": np.nan}, "step 3", "got nan"),
-    ({"reward": np.inf}, "step 3", "got inf"),
-    ({"reward": 10**400}, "step 3", "reward"),
-    ({"reward": "much"}, "step 3", "reward"),
     ({"seen": np.array([np.nan])}, "step 3", "observation[0] must be finite"),
     ({"seen": np.zeros(2)}, "step 3", "observation"),
     ({"first": np.array([np.nan])}, "the reset", "observation[0] must be finite"),
@@ -200,9 +197,6 @@ def test_what_cannot_be_learned_or_evaluated_is_told_with_its_place(given, where
 def test_of_several_environments_the_one_is_told_that_cannot_be_learned_from():
     envs = gym.vector.SyncVectorEnv([Corridor, lambda: Broken(reward=np.nan)])
     with pytest.raises(UnusableStepError, match=r"environment 1\b.*\breward\b"):
-        corridor_agent().train(envs, steps=40)
-    envs = gym.vector.SyncVectorEnv([Corridor, lambda: Broken(seen=np.zeros(2))])
-    with pytest.raises(UnusableStepError, match="next_observation must have shape"):
         corridor_agent().train(envs, steps=40)
 
 
@@ -495,18 +489,6 @@ def test_rows_are_those_of_the_episodes():
     assert [row["step"] for row in result.rows] == list(np.cumsum(lengths))
 
 
-def test_progress_goes_from_0_to_1():
-    seen = []
-
-    class Note(Callback):
-        def on_step(self, training):
-            seen.append((training.agent.progress, training.agent.epsilon))
-
-    corridor_agent().train(Corridor(), steps=10, callbacks=[Note()])
-    assert [progress for progress, _ in seen] == pytest.approx(np.arange(1, 11) / 10)
-    assert seen[-1][1] == pytest.approx(0.01)
-
-
 def test_every_episode_has_a_seed_of_its_own():
     env, other = Corridor(), Corridor()
     corridor_agent().train(env, episodes=30, seed=4)
@@ -537,43 +519,31 @@ def test_evaluations_change_nothing_that_is_learned(tmp_path):
 def test_a_training_stopped_inside_an_episode_goes_on_exactly(kind, tmp_path):
     make, options = KINDS[kind]
 
-    def begun(callbacks=()):
-        env = gym.make("Pendulum-v1", max_episode_steps=40)
-        agent = make(env.observation_space, env.action_space, seed=3, **options)
-        return Training(agent, env, steps=300, seed=9, callbacks=callbacks)
+    def env():
+        return gym.make("Pendulum-v1", max_episode_steps=40)
 
-    whole = begun()
-    rows = whole.run().rows
-    for cut in np.random.default_rng(5).integers(1, 300, 12):
-        first = begun([Stop(cut, tmp_path / "t")])
-        before = first.run()
-        assert not before.is_finished
-        second = Training.load(tmp_path / "t", gym.make("Pendulum-v1", max_episode_steps=40))
-        after = second.run()
-        assert (*before.rows, *after.rows) == rows
-        assert states_equal(whole.agent, second.agent)
+    def begun(*callbacks):
+        agent = make(env(), seed=3, **options)
+        return Training(agent, env(), steps=300, seed=9, callbacks=callbacks)
+
+    cuts = np.random.default_rng(5).integers(1, 300, 12)
+    goes_on_exactly(begun, env, tmp_path / "t", cuts)
 
 
 def test_an_unbounded_environment_is_warmed_up_and_learned(tmp_path):
     env = gym.make("CartPole-v1")
 
-    def begun(callbacks=()):
-        agent = SDNNQLearning(
-            env.observation_space, env.action_space, approximator=SMALL, warm_up_steps=200
-        )
+    def begun(*callbacks):
+        agent = SDNNQLearning(env, approximator=SMALL, warm_up_steps=200)
         return Training(agent, env, steps=500, callbacks=callbacks)
 
-    whole = begun()
-    assert whole.agent.is_warming_up
-    refuses("observation_range", whole.agent.q_values, env.reset()[0], error=RuntimeError)
-    whole.run()
+    young = begun().agent
+    assert young.is_warming_up
+    refuses("observation_range", young.q_values, env.reset()[0], error=RuntimeError)
+    cuts = (1, 150, 199, 200, 201, 350)
+    whole = goes_on_exactly(begun, lambda: env, tmp_path / "t", cuts)
     assert not whole.agent.is_warming_up
     assert whole.agent.learning_report()["n_corrections"] > 480
-    for cut in (1, 150, 199, 200, 201, 350):
-        begun([Stop(cut, tmp_path / "t")]).run()
-        again = Training.load(tmp_path / "t", env)
-        again.run()
-        assert states_equal(whole.agent, again.agent)
 
 
 @pytest.mark.parametrize("missing", ["hold", "code"])
@@ -586,17 +556,11 @@ def test_a_training_goes_on_from_an_observation_that_is_missing(missing, tmp_pat
         def _seen(self):
             return np.array([np.inf if self._at == 1 else self._at])
 
-    def begun(callbacks=()):
+    def begun(*callbacks):
         agent = SDNNQLearning(Echo(), approximator=SMALL, observation_range=(0, 4), missing=missing)
         return Training(agent, Echo(), steps=60, callbacks=callbacks)
 
-    whole = begun()
-    whole.run()
-    for cut in range(1, 10):
-        begun([Stop(cut, tmp_path / "t")]).run()
-        again = Training.load(tmp_path / "t", Echo())
-        again.run()
-        assert states_equal(whole.agent, again.agent)
+    goes_on_exactly(begun, Echo, tmp_path / "t", range(1, 10))
 
 
 def test_an_environment_that_does_not_repeat_itself_is_refused(tmp_path):
@@ -716,25 +680,20 @@ def test_lines_of_a_resumed_training_are_those_of_a_whole_one(tmp_path):
 
 
 def test_evaluations_may_follow_episodes(tmp_path):
-    def training(callbacks=()):
+    def begun(*callbacks):
         return Training(
             corridor_agent(), Corridor(), episodes=30, evaluate_every_episodes=5,
             evaluation_env=Corridor(), evaluation_episodes=2, callbacks=callbacks,
         )  # fmt: skip
 
-    whole = training()
-    rows = whole.run().rows
+    rows = begun().run().rows
     evaluations = [row for row in rows if row["kind"] == "evaluation"]
     assert [row["episode"] for row in evaluations] == [5, 10, 15, 20, 25, 30]
     assert all(len(row["lengths"]) == len(row["terminated"]) == 2 for row in evaluations)
     ends = {row["step"] for row in rows if row["kind"] == "episode"}
     assert {row["step"] for row in evaluations} <= ends
-    for cut in (3, 20, 47, evaluations[2]["step"]):
-        first = training([Stop(cut, tmp_path / "t")])
-        before = first.run().rows
-        again = Training.load(tmp_path / "t", Corridor(), evaluation_env=Corridor())
-        assert (*before, *again.run().rows) == rows
-        assert states_equal(whole.agent, again.agent)
+    cuts = (3, 20, 47, evaluations[2]["step"])
+    goes_on_exactly(begun, Corridor, tmp_path / "t", cuts, evaluation_env=Corridor())
 
 
 def test_without_a_seed_the_streams_of_environments_run_on(tmp_path):

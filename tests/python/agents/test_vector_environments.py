@@ -22,7 +22,7 @@ from sdnn.agents import (
 )
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.training.episodes import episode_seed
-from stopped_training import Stop, states_equal
+from stopped_training import Stop, goes_on_exactly, states_equal
 
 AutoresetMode = gym.vector.AutoresetMode
 
@@ -213,23 +213,16 @@ def test_the_fast_acrobots_have_the_bits_of_single_ones_and_go_on_exactly(tmp_pa
         env = gym.make("sdnn/AcrobotSwingUp-v0")
         return sdnn_agent(env, approximator=SMALL)
 
-    def acrobots(fast=True):
-        mode = None if fast else "sync"
-        name = "sdnn/AcrobotSwingUp-v0"
-        if fast:
-            return gym.make_vec(name, num_envs=3)
-        return gym.make_vec(name, num_envs=3, vectorization_mode=mode)
+    def acrobots(mode=None):
+        return gym.make_vec("sdnn/AcrobotSwingUp-v0", num_envs=3, vectorization_mode=mode)
 
-    whole = Training(agent(), acrobots(), steps=400)
-    whole.run()
-    slow = Training(agent(), acrobots(fast=False), steps=400)
+    def begun(*callbacks):
+        return Training(agent(), acrobots(), steps=400, callbacks=callbacks)
+
+    whole = goes_on_exactly(begun, acrobots, tmp_path / "t", (100, 302, 355))
+    slow = Training(agent(), acrobots("sync"), steps=400)
     slow.run()
     assert states_equal(whole.agent, slow.agent)
-    for cut in (100, 302, 355):
-        Training(agent(), acrobots(), steps=400, callbacks=[Stop(cut, tmp_path / "t")]).run()
-        again = Training.load(tmp_path / "t", acrobots())
-        again.run()
-        assert states_equal(whole.agent, again.agent)
 
 
 def test_steps_and_callbacks_count_transitions(tmp_path):

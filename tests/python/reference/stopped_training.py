@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sdnn.agents import Callback
+from sdnn.agents import Callback, Training
 
 
 class Stop(Callback):
@@ -21,4 +21,23 @@ def states_equal(one, other):
     """Whether two agents have the same bits."""
     one, other = one.state(), other.state()
     assert one.keys() == other.keys()
-    return all(np.array_equal(one[name], other[name]) for name in one)
+    return all(
+        one[name].dtype == other[name].dtype and np.array_equal(one[name], other[name])
+        for name in one
+    )
+
+
+def goes_on_exactly(begun, env, path, cuts, **options):
+    """Check that trainings of ``begun(*callbacks)`` that stop at a cut end as the whole one does.
+
+    ``env()`` is the environment that a stopped one is loaded with. Returns the whole one.
+    """
+    whole = begun()
+    rows = whole.run().rows
+    for cut in cuts:
+        before = begun(Stop(cut, path)).run()
+        assert not before.is_finished
+        again = Training.load(path, env(), **options)
+        assert (*before.rows, *again.run().rows) == rows
+        assert states_equal(whole.agent, again.agent)
+    return whole
