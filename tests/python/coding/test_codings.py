@@ -127,12 +127,6 @@ def test_the_length_scale_is_where_the_correlation_is_one_over_e(half, length_sc
         assert abs(kept**distance - np.exp(-1)) < 0.1
 
 
-def test_neighbours_differ_in_the_flips():
-    patterns = RandomInverse(n_bins=50, n_flipped=3).fit(UNIT, 100).patterns(100, 0).astype(int)
-    assert np.all(np.sum(patterns, axis=1) == 0)
-    assert np.all(np.sum(patterns[1:] != patterns[:-1], axis=1) == 6)
-
-
 @pytest.mark.parametrize("name", FITTED)
 def test_codings_survive_json(name):
     coding = FITTED[name]

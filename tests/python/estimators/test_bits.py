@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import estimator_transcription
-from sdnn import SDNNClassifier, SDNNRegressor, _core
+from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import RandomInverse
 
 # Drawn inputs may have outliers, which change no comparison.
@@ -127,16 +127,3 @@ def test_fit_draws_seeds_and_then_a_permutation_per_epoch(regression):
     corrected = [slow.present(orders.permutation(30))[0] for _ in range(model.n_iter_)]
     assert model.n_corrected_.tolist() == corrected
     agree(model, layer, X)
-
-
-def test_gram_matrix_is_that_of_the_code():
-    random = np.random.RandomState(0)
-    model, _ = untrained(
-        SDNNRegressor(n_pattern_units=100, random_state=0),
-        random.uniform(size=(20, 3)),
-        np.arange(20),
-    )
-    bins = model.network_.input_code.bins(random.uniform(size=(20, 3)))
-    code = model.network_.input_code.core.transform(bins).astype(int)
-    np.testing.assert_array_equal(model.network_.input_code.core.gram(bins), code @ code.T)
-    assert isinstance(model.network_.layer, _core.ParallelPerceptron)

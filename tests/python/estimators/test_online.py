@@ -267,12 +267,14 @@ def test_a_range_widens_alike_in_any_portions():
     assert whole.output_range_[0, 1] > drifting.max()
 
 
-@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_river_streams_are_learned():
-    pytest.importorskip("river")
-    from sdnn.estimators.river import RiverClassifier, RiverRegressor
+@pytest.fixture(scope="module")
+def river():
+    return pytest.importorskip("sdnn.estimators.river")
 
-    model = RiverRegressor(SDNNRegressor(**OPTIONS, out_of_range="widen"), grace_period=50)
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+def test_river_streams_are_learned(river):
+    model = river.RiverRegressor(SDNNRegressor(**OPTIONS, out_of_range="widen"), grace_period=50)
     assert model.predict_one(ROWS[0]) == 0.0
     errors = []
     for _ in range(5):
@@ -280,7 +282,7 @@ def test_river_streams_are_learned():
             errors.append(abs(model.predict_one(row) - y))
             model.learn_one(row, y)
     assert np.mean(errors[-200:]) < 0.5 * np.mean(np.abs(Y - Y.mean()))
-    labelled = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
+    labelled = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
     assert labelled.predict_one(ROWS[0]) is None
     for _ in range(5):
         hits = []
@@ -289,19 +291,16 @@ def test_river_streams_are_learned():
             labelled.learn_one(row, label)
     assert np.mean(hits) > 0.8
     assert labelled.clone().fitted is None
-    assert RiverRegressor().clone().model.out_of_range == "widen"
-    assert RiverClassifier().clone().model.correction_share == 0.5
-    for kind, wrong in ((RiverRegressor, SDNNClassifier()), (RiverClassifier, 3)):
+    assert river.RiverRegressor().clone().model.out_of_range == "widen"
+    assert river.RiverClassifier().clone().model.correction_share == 0.5
+    for kind, wrong in ((river.RiverRegressor, SDNNClassifier()), (river.RiverClassifier, 3)):
         with pytest.raises(TypeError, match="model must be an SDNN"):
             kind(wrong)
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_names_of_river_streams_may_be_numbers():
-    pytest.importorskip("river")
-    from sdnn.estimators.river import RiverRegressor
-
-    model = RiverRegressor(SDNNRegressor(**OPTIONS), grace_period=20)
+def test_names_of_river_streams_may_be_numbers(river):
+    model = river.RiverRegressor(SDNNRegressor(**OPTIONS), grace_period=20)
     for x, y in zip(X[:40], Y[:40], strict=True):
         model.learn_one(dict(enumerate(x)), y)
     assert np.isfinite(model.predict_one(dict(enumerate(X[0]))))
@@ -310,8 +309,7 @@ def test_names_of_river_streams_may_be_numbers():
 BAD_SAMPLES = [{"a": float("inf")}, {"a": [1.0]}, {"a": 10**400}, {1: 0.5, "1": 0.5}]
 
 
-def river_models(**options):
-    river = pytest.importorskip("sdnn.estimators.river")
+def river_models(river, **options):
     regressor = SDNNRegressor(**OPTIONS, out_of_range="widen")
     return [
         river.RiverRegressor(regressor, **options),
@@ -322,8 +320,8 @@ def river_models(**options):
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 @pytest.mark.parametrize("n_before", [0, 19, 40])
 @pytest.mark.parametrize("number", [0, 1])
-def test_a_sample_that_cannot_be_learned_is_refused_alone(number, n_before):
-    model, other = (river_models(grace_period=20)[number] for _ in range(2))
+def test_a_sample_that_cannot_be_learned_is_refused_alone(river, number, n_before):
+    model, other = (river_models(river, grace_period=20)[number] for _ in range(2))
     targets = [Y.tolist(), LABELS.tolist()][number]
     for row, target in zip(ROWS[:n_before], targets, strict=False):
         model.learn_one(row, target)
@@ -340,8 +338,8 @@ def test_a_sample_that_cannot_be_learned_is_refused_alone(number, n_before):
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("number", [0, 1])
-def test_rivers_checks_of_estimators_pass(number):
-    model = river_models()[number]
+def test_rivers_checks_of_estimators_pass(river, number):
+    model = river_models(river)[number]
     for check in pytest.importorskip("river.checks").yield_checks(model):
         check(model.clone())
 
@@ -359,8 +357,8 @@ def late_stream(n_samples):
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 @pytest.mark.parametrize("n_pattern_units", [40, None, 2000])  # the last begins anew
-def test_features_and_categories_of_river_streams_may_come_late(n_pattern_units):
-    model, other = (river_models()[0] for _ in range(2))
+def test_features_and_categories_of_river_streams_may_come_late(river, n_pattern_units):
+    model, other = (river_models(river)[0] for _ in range(2))
     errors = []
     for one in (model, other):
         one.model.set_params(n_pattern_units=n_pattern_units)
@@ -378,11 +376,10 @@ def test_features_and_categories_of_river_streams_may_come_late(n_pattern_units)
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_growing_changes_no_prediction_and_survives_files(tmp_path):
-    pytest.importorskip("river")
+def test_growing_changes_no_prediction_and_survives_files(river, tmp_path):
     from sdnn.estimators.growth import grow
 
-    model = river_models()[0]
+    model = river_models(river)[0]
     for x, y in late_stream(300):
         model.learn_one(x, y)
     rows = [{**x, "flag": float(x["flag"])} for x, _ in late_stream(50)]
@@ -399,26 +396,20 @@ def test_growing_changes_no_prediction_and_survives_files(tmp_path):
     same(SDNNRegressor.load(tmp_path / "grown.safetensors"), model.fitted)
 
 
-def test_labels_of_equal_number_are_predicted_in_their_order():
-    pytest.importorskip("river")
-    from sdnn.estimators.river import RiverClassifier
-
-    model = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
+def test_labels_of_equal_number_are_predicted_in_their_order(river):
+    model = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
     for row, label in zip(ROWS, ["red", "green", "blue", "blue", "green", "red"], strict=False):
         model.learn_one(row, label)
     assert model.predict_one(ROWS[0]) == "red"
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_ranges_of_a_river_stream_are_followed():
-    pytest.importorskip("river")
-    from sdnn.estimators.river import RiverRegressor
-
+def test_ranges_of_a_river_stream_are_followed(river):
     random = np.random.RandomState(0)
     errors = {}
     for follows in (True, False):
         learner = SDNNRegressor(n_pattern_units=32, random_state=0, out_of_range="widen")
-        model = RiverRegressor(learner, follows_ranges=follows)
+        model = river.RiverRegressor(learner, follows_ranges=follows)
         random.seed(1)
         for number in range(1500):
             a, b = random.uniform(size=2)
@@ -429,11 +420,8 @@ def test_ranges_of_a_river_stream_are_followed():
     assert np.mean(errors[True][-500:]) < 0.5 * np.mean(errors[False][-500:])
 
 
-def test_classes_of_a_river_stream_may_come_late():
-    pytest.importorskip("river")
-    from sdnn.estimators.river import RiverClassifier
-
-    model = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=20)
+def test_classes_of_a_river_stream_may_come_late(river):
+    model = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=20)
     names = np.array(["middle", "low", "high"])[LABELS]
     order = np.argsort(LABELS == 2, kind="stable")  # class "high" comes last
     for _ in range(5):
@@ -448,12 +436,14 @@ def test_classes_of_a_river_stream_may_come_late():
         refuses("y", model.learn_one, ROWS[0], label)
     refuses("x", model.learn_one, {"other": [1.0]}, "highest")
     assert len(model.fitted.classes_) == 3  # none is added by an error
-    numbers = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=20)
+    numbers = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=20)
     for row, label in zip(ROWS[:30], LABELS, strict=False):
         numbers.learn_one(row, float(label))
     refuses("y", numbers.learn_one, ROWS[0], float("nan"))
-    refuses("follows_ranges", RiverClassifier, SDNNClassifier(), follows_ranges=1, error=TypeError)
-    pairs = RiverClassifier(SDNNClassifier(**OPTIONS, scheme="one_vs_one"), grace_period=20)
+    refuses(
+        "follows_ranges", river.RiverClassifier, SDNNClassifier(), follows_ranges=1, error=TypeError
+    )
+    pairs = river.RiverClassifier(SDNNClassifier(**OPTIONS, scheme="one_vs_one"), grace_period=20)
     for row in np.argsort(LABELS == 2, kind="stable")[:30].tolist():
         pairs.learn_one(ROWS[row], names[row])
     refuses("one_vs_rest", pairs.learn_one, ROWS[0], "high")
@@ -469,22 +459,19 @@ def test_probabilities_of_one_have_the_bits_of_those_of_many(n_classes):
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_river_measures_and_wraps_classifiers_with_probabilities():
-    pytest.importorskip("river")
+def test_river_measures_and_wraps_classifiers_with_probabilities(river):
     from river import ensemble, evaluate, metrics, multiclass
 
-    from sdnn.estimators.river import RiverClassifier
-
-    model = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
+    model = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
     assert model.predict_proba_one(ROWS[0]) == {}
     for row, label in zip(ROWS, ["red", "green", "red", "red"], strict=False):
         model.learn_one(row, label)
     assert model.predict_proba_one(ROWS[0]) == {"red": 0.75, "green": 0.25}
     assert ensemble.VotingClassifier([model, model])._multiclass  # not for two classes alone
-    single = RiverClassifier(SDNNClassifier(**OPTIONS, scheme="one_vs_one"))
+    single = river.RiverClassifier(SDNNClassifier(**OPTIONS, scheme="one_vs_one"))
     refuses("scheme", single.predict_proba_one, ROWS[0], error=NotImplementedError)
     stream = list(zip(ROWS, (Y > 0.2).tolist(), strict=True)) * 3
-    model = RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
+    model = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
     metric = evaluate.progressive_val_score(stream, model, metrics.ROCAUC() + metrics.LogLoss())
     assert metric[0].get() > 0.9
     assert metric[1].get() < 0.5
@@ -492,7 +479,7 @@ def test_river_measures_and_wraps_classifiers_with_probabilities():
     assert list(map(type, shares)) == [bool, bool]
     assert model.predict_one(ROWS[0]) == max(shares, key=shares.get)
     wrapped = multiclass.OneVsRestClassifier(
-        RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
+        river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
     )
     stream = list(zip(ROWS, LABELS.tolist(), strict=True)) * 3
     assert evaluate.progressive_val_score(stream, wrapped, metrics.Accuracy()).get() > 0.7

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from refusals import refuses
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import CorrelationMatrix, Symbolic, WithMissing
 
@@ -94,8 +93,3 @@ def test_pairs_have_the_names_that_they_are_given_by():
     assert SDNNClassifier(**OPTIONS, pairs=[(0, 1), (2, None)]).fit(X, XOR).pair_names_ == [
         (0, 1), (2, None),
     ]  # fmt: skip
-
-
-def test_a_single_class_is_a_clear_error():
-    X = np.random.RandomState(0).uniform(size=(60, 3))
-    refuses("classes", SDNNClassifier(pairs="auto", max_iter=2).fit, X, np.zeros(60))

@@ -99,14 +99,6 @@ class FuzzyQLearning:
             self.v[cell] = np.float32(float(self.v[cell]) + step * truth)
 
 
-def joint_bases(x: NDArray[np.float64], *, n_bases: int, width: float) -> NDArray[np.float64]:
-    """Gaussians around every point of the grid over [0, 1]^d: shape (n_bases^d,), row-major."""
-    centres = np.array(list(itertools.product(np.arange(n_bases), repeat=x.size)))
-    distances = (x * (n_bases - 1) - centres) / width
-    gaussians: NDArray[np.float64] = np.exp(-0.5 * (distances**2).sum(axis=1))
-    return gaussians
-
-
 class RBFNetwork:
     """Q(s, a) = sum_j w_j phi_j(s, a) over the joint grid of state and action."""
 
