@@ -9,6 +9,7 @@ import dataclasses
 import inspect
 import re
 import tempfile
+from functools import partial
 from pathlib import Path
 
 import gymnasium as gym
@@ -302,28 +303,33 @@ def judged(parameter, call, lived_agent=None, value=None):
     """
     try:
         fault = call() or ""
-        if lived_agent is not None:
-            lived_agent.forget()
-        return fault
     except EnoughError:
-        if lived_agent is not None:
-            lived_agent.forget()
-        return ""
+        fault = ""
     except TYPED as error:
-        message = str(error)
-        if "incompatible" in message or "not supported" in message:
-            return f"said {type(error).__name__}: {message[:200]}"
-        is_named = re.search(rf"\b{parameter}\b", message) or isinstance(error, OSError)
-        if not is_named:
-            return f"did not name {parameter}: {type(error).__name__}: {message[:200]}"
-        if value is not None and not is_shown(value(), message) and not isinstance(error, OSError):
-            return f"did not show the value: {type(error).__name__}: {message[:200]}"
-        if lived_agent is not None and not lived_agent.is_unchanged:
-            lived_agent.forget()
-            return f"refused, but changed the agent: {message[:100]}"
-        return ""
+        if fault := message_fault(error, parameter, value):
+            return fault
+        if lived_agent is None or lived_agent.is_unchanged:
+            return ""
+        fault = f"refused, but changed the agent: {str(error)[:100]}"
     except Exception as error:
         return f"raised {type(error).__name__}: {str(error)[:200]}"
+    if lived_agent is not None:
+        lived_agent.forget()
+    return fault
+
+
+def message_fault(error, parameter, value):
+    """Return what is wrong with the words of a refusal, or ""."""
+    message = str(error)
+    told = f"{type(error).__name__}: {message[:200]}"
+    if "incompatible" in message or "not supported" in message:
+        return f"said {told}"
+    if isinstance(error, OSError):
+        return ""
+    if not re.search(rf"\b{parameter}\b", message):
+        return f"did not name {parameter}: {told}"
+    is_told = value is None or is_shown(value(), message)
+    return "" if is_told else f"did not show the value: {told}"
 
 
 def is_shown(value, message):
@@ -367,22 +373,28 @@ def parameters_of(function):
     return [name for name in named if name not in ("self", "cls")]
 
 
-def values_for(parameter):
-    return BAD | SPACES if parameter.endswith("_space") else BAD
+def bad_cells(label, parameters, cell, values=BAD):
+    """Yield ``cell(parameter, value)`` for all parameters and bad values, which the label names."""
+    for parameter in parameters:
+        for word, value in values.items():
+            yield label.format(f"{parameter}={word}"), cell(parameter, value)
 
 
 # The rows of the matrix.
 
 
 def constructor_cells(name):
-    cls = getattr(agents, name)
-    for parameter in parameters_of(cls.__init__):
-        for word, value in values_for(parameter).items():
+    cell = partial(_constructor_cell, name)
+    for parameter in parameters_of(getattr(agents, name).__init__):
+        values = BAD | SPACES if parameter.endswith("_space") else BAD
+        yield from bad_cells(f"{name}({{}})", [parameter], cell, values)
 
-            def call(parameter=parameter, value=value):
-                return insanity(make_agent(name, **{parameter: value()}))
 
-            yield f"{name}({parameter}={word})", _cell(parameter, call, value)
+def _constructor_cell(name, parameter, value):
+    def call():
+        return insanity(make_agent(name, **{parameter: value()}))
+
+    return lambda: judged(parameter, call, value=value)
 
 
 def setting_cells(name):
@@ -391,46 +403,42 @@ def setting_cells(name):
         for part, settings in zip(
             ("approximator", "learning"), SETTINGS[getattr(agents, name)], strict=True
         ):
-            for field in dataclasses.fields(settings):
-                for word, value in BAD.items():
-
-                    def call(part=part, settings=settings, field=field, value=value, case=case):
-                        changed = dataclasses.replace(settings, **{field.name: value()})
-                        return insanity(make_agent(name + case, **{part: changed}))
-
-                    yield (
-                        f"{name}{case}: {part}.{field.name}={word}",
-                        _cell(field.name, call, value),
-                    )
+            fields = [field.name for field in dataclasses.fields(settings)]
+            cell = partial(_setting_cell, name + case, part, settings)
+            yield from bad_cells(f"{name}{case}: {part}.{{}}", fields, cell)
 
 
-def _cell(parameter, call, value):
-    return lambda: judged(parameter, call, value=value)
+def _setting_cell(kind, part, settings, field, value):
+    def call():
+        changed = dataclasses.replace(settings, **{field: value()})
+        return insanity(make_agent(kind, **{part: changed}))
+
+    return lambda: judged(field, call, value=value)
 
 
 def transition_cells(kind):
-    life = Lived(kind)
-    for parameter in Transition._fields:
-        for word, value in BAD.items():
+    cell = partial(_transition_cell, Lived(kind))
+    return bad_cells(f"{kind}.learn: {{}}", Transition._fields, cell)
 
-            def run(parameter=parameter, value=value):
-                agent = life.agent
-                good = Transition(HERE, agent.last, 1.0, [0.3, 0.4], False)
 
-                def call():
-                    agent.learn(good._replace(**{parameter: value()}))
-                    return state_fault(agent) or insanity(agent)
+def _transition_cell(life, parameter, value):
+    def run():
+        agent = life.agent
+        good = Transition(HERE, agent.last, 1.0, [0.3, 0.4], False)
 
-                return judged(parameter, call, life, value)
+        def call():
+            agent.learn(good._replace(**{parameter: value()}))
+            return state_fault(agent) or insanity(agent)
 
-            yield f"{kind}.learn: {parameter}={word}", run
+        return judged(parameter, call, life, value)
+
+    return run
 
 
 def method_cells(kind):
     """Every public method and settable property of an agent."""
     life = Lived(kind)
-    cls = type(life.agent)
-    for name, method in inspect.getmembers(cls):
+    for name, method in inspect.getmembers(type(life.agent)):
         if name.startswith("_") or name == "rebuild":  # rebuild: see the cells of files
             continue
         if kind != KINDS[0] and name in ("train", "save", "load"):  # the same of all kinds
@@ -441,12 +449,8 @@ def method_cells(kind):
             parameters = parameters_of(method)
         else:
             continue
-        for parameter in parameters:
-            for word, value in BAD.items():
-                yield (
-                    f"{kind}.{name}: {parameter}={word}",
-                    _method_cell(life, kind, name, parameters, parameter, value),
-                )
+        cell = partial(_method_cell, life, kind, name, parameters)
+        yield from bad_cells(f"{kind}.{name}: {{}}", parameters, cell)
 
 
 def _method_cell(life, kind, name, parameters, parameter, value):
@@ -544,12 +548,8 @@ def loop_cells():
     }
     for name, function in callables.items():
         parameters = parameters_of(function)
-        for parameter in parameters:
-            for word, value in BAD.items():
-                yield (
-                    f"{name}({parameter}={word})",
-                    _loop_cell(kind, name, function, parameters, parameter, value),
-                )
+        cell = partial(_loop_cell, kind, name, function, parameters)
+        yield from bad_cells(f"{name}({{}})", parameters, cell)
 
 
 def _loop_cell(kind, name, function, parameters, parameter, value):

@@ -10,11 +10,12 @@ import inspect
 import operator
 import pickle
 import time
+from functools import partial
 
 import numpy as np
 
 import sdnn._core as core
-from bad_inputs import BAD, TYPED
+from bad_inputs import TYPED, bad_cells
 
 CLASSES = [value for value in vars(core).values() if type(value).__name__ == "pybind11_type"]
 """All classes but enumerations, which are Python's own."""
@@ -247,16 +248,10 @@ def _subclass_cell(cls):
 
 def argument_cells():
     for name in GOOD:
-        for parameter in GOOD[name]():
-            for word, value in BAD.items():
-                yield f"{name}({parameter}={word})", _argument_cell(name, parameter, value)
+        yield from bad_cells(f"{name}({{}})", GOOD[name](), partial(_argument_cell, name))
     for (name, method), good in METHODS.items():
-        for parameter in good:
-            for word, value in BAD.items():
-                yield (
-                    f"{name}.{method}({parameter}={word})",
-                    _method_cell(name, method, good, parameter, value),
-                )
+        cell = partial(_method_cell, name, method, good)
+        yield from bad_cells(f"{name}.{method}({{}})", good, cell)
 
 
 def _argument_cell(name, parameter, value):

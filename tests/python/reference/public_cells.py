@@ -5,12 +5,13 @@ import importlib
 import inspect
 import pickle
 import re
+from functools import partial
 
 import gymnasium as gym
 import numpy as np
 
 import core_cells
-from bad_inputs import BAD, judged, parameters_of
+from bad_inputs import BAD, bad_cells, judged, parameters_of
 from sdnn.agents import SDNNQLambda
 from sdnn.coding import (
     Anchor,
@@ -107,15 +108,12 @@ def _n_required(function):
 def estimator_cells():
     for cls in ESTIMATORS:
         for parameter in parameters_of(cls.__init__):
-            for word, value in BAD.items():
-                if (parameter, word) in LONG_WORK | IN_OTHER_WORDS:
-                    continue
-                yield f"{cls.__name__}({parameter}={word})", _estimator_cell(cls, parameter, value)
-        for parameter in ("X", "y"):
-            for word, value in BAD.items():
-                yield f"{cls.__name__}.fit({parameter}={word})", _data_cell(cls, parameter, value)
-        for word, value in BAD.items():
-            yield f"{cls.__name__}.predict(X={word})", _predict_cell(cls, value)
+            left_out = {word for name, word in LONG_WORK | IN_OTHER_WORDS if name == parameter}
+            values = {word: value for word, value in BAD.items() if word not in left_out}
+            cell = partial(_estimator_cell, cls)
+            yield from bad_cells(f"{cls.__name__}({{}})", [parameter], cell, values)
+        yield from bad_cells(f"{cls.__name__}.fit({{}})", ["X", "y"], partial(_data_cell, cls))
+        yield from bad_cells(f"{cls.__name__}.predict({{}})", ["X"], _predict_cell(cls))
 
 
 def _estimator_cell(cls, parameter, value):
@@ -136,10 +134,10 @@ def _data_cell(cls, parameter, value):
     return lambda: _without_name(call)
 
 
-def _predict_cell(cls, value):
+def _predict_cell(cls):
     targets, small = ESTIMATORS[cls]
     model = cls(**small).fit(SAMPLES, targets)
-    return lambda: _without_name(lambda: model.predict(value()) is None)
+    return lambda _, value: lambda: _without_name(lambda: model.predict(value()) is None)
 
 
 def _without_name(call):
@@ -175,16 +173,12 @@ def coding_cells():
         (CorrelationMatrix, letters, {"matrix": np.eye(3)}),
         (WithMissing, numbers, {}),
     ):
-        for parameter in parameters_of(cls.__init__):
-            for word, value in BAD.items():
-                cell = _coding_cell(cls, column, given, parameter, value)
-                yield f"{cls.__name__}({parameter}={word})", cell
+        name, parameters = cls.__name__, parameters_of(cls.__init__)
+        yield from bad_cells(f"{name}({{}})", parameters, partial(_coding_cell, cls, column, given))
         for word, value in BAD.items():
-            yield f"{cls.__name__}.fit({word})", _column_cell(cls, given, value)
-        for parameter in ("n_units", "seed"):
-            for word, value in BAD.items():
-                cell = _patterns_cell(cls, column, given, parameter, value)
-                yield f"{cls.__name__}.patterns({parameter}={word})", cell
+            yield f"{name}.fit({word})", _column_cell(cls, given, value)
+        cell = partial(_patterns_cell, cls, column, given)
+        yield from bad_cells(f"{name}.patterns({{}})", ["n_units", "seed"], cell)
 
 
 def _coding_cell(cls, column, given, parameter, value):
@@ -317,32 +311,27 @@ def public_functions():
 def function_cells():
     """Every public function: a bad value is refused, or taken; nothing crashes or hangs."""
     for name, function in public_functions():
-        for parameter in parameters_of(function):
-            for word, value in BAD.items():
-                cell = _function_cell(function, parameter, value)
-                yield f"{name}({parameter}={word})", cell
-    one = kernel.AnalyticKernel("anchor", n_inputs=2, n_units=100)
-    for parameter in parameters_of(kernel.AnalyticKernel.__init__):
-        for word, value in BAD.items():
-            cell = _kernel_cell(kernel.AnalyticKernel, parameter, value)
-            yield f"AnalyticKernel({parameter}={word})", cell
-    for parameter in ("X", "Y"):
-        for word, value in BAD.items():
-            yield f"AnalyticKernel()({parameter}={word})", _call_cell(one, parameter, value)
+        cell = partial(_function_cell, function)
+        yield from bad_cells(f"{name}({{}})", parameters_of(function), cell)
+    parameters = parameters_of(kernel.AnalyticKernel.__init__)
+    yield from bad_cells("AnalyticKernel({})", parameters, _kernel_cell)
+    yield from bad_cells("AnalyticKernel()({})", ["X", "Y"], _call_cell)
 
 
-def _kernel_cell(cls, parameter, value):
+def _kernel_cell(parameter, value):
     def call():
         given = {"coding": "anchor", "n_inputs": 2, "n_units": 100, parameter: value()}
-        return "" if np.isfinite(cls(**given)(np.zeros((2, 2)))).all() else "gave NaN"
+        made = kernel.AnalyticKernel(**given)
+        return "" if np.isfinite(made(np.zeros((2, 2)))).all() else "gave NaN"
 
     return lambda: judged(parameter, call)
 
 
-def _call_cell(one, parameter, value):
+def _call_cell(parameter, value):
     def call():
         given = {"X": np.zeros((2, 2)), parameter: value()}
-        return "" if np.isfinite(one(**given)).all() else "gave NaN"
+        made = kernel.AnalyticKernel("anchor", n_inputs=2, n_units=100)
+        return "" if np.isfinite(made(**given)).all() else "gave NaN"
 
     return lambda: judged(parameter, call)
 
@@ -371,12 +360,8 @@ def experiment_cells():
         RunSpec: _spec_used,
     }
     for config, used in made.items():
-        for parameter in parameters_of(config):
-            for word, value in BAD.items():
-                yield (
-                    f"{config.__name__}({parameter}={word})",
-                    _experiment_cell(used, parameter, value),
-                )
+        cell = partial(_experiment_cell, used)
+        yield from bad_cells(f"{config.__name__}({{}})", parameters_of(config), cell)
 
 
 def _experiment_cell(used, parameter, value):
@@ -417,25 +402,14 @@ def _spec_used(given):
 
 
 def environment_cells():
-    makers = {
-        "AcrobotSwingUpEnv": AcrobotSwingUpEnv,
-        "AcrobotSwingUpVectorEnv": AcrobotSwingUpVectorEnv,
-        "PaperAcrobotEnv": PaperAcrobotEnv,
-    }
-    for name, maker in makers.items():
-        for parameter in parameters_of(maker.__init__):
-            for word, value in BAD.items():
-                yield f"{name}({parameter}={word})", _env_cell(maker, parameter, value)
+    for maker in (AcrobotSwingUpEnv, AcrobotSwingUpVectorEnv, PaperAcrobotEnv):
+        parameters = parameters_of(maker.__init__)
+        yield from bad_cells(f"{maker.__name__}({{}})", parameters, partial(_env_cell, maker))
     for config in (AcrobotConfig, SensorConfig):
-        for parameter in parameters_of(config):
-            for word, value in BAD.items():
-                yield (
-                    f"{config.__name__}({parameter}={word})",
-                    _config_cell(config, parameter, value),
-                )
-    for parameter in parameters_of(GoalSchedule.__call__):
-        for word, value in BAD.items():
-            yield f"GoalSchedule()({parameter}={word})", _schedule_cell(parameter, value)
+        cell = partial(_config_cell, config)
+        yield from bad_cells(f"{config.__name__}({{}})", parameters_of(config), cell)
+    parameters = parameters_of(GoalSchedule.__call__)
+    yield from bad_cells("GoalSchedule()({})", parameters, _schedule_cell)
 
 
 def _env_cell(maker, parameter, value):
