@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+from collections.abc import Sequence
 from numbers import Real
-from typing import Any, TypeVar
+from typing import Any, Self
 
 import numpy as np
 from joblib import effective_n_jobs
@@ -15,6 +16,7 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 
 from sdnn import _core
+from sdnn.coding import Coding
 from sdnn.estimators.columns import (
     Array,
     Floats,
@@ -50,8 +52,6 @@ from sdnn.estimators.training import (
     sample_weights,
     without_absent,
 )
-
-Self = TypeVar("Self", bound="BaseSDNN")
 
 
 class OutOfRangeWarning(UserWarning):
@@ -160,9 +160,9 @@ class BaseSDNN(Fitted, CodedInputs):
 
     @abc.abstractmethod
     def _check_samples(
-        self, X: object, y: object, reset: bool, in_fit: bool = False
+        self, X: object, y: object, codings: Sequence[Coding] | None, in_fit: bool = False
     ) -> tuple[Array, Array]:
-        """Return samples and targets, checked by scikit-learn's rules."""
+        """Return samples and targets, checked as by `CodedInputs._validated`."""
 
     @abc.abstractmethod
     def _set_outputs(self, y: ArrayLike) -> int:
@@ -192,37 +192,10 @@ class BaseSDNN(Fitted, CodedInputs):
         """Return the mean number of presentations per epoch of each sample; None for once."""
         return weights
 
-    def fit(self: Self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
-        """Learn ranges and outputs, draw the network and train it.
-
-        Parameters
-        ----------
-        X : array_like, shape (n_samples, n_features)
-        y : array_like, shape (n_samples,) or (n_samples, n_outputs)
-            Several outputs for the regressor only.
-        sample_weight : array_like, shape (n_samples,), optional
-            Mean number of presentations of each sample per epoch, by default 1. If none reaches 1,
-            they are scaled to a mean of 1. Samples of weight 0 count as absent.
-
-        Raises
-        ------
-        ValueError
-            For an impossible parameter, unusable data, or training that needs more than
-            ``memory_limit``.
-        OverflowError
-            Before a weight could leave its range.
-        """
-        work = self._scratch()
-        work._fit(X, y, sample_weight)
-        self.__dict__ = work.__dict__
-        return self
-
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
-        # An interrupt of scikit-learn's _fit_context could leave its global setting changed.
-        self._validate_params()
         resumes = bool(self.warm_start) and hasattr(self, "network_")
-        X, y, sample_weight = without_absent(X, y, sample_weight)
-        table, observed = self._check_samples(X, y, reset=not resumes, in_fit=True)
+        codings = self.codings_ if resumes else None
+        table, observed = self._check_samples(X, y, codings, in_fit=True)
         weights = sample_weights(sample_weight, len(table))
         if resumes:
             random = self._resume(table, observed)
@@ -271,11 +244,7 @@ class BaseSDNN(Fitted, CodedInputs):
         self._earlier = history.earlier
 
     def _partial_fit(
-        self: Self,
-        X: ArrayLike,
-        y: ArrayLike,
-        classes: ArrayLike | None,
-        sample_weight: ArrayLike | None,
+        self, X: ArrayLike, y: ArrayLike, classes: ArrayLike | None, sample_weight: ArrayLike | None
     ) -> Self:
         """Present samples in order, once or by their weights; all or nothing."""
         work = self._scratch()
@@ -283,7 +252,7 @@ class BaseSDNN(Fitted, CodedInputs):
         if first:
             self._validate_params()
         X, y, sample_weight = without_absent(X, y, sample_weight)
-        table, observed = work._check_samples(X, y, reset=first)
+        table, observed = work._check_samples(X, y, None if first else self.codings_)
         if first:
             work._begin(X, table, observed if classes is None else classes)
             work.n_iter_ = 0
@@ -301,7 +270,7 @@ class BaseSDNN(Fitted, CodedInputs):
         self.__dict__ = work.__dict__
         return self
 
-    def _learn_one(self: Self, x: Sample, y: Array, classes: ArrayLike | None) -> Self:
+    def _learn_one(self, x: Sample, y: Array, classes: ArrayLike | None) -> Self:
         """Learn a sample; y has shape (1,) or (1, n_outputs)."""
         work = self._scratch()
         if hasattr(self, "network_"):
@@ -437,7 +406,7 @@ class BaseSDNN(Fitted, CodedInputs):
     def _bins(self, X: object) -> Ints:
         """Check samples to predict and return their bins."""
         codings = self.codings_
-        table = self._finite(self._validated(X, reset=False), codings)
+        table = self._finite(self._validated(X, codings=codings), codings)
         return self.network_.input_code.bins(table)
 
     def _bins_of_one(self, x: Sample) -> Ints:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, TypeVar
+from collections.abc import Sequence
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +13,7 @@ from sklearn.utils.metaestimators import available_if
 from sklearn.utils.multiclass import _ovr_decision_function, unique_labels
 
 from sdnn import _core
+from sdnn.coding import Coding
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.columns import Array, Floats, Ints, Sample
 from sdnn.estimators.fitted import mean_of
@@ -25,8 +27,6 @@ UNITS_EACH = 60
 MOST_UNITS = 1200
 FIRING_SHARE = 5 / 6  # share of a class's units for its samples; the rest fires for other classes
 STEEPNESS = 6.0  # factor of scores in the softmax
-
-Self = TypeVar("Self", bound="SDNNClassifier")
 
 
 @explains_names()
@@ -76,7 +76,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     correction_share: float = parameter(0.25, SHARE)
 
     def partial_fit(
-        self: Self,
+        self,
         X: ArrayLike,
         y: ArrayLike,
         classes: ArrayLike | None = None,
@@ -94,7 +94,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         self._require_classes(classes)
         return self._partial_fit(X, y, classes, sample_weight)
 
-    def learn_one(self: Self, x: Sample, y: object, classes: ArrayLike | None = None) -> Self:
+    def learn_one(self, x: Sample, y: object, classes: ArrayLike | None = None) -> Self:
         """Learn one sample: `partial_fit` of one row, to the same bits, without its overhead.
 
         ``x`` is a row or a mapping from feature names to values, which may lack features coded with
@@ -149,9 +149,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             raise ValueError("classes must be given in the first call of partial_fit or learn_one")
 
     def _check_samples(
-        self, X: object, y: object, reset: bool, in_fit: bool = False
+        self, X: object, y: object, codings: Sequence[Coding] | None, in_fit: bool = False
     ) -> tuple[Array, Array]:
-        table, labels = self._validated(X, y, reset=reset, ensure_min_samples=2 if in_fit else 1)
+        table, labels = self._validated(X, y, codings, ensure_min_samples=2 if in_fit else 1)
         check_labels(labels)
         return table, labels
 

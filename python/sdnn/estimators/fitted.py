@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Self, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +13,18 @@ from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from sdnn import _core
-from sdnn.coding import Coding, WithMissing, from_dict, to_dict
+from sdnn.coding import Coding, from_dict, to_dict
 from sdnn.coding.symbols import Categorical
 from sdnn.estimators.columns import Array, Codings, Floats, Ints, coding_entries
-from sdnn.estimators.network import InputCode, Network, code_bytes
+from sdnn.estimators.network import InputCode, Network, code_bytes, present
 from sdnn.support.arguments import seed_of, whole
 from sdnn.support.state_files import Arrays, Description, read_file, write_file
-
-Self = TypeVar("Self", bound="Fitted")
 
 MOST_BYTES_OF_NAMES = 2**26
 NAMES = ("classes_", "feature_names_in_")  # arrays whose type may be text
 
 
-class Learned:
+class Learned(BaseEstimator):
     """Attributes that files hold unchanged: numbers, words and arrays of numbers."""
 
     n_corrected_: NDArray[np.int64]
@@ -47,28 +45,11 @@ class Learned:
     _weight_seed: int
 
 
-ATTRIBUTES: dict[str, type] = {
-    "n_corrected_": np.ndarray,
-    "n_features_in_": int,
-    "n_inputs_out_of_range_": int,
-    "n_iter_": int,
-    "n_outputs_": int,
-    "n_outputs_out_of_range_": int,
-    "output_range_": np.ndarray,
-    "training_form_": str,
-    "training_memory_": int,
-    "validation_scores_": np.ndarray,
-    "_counts_of_range": int,
-    "_flat": bool,
-    "_n_units_each": int,
-    "_n_weighted": int,
-    "_scheme": str,
-    "_weight_seed": int,
-}
+ATTRIBUTES = {name: get_origin(hint) or hint for name, hint in get_type_hints(Learned).items()}
 """Types of the attributes of `Learned` as a file has them."""
 
 
-class Fitted(Learned, BaseEstimator):
+class Fitted(Learned):
     """Attributes of an estimator that holds a network, and its file."""
 
     coding: Codings
@@ -87,9 +68,6 @@ class Fitted(Learned, BaseEstimator):
     def codings_(self) -> tuple[Coding, ...]:
         """Fitted coding of each input."""
         return self._fitted_network.input_code.codings
-
-    def _fitted_codings(self) -> tuple[Coding, ...]:
-        return self.codings_ if hasattr(self, "network_") else ()
 
     @property
     def pairs_(self) -> tuple[tuple[int, int], ...]:
@@ -122,15 +100,10 @@ class Fitted(Learned, BaseEstimator):
         counts: Ints = _core.counts_of_all(layers, bins, n_groups, n_threads)
         return counts
 
-    def _names_or_numbers(self) -> list[str | int]:
-        """Return the names of the features, or their numbers."""
-        names = getattr(self, "feature_names_in_", np.arange(len(self.codings_)))
-        return list(names.tolist())
-
     @property
     def pair_names_(self) -> list[tuple[str | int, str | int | None]]:
         """The pairs by names of the features, as ``pairs`` takes them."""
-        names = self._names_or_numbers()
+        names = getattr(self, "feature_names_in_", np.arange(len(self.codings_))).tolist()
         return [(names[mu], None if mu == nu else names[nu]) for mu, nu in self.pairs_]
 
     def _weight_changes(self) -> Floats:
@@ -186,7 +159,7 @@ class Fitted(Learned, BaseEstimator):
         write_file(Path(path), "estimator", arrays, description)
 
     @classmethod
-    def load(cls: type[Self], path: str | Path, *, memory_limit: int = 2**27) -> Self:
+    def load(cls, path: str | Path, *, memory_limit: int = 2**27) -> Self:
         """Read an estimator that `save` has written.
 
         Parameters
@@ -207,11 +180,33 @@ class Fitted(Learned, BaseEstimator):
         if description.get("class") != cls.__name__:
             raise ValueError(f"{path} holds an {description.get('class')}, not an {cls.__name__}")
         try:
-            return read_estimator(description, arrays, cls, memory_limit)
+            return cls._read(description, arrays, memory_limit)
         except (
             ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError,
         ) as error:  # fmt: skip
             raise ValueError(f"{path} is damaged: {error or repr(error)}") from error
+
+    @classmethod
+    def _read(cls, description: Description, arrays: Arrays, memory_limit: int) -> Self:
+        """Make the estimator with its parameters and everything it has learned."""
+        parameters = {name: restored(value) for name, value in description["parameters"].items()}
+        estimator = cls(**parameters)
+        estimator._validate_params()
+        coding_entries(estimator.coding)
+        stored = {**description["attributes"], **arrays}
+        for name, expected in ATTRIBUTES.items():
+            if name in stored:
+                if type(stored[name]) is not expected:
+                    problem = f"must be of type {expected.__name__}, got {stored[name]!r:.80}"
+                    raise ValueError(f"attributes.{name} {problem}")
+                setattr(estimator, name, stored[name])
+        for name in NAMES:
+            if name in description["names"]:
+                setattr(estimator, name, array_of_names(name, description["names"][name]))
+        estimator.network_, *earlier = read_networks(description, arrays, memory_limit)
+        estimator._earlier = tuple(earlier)
+        require_consistent(estimator)
+        return estimator
 
 
 def mean_of(arrays: Sequence[Array] | Array) -> Array:
@@ -265,9 +260,8 @@ def restored(value: Any) -> Any:
 def narrowed(values: Ints) -> Array:
     """Return integers in the smallest type that holds them."""
     for integer in (np.int8, np.int16):
-        info = np.iinfo(integer)
-        if values.size == 0 or (values.min() >= info.min and values.max() <= info.max):
-            return values.astype(integer)
+        if np.array_equal(narrow := values.astype(integer), values):
+            return narrow
     return values
 
 
@@ -288,31 +282,6 @@ def array_of_names(name: str, stored: Mapping[str, Any]) -> Array:
     return array
 
 
-def read_estimator(
-    description: Description, arrays: Arrays, estimator_class: type[Self], memory_limit: int
-) -> Self:
-    """Make the estimator with its parameters and everything it has learned."""
-    parameters = {name: restored(value) for name, value in description["parameters"].items()}
-    estimator = estimator_class(**parameters)
-    estimator._validate_params()
-    coding_entries(estimator.coding)
-    held: dict[str, Any] = estimator.__dict__
-    stored = {**description["attributes"], **arrays}
-    for name, expected in ATTRIBUTES.items():
-        if name in stored:
-            if type(stored[name]) is not expected:
-                problem = f"must be of type {expected.__name__}, got {stored[name]!r:.80}"
-                raise ValueError(f"attributes.{name} {problem}")
-            held[name] = stored[name]
-    for name in NAMES:
-        if name in description["names"]:
-            held[name] = array_of_names(name, description["names"][name])
-    estimator.network_, *earlier = read_networks(description, arrays, memory_limit)
-    held["_earlier"] = tuple(earlier)
-    require_consistent(estimator)
-    return estimator
-
-
 def require_consistent(estimator: Fitted) -> None:
     """Raise ValueError if the parts of a loaded estimator do not fit together."""
     held = vars(estimator)
@@ -324,10 +293,8 @@ def require_consistent(estimator: Fitted) -> None:
         fits = network.n_units == n_units
     else:
         n_outputs = held["n_outputs_"]
-        fits = held["output_range_"].shape == (n_outputs, 2) and network.n_units == (
-            n_outputs * held["_counts_of_range"]
-        )
-        fits = fits and isinstance(held["_flat"], bool)
+        fits = held["output_range_"].shape == (n_outputs, 2) and "_flat" in held
+        fits = fits and network.n_units == n_outputs * held["_counts_of_range"]
     fits = fits and len(code.codings) == held["n_features_in_"]
     for (mu, nu), modified, modifier in zip(code.pairs, code.modified, code.modifiers, strict=True):
         fits = fits and len(modified) == code.codings[mu].size
@@ -338,7 +305,7 @@ def require_consistent(estimator: Fitted) -> None:
 
 def require_fitted(coding: Coding, n_units: int) -> Coding:
     """Return a coding that is fitted; ValueError if it is not, or a field of it is wrong."""
-    base = coding.base if isinstance(coding, WithMissing) else coding
+    base = present(coding)
     if isinstance(base, Categorical):
         values = np.empty(base.size, object)
         values[:] = base.categories

@@ -8,7 +8,7 @@ import dataclasses
 import datetime
 from collections.abc import Mapping, Sequence
 from numbers import Number
-from typing import Any, TypeVar
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,9 +35,9 @@ from sdnn.estimators.hints import first_of_words, hint_about
 from sdnn.estimators.network import InputCode
 from sdnn.estimators.outliers import OutlierWarning, numbers_to_range, usual_range, warn_caller
 from sdnn.estimators.parameters import parameter, words
+from sdnn.estimators.training import without_absent
 from sdnn.support.arguments import require, shown
 
-Self = TypeVar("Self", bound="CodedInputs")
 MOST_BEYOND = 30.0  # outliers that are kept, in widths of the range of the others
 DATES = (datetime.date, datetime.time, datetime.timedelta, np.datetime64, np.timedelta64)
 DATES_HINT = "give numbers for it, such as the hour with coding=[(Circular(period=24), columns)]"
@@ -107,7 +107,7 @@ class CodedInputs(BaseEstimator):
     _has_outliers = False
     """Whether the last call that learned left values out of a range."""
 
-    def set_params(self: Self, **params: Any) -> Self:
+    def set_params(self, **params: Any) -> Self:
         """Set parameters; ``coding__length_scale`` and the like replace fields of codings.
 
         In a list, ``coding__0__period`` is a field of the first coding, ``coding__period`` one of
@@ -136,30 +136,71 @@ class CodedInputs(BaseEstimator):
         tags.input_tags.allow_nan = True
         return tags
 
-    @abc.abstractmethod
-    def _fitted_codings(self) -> Sequence[Coding]:
-        """Return the fitted coding of each input, none before `fit`."""
+    def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
+        """Learn ranges and outputs, and what the estimator predicts with.
 
-    def _scratch(self: Self) -> Self:
+        Parameters
+        ----------
+        X : array_like, shape (n_samples, n_features)
+        y : array_like, shape (n_samples,) or (n_samples, n_outputs)
+            Several outputs for regressors only.
+        sample_weight : array_like, shape (n_samples,), optional
+            How many samples each one counts for, by default 1. A network is presented with them so
+            many times per epoch on average; if none reaches 1, they are scaled to a mean of 1.
+            Samples of weight 0 count as absent.
+
+        Raises
+        ------
+        ValueError
+            For an impossible parameter, unusable data, or training that needs more than
+            ``memory_limit``.
+        OverflowError
+            Before a weight of a network could leave its range.
+        """
+        # An interrupt of scikit-learn's _fit_context could leave its global setting changed.
+        self._validate_params()
+        work = self._scratch()
+        work._fit(*without_absent(X, y, sample_weight))
+        self.__dict__ = work.__dict__
+        return self
+
+    @abc.abstractmethod
+    def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
+        """Check the samples and learn from them."""
+
+    def _scratch(self) -> Self:
         """Return a shallow copy to train, so that failures leave this one unchanged."""
         work = object.__new__(type(self))
         work.__dict__.update(self.__dict__)
         work.__dict__.pop("_has_outliers", None)
         return work
 
-    def _validated(self, X: object, y: object = "no_validation", **options: bool | int) -> Any:
-        """Check data by scikit-learn's rules; words pass where a coding takes them."""
+    def _validated(
+        self,
+        X: object,
+        y: object = "no_validation",
+        codings: Sequence[Coding] | None = None,
+        **options: bool | int,
+    ) -> Any:
+        """Check data by scikit-learn's rules; words pass where a coding takes them.
+
+        ``codings`` are the fitted codings of the inputs, None if they are to be learned.
+        """
         refuse_dates(X)
-        numeric = all(coding.is_numeric for coding, _ in coding_entries(self.coding))
-        if options["reset"]:
-            numeric = numeric and not of_categories(X)
-        else:
-            numeric = numeric and all(coding.is_numeric for coding in self._fitted_codings())
+        every = (*(coding for coding, _ in coding_entries(self.coding)), *(codings or ()))
+        numeric = all(coding.is_numeric for coding in every)
+        numeric = numeric and (codings is not None or not of_categories(X))
         # `_finite` checks the numbers afterwards, because missing ones may have a pattern.
-        checks: dict[str, object] = {"dtype": np.float64 if numeric else None}
-        checks["ensure_all_finite"] = "allow-nan" if numeric else False
+        options["reset"] = codings is None
         try:
-            return validate_data(self, X if numeric else with_types_kept(X), y, **checks, **options)
+            return validate_data(
+                self,
+                X if numeric else with_types_kept(X),
+                y,
+                dtype=np.float64 if numeric else None,
+                ensure_all_finite="allow-nan" if numeric else False,
+                **options,
+            )
         except ValueError as error:
             if "could not convert string" in str(error) and np.asarray(X).dtype.kind in "OSU":
                 name, column = first_of_words(X)
@@ -271,7 +312,7 @@ class CodedInputs(BaseEstimator):
 
     def _values_of(self, x: Mapping[str, object], codings: tuple[Coding, ...]) -> list[object]:
         """Return a sample's values in feature order, None for missing ones."""
-        names = getattr(self, "feature_names_in_", None)
+        names = self._feature_names()
         if names is None:
             raise ValueError("x must be a 1-D array: the features were learned without names")
         if len(x) == len(names):
@@ -281,7 +322,7 @@ class CodedInputs(BaseEstimator):
         optional = {name for name, coding in coded if isinstance(coding, WithMissing)}
         if not set(names) - optional <= set(x) <= set(names):
             note = f", of which {sorted(optional)} may be missing" if optional else ""
-            raise ValueError(f"x must have the features {names.tolist()}{note}, got {list(x)}")
+            raise ValueError(f"x must have the features {names}{note}, got {list(x)}")
         return [x.get(name) for name in names]
 
     def _first_row(self, x: Sample) -> Array:
@@ -291,7 +332,7 @@ class CodedInputs(BaseEstimator):
         are_words = all(isinstance(name, str) for name in names or ())
         expected = "be a 1-D array, or a mapping with words as keys"
         require(row.ndim == 1 and are_words, "x", expected, x)
-        table: Array = self._validated(row[None], reset=True)
+        table: Array = self._validated(row[None])
         if names is not None:
             self.feature_names_in_ = np.array(names, dtype=object)
         return table
@@ -306,13 +347,15 @@ class CodedRegressor(RegressorMixin, CodedInputs):
         tags.target_tags.multi_output = True
         return tags
 
-    def _validated_numbers(self, X: object, y: object, reset: bool) -> tuple[Array, Floats]:
+    def _validated_numbers(
+        self, X: object, y: object, codings: Sequence[Coding] | None = None
+    ) -> tuple[Array, Floats]:
         if y is None:
             # scikit-learn's message for several outputs is less clear.
             raise ValueError(
                 f"{type(self).__name__} requires y to be passed, but the target y is None"
             )
-        table, targets = self._validated(X, y, multi_output=True, y_numeric=True, reset=reset)
+        table, targets = self._validated(X, y, codings, multi_output=True, y_numeric=True)
         try:
             return table, np.asarray(targets, dtype=np.float64)
         except ValueError as error:

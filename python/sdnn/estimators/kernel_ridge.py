@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import abc
 import dataclasses
-from collections.abc import Sequence
 from numbers import Real
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +14,6 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
-from sdnn.coding import Coding
 from sdnn.coding.kernel import N_UNITS, AnalyticKernel
 from sdnn.estimators.columns import Array, Floats, PairChoice, input_pairs
 from sdnn.estimators.inputs import CodedInputs, CodedRegressor, check_labels, class_labels
@@ -30,15 +26,13 @@ from sdnn.estimators.leave_one_out import (
     solve,
 )
 from sdnn.estimators.parameters import RandomState, documents, parameter, wholes, words
-from sdnn.estimators.training import ClassWeight, class_weights, sample_weights, without_absent
+from sdnn.estimators.training import ClassWeight, class_weights, sample_weights
 from sdnn.support.arguments import explains_names, real
 
 AUTO = words("auto")
 DEGREES = (1, 2, 3)
 LARGEST_TARGET = 1e140  # so that sums of squares are finite
 LOG_STEEPNESS = (0.0, 5.0)  # bounds, for the softmax of scores
-
-Self = TypeVar("Self", bound="BaseKernelRidge")
 
 
 def of_degree(kernel: Floats, degree: int) -> Floats:
@@ -103,32 +97,6 @@ class BaseKernelRidge(CodedInputs):
     max_components: int = parameter(2000, wholes(10, 2**15))
     random_state: RandomState = parameter(None, "random_state")
 
-    def fit(self: Self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
-        """Learn ranges, alpha and degree, and a weight of each component.
-
-        Parameters
-        ----------
-        X : array_like, shape (n_samples, n_features)
-        y : array_like, shape (n_samples,) or (n_samples, n_outputs)
-            Several outputs for the regressor only.
-        sample_weight : array_like, shape (n_samples,), optional
-            How many samples each one counts for, by default 1.
-
-        Raises
-        ------
-        ValueError
-            For an impossible parameter or unusable data.
-        """
-        self._validate_params()
-        work = self._scratch()
-        work._fit(*without_absent(X, y, sample_weight))
-        self.__dict__ = work.__dict__
-        return self
-
-    @abc.abstractmethod
-    def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
-        """Check the samples and learn from them."""
-
     @staticmethod
     def _counts_of(sample_weight: ArrayLike | None, n_samples: int) -> Floats:
         counts = sample_weights(sample_weight, n_samples)
@@ -177,9 +145,6 @@ class BaseKernelRidge(CodedInputs):
         self.dual_coef_, self.intercept_ = solution.dual, solution.intercept
         return solution.left_out, solution.rows
 
-    def _fitted_codings(self) -> Sequence[Coding]:
-        return self.kernel_.codings if hasattr(self, "kernel_") else ()
-
     def _kernel(self, table: Array) -> Floats:
         """Return the kernel of samples and components."""
         return of_degree(self.kernel_(table, self.X_fit_), self.degree_)
@@ -187,7 +152,8 @@ class BaseKernelRidge(CodedInputs):
     def _outputs(self, X: ArrayLike) -> Floats:
         """Return the outputs of samples, shape (n_samples, n_outputs)."""
         check_is_fitted(self, "dual_coef_")
-        table = self._finite(self._validated(X, reset=False), self.kernel_.codings)
+        codings = self.kernel_.codings
+        table = self._finite(self._validated(X, codings=codings), codings)
         parts = [self._kernel(table[rows]) @ self.dual_coef_ for rows in portions(len(table))]
         outputs: Floats = np.concatenate(parts) + self.intercept_
         return outputs
@@ -212,7 +178,7 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
     """
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
-        table, targets = self._validated_numbers(X, y, reset=True)
+        table, targets = self._validated_numbers(X, y)
         counts = self._counts_of(sample_weight, len(table))
         self._flat = targets.ndim == 1
         targets = targets.reshape(len(table), -1)
@@ -256,7 +222,7 @@ class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
     class_weight: ClassWeight = parameter(None, words("balanced"), dict, None)
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
-        table, labels = self._validated(X, y, reset=True)
+        table, labels = self._validated(X, y)
         check_labels(labels)
         counts = self._counts_of(sample_weight, len(table))
         self.classes_: Array = class_labels(labels)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TypeVar
+from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sdnn.coding import Coding
 from sdnn.estimators.base import BaseSDNN, OutOfRangeWarning
 from sdnn.estimators.columns import Array, Floats, Ints, Sample
 from sdnn.estimators.fitted import mean_of
@@ -20,8 +22,6 @@ from sdnn.support.arguments import explains_names, require, shown
 
 MARGIN = 0.2  # share of the range of targets that is added on either side
 FURTHEST = 1e300  # largest end of an output range, so that its width is finite
-
-Self = TypeVar("Self", bound="SDNNRegressor")
 
 
 @explains_names()
@@ -76,7 +76,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     refit: bool = parameter(False, "boolean")
 
     def partial_fit(
-        self: Self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None
+        self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None
     ) -> Self:
         """Present the samples once, in order; any portions give the same weights.
 
@@ -89,7 +89,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         """
         return self._partial_fit(X, y, None, sample_weight)
 
-    def learn_one(self: Self, x: Sample, y: ArrayLike) -> Self:
+    def learn_one(self, x: Sample, y: ArrayLike) -> Self:
         """Learn one sample: `partial_fit` of one row, to the same bits, without its overhead.
 
         ``x`` is a row or a mapping from feature names to values, which may lack features coded with
@@ -132,11 +132,11 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         return (values[:, 0], spread[:, 0]) if self._flat else (values, spread)
 
     def _check_samples(
-        self, X: object, y: object, reset: bool, in_fit: bool = False
+        self, X: object, y: object, codings: Sequence[Coding] | None, in_fit: bool = False
     ) -> tuple[Array, Floats]:
         if in_fit and self.warm_start and self.refit:
             raise ValueError("refit=True trains a new network: it cannot be with warm_start=True")
-        return self._validated_numbers(X, y, reset)
+        return self._validated_numbers(X, y, codings)
 
     def _set_outputs(self, y: ArrayLike) -> int:
         targets = np.asarray(y)

@@ -25,7 +25,7 @@ def transcribed(model):
 
 def untrained(model, X, y):
     """The model before its first sample, and its targets as the trainer has them."""
-    table, targets = model._check_samples(X, y, reset=True)
+    table, targets = model._check_samples(X, y, codings=None)
     model._begin(X, table, targets)
     return model, model._targets(targets)
 
