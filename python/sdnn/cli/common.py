@@ -21,15 +21,13 @@ from sdnn.support.progress import is_shown
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sdnn.runs import ConfigError, Run, RunOutcome
+    from sdnn.runs import ConfigError, Run
     from sdnn.runs.engine import Executor
-    from sdnn.runs.report import WrittenReport
     from sdnn.runs.study import Study
 
 Options: TypeAlias = dict[str, Any]
 """The options of a command by their names."""
 
-EXIT_FAILURE = 1
 PLAIN_WIDTH = 160
 """Width of tables that go to a file or pipe."""
 
@@ -179,6 +177,8 @@ def run_command(
     ``words`` returns the message about a configuration whose file is not known. ``folder`` is the
     run that is resumed after an interrupt.
     """
+    import gymnasium as gym
+
     from sdnn.runs.environment import search_folder
     from sdnn.runs.errors import RunError
 
@@ -189,20 +189,14 @@ def run_command(
         except (RunError, click.ClickException, click.exceptions.Exit):
             raise
         except Exception as error:  # of an environment, whose author needs the traceback, too
-            is_of_file = isinstance(error, OSError) and not _is_of_environment(error)
+            frames = traceback.walk_tb(error.__traceback__)
+            is_of_environment = any(isinstance(f.f_locals.get("self"), gym.Env) for f, _ in frames)
+            is_of_file = isinstance(error, OSError) and not is_of_environment
             if not is_of_file and (way := _how_to_resume(folder)):
                 click.echo("failed" + way, err=True)
             if is_of_file or not isinstance(error, OSError):
                 raise
             raise RuntimeError(f"the environment failed: {error}") from error
-
-
-def _is_of_environment(error: BaseException) -> bool:
-    """Return whether it was raised in a method of an environment."""
-    import gymnasium as gym
-
-    frames = traceback.walk_tb(error.__traceback__)
-    return any(isinstance(frame.f_locals.get("self"), gym.Env) for frame, _ in frames)
 
 
 def _how_to_resume(folder: Path | None) -> str:
@@ -221,7 +215,9 @@ def train_run(
     episodes: int | None = None,
     repeat_episodes: bool = True,
 ) -> None:
-    """Train a run, with a line of progress on a terminal, and print the result."""
+    """Train a run, with a line of progress on a terminal; print the result and what comes next."""
+    from sdnn.runs.run import resume_command
+
     callbacks = []
     if is_shown():
         from sdnn.training.callbacks import ProgressBarCallback
@@ -234,21 +230,13 @@ def train_run(
         shown = {k: v for k, v in vars(outcome).items() if k not in ("has_pictures", "scaling")}
         click.echo(json_text({"folder": str(run.folder), **shown}))
         return
-    click.echo(outcome_text(run, outcome))
-
-
-def outcome_text(run: Run, outcome: RunOutcome) -> str:
-    """Write the outcome of a training: what was learned, what did not suit, and what comes next."""
-    from sdnn.runs.run import resume_command
-
     report = outcome.learning_report
-    beyond: list[int] = []
-    within: list[int] = []
+    within, beyond = [], []
     if report is not None and not outcome.is_solved:  # else what does not suit does no harm
-        within = _where(report["share_of_range"], lambda share: 0.0 < share < 0.1)
-        within = [i for i in within if i not in report["fitted"]]
-        beyond = _where(report["share_beyond_range"], lambda share: share > 0.1)
-    return rendered(
+        shares = enumerate(report["share_of_range"])
+        within = [i for i, s in shares if s and s < 0.1 and i not in report["fitted"]]
+        beyond = [i for i, s in enumerate(report["share_beyond_range"]) if s and s > 0.1]
+    text = rendered(
         "outcome.txt.jinja",
         run=run,
         outcome=outcome,
@@ -260,10 +248,7 @@ def outcome_text(run: Run, outcome: RunOutcome) -> str:
         folder=str(run.folder),
         quoted=shlex.quote(str(run.folder)),
     )
-
-
-def _where(shares: Sequence[float | None], is_so: Callable[[float], bool]) -> list[int]:
-    return [i for i, share in enumerate(shares) if share is not None and is_so(share)]
+    click.echo(text)
 
 
 def rendered(template: str, **values: object) -> str:
@@ -291,30 +276,24 @@ def run_or_forecast(
     full: bool, dry_run: bool,
 ) -> None:  # fmt: skip
     """Run a study with a line of progress and print its results, or only what is to be run."""
+    from rich.console import Console
+
+    from sdnn.reports.pages import duration_words
+    from sdnn.runs.engine import TrialBars
+    from sdnn.runs.forecast import forecast
+    from sdnn.runs.sweep import run_study
+
     with errors_in_a_line():
         if dry_run:
-            _print_forecast(study, out, executor.jobs, as_json=as_json)
+            estimate = forecast(study, out, executor.jobs)
+            if as_json:
+                click.echo(json.dumps(estimate, indent=2))
+            else:
+                text = rendered("forecast.txt.jinja", out=out, duration=duration_words, **estimate)
+                click.echo(text, nl=bool(text))
             return
-        from rich.console import Console
-
-        from sdnn.runs.engine import TrialBars
-        from sdnn.runs.sweep import run_study
-
         with TrialBars(Console(stderr=True)) as observer:
             done = run_study(study, out, executor=executor, observer=observer)
-    _print_report(context, study, done, out, as_json=as_json, full=full)
-
-
-def _print_report(
-    context: click.Context,
-    study: Study,
-    done: WrittenReport,
-    out: Path,
-    *,
-    as_json: bool,
-    full: bool,
-) -> None:
-    """Print the results, what failed and how much is stored."""
     outcome = done.outcome
     n_stored = outcome.n_reused + outcome.n_run
     stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
@@ -336,20 +315,7 @@ def _print_report(
         done_now = f"{stored} ({outcome.n_run} run now); " if outcome.n_planned else ""
         click.echo(f"{done_now}wrote {len(done.files)} files: see {page}")
     if done.page is None or outcome.failures:
-        context.exit(EXIT_FAILURE)
-
-
-def _print_forecast(study: Study, out: Path, jobs: int, *, as_json: bool) -> None:
-    """Print what is still to be run and how long that takes."""
-    from sdnn.reports.pages import duration_words
-    from sdnn.runs.forecast import forecast
-
-    estimate = forecast(study, out, jobs)
-    if as_json:
-        click.echo(json.dumps(estimate, indent=2))
-    else:
-        text = rendered("forecast.txt.jinja", out=out, duration=duration_words, **estimate)
-        click.echo(text, nl=bool(text))
+        context.exit(1)
 
 
 def make_console() -> Console:
@@ -359,7 +325,7 @@ def make_console() -> Console:
     return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
 
 
-Function = Callable[..., Any]
+Function = Callable[..., object]
 
 _OPTIONS = (
     click.option(

@@ -14,7 +14,6 @@ import click
 from sdnn.cli.common import (
     NEW_FILE,
     SEED,
-    Options,
     json_option,
     json_text,
     named_values,
@@ -28,7 +27,7 @@ from sdnn.cli.common import (
 if TYPE_CHECKING:
     import gymnasium as gym
 
-    from sdnn.agents import Agent
+    from sdnn.runs.run import AnyAgent
 
 _MOST_ACTIONS = 2**16
 _LARGEST = 2**31  # of readings
@@ -129,9 +128,20 @@ def export(
       --range -3.5:3.5 --actions 2 --c-header pole.h
     """  # noqa: D301
     from sdnn.export import c_header
+    from sdnn.support.arguments import blamed
     from sdnn.support.files import write_whole
 
-    _check_together(source, new, options)
+    if new and source is not None:
+        raise click.UsageError(f"--new makes an agent that needs no RUN: omit {source}, or --new")
+    if not new and source is None:
+        raise click.UsageError("RUN must be given, or --new for an agent that has learned nothing")
+    names = {"ranges": "--range", "settings": "--set", "kind": "--agent"}
+    for key, value in options.items():
+        option, is_given = names.get(key, f"--{key}"), value not in ((), None)
+        if new and key in ("ranges", "actions") and not is_given:
+            raise click.UsageError(f"--new needs {option}, once or more: see sdnn export --help")
+        if not new and is_given:
+            raise click.UsageError(f"{option} needs --new: the agent of RUN has its own")
     learning = learning or new
     with run_command(option_words if source is None else words_of_run(source)):
         agent = _new_agent(**options) if source is None else _known_agent(source)
@@ -143,7 +153,13 @@ def export(
                 learning=learning,
             )
         except ValueError as error:
-            raise _usage_error(error, is_named=name is not None) from error
+            argument, problem = blamed(error)
+            if argument not in ("name", "fraction_bits"):
+                raise click.ClickException(str(error)) from error
+            option = "--" + argument.replace("_", "-")
+            if argument == "name" and name is None:
+                option = "--c-header gives no name; use --name, which"
+            raise click.UsageError(f"{option} {problem}") from error
         except (TypeError, RuntimeError) as error:
             prefix = "" if source is None else f"{source}: "
             raise click.ClickException(f"{prefix}{error}") from error
@@ -165,24 +181,7 @@ def export(
             click.echo(f"  {line}")
 
 
-def _check_together(source: Path | None, new: bool, options: Options) -> None:
-    """Raise UsageError unless there is either a RUN or what a new agent needs."""
-    if new and source is not None:
-        raise click.UsageError(f"--new makes an agent that needs no RUN: omit {source}, or --new")
-    if not new and source is None:
-        raise click.UsageError("RUN must be given, or --new for an agent that has learned nothing")
-    for key, option in (("ranges", "--range"), ("actions", "--actions")):
-        if new and not options[key]:
-            raise click.UsageError(f"--new needs {option}, once or more: see sdnn export --help")
-    if not new:
-        for key, value in options.items():
-            if value not in ((), None):
-                options_of = {"ranges": "--range", "settings": "--set", "kind": "--agent"}
-                option = options_of.get(key, f"--{key}")
-                raise click.UsageError(f"{option} needs --new: the agent of RUN has its own")
-
-
-def _known_agent(source: Path) -> Agent[Any, Any]:
+def _known_agent(source: Path) -> AnyAgent:
     from sdnn.agents import load_agent
     from sdnn.runs.config_file import ConfigFile
     from sdnn.runs.errors import ConfigError
@@ -192,7 +191,7 @@ def _known_agent(source: Path) -> Agent[Any, Any]:
         agent = agent_of(source) if source.is_dir() else load_agent(source)
     except ValueError as error:
         raise click.ClickException(str(error)) from error
-    environment: Any = None
+    environment: object = None
     if source.is_dir():
         with suppress(ConfigError):  # of a damaged file, which the agent does not need
             # No specification is made of it: that would import what it names.
@@ -213,7 +212,7 @@ def _new_agent(
     ram: int | None,
     settings: Sequence[str],
     seed: int | None,
-) -> Agent[Any, Any]:
+) -> AnyAgent:
     """Make an agent that has learned nothing, of the options that `export` has for it."""
     import gymnasium as gym
     import numpy as np
@@ -224,14 +223,12 @@ def _new_agent(
     from sdnn.support.arguments import blamed
 
     bounds = [(-math.pi, math.pi) if text == "angle" else _ends("--range", text) for text in ranges]
-    tables: dict[str, dict[str, Any]] = {"approximator": {}, "learning": {}}
+    tables: dict[str, dict[str, object]] = {"approximator": {}, "learning": {}}
     for name, text in named_values("--set", settings):
         table, _, key = name.partition(".")
         if table not in tables or not key:
-            raise click.UsageError(
-                f"--set {name}: must be approximator.NAME or learning.NAME, such as"
-                " learning.discount"
-            )
+            expected = "approximator.NAME or learning.NAME, such as learning.discount"
+            raise click.UsageError(f"--set {name}: must be {expected}")
         tables[table][key] = value_of(text)
     kind = kind or "q-lambda"
     parts = {name: changed(new_settings(kind)[name], tables[name], name) for name in tables}
@@ -248,11 +245,8 @@ def _new_agent(
         )
     except (ValueError, OverflowError, MemoryError) as error:
         name, problem = blamed(error)
-        options_of = {
-            "ram_bytes": "--ram",
-            "observation_space": "--range",
-            "action_space": "--actions",
-        }
+        options_of = {"ram_bytes": "--ram"}
+        options_of |= {"observation_space": "--range", "action_space": "--actions"}
         for table, part in parts.items():
             if hasattr(part, name):
                 options_of[name] = option_of(f"{table}.{name}")
@@ -290,16 +284,3 @@ def _ends(option: str, text: str) -> tuple[float, float]:
             f"{option} must be LOW:HIGH{word}, LOW below HIGH and both within 2^31, got {text!r}"
         )
     return bounds
-
-
-def _usage_error(error: ValueError, is_named: bool) -> click.ClickException:
-    """Return an error about an argument as one about its option."""
-    from sdnn.support.arguments import blamed
-
-    name, problem = blamed(error)
-    if name == "name" and not is_named:
-        return click.UsageError(f"--c-header gives no name; use --name, which {problem}")
-    option = {"name": "--name", "fraction_bits": "--fraction-bits"}.get(name)
-    if option is None:
-        return click.ClickException(str(error))
-    return click.UsageError(f"{option} {problem}")

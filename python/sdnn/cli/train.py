@@ -25,7 +25,7 @@ from sdnn.cli.common import (
 from sdnn.support.arguments import advice
 
 if TYPE_CHECKING:
-    from sdnn.runs import ConfigError, RunSpec
+    from sdnn.runs import ConfigError
 
 
 class SpecCommand(click.Command):
@@ -72,7 +72,7 @@ def _options() -> Iterator[click.Option]:
         )
 
 
-def _option_type(kind: Mapping[str, Any]) -> Any:
+def _option_type(kind: Mapping[str, Any]) -> click.ParamType[Any]:
     low, high = kind.get("minimum"), kind.get("maximum")
     if "enum" in kind:
         return click.Choice([word for word in kind["enum"] if word is not None])
@@ -81,12 +81,6 @@ def _option_type(kind: Mapping[str, Any]) -> Any:
     if kind.get("type") == "number":
         return click.FLOAT if low is None else click.FloatRange(low, high)
     return click.STRING
-
-
-def given_values(options: Options) -> Options:
-    """Take the options of a specification out of those of a command: given values by their keys."""
-    values = {key: options.pop(key.replace(".", "_")) for key in KEYS}
-    return {key: value for key, value in values.items() if value is not None and value is not False}
 
 
 @click.command(cls=SpecCommand, short_help="Learn in a Gymnasium environment.")
@@ -163,7 +157,8 @@ def train(
     with run_command(located_message):
         values = {} if source is None else source.specification()
         spec = RunSpec.from_values(overridden(values, settings))
-        folder = out or _folder_of(spec)
+        environment = re.sub(r"[^\w.-]+", "-", spec.task)
+        folder = out or Path("runs", f"{environment}-{spec.agent.name}-{spec.seed}")
         if dry_run:
             Run(folder, spec).check()
             click.echo(json.dumps({"folder": str(folder), **spec.values()}, indent=2))
@@ -181,7 +176,8 @@ def _given(env_id: str | None, options: Options) -> Options:
     """Return the values of the options by their keys; UsageError if two options set the same."""
     from sdnn.runs.settings import KEYS_BY_NAME
 
-    values = given_values(options)
+    given = {key: options.pop(key.replace(".", "_")) for key in KEYS}
+    values = {k: value for k, value in given.items() if value is not None and value is not False}
     by_option = {key: (option_of(key), value) for key, value in values.items()}
 
     def give(option: str, key: str, value: object) -> None:
@@ -224,8 +220,3 @@ def _range(text: str) -> tuple[str, list[float]]:
         raise click.UsageError(
             f"--range must be [VARIABLE=]LOW:HIGH or adaptive, got {text!r}"
         ) from None
-
-
-def _folder_of(spec: RunSpec) -> Path:
-    environment = re.sub(r"[^\w.-]+", "-", spec.task)
-    return Path("runs") / f"{environment}-{spec.agent.name}-{spec.seed}"

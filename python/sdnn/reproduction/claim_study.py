@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from sdnn.reports.pages import Section, Table
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
@@ -12,6 +12,7 @@ from sdnn.reproduction.claims import ClaimOutcome, TenTrials, judge_claims
 from sdnn.reproduction.report import CHECKS_HEADER, RULE_NOTE, VERDICT_KINDS, check_rows
 from sdnn.reproduction.reproduce import with_paper_defaults
 from sdnn.runs.report import format_share
+from sdnn.runs.settings import Values
 from sdnn.runs.study import Comparison, StudyCase
 from sdnn.runs.study_file import KnownCase, StudyFile
 from sdnn.runs.sweep import Addition
@@ -34,7 +35,7 @@ class ClaimStudy(StudyFile):
         case.id: KnownCase(case.title, case.settings) for case in PAPER_CASES.values()
     }
 
-    def completed(self, case: StudyCase, values: dict[str, Any]) -> dict[str, Any]:
+    def completed(self, case: StudyCase, values: Values) -> Values:
         """Return the values of a specification, in the paper's cases with the paper's defaults."""
         return with_paper_defaults(values) if case.id in PAPER_CASES else values
 

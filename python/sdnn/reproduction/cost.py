@@ -11,7 +11,6 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -42,7 +41,7 @@ class CostSeries:
     title: str
     agent: str
     growth: str  # what the number of operations is proportional to (mathtext)
-    core_agent: Callable[..., Any]
+    core_agent: Callable[..., _core.BareAgent | _core.PlainRBFQLearning]
     settings: Mapping[str, int] = field(default_factory=dict)  # that are not the default
     is_plain: bool = False  # its product structure is unused: seconds a step with many inputs
 

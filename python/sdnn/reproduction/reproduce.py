@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from sdnn.agents.registry import agent_entry, split_label, title_of
 from sdnn.environments.paper_acrobot import PAPER_ACROBOT
@@ -29,7 +28,7 @@ from sdnn.reproduction.report import Report
 from sdnn.runs.engine import Observer, PlannedTrial
 from sdnn.runs.report import Content
 from sdnn.runs.results import CaseResult
-from sdnn.runs.settings import overridden
+from sdnn.runs.settings import Values, overridden
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Comparison, Layer, Study, StudyCase, StudyVariant
@@ -176,7 +175,7 @@ def collect(experiment: Experiment, comparison: Comparison) -> tuple[CaseResult,
     )
 
 
-def with_paper_defaults(values: dict[str, Any]) -> dict[str, Any]:
+def with_paper_defaults(values: Values) -> Values:
     """Return the values of a specification with the paper's where others are missing.
 
     The agent is SDNN-C, with the settings of the paper unless a preset is named; it learns 15,000

@@ -7,11 +7,11 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from sdnn.runs.errors import ConfigError
+from sdnn.runs.settings import Values
 from sdnn.runs.spec import RunSpec
 from sdnn.support.files import read_bytes
 from sdnn.support.toml import TOO_DEEP, KeyPath, deep_key, dotted, line_of, parse_toml
@@ -29,7 +29,7 @@ class ConfigFile:
 
     path: Path
     text: str
-    values: dict[str, Any]
+    values: Values
 
     @classmethod
     def read(cls, path: str | Path) -> ConfigFile:

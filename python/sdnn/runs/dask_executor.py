@@ -14,6 +14,7 @@ import pickle
 import time
 from collections import deque
 from collections.abc import Generator, Sequence
+from contextlib import closing
 from pathlib import Path
 from queue import SimpleQueue
 from threading import Event
@@ -82,21 +83,17 @@ def run_on_worker(planned: PlannedTrial) -> TrialRecord:
     worker = get_worker()
     key = worker.get_current_task()
     reported = time.monotonic()
-
-    def wanted() -> bool:
-        task = worker.state.tasks.get(key)
-        return task is not None and task.state == "executing"
-
-    def advanced(episode: int) -> None:
-        nonlocal reported
-        if time.monotonic() - reported >= PROGRESS_SECONDS:
-            reported = time.monotonic()
-            worker.log_event(PROGRESS_TOPIC, (key, episode))
-
-    record = run_to_end(planned, wanted=wanted, advanced=advanced)
-    if record is None:
-        raise Reschedule
-    return record
+    with closing(run_to_end(planned)) as happening:
+        for message in happening:
+            if isinstance(message, Finished):
+                return message.record
+            task = worker.state.tasks.get(key)
+            if task is None or task.state != "executing":
+                break
+            if time.monotonic() - reported >= PROGRESS_SECONDS:
+                reported = time.monotonic()
+                worker.log_event(PROGRESS_TOPIC, (key, message.episode))
+    raise Reschedule
 
 
 class DaskExecutor:
@@ -235,7 +232,7 @@ class _Run:
         client = self.client
         threads = client.sync(client.scheduler.ncores, callback_timeout=ANSWER_SECONDS)
         self.problems = {worker: why for worker, why in self.problems.items() if worker in threads}
-        answers: dict[str, Any] = {}
+        answers: dict[str, str | BaseException] = {}
         if new := [worker for worker in threads if worker not in self.problems]:
             build = {"version": _core.__version__, "probes": self.probes}
             answers = client.run(eval, MISMATCH, build, workers=new, on_error="return")

@@ -247,27 +247,22 @@ def run_trials(
     )
 
 
-def run_to_end(
-    planned: PlannedTrial,
-    *,
-    wanted: Callable[[], bool],
-    advanced: Callable[[int], None],
-) -> TrialRecord | None:
-    """Run one trial, in pieces of about `CHUNK_SECONDS`; None where it did not come to its end.
+def run_to_end(planned: PlannedTrial) -> Generator[Advanced | Finished, None, None]:
+    """Run one trial, in pieces of about `CHUNK_SECONDS`; yield what happens.
 
-    After every piece, ``advanced`` is called with the number of learning episodes done, and the
-    trial is given up unless ``wanted`` returns True.
+    The last message is that it is finished. Closing the generator gives the trial up.
     """
     begin = time.thread_time()
+    record = None
     with opened(planned.spec.make_trial(planned.key.seed)) as trial:
         with closing(_pieces(trial)) as pieces:
             for _ in pieces:
-                advanced(trial.done if isinstance(trial, TrainingTrial) else trial.episode)
-                if not wanted():
-                    return None
-        if not trial.finished:
-            return None
-        return _record(planned, trial, time.thread_time() - begin)
+                done = trial.done if isinstance(trial, TrainingTrial) else trial.episode
+                yield Advanced(planned, done)
+        if trial.finished:
+            record = _record(planned, trial, time.thread_time() - begin)
+    if record is not None:
+        yield Finished(planned, record)
 
 
 def _record(planned: PlannedTrial, trial: Trial | TrainingTrial, seconds: float) -> TrialRecord:
@@ -413,20 +408,21 @@ def _run_team(
 def _run_one(
     planned: PlannedTrial, messages: SimpleQueue[Message | None], stop: threading.Event
 ) -> None:
-    """Run one trial; runs in a worker thread."""
-    record = None
+    """Run one trial in a worker thread; its last message is None where it was given up."""
+    last: Message | None = None
     try:
-        if not stop.is_set():
-            record = run_to_end(
-                planned,
-                wanted=lambda: not stop.is_set(),
-                advanced=lambda episode: messages.put(Advanced(planned, episode)),
-            )
+        with closing(run_to_end(planned)) as happening:
+            for message in () if stop.is_set() else happening:
+                if isinstance(message, Finished):
+                    last = message
+                elif stop.is_set():
+                    break
+                else:
+                    messages.put(message)
     except Exception as error:
-        messages.put(Failed(planned, error))
+        last = Failed(planned, error)
     except BaseException as error:  # SystemExit and the like end a thread without a word
         failure = RuntimeError(f"the trial raised {error!r}")
         failure.__cause__ = error
-        messages.put(Failed(planned, failure))
-    else:
-        messages.put(None if record is None else Finished(planned, record))
+        last = Failed(planned, failure)
+    messages.put(last)

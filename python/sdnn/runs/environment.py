@@ -38,8 +38,6 @@ from sdnn.support.arguments import blamed, shown
 ALL = "all"
 """The key of the range of all variables that have no other."""
 
-Ends = tuple[NDArray[np.float64], NDArray[np.float64]]
-
 Stream: TypeAlias = Literal["sensor_noise", "evaluation_sensor_noise"]
 
 
@@ -126,13 +124,11 @@ class EnvironmentSpec(Settings, frozen=True):
             raise ConfigError("kwargs", f"must be data that JSON has: {error}") from None
         for key, (low, high) in self.ranges.items():
             if key != ALL and not (key.isascii() and key.isdigit()):
-                raise ConfigError(
-                    f"ranges.{key}", f"must be of 'all' or a number, got {shown(key)}"
-                )
+                problem = f"must be of 'all' or a number, got {shown(key)}"
+                raise ConfigError(f"ranges.{key}", problem)
             if not (np.isfinite([low, high]).all() and low < high):
-                raise ConfigError(
-                    f"ranges.{key}", f"must be finite, low < high, got {low} and {high}"
-                )
+                problem = f"must be finite, low < high, got {low} and {high}"
+                raise ConfigError(f"ranges.{key}", problem)
 
     def __hash__(self) -> int:
         return hash((self.id, self.noise, self.redundant, json.dumps(self.kwargs, sort_keys=True)))
@@ -160,11 +156,10 @@ class EnvironmentSpec(Settings, frozen=True):
 
     def without_noise(self) -> EnvironmentSpec:
         """Return the environment without noise on its sensors."""
-        if not self.is_paper_acrobot:
-            return self.replace(noise=0.0)
-        return self.replace(
-            noise=0.0, kwargs=self.kwargs | {"sensors": self.kwargs["sensors"] | {"noise": 0.0}}
-        )
+        kwargs = self.kwargs
+        if self.is_paper_acrobot:
+            kwargs = kwargs | {"sensors": kwargs["sensors"] | {"noise": 0.0}}
+        return self.replace(noise=0.0, kwargs=kwargs)
 
     @property
     def changes_observations(self) -> bool:
@@ -194,13 +189,16 @@ class EnvironmentSpec(Settings, frozen=True):
             if render_mode is not None and env.render_mode != render_mode:
                 raise RunError(_no_pictures(self.id, render_mode))
             if self.action_masks:
-                env = self._masked(env)
+                try:
+                    env = ActionMasks(env)
+                except ValueError as error:
+                    problem = f"{self.id}: {error}"
+                    raise ConfigError("environment.action_masks", problem) from error
             low, high = self.ends(env)
             if not self.has_other_sensors:
                 return env
-            if not isinstance(env.observation_space, gym.spaces.Box) or low.shape != (
-                env.observation_space.shape
-            ):
+            space = env.observation_space
+            if not isinstance(space, gym.spaces.Box) or low.shape != space.shape:
                 env = gym.wrappers.FlattenObservation(env)
             unknown = np.flatnonzero(~(np.isfinite(low) & np.isfinite(high)))
             if unknown.size:
@@ -221,12 +219,6 @@ class EnvironmentSpec(Settings, frozen=True):
         except BaseException:
             env.close()
             raise
-
-    def _masked(self, env: Env) -> Env:
-        try:
-            return ActionMasks(env)
-        except ValueError as error:
-            raise ConfigError("environment.action_masks", f"{self.id}: {error}") from error
 
     def imported(self) -> bool:
         """Import the module that ``id`` names; False if there is none, or it was imported before.
@@ -274,7 +266,7 @@ class EnvironmentSpec(Settings, frozen=True):
         pairs = zip(env.observation_low.tolist(), env.observation_high.tolist(), strict=True)
         return Scaling(ranges=tuple(pairs), n_redundant=self.redundant)
 
-    def ends(self, env: Env) -> Ends:
+    def ends(self, env: Env) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the lowest and highest values of the flattened observation; infinite: not known.
 
         ConfigError if a range is given of a variable that is not there, or observations are no
@@ -283,22 +275,16 @@ class EnvironmentSpec(Settings, frozen=True):
         try:
             low, high = flat_bounds(env.observation_space)
         except TypeError:
-            raise ConfigError(
-                "environment.id",
-                f"{self.id} must have observations that Gymnasium flattens to a vector, got"
-                f" {env.observation_space}",
-            ) from None
+            expected = "observations that Gymnasium flattens to a vector"
+            problem = f"{self.id} must have {expected}, got {env.observation_space}"
+            raise ConfigError("environment.id", problem) from None
         if ALL in self.ranges:
             low[:], high[:] = self.ranges[ALL]
-        for key, ends in self.ranges.items():
-            if key == ALL:
-                continue
+        for key in sorted(self.ranges.keys() - {ALL}):
             if int(key) >= low.size:
-                raise ConfigError(
-                    f"environment.ranges.{key}",
-                    f"{self.id} has the variables 0 to {low.size - 1}, got {key}",
-                )
-            low[int(key)], high[int(key)] = ends
+                problem = f"{self.id} has the variables 0 to {low.size - 1}, got {key}"
+                raise ConfigError(f"environment.ranges.{key}", problem)
+            low[int(key)], high[int(key)] = self.ranges[key]
         return low, high
 
     def _bare(self, stream: Stream, render_mode: str | None) -> Env:
@@ -311,9 +297,8 @@ class EnvironmentSpec(Settings, frozen=True):
         try:
             return gym.make(self.id, **options)
         except gym.error.DependencyNotInstalled as error:
-            raise ConfigError(
-                "environment.id", f"{self.id} needs more packages: {error}"
-            ) from error
+            problem = f"{self.id} needs more packages: {error}"
+            raise ConfigError("environment.id", problem) from error
         except (gym.error.Error, ImportError) as error:
             raise ConfigError("environment.id", f"no environment {self.id!r}: {error}") from error
         except Exception as error:  # whatever a user's environment raises
@@ -347,14 +332,14 @@ def episode_option(episode: int) -> Data:
     return {"episode": max(1, episode)}
 
 
-class SeedFirstReset(gym.Wrapper[Any, Any, Any, Any]):
+class SeedFirstReset(gym.Wrapper[object, object, object, object]):
     """Gives the first reset a seed, so that the random streams of all others follow from it."""
 
     def __init__(self, env: Env, seed: int) -> None:
         super().__init__(env)
         self._seed: int | None = seed
 
-    def reset(self, *, seed: int | None = None, options: Data | None = None) -> tuple[Any, Data]:
+    def reset(self, *, seed: int | None = None, options: Data | None = None) -> tuple[object, Data]:
         """Reset the environment."""
         if seed is None:
             seed, self._seed = self._seed, None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
 
 from sdnn.runs.engine import PlannedTrial
 from sdnn.runs.errors import RunError
@@ -16,7 +15,7 @@ from sdnn.support.machine import n_cores
 PROBE_SECONDS = 0.3  # processor time of a probe, about
 
 
-def forecast(study: Study, out: Path, jobs: int) -> dict[str, Any]:
+def forecast(study: Study, out: Path, jobs: int) -> dict[str, object]:
     """Count what is to be run and estimate how long it takes, without making any file.
 
     Returns values that JSON can hold. Estimates from the start of a trial are too low where the
@@ -29,7 +28,7 @@ def forecast(study: Study, out: Path, jobs: int) -> dict[str, Any]:
         with ResultStore(out, read_only=True) as store:
             stored = store.seconds()
     study.check(stored)
-    works: list[dict[str, Any]] = []
+    works: list[dict[str, object]] = []
     missing: dict[TrialKey, tuple[float, bool]] = {}  # variants that are the same share trials
     probes: dict[tuple[str, str, bool], tuple[float, int]] = {}
     for pair in study.pairs:

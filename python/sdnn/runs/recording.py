@@ -7,7 +7,6 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -88,7 +87,7 @@ def record(
 def _rendered(env: Env) -> Iterator[NDArray[np.uint8]]:
     """Yield the pictures of the present step, shape (height, width, 3)."""
     try:
-        rendered: Any = env.render()
+        rendered: object = env.render()
     except gym.error.DependencyNotInstalled as error:
         raise RunError(f"pictures of this environment need more: {error}") from error
     for picture in rendered if isinstance(rendered, list) else [rendered]:
@@ -112,7 +111,7 @@ def _write(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None
     import imageio_ffmpeg
 
     is_gif = path.suffix == ".gif"
-    options: dict[str, Any] = {"quality": 7, "output_params": ["-f", "mp4"]}
+    options: dict[str, object] = {"quality": 7, "output_params": ["-f", "mp4"]}
     if is_gif:
         rate = min(rate, _FASTEST_GIF)
         end = str(round(100 / rate) + 100)  # stays for a second before it begins anew

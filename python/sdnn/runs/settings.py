@@ -10,17 +10,7 @@ import types
 import typing
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import (
-    Annotated,
-    Any,
-    ClassVar,
-    Literal,
-    Protocol,
-    TypeVar,
-    get_args,
-    get_origin,
-    runtime_checkable,
-)
+from typing import Annotated, Any, Literal, Protocol, TypeAlias, TypeVar, get_args, get_origin
 
 import msgspec
 import numpy as np
@@ -30,6 +20,9 @@ from sdnn.agents.registry import AGENTS
 from sdnn.config import WARM_UP, ProtocolConfig, fields_of
 from sdnn.runs.errors import ConfigError
 from sdnn.support.arguments import advice, blamed, shown
+
+Values: TypeAlias = dict[str, Any]
+"""A table as JSON and TOML have it."""
 
 AnySettings = TypeVar("AnySettings", bound="Settings")
 AnyPart = TypeVar("AnyPart", bound="PartSettings")
@@ -57,11 +50,10 @@ _WORDS = {
 """Words for those of msgspec's messages."""
 
 
-@runtime_checkable
 class PartSettings(Protocol):
     """The settings of a part of an agent: a frozen dataclass, or a class of the core."""
 
-    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
+    __dataclass_fields__: typing.ClassVar[dict[str, dataclasses.Field[Any]]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,7 +97,7 @@ def _kinds_of(kind: type[object]) -> Mapping[str, Any]:
     return {name: hints.get(name, Any) for name in names_of(kind)}
 
 
-def schemas_of(*kinds: Any) -> dict[str, Any]:
+def schemas_of(*kinds: object) -> Values:
     """Return the JSON Schemas of classes and of those in them, by name, as ``#/$defs/`` refers."""
     _, schemas = msgspec.json.schema_components(
         kinds, ref_template="#/$defs/{name}", schema_hook=lambda _: {"type": "object"}
@@ -202,11 +194,17 @@ def read(kind: type[AnySettings], values: object, where: str = "") -> AnySetting
 def changed(base: AnyPart, values: object, where: str, hint: str = "") -> AnyPart:
     """Return settings of an agent's part with the values of a table, whose key is ``where``.
 
-    They are those of the core, which check themselves, or a frozen dataclass. ConfigError if a key
-    is unknown, follows from others, or a value does not fit; ``hint`` ends one about unknown keys.
+    They are those of the core, which check themselves, or a frozen dataclass. Such settings may be
+    given instead. ConfigError if a key is unknown, follows from others, or a value does not fit;
+    ``hint`` ends one about unknown keys.
     """
+    if isinstance(values, type(base)):
+        return values
+    if not isinstance(values, Mapping):
+        expected = f"must be a table or {type(base).__name__}{hint}"
+        raise ConfigError(where, f"{expected}, got {shown(values)}")
     names = names_of(type(base))
-    if isinstance(values, Mapping) and "n_inputs" in values:
+    if "n_inputs" in values:
         raise ConfigError(f"{where}.n_inputs", "follows from the observations: omit it")
     values = check_names(values, [name for name in names if name != "n_inputs"], where, hint)
     if not fields_of(type(base)):
@@ -221,7 +219,7 @@ def changed(base: AnyPart, values: object, where: str, hint: str = "") -> AnyPar
 
 def differences(
     values: Mapping[str, object], defaults: Mapping[str, object], always: Collection[str] = ()
-) -> dict[str, Any]:
+) -> Values:
     """Return the values, also in tables, that are not the default, and some by their names.
 
     Examples
@@ -229,7 +227,7 @@ def differences(
     >>> differences({"a": 1, "b": {"c": 2, "d": 3}}, {"a": 1, "b": {"c": 2, "d": 4}})
     {'b': {'d': 3}}
     """
-    changes: dict[str, Any] = {}
+    changes: Values = {}
     for name, value in values.items():
         default = defaults.get(name)
         if isinstance(value, Mapping) and isinstance(default, Mapping):
@@ -420,7 +418,7 @@ _REPLACED = {
 """Keys of a file that an option replaces besides its own."""
 
 
-def overridden(values: Mapping[str, object], options: Mapping[str, object]) -> dict[str, Any]:
+def overridden(values: Mapping[str, object], options: Mapping[str, object]) -> Values:
     """Return the values of a specification with others in their place.
 
     Parameters
@@ -430,7 +428,7 @@ def overridden(values: Mapping[str, object], options: Mapping[str, object]) -> d
     options
         Values by their keys, with dots between tables.
     """
-    made: dict[str, Any] = copy.deepcopy(dict(values))
+    made: Values = copy.deepcopy(dict(values))
     for name, key in SHORTHANDS.items():
         if isinstance(made.get(name), str):
             made[name] = {key: made[name]}

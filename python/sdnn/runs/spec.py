@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 from gymnasium.vector import SyncVectorEnv
@@ -35,6 +35,7 @@ from sdnn.runs.settings import (
     PresetSettings,
     ProtocolSpec,
     Settings,
+    Values,
     changed,
     changed_size,
     differences,
@@ -97,34 +98,23 @@ class RunSpec(Settings, frozen=True):
         for name, value in values.items():
             msgspec.structs.force_setattr(self, name, value)
 
-    def _part(self, name: str, base: PartSettings, hint: str) -> PartSettings:
-        """Return the settings of a part, or those of ``base`` with the given changes."""
-        value: object = getattr(self, name)
-        if isinstance(value, type(base)):
-            return value
-        if value is None or isinstance(value, Mapping | PresetSettings):
-            return changed(base, value if isinstance(value, Mapping) else {}, name, hint)
-        expected = f"must be a table or {type(base).__name__}{hint}"
-        raise ConfigError(name, f"{expected}, got {shown(value)}")
-
     def _fill_agent(self) -> None:
         entry, preset = self._chosen_agent()
         if preset is None and entry.presets:
             preset = "general"
         if preset is not None and preset not in entry.presets:
-            expected = (
-                f"one of {', '.join(map(repr, entry.presets))}" if entry.presets else "omitted"
-            )
+            names = ", ".join(map(repr, entry.presets))
+            expected = f"{f'one of {names}' if names else 'omitted'} for the agent {entry.id!r}"
             others = [other.id for other in AGENTS.values() if preset in other.presets]
             hint = f", a preset of {' and '.join(others)}" if others else ""
-            raise ConfigError(
-                "agent.preset",
-                f"must be {expected} for the agent {entry.id!r}, got {shown(preset)}{hint}",
-            )
+            raise ConfigError("agent.preset", f"must be {expected}, got {shown(preset)}{hint}")
         defaults = entry.settings(preset)
+        hint = f" (agent {entry.id})"
         for name in ("approximator", "learning"):
             base: PartSettings = getattr(defaults, name)
-            self._set(**{name: self._part(name, base, f" (agent {entry.id})")})
+            value: object = getattr(self, name)
+            is_preset = value is None or isinstance(value, PresetSettings)
+            self._set(**{name: base if is_preset else changed(base, value, name, hint)})
         pairs = "none" if self.environment.changes_observations else defaults.angle_pairs
         agent = self.agent
         self._set(
@@ -156,26 +146,20 @@ class RunSpec(Settings, frozen=True):
         if budget.steps is budget.episodes is None:
             budget = budget.replace(steps=DEFAULT_STEPS)
         self._set(protocol=protocol, budget=budget)
-        if not self.is_evaluated and (budget.target_return is not None or self.output.keep_best):
-            key = "output.keep_best" if self.output.keep_best else "budget.target_return"
+        every, keep_best = protocol.evaluate_every, self.output.keep_best
+        if not self.is_evaluated and (budget.target_return is not None or keep_best):
+            key = "output.keep_best" if keep_best else "budget.target_return"
             raise ConfigError(key, "needs evaluations: evaluate_every must not be 0")
-        if self.output.keep_best and budget.steps and budget.steps < (protocol.evaluate_every or 0):
-            raise ConfigError(
-                "output.keep_best",
-                f"needs an evaluation: budget.steps must be at least {protocol.evaluate_every}"
-                f" (evaluate_every), got {budget.steps}",
-            )
+        if keep_best and budget.steps and budget.steps < (every or 0):
+            problem = f"budget.steps must be at least {every} (evaluate_every), got {budget.steps}"
+            raise ConfigError("output.keep_best", f"needs an evaluation: {problem}")
         every = protocol.evaluate_every_episodes
         if every is not None and budget.episodes is not None and budget.episodes < every:
-            raise ConfigError(
-                "budget.episodes",
-                f"must be at least evaluate_every_episodes ({every}), got {budget.episodes}",
-            )
+            problem = f"must be at least evaluate_every_episodes ({every}), got {budget.episodes}"
+            raise ConfigError("budget.episodes", problem)
         if self.agent.angle_pairs == "find" and self.environment.changes_observations:
-            raise ConfigError(
-                "agent.angle_pairs",
-                "finds no angles in scaled observations: not together with noise or redundant",
-            )
+            problem = "finds no angles in scaled observations: not together with noise or redundant"
+            raise ConfigError("agent.angle_pairs", problem)
 
     def __hash__(self) -> int:
         return hash((self.canonical_json(), self.seed, self.output))
@@ -275,7 +259,11 @@ class RunSpec(Settings, frozen=True):
         with ExitStack() as environments:
             env = environments.enter_context(closing(self.make_training_env()))
             if self.is_evaluated:
-                evaluation_env = self._make_evaluation_env()
+                try:
+                    evaluation_env = self.make_env("evaluation_sensor_noise")
+                except ConfigError as error:  # there may be one robot only
+                    problem = f"needs a second environment, or must be 0: {error.problem}"
+                    raise ConfigError("protocol.evaluate_every", problem) from error
                 environments.callback(evaluation_env.close)
             single: Env = env.envs[0] if isinstance(env, SyncVectorEnv) else env
             options = episode_option if takes_episode(single) else None
@@ -303,13 +291,6 @@ class RunSpec(Settings, frozen=True):
                     reset_options=options,
                 )
             return TrainingTrial(training, environments.pop_all(), target)
-
-    def _make_evaluation_env(self) -> Env:
-        try:
-            return self.make_env("evaluation_sensor_noise")
-        except ConfigError as error:  # there may be one robot only
-            problem = f"needs a second environment, or must be 0: {error.problem}"
-            raise ConfigError("protocol.evaluate_every", problem) from error
 
     def make_env(self, stream: Stream = "sensor_noise", *, render_mode: str | None = None) -> Env:
         """Make an environment to learn in or, of the other stream, to be evaluated in.
@@ -379,9 +360,8 @@ class RunSpec(Settings, frozen=True):
         if environment.has_other_sensors:  # given ranges are the space's then
             return {"observation_range": flat_bounds(env.observation_space), **arguments}
         if "observation_range" in arguments:
-            raise ConfigError(
-                "environment.ranges", "must not be given together with adaptive ranges"
-            )
+            problem = "must not be given together with adaptive ranges"
+            raise ConfigError("environment.ranges", problem)
         return {**arguments, "observation_range": environment.ends(env)}
 
     def refusal(self, error: Exception) -> ConfigError:
@@ -396,7 +376,7 @@ class RunSpec(Settings, frozen=True):
             return ConfigError(key, problem)
         return ConfigError("environment.id", str(error) or type(error).__name__)
 
-    def values(self) -> dict[str, Any]:
+    def values(self) -> Values:
         """Return what is not the default as JSON has it; `from_values` reads it.
 
         The settings of the agent's parts are those that differ from its preset.
@@ -411,9 +391,9 @@ class RunSpec(Settings, frozen=True):
             values[name] = {key: value for key, value in table.items() if value is not None}
         return {name: value for name, value in values.items() if value != {}}
 
-    def full_values(self) -> dict[str, Any]:
+    def full_values(self) -> Values:
         """Return all values as JSON has them."""
-        values: dict[str, Any] = msgspec.to_builtins(self)
+        values: Values = msgspec.to_builtins(self)
         values["approximator"].pop("n_inputs", None)
         return values
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, get_type_hints
 
 import msgspec
 
@@ -11,10 +11,10 @@ from sdnn.agents.registry import AGENTS
 from sdnn.config import Field, fields_of
 from sdnn.environments.paper_acrobot import PAPER_ACROBOT
 from sdnn.runs.environment import PaperSettings
-from sdnn.runs.settings import schemas_of
+from sdnn.runs.settings import Values, schemas_of
 from sdnn.runs.spec import RunSpec
 
-PAPER_ARGUMENTS: dict[str, Any] = get_type_hints(PaperSettings)
+PAPER_ARGUMENTS: dict[str, type[object]] = get_type_hints(PaperSettings)
 """The core's settings that are arguments of the paper's acrobot."""
 
 PARTS: dict[str, tuple[type[object], ...]] = {
@@ -26,7 +26,7 @@ PARTS: dict[str, tuple[type[object], ...]] = {
 """The core's settings of the parts of agents, by their tables."""
 
 
-def spec_schema() -> dict[str, Any]:
+def spec_schema() -> Values:
     """Return the JSON Schema of a specification.
 
     Examples
@@ -35,7 +35,14 @@ def spec_schema() -> dict[str, Any]:
     1.0
     """
     configs = [config for configs in PARTS.values() for config in configs]
-    structs = [_struct(config) for config in (*configs, *PAPER_ARGUMENTS.values())]
+    structs = [
+        msgspec.defstruct(
+            config.__name__,
+            [(f.name, _type(f), f.default) for f in fields_of(config) if f.name != "n_inputs"],
+            forbid_unknown_fields=True,
+        )
+        for config in (*configs, *PAPER_ARGUMENTS.values())
+    ]
     components = schemas_of(RunSpec, *structs)
     properties = components["RunSpec"]["properties"]
     for table, core in PARTS.items():
@@ -57,21 +64,8 @@ def spec_schema() -> dict[str, Any]:
             "$ref": "#/$defs/RunSpec", "$defs": components}  # fmt: skip
 
 
-def _struct(kind: Any) -> Any:
-    """Make a class of the fields of the core's settings, without the number of inputs."""
-    return msgspec.defstruct(
-        kind.__name__,
-        [
-            (field.name, _type(field), field.default)
-            for field in fields_of(kind)
-            if field.name != "n_inputs"
-        ],
-        forbid_unknown_fields=True,
-    )
-
-
-def _type(field: Field) -> Any:
-    limits: dict[str, Any] = {}
+def _type(field: Field) -> object:
+    limits: Values = {}
     if field.hint in ("int", "float"):
         number = int if field.hint == "int" else float
         if math.isfinite(field.low):

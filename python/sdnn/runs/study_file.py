@@ -12,7 +12,7 @@ from contextlib import suppress
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeAlias
+from typing import Annotated, ClassVar, Literal, NamedTuple, TypeAlias
 
 import msgspec
 from msgspec import Meta
@@ -26,6 +26,7 @@ from sdnn.runs.settings import (
     DEFAULT_AGENT,
     SHORTHANDS,
     Settings,
+    Values,
     check_names,
     checked,
     doc,
@@ -208,11 +209,11 @@ class StudyFile(Study):
         except ConfigError as error:
             raise self.refusal(case, variant, settings, error) from error
 
-    def _values(self, case: StudyCase, settings: Layer) -> dict[str, Any]:
+    def _values(self, case: StudyCase, settings: Layer) -> Values:
         values = {".".join(name): setting.value for name, setting in settings.items()}
         return self.completed(case, overridden({}, values))
 
-    def completed(self, case: StudyCase, values: dict[str, Any]) -> dict[str, Any]:
+    def completed(self, case: StudyCase, values: Values) -> Values:
         """Return the values of a specification with the defaults of its case."""
         return values
 

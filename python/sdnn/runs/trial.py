@@ -53,7 +53,13 @@ HASH_DIGITS = 16
 
 def canonical_json(values: Mapping[str, object]) -> str:
     """Return values as one line of JSON: sorted keys, 1 for 1.0."""
-    return json.dumps(_canonical(values), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    read = json.loads(json.dumps(values, allow_nan=False), parse_float=_canonical_number)
+    return json.dumps(read, sort_keys=True, separators=(",", ":"))
+
+
+def _canonical_number(text: str) -> int | float:
+    value = float(text)
+    return int(value) if value.is_integer() else value
 
 
 def config_hash(text: str) -> str:
@@ -65,16 +71,6 @@ def config_hash(text: str) -> str:
     True
     """
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
-
-
-def _canonical(value: object) -> object:
-    if isinstance(value, Mapping):
-        return {str(key): _canonical(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_canonical(item) for item in value]
-    if isinstance(value, float) and value.is_integer():
-        return int(value)
-    return value
 
 
 ROW = np.dtype(
