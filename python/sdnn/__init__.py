@@ -19,45 +19,7 @@ Packages, from the network up (each is imported when first used):
 core uses.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 from sdnn._core import __version__ as __version__
 from sdnn.support.lazy import attach
 
-if TYPE_CHECKING:
-    from sdnn import (
-        agents as agents,
-        approximators as approximators,
-        benchmarks as benchmarks,
-        coding as coding,
-        environments as environments,
-        estimators as estimators,
-        export as export,
-        libsdnn as libsdnn,
-        reproduction as reproduction,
-        runs as runs,
-    )
-    from sdnn.estimators import (
-        SDNNClassifier as SDNNClassifier,
-        SDNNKernelClassifier as SDNNKernelClassifier,
-        SDNNKernelRidge as SDNNKernelRidge,
-        SDNNRegressor as SDNNRegressor,
-    )
-    from sdnn.support.machine import (
-        instruction_set as instruction_set,
-        set_instruction_set as set_instruction_set,
-    )
-
-__getattr__, __dir__, __all__ = attach(
-    __name__,
-    {
-        "sdnn": (
-            "agents approximators benchmarks coding environments estimators export "
-            "libsdnn reproduction runs"
-        ),
-        "sdnn.estimators": "SDNNClassifier SDNNKernelClassifier SDNNKernelRidge SDNNRegressor",
-        "sdnn.support.machine": "instruction_set set_instruction_set",
-    },
-)
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -5,30 +5,11 @@ Names are loaded when they are first used, so that ``import sdnn`` needs no scik
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sdnn.support.lazy import attach
 
-if TYPE_CHECKING:
-    from sdnn.estimators.base import OutOfRangeWarning as OutOfRangeWarning
-    from sdnn.estimators.classifier import SDNNClassifier as SDNNClassifier
-    from sdnn.estimators.kernel_ridge import (
-        SDNNKernelClassifier as SDNNKernelClassifier,
-        SDNNKernelRidge as SDNNKernelRidge,
-    )
-    from sdnn.estimators.outliers import OutlierWarning as OutlierWarning
-    from sdnn.estimators.regressor import SDNNRegressor as SDNNRegressor
-
-_load, __dir__, __all__ = attach(
-    __name__,
-    {
-        "sdnn.estimators.base": "OutOfRangeWarning",
-        "sdnn.estimators.classifier": "SDNNClassifier",
-        "sdnn.estimators.kernel_ridge": "SDNNKernelClassifier SDNNKernelRidge",
-        "sdnn.estimators.outliers": "OutlierWarning",
-        "sdnn.estimators.regressor": "SDNNRegressor",
-    },
-)
+_load, __dir__, __all__ = attach(__name__, __file__)
 
 
 def __getattr__(name: str) -> Any:
