@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.base import Approximator, BaseAgent, Learning
+from sdnn.environments.types import AnyEnv, Element, Elements, Env, Mask, Space
 from sdnn.support.arguments import (
     argument_error,
     blamed,
@@ -25,7 +26,7 @@ from sdnn.support.arguments import (
 from sdnn.support.progress import is_shown
 from sdnn.training.callbacks import ProgressBarCallback
 from sdnn.training.files import read_agent
-from sdnn.training.interfaces import Transition
+from sdnn.training.interfaces import CoreParts, Transition
 from sdnn.training.names import explained
 from sdnn.training.training import Callback, Training, TrainingResult, listed
 
@@ -101,8 +102,8 @@ class Agent(BaseAgent[Approximator, Learning]):
 
     @explained
     def act(
-        self, observation: Any, explore: bool = True, environment: int = 0, mask: Any = None
-    ) -> Any:
+        self, observation: Element, explore: bool = True, environment: int = 0, mask: Mask = None
+    ) -> Element:
         """Return the action to take, an element of the action space.
 
         Parameters
@@ -130,7 +131,7 @@ class Agent(BaseAgent[Approximator, Learning]):
         numbers = self._controller.act(variables, explore, environment, allowed)
         return self._actions.elements(numbers)[0]
 
-    def flat_observation(self, observation: Any) -> NDArray[np.float64]:
+    def flat_observation(self, observation: Element) -> NDArray[np.float64]:
         """Return the observed variables as a vector, shape (n_variables,), in their own units.
 
         Missing readings are NaN. ValueError if the observation has another shape, or holds some
@@ -169,7 +170,7 @@ class Agent(BaseAgent[Approximator, Learning]):
         """Raise what `learn` would for a transition that cannot be learned; learn nothing."""
         self._controller.check(*self._parts_of(transition, 0))
 
-    def _parts_of(self, transition: Any, environment: int) -> tuple[Any, ...]:
+    def _parts_of(self, transition: Transition, environment: int) -> tuple[Any, ...]:
         """Return a transition as the core takes it; TypeError or ValueError if it is none."""
         if not isinstance(transition, Transition):
             raise TypeError(
@@ -200,22 +201,23 @@ class Agent(BaseAgent[Approximator, Learning]):
             stacklevel=2,
         )
 
-    def core_parts(self) -> tuple[Any, ...] | None:
+    def core_parts(self) -> CoreParts | None:
         """Return the core and functions around it, unless `act` or `learn` has been replaced."""
         functions = [getattr(method, "__func__", None) for method in (self.act, self.learn)]
         actions = self._actions
-        parts = self._controller, self._observations.rows, actions.elements, actions.mask
-        return parts if functions == [Agent.act, Agent.learn] else None
+        if functions != [Agent.act, Agent.learn]:
+            return None
+        return CoreParts(self._controller, self._observations.rows, actions.elements, actions.mask)
 
     @explained
     def predict(
         self,
-        observation: Any,
+        observation: Element,
         state: None = None,
-        episode_start: Any = None,
+        episode_start: object = None,
         deterministic: bool = True,
         action_masks: Any = None,
-    ) -> tuple[Any, None]:
+    ) -> tuple[Element, None]:
         """Choose as Stable-Baselines3's models do, for its tools such as ``evaluate_policy``.
 
         Parameters
@@ -248,7 +250,7 @@ class Agent(BaseAgent[Approximator, Learning]):
             [self._masked_action(element, explore, mask) for element, mask in pairs]
         ), None
 
-    def _masked_action(self, observation: Any, explore: bool, mask: Any) -> Any:
+    def _masked_action(self, observation: Element, explore: bool, mask: Mask) -> Element:
         try:
             return self.act(observation, explore, mask=mask)
         except ValueError as error:
@@ -260,7 +262,7 @@ class Agent(BaseAgent[Approximator, Learning]):
     @explained
     def train(
         self,
-        env: gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any],
+        env: AnyEnv,
         steps: int | None = None,
         *,
         episodes: int | None = None,
@@ -268,7 +270,7 @@ class Agent(BaseAgent[Approximator, Learning]):
         callbacks: Iterable[Callback] = (),
         progress: bool | None = None,
         evaluate_every: int | None = None,
-        evaluation_env: gym.Env[Any, Any] | None = None,
+        evaluation_env: Env | None = None,
         evaluation_episodes: int = 10,
     ) -> TrainingResult:
         """Learn in an environment, or in all of a vector; see `sdnn.agents.Training`.
@@ -310,14 +312,18 @@ class Agent(BaseAgent[Approximator, Learning]):
                 self._next_episode = training.next_episode
 
 
+AnyAgent: TypeAlias = Agent[Any, Any]
+"""An agent with any approximator and learning rule."""
+
+
 @explained
-def load_agent(path: str | Path) -> Agent[Any, Any]:
+def load_agent(path: str | Path) -> AnyAgent:
     """Read an agent of any kind that `Agent.save` wrote; see `Agent.load`."""
-    agent: Agent[Any, Any] = read_agent(path_of("path", path), "agent", "training")[0]
+    agent: AnyAgent = read_agent(path_of("path", path), "agent", "training")[0]
     return agent
 
 
-def unbatched(space: gym.Space[Any], observation: Any) -> Sequence[Any] | None:
+def unbatched(space: Space, observation: Element) -> Elements | None:
     """Return the elements of a batch of observations; None if it is no batch."""
     if isinstance(space, gym.spaces.Dict):
         if not isinstance(observation, Mapping) or set(observation) != set(space):
@@ -336,7 +342,7 @@ def unbatched(space: gym.Space[Any], observation: Any) -> Sequence[Any] | None:
     return observation if is_batch else None
 
 
-def _columns(parts: Iterable[tuple[gym.Space[Any], Any]]) -> list[Sequence[Any]] | None:
+def _columns(parts: Iterable[tuple[Space, Element]]) -> list[Elements] | None:
     """Return the elements of each part of a batch; None if these are not equally many."""
     columns = [unbatched(space, part) for space, part in parts]
     present = [column for column in columns if column is not None]

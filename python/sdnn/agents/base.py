@@ -9,7 +9,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 
-import gymnasium as gym
 import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +36,7 @@ from sdnn.environments.spaces import (
     observation_space_of,
     space_of_error,
 )
+from sdnn.environments.types import Array, Data, Element, Space
 from sdnn.support.arguments import (
     argument_error,
     blamed,
@@ -105,7 +105,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
     def __init__(
         self,
         observation_space: Observed,
-        action_space: gym.Space[Any] | None = None,
+        action_space: Space | None = None,
         *,
         approximator: Approximator | None = None,
         learning: Learning | None = None,
@@ -145,12 +145,12 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         self._action = self._actions.config
         self._make(tables=list(made_of))
 
-    def _take_spaces(self, observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
+    def _take_spaces(self, observations: Space, actions: Space) -> None:
         self._observations = Observations(observations)
         self._actions = Actions(actions)
 
     @property
-    def observation_space(self) -> gym.Space[Any]:
+    def observation_space(self) -> Space:
         """The space of the observations, whose bounds environments must have.
 
         May be set to one with other bounds, where the units are the same: ranges stay.
@@ -158,13 +158,13 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         return self._observations.space
 
     @observation_space.setter
-    def observation_space(self, space: gym.Space[Any]) -> None:
+    def observation_space(self, space: Space) -> None:
         observations = Observations(space)
         require_same_variables(self.observation_space, space)
         self._observations, self.has_bounds = observations, True
 
     @property
-    def action_space(self) -> gym.Space[Any]:
+    def action_space(self) -> Space:
         """The space of the actions."""
         return self._actions.space
 
@@ -265,7 +265,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             )
         return self._controller
 
-    def _values(self, observation: Any, dimension: int) -> NDArray[np.float64]:
+    def _values(self, observation: Element, dimension: int) -> NDArray[np.float64]:
         """Return the values of a dimension's actions, or of fuzzy rules that of the observation."""
         variables = self._observations.vector("observation", observation)
         return self._require_warm().values(variables, dimension)
@@ -357,14 +357,14 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         arrays, prefix = self.state().items(), f"{part}."
         return {name.removeprefix(prefix): a for name, a in arrays if name.startswith(prefix)}
 
-    def _restore(self, **parts: Mapping[str, NDArray[Any]]) -> None:
+    def _restore(self, **parts: Mapping[str, Array]) -> None:
         """Replace parts of the state; ValueError if they do not fit, and nothing changes."""
         kept = {k: a for k, a in self.state().items() if k.partition(".")[0] not in parts}
         new = {f"{part}.{name}": a for part, state in parts.items() for name, a in state.items()}
         self._controller.restore(kept | new)
 
     @classmethod
-    def rebuild(cls, description: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Self:
+    def rebuild(cls, description: Data, arrays: Mapping[str, Array]) -> Self:
         """Make an agent from its `description` and `state`; ValueError if they do not fit."""
         agent = cls.__new__(cls)
         agent._observation = _core.ObservationConfig(**description["observation"])

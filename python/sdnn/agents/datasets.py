@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeAlias
 import gymnasium as gym
 import numpy as np
 
-from sdnn.agents.agent import Agent
+from sdnn.agents.agent import Agent, AnyAgent
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.logs import Logged, reader_of
 from sdnn.support.arguments import is_of_class, require, whole
@@ -29,7 +29,7 @@ Dataset: TypeAlias = str | Path | Mapping[str, Any] | Iterable[Any] | MinariData
 
 
 @explained
-def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> int:
+def learn_from(agent: AnyAgent, dataset: Dataset, *, epochs: int = 1) -> int:
     """Learn logged transitions in their order. All of them are checked before any is learned.
 
     An agent without ranges takes its warm-up from the first transitions. ``agent.progress`` stays
@@ -94,7 +94,7 @@ def learn_from(agent: Agent[Any, Any], dataset: Dataset, *, epochs: int = 1) -> 
     return n * epochs
 
 
-def _checked_length(agent: Agent[Any, Any], log: Iterator[Logged]) -> int:
+def _checked_length(agent: AnyAgent, log: Iterator[Logged]) -> int:
     """Return the number of transitions; the error of one that cannot be learned has its place."""
     n = n_episodes = 0
     for place, transition, truncated in log:
@@ -108,7 +108,7 @@ def _checked_length(agent: Agent[Any, Any], log: Iterator[Logged]) -> int:
     return n
 
 
-def _with_action(agent: Agent[Any, Any], transition: Transition) -> Transition:
+def _with_action(agent: AnyAgent, transition: Transition) -> Transition:
     """Return a transition whose action, if it is a whole number in a float or an array, is one."""
     if not isinstance(agent.action_space, gym.spaces.Discrete) or type(transition.action) is int:
         return transition

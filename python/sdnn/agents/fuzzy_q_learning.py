@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +10,7 @@ from sdnn import _core
 from sdnn.agents.agent import Agent
 from sdnn.agents.base import presets_of
 from sdnn.config import FuzzyQLearningConfig, FuzzyRulesConfig
+from sdnn.environments.types import Space
 from sdnn.support.arguments import whole
 
 
@@ -47,7 +46,7 @@ class FuzzyQLearning(Agent[FuzzyRulesConfig, FuzzyQLearningConfig]):
     presets = presets_of({"paper": ("paper", FuzzyRulesConfig(), FuzzyQLearningConfig())})
     default_preset = "paper"
 
-    def _take_spaces(self, observations: gym.Space[Any], actions: gym.Space[Any]) -> None:
+    def _take_spaces(self, observations: Space, actions: Space) -> None:
         if not isinstance(actions, gym.spaces.Box):
             raise TypeError(f"action_space must be a Box, got {type(actions).__name__}")
         super()._take_spaces(observations, actions)

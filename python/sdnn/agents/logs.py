@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sdnn.environments.types import Data, Info
 from sdnn.support.arguments import advice, argument_error, array_of, path_of, require, shown
 from sdnn.support.files import open_regular
 from sdnn.training.interfaces import Transition
@@ -34,7 +35,6 @@ NAMES: Mapping[str, tuple[str, ...]] = {
 _IGNORED = re.compile(r"(infos?|metadata|id|seed|total_steps)\b")
 _NUMBERED = re.compile(r"(.+?)[_.\[](\d+)\]?")
 _ARRAYS = ("observations", "actions", "rewards")
-_Columns = dict[str, Any]
 
 
 class Logged(NamedTuple):
@@ -88,7 +88,7 @@ def _json_lines(path: Path) -> Iterator[Logged]:
 def _table_lines(path: Path) -> Iterator[Logged]:
     """Read a file of comma-separated values, whose first line has the names."""
     names: list[str] = []
-    before: dict[str, Any] | None = None
+    before: Data | None = None
     for number, line in _lines(path):
         try:
             cells = next(csv.reader(io.StringIO(line.decode())), [])
@@ -115,7 +115,7 @@ def _table_lines(path: Path) -> Iterator[Logged]:
             before = None
 
 
-def _is_cut(row: Mapping[str, Any]) -> bool:
+def _is_cut(row: Info) -> bool:
     return _flag("truncations", row.get("truncations", False))
 
 
@@ -162,7 +162,7 @@ def _items(items: Iterable[Any]) -> Iterator[Logged]:
 _ROW = ("observations", "actions", "rewards", "next_observations", "terminations", "truncations")
 
 
-def _fields_of(item: Any) -> dict[str, Any] | None:
+def _fields_of(item: Any) -> Data | None:
     """Return the columns of a mapping or of an object with attributes of such names."""
     if isinstance(item, Mapping):
         return dict(item)
@@ -171,11 +171,11 @@ def _fields_of(item: Any) -> dict[str, Any] | None:
     return named if has_all else None
 
 
-def _value(values: Mapping[str, Any], name: str, default: Any = None) -> Any:
+def _value(values: Info, name: str, default: Any = None) -> Any:
     return next((values[other] for other in (name, *NAMES[name]) if other in values), default)
 
 
-def _transition(values: Mapping[str, Any], place: str) -> Logged:
+def _transition(values: Info, place: str) -> Logged:
     """Read a mapping of one transition."""
     row = {}
     for name, value in values.items():
@@ -190,7 +190,7 @@ def _transition(values: Mapping[str, Any], place: str) -> Logged:
     return _logged(row, place)
 
 
-def _logged(row: Mapping[str, Any], place: str) -> Logged:
+def _logged(row: Info, place: str) -> Logged:
     try:
         terminated = _flag("terminated", row.get("terminations", False))
         truncated = _flag("truncated", row.get("truncations", False))
@@ -211,14 +211,12 @@ def _flag(name: str, value: Any) -> bool:
     return bool(number.item())
 
 
-def _columns_of(
-    values: Mapping[str, Any], where: str = "dataset", *, is_episode: bool = False
-) -> _Columns:
+def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = False) -> Data:
     """Return arrays of n rows each by their usual names; ``observations`` may have one more.
 
     Columns such as ``observation_0`` are put together. Files mapped to memory are not read yet.
     """
-    columns: _Columns = {}
+    columns: Data = {}
     parts: dict[str, dict[int, Any]] = {}
     for name, column in values.items():
         if column is None or _IGNORED.match(str(name)):
@@ -278,7 +276,7 @@ def _length(column: Any) -> int:
     return len(column) if np.ndim(column) or isinstance(column, list) else 0
 
 
-def _rows(columns: _Columns, place: str, *, is_episode: bool = False) -> Iterator[Logged]:
+def _rows(columns: Data, place: str, *, is_episode: bool = False) -> Iterator[Logged]:
     """Read rows of arrays. Without next observations they are those of the next row.
 
     The last step of an episode that was cut off has none then, and is left out.

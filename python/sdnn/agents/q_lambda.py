@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from sdnn import _core
 from sdnn.agents.base import presets_of
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.config import LinearSDNNConfig, QLambdaConfig
+from sdnn.environments.types import Data
 
 
 class SDNNQLambda(ValueAgent[LinearSDNNConfig, QLambdaConfig]):
@@ -74,7 +73,7 @@ class SDNNQLambda(ValueAgent[LinearSDNNConfig, QLambdaConfig]):
         """
         return self._controller.final_epsilon or 0.0
 
-    def learning_report(self) -> dict[str, Any]:
+    def learning_report(self) -> Data:
         """Return statistics of learning so far, to find settings that cannot work.
 
         Returns

@@ -12,6 +12,7 @@ from sdnn import _core
 from sdnn.agents.agent import Agent
 from sdnn.agents.base import Approximator, Learning, presets_of
 from sdnn.config import QLearningConfig, RBFNetworkConfig, SDNNCConfig
+from sdnn.environments.types import Array, Data
 from sdnn.support.arguments import real
 
 
@@ -56,11 +57,11 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         return n_actions[0] if len(n_actions) == 1 else n_actions
 
     @property
-    def actions(self) -> NDArray[Any]:
+    def actions(self) -> Array:
         """The actions of the first dimension in the order of ``q_values``, shape (n_actions,)."""
         return self.actions_of(0)
 
-    def actions_of(self, dimension: int) -> NDArray[Any]:
+    def actions_of(self, dimension: int) -> Array:
         """Return the actions of a dimension in order, shape (n_actions[dimension],)."""
         n = self._controller.n_actions[self._dimension(dimension)]
         values = [self._controller.action_of(index, dimension) for index in range(n)]
@@ -79,7 +80,7 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         """
         return self._values(observation, self._dimension(dimension))
 
-    def learning_report(self) -> dict[str, Any]:
+    def learning_report(self) -> Data:
         """Return statistics of learning so far, to find settings that cannot work.
 
         Returns
@@ -157,7 +158,7 @@ warm_up_steps, missing
     presets = presets_of(_core.presets())
     """Settings by name: ``"paper"``, ``"general"``, ``"robust"`` and ``"small"``."""
 
-    def learning_report(self) -> dict[str, Any]:
+    def learning_report(self) -> Data:
         """Return statistics of learning so far, to find settings that cannot work.
 
         Returns

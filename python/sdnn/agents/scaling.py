@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn.environments.types import Data
 from sdnn.support.arguments import real, require, whole
 
 
@@ -72,12 +72,12 @@ class Scaling:
             means = f"observation[{first}] and observation[{second}]"
             yield f"observation[{n_variables + i}]: the mean of {means}"
 
-    def values(self) -> dict[str, Any]:
+    def values(self) -> Data:
         """Return it as data that JSON can hold."""
         return {"ranges": [list(pair) for pair in self.ranges], "redundant": self.n_redundant}
 
     @classmethod
-    def of_values(cls, values: Mapping[str, Any], n_variables: int) -> Scaling:
+    def of_values(cls, values: Data, n_variables: int) -> Scaling:
         """Make it from `values`; ValueError if it does not fit their number."""
         scaling = cls(ranges=values["ranges"], n_redundant=values["redundant"])
         n = len(scaling.ranges) + scaling.n_redundant

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import gymnasium as gym
 
 from sdnn import _core
 from sdnn.config import GoalScheduleConfig
-from sdnn.environments.types import Array, Data
+from sdnn.environments.types import Array, Data, Element
 from sdnn.support.arguments import whole
 
 
@@ -41,7 +40,7 @@ class GoalSchedule:
         return f"GoalSchedule({self.config})"
 
 
-class TighteningGoal(gym.Wrapper[Array, Any, Array, Any], gym.utils.RecordConstructorArgs):
+class TighteningGoal(gym.Wrapper[Array, Element, Array, Element], gym.utils.RecordConstructorArgs):
     """Reduces the goal tolerance with the learning episode.
 
     The caller counts the learning episodes: ``reset(options={"episode": k})`` or the attribute
@@ -64,7 +63,7 @@ class TighteningGoal(gym.Wrapper[Array, Any, Array, Any], gym.utils.RecordConstr
     """
 
     def __init__(
-        self, env: gym.Env[Array, Any], schedule: Callable[[int], float] | None = None
+        self, env: gym.Env[Array, Element], schedule: Callable[[int], float] | None = None
     ) -> None:
         gym.utils.RecordConstructorArgs.__init__(self, schedule=schedule)
         super().__init__(env)

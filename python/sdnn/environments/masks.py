@@ -7,11 +7,11 @@ from typing import Any
 
 import gymnasium as gym
 
-from sdnn.environments.types import Data, Env
+from sdnn.environments.types import Data, Element, Env, Mask
 from sdnn.support.arguments import has_methods, shown
 
 
-class ActionMasks(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):
+class ActionMasks(gym.Wrapper[Element, Element, Element, Element], gym.utils.RecordConstructorArgs):
     """Lets agents take the allowed actions only: its ``info["action_mask"]`` has 1 for each.
 
     `sdnn.agents.Agent.train` and `sdnn.agents.evaluate` follow the masks of environments, or
@@ -36,7 +36,7 @@ class ActionMasks(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorAr
     300
     """
 
-    def __init__(self, env: Env, mask: Callable[[Env], Any] | None = None) -> None:
+    def __init__(self, env: Env, mask: Callable[[Env], Mask] | None = None) -> None:
         gym.utils.RecordConstructorArgs.__init__(self, mask=mask)
         has_methods("env", env, "a Gymnasium environment", "reset", "step")
         super().__init__(env)
@@ -47,12 +47,12 @@ class ActionMasks(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorAr
         self._mask = mask
         self.metadata = {**(env.metadata or {}), "action_masks": True}
 
-    def reset(self, **kwargs: Any) -> tuple[Any, Data]:
+    def reset(self, **kwargs: Any) -> tuple[Element, Data]:
         """Begin an episode."""
         observation, info = self.env.reset(**kwargs)
         return observation, self._with_mask(info)
 
-    def step(self, action: Any) -> tuple[Any, Any, Any, Any, Data]:
+    def step(self, action: Element) -> tuple[Element, Any, Any, Any, Data]:
         """Take an action."""
         *outcome, info = self.env.step(action)
         return (*outcome, self._with_mask(info))

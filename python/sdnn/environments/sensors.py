@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn import _core
 from sdnn.config import SensorConfig
 from sdnn.environments.space_kinds import with_infinities
-from sdnn.environments.types import Array
+from sdnn.environments.types import Array, Data, Element
 from sdnn.support.arguments import array_of, choice, one_of, require, seed_of
 
 Observation = Array
-Env = gym.Env[Observation, Any]
+Env = gym.Env[Observation, Element]
 SensorFunction = Callable[[Observation], float]
 Edge = Literal["wrap", "saturate"]
 NoiseStream = Literal["sensor_noise", "evaluation_sensor_noise"]
@@ -28,7 +28,7 @@ _NAMED: dict[str, SensorFunction] = {
 
 
 class _Sensors(
-    gym.ObservationWrapper[Observation, Any, Observation], gym.utils.RecordConstructorArgs
+    gym.ObservationWrapper[Observation, Element, Observation], gym.utils.RecordConstructorArgs
 ):
     """Wrapper of an environment whose observations are a one-dimensional ``Box``."""
 
@@ -148,7 +148,9 @@ class _RandomSensors(_Sensors):
         one_of("stream", stream, ("sensor_noise", "evaluation_sensor_noise"))
         self._stream = _core.Stream.__members__[stream]
 
-    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Observation, Any]:
+    def reset(
+        self, *, seed: int | None = None, options: Data | None = None
+    ) -> tuple[Observation, Data]:
         """Reset the environment; a ``seed`` also restarts the random stream."""
         if seed is not None:
             self._restart(seed)

@@ -136,7 +136,7 @@ def _key(key: Any) -> Any:
     return key
 
 
-def _key_of(data: Any) -> Any:
+def _key_of(data: object) -> Any:
     return tuple(map(_key_of, data)) if isinstance(data, list) else data
 
 
@@ -233,7 +233,7 @@ def _has_equal_rows(space: Space) -> bool:
     return bool((space.low == space.low[:1]).all() and (space.high == space.high[:1]).all())
 
 
-def require_same_kind(agent: Any, env: Any) -> None:
+def require_same_kind(agent: object, env: object) -> None:
     """Check that an agent can learn in an environment, or in each of a vector.
 
     Observations must be possible in the agent's space, and there must be as many actions. Bounds of
@@ -310,11 +310,11 @@ def require_same_variables(space: Space, other_space: Space) -> None:
     )
 
 
-def _space_of(env: Any, name: str) -> Any:
+def _space_of(env: object, name: str) -> Any:
     return getattr(env, f"single_{name}", getattr(env, name, None))
 
 
-def _is_unit(space: Any) -> bool:
+def _is_unit(space: Space | None) -> bool:
     if not isinstance(space, gym.spaces.Box):
         return space is None
     return bool((space.low >= 0.0).all() and (space.high <= 1.0).all())

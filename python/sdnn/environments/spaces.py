@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.environments.space_kinds import flat_bounds, in_a_line, wholes_of, with_infinities
-from sdnn.environments.types import Array, Space
+from sdnn.environments.types import Array, Element, Space
 from sdnn.support.arguments import argument_error, array_of, blamed, require, shown
 
 Inputs: TypeAlias = Literal["all", "relevant"] | Sequence[int]
@@ -85,7 +85,7 @@ class Observations:
             missing=missing,
         )
 
-    def vector(self, name: str, observation: Any) -> Array:
+    def vector(self, name: str, observation: Element) -> Array:
         """Return the variables of an observation, in any shape; ValueError if it is none.
 
         Masked ones are NaN.
@@ -115,7 +115,7 @@ class Observations:
         return rows if rows.ndim == 2 else rows.reshape(-1, self.n_variables)
 
 
-def has_mask(space: Space, observation: Any) -> bool:
+def has_mask(space: Space, observation: Element) -> bool:
     """Return whether an observation of a space, or a part of it, is a masked array."""
     if isinstance(space, gym.spaces.Dict) and isinstance(observation, Mapping):
         return any(has_mask(part, observation.get(key)) for key, part in space.spaces.items())
@@ -137,7 +137,7 @@ def _readings(name: str, values: Any, kinds: str = "fiub") -> Array:
     return readings
 
 
-def _flat_parts(space: Space, observation: Any) -> Iterator[Array]:
+def _flat_parts(space: Space, observation: Element) -> Iterator[Array]:
     """Yield the variables of each part as Gymnasium flattens them; of missing symbols NaN.
 
     ValueError, or what looking raises, for an observation that is not of the space.
@@ -307,7 +307,7 @@ class Actions:
         require(((allowed == 0) | (allowed == 1)).all(), name, "be 0 or 1 per action", mask)
         return allowed.astype(np.uint8)
 
-    def numbers(self, action: Any) -> Array:
+    def numbers(self, action: Element) -> Array:
         """Return the numbers of an element, in any shape; ValueError if they are none."""
         if type(action) is np.ndarray and action.dtype is self._dtype:
             return action

@@ -169,7 +169,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[Array, ArrayLike, Array]):
         """Release the pictures."""
         self._picture = None
 
-    def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
+    def _reset_mask(self, mask: ArrayLike | None) -> NDArray[np.bool_]:
         name = "options['reset_mask']"
         chosen = np.ones(self.num_envs, np.bool_) if mask is None else array_of(name, mask, "b")
         expected = f"be a bool array of shape ({self.num_envs},) with at least one True"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn import _core
 from sdnn.export.tables import Tables
 
 Pair = tuple[int, int]
@@ -20,7 +20,7 @@ class Code:
     which one is 0: see cpp/include/sdnn/coding/state_code.hpp.
     """
 
-    def __init__(self, network: Any, n_inputs: int) -> None:
+    def __init__(self, network: _core.SDNNC | _core.LinearSDNN, n_inputs: int) -> None:
         self.network = network
         self.n_inputs = n_inputs
         self.m = len(network.permutation(*network.pairs[0]))

@@ -6,7 +6,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-from sdnn.agents import Agent, SDNNQLambda, SDNNQLearning
+from sdnn.agents import SDNNQLambda, SDNNQLearning
+from sdnn.agents.agent import AnyAgent
 from sdnn.export.q_lambda import QLambdaLearner, QLambdaWriter
 from sdnn.export.sdnn_c import SDNNCWriter
 from sdnn.export.sdnn_c_learning import SDNNCLearner
@@ -18,7 +19,7 @@ _LARGEST_NAME = 40
 
 
 def export_c_header(
-    agent: Agent[Any, Any],
+    agent: AnyAgent,
     path: str | Path,
     *,
     name: str | None = None,
@@ -42,7 +43,7 @@ def export_c_header(
 
 
 def c_header(
-    agent: Agent[Any, Any],
+    agent: AnyAgent,
     name: str,
     *,
     fraction_bits: int | None = None,

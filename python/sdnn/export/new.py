@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import gymnasium as gym
-
 from sdnn.agents import SDNNQLambda, SDNNQLearning
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
+from sdnn.environments.types import Data, Space
 from sdnn.export.header import c_header
 from sdnn.export.sdnn_c_learning import MOST_WEIGHT
 from sdnn.support.arguments import argument_error, choice, shown, whole
@@ -24,8 +23,8 @@ _RAM_BYTES = {"q-lambda": 20_000, "sdnn-c": 60_000}
 
 
 def new_agent(
-    observation_space: gym.Space[Any],
-    action_space: gym.Space[Any],
+    observation_space: Space,
+    action_space: Space,
     *,
     kind: str = "q-lambda",
     ram_bytes: int | None = None,
@@ -77,10 +76,10 @@ def new_agent(
             f"approximator must have the type {expected} for {kind}, got {shown(config)}"
         )
 
-    def made(size: Any) -> SDNNQLambda | SDNNQLearning:
+    def made(size: NewConfig) -> SDNNQLambda | SDNNQLearning:
         return agent_type(observation_space, action_space, **{**settings, "approximator": size})
 
-    def needed(size: Any) -> int:
+    def needed(size: NewConfig) -> int:
         return c_header(made(size), "agent", learning=True).ram_bytes
 
     sizes = _sizes(config)
@@ -96,7 +95,7 @@ def new_agent(
     return made(sizes[n_fitting - 1])
 
 
-def new_settings(kind: str) -> dict[str, Any]:
+def new_settings(kind: str) -> Data:
     """Return the settings that a new agent begins with, ``approximator`` and ``learning``."""
     agent_class, name = _KINDS[kind], "general" if kind == "q-lambda" else "small"
     preset = agent_class.presets[name]
@@ -106,7 +105,7 @@ def new_settings(kind: str) -> dict[str, Any]:
     return {"approximator": config, "learning": preset.learning}
 
 
-def _sizes(config: Any) -> Sequence[Any]:
+def _sizes(config: NewConfig) -> Sequence[NewConfig]:
     """Return the sizes to choose from, the smallest first."""
     if isinstance(config, LinearSDNNConfig):
         if config.n_pattern_units > 0:

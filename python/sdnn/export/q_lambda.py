@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn import _core
 from sdnn.agents import SDNNQLambda
+from sdnn.environments.types import Array, Data
 from sdnn.export.code import Code
 from sdnn.export.tables import Tables
 from sdnn.export.writer import (
     NONE,
     SCALE_FIELDS,
     CHeader,
+    Field,
     Learner,
     Writer,
     learning_needs,
@@ -30,8 +32,9 @@ class QLambdaWriter(Writer):
     """Makes the header of an `SDNNQLambda` agent's greedy policy."""
 
     agent: SDNNQLambda
+    networks: list[_core.LinearSDNN]
 
-    def network(self) -> Any:
+    def network(self) -> _core.LinearSDNN:
         """Return the readout."""
         return self.networks[0]
 
@@ -63,7 +66,7 @@ class QLambdaWriter(Writer):
             f" {' x '.join(map(str, self.n_actions()))} actions"
         )
 
-    def defines(self) -> dict[str, Any]:
+    def defines(self) -> Data:
         """Return the sizes of the readout."""
         return {
             **self.code().defines(),
@@ -112,7 +115,7 @@ class QLambdaLearner(Learner, QLambdaWriter):
     magic = 0x4C4E4453  # "SDNL"
     streams = ("policy.exploration", "policy.ties", "policy.evaluation_ties", "repetitions")
 
-    def fields(self) -> list[tuple[Any, ...]]:
+    def fields(self) -> list[Field]:
         """Return names, types and shapes of an image."""
         shape = sum(self.n_rows()), self.code().n_columns
         names = _WEIGHTS[: 1 + self.averages]
@@ -133,13 +136,13 @@ class QLambdaLearner(Learner, QLambdaWriter):
         """Whether the agent acts by an average of its weights."""
         return self.agent.approximator.averaging_interval > 0
 
-    def remembered(self, state: dict[str, Any]) -> dict[str, Any]:
+    def remembered(self, state: Data) -> Data:
         """Return the fields that are not the same in the core's state."""
         columns = self.columns()
         rows = {name: state[name][:, columns] for name in _WEIGHTS if name in state}
         return {"action_value.exponent": NONE, **state, **rows}
 
-    def recall(self, image: Any, state: dict[str, Any]) -> None:
+    def recall(self, image: Array, state: Data) -> None:
         """Put the fields of an image into the core's state; the episode before is over."""
         for name in ("waits", "reward", "old_value"):
             state[name] = np.zeros_like(state[name])
@@ -184,7 +187,7 @@ class QLambdaLearner(Learner, QLambdaWriter):
             n_words=self.code().most_columns * sum(self.n_rows()),
         )
 
-    def _learning_rule(self) -> dict[str, Any]:
+    def _learning_rule(self) -> Data:
         """Return the settings of the learning rule."""
         learning, discount = self.agent.learning, round(self.agent.learning.discount * 32768)
         number, exponent = self.tolerance()

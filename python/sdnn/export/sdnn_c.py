@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn import _core
 from sdnn.agents import SDNNQLearning
 from sdnn.export.code import Code
 from sdnn.export.tables import Tables, weight_words
@@ -21,8 +20,9 @@ class SDNNCWriter(Writer):
     """Makes the header of an `SDNNQLearning` agent."""
 
     agent: SDNNQLearning
+    networks: list[_core.SDNNC]
 
-    def network(self) -> Any:
+    def network(self) -> _core.SDNNC:
         """Return the network of the first dimension."""
         return self.networks[0]
 
@@ -34,7 +34,7 @@ class SDNNCWriter(Writer):
             raise argument_error("n_hidden_units", problem)
         require_few_weights(self.n_dimensions * n_units * n_columns, "n_hidden_units")
 
-    def units(self, network: Any) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def units(self, network: _core.SDNNC) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Return the hidden units that are in a window, and where among them the windows begin."""
         first = network.first_units().astype(np.intp)
         used = np.unique(first[:, None] + np.arange(self.agent.approximator.n_active_units))

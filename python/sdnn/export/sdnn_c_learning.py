@@ -9,10 +9,18 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents import SDNNQLearning
+from sdnn.environments.types import Array, Data
 from sdnn.export.code import Code
 from sdnn.export.sdnn_c import SDNNCWriter
 from sdnn.export.tables import Tables, weight_words
-from sdnn.export.writer import MOST_FRACTION_BITS, SCALE_FIELDS, CHeader, Learner, learning_needs
+from sdnn.export.writer import (
+    MOST_FRACTION_BITS,
+    SCALE_FIELDS,
+    CHeader,
+    Field,
+    Learner,
+    learning_needs,
+)
 from sdnn.support.arguments import argument_error, whole
 
 _WEIGHTS_STREAM = 3  # see cpp/include/sdnn/core/random.hpp
@@ -99,9 +107,9 @@ class SDNNCLearner(Learner, SDNNCWriter):
         thresholds: NDArray[np.int32] = self.network().thresholds()[self.used]
         return np.pad(thresholds, (0, self.n_units - self.used.size))
 
-    def fields(self) -> list[tuple[Any, ...]]:
+    def fields(self) -> list[Field]:
         """Return names, types and shapes of an image."""
-        of_range: list[tuple[Any, ...]] = []
+        of_range: list[Field] = []
         if self.adapts:
             of_range = [
                 *((f"range.{name}", "<f8") for name in ("low", "high", "sum")),
@@ -122,9 +130,9 @@ class SDNNCLearner(Learner, SDNNCWriter):
             ("weights", "<u4", (self.n_words,)),
         ]
 
-    def remembered(self, state: dict[str, Any]) -> dict[str, Any]:
+    def remembered(self, state: Data) -> Data:
         """Return the fields that are not the same in the core's state."""
-        of_range: dict[str, Any] = {}
+        of_range: Data = {}
         if self.adapts:
             rewards, returns = self._rewards(state), state["range.returns"]
             of_range = {
@@ -140,7 +148,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
             **of_range,
         }
 
-    def recall(self, image: Any, state: dict[str, Any]) -> None:
+    def recall(self, image: Array, state: Data) -> None:
         """Put the fields of an image into the core's state; the episode before is over."""
         fraction_bits = whole("fraction_bits", int(image["fraction_bits"]), 0, MOST_FRACTION_BITS)
         state["action_value.output_range"] = image["action_value.output_range"].copy()
@@ -168,9 +176,9 @@ class SDNNCLearner(Learner, SDNNCWriter):
         super().restore(whole)
         self.agent.progress = float(np.frombuffer(whole, self.layout(), 1)["progress"][0])
 
-    def _rewards(self, state: dict[str, Any]) -> NDArray[Any]:
-        scaled: NDArray[Any] = np.round(state["range.rewards"] * 2.0**self.fraction_bits)
-        clipped: NDArray[Any] = np.clip(scaled, -(2**31), 2**31 - 1).astype("<i4")
+    def _rewards(self, state: Data) -> Array:
+        scaled: Array = np.round(state["range.rewards"] * 2.0**self.fraction_bits)
+        clipped: Array = np.clip(scaled, -(2**31), 2**31 - 1).astype("<i4")
         return clipped
 
     def _is_new(self) -> bool:
@@ -183,7 +191,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
             network.thresholds(), new.thresholds()
         )
 
-    def _rates(self, state: dict[str, Any]) -> dict[str, str]:
+    def _rates(self, state: Data) -> dict[str, str]:
         """Return how alpha and epsilon follow the progress, those that do."""
         learning, defines = self.agent.learning, dict[str, str]()
         fractions = {"learning_rate": 1.0, "epsilon": learning.exploration_fraction}
@@ -229,7 +237,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
             n_words=self.n_words,
         )
 
-    def _network_defines(self) -> dict[str, Any]:
+    def _network_defines(self) -> Data:
         """Return the sizes of the network and the settings of its learning rule."""
         sizes, learning, network = self.agent.approximator, self.agent.learning, self.network()
         return {

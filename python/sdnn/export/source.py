@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 _INSTALLED = Path(__file__).parent / "c"
 _FOLDER = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[3] / "cpp" / "c"
@@ -32,7 +31,7 @@ def comment(*lines: str) -> list[str]:
     return [f"/*{body[0][2:]}", *body[1:], " */"]
 
 
-def define_lines(macro: str, values: Mapping[str, Any]) -> list[str]:
+def define_lines(macro: str, values: Mapping[str, object]) -> list[str]:
     """Define macros, whose names begin with ``macro``; a list has a line for each element."""
     lines = []
     for name, value in values.items():

@@ -6,10 +6,11 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from sdnn.environments.types import Array
 
 _DIRECTION_BITS = 30
 _BYTES = {"uint8_t": 1, "uint16_t": 2, "int32_t": 4, "uint32_t": 4, "uint64_t": 8}
@@ -23,7 +24,7 @@ class Tables:
     n_bytes: int = 0
     lines: list[str] = field(default_factory=list)
 
-    def add(self, kind: str, name: str, values: NDArray[Any], comment: str = "") -> None:
+    def add(self, kind: str, name: str, values: Array, comment: str = "") -> None:
         """Add a table of one or two dimensions of a C type; ``name`` comes after the prefix."""
         self.n_bytes += _BYTES[kind] * values.size
         if comment:
@@ -35,7 +36,7 @@ class Tables:
         self.lines += table_lines(f"static const {kind} {self.prefix}_{name}", stored, form)
 
 
-def table_lines(declaration: str, values: NDArray[Any], form: str) -> list[str]:
+def table_lines(declaration: str, values: Array, form: str) -> list[str]:
     """Write a table of one or two dimensions in C."""
     sizes = "".join(f"[{n}]" for n in values.shape)
     rows = [wrapped(map(form.format, row)) for row in values.reshape(-1, values.shape[-1]).tolist()]
@@ -62,12 +63,12 @@ def joined(lines: Iterable[str]) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def by_dimension(actions: NDArray[Any]) -> NDArray[Any]:
+def by_dimension(actions: Array) -> Array:
     """Arrange actions as (n_actions,), or as (n_dimensions, n_actions)."""
     return actions[:, 0] if actions.shape[1] == 1 else actions.T
 
 
-def weight_words(weights: NDArray[np.int32]) -> tuple[NDArray[Any], NDArray[Any]]:
+def weight_words(weights: NDArray[np.int32]) -> tuple[Array, Array]:
     """Pack weights (n, D) as bytes plus 128, those of four units in a word.
 
     Returns the words (D,) of each four units, high bytes before low ones where one is needed, and
@@ -113,9 +114,9 @@ def conversions(inputs: Sequence[Input], name: str, fraction_bits: int) -> tuple
 
     Inputs of the same type and range share a table. The macros are those of sdnn_observation.h.
     """
-    tables, names = Tables(name), dict[Any, str]()
+    tables, names = Tables(name), dict[tuple[str | int, int], str]()
 
-    def table(key: Any, word: str, values: NDArray[Any], comment: str) -> str:
+    def table(key: tuple[str | int, int], word: str, values: Array, comment: str) -> str:
         if key not in names:
             names[key] = f"{name}_{word}_{len(names)}"
             tables.add("int32_t", f"{word}_{len(names) - 1}", values, comment)
@@ -142,7 +143,7 @@ def conversions(inputs: Sequence[Input], name: str, fraction_bits: int) -> tuple
     return tables, calls
 
 
-def _fixed_bounds(low: float, high: float, n_bins: int, fraction_bits: int) -> NDArray[Any]:
+def _fixed_bounds(low: float, high: float, n_bins: int, fraction_bits: int) -> Array:
     """Find the least observations in bins 1, 2, ... n_bins - 1, integers times 2^-fraction_bits.
 
     Bins are calculated as for observations, rounding included.
@@ -168,9 +169,9 @@ def _turns(low: float, high: float, fraction_bits: int) -> tuple[int, int]:
     return rate, (round(-Fraction(low) / width * 2**64) + 2**31) % 2**64
 
 
-def _directions(n_bins: int) -> NDArray[Any]:
+def _directions(n_bins: int) -> Array:
     """Return cosine and sine of the angles where bins 1, 2, ... begin, shape (n_bins - 1, 2)."""
     angles = [math.pi * (2 * b - n_bins) / n_bins for b in range(1, n_bins)]
     ends = np.array([(math.cos(angle), math.sin(angle)) for angle in angles])
-    rounded: NDArray[Any] = np.round(ends.reshape(-1, 2) * 2**_DIRECTION_BITS).astype(np.int64)
+    rounded: Array = np.round(ends.reshape(-1, 2) * 2**_DIRECTION_BITS).astype(np.int64)
     return rounded

@@ -8,14 +8,15 @@ import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 
+from sdnn import _core
 from sdnn._core import __version__
 from sdnn.agents.q_learning import ValueAgent
+from sdnn.environments.types import Array, Data
 from sdnn.export.source import c_source, comment, define_lines
 from sdnn.export.tables import Input, Tables, by_dimension, conversions, joined, table_lines
 from sdnn.support.arguments import argument_error, whole
@@ -33,6 +34,9 @@ SCALE_FIELDS = [
 ]
 _TIES = {"lowest": "LOWEST", "middle": "MIDDLE", "uniform": "DRAWN"}
 MOST_WEIGHTS = 2**26  # some hundred megabytes of text
+Field: TypeAlias = tuple[str, str] | tuple[str, str, tuple[int, ...]]
+"""Name and type of a field of an image, and its shape."""
+Network: TypeAlias = _core.SDNNC | _core.LinearSDNN
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +79,7 @@ class Writer(ABC):
     title: ClassVar[str] = "the greedy policy of a trained agent"
 
     @abstractmethod
-    def network(self) -> Any:
+    def network(self) -> Network:
         """Return a network of the agent, which has the patterns of its inputs."""
 
     @abstractmethod
@@ -89,7 +93,7 @@ class Writer(ABC):
             inputs.append(Input(kind, list(at), low, high, len(self.network().table(i))))
         return inputs
 
-    def _box(self) -> NDArray[Any] | None:
+    def _box(self) -> Array | None:
         """Return the actions of a Box as `act` gives them, shape (n_actions, n_dimensions)."""
         if not isinstance(self.agent.action_space, gym.spaces.Box):
             return None
@@ -158,7 +162,7 @@ class Writer(ABC):
         file: str,
         description: str,
         needs: list[str],
-        defines: dict[str, Any],
+        defines: Data,
         tables: Tables,
         **sizes: int,
     ) -> CHeader:
@@ -307,15 +311,15 @@ class Learner(Writer):
     """Random generators, in the order of the image."""
 
     @abstractmethod
-    def fields(self) -> list[tuple[Any, ...]]:
+    def fields(self) -> list[Field]:
         """Return names, types and shapes of an image, as `numpy.dtype` takes them."""
 
     @abstractmethod
-    def remembered(self, state: dict[str, Any]) -> dict[str, Any]:
+    def remembered(self, state: Data) -> Data:
         """Return the fields that are not the same in the core's state."""
 
     @abstractmethod
-    def recall(self, image: Any, state: dict[str, Any]) -> None:
+    def recall(self, image: Array, state: Data) -> None:
         """Put the fields of an image into the core's state; ValueError for impossible ones."""
 
     def layout(self) -> np.dtype[Any]:
@@ -323,7 +327,7 @@ class Learner(Writer):
         head = [("magic", "<u4"), ("fingerprint", "<u4")]
         return np.dtype([*head, *self.fields()])
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> Data:
         """Return the core's state, and the scale of rewards, with all of its numbers."""
         scale = {"size": NONE, "size_in_window": NONE, **self.agent._state_of("reward_scale")}
         state = self.agent._state_of("agent")
@@ -381,7 +385,7 @@ class Learner(Writer):
         head = np.frombuffer(self.image()[: fields[end][1]], np.uint8)
         tables.add("uint8_t", "first_head", head, "What the agent begins with, as in an image.")
 
-    def learning_defines(self) -> dict[str, Any]:
+    def learning_defines(self) -> Data:
         """Return the settings of all agents that learn."""
         learning = self.agent.learning
         return {

@@ -9,7 +9,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from sdnn.environments.types import Array, Data
+from sdnn.environments.types import AnyEnv, Array, Data, Element, Elements, Masks
 from sdnn.training.files import SavedEpisode, Statistics, learning_wrappers, names_of, statistics_of
 from sdnn.training.interfaces import (
     EachLearner,
@@ -40,14 +40,14 @@ class _ActionLog:
 
     def __init__(self, actions: Array | None = None) -> None:
         self._arrays = [] if actions is None or not len(actions) else [actions]
-        self._recent: list[Any] = []
+        self._recent: list[Element] = []
 
     def array(self) -> Array:
         """Return all of them, shape (n, ...)."""
         arrays = self._arrays + ([np.array(self._recent)] if self._recent else [])
         return np.concatenate(arrays) if arrays else np.empty(0)
 
-    def append(self, action: Any) -> None:
+    def append(self, action: Element) -> None:
         """Add an action, of the shape and type of the others."""
         self._recent.append(action)
         if len(self._recent) == _N_RECENT:
@@ -90,13 +90,13 @@ class Episodes:
         The wrappers that learn, and what they had learned when the last episode began.
     """
 
-    observations: Any
-    previous_observations: Any
-    masks: Any = None
+    observations: Elements
+    previous_observations: Elements
+    masks: Masks | None = None
 
     def __init__(
         self,
-        env: Any,
+        env: AnyEnv,
         adapter: EnvironmentAdapter,
         learner: EachLearner,
         seed: int | None,
@@ -113,7 +113,7 @@ class Episodes:
         self.next_number = first
         self.present: list[Episode | None] = [None] * n
         self.unlearned: list[int] = []
-        self.actions: Any = [None] * n
+        self.actions: Elements = [None] * n
         self._environments = list(range(n))
         self._begins_with_step: dict[int, int] = {}
 
@@ -148,7 +148,7 @@ class Episodes:
         self._begins_with_step = numbers
         self.unlearned = [i for i in self._environments if present[i] is not None]
 
-    def step(self, actions: Any) -> None:
+    def step(self, actions: Elements) -> None:
         """Take a step in every environment."""
         self.actions, self.previous_observations = actions, self.observations
         elements = self._learner.elements(actions)
@@ -199,7 +199,7 @@ class Episodes:
             episode: Any = self.present[i]
             episode.sum_of_rewards += self.adapter.rewards[i]
 
-    def _reset(self, numbers: Mapping[int, int]) -> dict[int, Any]:
+    def _reset(self, numbers: Mapping[int, int]) -> dict[int, Element]:
         """Begin episodes of these numbers in some environments; return first observations."""
         seeds = {
             i: None if self._seed is None else episode_seed(self._seed, _LEARNING, number)
@@ -207,7 +207,7 @@ class Episodes:
         }
         return self.adapter.reset(seeds, self._options(1 + max(numbers.values())))
 
-    def _put(self, first_observations: dict[int, Any]) -> None:
+    def _put(self, first_observations: dict[int, Element]) -> None:
         """Read the first observations of all, or some, environments."""
         if len(first_observations) == self.n_environments:
             observations = list(first_observations.values())
@@ -329,7 +329,7 @@ class Episodes:
             over = {i for i in self._environments if self.is_over(i)}
 
 
-def adapter_for(env: Any) -> EnvironmentAdapter:
+def adapter_for(env: AnyEnv) -> EnvironmentAdapter:
     """Return the adapter for an environment, or for a vector of them."""
     if not isinstance(env, gym.vector.VectorEnv):
         return OneEnvironment(env)

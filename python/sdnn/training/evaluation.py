@@ -6,13 +6,13 @@ import math
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.environments.space_kinds import require_same_kind
-from sdnn.environments.types import Data, Env
+from sdnn.environments.types import Data, Element, Env
 from sdnn.support.arguments import has_methods, require, seed_of, whole
 from sdnn.support.display import Displayed
 from sdnn.training.episodes import EVALUATION, episode_seed
@@ -35,7 +35,7 @@ _LONG = 100_000
 class Acts(Protocol):
     """The interface of what is evaluated."""
 
-    def act(self, observation: Any, explore: bool = True) -> Any:
+    def act(self, observation: Element, explore: bool = True) -> Element:
         """Choose an action."""
 
 

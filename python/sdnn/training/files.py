@@ -44,7 +44,7 @@ class Statistics(msgspec.Struct, frozen=True):
     numbers: dict[str, _Numbers]
 
 
-def learning_wrappers(env: Any) -> list[Any]:
+def learning_wrappers(env: object) -> list[Any]:
     """List the wrappers of an environment, or of a vector, that learn; the outermost first."""
     wrappers = []
     while env is not None:
@@ -57,7 +57,7 @@ def learning_wrappers(env: Any) -> list[Any]:
     return wrappers
 
 
-def names_of(env: Any) -> str:
+def names_of(env: object) -> str:
     """Return the names of all wrappers and of the environment in them."""
     names = []
     while env is not None:
@@ -66,7 +66,7 @@ def names_of(env: Any) -> str:
     return ", ".join(names)
 
 
-def share_statistics(env: Any, evaluation_env: Any) -> None:
+def share_statistics(env: object, evaluation_env: object) -> None:
     """Copy the statistics of one environment's wrappers to those of another.
 
     Warns where only one of the two has a wrapper that learns about observations.
@@ -87,7 +87,7 @@ def share_statistics(env: Any, evaluation_env: Any) -> None:
         )
 
 
-def read_statistics(values: Any) -> list[Statistics]:
+def read_statistics(values: object) -> list[Statistics]:
     """Make statistics of plain data; ValueError if they are none."""
     try:
         learned = msgspec.convert(values, list[Statistics])
@@ -99,7 +99,7 @@ def read_statistics(values: Any) -> list[Statistics]:
     return learned
 
 
-def statistics_of(wrappers: Sequence[Any]) -> list[Statistics]:
+def statistics_of(wrappers: Sequence[object]) -> list[Statistics]:
     """Return what wrappers have learned."""
     return [
         Statistics(
@@ -110,7 +110,7 @@ def statistics_of(wrappers: Sequence[Any]) -> list[Statistics]:
     ]
 
 
-def take_statistics(wrappers: Sequence[Any], learned: Sequence[Statistics]) -> bool:
+def take_statistics(wrappers: Sequence[object], learned: Sequence[Statistics]) -> bool:
     """Give each wrapper, in order, the statistics of its name; return whether all match."""
     remaining = list(learned)
     for wrapper in wrappers:
@@ -123,13 +123,13 @@ def take_statistics(wrappers: Sequence[Any], learned: Sequence[Statistics]) -> b
     return not remaining and len(wrappers) == len(learned)
 
 
-def moments_of(wrapper: Any, name: str) -> Any:
+def moments_of(wrapper: object, name: str) -> Any:
     """Return a wrapper's attribute that has mean, var and count; None if it has none."""
     moments = getattr(wrapper, "__dict__", {}).get(name)
     return moments if all(hasattr(moments, moment) for moment in _MOMENTS) else None
 
 
-def _slots(wrapper: Any) -> Iterator[tuple[str, Any, str]]:
+def _slots(wrapper: object) -> Iterator[tuple[str, object, str]]:
     """Yield the names of all numbers that a wrapper has learned, and where each is kept."""
     for name in _STATISTICS:
         moments = moments_of(wrapper, name)
@@ -140,13 +140,13 @@ def _slots(wrapper: Any) -> Iterator[tuple[str, Any, str]]:
             yield name, wrapper, name
 
 
-def _fits(wrapper: Any, learned: Statistics) -> bool:
+def _fits(wrapper: object, learned: Statistics) -> bool:
     shapes = {name: np.shape(getattr(owner, key)) for name, owner, key in _slots(wrapper)}
     learned_shapes = {name: numbers.shape for name, numbers in learned.numbers.items()}
     return type(wrapper).__name__ == learned.wrapper and shapes == learned_shapes
 
 
-def _packed(value: Any) -> _Numbers:
+def _packed(value: object) -> _Numbers:
     array = np.asarray(value)
     array = array.astype("<f4" if array.dtype == np.float32 else "<f8")
     text = base64.b64encode(array.tobytes()).decode()
@@ -160,7 +160,7 @@ def _unpacked(numbers: _Numbers) -> Array:
 
 
 @contextmanager
-def fixed(env: Any, learned: Sequence[Statistics]) -> Iterator[None]:
+def fixed(env: object, learned: Sequence[Statistics]) -> Iterator[None]:
     """Keep the statistics of an environment's wrappers as they are, for greedy episodes.
 
     Wrappers without statistics take those that were learned; a warning names one that cannot.
@@ -189,7 +189,7 @@ def fixed(env: Any, learned: Sequence[Statistics]) -> Iterator[None]:
                 wrapper.update_running_mean = flag
 
 
-def _has_no_statistics(wrapper: Any) -> bool:
+def _has_no_statistics(wrapper: object) -> bool:
     all_moments = (moments_of(wrapper, name) for name in _STATISTICS)
     return any(moments is not None and moments.count < _FEW for moments in all_moments)
 
@@ -204,7 +204,7 @@ _Period = Annotated[int, msgspec.Meta(ge=1, le=2**53)]
 class SavedClass(Protocol):
     """A class whose objects are made of what files hold."""
 
-    def rebuild(self, description: Mapping[str, Any], arrays: Mapping[str, Array]) -> Any:
+    def rebuild(self, description: Data, arrays: Mapping[str, Array]) -> Any:
         """Make an object; an ordinary error if description and arrays do not fit."""
 
 

@@ -12,11 +12,14 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sdnn.environments.types import Array, Data, Env
+from sdnn.environments.types import AnyEnv, Array, Data, Element, Elements, Env, Info, Mask, Masks
 from sdnn.support.arguments import flag, has_methods, reward_of, shown
 
 if TYPE_CHECKING:
     from sdnn._core import Controller
+
+Seeds: TypeAlias = Mapping[int, int | None]
+Options: TypeAlias = Data | None
 
 _SCALARS = (np.generic, int, float)
 
@@ -26,7 +29,7 @@ _OLD_API = (
 )
 
 
-def require_single(name: str, env: Any) -> None:
+def require_single(name: str, env: object) -> None:
     """Check that a value is one environment; TypeError that names the argument."""
     has_methods(name, env, "an environment, as of gymnasium.make(id)", "reset", "step")
     if isinstance(env, gym.vector.VectorEnv):
@@ -39,22 +42,23 @@ class UnusableStepError(ValueError):
     """A step or reset of an environment cannot be used; the message names it and the reason."""
 
 
-def has_action_masks(env: Any) -> bool:
+def has_action_masks(env: object) -> bool:
     """Return whether an environment, or a vector, tells which actions are allowed."""
     return bool((getattr(env, "metadata", None) or {}).get("action_masks"))
 
 
-def mask_in(info: Mapping[str, Any]) -> Any:
+def mask_in(info: Info) -> Mask:
     """Return the mask in an info; UnusableStepError if there is none."""
     if "action_mask" not in info:
         raise UnusableStepError(
             "info must have 'action_mask', as metadata['action_masks'] of env is True,"
             f" got {shown(sorted(map(str, info)))}"
         )
-    return info["action_mask"]
+    mask: Mask = info["action_mask"]
+    return mask
 
 
-def reset_env(env: Any, seed: Any, options: Data | None) -> tuple[Any, Any]:
+def reset_env(env: AnyEnv, seed: Any, options: Options) -> tuple[Element, Info]:
     """Reset an environment, or a vector; return what is observed first, and the info.
 
     UnusableStepError if it returns something else than an observation and a dictionary.
@@ -68,7 +72,7 @@ def reset_env(env: Any, seed: Any, options: Data | None) -> tuple[Any, Any]:
     return made[0], made[1]
 
 
-def step_env(env: Any, action: Any) -> tuple[Any, Any, Any, Any, Any]:
+def step_env(env: AnyEnv, action: Element) -> Sequence[Any]:
     """Step an environment, or a vector; UnusableStepError if it does not return five values."""
     made = env.step(action)
     if not (isinstance(made, (tuple, list)) and len(made) == 5):
@@ -77,10 +81,10 @@ def step_env(env: Any, action: Any) -> tuple[Any, Any, Any, Any, Any]:
             "env.step must return five values, (observation, reward, terminated, truncated, info),"
             f" got {n}{_OLD_API}"
         )
-    return made  # type: ignore[return-value]
+    return made
 
 
-def checked_outcome(reward: Any, terminated: Any, truncated: Any) -> tuple[float, bool, bool]:
+def checked_outcome(reward: Any, terminated: object, truncated: object) -> tuple[float, bool, bool]:
     """Return a finite float and bools; UnusableStepError for something else."""
     try:
         if type(reward) is not float:
@@ -94,15 +98,11 @@ def checked_outcome(reward: Any, terminated: Any, truncated: Any) -> tuple[float
     return reward, terminated, truncated
 
 
-def copied(value: Any) -> Any:
+def copied(value: Element) -> Element:
     """Copy what others may write to: environments may keep their state, or change an action."""
     if type(value) is np.ndarray:
         return value.copy()
     return value if isinstance(value, _SCALARS) else copy.deepcopy(value)
-
-
-Seeds: TypeAlias = Mapping[int, int | None]
-Options: TypeAlias = Data | None
 
 
 class EnvironmentAdapter(abc.ABC):
@@ -119,17 +119,17 @@ class EnvironmentAdapter(abc.ABC):
     rewards: list[float]
     terminated: list[bool]
     truncated: list[bool]
-    masks: list[Any] | None
+    masks: list[Mask] | None
 
     @abc.abstractmethod
-    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
         """Begin episodes in some environments, with seeds; return their first observations.
 
         Where one is missing, the episode begins with the next `step`, which returns it.
         """
 
     @abc.abstractmethod
-    def step(self, actions: Sequence[Any]) -> Any:
+    def step(self, actions: Elements) -> Elements:
         """Take an action in each, any one where the episode has not begun.
 
         Returns what is observed, in an array or a list: the last observations where episodes end.
@@ -147,14 +147,14 @@ class OneEnvironment(EnvironmentAdapter):
         self.rewards, self.terminated, self.truncated = [0.0], [False], [False]
         self.masks = [None] if has_action_masks(env) else None
 
-    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
         """Begin its episode."""
         first, info = reset_env(self._env, seeds[0], options)
         if self.masks is not None:
             self.masks = [mask_in(info)]
         return {0: first}
 
-    def take(self, action: Any) -> tuple[Any, float, bool, bool]:
+    def take(self, action: Element) -> tuple[Element, float, bool, bool]:
         """Take an action; return what a step gives but for the info."""
         observation, reward, terminated, truncated, info = step_env(self._env, copied(action))
         reward, terminated, truncated = checked_outcome(reward, terminated, truncated)
@@ -162,7 +162,7 @@ class OneEnvironment(EnvironmentAdapter):
             self.masks = [None if terminated else mask_in(info)]
         return observation, reward, terminated, truncated
 
-    def step(self, actions: Sequence[Any]) -> Any:
+    def step(self, actions: Elements) -> Elements:
         """Take the only action."""
         observation, self.rewards[0], self.terminated[0], self.truncated[0] = self.take(actions[0])
         return observation[np.newaxis] if type(observation) is np.ndarray else [observation]
@@ -177,11 +177,11 @@ class Transition(NamedTuple):
     """
 
     observation: ArrayLike
-    action: Any
+    action: Element
     reward: float
     next_observation: ArrayLike
     terminated: bool
-    next_mask: Any = None
+    next_mask: Mask = None
 
 
 class Learner(Protocol):
@@ -195,7 +195,7 @@ class Learner(Protocol):
     def begin_episode(self) -> None:
         """Note that an episode begins."""
 
-    def act(self, observation: Any, explore: bool = True) -> Any:
+    def act(self, observation: Element, explore: bool = True) -> Element:
         """Choose an action; without `explore` nothing may be learned or remembered."""
 
     def learn(self, transition: Transition) -> None:
@@ -218,21 +218,25 @@ class EachLearner:
         """Note that an episode begins."""
         self._learner.begin_episode(**self.arguments[environment])
 
-    def read(self, name: str, observations: Any) -> Any:
+    def read(self, name: str, observations: Elements) -> Elements:
         """Return observations as `act` and `learn` take them, copied; ValueError names them."""
         return [copied(observation) for observation in observations]
 
-    def flat(self, observation: Any) -> NDArray[np.float64]:
+    def flat(self, observation: Element) -> NDArray[np.float64]:
         """Return the numbers of an observation that was read, for a file."""
         return np.asarray(self._learner.flat_observation(observation))
 
-    def masks(self, masks: list[Any]) -> Any:
+    def masks(self, masks: list[Mask]) -> Masks:
         """Return masks of all environments as `act` and `learn` take them; ValueError names one."""
         return masks
 
     def act(
-        self, observations: Any, actions: Sequence[Any], environments: list[int], masks: Any = None
-    ) -> Any:
+        self,
+        observations: Elements,
+        actions: Elements,
+        environments: list[int],
+        masks: Masks | None = None,
+    ) -> Elements:
         """Return actions as `learn` takes them: new ones in these, the others as they were."""
         chosen = list(actions)
         for i in environments:
@@ -240,20 +244,20 @@ class EachLearner:
             chosen[i] = self._learner.act(observations[i], **self.arguments[i], **mask)
         return chosen
 
-    def elements(self, actions: Any) -> Any:
+    def elements(self, actions: Elements) -> Elements:
         """Return the elements of the action space that `act` has chosen."""
         return actions
 
     def learn(
         self,
-        observations: Any,
-        actions: Any,
+        observations: Elements,
+        actions: Elements,
         rewards: list[float],
-        next_observations: Any,
+        next_observations: Elements,
         terminated: list[bool],
         environments: list[int],
         progress: list[float],
-        next_masks: Any = None,
+        next_masks: Masks | None = None,
     ) -> int:
         """Learn steps in the first of these environments or more; return in how many.
 
@@ -269,30 +273,31 @@ class EachLearner:
         return 1
 
 
+class CoreParts(NamedTuple):
+    """The core of an agent, and functions around it."""
+
+    core: Controller
+    read: Callable[[str, Elements], NDArray[np.float64]]
+    elements: Callable[[NDArray[np.float64]], Array]
+    mask: Callable[[str, Mask], NDArray[np.uint8] | None]
+
+
 class _CoreLearner(EachLearner):
     """An agent of the core, which acts or learns in all environments with one call."""
 
-    def __init__(
-        self,
-        learner: Any,
-        n_environments: int,
-        core: Controller,
-        read: Callable[[str, Any], NDArray[np.float64]],
-        elements: Callable[[NDArray[np.float64]], Array],
-        mask: Callable[[str, Any], NDArray[np.uint8] | None],
-    ) -> None:
+    def __init__(self, learner: Learner, n_environments: int, parts: CoreParts) -> None:
         super().__init__(learner, n_environments)
-        self.progressing = self._core = core
-        self._read, self._elements, self._mask = read, elements, mask
-        self._n_actions = sum(core.n_actions)
+        self.progressing = self._core = parts.core
+        self._read, self._elements, self._mask = parts.read, parts.elements, parts.mask
+        self._n_actions = sum(parts.core.n_actions)
 
-    def read(self, name: str, observations: Any) -> NDArray[np.float64]:
+    def read(self, name: str, observations: Elements) -> NDArray[np.float64]:
         return self._read(name, observations)
 
-    def flat(self, observation: Any) -> NDArray[np.float64]:
+    def flat(self, observation: Element) -> NDArray[np.float64]:
         return np.array(observation)
 
-    def masks(self, masks: list[Any]) -> NDArray[np.uint8]:
+    def masks(self, masks: list[Mask]) -> NDArray[np.uint8]:
         rows = np.ones((len(masks), self._n_actions), np.uint8)
         for i, mask in enumerate(masks):
             if (row := self._mask("action_mask", mask)) is not None:
@@ -300,7 +305,11 @@ class _CoreLearner(EachLearner):
         return rows
 
     def act(
-        self, observations: Any, actions: Sequence[Any], environments: list[int], masks: Any = None
+        self,
+        observations: Elements,
+        actions: Elements,
+        environments: list[int],
+        masks: Any = None,
     ) -> NDArray[np.float64]:
         chosen = self._core.act_each(observations, environments, masks)
         if len(environments) < len(chosen):
@@ -308,16 +317,16 @@ class _CoreLearner(EachLearner):
                 chosen[i] = np.ravel(actions[i])  # an element of the space after a replay
         return chosen
 
-    def elements(self, actions: NDArray[np.float64]) -> Array:
+    def elements(self, actions: Any) -> Array:
         return self._elements(actions)
 
     def learn(self, *outcomes: Any) -> int:
         return self._core.learn_each(*outcomes)
 
 
-def each_learner(learner: Any, n_environments: int) -> EachLearner:
+def each_learner(learner: Learner, n_environments: int) -> EachLearner:
     """Return a learner in all environments; an agent of the core acts and learns in one call."""
-    core_parts = getattr(type(learner), "core_parts", None)
-    parts = core_parts and core_parts(learner)
-    learner_class = _CoreLearner if parts else EachLearner
-    return learner_class(learner, n_environments, *(parts or ()))
+    core_parts: Callable[..., CoreParts | None] | None = getattr(type(learner), "core_parts", None)
+    if core_parts and (parts := core_parts(learner)):
+        return _CoreLearner(learner, n_environments, parts)
+    return EachLearner(learner, n_environments)

@@ -13,7 +13,7 @@ from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any, TypeAlias
 
-from sdnn.environments.types import Data
+from sdnn.environments.types import AnyEnv, Data
 from sdnn.support.interrupts import Interrupts
 from sdnn.training.episodes import Episodes
 from sdnn.training.evaluation import evaluate
@@ -31,7 +31,7 @@ class TrainingLoop(abc.ABC):
     """The loop of a training; `Training` has its arguments and its files."""
 
     agent: Any
-    env: Any
+    env: AnyEnv
     evaluation_env: Any
     steps: int | None
     episodes: int | None

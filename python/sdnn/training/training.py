@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.environments.space_kinds import require_same_kind
-from sdnn.environments.types import Data, Env, VectorEnv
+from sdnn.environments.types import Data, Env, Info, VectorEnv
 from sdnn.support.arguments import flag, has_methods, path_of, require, shown, whole
 from sdnn.support.display import Displayed
 from sdnn.training.episodes import Episodes, adapter_for
@@ -182,7 +182,7 @@ class Training(TrainingLoop):
         evaluation_env: Env | None = None,
         evaluation_episodes: int = 10,
         limit_bootstraps: bool = True,
-        reset_options: Callable[[int], Mapping[str, Any]] | None = None,
+        reset_options: Callable[[int], Info] | None = None,
     ) -> None:
         has_methods("agent", agent, "an agent", "act", "learn", "begin_episode")
         has_methods("env", env, "an environment, as of gymnasium.make(id)", "reset", "step")
@@ -288,7 +288,7 @@ class Training(TrainingLoop):
         steps: int | None = None,
         episodes: int | None = None,
         repeat_episodes: bool = True,
-        reset_options: Callable[[int], Mapping[str, Any]] | None = None,
+        reset_options: Callable[[int], Info] | None = None,
     ) -> Self:
         """Read a training that `save` wrote, to resume exactly where it was.
 

@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 
 from sdnn.environments.spaces import has_mask
-from sdnn.environments.types import VectorEnv
+from sdnn.environments.types import Element, Elements, Info, Mask, VectorEnv
 from sdnn.support.arguments import array_of
 from sdnn.training.interfaces import (
     EnvironmentAdapter,
@@ -44,11 +44,11 @@ class _Listed(EnvironmentAdapter):
         self.n_environments = env.num_envs
         self.masks = [None] * env.num_envs if has_action_masks(env) else None
 
-    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
         first = self._of_each(seeds, lambda env, i: env.reset({0: seeds[i]})[0])
         return dict(zip(seeds, self._converted(first), strict=True))
 
-    def step(self, actions: Sequence[Any]) -> Any:
+    def step(self, actions: Elements) -> Elements:
         steps = self._of_each(range(self.n_environments), lambda env, i: env.take(actions[i]))
         columns = map(list, zip(*steps, strict=True))
         observations, self.rewards, self.terminated, self.truncated = columns
@@ -68,7 +68,7 @@ class _Listed(EnvironmentAdapter):
             self.masks = [env.masks[0] if env.masks else None for env in self._adapters]
         return results
 
-    def _converted(self, observations: list[Any]) -> Any:
+    def _converted(self, observations: list[Element]) -> Elements:
         """Return observations in the numbers of their space, as the vector itself does.
 
         Others stay as they are: the agent refuses them by name.
@@ -98,9 +98,9 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         self._mode = _autoreset_mode(env)
         self.n_environments = env.num_envs
         self.masks = [None] * env.num_envs if has_action_masks(env) else None
-        self._begun: list[Any] = []  # masks after resets in the same step
+        self._begun: list[Mask] = []  # masks after resets in the same step
 
-    def _step(self, actions: Any) -> tuple[Any, Any]:
+    def _step(self, actions: Elements) -> tuple[Elements, Elements]:
         """Return what is observed, and what is after resets in the same step."""
         batch, rewards, terminated, truncated, infos = step_env(self._env, self._batch(actions))
         observations = _listed(self._env, batch)
@@ -120,7 +120,7 @@ class _Vector(EnvironmentAdapter, abc.ABC):
             return last, observations
         return observations, observations
 
-    def _take_masks(self, infos: Any, terminated: Sequence[bool], ended: Sequence[bool]) -> None:
+    def _take_masks(self, infos: Info, terminated: Sequence[bool], ended: Sequence[bool]) -> None:
         """Take the masks of what is observed: of episodes that ended, those of their ends."""
         if self.masks is None:
             return
@@ -133,11 +133,11 @@ class _Vector(EnvironmentAdapter, abc.ABC):
             masks = [last[i] if has_ended else masks[i] for i, has_ended in enumerate(ended)]
         self.masks = masks
 
-    def _masks_in(self, infos: Any, needed: Sequence[bool]) -> list[Any]:
+    def _masks_in(self, infos: Info, needed: Sequence[bool]) -> list[Mask]:
         """Return the masks of environments in infos, where needed; UnusableStepError without."""
         if not any(needed):
             return [None] * self.n_environments
-        masks = mask_in(infos)
+        masks: Any = mask_in(infos)
         has_mask_of = infos.get("_action_mask", np.ones(self.n_environments, bool))
         for i in np.flatnonzero(needed):
             if not has_mask_of[i]:
@@ -145,13 +145,13 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         rows = list(zip(*masks, strict=True)) if isinstance(masks, tuple) else masks
         return [rows[i] if is_needed else None for i, is_needed in enumerate(needed)]
 
-    def _note_masks(self, infos: Any, begun: Collection[int]) -> None:
+    def _note_masks(self, infos: Info, begun: Collection[int]) -> None:
         """Note the masks of the environments that were reset."""
         if self.masks is not None:
             rows = self._masks_in(infos, [i in begun for i in range(self.n_environments)])
             self.masks = [rows[i] if i in begun else m for i, m in enumerate(self.masks)]
 
-    def _batch(self, actions: Any) -> Any:
+    def _batch(self, actions: Elements) -> Element:
         """Return a copy of the actions as the environment takes them."""
         space: Any = self._env.single_action_space
         if type(actions) is np.ndarray:
@@ -159,7 +159,7 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         batch: Any = create_empty_array(space, self.n_environments)
         return concatenate(space, actions, batch)
 
-    def _column(self, name: str, values: Any, kinds: str, what: str) -> list[Any]:
+    def _column(self, name: str, values: object, kinds: str, what: str) -> list[Any]:
         """Return one value for each environment; UnusableStepError if there are others."""
         what = f"{self.n_environments} {what}"
         try:
@@ -181,17 +181,17 @@ class _SeparateResets(_Vector):
 
     can_repeat = True
 
-    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
         mask = np.array([i in seeds for i in range(self.n_environments)])
         # Without the option where it is not needed: some wrappers have complete resets only.
         options = None if mask.all() else {"reset_mask": mask}
-        listed: Any = [seeds.get(i) for i in range(self.n_environments)]
+        listed = [seeds.get(i) for i in range(self.n_environments)]
         observations, infos = reset_env(self._env, listed, options)
         self._note_masks(infos, seeds)
         rows = _listed(self._env, observations)
         return {i: rows[i] for i in seeds}
 
-    def step(self, actions: Sequence[Any]) -> Any:
+    def step(self, actions: Elements) -> Elements:
         return self._step(actions)[0]
 
 
@@ -202,9 +202,9 @@ class _OwnResets(_Vector):
 
     def __init__(self, env: VectorEnv) -> None:
         super().__init__(env)
-        self._after_resets: Any = None
+        self._after_resets: Elements | None = None
 
-    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Any]:
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
         if self._after_resets is None:
             observations, infos = reset_env(self._env, seeds[0], None)
             self._note_masks(infos, range(self.n_environments))
@@ -215,12 +215,12 @@ class _OwnResets(_Vector):
             self.masks = [self._begun[i] if i in seeds else m for i, m in enumerate(self.masks)]
         return {i: self._after_resets[i] for i in seeds}
 
-    def step(self, actions: Sequence[Any]) -> Any:
+    def step(self, actions: Elements) -> Elements:
         observations, self._after_resets = self._step(actions)
         return observations
 
 
-def _listed(env: VectorEnv, observations: Any) -> Any:
+def _listed(env: VectorEnv, observations: Element) -> Elements:
     """Return observations one by one, not copied."""
     if type(observations) is np.ndarray:
         return observations
