@@ -58,13 +58,13 @@ def reader_of(dataset: Any) -> Callable[[], Iterator[Logged]]:
     """
     if isinstance(dataset, str | Path):
         path = path_of("dataset", dataset)
-        return lambda: _table_lines(path) if path.suffix.lower() == ".csv" else _json_lines(path)
+        is_table = path.suffix.lower() == ".csv"
+        return lambda: _followed(_table_lines(path)) if is_table else _json_lines(path)
+    if hasattr(dataset, "columns") and hasattr(dataset, "iloc"):  # a table of pandas
+        dataset = {str(name): dataset[name].to_numpy() for name in dataset.columns}
     if isinstance(dataset, Mapping):
         columns = _columns_of(dataset)
-        return lambda: _rows(columns, "row")
-    if hasattr(dataset, "columns") and hasattr(dataset, "iloc"):  # a table of pandas
-        columns = _columns_of({str(name): dataset[name].to_numpy() for name in dataset.columns})
-        return lambda: _rows(columns, "row")
+        return lambda: _followed(_rows(columns, "row"))
     if callable(getattr(dataset, "iterate_episodes", None)):
         return lambda: _items(dataset.iterate_episodes())
     if isinstance(dataset, Iterable):
@@ -85,10 +85,9 @@ def _json_lines(path: Path) -> Iterator[Logged]:
         yield _transition(values, f"line {number}")
 
 
-def _table_lines(path: Path) -> Iterator[Logged]:
+def _table_lines(path: Path) -> Iterator[tuple[str, Data]]:
     """Read a file of comma-separated values, whose first line has the names."""
     names: list[str] = []
-    before: Data | None = None
     for number, line in _lines(path):
         try:
             cells = next(csv.reader(io.StringIO(line.decode())), [])
@@ -100,23 +99,33 @@ def _table_lines(path: Path) -> Iterator[Logged]:
         expected = f"have {len(names)} cells, as many as there are names"
         require(len(cells) == len(names), f"dataset, line {number}", expected, cells)
         values = {name: [_cell(cell)] for name, cell in zip(names, cells, strict=True)}
-        columns = _columns_of(values, f"dataset, line {number}")
-        row = {name: column[0] for name, column in columns.items() if name != "_n_rows"}
-        if "next_observations" in row:
-            yield _logged(row, f"line {number}")
+        for _, row in _rows(_columns_of(values, f"dataset, line {number}"), ""):
+            yield f"line {number}", row
+
+
+def _followed(rows: Iterable[tuple[str, Data]], *, is_episode: bool = False) -> Iterator[Logged]:
+    """Read rows; where they have no next observations these are the observations of the next row.
+
+    The last step of an episode that was cut off has none then, and is left out.
+    """
+    waiting: tuple[Data, str] | None = None
+    for place, row in rows:
+        if waiting is not None:
+            waiting[0]["next_observations"] = row["observations"]
+            yield _logged(*waiting)
+            waiting = None
+        if "rewards" not in row:  # only what follows the last step
             continue
-        if before is not None and not _is_cut(before):
-            before["next_observations"] = row["observations"]
-            yield _logged(before, f"line {number - 1}")
-        before = row
-        if _flag("terminations", before.get("terminations", False)):
-            before["next_observations"] = row["observations"]
-            yield _logged(before, f"line {number}")
-            before = None
-
-
-def _is_cut(row: Info) -> bool:
-    return _flag("truncations", row.get("truncations", False))
+        if "next_observations" in row:
+            yield _logged(row, place)
+            continue
+        ends = _flag("terminations", row.get("terminations", False))
+        is_cut = _flag("truncations", row.get("truncations", False))
+        if is_episode or not (ends or is_cut):
+            waiting = row, place
+        elif ends:
+            row["next_observations"] = row["observations"]  # whose value is not asked for
+            yield _logged(row, place)
 
 
 def _cell(text: str) -> Any:
@@ -156,7 +165,8 @@ def _items(items: Iterable[Any]) -> Iterator[Logged]:
                 yield _transition(values, f"transition {number}")
             else:
                 columns = _columns_of(values, f"dataset, episode {number}", is_episode=True)
-                yield from _rows(columns, f"episode {number}, step", is_episode=True)
+                rows = _rows(columns, f"episode {number}, step", is_episode=True)
+                yield from _followed(rows, is_episode=True)
 
 
 _ROW = ("observations", "actions", "rewards", "next_observations", "terminations", "truncations")
@@ -250,7 +260,7 @@ def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = Fals
     if is_episode and one_more:
         is_whole = lengths["observations"] == n + 1
         require(is_whole, where, f"have {n + 1} observations for {n} rewards", lengths)
-    return {**columns, "_n_rows": n}
+    return columns
 
 
 def _column(name: str, column: Any) -> Any:
@@ -276,33 +286,15 @@ def _length(column: Any) -> int:
     return len(column) if np.ndim(column) or isinstance(column, list) else 0
 
 
-def _rows(columns: Data, place: str, *, is_episode: bool = False) -> Iterator[Logged]:
-    """Read rows of arrays. Without next observations they are those of the next row.
-
-    The last step of an episode that was cut off has none then, and is left out.
-    """
-    n = columns["_n_rows"]
-    observations, following = columns["observations"], columns.get("next_observations")
-    n_observations = _length(observations)
-    for i in range(n):
-        row = {
-            name: _at(column, i) for name, column in columns.items()
-            if name not in ("_n_rows", "observations", "next_observations")
-        }  # fmt: skip
-        row["observations"] = _at(observations, i)
-        is_last = is_episode and i == n - 1
-        ends = _flag("terminations", row.get("terminations", False))
-        is_cut = _flag("truncations", row.get("truncations", False)) or (is_last and not ends)
-        row["truncations"] = is_cut
-        if following is not None:
-            row["next_observations"] = _at(following, i)
-        elif i + 1 < n_observations and (is_episode or not (is_cut or ends)):
-            row["next_observations"] = _at(observations, i + 1)
-        elif ends:
-            row["next_observations"] = row["observations"]  # whose value is not asked for
-        else:
-            continue
-        yield _logged(row, f"{place} {i}")
+def _rows(columns: Data, place: str, *, is_episode: bool = False) -> Iterator[tuple[str, Data]]:
+    """Yield rows of arrays with their places, and the observation that follows the last one."""
+    n, has_next = _length(columns["rewards"]), "next_observations" in columns
+    for i in range(n if has_next else _length(columns["observations"])):
+        names = columns if i < n else ("observations",)
+        row = {name: _at(columns[name], i) for name in names}
+        if is_episode and i == n - 1 and not _flag("terminations", row.get("terminations", False)):
+            row["truncations"] = True
+        yield f"{place} {i}", row
 
 
 def _at(values: Any, t: int) -> Any:
