@@ -1,5 +1,4 @@
 import functools
-import importlib.util
 import os
 import re
 import shutil
@@ -10,6 +9,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 # Small matrix products are slower on several threads than on one, far slower on a busy machine.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -98,39 +98,46 @@ def configure(cmake):
     return _configure
 
 
-@pytest.fixture(scope="session")
-def fake():
-    """The module of the fake trial, which is also a script."""
-    path = Path(__file__).parent / "python" / "runs" / "fake_trial.py"
-    spec = importlib.util.spec_from_file_location("fake_trial", path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["fake_trial"] = module
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture
-def use_trial(monkeypatch, fake):
+def use_trial(monkeypatch):
     """Let every agent run in trials of another kind."""
+    from fake_trial import agents_with
     from sdnn.runs import AGENTS
 
     def _use(core_trial):
-        for name, entry in fake.agents_with(core_trial).items():
+        for name, entry in agents_with(core_trial).items():
             monkeypatch.setitem(AGENTS, name, entry)
 
     return _use
 
 
 @pytest.fixture
-def run(fake, use_trial):
+def invoke(monkeypatch, tmp_path, use_trial):
+    """Call the command in an empty folder, with another kind of trials if one is given."""
+    from sdnn.cli import main
+
+    monkeypatch.chdir(tmp_path)
+
+    def _invoke(*arguments, trial=None, **options):
+        if trial is not None:
+            use_trial(trial)
+        options = {"catch_exceptions": False} | options
+        return CliRunner().invoke(main, [str(one) for one in arguments], **options)
+
+    return _invoke
+
+
+@pytest.fixture
+def run(use_trial):
     """Run a plan into the store of a folder, with fake trials; returns outcome and digest."""
+    from fake_trial import FakeTrial, make_plan
     from sdnn.runs import ResultStore, run_trials
     from sdnn.runs.trial import records_digest
 
-    def _run(folder, plan=None, trial=fake.FakeTrial, **options):
+    def _run(folder, plan=None, trial=FakeTrial, **options):
         use_trial(trial)
         with ResultStore(folder) as store:
-            outcome = run_trials(fake.make_plan() if plan is None else plan, store, **options)
+            outcome = run_trials(make_plan() if plan is None else plan, store, **options)
             return outcome, records_digest(store.load())
 
     return _run

@@ -4,15 +4,15 @@ import os
 import sqlite3
 import stat
 import struct
-import subprocess
-import sys
 import zlib
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from made_records import hash_of, make_record
+from made_records import hash_of, hot_journal, make_record
+from processes import python
+from refusals import refuses
 from sdnn.agents import load_agent
 from sdnn.runs import EnvironmentSpec, ResultStore, Run, RunSpec, StoreError, TrialRows
 from sdnn.runs.curves import curves_of, write_curves
@@ -82,6 +82,8 @@ def test_no_flipped_bit_changes_the_rows_of_a_store(tmp_path):
         else:
             assert found == expected, "a bit of no meaning"
     assert n_noticed > 50
+    path.write_bytes(content[: len(content) // 2])
+    refuses("damaged", ResultStore, tmp_path, error=StoreError)
 
 
 def test_a_store_of_a_terabyte_is_refused(tmp_path):
@@ -172,21 +174,6 @@ def test_a_configuration_of_a_store_has_the_hash_beside_it(tmp_path):
         store.add(replace(record, key=record.key._replace(config_hash="0" * 16)))
         with pytest.raises(StoreError, match=r"results\.sqlite.*config_hash"):
             store.load()
-
-
-def hot_journal(path):
-    """Leave the journal of a process that was killed while it wrote."""
-    script = (
-        "import os, sqlite3, sys\n"
-        "connection = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
-        "connection.execute('PRAGMA cache_size = 1')\n"
-        "connection.execute('BEGIN IMMEDIATE')\n"
-        "for i in range(300):\n"
-        "    connection.execute(f'CREATE TABLE t{i} (x)')\n"
-        "os._exit(0)\n"
-    )
-    subprocess.run([sys.executable, "-c", script, str(path)], check=True)
-    return path.with_name(f"{path.name}-journal")
 
 
 def test_a_journal_of_a_store_rolls_back_and_removes_no_other_file(tmp_path):
@@ -340,11 +327,6 @@ except ValueError as error:
 def test_a_file_that_is_cut_while_it_is_read_is_damaged(tmp_path):
     path = tmp_path / "file"
     write_file(path, "agent", {"a": np.zeros(2**20)}, {})
-    done = subprocess.run(
-        [sys.executable, "-c", TRUNCATED, str(path)],
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
-    )
+    done = python("-c", TRUNCATED, path)
     assert done.returncode == 0, done.stderr
     assert f"{path} is damaged" in done.stdout

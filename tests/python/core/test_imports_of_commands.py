@@ -1,15 +1,13 @@
 """Which modules a command imports: those that are named, never those that merely lie there."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import gymnasium as gym
 import pytest
 
 import agent_files
+from processes import python
 from sdnn.agents import SDNNQLearning
 from sdnn.runs import EnvironmentSpec, Run, RunSpec
 
@@ -28,10 +26,7 @@ def folder(tmp_path, monkeypatch):
 
 def run(*arguments):
     """Run a command in the present folder; give the modules that it imported from there."""
-    path = os.pathsep.join(str(Path(p).resolve()) for p in sys.path if p)
-    subprocess.run(
-        [sys.executable, *arguments], env=os.environ | {"PYTHONPATH": path}, capture_output=True
-    )
+    python(*arguments)
     imported = Path("imported")
     return imported.read_text().split() if imported.exists() else []
 

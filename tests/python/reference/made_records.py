@@ -1,6 +1,8 @@
-"""A stored trial, made up."""
+"""A stored trial, made up, and what is left of a store whose writer was killed."""
 
 import hashlib
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -30,3 +32,20 @@ def make_record(trial=0, config="{}", steps=(50, 7), **changes):
         rows=rows,
     )
     return replace(record, **changes)
+
+
+KILLED = """
+import os, sqlite3, sys
+connection = sqlite3.connect(sys.argv[1], isolation_level=None)
+connection.execute("PRAGMA cache_size = 1")
+connection.execute("BEGIN IMMEDIATE")
+for i in range(300):
+    connection.execute(f"CREATE TABLE t{i} (x)")
+os._exit(0)
+"""
+
+
+def hot_journal(path):
+    """Leave the journal of a process that was killed while it wrote."""
+    subprocess.run([sys.executable, "-c", KILLED, str(path)], check=True)
+    return path.with_name(f"{path.name}-journal")

@@ -6,14 +6,15 @@ from sdnn.agents import Callback, Training
 
 
 class Stop(Callback):
-    """Saves and stops at a step."""
+    """Saves, where a path is given, and stops at a step."""
 
-    def __init__(self, at, path):
+    def __init__(self, at, path=None):
         self.at, self.path = at, path
 
     def on_step(self, training):
         if training.n_steps == self.at:
-            training.save(self.path)
+            if self.path is not None:
+                training.save(self.path)
             training.stop()
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+import fake_trial
 from refusals import refuses
 from sdnn.reports.plots import figure_bytes
 from sdnn.reports.statistics import Estimate, running_median
@@ -28,10 +29,10 @@ PICTURES = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
 
 
 @pytest.fixture
-def results(tmp_path, fake, run, collected):
+def results(tmp_path, run, collected):
     """Three fake trials of 3000 episodes, beside trials of another seed in the same store."""
-    run(tmp_path, fake.make_plan(2, 3000, root_seed=9))
-    run(tmp_path, fake.make_plan(3, 3000))
+    run(tmp_path, fake_trial.make_plan(2, 3000, root_seed=9))
+    run(tmp_path, fake_trial.make_plan(3, 3000))
     return collected(EXPERIMENT, tmp_path, 3, 3000)
 
 
@@ -67,8 +68,8 @@ def test_panels_hold_the_stored_rows(results):
         assert axes.get_xlim() == (0, 3000)
 
 
-def test_short_runs_are_drawn_as_they_are(tmp_path, fake, run, collected):
-    run(tmp_path, fake.make_plan(2, 300))
+def test_short_runs_are_drawn_as_they_are(tmp_path, run, collected):
+    run(tmp_path, fake_trial.make_plan(2, 300))
     results = collected(EXPERIMENT, tmp_path, 2, 300)
     for axes, result in zip(draw_experiment(EXPERIMENT, results).axes, results, strict=True):
         ((_, line),) = curves_of(axes)
@@ -104,8 +105,8 @@ def test_a_missing_matplotlib_is_an_error_before_any_trial(monkeypatch, tmp_path
     assert not (tmp_path / "out").exists()
 
 
-def test_a_run_reads_its_trials_once(monkeypatch, tmp_path, fake, use_trial):
-    use_trial(fake.FakeTrial)
+def test_a_run_reads_its_trials_once(monkeypatch, tmp_path, use_trial):
+    use_trial(fake_trial.FakeTrial)
     calls = []
 
     def counted(name, function):

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fake_trial
 import sdnn.reproduction.claims as reference_module
 import sdnn.reproduction.reproduce as reproduce_module
 from refusals import refuses
@@ -237,8 +238,8 @@ def test_reports_show_the_reference_results(fake_results):
     assert 'class="verdict open">inconclusive</td>' in page
 
 
-def test_only_more_trials_of_the_same_settings_are_shown(monkeypatch, tmp_path, fake, use_trial):
-    use_trial(fake.FakeTrial)
+def test_only_more_trials_of_the_same_settings_are_shown(monkeypatch, tmp_path, use_trial):
+    use_trial(fake_trial.FakeTrial)
 
     def shown(**request):
         found = []

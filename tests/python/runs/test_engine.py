@@ -6,6 +6,7 @@ import time
 import pytest
 from rich.console import Console
 
+import fake_trial
 from refusals import refuses
 from sdnn.reproduction import EXPERIMENTS, plan_trials
 from sdnn.runs import ResultStore, StoreError, WorkerLostError, run_trials
@@ -88,19 +89,19 @@ def test_a_failure_in_a_batch_affects_its_trial_alone(tmp_path, monkeypatch):
     assert [f.planned for f in outcome.failures] == [bad]
 
 
-def test_stored_trials_are_not_run_again(tmp_path, fake, run):
+def test_stored_trials_are_not_run_again(tmp_path, run):
     made = []
 
     def make(*, seed, **parts):
         made.append(seed)
-        return fake.FakeTrial(seed=seed, **parts)
+        return fake_trial.FakeTrial(seed=seed, **parts)
 
-    run(tmp_path, fake.make_plan(2), make)
+    run(tmp_path, fake_trial.make_plan(2), make)
     assert len(made) == 4
-    outcome, digest = run(tmp_path, fake.make_plan(3), make)
+    outcome, digest = run(tmp_path, fake_trial.make_plan(3), make)
     assert (outcome.n_planned, outcome.n_reused, outcome.n_run) == (6, 4, 2)
     assert len(made) == 6
-    assert run(tmp_path, fake.make_plan(3), make) == (
+    assert run(tmp_path, fake_trial.make_plan(3), make) == (
         type(outcome)(n_planned=6, n_reused=6, n_run=0, failures=(), interrupted=False),
         digest,
     )
@@ -108,17 +109,17 @@ def test_stored_trials_are_not_run_again(tmp_path, fake, run):
 
 
 @pytest.mark.parametrize("change", [{"root_seed": 1}, {"n_episodes": 310}])
-def test_other_settings_are_other_trials(tmp_path, fake, run, change):
-    run(tmp_path, fake.make_plan())
-    outcome, _ = run(tmp_path, fake.make_plan(**change))
+def test_other_settings_are_other_trials(tmp_path, run, change):
+    run(tmp_path, fake_trial.make_plan())
+    outcome, _ = run(tmp_path, fake_trial.make_plan(**change))
     assert outcome.n_run == 6
 
 
-def test_observer_hears_every_trial_from_the_calling_thread(tmp_path, fake, run):
+def test_observer_hears_every_trial_from_the_calling_thread(tmp_path, run):
     recorder = Recorder()
-    run(tmp_path, fake.make_plan(2), observer=recorder)
+    run(tmp_path, fake_trial.make_plan(2), observer=recorder)
     assert recorder.events[0] == ("begun", 4, 0, 1200)
-    for planned in fake.make_plan(2):
+    for planned in fake_trial.make_plan(2):
         mine = [event for event in recorder.events[1:] if event[1] == planned.key]
         assert mine[0] == ("advanced", planned.key, 0)
         assert mine[-1][0] == "finished"
@@ -127,13 +128,13 @@ def test_observer_hears_every_trial_from_the_calling_thread(tmp_path, fake, run)
         assert episodes[-1] == 300
 
 
-def test_failing_trial_does_not_stop_the_others(tmp_path, fake, run):
-    plan = fake.make_plan()
+def test_failing_trial_does_not_stop_the_others(tmp_path, run):
+    plan = fake_trial.make_plan()
 
     def make(*, seed, **parts):
         if seed == plan[0].key.seed:
             raise RuntimeError("broken")
-        return fake.FakeTrial(seed=seed, **parts)
+        return fake_trial.FakeTrial(seed=seed, **parts)
 
     recorder = Recorder()
     outcome, _ = run(tmp_path, plan, make, observer=recorder)
@@ -144,8 +145,8 @@ def test_failing_trial_does_not_stop_the_others(tmp_path, fake, run):
 
 
 @pytest.mark.parametrize("kind", [SystemExit, KeyboardInterrupt, GeneratorExit])
-def test_a_thread_that_ends_silently_is_a_failure(tmp_path, fake, run, kind):
-    class Leaving(fake.FakeTrial):
+def test_a_thread_that_ends_silently_is_a_failure(tmp_path, run, kind):
+    class Leaving(fake_trial.FakeTrial):
         def __init__(self, **_parts):
             raise kind("left")
 
@@ -155,12 +156,12 @@ def test_a_thread_that_ends_silently_is_a_failure(tmp_path, fake, run, kind):
     assert {str(f.error) for f in outcome.failures} == {f"the trial raised {kind('left')!r}"}
 
 
-def test_interruption_keeps_finished_trials(tmp_path, fake, run):
+def test_interruption_keeps_finished_trials(tmp_path, run):
     """Ctrl-C comes while the second trial runs: it is given up, the first stays stored."""
     made = []
     before = signal.getsignal(signal.SIGINT)
 
-    class Interrupting(fake.FakeTrial):
+    class Interrupting(fake_trial.FakeTrial):
         def __init__(self, *, seed, **parts):
             super().__init__(seed=seed, **parts)
             made.append(seed)
@@ -185,7 +186,7 @@ def test_interruption_keeps_finished_trials(tmp_path, fake, run):
     assert digest == run(tmp_path / "whole")[1]
 
 
-def test_unwritable_store_stops_the_run(tmp_path, fake, use_trial):
+def test_unwritable_store_stops_the_run(tmp_path, use_trial):
     from sdnn.runs import run_trials
 
     class Full(ResultStore):
@@ -194,14 +195,14 @@ def test_unwritable_store_stops_the_run(tmp_path, fake, use_trial):
 
     made = []
 
-    class Counted(fake.SlowTrial):
+    class Counted(fake_trial.SlowTrial):
         def __init__(self, *, seed, **parts):
             super().__init__(seed=seed, **parts)
             made.append(seed)
 
     use_trial(Counted)
     with Full(tmp_path) as store, pytest.raises(StoreError, match="disk full"):
-        run_trials(fake.make_plan(10, 50), store, executor=ThreadExecutor(1))
+        run_trials(fake_trial.make_plan(10, 50), store, executor=ThreadExecutor(1))
     assert len(made) < 20
 
 
@@ -224,15 +225,15 @@ class Scripted:
 
 
 @pytest.fixture
-def record(fake, tmp_path, run):
+def record(tmp_path, run):
     """The first trial's record, as another run gave it."""
-    run(tmp_path / "other", fake.make_plan(1))
+    run(tmp_path / "other", fake_trial.make_plan(1))
     with ResultStore(tmp_path / "other") as store:
-        return store.load([fake.make_plan(1)[0].key])[0]
+        return store.load([fake_trial.make_plan(1)[0].key])[0]
 
 
-def test_an_executor_reports_and_the_engine_stores(tmp_path, fake, run, record):
-    plan = fake.make_plan(1)
+def test_an_executor_reports_and_the_engine_stores(tmp_path, run, record):
+    plan = fake_trial.make_plan(1)
     lost = WorkerLostError("gone")
     script = (
         lambda a, b: Noted("hear"),
@@ -258,14 +259,14 @@ def test_an_executor_reports_and_the_engine_stores(tmp_path, fake, run, record):
     assert "all (0 to go)" in text.getvalue()
 
 
-def test_an_executor_is_closed_when_the_store_fails(tmp_path, fake, run, record, monkeypatch):
+def test_an_executor_is_closed_when_the_store_fails(tmp_path, run, record, monkeypatch):
     def full(store, record, *, is_exact=True):
         raise StoreError("disk full")
 
     executor = Scripted(lambda a, b: Finished(a, record), lambda a, b: pytest.fail("asked again"))
     monkeypatch.setattr(ResultStore, "add", full)
     with pytest.raises(StoreError, match="disk full"):
-        run(tmp_path, fake.make_plan(1), executor=executor)
+        run(tmp_path, fake_trial.make_plan(1), executor=executor)
     assert executor.closed
     nobody = Scripted(lambda: pytest.fail("asked without need"))
     assert run(tmp_path, [], executor=nobody)[0].n_planned == 0

@@ -2,6 +2,7 @@
 
 import pytest
 
+import fake_trial
 from made_records import make_record
 from sdnn.runs import ResultStore, forecast
 from sdnn.runs.forecast import wall_seconds
@@ -17,10 +18,10 @@ learning.discount = [0.8, 0.9]
 """
 
 
-def test_stored_trials_count_and_else_a_probe(fake, use_trial, study, tmp_path, monkeypatch):
+def test_stored_trials_count_and_else_a_probe(use_trial, study, tmp_path, monkeypatch):
     made = []
 
-    class Probed(fake.FakeTrial):
+    class Probed(fake_trial.FakeTrial):
         def __init__(self, **options):
             made.append(options["seed"])
             super().__init__(**options)

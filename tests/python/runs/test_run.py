@@ -1,6 +1,5 @@
 import errno
 import json
-import os
 import random
 import subprocess
 import sys
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 
 import drifting_env  # noqa: F401
+from processes import python
 from refusals import refuses
 from run_specs import run_spec
 from sdnn.agents import Callback, Training, load_agent
@@ -20,6 +20,7 @@ from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunError, RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrialRows
 from sdnn.support.files import lock
+from stopped_training import Stop
 
 SMALL = {
     "approximator": {"n_hidden_units": 60, "n_active_units": 20, "n_pattern_units": 20},
@@ -77,15 +78,6 @@ def test_a_run_is_made_where_a_killed_one_has_left_its_first_file(tmp_path):
         refuses("other", Run.create, tmp_path / "other", CONFIG, error=RunError)
 
 
-class StopAt(Callback):
-    def __init__(self, step):
-        self._step = step
-
-    def on_step(self, training):
-        if training.n_steps == self._step:
-            training.stop()
-
-
 def test_a_run_equals_the_training_of_its_configuration(whole, tmp_path):
     run = whole(CONFIG)
     env, evaluation_env = (
@@ -120,7 +112,7 @@ def test_a_run_stopped_at_any_step_resumes_exactly(whole, tmp_path, config):
     steps = sorted(random.Random(5).sample(range(1, 400), 12))
     run = Run.create(tmp_path / "run", config)
     for step in steps:  # within an episode, as good as always
-        outcome = Run.open(run.folder).train(callbacks=[StopAt(step)])
+        outcome = Run.open(run.folder).train(callbacks=[Stop(step)])
         assert (outcome.n_steps, outcome.reason) == (step, "stopped")
     assert Run.open(run.folder).train().reason == "done"
     assert contents(run) == expected
@@ -162,9 +154,7 @@ def test_a_run_killed_at_any_instant_resumes_exactly(whole, tmp_path):
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(config.values()))
     script = Path(__file__).with_name("kill_run.py")
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-    command = [sys.executable, script, tmp_path / "run", path, "12", "8"]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    done = python(script, tmp_path / "run", path, "12", "8")
     assert done.returncode == 0, done.stderr
     killed, *left = map(int, done.stdout.split())
     assert killed >= 10
@@ -190,7 +180,7 @@ def test_a_target_stops_the_run_and_a_new_goal_drops_it(tmp_path):
 def test_a_new_goal_is_kept_when_the_run_is_stopped_again(tmp_path):
     run = Run.create(tmp_path / "run", run_spec(CONFIG, steps=50))
     run.train()
-    run.train(steps=120, callbacks=[StopAt(80)])
+    run.train(steps=120, callbacks=[Stop(80)])
     assert Run.open(run.folder).train().n_steps == 120
     refuses("120", run.train, steps=20, error=ConfigError)
     refuses("episodes", run.train, steps=200, episodes=20, error=ConfigError)
@@ -250,7 +240,7 @@ def test_a_run_counts_the_time_of_all_its_parts(tmp_path):
     parts = []
     for step in (150, 300, 400):
         before = time.thread_time()
-        run.train(callbacks=[StopAt(step)])
+        run.train(callbacks=[Stop(step)])
         parts.append(time.thread_time() - before)
     with ResultStore(run.folder, read_only=True) as store:
         (record,) = store.load()
@@ -368,7 +358,7 @@ def test_a_run_keeps_statistics_of_wrappers(tmp_path):
         }
     )
     cut, whole = (Run.create(tmp_path / name, spec) for name in ("cut", "whole"))
-    cut.train(callbacks=[StopAt(117)])
+    cut.train(callbacks=[Stop(117)])
     cut.train()
     whole.train()
     assert cut.rows() == whole.rows()

@@ -5,12 +5,13 @@ import sqlite3
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from made_records import make_record
+import fake_trial
+from made_records import hot_journal, make_record
+from processes import environment
 from refusals import refuses
 from sdnn.runs import ResultStore, StoreError, TrialRows
 from sdnn.runs.trial import records_digest
@@ -112,7 +113,7 @@ def test_a_folder_on_a_file_system_that_is_read_only(tmp_path):
          path.parent],
         capture_output=True,
         text=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+        env=environment(),
     )  # fmt: skip
     assert (done.returncode, done.stdout) == (0, "2 2\n"), done.stderr
 
@@ -256,50 +257,19 @@ def test_file_of_a_process_killed_before_the_schema_is_used(tmp_path):
     assert filled(tmp_path, 1)
 
 
-def test_damaged_bytes_never_give_wrong_rows(tmp_path):
-    path, digest = filled(tmp_path)
-    content = path.read_bytes()
-    expected = make_record(steps=range(1, 60)).rows.digest()
-    generator = np.random.default_rng(1)
-    n_noticed = 0
-    for _ in range(60):
-        damaged = bytearray(content)
-        begin = int(generator.integers(len(content)))
-        damaged[begin : begin + 64] = generator.bytes(len(damaged[begin : begin + 64]))
-        path.write_bytes(damaged)
-        try:
-            with ResultStore(tmp_path) as store:
-                records = store.load()
-        except StoreError as error:
-            message = str(error)
-            n_noticed += 1
-            assert str(path) in message
-            continue
-        # Labels that no figure reads may differ; rows and keys may not.
-        assert len(records) == 20
-        assert {r.rows.digest() for r in records} == {expected}
-    assert n_noticed > 30
-    path.write_bytes(content[: len(content) // 2])
-    refuses("damaged", ResultStore, tmp_path, error=StoreError)
-    path.write_bytes(content)
-    with ResultStore(tmp_path) as store:
-        assert records_digest(store.load()) == digest
-
-
-def test_killed_run_resumes_to_the_same_content(tmp_path, fake, run):
-    script = Path(fake.__file__)
+def test_killed_run_resumes_to_the_same_content(tmp_path, run):
     child = subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path / "killed")],
+        [sys.executable, fake_trial.__file__, str(tmp_path / "killed")],
         stdout=subprocess.PIPE,
         text=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+        env=environment(),
     )
     for _ in range(3):
         assert child.stdout.readline() == "stored\n"
     child.send_signal(signal.SIGKILL)
     child.wait()
     child.stdout.close()
-    plan = fake.make_plan(6, 100)
+    plan = fake_trial.make_plan(6, 100)
     outcome, resumed = run(tmp_path / "killed", plan)
     assert outcome.n_reused >= 3
     assert outcome.n_reused + outcome.n_run == len(plan) == 12
@@ -309,17 +279,7 @@ def test_killed_run_resumes_to_the_same_content(tmp_path, fake, run):
 def test_a_file_whose_making_was_killed_is_made_anew(tmp_path):
     """A kill inside the very first transaction leaves a journal that has to be rolled back."""
     path = tmp_path / "results.sqlite"
-    script = (
-        "import os, sqlite3, sys\n"
-        "connection = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
-        "connection.execute('PRAGMA cache_size = 1')\n"
-        "connection.execute('BEGIN IMMEDIATE')\n"
-        "for i in range(500):\n"
-        "    connection.execute(f'CREATE TABLE t{i} (x)')\n"
-        "os._exit(0)\n"
-    )
-    subprocess.run([sys.executable, "-c", script, str(path)], check=True)
-    assert path.with_name("results.sqlite-journal").stat().st_size > 0
+    assert hot_journal(path).stat().st_size > 0
     assert path.stat().st_size > 0
     with ResultStore(tmp_path) as store:
         store.add(make_record())

@@ -1,6 +1,8 @@
 """From a study file to configurations and trials, and what is said about wrong files."""
 
+import re
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -300,212 +302,41 @@ def test_errors_of_registered_settings_name_file_and_line(study, tmp_path, error
         sys.modules.pop("strict_agents", None)
 
 
-WRONG = {
-    "toml": ("[base]\nlearning.discount 2\n", 2, "must be TOML"),
-    "table": ("base = 2\n", 1, "base: must be a table, got 2"),
-    "top": ("[base]\n\n[axis]\n", 3, "axis: unknown key; did you mean axes?"),
-    "study key": ("[study]\nseeds = 3\n", 2, "study.seeds: unknown key; did you mean seed?"),
-    "study value": ("[study]\ntrials = 'x'\n", 2, "study.trials: must be a whole number, got 'x'"),
-    "trials": ("[study]\ntrials = 0\n", 2, "study.trials: must be a whole number of at least"),
-    "too many trials": (
-        "[study]\ntrials = 1_000_000_000\n[cases.s4]\n", 2,
-        "study.trials: must be at most 100000 in all",
-    ),
-    "too many combinations": (
-        "[cases.s4]\n[axes]\ncombine = 'product'\n"
-        + "".join(f"learning.{name} = {[n / 100 for n in range(100)]}\n"
-                  for name in ("epsilon", "discount", "learning_rate")),
-        3, "axes.combine: must give at most 5000 combinations",
-    ),
-    "deep": ("[base]\nenvironment.kwargs.a = " + 99 * "[" + 99 * "]", None, "base.environment"),
-    "a long key": ("[base]\n" + 99 * "a." + "a = 1", None, "must be TOML: a key must have"),
-    "seed": ("[study]\nseed = -1\n", 2, "study.seed: must be a whole number of at least 0, got -1"),
-    "no cases": ("[base]\nagent = 'fuzzy'\n", None, "no cases: give some of the paper's"),
-    "case": (
-        "[study]\ncases = [\n 's4',\n 's5-nois',\n]\n", 2,
-        "study.cases[1]: no case 's5-nois': neither a table [cases.s5-nois] nor a case of the"
-        " paper; did you mean s5-noise?",
-    ),
-    "unlisted case": (
-        "[study]\ncases = ['s4']\n[cases.x]\n", 3,
-        "cases.x: is not among the cases of [study]",
-    ),
-    "paper's case": (
-        "[cases.s4-noise]\n[cases.s4]\nenvironment.kwargs.sensors.noise = 0.1\n", 3,
-        "cases.s4.environment.kwargs.sensors.noise: s4 is a case with environment.id = sdnn/Paper",
-    ),
-    "no table of sensors": (
-        "[cases.x.environment]\nid = 'sdnn/PaperAcrobot-v0'\nkwargs.sensors = 3\n", 3,
-        "cases.x.environment.kwargs.sensors: must be a table",
-    ),
-    "paper's case elsewhere": (
-        "[cases.s4]\nenvironment = 'Pendulum-v1'\n", 2,
-        "cases.s4.environment: s4 is a case with",
-    ),
-    "reference": (
-        "[study]\nreference = 'slo'\n[cases.s4]\n[variants.slow]\n[variants.b]\n", 2,
-        "study.reference: no variant 'slo'; did you mean slow? possible: slow, b",
-    ),
-    "import": (
-        "[study]\nimports = ['json',\n'not_there_at_all']\n", 2,
-        "study.imports[1]: importing not_there_at_all failed: ModuleNotFoundError",
-    ),
-    "only in no case": (
-        "[cases.s4]\n[variants.a]\nonly = ['s4', 's5']\n", 3,
-        "variants.a.only[1]: no case 's5'; possible: s4",
-    ),
-    "settings in another case": (
-        "[cases.s4]\n[cases.x]\n[variants.a]\nonly = ['s4']\ncases.x.learning.epsilon = 0\n", 5,
-        "variants.a.cases.x: unknown key; possible: s4",
-    ),
-    "agent": (
-        "[cases.s4]\n[variants.a]\nagent = 'fuzzyy'\n", 3,
-        "variants.a.agent: must be one of sdnn-c, fuzzy, rbf,",
-    ),
-    "agents": ("[agents.dqn]\n[cases.s4]\n", 1, "agents.dqn: no such agent; possible: sdnn-c"),
-    "agent of agents": (
-        "[agents.fuzzy]\nagent = 'rbf'\n[cases.s4]\n", 2,
-        "agents.fuzzy.agent: settings of an agent cannot choose another one",
-    ),
-    "section": (
-        "[cases.s4]\n[base]\n\nlerning.discount = 0.5\n", 4,
-        "base.lerning.discount: unknown key; did you mean learning?",
-    ),
-    "setting": (
-        "[cases.s4]\n[base]\nlearning = { epsilon = 0.1, discont = 2 }\n", 3,
-        "base.learning.discont: unknown key; did you mean discount?",
-    ),
-    "setting of another agent": (
-        "[cases.s4]\n[base]\nlearning.learning_rate = 0.1\n[variants.f]\nagent = 'fuzzy'\n", 3,
-        "base.learning.learning_rate: unknown key; did you mean learning_coefficient?",
-    ),
-    "no table": ("[cases.s4]\n[base]\nlearning = 3\n", 3, "base.learning: must be a table"),
-    "float": (
-        "[cases.s4]\n[base.learning]\ndiscount = '0.5'\n", 3,
-        "base.learning.discount: must be a number, got '0.5'",
-    ),
-    "infinite": (
-        "[cases.s4]\n[base.environment.kwargs.acrobot]\ngravity = inf\n", 3,
-        "base.environment.kwargs.acrobot.gravity: must be finite, got inf",
-    ),
-    "int": (
-        "[cases.s4]\n[base.protocol]\nevaluate_every_episodes = 10.0\n", 3,
-        "base.protocol.evaluate_every_episodes: must be a whole number, got 10.0",
-    ),
-    "bool": (
-        "[cases.s4]\n[base.approximator]\nbalanced_anchors = 1\n", 3,
-        "base.approximator.balanced_anchors: must be True or False, got 1",
-    ),
-    "word": (
-        "[cases.s4]\n[axes]\n'learning.tie_rule' = ['uniform',\n'upper']\n", 3,
-        "axes.\"learning.tie_rule\"[1]: must be one of 'uniform', 'lowest', 'middle', got 'upper'",
-    ),
-    "array": (
-        "[cases.s4]\n[base]\napproximator.circular = [true, 1]\n", 3,
-        "base.approximator.circular: must be a sequence, each True or False, got [True, 1]",
-    ),
-    "optional": (
-        "[cases.s4]\n[base]\napproximator.u_low = 'x'\n", 3,
-        "base.approximator.u_low: must be a whole number, or None, got 'x'",
-    ),
-    "derived": (
-        "[cases.s4]\n[base]\napproximator.n_inputs = 4\n", 3,
-        "base.approximator.n_inputs: follows from the observations: omit it",
-    ),
-    "too deep": (
-        "[cases.s4]\n[base]\nlearning.discount = 0.5\n'learning.discount.x' = 0.6\n", 4,
-        'base."learning.discount.x": must be SECTION.NAME, or environment.kwargs.NAME, got learn',
-    ),
-    "infinite argument": (
-        "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.kwargs.g = inf\n", 3,
-        "base.environment.kwargs.g: must be finite, got inf",
-    ),
-    "twice": (
-        "[cases.s4]\n[base]\nlearning.discount = 0.5\n'learning.discount' = 0.6\n", 4,
-        'base."learning.discount": learning.discount is set twice',
-    ),
-    "short trials": (
-        "[cases.s4]\n[base]\nbudget.episodes = 9\n", 3,
-        "base.budget.episodes: must be at least evaluate_every_episodes (10), got 9",
-    ),
-    "axis": ("[cases.s4]\n[axes]\nlearning.epsilon = 5\n", 3, "axes.learning.epsilon: must be an"),
-    "axis twice": (
-        "[cases.s4]\n[axes]\nlearning.epsilon = [5, 5]\n", 3,
-        "axes.learning.epsilon: must be different values",
-    ),
-    "combine": (
-        "[cases.s4]\n[axes]\ncombine = 'all'\n", 3,
-        "axes.combine: must be one of 'one_at_a_time', 'product', got 'all'",
-    ),
-    "name taken": (
-        "[cases.s4]\n[axes]\nlearning.epsilon = [0]\n[variants.'epsilon=0']\n", 3,
-        "axes.learning.epsilon[0]: there is a variant 'epsilon=0' already",
-    ),
-    "case of a variant": (
-        "[cases.s4]\n[variants.a.cases.s6]\n", 2,
-        "variants.a.cases.s6: unknown key; possible: s4",
-    ),
-    "environment without id": (
-        "[cases.x]\nenvironment.noise = 0.1\n", 2,
-        "environment.id: must be given",
-    ),
-    "sensors": (
-        "[cases.x.environment]\nid = 'sdnn/PaperAcrobot-v0'\nkwargs.sensors.n_sensors = 9\n", 3,
-        "cases.x.environment.kwargs.sensors.n_sensors: must be in [4, 6], got 9",
-    ),
-    "discount": (
-        "[cases.s4]\n[variants.ok]\n[variants.bad]\nlearning.discount = 2\n", 4,
-        "variants.bad.learning.discount: must be in [0, 1], got 2"
-        " (case s4, variant bad)",
-    ),
-    "range": (
-        "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.ranges.0 = [1, 0]\n", 3,
-        "base.environment.ranges.0: must be finite, low < high, got 1.0 and 0.0",
-    ),
-    "seed of a trial": ("[base]\nseed = 3\n", 2, "base.seed: is no setting of a study"),
-    "presets": (
-        "[cases.s4]\n[variants.a]\nagent.preset = 'best'\n", 3,
-        "variants.a.agent.preset: must be one of 'paper', 'general', 'robust', 'small'",
-    ),
-}  # fmt: skip
+def wrong_studies(name):
+    """Yield texts of studies, the line that is wrong (0 if no line is), and the message about it.
+
+    A file of them has a title before each study, and the message after ``#!``.
+    """
+    text = Path(__file__, "../../../data/studies", name).resolve().read_text()
+    for title, study in re.findall(r"^=== (.*)\n((?:(?!===).*\n)+)", text, re.MULTILINE):
+        lines = [title, *study.splitlines()]
+        ((number, line),) = [(n, line) for n, line in enumerate(lines) if "#! " in line]
+        yield pytest.param(study, number, line.partition("#! ")[2], id=title.partition("  #!")[0])
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_errors_name_file_line_and_key(study, name, tmp_path):
-    text, line, message = WRONG[name]
-    with pytest.raises(ConfigError) as caught:
-        study(text)
-    place = str(tmp_path / "mine.toml") + ("" if line is None else f":{line}")
-    assert str(caught.value).startswith(f"{place}: {message}")
+PRODUCT = "[cases.s4]\n[axes]\ncombine = 'product'\n" + "".join(
+    f"learning.{name} = {[n / 100 for n in range(100)]}\n"
+    for name in ("epsilon", "discount", "learning_rate")
+)
 
 
 @pytest.mark.parametrize(
     ("text", "line", "message"),
     [
-        (
-            "[cases.s4]\n[axes.environment.kwargs]\nacrobot.integration_step = [\n0.02,\n0.3]\n", 3,
-            "axes.environment.kwargs.acrobot.integration_step[1]: must be a whole fraction",
-        ),
-        (
-            "[base]\nenvironment = 'MountainCar-v0'\n[variants.f]\nagent = 'fuzzy'\n", 2,
-            "base.environment: action_space must be a Box, got Discrete"
-            " (case MountainCar-v0, variant f)",
-        ),
-        ("[base]\nenvironment = 'Pendulm-v1'\n", 2, "base.environment: no environment"),
-        (
-            "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.kwargs = { gg = 3 }\n", 3,
-            "base.environment.kwargs.gg: Pendulum-v1 cannot be made",
-        ),
-        (
-            "[base]\nenvironment.id = 'CartPole-v1'\nenvironment.noise = 0.1\n", 2,
-            "environment.ranges.1: must be given",
-        ),
-        (
-            "[base]\nenvironment.id = 'Pendulum-v1'\nenvironment.ranges.7 = [0, 1]\n", 3,
-            "base.environment.ranges.7: Pendulum-v1 has the variables 0 to 2, got 7",
-        ),
+        *wrong_studies("wrong.txt"),
+        (PRODUCT, 3, "axes.combine: must give at most 5000 combinations"),
+        ("[base]\nenvironment.kwargs.a = " + 99 * "[" + 99 * "]", 0, "base.environment"),
+        ("[base]\n" + 99 * "a." + "a = 1", 0, "must be TOML: a key must have"),
     ],
-)  # fmt: skip
+)
+def test_errors_name_file_line_and_key(study, tmp_path, text, line, message):
+    with pytest.raises(ConfigError) as caught:
+        study(text)
+    place = f"{tmp_path / 'mine.toml'}:{line or ''}".rstrip(":")
+    assert str(caught.value).startswith(f"{place}: {message}")
+
+
+@pytest.mark.parametrize(("text", "line", "message"), [*wrong_studies("unusable.txt")])
 def test_errors_of_the_core_are_raised_before_any_trial(study, tmp_path, text, line, message):
     with pytest.raises(ConfigError) as caught:
         study(text).check()

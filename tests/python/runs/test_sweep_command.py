@@ -7,10 +7,8 @@ import re
 import sys
 
 import pytest
-from click.testing import CliRunner
 
-from sdnn.cli import main
-from sdnn.runs import AGENTS
+import fake_trial
 
 STUDY = """
 [study]
@@ -26,15 +24,12 @@ FILES = ["figure.png", "figure.svg", "report.html", "results.csv.gz", "results.m
 
 
 @pytest.fixture
-def invoke(monkeypatch, tmp_path, fake):
-    """Call the command in an empty folder, with fake trials unless told otherwise."""
-    monkeypatch.chdir(tmp_path)
+def invoke(invoke, tmp_path):
+    """Call the command beside a study, with fake trials unless told otherwise."""
 
-    def _invoke(*arguments, trial=fake.FakeTrial, study=STUDY):
-        for name, entry in fake.agents_with(trial).items():
-            monkeypatch.setitem(AGENTS, name, entry)
+    def _invoke(*arguments, trial=fake_trial.FakeTrial, study=STUDY):
         (tmp_path / "mine.toml").write_text(study)
-        return CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
+        return invoke(*arguments, trial=trial)
 
     return _invoke
 
@@ -131,14 +126,8 @@ def test_wrong_files_are_exit_code_2_and_leave_nothing(invoke, tmp_path, study, 
         assert [p.name for p in tmp_path.iterdir()] == ["mine.toml"]
 
 
-def test_a_file_that_is_not_there(invoke):
-    result = invoke("sweep", "nowhere.toml")
-    assert result.exit_code == 2
-    assert "nowhere.toml" in result.stderr
-
-
-def test_a_trial_that_raises_leaves_out_its_variant_only(invoke, fake, tmp_path):
-    class Raising(fake.FakeTrial):
+def test_a_trial_that_raises_leaves_out_its_variant_only(invoke, tmp_path):
+    class Raising(fake_trial.FakeTrial):
         def __init__(self, *, learning, sensors, **others):
             super().__init__(**others)
             self._fails = learning.discount == 0.8 and sensors.n_sensors == 6
@@ -190,8 +179,8 @@ def test_dry_run_counts_and_estimates_without_making_a_file(invoke, tmp_path):
     assert {t["source"] for t in done["trials"]} == {"2 stored trials"}
 
 
-def test_a_dry_run_reports_a_trial_that_raises(invoke, fake):
-    class Raising(fake.FakeTrial):
+def test_a_dry_run_reports_a_trial_that_raises(invoke):
+    class Raising(fake_trial.FakeTrial):
         def advance(self, n):
             raise OverflowError("a weight would leave its range")
 

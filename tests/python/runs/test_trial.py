@@ -9,7 +9,7 @@ from refusals import refuses
 from sdnn import _core
 from sdnn.agents import SDNNQLearning
 from sdnn.agents.registry import labels, title_of
-from sdnn.reproduction import Case, case_spec, paper_spec
+from sdnn.reproduction import Case, case_spec
 from sdnn.runs import (
     AGENTS,
     AgentEntry,
@@ -169,41 +169,6 @@ def test_a_registered_dataclass_is_the_configuration_of_its_agent(monkeypatch):
     assert spec.approximator == Nothing()
     assert '"name":"new"' in spec.canonical_json()
     assert len(spec.config_hash) == 16
-
-
-def short_spec(agent="sdnn-c", **changes):
-    tables = {"protocol": {"evaluate_every_episodes": 5}, "budget": {"episodes": 60}}
-    return paper_spec(agent=agent, **tables | changes)
-
-
-@pytest.mark.parametrize(
-    "spec",
-    [
-        *map(short_spec, ("sdnn-c", "rbf", "fuzzy")),
-        short_spec(
-            agent="fuzzy",
-            environment={
-                "kwargs": {
-                    "acrobot": {"max_decisions": 3, "penalty": -1.0},
-                    "sensors": {"n_sensors": 5, "noise": 0.02},
-                }
-            },
-            protocol={
-                "evaluate_every_episodes": 5,
-                "limit_bootstraps": False,
-                "noisy_evaluations": False,
-            },
-        ),
-    ],
-)
-def test_both_trials_of_a_specification_have_the_same_rows(spec):
-    core, trial = spec.make_trial(SEED), spec.replace(seed=SEED).make_training()
-    assert (type(core).__module__, spec.length) == (_core.__name__, 60)
-    core.advance(60)
-    trial.advance(60)
-    assert trial.n_decisions == core.n_decisions
-    assert trial.rows().digest() == TrialRows.of_tests(**core.test_rows()).digest()
-    trial.close()
 
 
 def test_a_specification_that_cpp_does_not_know_is_a_training():
