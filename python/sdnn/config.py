@@ -52,7 +52,7 @@ def fields_of(config_class: object) -> tuple[Field, ...]:
     return tuple(Field(*field) for field in getattr(config_class, "fields", ()))
 
 
-def values_of(config: object) -> dict[str, Any]:
+def values_of(config: object) -> dict[str, object]:
     """Return the values of all settings by name, in types that JSON has."""
     return {field.name: getattr(config, field.name) for field in fields_of(type(config))}
 

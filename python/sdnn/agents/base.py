@@ -48,7 +48,7 @@ from sdnn.support.arguments import (
     seed_of,
     whole,
 )
-from sdnn.support.display import line_of, table_of
+from sdnn.support.display import Displayed
 from sdnn.support.state_files import Arrays, Description, write_file
 from sdnn.training.files import CLASSES, Statistics, read_agent, read_statistics
 from sdnn.training.names import explained
@@ -79,7 +79,7 @@ def presets_of(listed: Mapping[str, Any], **more: Mapping[str, Any]) -> Mapping[
     )
 
 
-class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
+class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
     """The settings and the state of an agent, and its files; `Agent` adds acting and learning."""
 
     kind: ClassVar[str]
@@ -287,12 +287,6 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             "inputs": inputs,
             "seed": self.seed,
         }
-
-    def __repr__(self) -> str:
-        return line_of(self, self._facts())
-
-    def _repr_html_(self) -> str:
-        return table_of(self, self._facts())
 
     @property
     def scaling(self) -> Scaling | None:

@@ -5,14 +5,12 @@ Names are loaded when they are first used, so that ``import sdnn`` needs no scik
 
 from __future__ import annotations
 
-from typing import Any
-
 from sdnn.support.lazy import attach
 
 _load, __dir__, __all__ = attach(__name__, __file__)
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     try:
         return _load(name)
     except ModuleNotFoundError as error:

@@ -120,8 +120,7 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def predict(self, X: ArrayLike) -> Array:
         """Predict the labels of samples, shape (n_samples,)."""
         winners = self._winners(self.decision_function(X))  # first: it may raise NotFittedError
-        labels: Array = self.classes_[winners]
-        return labels
+        return self.classes_[winners]
 
     def _has_several_units(self) -> bool:
         return self.scheme == "one_vs_rest" and self.n_units_per_class != 1

@@ -97,8 +97,7 @@ class Fitted(Learned):
         if all(network.predicts_in_bytes(len(bins)) for network in networks):
             return np.stack([network.counts(bins, n_groups, n_threads) for network in networks])
         layers = [network.layer for network in networks]
-        counts: Ints = _core.counts_of_all(layers, bins, n_groups, n_threads)
-        return counts
+        return _core.counts_of_all(layers, bins, n_groups, n_threads)
 
     @property
     def pair_names_(self) -> list[tuple[str | int, str | int | None]]:
@@ -119,8 +118,7 @@ class Fitted(Learned):
             for feature in set(pair):
                 total[feature] += square
                 count[feature] += 1
-        means: Floats = total / np.maximum(count, 1)
-        return means
+        return total / np.maximum(count, 1)
 
     def save(self, path: str | Path) -> None:
         """Write the fitted estimator to a safetensors file with JSON metadata, without pickle.
@@ -211,8 +209,7 @@ class Fitted(Learned):
 
 def mean_of(arrays: Sequence[Array] | Array) -> Array:
     """Return the mean of several arrays, or a single array unchanged."""
-    mean: Array = np.mean(arrays, axis=0) if len(arrays) > 1 else arrays[0]
-    return mean
+    return np.mean(arrays, axis=0) if len(arrays) > 1 else arrays[0]
 
 
 def description_of(index: int, coding: Coding) -> dict[str, object]:

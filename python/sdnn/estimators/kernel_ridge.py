@@ -155,8 +155,7 @@ class BaseKernelRidge(CodedInputs):
         codings = self.kernel_.codings
         table = self._finite(self._validated(X, codings=codings), codings)
         parts = [self._kernel(table[rows]) @ self.dual_coef_ for rows in portions(len(table))]
-        outputs: Floats = np.concatenate(parts) + self.intercept_
-        return outputs
+        return np.concatenate(parts) + self.intercept_
 
 
 @explains_names()

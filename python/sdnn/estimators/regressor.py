@@ -207,13 +207,11 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
 
     def _in_counts(self, targets: Floats) -> Floats:
         """Return targets in units of the firing count, not rounded."""
-        counts: Floats = (targets - self.output_range_[:, 0]) / self._step()
-        return counts
+        return (targets - self.output_range_[:, 0]) / self._step()
 
     def _of_counts(self, counts: Array) -> Floats:
         """Return the outputs of firing counts, shape (n_samples, n_outputs)."""
-        values: Floats = self._step() * counts + self.output_range_[:, 0]
-        return values
+        return self._step() * counts + self.output_range_[:, 0]
 
     def _targets(self, y: Floats, at_once: bool = False) -> Floats:
         """Return targets in counts; those outside the range are clipped, refused, or widen it."""

@@ -12,7 +12,7 @@ from contextlib import suppress
 from numbers import Integral, Real
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, SupportsFloat, TypeVar
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,7 +37,7 @@ def shown(value: object) -> str:
         return object.__repr__(value)
 
 
-def array_of(name: str, value: Any, types: str = "fiub", what: str = "numbers") -> NDArray[Any]:
+def array_of(name: str, value: object, types: str = "fiub", what: str = "numbers") -> NDArray[Any]:
     """Read an array of any library, a number, or lists of such; ValueError for others.
 
     ``types`` are letters of the possible types, as in ``numpy.dtype.kind``, and ``what`` their word
@@ -50,8 +50,8 @@ def array_of(name: str, value: Any, types: str = "fiub", what: str = "numbers") 
     import numpy as np  # takes longer than all else that `import sdnn` loads
 
     is_plain = type(value) is np.ndarray or isinstance(value, np.generic)
-    if is_plain and value.dtype.kind in types:
-        return np.asarray(value)
+    if is_plain and (array := np.asarray(value)).dtype.kind in types:
+        return array
     rows = value if isinstance(value, list | tuple) else [value]
     has_mask = any(isinstance(row, np.ma.MaskedArray) for row in rows)
     require(not has_mask, name, f"be {what} without a mask", value)
@@ -106,18 +106,17 @@ def blamed(error: BaseException) -> tuple[str, str]:
     return name, (str(error) or type(error).__name__).removeprefix(f"{name} ")
 
 
-def choice(name: str, word: Any, members: Mapping[str, Member]) -> Member:
+def choice(name: str, word: object, members: Mapping[str, Member]) -> Member:
     """Find the member called ``word``; ValueError if none is.
 
     >>> choice("direction", "left", {"up": 1, "down": -1})
     Traceback (most recent call last):
     ValueError: direction must be one of 'up', 'down', got 'left'
     """
-    try:
+    if isinstance(word, str) and word in members:
         return members[word]
-    except (KeyError, TypeError):
-        names = ", ".join(repr(member) for member in members)
-        raise argument_error(name, f"must be one of {names}, got {shown(word)}") from None
+    names = ", ".join(map(repr, members))
+    raise argument_error(name, f"must be one of {names}, got {shown(word)}")
 
 
 def one_of(name: str, word: object, choices: tuple[str, ...]) -> str:
@@ -139,17 +138,18 @@ def _is_no_number(value: object) -> bool:
     return isinstance(value, bool) or _is_of_numpy(value, "timedelta64")
 
 
-def whole(name: str, value: Any, low: int, high: int) -> int:
+def whole(name: str, value: object, low: int, high: int) -> int:
     """Check that an argument is a whole number within bounds; ValueError if not.
 
     >>> whole("n_bins", 1, 2, 65535)
     Traceback (most recent call last):
     ValueError: n_bins must be a whole number in [2, 65535], got 1
     """
-    is_whole = isinstance(value, Integral) and not _is_no_number(value)
-    if not is_whole or not low <= value <= high:
-        raise argument_error(name, f"must be a whole number in [{low}, {high}], got {shown(value)}")
-    return int(value)
+    if isinstance(value, Integral) and not _is_no_number(value):
+        number = int(value)
+        if low <= number <= high:
+            return number
+    raise argument_error(name, f"must be a whole number in [{low}, {high}], got {shown(value)}")
 
 
 def seed_of(value: object) -> int:
@@ -175,17 +175,18 @@ def real(name: str, value: object) -> float:
         raise argument_error(name, problem, OverflowError) from None
 
 
-def reward_of(reward: Any) -> float:
+def reward_of(reward: object) -> float:
     """Read a reward: a number of any library, an array of one or a bool; else ValueError."""
     if isinstance(reward, float):  # NumPy's, too
         return float(reward)
     import numpy as np
 
-    is_numpy = isinstance(reward, np.ndarray | np.generic)
-    is_masked = isinstance(reward, np.ma.MaskedArray)
-    if is_numpy and not is_masked and reward.size == 1 and reward.dtype.kind in "fiub":
-        reward, is_numpy = reward.item(), False
-    if not is_numpy and hasattr(reward, "__float__"):
+    is_array = isinstance(reward, np.ndarray | np.generic)
+    if is_array and not isinstance(reward, np.ma.MaskedArray):
+        array = np.asarray(reward)
+        if array.size == 1 and array.dtype.kind in "fiub":
+            reward, is_array = array.item(), False
+    if isinstance(reward, SupportsFloat) and not is_array:
         with suppress(OverflowError, TypeError, ValueError):
             return float(reward)
     try:

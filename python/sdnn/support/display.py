@@ -6,21 +6,6 @@ from collections.abc import Mapping
 from html import escape
 
 
-def line_of(thing: object, facts: Mapping[str, object]) -> str:
-    """Return the class of a thing and facts about it, for a terminal."""
-    shown = ", ".join(f"{name} {fact}" for name, fact in facts.items())
-    return f"<{type(thing).__name__}: {shown}>"
-
-
-def table_of(thing: object, facts: Mapping[str, object]) -> str:
-    """Return the class of a thing and facts about it as a table in HTML, for a notebook."""
-    rows = "".join(
-        f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(str(fact))}</td></tr>"
-        for name, fact in facts.items()
-    )
-    return f"<table><caption>{escape(type(thing).__name__)}</caption>{rows}</table>"
-
-
 class Displayed:
     """An object that is displayed as the facts that `_facts` returns.
 
@@ -36,7 +21,12 @@ class Displayed:
         raise NotImplementedError
 
     def __repr__(self) -> str:
-        return line_of(self, self._facts())
+        facts = ", ".join(f"{name} {fact}" for name, fact in self._facts().items())
+        return f"<{type(self).__name__}: {facts}>"
 
     def _repr_html_(self) -> str:
-        return table_of(self, self._facts())
+        rows = "".join(
+            f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(str(fact))}</td></tr>"
+            for name, fact in self._facts().items()
+        )
+        return f"<table><caption>{escape(type(self).__name__)}</caption>{rows}</table>"

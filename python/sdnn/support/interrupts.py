@@ -7,11 +7,12 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Self, TypeAlias
 
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor
-    from typing import Self
+
+Handler: TypeAlias = Callable[[int, FrameType | None], object] | int | None
 
 
 class Interrupts:
@@ -26,7 +27,7 @@ class Interrupts:
     ) -> None:
         self._ask_to_stop = ask_to_stop
         self._signals = signals
-        self._before: dict[int, Any] = {}
+        self._before: dict[int, Handler] = {}
         self.received: int | None = None
 
     def __enter__(self) -> Self:

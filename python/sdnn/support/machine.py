@@ -9,6 +9,8 @@ levels; only the time differs.
 from __future__ import annotations
 
 import os
+import re
+from contextlib import suppress
 from pathlib import Path
 
 from sdnn import _core
@@ -19,13 +21,9 @@ _PROCESSOR_FILE = Path("/proc/cpuinfo")
 
 def processor() -> str:
     """Return the name of the processor, or "unknown"."""
-    try:
-        for line in _PROCESSOR_FILE.read_text().splitlines():
-            name, _, value = line.partition(":")
-            if name.strip() == "model name":
-                return value.strip()
-    except OSError:
-        pass
+    with suppress(OSError):
+        if model := re.search(r"^model name\s*:(.*)", _PROCESSOR_FILE.read_text(), re.MULTILINE):
+            return model[1].strip()
     import platform
 
     return platform.processor() or "unknown"

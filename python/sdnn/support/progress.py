@@ -7,11 +7,9 @@ import sys
 import time
 from collections.abc import Hashable
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 if TYPE_CHECKING:
-    from typing import Self
-
     from rich.console import Console
     from rich.progress import TaskID
 

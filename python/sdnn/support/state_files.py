@@ -34,12 +34,13 @@ _CHECKSUM = slice(8 + len(_BEGINNING), 16 + len(_BEGINNING))
 _TYPES = ("BOOL", "I8", "I16", "I32", "I64", "U8", "U16", "U32", "U64", "F16", "F32", "F64")
 """Types of arrays, as safetensors names them: those of NumPy."""
 
-Arrays = dict[str, NDArray[Any]]
+Array = NDArray[Any]
+Arrays = dict[str, Array]
 Description = dict[str, Any]
 
 
 def write_file(
-    path: Path, content: str, arrays: Mapping[str, NDArray[Any]], description: Mapping[str, Any]
+    path: Path, content: str, arrays: Mapping[str, Array], description: Mapping[str, object]
 ) -> None:
     """Write a file of an ``"agent"``, ``"training"`` or ``"estimator"``, whole or not at all.
 

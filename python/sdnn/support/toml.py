@@ -49,18 +49,18 @@ def line_of(text: str, key: KeyPath) -> int | None:
     return None
 
 
-def parse_toml(text: str) -> dict[str, Any]:
+def parse_toml(text: str) -> dict[str, object]:
     """Parse TOML; ValueError for a key of many parts, which would take unlimited time."""
     for part in re.split(r"[={},\n]", text):
         if part.count(".") > MOST_LEVELS:
             raise ValueError(f"a key must have at most {MOST_LEVELS} parts, got {part[:40]!r}...")
-    values: dict[str, Any] = msgspec.toml.decode(text)
+    values: dict[str, object] = msgspec.toml.decode(text)
     return values
 
 
-def deep_key(values: dict[str, Any]) -> KeyPath | None:
+def deep_key(values: dict[str, object]) -> KeyPath | None:
     """Return the key of a value that is too deep, or None."""
-    level: list[tuple[KeyPath, Any]] = [((), values)]
+    level: list[tuple[KeyPath, dict[str, object] | list[object]]] = [((), values)]
     for _ in range(MOST_LEVELS):
         items = (
             (key, value.items() if isinstance(value, dict) else enumerate(value))
