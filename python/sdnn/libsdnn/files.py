@@ -15,7 +15,7 @@ import numpy as np
 
 from sdnn import _core
 from sdnn.libsdnn.network import Library, LibsdnnInput, LibsdnnModel, LibsdnnParameters
-from sdnn.support.arguments import path_of, shown
+from sdnn.support.arguments import one_of, path_of
 from sdnn.support.files import read_bytes
 
 MOST_BYTES = 2**20  # size of a parameter file
@@ -124,13 +124,7 @@ class Entries(dict[str, str]):
 
     def one_of(self, name: str, default: str, *others: str) -> str:
         """Return an entry that is one of some words."""
-        word = self.get(name, default)
-        if word not in (default, *others):
-            choices = ", ".join((default, *others))
-            raise ValueError(
-                f"{name.replace('/', ' / ')} must be one of {choices}, got {shown(word)}"
-            )
-        return word
+        return one_of(name.replace("/", " / "), self.get(name, default), (default, *others))
 
     def whole(self, name: str, low: int, high: int) -> int:
         """Return an entry that is a whole number within bounds."""

@@ -214,12 +214,11 @@ def path_of(name: str, value: object) -> Path:
     Traceback (most recent call last):
     TypeError: path must be the name of a file, got None
     """
-    if not isinstance(value, str | os.PathLike):
-        raise argument_error(name, f"must be the name of a file, got {shown(value)}", TypeError)
-    text = os.fspath(value)
-    if not isinstance(text, str) or not text or "\0" in text:
-        raise argument_error(name, f"must be the name of a file, got {shown(value)}")
-    return Path(text)
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if isinstance(text, str) and text and "\0" not in text:
+        return Path(text)
+    error_class = TypeError if text is None else ValueError
+    raise argument_error(name, f"must be the name of a file, got {shown(value)}", error_class)
 
 
 def is_of_class(value: object, expected: type) -> bool:

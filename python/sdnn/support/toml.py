@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import bisect
+import functools
 import json
+import operator
 import re
 from contextlib import suppress
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import msgspec
 
@@ -36,8 +38,13 @@ def line_of(text: str, key: KeyPath) -> int | None:
             n_left -= len(beginning)
             if n_left < 0:
                 raise OverflowError
-            with suppress(msgspec.DecodeError):
-                return _has(msgspec.toml.decode(beginning), key)
+            try:
+                functools.reduce(operator.getitem, key, msgspec.toml.decode(beginning))
+                return True
+            except msgspec.DecodeError:
+                continue
+            except (IndexError, KeyError, TypeError):
+                return False
         return True
 
     with suppress(OverflowError):
@@ -73,15 +80,6 @@ def deep_key(values: dict[str, object]) -> KeyPath | None:
             if isinstance(inner, dict | list)
         ]
     return level[0][0] if level else None
-
-
-def _has(value: Any, key: KeyPath) -> bool:
-    for name in key:
-        try:
-            value = value[name]
-        except (IndexError, KeyError, TypeError):
-            return False
-    return True
 
 
 def dotted(key: KeyPath) -> str:
