@@ -121,17 +121,17 @@ def json_value(value: object) -> object:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def from_dict(data: Mapping[str, Any]) -> Coding:
+def from_dict(data: Mapping[str, object]) -> Coding:
     """Make the coding that `to_dict` described; lists become tuples.
 
     >>> from_dict({"coding": "circular", "period": 24.0}).period
     24.0
     """
     fields = {name: restored(value) for name, value in data.items() if name != "coding"}
-    return CODINGS[data["coding"]](**fields)
+    return CODINGS[str(data["coding"])](**fields)
 
 
-def restored(value: Any) -> Any:
+def restored(value: object) -> object:
     """Return the value that `json_value` described; lists become tuples."""
     if isinstance(value, Mapping):
         return from_dict(value)

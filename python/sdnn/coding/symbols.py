@@ -200,10 +200,10 @@ class WithMissing(Coding):
     def fit(self, column: Column, n_units: int) -> WithMissing:
         one_of("unknown", self.unknown, ("missing", "error"))
         learns = self.learns  # first, because it checks that the base is a coding
-        present = self._values(column[self._is_present(column)])
-        if learns and len(present) == 0:
+        values = self._values(column[self._is_present(column)])
+        if learns and len(values) == 0:
             raise ValueError("every value of an input is missing: there is nothing to learn")
-        return dataclasses.replace(self, base=self.base.fit(present, n_units))
+        return dataclasses.replace(self, base=self.base.fit(values, n_units))
 
     @property
     def learns(self) -> bool:
@@ -240,11 +240,16 @@ class WithMissing(Coding):
     def _is_present(self, column: Column) -> NDArray[np.bool_]:
         return np.array([not is_missing(value) for value in column.tolist()], dtype=bool)
 
-    def _values(self, present: Column) -> Column:
+    def _values(self, column: Column) -> Column:
         """Return values in the type of the base coding; numbers must be finite."""
         if not self.base.is_numeric:
-            return present
-        values = missing_as_nan(present)
+            return column
+        values = missing_as_nan(column)
         if not np.isfinite(values).all():
             raise ValueError("Input contains infinity")
         return values
+
+
+def present(coding: Coding) -> Coding:
+    """Return the coding of values that are not missing."""
+    return coding.base if isinstance(coding, WithMissing) else coding

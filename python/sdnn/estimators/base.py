@@ -325,7 +325,7 @@ class BaseSDNN(Fitted, CodedInputs):
         n_networks, code = self._n_networks(len(table)), network.input_code
         if n_networks > 1:
             limit, n_units = self.memory_limit, network.n_units
-            require_memory(limit, n_units, n_networks, code.n_units, code.codings, code.pairs)
+            require_memory(limit, n_units, n_networks, code.core.n_units, code.codings, code.pairs)
         self._note_inputs(self._finite(table, self.codings_))
         self.network_ = network.copy()
         random: np.random.RandomState = check_random_state(self.random_state)

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from sklearn.base import ClassifierMixin
+from numpy.typing import ArrayLike
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.multiclass import _ovr_decision_function, unique_labels
 
@@ -17,10 +16,10 @@ from sdnn.coding import Coding
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.columns import Array, Floats, Ints, Sample
 from sdnn.estimators.fitted import mean_of
-from sdnn.estimators.inputs import check_labels, class_labels
+from sdnn.estimators.inputs import CodedClassifier
 from sdnn.estimators.network import Network, Rule
 from sdnn.estimators.parameters import SHARE, documents, parameter, wholes, words
-from sdnn.estimators.training import ClassWeight, class_weights, sample_weights, weighted_mean
+from sdnn.estimators.training import class_weights, sample_weights, weighted_mean
 from sdnn.support.arguments import explains_names, require, shown
 
 UNITS_EACH = 60
@@ -32,7 +31,7 @@ STEEPNESS = 6.0  # factor of scores in the softmax
 @explains_names()
 @documents(BaseSDNN)
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
-class SDNNClassifier(ClassifierMixin, BaseSDNN):
+class SDNNClassifier(CodedClassifier, BaseSDNN):
     """Classification by a selective desensitization neural network, exact and online.
 
     Each input becomes a binary pattern; selective desensitization combines the patterns of each two
@@ -72,7 +71,6 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
 
     scheme: str = parameter("one_vs_rest", words(*_core.CLASS_SCHEMES))
     n_units_per_class: int | None = parameter(None, wholes(1, 1024), None)
-    class_weight: ClassWeight = parameter(None, words("balanced"), dict, None)
     correction_share: float = parameter(0.25, SHARE)
 
     def partial_fit(
@@ -82,14 +80,9 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         classes: ArrayLike | None = None,
         sample_weight: ArrayLike | None = None,
     ) -> Self:
-        """Present the samples once, in order; any portions give the same weights.
+        """Present the samples once, in order, as `SDNNRegressor.partial_fit` does.
 
-        ``sample_weight`` is the mean number of presentations: samples of weight 2 are presented
-        twice, and every other sample of weight 1/2.
-
-        The weights equal those of `fit` with ``max_iter=1, shuffle=False`` if ranges and categories
-        are given; otherwise the first call learns them. ``classes``, all labels that can occur,
-        must be given in the first call. Raises as `fit`.
+        ``classes``, all labels that can occur, must be given in the first call. Raises as `fit`.
         """
         self._require_classes(classes)
         return self._partial_fit(X, y, classes, sample_weight)
@@ -116,11 +109,6 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
         positive for the second.
         """
         return self._decision(self._bins(X), self._n_threads())
-
-    def predict(self, X: ArrayLike) -> Array:
-        """Predict the labels of samples, shape (n_samples,)."""
-        winners = self._winners(self.decision_function(X))  # first: it may raise NotFittedError
-        return self.classes_[winners]
 
     def _has_several_units(self) -> bool:
         return self.scheme == "one_vs_rest" and self.n_units_per_class != 1
@@ -150,12 +138,10 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
     def _check_samples(
         self, X: object, y: object, codings: Sequence[Coding] | None, in_fit: bool = False
     ) -> tuple[Array, Array]:
-        table, labels = self._validated(X, y, codings, ensure_min_samples=2 if in_fit else 1)
-        check_labels(labels)
-        return table, labels
+        return self._validated_labels(X, y, codings, n_samples=2 if in_fit else 1)
 
     def _set_outputs(self, y: ArrayLike) -> int:
-        self.classes_: Array = class_labels(y)
+        self._set_classes(y)
         n_classes = len(self.classes_)
         may_be_several, n_units_each = self.scheme == "one_vs_rest", self.n_units_per_class
         fits = may_be_several or n_units_each is None or n_units_each == 1
@@ -178,10 +164,10 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             )
         network = self.network_
         n_units = _core.n_units_for(self._scheme, len(classes)) * self._n_units_each
-        untrained = Network(network.input_code, n_units, seed=self._weight_seed)
+        untrained = Network(network.input_code, n_units, seed=self._weight_seed).layer
         weights, thresholds = untrained.weights, untrained.thresholds
-        weights[: network.n_units] = network.weights
-        thresholds[: network.n_units] = network.thresholds
+        weights[: network.n_units] = network.layer.weights
+        thresholds[: network.n_units] = network.layer.thresholds
         self.network_ = Network(network.input_code, n_units, weights=weights, thresholds=thresholds)
         self._earlier = ()
         self.classes_ = classes
@@ -248,10 +234,3 @@ class SDNNClassifier(ClassifierMixin, BaseSDNN):
             return -margins[:, 0]
         decision: Floats = _ovr_decision_function(margins <= 0, -margins, n_classes)
         return decision
-
-    @staticmethod
-    def _winners(decision: Floats) -> NDArray[np.int64]:
-        if decision.ndim == 1:
-            return (decision > 0).astype(np.int64)
-        winners: NDArray[np.int64] = np.argmax(decision, axis=1)
-        return winners

@@ -121,19 +121,13 @@ def field_names(coding: Coding) -> list[str]:
 
 def with_own_fields(coding: Coding, fields: Mapping[str, object]) -> Coding:
     """Return a coding with some fields, or fields of these, replaced."""
-    new: dict[str, Any] = {}
-    inner: dict[str, dict[str, object]] = {}
-    for name, value in fields.items():
+    if not all(has_field(coding, name) for name in fields):
+        raise ValueError(f"{coding!r} must have the fields {sorted(fields)}")
+    for name, value in sorted(fields.items()):  # "base" before "base__period"
         head, _, rest = name.partition("__")
-        if head not in field_names(coding):
-            raise ValueError(f"{coding!r} must have the fields {sorted(fields)}")
-        if rest:
-            inner.setdefault(head, {})[rest] = value
-        else:
-            new[head] = value
-    for head, fields_of_head in inner.items():
-        new[head] = with_fields(new.get(head, getattr(coding, head)), fields_of_head)
-    return dataclasses.replace(coding, **new) if new else coding  # type: ignore[type-var]
+        new = with_fields(getattr(coding, head), {rest: value}) if rest else value
+        coding = dataclasses.replace(coding, **{head: new})  # type: ignore[type-var]
+    return coding
 
 
 def of_categories(table: object) -> list[int]:

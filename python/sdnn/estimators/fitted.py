@@ -14,9 +14,9 @@ from sklearn.utils.validation import check_is_fitted
 
 from sdnn import _core
 from sdnn.coding import Coding, from_dict, to_dict
-from sdnn.coding.symbols import Categorical
+from sdnn.coding.symbols import Categorical, present
 from sdnn.estimators.columns import Array, Codings, Floats, Ints, coding_entries
-from sdnn.estimators.network import InputCode, Network, code_bytes, present
+from sdnn.estimators.network import InputCode, Network, code_bytes
 from sdnn.support.arguments import seed_of, whole
 from sdnn.support.state_files import Arrays, Description, read_file, write_file
 
@@ -54,6 +54,9 @@ class Fitted(Learned):
 
     coding: Codings
     memory_limit: int
+    n_iter_no_change: int
+    shuffle: bool
+    verbose: int
     network_: Network
     _earlier: tuple[Network, ...] = ()
     _n_weighted = 0  # samples with weights that partial_fit has received
@@ -77,12 +80,12 @@ class Fitted(Learned):
     @property
     def weights_(self) -> Ints:
         """Integer weights, shape (n_units, n_pairs * n_pattern_units)."""
-        return self._fitted_network.weights
+        return self._fitted_network.layer.weights
 
     @property
     def thresholds_(self) -> Ints:
         """Integer thresholds, shape (n_units,)."""
-        return self._fitted_network.thresholds
+        return self._fitted_network.layer.thresholds
 
     def _networks_for(self, n_samples: int) -> tuple[Network, ...]:
         """Return the averaged networks, ready to predict a number of samples."""
@@ -107,11 +110,10 @@ class Fitted(Learned):
 
     def _weight_changes(self) -> Floats:
         """Return the mean squared change of the weights of pairs with each feature."""
-        network = self.network_
-        code = network.input_code
+        network, code = self.network_, self.network_.input_code
         untrained = _core.ParallelPerceptron(code.core, network.n_units, seed=self._weight_seed)
-        change = network.weights - untrained.weights
-        of_pairs = change.reshape(network.n_units, len(code.pairs), code.n_units)
+        change = network.layer.weights - untrained.weights
+        of_pairs = change.reshape(network.n_units, len(code.pairs), code.core.n_units)
         squares: Floats = np.square(of_pairs, dtype=np.float64).sum(axis=(0, 2))
         total, count = np.zeros((2, self.n_features_in_))
         for pair, square in zip(code.pairs, squares.tolist(), strict=True):
@@ -126,17 +128,16 @@ class Fitted(Learned):
         Raises TypeError if a parameter cannot be written as JSON, such as a user-defined coding.
         """
         check_is_fitted(self, "network_")
-        held = vars(self)
-        code = self.network_.input_code
+        held, code = vars(self), self.network_.input_code
         tables = {id(table): table for table in (*code.modified, *code.modifiers)}
         number_of = {key: number for number, key in enumerate(tables)}
-        networks = (self.network_, *held.get("_earlier", ()))
+        networks = (self.network_, *self._earlier)
         arrays = {name: held[name] for name in ATTRIBUTES if isinstance(held.get(name), np.ndarray)}
         for number, table in enumerate(tables.values()):
             arrays[f"table.{number}"] = np.packbits(table > 0, axis=1)
         for number, network in enumerate(networks):
-            arrays[f"weights.{number}"] = narrowed(network.weights)
-            arrays[f"thresholds.{number}"] = narrowed(network.thresholds)
+            arrays[f"weights.{number}"] = narrowed(network.layer.weights)
+            arrays[f"thresholds.{number}"] = narrowed(network.layer.thresholds)
         attributes = {
             name: held[name] for name in ATTRIBUTES if name in held and name not in arrays
         }
@@ -150,7 +151,7 @@ class Fitted(Learned):
             "pairs": code.pairs,
             "n_units": self.network_.n_units,
             "n_networks": len(networks),
-            "n_pattern_units": code.n_units,
+            "n_pattern_units": code.core.n_units,
             "modified": [number_of[id(table)] for table in code.modified],
             "modifiers": [number_of[id(table)] for table in code.modifiers],
         }
@@ -281,10 +282,9 @@ def array_of_names(name: str, stored: Mapping[str, Any]) -> Array:
 
 def require_consistent(estimator: Fitted) -> None:
     """Raise ValueError if the parts of a loaded estimator do not fit together."""
-    held = vars(estimator)
-    seed_of(held["_weight_seed"])
-    network = estimator.network_
+    held, network = vars(estimator), estimator.network_
     code = network.input_code
+    seed_of(held["_weight_seed"])
     if "classes_" in held:
         n_units = _core.n_units_for(held["_scheme"], len(held["classes_"])) * held["_n_units_each"]
         fits = network.n_units == n_units

@@ -32,15 +32,6 @@ def pairs_of_new(n_before: int, n_new: int, random: np.random.RandomState) -> Pa
     return pairs
 
 
-def longer(table: Table, n_rows: int, random: np.random.RandomState) -> Table:
-    """Return a table with random patterns inserted before its last pattern, for missing values."""
-    n_new = n_rows - len(table)
-    if n_new == 0:
-        return table
-    patterns = _core.symbol_patterns(n_new, table.shape[1], int(random.randint(2**31 - 1)))
-    return np.vstack([table[:-1], patterns, table[-1:]])
-
-
 def grow(
     model: BaseSDNN, new: Mapping[str, Coding], changed: Mapping[int, Coding], most_columns: int
 ) -> bool:
@@ -51,7 +42,7 @@ def grow(
     more columns than ``most_columns``.
     """
     network, before = model.network_, model.network_.input_code
-    n_before, n_units = len(before.codings), before.n_units
+    n_before, n_units = len(before.codings), before.core.n_units
     n_patterns = sum(coding.size for coding in before.codings)  # differs at the next growth
     random = np.random.RandomState((model._weight_seed + n_patterns) % 2**32)
     added = pairs_of_new(n_before, len(new), random)
@@ -64,9 +55,12 @@ def grow(
     tables: dict[int, Table] = {}  # by identity: pairs share them
 
     def lengthened(table: Table, index: int) -> Table:
-        if id(table) not in tables:
-            tables[id(table)] = longer(table, codings[index].size, random)
-        return tables[id(table)]
+        """Return a table with random patterns before the last one, which is for missing values."""
+        n_new = codings[index].size - len(table)
+        if n_new and id(table) not in tables:
+            drawn = _core.symbol_patterns(n_new, n_units, int(random.randint(2**31 - 1)))
+            tables[id(table)] = np.vstack([table[:-1], drawn, table[-1:]])
+        return tables.get(id(table), table)
 
     modified = [
         lengthened(table, mu) for (mu, _), table in zip(before.pairs, before.modified, strict=True)
@@ -85,10 +79,11 @@ def grow(
         modifiers.append(np.ascontiguousarray(patterns[nu][:, order]))
     code = InputCode(codings, pairs, modified, modifiers)
     weights = np.zeros((network.n_units, code.core.n_columns), dtype=np.int32)
-    weights[:, : before.core.n_columns] = network.weights
+    weights[:, : before.core.n_columns] = network.layer.weights
     names = [*model.feature_names_in_.tolist(), *new]
     work = model._scratch()
-    work.network_ = Network(code, network.n_units, weights=weights, thresholds=network.thresholds)
+    thresholds = network.layer.thresholds
+    work.network_ = Network(code, network.n_units, weights=weights, thresholds=thresholds)
     work._earlier = ()
     work.feature_names_in_ = np.array(names, dtype=object)
     work.n_features_in_ = len(names)

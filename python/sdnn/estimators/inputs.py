@@ -11,9 +11,9 @@ from numbers import Number
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
-from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils import assert_all_finite
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, ClassifierMixin, RegressorMixin
+from sklearn.utils import Tags, assert_all_finite
 from sklearn.utils.multiclass import check_classification_targets, unique_labels
 from sklearn.utils.validation import validate_data
 
@@ -35,7 +35,7 @@ from sdnn.estimators.hints import first_of_words, hint_about
 from sdnn.estimators.network import InputCode
 from sdnn.estimators.outliers import OutlierWarning, numbers_to_range, usual_range, warn_caller
 from sdnn.estimators.parameters import parameter, words
-from sdnn.estimators.training import without_absent
+from sdnn.estimators.training import ClassWeight, without_absent
 from sdnn.support.arguments import require, shown
 
 MOST_BEYOND = 30.0  # outliers that are kept, in widths of the range of the others
@@ -43,32 +43,13 @@ DATES = (datetime.date, datetime.time, datetime.timedelta, np.datetime64, np.tim
 DATES_HINT = "give numbers for it, such as the hour with coding=[(Circular(period=24), columns)]"
 
 
-def check_labels(y: Array) -> None:
-    """Raise ValueError for values that are not the labels of classes."""
-    examples: dict[type, object] = {}
-    for label in y.ravel().tolist() if y.dtype == object else ():
-        label_type = str if isinstance(label, str) else type(label)
-        examples[Number if isinstance(label, Number) else label_type] = label
-    if len(examples) > 1:
-        mixed = shown(list(examples.values()))
-        raise ValueError(f"y must have labels that are all words or all numbers, got {mixed}")
-    check_classification_targets(y)
-
-
-def class_labels(y: ArrayLike) -> Array:
-    """Return the labels, sorted; ValueError for fewer than two."""
-    classes: Array = unique_labels(y)
-    if len(classes) < 2:
-        raise ValueError(f"at least two classes are needed, got one class: {classes!r}")
-    return classes
-
-
-def refuse_dates(X: Any) -> None:
+def refuse_dates(X: object) -> None:
     """Raise ValueError for a column of dates or times, which scikit-learn may take for numbers."""
     if hasattr(X, "iloc") and hasattr(X, "columns"):
-        names, rows = list(X.columns), X.head(1).astype(object).to_numpy()
+        names, rows = list(X.columns), X.iloc[:1].astype(object).to_numpy()
     elif getattr(X, "ndim", 0) == 2 and getattr(X, "dtype", np.dtype(float)).kind in "OmM":
-        names, rows = list(range(X.shape[1])), X[:1]
+        rows = np.asarray(X)[:1]
+        names = list(range(rows.shape[1]))
     else:
         return
     for name, value in zip(names, rows[0] if len(rows) else (), strict=False):
@@ -107,7 +88,7 @@ class CodedInputs(BaseEstimator):
     _has_outliers = False
     """Whether the last call that learned left values out of a range."""
 
-    def set_params(self, **params: Any) -> Self:
+    def set_params(self, **params: object) -> Self:
         """Set parameters; ``coding__length_scale`` and the like replace fields of codings.
 
         In a list, ``coding__0__period`` is a field of the first coding, ``coding__period`` one of
@@ -119,9 +100,9 @@ class CodedInputs(BaseEstimator):
             self.coding = with_fields(self.coding, fields)
         return self
 
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
+    def get_params(self, deep: bool = True) -> dict[str, object]:
         """Return the parameters; ``deep`` adds fields of codings, as `set_params` names them."""
-        params: dict[str, Any] = super().get_params(deep)
+        params: dict[str, object] = super().get_params(deep)
         if deep:
             is_list = isinstance(self.coding, list | tuple)
             with contextlib.suppress(ValueError):  # `fit` will refuse this coding
@@ -130,7 +111,7 @@ class CodedInputs(BaseEstimator):
                     params |= {prefix + name: getattr(coding, name) for name in field_names(coding)}
         return params
 
-    def __sklearn_tags__(self) -> Any:
+    def __sklearn_tags__(self) -> Tags:
         """Declare that numbers may be missing."""
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
@@ -302,8 +283,8 @@ class CodedInputs(BaseEstimator):
             row = np.array(values, dtype=object)
         require(row.shape == (len(codings),), "x", f"have {len(codings)} features", x)
         if not code.is_numeric:
-            checked: Array = self._finite(row[None], codings)[0]
-            return checked
+            self._finite(row[None], codings)
+            return row
         is_number = np.isfinite(row)
         if not is_number.all():
             is_number |= np.isnan(row) & code.may_lack
@@ -341,7 +322,7 @@ class CodedInputs(BaseEstimator):
 class CodedRegressor(RegressorMixin, CodedInputs):
     """Validation of numeric targets, of one output or several."""
 
-    def __sklearn_tags__(self) -> Any:
+    def __sklearn_tags__(self) -> Tags:
         """Declare that several outputs can be learned at once."""
         tags = super().__sklearn_tags__()
         tags.target_tags.multi_output = True
@@ -365,3 +346,44 @@ class CodedRegressor(RegressorMixin, CodedInputs):
         """Return the lowest and highest target of each output, perhaps without outliers."""
         low, high = zip(*(self._range("y", column) for column in targets.T), strict=True)
         return np.array(low), np.array(high)
+
+
+@dataclasses.dataclass(eq=False, repr=False)
+class CodedClassifier(ClassifierMixin, CodedInputs):
+    """Validation of labels, and prediction of the label with the largest score."""
+
+    class_weight: ClassWeight = parameter(None, words("balanced"), dict, None)
+
+    def _validated_labels(
+        self, X: object, y: object, codings: Sequence[Coding] | None = None, n_samples: int = 1
+    ) -> tuple[Array, Array]:
+        """Return samples and labels; ValueError for fewer than ``n_samples``."""
+        table, labels = self._validated(X, y, codings, ensure_min_samples=n_samples)
+        examples: dict[type, object] = {}
+        for label in labels.ravel().tolist() if labels.dtype == object else ():
+            label_type = str if isinstance(label, str) else type(label)
+            examples[Number if isinstance(label, Number) else label_type] = label
+        if len(examples) > 1:
+            mixed = shown(list(examples.values()))
+            raise ValueError(f"y must have labels that are all words or all numbers, got {mixed}")
+        check_classification_targets(labels)
+        return table, labels
+
+    def _set_classes(self, y: ArrayLike) -> None:
+        self.classes_: Array = unique_labels(y)
+        if len(self.classes_) < 2:
+            raise ValueError(f"at least two classes are needed, got one class: {self.classes_!r}")
+
+    @abc.abstractmethod
+    def decision_function(self, X: ArrayLike) -> Floats:
+        """Return the score of each class; of two classes, positive for the second."""
+
+    @staticmethod
+    def _winners(decision: Floats) -> NDArray[np.int64]:
+        winners = decision > 0 if decision.ndim == 1 else np.argmax(decision, axis=1)
+        return np.asarray(winners, dtype=np.int64)
+
+    def predict(self, X: ArrayLike) -> Array:
+        """Predict the labels of samples, shape (n_samples,)."""
+        winners = self._winners(self.decision_function(X))  # first: it may raise NotFittedError
+        return self.classes_[winners]

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 from scipy.special import log_softmax, softmax
-from sklearn.base import ClassifierMixin
 from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
 from sdnn.coding.kernel import N_UNITS, AnalyticKernel
 from sdnn.estimators.columns import Array, Floats, PairChoice, input_pairs
-from sdnn.estimators.inputs import CodedInputs, CodedRegressor, check_labels, class_labels
+from sdnn.estimators.inputs import CodedClassifier, CodedInputs, CodedRegressor
 from sdnn.estimators.leave_one_out import (
     Rows,
     Samples,
@@ -26,7 +25,7 @@ from sdnn.estimators.leave_one_out import (
     solve,
 )
 from sdnn.estimators.parameters import RandomState, documents, parameter, wholes, words
-from sdnn.estimators.training import ClassWeight, class_weights, sample_weights
+from sdnn.estimators.training import class_weights, sample_weights
 from sdnn.support.arguments import explains_names, real
 
 AUTO = words("auto")
@@ -192,7 +191,7 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
 @explains_names()
 @documents(BaseKernelRidge)
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
-class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
+class SDNNKernelClassifier(CodedClassifier, BaseKernelRidge):
     """Classification by kernel ridge with the network's kernel, on one-hot targets.
 
     Its settings need no search. It does not learn online.
@@ -218,13 +217,10 @@ class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
     True
     """
 
-    class_weight: ClassWeight = parameter(None, words("balanced"), dict, None)
-
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
-        table, labels = self._validated(X, y)
-        check_labels(labels)
+        table, labels = self._validated_labels(X, y)
         counts = self._counts_of(sample_weight, len(table))
-        self.classes_: Array = class_labels(labels)
+        self._set_classes(labels)
         one_hot = (labels[:, None] == self.classes_).astype(np.float64)
         of_classes = class_weights(self.class_weight, labels)
         left_out, rows = self._solve(X, table, one_hot, counts, of_classes)
@@ -244,12 +240,6 @@ class SDNNKernelClassifier(ClassifierMixin, BaseKernelRidge):
         """
         scores = self._outputs(X)
         return scores[:, 1] - scores[:, 0] if len(self.classes_) == 2 else scores
-
-    def predict(self, X: ArrayLike) -> Array:
-        """Predict the labels of samples, shape (n_samples,)."""
-        winners = self._outputs(X).argmax(axis=1)  # first: it may raise NotFittedError
-        labels: Array = self.classes_[winners]
-        return labels
 
     def predict_proba(self, X: ArrayLike) -> Floats:
         """Return a softmax of the scores, shape (n_samples, n_classes)."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.coding import Coding, WithMissing
-from sdnn.coding.symbols import missing_as_nan
+from sdnn.coding.symbols import missing_as_nan, present
 from sdnn.estimators.columns import PAIR_BUDGET, Array, Floats, Ints, Pairs
 
 Rule = tuple[Array, float] | tuple[Ints, int, str]
@@ -37,11 +37,6 @@ def code_bytes(codings: Sequence[Coding], pairs: Sequence[tuple[int, int]], n_un
     """Return about how many bytes drawing and keeping the patterns takes."""
     of_pairs = sum(codings[mu].size + codings[nu].size for mu, nu in pairs)
     return int(of_pairs * n_units * 9 / 8)  # a byte a unit, and a bit in the core
-
-
-def present(coding: Coding) -> Coding:
-    """Return the coding of values that are not missing."""
-    return coding.base if isinstance(coding, WithMissing) else coding
 
 
 class InputCode:
@@ -73,11 +68,6 @@ class InputCode:
 
     def __reduce__(self) -> tuple[object, ...]:
         return InputCode, (self.codings, self.pairs, self.modified, self.modifiers)
-
-    @property
-    def n_units(self) -> int:
-        """Units per pattern."""
-        return self.core.n_units
 
     def bins(self, table: Array) -> Ints:
         """Return the bins of samples, (n_samples, n_inputs) to (n_samples, n inputs in pairs)."""
@@ -121,13 +111,10 @@ class InputCode:
     @functools.cached_property
     def _ranges(self) -> tuple[list[int], Floats, Floats]:
         """The inputs that have a range, and their lowest and highest values."""
-        ranges = {
-            index: limits
-            for index in self.used
-            if (limits := self.codings[index].ends()) is not None
-        }
-        low, high = np.array(list(ranges.values()), dtype=np.float64).reshape(-1, 2).T
-        return list(ranges), low, high
+        indices = [index for index in self.used if self.codings[index].ends() is not None]
+        ranges = [self.codings[index].ends() for index in indices]
+        low, high = np.array(ranges, dtype=np.float64).reshape(-1, 2).T
+        return indices, low, high
 
     def outside(self, table: Array) -> tuple[int, str]:
         """Count the values that are outside their input's range, and describe the first of them."""
@@ -209,7 +196,8 @@ class Network:
             ) from None
 
     def __reduce__(self) -> tuple[object, ...]:
-        return Network, (self.input_code, self.n_units, 0, self.weights, self.thresholds)
+        layer = self.layer
+        return Network, (self.input_code, self.n_units, 0, layer.weights, layer.thresholds)
 
     @property
     def layer(self) -> _core.ParallelPerceptron:
@@ -269,16 +257,6 @@ class Network:
             online.learn_labels(bins, *rule)
         self._learned = ended
         return True
-
-    @property
-    def weights(self) -> Ints:
-        """Copy of the weights, shape (n_units, n_columns)."""
-        return self.layer.weights
-
-    @property
-    def thresholds(self) -> Ints:
-        """Copy of the thresholds, shape (n_units,)."""
-        return self.layer.thresholds
 
     def potentials(self, bins: Ints, n_threads: int) -> Ints:
         """Return the potentials, shape (n_samples, n_units)."""

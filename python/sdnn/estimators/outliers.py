@@ -7,8 +7,8 @@ import warnings
 
 import numpy as np
 
-from sdnn.coding import Coding, WithMissing
-from sdnn.coding.symbols import missing_as_nan
+from sdnn.coding import Coding
+from sdnn.coding.symbols import missing_as_nan, present
 from sdnn.estimators.columns import Array, Floats
 
 TAIL = 0.025  # share of values at either end that may be outliers
@@ -56,7 +56,7 @@ def middle_of(ordered: Floats) -> tuple[float, float]:
 
 def numbers_to_range(coding: Coding, column: Array) -> Floats | None:
     """Return the numbers whose range a coding learns, NaN where missing; None without a range."""
-    base = coding.base if isinstance(coding, WithMissing) else coding
+    base = present(coding)
     if not (base.is_numeric and base.learns) or getattr(base, "spacing", "even") == "quantile":
         return None
     return missing_as_nan(column) if base is not coding else column.astype(np.float64)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import clone, is_classifier
+from sklearn.base import BaseEstimator, clone, is_classifier
 from sklearn.utils import _safe_indexing
 
 from sdnn.coding import Coding, CorrelationMatrix, Symbolic, WithMissing
+from sdnn.coding.symbols import present
 from sdnn.estimators.columns import Array, Floats, Pairs, input_pairs
 
 HELD_OUT_EVERY = 5  # samples
@@ -18,7 +17,7 @@ FEWEST_SAMPLES = 10
 
 def with_categories(coding: Coding, column: Array) -> Coding:
     """Return a coding with all categories of the column, if it could refuse unknown categories."""
-    base = coding.base if isinstance(coding, WithMissing) else coding
+    base = present(coding)
     is_strict = not isinstance(coding, WithMissing) or coding.unknown == "error"
     if isinstance(base, CorrelationMatrix) or (isinstance(base, Symbolic) and is_strict):
         return coding.fit(column, n_units=2)
@@ -37,7 +36,7 @@ def pairs_among(features: NDArray[np.int64], seed: int) -> Pairs:
 
 
 def select_pairs(
-    model: Any, X: ArrayLike, y: Array, weights: Floats | None, n_features: int, seed: int
+    model: BaseEstimator, X: ArrayLike, y: Array, weights: Floats | None, n_features: int, seed: int
 ) -> Pairs:
     """Return the pairs of the features with which a held-out fifth is predicted best.
 

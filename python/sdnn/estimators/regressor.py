@@ -18,7 +18,7 @@ from sdnn.estimators.network import Rule
 from sdnn.estimators.outliers import warn_caller
 from sdnn.estimators.parameters import documents, parameter, wholes, words
 from sdnn.estimators.training import weighted_mean
-from sdnn.support.arguments import explains_names, require, shown
+from sdnn.support.arguments import array_of, explains_names, require, shown
 
 MARGIN = 0.2  # share of the range of targets that is added on either side
 FURTHEST = 1e300  # largest end of an output range, so that its width is finite
@@ -179,11 +179,9 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     def _range_of(self, targets: Floats) -> Floats:
         if self.output_range is not None:
             try:
-                ranges = np.asarray(self.output_range)
-            except ValueError:  # rows of different lengths
+                ranges = array_of("output_range", self.output_range, "iuf").astype(np.float64)
+            except ValueError:  # rows of different lengths, or numbers beyond all floats
                 ranges = np.empty(0)
-            is_real = ranges.dtype.kind in "iuf"  # numbers beyond all floats are objects
-            ranges = ranges.astype(np.float64) if is_real else np.empty(0)
             ranges = np.tile(ranges, (self.n_outputs_, 1)) if ranges.ndim == 1 else ranges
             is_range = (
                 ranges.shape == (self.n_outputs_, 2)

@@ -15,11 +15,11 @@ from river import base
 from sklearn.base import clone
 
 from sdnn.coding import Coding, Symbolic, WithMissing
-from sdnn.coding.symbols import is_missing
+from sdnn.coding.symbols import is_missing, present
 from sdnn.estimators.classifier import SDNNClassifier
 from sdnn.estimators.columns import Codings, Entry, Floats, coding_entries, codings_of_columns
 from sdnn.estimators.growth import grow
-from sdnn.estimators.network import COLUMN_BUDGET, present
+from sdnn.estimators.network import COLUMN_BUDGET
 from sdnn.estimators.outliers import numbers_to_range
 from sdnn.estimators.regressor import SDNNRegressor
 from sdnn.support.arguments import flag, require, shown, whole
@@ -157,10 +157,9 @@ class Waiting:
         follows_ranges: bool = True,
     ) -> None:
         model_class = type(self.default_model)
-        chosen = clone(self.default_model) if model is None else model
-        is_model = isinstance(chosen, model_class)
-        require(is_model, "model", f"be an {model_class.__name__}", chosen, TypeError)
-        self.model = chosen
+        self.model = clone(self.default_model) if model is None else model
+        is_model = isinstance(self.model, model_class)
+        require(is_model, "model", f"be an {model_class.__name__}", model, TypeError)
         self.grace_period = whole("grace_period", grace_period, 2, 2**53)
         self.follows_ranges = flag("follows_ranges", follows_ranges)
         self.fitted: Any = None
@@ -170,7 +169,7 @@ class Waiting:
         self.targets: collections.deque[Target] = collections.deque(maxlen=most)
         self.n_learned = 0
         self.n_before_news: int | None = None  # samples before the first new feature or category
-        self.reads: dict[str, Callable[[Any], object]] = {}  # by feature; read its values
+        self.reads: dict[str, Callable[[object], object]] = {}  # by feature; read its values
         self.categories: dict[str, set[object]] = {}  # learned categories by feature
         self.most_columns = 0  # limit of a growing code
 
@@ -233,11 +232,11 @@ class Waiting:
 
     def _frame(self) -> pd.DataFrame:
         """Return the last samples as a table, with values as the model reads them."""
-        rows = [
-            [None if (value := x.get(name)) is None else read(value) for x in self.samples]
+        columns = {
+            name: [None if (value := x.get(name)) is None else read(value) for x in self.samples]
             for name, read in self.reads.items()
-        ]
-        return pd.DataFrame(dict(zip(self.reads, rows, strict=True)))
+        }
+        return pd.DataFrame(columns)
 
     def _begin(self) -> None:
         """Learn ranges, categories, classes and weights from the last samples."""
@@ -253,12 +252,12 @@ class Waiting:
         codings = self._codings(names, names)
         frame, targets = self._frame(), np.array(self.targets)
         entries = [(coding, [name]) for name, coding in zip(names, codings, strict=True)]
-        fitted = clone(self.model).set_params(coding=entries)
         options = {}
         if isinstance(self.model, SDNNClassifier):
             before = [] if self.fitted is None else self.fitted.classes_.tolist()
             options["classes"] = np.unique([*before, *self.targets])
-        self.fitted = fitted.partial_fit(frame, targets, **options)
+        model = clone(self.model).set_params(coding=entries)
+        self.fitted = model.partial_fit(frame, targets, **options)
         self.ranges = None
         self._follow(codings, self.fitted.codings_, frame)
         n_columns = self.fitted.network_.input_code.core.n_columns
@@ -345,7 +344,7 @@ class Waiting:
         names = list(self.reads)
         unfitted = self._codings([*names, *new], new)
         frame = self._frame()[new]
-        n_units = self.fitted.network_.input_code.n_units
+        n_units = self.fitted.network_.input_code.core.n_units
         codings = self.fitted._fit_codings(unfitted, frame.to_numpy(dtype=object), n_units)
         added = dict(zip(new, codings, strict=True))
         if not grow(self.fitted, added, changed, self.most_columns):
@@ -353,7 +352,7 @@ class Waiting:
             return False
         self._follow(unfitted, codings, frame)
         for index, coding in changed.items():
-            self.categories[names[index]] = set(cast(Any, coding).base.categories)
+            self.categories[names[index]] = set(cast(Symbolic, present(coding)).categories or ())
         return True
 
 

@@ -16,8 +16,9 @@ from sklearn.utils.validation import _num_samples
 
 from sdnn import _core
 from sdnn.estimators.columns import Array, Floats, Ints
+from sdnn.estimators.fitted import Fitted
 from sdnn.estimators.network import Network
-from sdnn.support.arguments import require, shown
+from sdnn.support.arguments import require
 
 LARGE_SAMPLE = 5000
 """Samples above which one epoch alone changes much, and blocks are shuffled instead of samples."""
@@ -27,8 +28,6 @@ MOST_PRESENTED = 2**28  # samples in an epoch: their indices take a GiB
 
 ClassWeight = str | Mapping[Any, float] | None
 Trainer = _core.PDeltaTrainer | _core.PerceptronTrainer
-
-
 Rows = NDArray[np.int64]
 MOST_EPOCHS = 30  # by default
 FEWEST_EPOCHS = 5
@@ -70,14 +69,14 @@ def sample_weights(
     """
     if weights is None:
         return None
-    problem = f"{name} must be a number in [0, {LARGEST_WEIGHT}] for each of {n_samples} samples"
     try:
         each = np.array(weights, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ValueError(f"{problem}, got {shown(weights)}") from None
+        each = np.array(np.nan)
     each = np.full(n_samples, each) if each.ndim == 0 else each
-    if each.shape != (n_samples,) or not np.all((each >= 0) & (each <= LARGEST_WEIGHT)):
-        raise ValueError(f"{problem}, got {shown(weights)}")
+    fits = each.shape == (n_samples,) and np.all((each >= 0) & (each <= LARGEST_WEIGHT))
+    expected = f"be a number in [0, {LARGEST_WEIGHT}] for each of {n_samples} samples"
+    require(fits, name, expected, weights)
     if not each.any():
         raise ValueError(f"{name} must be above zero for some sample, got zero for all")
     if each.sum() > MOST_PRESENTED:
@@ -193,7 +192,7 @@ def shuffled(order: Ints, random: np.random.RandomState, in_blocks: bool) -> Int
 
 
 def run_epochs(
-    model: Any,
+    model: Fitted,
     trainer: Trainer,
     n_samples: int,
     max_iter: int,
@@ -210,7 +209,7 @@ def run_epochs(
     the last one and those of every third epoch before it, counted from the first, or of every one.
     ``in_blocks`` shuffles blocks of samples instead of samples.
     """
-    network: Network = model.network_
+    network = model.network_
     history = History(network)
     weights = presentations(weights)
     quiet, n_quiet = 0, epochs_to_present_all(weights)
