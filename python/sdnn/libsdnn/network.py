@@ -1,17 +1,40 @@
-"""The networks of LIBSDNN: parameters, code, first weights, training and predictions."""
+"""The networks of LIBSDNN and its files of parameters and models, bit for bit."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import ast
+import operator
+import re
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
+from sdnn.support.arguments import one_of, path_of
+from sdnn.support.files import read_bytes
 
 Library = Literal["msvc", "libstdc++"]
 MOST_DRAWN = 2**27  # flips and 64-unit words of code tables: some seconds
+MOST_BYTES = 2**20  # size of a parameter file
+MOST_BYTES_OF_MODEL = 2**31
+MOST_ITEMS = 100_000  # length of a list
+MOST_PAIRS = 1_000_000
+
+OPERATORS: dict[type, Callable[..., float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.UAdd: operator.pos,
+    ast.USub: operator.neg,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,3 +158,260 @@ class LibsdnnModel:
             votes[:, i] += potentials[:, unit] > 0
             votes[:, j] += potentials[:, unit] <= 0
         return np.asarray(votes.argmax(axis=1))
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Name the file in errors about its content."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+
+
+def number_of(text: str, what: str) -> float:
+    """Return the value of a formula of numbers, ``+ - * / ^`` and parentheses."""
+
+    def value(node: ast.AST) -> float:
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+            return float(node.value)
+        if isinstance(node, ast.UnaryOp):
+            return OPERATORS[type(node.op)](value(node.operand))
+        if isinstance(node, ast.BinOp):
+            # A power of numbers below 0 may be complex, which float refuses.
+            return float(OPERATORS[type(node.op)](value(node.left), value(node.right)))
+        raise ValueError
+
+    try:
+        result = value(ast.parse(text[:1001].replace("^", "**"), mode="eval").body)
+        if len(text) <= 1000 and np.isfinite(result):
+            return result
+    except (ArithmeticError, LookupError, MemoryError, RecursionError, SyntaxError, TypeError,
+            ValueError):  # fmt: skip
+        pass
+    raise ValueError(f"{what} must be a number, got {text[:80]!r}")
+
+
+def whole_of(text: str, what: str, low: int, high: int = 2**31 - 1) -> int:
+    """Return the value of a formula that must be a whole number within bounds."""
+    value = number_of(text, what)
+    if value != int(value) or not low <= value <= high:
+        raise ValueError(f"{what} must be a whole number in [{low}, {high}], got {text[:80]}")
+    return int(value)
+
+
+def items_of(text: str, what: str) -> list[str]:
+    """Return the items of ``[a, b:3]``, which is ``[a, b, b, b]``."""
+    if not (text.startswith("[") and text.endswith("]")):
+        raise ValueError(f"{what} must be a list in brackets, got {text[:80]!r}")
+    items: list[str] = []
+    for item in split_outside_brackets(text[1:-1]):
+        content, colon, times = item.partition(":")
+        items += [content] * (whole_of(times, f"repeats of {what}", 1, MOST_ITEMS) if colon else 1)
+        if len(items) > MOST_ITEMS:
+            raise ValueError(f"{what} must have at most {MOST_ITEMS} items")
+    return items
+
+
+def split_outside_brackets(text: str) -> list[str]:
+    """Split at commas that are in no brackets."""
+    depth, commas = 0, [-1]
+    for mark in re.finditer(r"[(),]", text):
+        depth += {"(": 1, ")": -1, ",": 0}[mark[0]]
+        if mark[0] == "," and depth == 0:
+            commas.append(mark.start())
+    return [text[i + 1 : j] for i, j in zip(commas, [*commas[1:], len(text)], strict=True)]
+
+
+class Entries(dict[str, str]):
+    """The entries of a parameter file by full names, such as ``SDNN/PC/n``."""
+
+    def __init__(self, text: str, path: Path) -> None:
+        self.path = path
+        tags: list[str] = []
+        for number, line in enumerate(text.splitlines(), start=1):
+            stripped = re.sub(r"[\s{\0]", "", line.partition("%")[0])
+            if "<" in stripped:
+                tags.append(stripped.strip("<>"))
+                if len(tags) > 10:
+                    raise ValueError(f"line {number}: more than 10 tags within each other")
+            elif "}" in stripped:
+                if not tags:
+                    raise ValueError(f"line {number}: }} without a tag")
+                tags.pop()
+            elif "=" in stripped:
+                name, _, value = stripped.partition("=")
+                self["/".join([*tags, name])] = value
+            elif stripped:
+                raise ValueError(f"line {number}: must be a tag or name = value, got {line[:80]!r}")
+
+    def __missing__(self, name: str) -> str:
+        raise ValueError(f"it must have the entry {name.replace('/', ' / ')}")
+
+    def one_of(self, name: str, default: str, *others: str) -> str:
+        """Return an entry that is one of some words."""
+        return one_of(name.replace("/", " / "), self.get(name, default), (default, *others))
+
+    def whole(self, name: str, low: int, high: int) -> int:
+        """Return an entry that is a whole number within bounds."""
+        return whole_of(self[name], name.rpartition("/")[2], low, high)
+
+    def list_of(self, name: str, default: str | None = None) -> list[str]:
+        """Return the items of an entry that is a list."""
+        text = self[name] if default is None else self.get(name, default)
+        return items_of(text, name.rpartition("/")[2])
+
+    def seed(self, name: str) -> tuple[int, ...] | None:
+        """Return the numbers of a seed; None for hardware entropy."""
+        if self.get(name, "hardware_entropy") == "hardware_entropy":
+            return None
+        return tuple(whole_of(item, name, 0, 2**32 - 1) for item in self.list_of(name))
+
+
+def read_parameter_file(path: str | Path) -> LibsdnnParameters:
+    """Read a parameter file.
+
+    Raises ValueError if it is not one, lacks an entry, or uses codes by correlation matrix; OSError
+    if it cannot be read or is not a regular file.
+    """
+    path = path_of("path", path)
+    with naming(path):
+        return _parameters(read_bytes(path, MOST_BYTES).decode("latin-1"), path)
+
+
+def read_model_file(
+    path: str | Path, library: Library = "msvc", *, memory_limit: int = 2**27
+) -> LibsdnnModel:
+    """Read a model file: parameters as text, then thresholds and weights.
+
+    Parameters
+    ----------
+    path : path
+    library : {"msvc", "libstdc++"}
+        The C++ library of the program that wrote it, which decides the tables of a seed. LIBSDNN's
+        own programs are "msvc"; built with GCC they are "libstdc++".
+    memory_limit : int
+        Bytes that the patterns may take, which the file does not hold.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read or is not a regular file.
+    ValueError
+        For another kind of file, a wrong size, or weights too large for exact sums.
+    """
+    path = path_of("path", path)
+    with naming(path):
+        content = read_bytes(path, MOST_BYTES_OF_MODEL)
+        length = struct.unpack_from("<i", content)[0] if len(content) >= 4 else -1
+        if not 0 < length <= len(content) - 4:
+            raise ValueError(f"it must begin with the length of its parameters, got {length}")
+        parameters = _parameters(content[4 : 4 + length].decode("latin-1"), path)
+        n_units = parameters.n_output_units
+        n_columns = len(parameters.pairs) * parameters.n_units
+        expected = 4 * n_units * (n_columns + 1)
+        if len(content) - 4 - length != expected:
+            raise ValueError(
+                f"it must have {expected} bytes of weights for {n_units} units of {n_columns} "
+                f"columns, got {len(content) - 4 - length}"
+            )
+        n_bins = sum(parameters.inputs[index].n_bins for pair in parameters.pairs for index in pair)
+        if n_bins * parameters.n_units > memory_limit:
+            raise ValueError(
+                f"it needs {n_bins * parameters.n_units} bytes for {n_bins} patterns of"
+                f" {parameters.n_units} units, more than memory_limit={memory_limit}"
+            )
+        rows = np.frombuffer(content, "<i4", offset=4 + length).reshape(n_units, n_columns + 1)
+        try:
+            layer = _core.ParallelPerceptron(
+                parameters.make_code(library),
+                n_units,
+                weights=np.ascontiguousarray(rows[:, 1:], dtype=np.int32),
+                thresholds=np.ascontiguousarray(rows[:, 0], dtype=np.int32),
+            )
+        except OverflowError as error:
+            raise ValueError(f"it cannot be used: {error}") from None
+        return LibsdnnModel(parameters=parameters, layer=layer)
+
+
+def _input(text: str, n_units: int) -> LibsdnnInput:
+    match = re.fullmatch(r"(NUMERICAL|SYMBOLIC)\(RANDOM_INVERSE\(([^,]*),([^,]*)\)\)", text)
+    if match is None:
+        raise ValueError(
+            "input_type_and_creation_method must be NUMERICAL or SYMBOLIC, by RANDOM_INVERSE(q, r) "
+            f"to be reproduced, got {text[:80]!r}"
+        )
+    input_type, n_bins, n_flipped = match.groups()
+    return LibsdnnInput(
+        symbolic=input_type == "SYMBOLIC",
+        n_bins=whole_of(n_bins, "q of RANDOM_INVERSE", 1, 2**24),
+        n_flipped=whole_of(n_flipped, "r of RANDOM_INVERSE", 1, n_units // 2 - 1),
+    )
+
+
+def _pairs(entries: Entries, n_inputs: int) -> tuple[tuple[int, int], ...]:
+    method = entries.one_of("SDNN/SD/combination_setting", "mutual", "saved", "file")
+    if method == "mutual":
+        if n_inputs * (n_inputs - 1) > MOST_PAIRS:
+            raise ValueError(f"mutual combinations of {n_inputs} inputs are more than {MOST_PAIRS}")
+        return tuple((i, j) for i in range(n_inputs) for j in range(n_inputs) if i != j)
+    if method == "saved":
+        lines = [item.strip("()") for item in entries.list_of("SDNN/SD/line", "[(0,1),(1,0)]")]
+    else:
+        name = entries.get("SDNN/SD/filename", "")
+        try:
+            if Path(name).name != name:
+                raise FileNotFoundError(f"not a name: {name!r}")
+            content = read_bytes(entries.path.parent / name, MOST_BYTES)
+        except OSError as error:
+            raise ValueError(f"SDNN/SD/filename must be a file beside it: {error}") from error
+        lines = content.decode("latin-1").split()
+    pairs = []
+    for line in lines:
+        inputs = line.split(",")
+        if len(inputs) != 2:
+            raise ValueError(f"a combination must be two inputs, got {line[:80]!r}")
+        mu, nu = (whole_of(item, "an input of a combination", 0, n_inputs - 1) for item in inputs)
+        pairs.append((mu, nu))
+    if not pairs:
+        raise ValueError("it must combine at least one pair of inputs")
+    return tuple(pairs)
+
+
+def _parameters(text: str, path: Path) -> LibsdnnParameters:
+    entries = Entries(text, path)
+    task = entries.one_of("ISSUE/type", "function_approximation", "pattern_recognition")
+    n_inputs = entries.whole("ISSUE/input_number", 1, 10000)
+    n_units = entries.whole("SDNN/PC/n", 2, 2**24)
+    if n_units % 2 != 0:
+        raise ValueError(f"n must be even, got {n_units}")
+    name = "SDNN/PC/input_type_and_creation_method"
+    inputs = tuple(_input(item, n_units) for item in entries.list_of(name))
+    if len(inputs) != n_inputs:
+        raise ValueError(f"{name} must have input_number = {n_inputs} items, got {len(inputs)}")
+    name = "initial_value_range"
+    limits = entries.list_of(f"SDNN/NN/{name}", "[-5,5]")
+    low, high = (whole_of(item, name, -(10**6), 10**6) for item in (limits * 2)[:2])
+    if len(limits) != 2 or low > high:
+        raise ValueError(f"{name} must be two numbers that rise, got [{', '.join(limits)[:80]}]")
+    parameters = LibsdnnParameters(
+        task="regression" if task == "function_approximation" else "classification",
+        n_units=n_units,
+        inputs=inputs,
+        pairs=_pairs(entries, n_inputs),
+        pattern_seed=entries.seed("SDNN/PC/random_seed"),
+        weight_seed=entries.seed("SDNN/NN/random_seed"),
+        initial_range=(low, high),
+    )
+    if parameters.task == "classification":
+        scheme = entries.one_of("ISSUE/PR/multi_class_recognition", "1v1", "1vR")
+        return replace(
+            parameters,
+            n_classes=entries.whole("ISSUE/PR/class_number", 2, 1024),
+            scheme="one_vs_one" if scheme == "1v1" else "one_vs_rest",
+        )
+    step = number_of(entries["ISSUE/FA/required_step_size"], "required_step_size")
+    outputs = [number_of(item, "output_range") for item in entries.list_of("ISSUE/FA/output_range")]
+    if len(outputs) != 2 or not 1e-6 <= step <= outputs[1] - outputs[0]:
+        raise ValueError("output_range must be two numbers, a step size at least apart")
+    return replace(parameters, output_range=(outputs[0], outputs[1]), step_size=step)
