@@ -14,12 +14,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sdnn import _core
+from sdnn.agents.agent import AnyAgent
 from sdnn.agents.base import Preset
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
-from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.config import FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
 from sdnn.support.arguments import argument_error, shown
 from sdnn.training.interfaces import Learner
 from sdnn.training.training import Training
@@ -154,45 +153,39 @@ def title_of(label: str) -> str:
     return AGENTS[name].title + (f", {preset}" if preset else "")
 
 
-for _entry in (
-    AgentEntry(
-        id="sdnn-c",
-        title="SDNN-C",
-        approximator=SDNNCConfig,
-        learning=QLearningConfig,
-        agent=SDNNQLearning,
+def _register(
+    agent: type[AnyAgent], title: str, presets: Mapping[str, Preset] | None = None, **options: Any
+) -> None:
+    """Let an agent of this package take part, with the id that its files have."""
+    entry = AgentEntry(
+        id=agent.kind,
+        title=title,
+        approximator=agent.approximator_type,
+        learning=agent.learning_type,
+        agent=agent,
         core_trial=_core.AcrobotTrial,
-        table_bytes=lambda net: net.n_pattern_units * net.n_pairs * net.n_hidden_units,
-        presets=SDNNQLearning.presets,
-    ),
-    AgentEntry(
-        id="fuzzy",
-        title="FQL",
-        approximator=FuzzyRulesConfig,
-        learning=FuzzyQLearningConfig,
-        agent=FuzzyQLearning,
-        core_trial=_core.AcrobotTrial,
-        advances_together=True,
-        table_bytes=lambda rules: 4 * rules.n_sets**rules.n_inputs * rules.n_actions,
-    ),
-    AgentEntry(
-        id="rbf",
-        title="RBFN",
-        approximator=RBFNetworkConfig,
-        learning=QLearningConfig,
-        agent=RBFQLearning,
-        core_trial=_core.AcrobotTrial,
-        advances_together=True,
-        table_bytes=lambda network: 8 * network.n_bases ** (network.n_inputs + 1),
-    ),
-    AgentEntry(
-        id="q-lambda",
-        title="SDNNQLambda",
-        approximator=LinearSDNNConfig,
-        learning=QLambdaConfig,
-        agent=SDNNQLambda,
-        core_trial=_core.AcrobotTrial,
-        presets=SDNNQLambda.presets,
-    ),
-):
-    register(_entry)
+        presets=presets or {},
+        **options,
+    )
+    register(entry)
+
+
+_register(
+    SDNNQLearning,
+    "SDNN-C",
+    SDNNQLearning.presets,
+    table_bytes=lambda net: net.n_pattern_units * net.n_pairs * net.n_hidden_units,
+)
+_register(
+    FuzzyQLearning,
+    "FQL",
+    advances_together=True,
+    table_bytes=lambda rules: 4 * rules.n_sets**rules.n_inputs * rules.n_actions,
+)
+_register(
+    RBFQLearning,
+    "RBFN",
+    advances_together=True,
+    table_bytes=lambda network: 8 * network.n_bases ** (network.n_inputs + 1),
+)
+_register(SDNNQLambda, "SDNNQLambda", SDNNQLambda.presets)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.export.tables import Tables
+from sdnn.export.text import Tables
 
 Pair = tuple[int, int]
 

@@ -11,7 +11,7 @@ from sdnn import _core
 from sdnn.agents import SDNNQLambda
 from sdnn.environments.types import Array, Data
 from sdnn.export.code import Code
-from sdnn.export.tables import Tables
+from sdnn.export.text import Tables
 from sdnn.export.writer import (
     NONE,
     SCALE_FIELDS,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.agents import SDNNQLearning
 from sdnn.export.code import Code
-from sdnn.export.tables import Tables, weight_words
+from sdnn.export.text import Tables, weight_words
 from sdnn.export.writer import CHeader, Writer, require_few_weights
 from sdnn.support.arguments import argument_error
 

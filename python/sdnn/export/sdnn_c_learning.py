@@ -12,7 +12,7 @@ from sdnn.agents import SDNNQLearning
 from sdnn.environments.types import Array, Data
 from sdnn.export.code import Code
 from sdnn.export.sdnn_c import SDNNCWriter
-from sdnn.export.tables import Tables, weight_words
+from sdnn.export.text import Tables, weight_words
 from sdnn.export.writer import (
     MOST_FRACTION_BITS,
     SCALE_FIELDS,

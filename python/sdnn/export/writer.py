@@ -17,8 +17,17 @@ from sdnn import _core
 from sdnn._core import __version__
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.environments.types import Array, Data
-from sdnn.export.source import c_source, comment, define_lines
-from sdnn.export.tables import Input, Tables, by_dimension, conversions, joined, table_lines
+from sdnn.export.text import (
+    Input,
+    Tables,
+    by_dimension,
+    c_source,
+    comment,
+    conversions,
+    define_lines,
+    joined,
+    table_lines,
+)
 from sdnn.support.arguments import argument_error, whole
 
 _DEFAULT_FRACTION_BITS = 16

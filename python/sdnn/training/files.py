@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import base64
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Any, Literal
 
 import gymnasium as gym
 import msgspec
@@ -199,13 +199,6 @@ _ARRAYS_OF_TRAINING = "training."
 
 _Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 _Period = Annotated[int, msgspec.Meta(ge=1, le=2**53)]
-
-
-class SavedClass(Protocol):
-    """A class whose objects are made of what files hold."""
-
-    def rebuild(self, description: Data, arrays: Mapping[str, Array]) -> Any:
-        """Make an object; an ordinary error if description and arrays do not fit."""
 
 
 CLASSES: Data = {}

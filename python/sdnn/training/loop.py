@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import abc
 import time
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any, TypeAlias
 
-from sdnn.environments.types import AnyEnv, Data
+from sdnn.environments.types import AnyEnv, Data, Info
+from sdnn.support.arguments import require
 from sdnn.support.interrupts import Interrupts
 from sdnn.training.episodes import Episodes
 from sdnn.training.evaluation import evaluate
@@ -41,6 +42,7 @@ class TrainingLoop(abc.ABC):
     evaluation_episodes: int
     limit_bootstraps: bool
     callbacks: Sequence[Any]
+    reset_options: Callable[[int], Info] | None
     n_steps = 0
     n_episodes = 0
     n_rows = 0
@@ -253,9 +255,13 @@ class TrainingLoop(abc.ABC):
         if hasattr(self.agent, "wrappers"):
             self.agent.wrappers = statistics_of(self._episodes.wrappers)
 
-    @abc.abstractmethod
     def _options(self, episode: int) -> Data | None:
-        """Return the options of a reset."""
+        if self.reset_options is None:
+            return None
+        options = self.reset_options(episode)
+        is_mapping = isinstance(options, Mapping)
+        require(is_mapping, "reset_options", "return a mapping", options, TypeError)
+        return dict(options)
 
     @abc.abstractmethod
     def _find_listeners(self) -> Sequence[tuple[int, Any]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.environments.space_kinds import require_same_kind
-from sdnn.environments.types import Data, Env, Info, VectorEnv
+from sdnn.environments.types import Env, Info, VectorEnv
 from sdnn.support.arguments import flag, has_methods, path_of, require, shown, whole
 from sdnn.support.display import Displayed
 from sdnn.training.episodes import Episodes, adapter_for
@@ -338,14 +338,6 @@ class Training(TrainingLoop):
             for callback in self.callbacks
             if getattr(callback.on_step, "__func__", None) is not Callback.on_step
         ]
-
-    def _options(self, episode: int) -> Data | None:
-        if self.reset_options is None:
-            return None
-        options = self.reset_options(episode)
-        is_mapping = isinstance(options, Mapping)
-        require(is_mapping, "reset_options", "return a mapping", options, TypeError)
-        return dict(options)
 
 
 def _optional(name: str, value: float | None) -> int | None:

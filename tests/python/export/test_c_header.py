@@ -40,7 +40,7 @@ from sdnn.agents import (
     Transition,
 )
 from sdnn.export import c_header, export_c_header
-from sdnn.export.tables import weight_words
+from sdnn.export.text import weight_words
 
 Discrete = gym.spaces.Discrete
 
