@@ -10,7 +10,6 @@ from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.scaling import Scaling
 from sdnn.config import FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
 from sdnn.training.callbacks import (
-    CheckpointCallback,
     JSONLines,
     SaveBestAgent,
     Schedule,
@@ -21,7 +20,7 @@ from sdnn.training.callbacks import (
 from sdnn.training.episodes import UnrepeatedEpisodeError
 from sdnn.training.evaluation import Evaluation, evaluate
 from sdnn.training.interfaces import Transition, UnusableStepError
-from sdnn.training.training import Callback, Training, TrainingResult
+from sdnn.training.training import Callback, CheckpointCallback, Training, TrainingResult
 
 __all__ = [
     "Agent",

@@ -51,31 +51,6 @@ class JSONLines(Callback):
             self._file.close()
 
 
-class CheckpointCallback(Callback):
-    """Saves agent and training at regular steps; `Training.load` resumes from there exactly.
-
-    ``n_saved`` is the number of steps when it was saved last; None: not yet.
-    """
-
-    def __init__(self, path: str | Path, every: int = 10_000) -> None:
-        self.path = path_of("path", path)
-        self.every = self.step_interval = whole("every", every, 1, 2**53)
-        self.n_saved: int | None = None
-
-    def on_step(self, training: Training) -> None:
-        """Save."""
-        self._save(training)
-
-    def on_end(self, training: Training) -> None:
-        """Save where the training ends, be it by an environment's error, but not within a step."""
-        if not training.is_within_step:
-            self._save(training)
-
-    def _save(self, training: Training) -> None:
-        training.save(self.path)
-        self.n_saved = training.n_steps
-
-
 class StopTrainingOnRewardThreshold(Callback):
     """Stops when ``patience`` evaluations in a row reach a mean return."""
 
