@@ -26,8 +26,7 @@ from sdnn.support.arguments import (
 from sdnn.support.progress import is_shown
 from sdnn.training.callbacks import ProgressBarCallback
 from sdnn.training.files import read_agent
-from sdnn.training.interfaces import CoreParts, Transition
-from sdnn.training.names import explained
+from sdnn.training.interfaces import CoreParts, Transition, explained
 from sdnn.training.training import Callback, Training, TrainingResult, listed
 
 

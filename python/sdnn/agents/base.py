@@ -51,7 +51,7 @@ from sdnn.support.arguments import (
 from sdnn.support.display import Displayed
 from sdnn.support.state_files import Arrays, Description, write_file
 from sdnn.training.files import CLASSES, Statistics, read_agent, read_statistics
-from sdnn.training.names import explained
+from sdnn.training.interfaces import explained
 
 if TYPE_CHECKING:
     from typing import Self

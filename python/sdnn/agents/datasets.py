@@ -1,20 +1,319 @@
-"""Learning from transitions that were logged, without an environment."""
+"""Learning from transitions that were logged, in any of the forms in which people have them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import csv
+import io
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import gymnasium as gym
 import numpy as np
 
 from sdnn.agents.agent import Agent, AnyAgent
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
-from sdnn.agents.logs import Logged, reader_of
-from sdnn.support.arguments import is_of_class, require, whole
-from sdnn.training.interfaces import Transition
-from sdnn.training.names import explained
+from sdnn.environments.types import Data, Info
+from sdnn.support.arguments import (
+    advice,
+    argument_error,
+    array_of,
+    is_of_class,
+    path_of,
+    require,
+    shown,
+    whole,
+)
+from sdnn.support.files import open_regular
+from sdnn.training.interfaces import Transition, explained
+
+_MOST_BYTES = 2**20
+"""The longest line of a file that is read, so that memory stays bounded."""
+
+NAMES: Mapping[str, tuple[str, ...]] = {
+    "observations": ("observation", "obs", "states", "state"),
+    "actions": ("action", "acts", "act"),
+    "rewards": ("reward", "rews", "rew"),
+    "next_observations": ("next_observation", "next_obs", "next_states", "next_state"),
+    "terminations": ("terminated", "terminals", "terminal", "dones", "done"),
+    "truncations": ("truncated", "timeouts", "timeout"),
+    "next_masks": ("next_mask",),
+}
+"""Names of columns, and others that stand for them: of D4RL, imitation and Stable-Baselines3."""
+
+_IGNORED = re.compile(r"(infos?|metadata|id|seed|total_steps)\b")
+_NUMBERED = re.compile(r"(.+?)[_.\[](\d+)\]?")
+_ARRAYS = ("observations", "actions", "rewards")
+
+
+class Logged(NamedTuple):
+    """A transition, its place in the log, and whether its episode was cut off after it."""
+
+    place: str
+    transition: Transition
+    truncated: bool
+
+
+@cache
+def _column_of() -> dict[str, str]:
+    """Return the usual name for each name."""
+    return {other: name for name, others in NAMES.items() for other in (name, *others)}
+
+
+def reader_of(dataset: Any) -> Callable[[], Iterator[Logged]]:
+    """Return a function that reads a dataset from its beginning; see `learn_from`.
+
+    TypeError or ValueError for what is no dataset.
+    """
+    if isinstance(dataset, str | Path):
+        path = path_of("dataset", dataset)
+        is_table = path.suffix.lower() == ".csv"
+        return lambda: _followed(_table_lines(path)) if is_table else _json_lines(path)
+    if hasattr(dataset, "columns") and hasattr(dataset, "iloc"):  # a table of pandas
+        dataset = {str(name): dataset[name].to_numpy() for name in dataset.columns}
+    if isinstance(dataset, Mapping):
+        columns = _columns_of(dataset)
+        return lambda: _followed(_rows(columns, "row"))
+    if callable(getattr(dataset, "iterate_episodes", None)):
+        return lambda: _items(dataset.iterate_episodes())
+    if isinstance(dataset, Iterable):
+        items = [*dataset] if isinstance(dataset, Iterator) else dataset
+        return lambda: _items(items)
+    expected = "must be a path, arrays by name, a table, a Minari dataset, transitions or episodes"
+    raise argument_error("dataset", f"{expected}, got {shown(dataset)}", TypeError)
+
+
+def _json_lines(path: Path) -> Iterator[Logged]:
+    for number, line in _lines(path):
+        try:
+            values = json.loads(line)
+        except (ValueError, RecursionError) as error:
+            problem = f"must be a JSON object, got {shown(line[:40])}"
+            raise ValueError(f"dataset, line {number}: {problem}") from error
+        require(isinstance(values, dict), f"dataset, line {number}", "be a JSON object", values)
+        yield _transition(values, f"line {number}")
+
+
+def _table_lines(path: Path) -> Iterator[tuple[str, Data]]:
+    """Read a file of comma-separated values, whose first line has the names."""
+    names: list[str] = []
+    for number, line in _lines(path):
+        try:
+            cells = next(csv.reader(io.StringIO(line.decode())), [])
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise ValueError(f"dataset, line {number}: must be text, got {shown(line)}") from error
+        if not names:
+            names = [cell.strip() for cell in cells]
+            continue
+        expected = f"have {len(names)} cells, as many as there are names"
+        require(len(cells) == len(names), f"dataset, line {number}", expected, cells)
+        values = {name: [_cell(cell)] for name, cell in zip(names, cells, strict=True)}
+        for _, row in _rows(_columns_of(values, f"dataset, line {number}"), ""):
+            yield f"line {number}", row
+
+
+def _followed(rows: Iterable[tuple[str, Data]], *, is_episode: bool = False) -> Iterator[Logged]:
+    """Read rows; where they have no next observations these are the observations of the next row.
+
+    The last step of an episode that was cut off has none then, and is left out.
+    """
+    waiting: tuple[Data, str] | None = None
+    for place, row in rows:
+        if waiting is not None:
+            waiting[0]["next_observations"] = row["observations"]
+            yield _logged(*waiting)
+            waiting = None
+        if "rewards" not in row:  # only what follows the last step
+            continue
+        if "next_observations" in row:
+            yield _logged(row, place)
+            continue
+        ends = _flag("terminations", row.get("terminations", False))
+        is_cut = _flag("truncations", row.get("truncations", False))
+        if is_episode or not (ends or is_cut):
+            waiting = row, place
+        elif ends:
+            row["next_observations"] = row["observations"]  # whose value is not asked for
+            yield _logged(row, place)
+
+
+def _cell(text: str) -> Any:
+    word = text.strip()
+    if word.lower() in ("true", "false"):
+        return word.lower() == "true"
+    try:
+        return float(word)
+    except ValueError:
+        return word
+
+
+def _lines(path: Path) -> Iterator[tuple[int, bytes]]:
+    with open_regular(path, 2**62) as file:
+        number = 0
+        while line := file.readline(_MOST_BYTES + 1):
+            number += 1
+            if len(line) > _MOST_BYTES:
+                raise ValueError(f"dataset, line {number}: must be of at most {_MOST_BYTES} bytes")
+            yield number, line
+
+
+def _items(items: Iterable[Any]) -> Iterator[Logged]:
+    """Read transitions or episodes, whatever each of them is."""
+    for number, item in enumerate(items):
+        if isinstance(item, Transition):
+            yield Logged(f"transition {number}", item, False)
+        elif isinstance(item, tuple | list) and len(item) in (5, 6):
+            yield _logged(dict(zip(_ROW, item, strict=False)), f"transition {number}")
+        else:
+            values = _fields_of(item)
+            if values is None:
+                expected = "be a Transition, a mapping, or an episode with observations"
+                raise argument_error(f"dataset, transition {number}",
+                                     f"must {expected}, got {shown(item)}", TypeError)  # fmt: skip
+            if np.ndim(_value(values, "rewards", ())) == 0:
+                yield _transition(values, f"transition {number}")
+            else:
+                columns = _columns_of(values, f"dataset, episode {number}", is_episode=True)
+                rows = _rows(columns, f"episode {number}, step", is_episode=True)
+                yield from _followed(rows, is_episode=True)
+
+
+_ROW = ("observations", "actions", "rewards", "next_observations", "terminations", "truncations")
+
+
+def _fields_of(item: Any) -> Data | None:
+    """Return the columns of a mapping or of an object with attributes of such names."""
+    if isinstance(item, Mapping):
+        return dict(item)
+    named = {name: getattr(item, name) for name in _column_of() if hasattr(item, name)}
+    has_all = all(_value(named, name) is not None for name in ("observations", "rewards"))
+    return named if has_all else None
+
+
+def _value(values: Info, name: str, default: Any = None) -> Any:
+    return next((values[other] for other in (name, *NAMES[name]) if other in values), default)
+
+
+def _transition(values: Info, place: str) -> Logged:
+    """Read a mapping of one transition."""
+    row = {}
+    for name, value in values.items():
+        if _IGNORED.match(name):
+            continue
+        column = _column_of().get(name)
+        require(column, f"dataset, {place}", f"have no {name!r}: {advice(name, NAMES)}", [*values])
+        require(column not in row, f"dataset, {place}", f"have {column} once", [*values])
+        row[str(column)] = value
+    missing = [name for name in _ROW[:4] if name not in row]
+    require(not missing, f"dataset, {place}", f"have {', '.join(missing)}", [*values])
+    return _logged(row, place)
+
+
+def _logged(row: Info, place: str) -> Logged:
+    try:
+        terminated = _flag("terminated", row.get("terminations", False))
+        truncated = _flag("truncated", row.get("truncations", False))
+    except ValueError as error:
+        raise ValueError(f"dataset, {place}: {error}") from error
+    is_end = terminated and not truncated
+    observation, action, reward, following = (row[name] for name in _ROW[:4])
+    mask = row.get("next_masks")
+    transition = Transition(observation, action, reward, following, is_end, mask)
+    return Logged(place, transition, truncated)
+
+
+def _flag(name: str, value: Any) -> bool:
+    """Read True or False of any library, or 1 or 0."""
+    number = np.asarray(value)
+    is_flag = number.size == 1 and number.dtype.kind in "biuf" and number.item() in (0, 1)
+    require(is_flag, name, "be True or False, or 1 or 0", value)
+    return bool(number.item())
+
+
+def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = False) -> Data:
+    """Return arrays of n rows each by their usual names; ``observations`` may have one more.
+
+    Columns such as ``observation_0`` are put together. Files mapped to memory are not read yet.
+    """
+    columns: Data = {}
+    parts: dict[str, dict[int, Any]] = {}
+    for name, column in values.items():
+        if column is None or _IGNORED.match(str(name)):
+            continue
+        numbered = _NUMBERED.fullmatch(str(name))
+        whole = _column_of().get(str(name))
+        part = _column_of().get(numbered[1]) if numbered and whole is None else None
+        if part is not None and numbered is not None:
+            parts.setdefault(part, {})[int(numbered[2])] = array_of(f"{where}[{name!r}]", column)
+        elif whole is not None:
+            require(whole not in columns, where, f"have {whole} once", [*values])
+            columns[whole] = _column(f"{where}[{name!r}]", column)
+        else:
+            raise argument_error(
+                where, f"must have no {name!r}: {advice(str(name), NAMES)}; got {[*values]}"
+            )
+    for name, numbers in parts.items():
+        expected = f"have columns of {name} numbered from 0"
+        require([*sorted(numbers)] == [*range(len(numbers))], where, expected, sorted(numbers))
+        columns[name] = np.stack([numbers[i] for i in range(len(numbers))], axis=-1)
+    missing = [name for name in _ARRAYS if name not in columns]
+    require(not missing, where, f"have {', '.join(missing)}", [*values])
+    n = _length(columns["rewards"])
+    lengths = {name: _length(column) for name, column in columns.items()}
+    one_more = ("observations",) if "next_observations" not in columns else ()
+    expected = f"have {n} rows of each, as of rewards" + " (of observations one more)" * bool(
+        one_more
+    )
+    fits = all(m == n or (name in one_more and m == n + 1) for name, m in lengths.items())
+    require(fits, where, expected, lengths)
+    if is_episode and one_more:
+        is_whole = lengths["observations"] == n + 1
+        require(is_whole, where, f"have {n + 1} observations for {n} rewards", lengths)
+    return columns
+
+
+def _column(name: str, column: Any) -> Any:
+    if isinstance(column, Mapping):
+        return {key: _column(f"{name}[{key!r}]", part) for key, part in column.items()}
+    if isinstance(column, tuple) and column and np.ndim(column[0]) > 0:
+        return tuple(_column(f"{name}[{i}]", part) for i, part in enumerate(column))
+    if getattr(getattr(column, "dtype", None), "kind", "") == "O" or _is_of_mappings(column):
+        return list(column)  # whose items the agent reads
+    if isinstance(column, np.ma.MaskedArray):  # missing readings, as the agent takes them
+        return list(column) if np.ma.is_masked(column) else column.data
+    return array_of(name, column)
+
+
+def _is_of_mappings(column: Any) -> bool:
+    return isinstance(column, list) and bool(column) and isinstance(column[0], Mapping)
+
+
+def _length(column: Any) -> int:
+    if isinstance(column, Mapping | tuple):
+        parts = column.values() if isinstance(column, Mapping) else column
+        return min((_length(part) for part in parts), default=0)
+    return len(column) if np.ndim(column) or isinstance(column, list) else 0
+
+
+def _rows(columns: Data, place: str, *, is_episode: bool = False) -> Iterator[tuple[str, Data]]:
+    """Yield rows of arrays with their places, and the observation that follows the last one."""
+    n, has_next = _length(columns["rewards"]), "next_observations" in columns
+    for i in range(n if has_next else _length(columns["observations"])):
+        names = columns if i < n else ("observations",)
+        row = {name: _at(columns[name], i) for name in names}
+        if is_episode and i == n - 1 and not _flag("terminations", row.get("terminations", False)):
+            row["truncations"] = True
+        yield f"{place} {i}", row
+
+
+def _at(values: Any, t: int) -> Any:
+    """Return number t of an array, or of each in dictionaries and tuples, as Gymnasium's spaces."""
+    if isinstance(values, Mapping):
+        return {name: _at(part, t) for name, part in values.items()}
+    return tuple(_at(part, t) for part in values) if isinstance(values, tuple) else values[t]
 
 
 class MinariDataset(Protocol):

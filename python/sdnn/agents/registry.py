@@ -97,8 +97,6 @@ def register(entry: AgentEntry) -> None:
 def label_of(agent_id: str, preset: str | None) -> str:
     """Return the word for an agent with a preset.
 
-    Examples
-    --------
     >>> label_of("sdnn-c", "robust"), label_of("sdnn-c", "paper")
     ('sdnn-c-robust', 'sdnn-c')
     """
@@ -116,8 +114,6 @@ def split_label(label: str) -> tuple[str, str | None]:
 
     ValueError if there is no such agent.
 
-    Examples
-    --------
     >>> split_label("sdnn-c-robust")
     ('sdnn-c', 'robust')
     """
@@ -133,8 +129,6 @@ def split_label(label: str) -> tuple[str, str | None]:
 def agent_entry(label: str) -> AgentEntry:
     """Look up an agent by its word; ValueError if there is no such agent.
 
-    Examples
-    --------
     >>> agent_entry("sdnn-c-robust").title
     'SDNN-C'
     """
@@ -144,8 +138,6 @@ def agent_entry(label: str) -> AgentEntry:
 def title_of(label: str) -> str:
     """Return the title of an agent by its word; ValueError if there is no such agent.
 
-    Examples
-    --------
     >>> title_of("sdnn-c-robust")
     'SDNN-C, robust'
     """

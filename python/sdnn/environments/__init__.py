@@ -14,9 +14,13 @@ import gymnasium as gym
 
 from sdnn.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
-from sdnn.environments.goal import GoalSchedule, TighteningGoal
 from sdnn.environments.masks import ActionMasks
-from sdnn.environments.paper_acrobot import PAPER_ACROBOT, PaperAcrobotEnv
+from sdnn.environments.paper_acrobot import (
+    PAPER_ACROBOT,
+    GoalSchedule,
+    PaperAcrobotEnv,
+    TighteningGoal,
+)
 from sdnn.environments.sensors import AcrobotSensors, NoisySensors, RedundantSensors, UnitSensors
 from sdnn.environments.vector_env import AcrobotSwingUpVectorEnv
 

@@ -188,10 +188,6 @@ def _symbols_of(space: Space, first: int = 0) -> Iterator[tuple[int, int]]:
             first += n
 
 
-def _numbers(name: str, values: Any) -> NDArray[np.float64]:
-    return array_of(name, values).astype(np.float64, copy=False)
-
-
 def _ranges(
     low: NDArray[np.float64], high: NDArray[np.float64], ranges: Any
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -202,7 +198,12 @@ def _ranges(
         try:
             low, high = (
                 with_infinities(
-                    np.broadcast_to(_numbers("observation_range", end).reshape(-1), low.shape)
+                    np.broadcast_to(
+                        array_of("observation_range", end)
+                        .astype(np.float64, copy=False)
+                        .reshape(-1),
+                        low.shape,
+                    )
                 )
                 for end in ranges
             )

@@ -10,8 +10,7 @@ from typing import Any
 from sdnn.agents import SDNNQLambda, SDNNQLearning
 from sdnn.agents.agent import AnyAgent
 from sdnn.export.q_lambda import QLambdaLearner, QLambdaWriter
-from sdnn.export.sdnn_c import SDNNCWriter
-from sdnn.export.sdnn_c_learning import SDNNCLearner
+from sdnn.export.sdnn_c import SDNNCLearner, SDNNCWriter
 from sdnn.export.writer import CHeader
 from sdnn.support.arguments import argument_error, flag, path_of, require, shown
 from sdnn.support.files import write_whole

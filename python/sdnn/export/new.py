@@ -11,7 +11,7 @@ from sdnn.agents import SDNNQLambda, SDNNQLearning
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.environments.types import Data, Space
 from sdnn.export.header import c_header
-from sdnn.export.sdnn_c_learning import MOST_WEIGHT
+from sdnn.export.sdnn_c import MOST_WEIGHT
 from sdnn.support.arguments import argument_error, choice, shown, whole
 
 NewConfig = LinearSDNNConfig | SDNNCConfig

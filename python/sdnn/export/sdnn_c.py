@@ -1,16 +1,28 @@
-"""The greedy policy of an agent with SDNN-C as a C header."""
+"""SDNNQLearning as a C header: its greedy policy, or the agent that learns."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents import SDNNQLearning
+from sdnn.environments.types import Array, Data
 from sdnn.export.code import Code
 from sdnn.export.text import Tables, weight_words
-from sdnn.export.writer import CHeader, Writer, require_few_weights
-from sdnn.support.arguments import argument_error
+from sdnn.export.writer import (
+    MOST_FRACTION_BITS,
+    SCALE_FIELDS,
+    CHeader,
+    Field,
+    Learner,
+    Writer,
+    learning_needs,
+    require_few_weights,
+)
+from sdnn.support.arguments import argument_error, whole
 
 MOST_UNITS = 65535  # whose numbers fit 16 bits
 _BYTES_OF_NETWORK = 40  # a struct of eight pointers and two sizes, where pointers have 32 bits
@@ -106,3 +118,298 @@ class SDNNCWriter(Writer):
             ties = np.searchsorted(distinct, distinct - self.agent.learning.tie_tolerance)
             about = "Of each rank, the lowest that ties with it."
             tables.add("uint16_t", "ties", ties, about)
+
+
+_WEIGHTS_STREAM = 3  # see cpp/include/sdnn/core/random.hpp
+_MOST_RETURNS = 256
+MOST_WEIGHT = 127
+_LARGEST = 2.0**100  # of real numbers
+_WORD = 2**64 - 1
+_ROUNDING = {"away": "AWAY", "half_up": "HALF_UP", "random": "AT_RANDOM"}
+
+
+class SDNNCLearner(Learner, SDNNCWriter):
+    """Makes the header of an `SDNNQLearning` agent that learns."""
+
+    magic = 0x434E4453  # "SDNC"
+    streams = (
+        *(f"policy.{stream}" for stream in ("exploration", "ties", "evaluation_ties")),
+        "repetitions",
+        "action_value.rounding",
+    )
+
+    def __init__(self, agent: SDNNQLearning, name: str, fraction_bits: int | None) -> None:
+        if agent.n_dimensions > 1:
+            raise argument_error(
+                "action_space",
+                "must have one dimension for an SDNNQLearning that learns in C, got"
+                f" {agent.n_dimensions}: SDNNQLambda (q-lambda) learns with more",
+            )
+        super().__init__(agent, name, fraction_bits)
+        self._check_settings()
+        self.code = Code(self.network(), self.n_inputs)
+        self.used, self.first_units = self.units(self.network())
+        self.n_units = -(-self.used.size // 4) * 4
+        self.require_small(self.n_units, self.code.n_columns)
+        self._check_values()
+        self.n_words = self.n_units // 4 * self.code.n_columns
+        self.horizon = int(2.0 / max(1.0 - agent.learning.discount, 0.004))
+        """Rewards until a return is known; see cpp/include/sdnn/agents/return_range.hpp."""
+        self.adapts = agent.learning.value_range == "adaptive"
+
+    def _check_settings(self) -> None:
+        """Raise ValueError for settings that the header cannot have."""
+        learning, sizes = self.agent.learning, self.agent.approximator
+        has_finals = learning.final_learning_rate is not None or learning.final_epsilon is not None
+        ranges = {"weight_limit": f"1 to {MOST_WEIGHT}"}
+        limits = range(1, MOST_WEIGHT + 1)
+        for table, name, is_wrong, expected in (
+            ("approximator", "weight_limit", sizes.weight_limit not in limits, f"{MOST_WEIGHT}"),
+            ("approximator", "averaging_interval", sizes.averaging_interval > 0, "0"),
+            ("learning", "tie_tolerance", learning.tie_tolerance > 0, "0"),
+            ("learning", "schedule", has_finals and learning.schedule != "linear", "linear"),
+        ):
+            if is_wrong:
+                value = getattr(getattr(self.agent, table), name)
+                raise argument_error(
+                    name,
+                    f"must be {ranges.get(name, expected)} for an SDNNQLearning that learns in C,"
+                    f" got {value}: train with --set {table}.{name}={expected}",
+                )
+
+    def _check_values(self) -> None:
+        """Raise ValueError for values that the header could not tell apart."""
+        network = self.network()
+        low, high = network.output_range
+        steps = np.diff(network.output_values()[network.u_low : network.u_high + 1])
+        if max(abs(low), abs(high)) > _LARGEST or steps.min() <= 0:
+            raise ValueError(
+                f"values must be distinct and at most 2^100 in size in C, got {low:g} to {high:g}:"
+                " take other q_low and q_high, or value_range='adaptive'"
+            )
+
+    def columns(self) -> NDArray[np.int32]:
+        """Return the weights of the used units by columns, shape (n_used, n_columns)."""
+        columns = self.code.paired(self.network().weights()[self.used])
+        if np.abs(columns).max() > MOST_WEIGHT:
+            raise ValueError(
+                "sums and differences of two weights must be -127 to 127 for an SDNNQLearning that"
+                f" learns in C, got {np.abs(columns).max()}: export the greedy policy, without"
+                " learning"
+            )
+        return columns
+
+    def thresholds(self) -> NDArray[np.int32]:
+        """Return the thresholds of the used units, filled up with zeros."""
+        thresholds: NDArray[np.int32] = self.network().thresholds()[self.used]
+        return np.pad(thresholds, (0, self.n_units - self.used.size))
+
+    def fields(self) -> list[Field]:
+        """Return names, types and shapes of an image."""
+        of_range: list[Field] = []
+        if self.adapts:
+            of_range = [
+                *((f"range.{name}", "<f8") for name in ("low", "high", "sum")),
+                *((f"range.{name}", "<u8") for name in ("n_returns", "due")),
+                *((name, "<u4") for name in ("n_rewards", "n_kept_returns", "range.oldest")),
+                ("range.rewards", "<i4", (2 * self.horizon,)),
+                ("range.returns", "<f8", (_MOST_RETURNS,)),
+            ]
+        return [
+            ("fraction_bits", "<u4"),
+            ("n_random_left", "<u4"),
+            ("words", "<u8", (5, 4)),
+            *SCALE_FIELDS,
+            ("progress", "<f8"),
+            ("action_value.output_range", "<f8", (2,)),
+            *of_range,
+            ("thresholds", "<i4", (self.n_units,)),
+            ("weights", "<u4", (self.n_words,)),
+        ]
+
+    def remembered(self, state: Data) -> Data:
+        """Return the fields that are not the same in the core's state."""
+        of_range: Data = {}
+        if self.adapts:
+            rewards, returns = self._rewards(state), state["range.returns"]
+            of_range = {
+                "n_rewards": rewards.size,
+                "n_kept_returns": returns.size,
+                "range.rewards": np.pad(rewards, (0, 2 * self.horizon - rewards.size)),
+                "range.returns": np.pad(returns, (0, _MOST_RETURNS - returns.size)),
+            }
+        return {
+            "fraction_bits": self.fraction_bits,
+            "thresholds": self.thresholds(),
+            "weights": weight_words(self.columns())[0],
+            **of_range,
+        }
+
+    def recall(self, image: Array, state: Data) -> None:
+        """Put the fields of an image into the core's state; the episode before is over."""
+        fraction_bits = whole("fraction_bits", int(image["fraction_bits"]), 0, MOST_FRACTION_BITS)
+        state["action_value.output_range"] = image["action_value.output_range"].copy()
+        if self.adapts:
+            for name in ("low", "high", "sum", "n_returns", "due"):
+                state[f"range.{name}"] = image[f"range.{name}"]
+            state["range.oldest"] = np.uint64(image["range.oldest"])
+            rewards = image["range.rewards"][: image["n_rewards"]]
+            state["range.rewards"] = rewards / 2.0**fraction_bits
+            state["range.returns"] = image["range.returns"][: image["n_kept_returns"]].copy()
+        for name in ("states", "actions", "rewards"):
+            state[f"n_step_buffer.{name}"] = state[f"n_step_buffer.{name}"][:0]
+        words = image["weights"].reshape(-1, self.code.n_columns)
+        lanes = words.copy().view(np.uint8).reshape(len(words), -1, 4).transpose(0, 2, 1)
+        columns = lanes.reshape(self.n_units, -1)[: self.used.size].astype(np.int32) - 128
+        if not 0.0 <= image["progress"] <= 1.0 or columns.min() < -MOST_WEIGHT:
+            raise ValueError("progress must be 0 to 1, and weights -127 to 127")
+        known = {"thresholds": image["thresholds"], "weights": self.code.unpaired(columns)}
+        for name, values in known.items():
+            part = state[f"action_value.{name}"] = state[f"action_value.{name}"].copy()
+            part[self.used] = values[: self.used.size]
+
+    def restore(self, whole: bytes) -> None:
+        """Give the agent the state of an image, whole and of this agent."""
+        super().restore(whole)
+        self.agent.progress = float(np.frombuffer(whole, self.layout(), 1)["progress"][0])
+
+    def _rewards(self, state: Data) -> Array:
+        scaled: Array = np.round(state["range.rewards"] * 2.0**self.fraction_bits)
+        clipped: Array = np.clip(scaled, -(2**31), 2**31 - 1).astype("<i4")
+        return clipped
+
+    def _is_new(self) -> bool:
+        """Whether weights and thresholds are those that the header can draw."""
+        sizes, network = self.agent.approximator, self.network()
+        if sizes.initial_weights != "ternary":
+            return False
+        new = _core.SDNNC(sizes, self.agent.seed)
+        return np.array_equal(network.weights(), new.weights()) and np.array_equal(
+            network.thresholds(), new.thresholds()
+        )
+
+    def _rates(self, state: Data) -> dict[str, str]:
+        """Return how alpha and epsilon follow the progress, those that do."""
+        learning, defines = self.agent.learning, dict[str, str]()
+        fractions = {"learning_rate": 1.0, "epsilon": learning.exploration_fraction}
+        for macro, name in (("RATE", "learning_rate"), ("EPSILON", "epsilon")):
+            first, last = getattr(learning, name), getattr(learning, f"final_{name}")
+            fraction = fractions[name]
+            if last is None or name in state:
+                first = last = getattr(self.agent, name)
+                fraction = 0.0
+            numbers = {"FIRST": first, "LAST": last, "FRACTION": fraction}
+            defines |= {f"{macro}_{word}": _real(number) for word, number in numbers.items()}
+        return defines
+
+    def header(self) -> CHeader:
+        """Make the header."""
+        state, tables, is_new = self.state(), self.tables_of_spaces(), self._is_new()
+        self.code.add_tables(tables)
+        tables.add("uint32_t", "first_units", self.first_units, "Where windows begin.")
+        self.add_head(tables, "range.rewards" if self.adapts else "thresholds")
+        if self.adapts:
+            tables.add("int32_t", "first_rewards", self._rewards(state))
+            tables.add("uint64_t", "first_returns", state["range.returns"].view(np.uint64))
+        defines = {
+            **self.code.defines(),
+            **self._network_defines(),
+            **self._rates(state),
+            **self.learning_defines(),
+            **self._add_weights(tables, is_new),
+        }
+        ram_bytes = self._ram_bytes()
+        memory = (
+            f"{ram_bytes:,} bytes, in one struct that you place, and {self._stack_bytes():,} bytes"
+            " of arrays on the stack."
+        )
+        return self.write(
+            "sdnn_c.h",
+            self.describe(str(self.used.size)),
+            learning_needs("9", memory),
+            defines,
+            tables,
+            weight_bytes=0 if is_new else 4 * self.n_words,
+            ram_bytes=ram_bytes,
+            n_words=self.n_words,
+        )
+
+    def _network_defines(self) -> Data:
+        """Return the sizes of the network and the settings of its learning rule."""
+        sizes, learning, network = self.agent.approximator, self.agent.learning, self.network()
+        return {
+            "N_ACTIONS": network.n_actions,
+            "N_UNITS": self.n_units,
+            "N_ACTIVE_UNITS": sizes.n_active_units,
+            "U_LOW": network.u_low,
+            "U_HIGH": network.u_high,
+            "LATTICE": sizes.lattice,
+            "WEIGHT_LIMIT": sizes.weight_limit,
+            "ROUNDING_RULE": f"{self.name.upper()}_{_ROUNDING[sizes.rounding]}",
+            "N_STEPS": learning.n_steps,
+            "DISCOUNT": _real(learning.discount),
+            "ADAPTS": int(self.adapts),
+            "HORIZON": self.horizon,
+        }
+
+    def _add_weights(self, tables: Tables, is_new: bool) -> dict[str, int]:
+        """Add the weights, or ranges of used units where the agent draws weights."""
+        if not is_new:
+            words = weight_words(self.columns())[0]
+            tables.add("uint32_t", "first_weights", words)
+            tables.add("int32_t", "first_thresholds", self.thresholds())
+            return {"IS_NEW": 0}
+        breaks = np.flatnonzero(np.diff(self.used) > 1)
+        first, last = np.r_[0, breaks + 1], np.r_[breaks, self.used.size - 1]
+        ranges = np.stack([self.used[first], self.used[last] + 1], axis=1)
+        tables.add("uint16_t", "used", ranges, "Hidden units in use: from, to.")
+        groups = [self.code.groups.index(pair) for pair in self.network().pairs]
+        about = "Groups of the pairs of inputs, in the order in which weights are drawn."
+        tables.add("uint16_t", "groups", np.array(groups), about)
+        seed = np.array(_seeded(self.agent.seed, _WEIGHTS_STREAM), np.uint64)
+        tables.add("uint64_t", "seed_of_weights", seed)
+        sizes = self.agent.approximator
+        return {
+            "IS_NEW": 1,
+            "N_RANGES": len(ranges),
+            "N_HIDDEN_UNITS": sizes.n_hidden_units,
+            "FIRST_THRESHOLD": round(sizes.initial_threshold * sizes.lattice),
+        }
+
+    def _ram_bytes(self) -> int:
+        """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
+        n_steps, code = self.agent.learning.n_steps, self.code
+        columns = -(-code.column_bytes * code.most_columns // 4) * 4
+        state_bytes = 8 + 4 * self.n_inputs + columns + 4 + 4 * self.n_units
+        n_bytes = 5 * 32 + 24 + 5 * 8 + (n_steps + 1) * state_bytes + 12 * n_steps
+        n_bytes += 4 * self.n_words + 4 * self.n_units
+        n_bytes += 4 * (10 + self.n_inputs + self.n_observed)
+        if self.adapts:
+            n_bytes += 5 * 8 + 8 * _MOST_RETURNS + 8 * self.horizon + 12
+        return int(-(-n_bytes // 8) * 8)
+
+    def _stack_bytes(self) -> int:
+        """Return the bytes of the largest arrays that are there at one time."""
+        changes = 2 * self.code.column_bytes * self.code.most_columns + self.code.n_columns
+        return int(changes + 4 * self.network().n_actions + 8 * self.n_inputs)
+
+
+def _real(value: Any) -> str:
+    """Write a number as its bits."""
+    return f"UINT64_C(0x{np.float64(value).view(np.uint64):x})"
+
+
+def _seeded(seed: int, stream: int) -> list[int]:
+    """Return the words that a random stream begins with; see cpp/include/sdnn/core/random.hpp."""
+    mixed = seed
+
+    def split_mix() -> int:
+        nonlocal mixed
+        mixed = mixed + 0x9E3779B97F4A7C15 & _WORD
+        z = (mixed ^ mixed >> 30) * 0xBF58476D1CE4E5B9 & _WORD
+        z = (z ^ z >> 27) * 0x94D049BB133111EB & _WORD
+        return z ^ z >> 31
+
+    mixed = split_mix() ^ stream
+    mixed = split_mix()
+    return [split_mix() for _ in range(4)]

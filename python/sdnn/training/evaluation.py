@@ -20,13 +20,13 @@ from sdnn.training.files import fixed
 from sdnn.training.interfaces import (
     UnusableStepError,
     checked_outcome,
+    explained,
     has_action_masks,
     mask_in,
     require_single,
     reset_env,
     step_env,
 )
-from sdnn.training.names import explained
 
 _LONG = 100_000
 """Warn after this many steps in one episode."""

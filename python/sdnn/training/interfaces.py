@@ -1,4 +1,4 @@
-"""Environments and learners as a training calls them, both checked."""
+"""Environments and learners as a training calls them, and arguments that users expect elsewhere."""
 
 from __future__ import annotations
 
@@ -17,6 +17,12 @@ from sdnn.support.arguments import flag, has_methods, reward_of, shown
 
 if TYPE_CHECKING:
     from sdnn._core import Controller
+
+
+import inspect
+
+from sdnn.config import fields_of
+from sdnn.support.arguments import explains_names
 
 Seeds: TypeAlias = Mapping[int, int | None]
 Options: TypeAlias = Data | None
@@ -330,3 +336,30 @@ def each_learner(learner: Learner, n_environments: int) -> EachLearner:
     if core_parts and (parts := core_parts(learner)):
         return _CoreLearner(learner, n_environments, parts)
     return EachLearner(learner, n_environments)
+
+
+_OF_TRAIN = (
+    "steps", "episodes", "callbacks", "progress", "evaluate_every", "evaluation_env",
+    "evaluation_episodes",
+)  # fmt: skip
+
+
+def _elsewhere(agent: Any) -> Mapping[str, str]:
+    """Return the settings of an agent or a class of agents, and how they are written."""
+    spellings = {name: f"train(env, {name}=...)" for name in _OF_TRAIN}
+    agent_class = agent if isinstance(agent, type) else type(agent)
+    if not hasattr(agent_class, "learning_type"):
+        return spellings
+    for part in ("approximator", "learning"):
+        config_type = getattr(agent_class, f"{part}_type")
+        for field in fields_of(config_type):
+            meaning = field.doc.partition(".")[0]
+            inner = f"{part}={config_type.__name__}({field.name}=...)"
+            spellings[field.name] = f"{agent_class.__name__}(env, {inner}) ({meaning})"
+    for name in inspect.signature(agent_class).parameters:
+        spellings.setdefault(name, f"{agent_class.__name__}(env, {name}=...)")
+    return spellings
+
+
+explained = explains_names(_elsewhere)
+"""Decorator of agents' functions, which explains arguments that they do not have."""

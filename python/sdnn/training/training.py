@@ -23,9 +23,8 @@ from sdnn.training.files import (
     take_statistics,
     write_training,
 )
-from sdnn.training.interfaces import Learner, each_learner, require_single
+from sdnn.training.interfaces import Learner, each_learner, explained, require_single
 from sdnn.training.loop import Row, TrainingLoop
-from sdnn.training.names import explained
 
 if TYPE_CHECKING:
     from typing import Self
