@@ -13,7 +13,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any, TypeAlias
 
-from sdnn.environments.types import AnyEnv, Data, Info
+from sdnn.environments.types import Data, Info
 from sdnn.support.arguments import require
 from sdnn.support.interrupts import Interrupts
 from sdnn.training.episodes import Episodes
@@ -32,7 +32,7 @@ class TrainingLoop(abc.ABC):
     """The loop of a training; `Training` has its arguments and its files."""
 
     agent: Any
-    env: AnyEnv
+    env: Any
     evaluation_env: Any
     steps: int | None
     episodes: int | None
