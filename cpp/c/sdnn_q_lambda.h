@@ -413,8 +413,9 @@ static inline int64_t sdnn_q_of_each(sdnn_agent* agent, const int32_t* observati
   return sdnn_sum(agent->weights, sdnn_other(agent, bins), limited);
 }
 
-/* Learns a transition. `terminated` says that nothing follows it; running out of time is no such
- * end. If the next transition begins elsewhere, this one was the last of its episode. */
+/* Learns a transition, whose reward is times 2^SDNN_FRACTION_BITS. `terminated` says that nothing
+ * follows it; running out of time is no such end. If the next transition begins elsewhere, this one
+ * was the last of its episode. */
 static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observation,
                                       const uint32_t* action, int32_t reward,
                                       const int32_t* next_observation, int terminated) {
