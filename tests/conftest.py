@@ -163,7 +163,7 @@ def collected():
 @pytest.fixture
 def study(tmp_path, monkeypatch):
     """Write a study file and read it; the folder stays importable for the test only."""
-    from sdnn.reproduction.claim_study import ClaimStudy
+    from sdnn.reproduction.reproduce import ClaimStudy
 
     monkeypatch.setattr(sys, "path", [*sys.path])
 

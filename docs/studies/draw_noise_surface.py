@@ -16,7 +16,7 @@ import numpy as np
 
 from sdnn.agents.registry import title_of
 from sdnn.reports.plots import png_bytes
-from sdnn.reproduction.claim_study import ClaimStudy
+from sdnn.reproduction.reproduce import ClaimStudy
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.results import SHARE_STABLE, final_share_solved
 from sdnn.runs.store import ResultStore

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sdnn.reproduction.claim_study import ClaimStudy
+from sdnn.reproduction.reproduce import ClaimStudy
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "how-to" / "studies.md").read_text()

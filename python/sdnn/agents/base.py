@@ -279,7 +279,6 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         return whole("dimension", dimension, 0, self.n_dimensions - 1)
 
     def _facts(self) -> dict[str, object]:
-        """Return what is shown of it."""
         inputs = "found in the warm-up" if self.is_warming_up else len(self.inputs)
         return {
             "observation": self.observation_space,

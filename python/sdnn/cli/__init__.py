@@ -1,4 +1,4 @@
-"""The command ``sdnn``, a file per command. They read options; the packages do the work."""
+"""The command ``sdnn``. Its commands read options; the packages do the work."""
 
 from __future__ import annotations
 
@@ -9,13 +9,9 @@ import click
 
 from sdnn.cli.bench import bench
 from sdnn.cli.common import exit_interrupted, explained_option
-from sdnn.cli.evaluate import evaluate
 from sdnn.cli.export import export
-from sdnn.cli.plot import plot
-from sdnn.cli.record import record
-from sdnn.cli.reproduce import reproduce
-from sdnn.cli.resume import resume
-from sdnn.cli.sweep import sweep
+from sdnn.cli.runs import evaluate, plot, record, resume
+from sdnn.cli.studies import reproduce, sweep
 from sdnn.cli.train import train
 
 __all__ = ["main"]

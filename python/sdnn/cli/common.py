@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import functools
-import json
 import shlex
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from signal import SIGINT, SIGTERM
@@ -22,15 +20,12 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sdnn.runs import ConfigError, Run
-    from sdnn.runs.engine import Executor
-    from sdnn.runs.study import Study
 
 Options: TypeAlias = dict[str, Any]
 """The options of a command by their names."""
 
 PLAIN_WIDTH = 160
 """Width of tables that go to a file or pipe."""
-
 
 KEYS = (
     "agent.name", "agent.preset", "budget.steps", "budget.episodes", "budget.target_return", "seed",
@@ -43,20 +38,11 @@ KEYS = (
 
 WARMING_UP = "the agent is still warming up: it acts at random and has learned nothing yet"
 
-RUN = click.Path(exists=True, file_okay=False, path_type=Path)
 OLD_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 NEW_FILE = click.Path(dir_okay=False, path_type=Path)
 SEED = click.IntRange(min=0, max=2**64 - 1)
 
-run_argument = click.argument("folder", metavar="RUN", type=RUN)
-
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON.")
-
-seed_option = click.option(
-    "--seed",
-    type=SEED,
-    help="Root of the episodes' seeds.  [default: others than those of the training]",
-)
 
 
 def option_of(key: str) -> str:
@@ -121,12 +107,6 @@ def value_of(text: str) -> object:
         return msgspec.toml.decode(f"value = {text}")["value"]
     except msgspec.DecodeError:
         return text
-
-
-def check_ending(option: str, path: Path, endings: Sequence[str]) -> None:
-    """Check what a file is to become; UsageError with the option's name if it is something else."""
-    if path.suffix not in endings:
-        raise click.UsageError(f"{option} must end in one of {', '.join(endings)}, got {path}")
 
 
 def named_values(option: str, pairs: Iterable[str]) -> Iterator[tuple[str, str]]:
@@ -208,13 +188,9 @@ def _how_to_resume(folder: Path | None) -> str:
 
 
 def train_run(
-    run: Run,
-    as_json: bool,
-    *,
-    steps: int | None = None,
-    episodes: int | None = None,
+    run: Run, as_json: bool, *, steps: int | None = None, episodes: int | None = None,
     repeat_episodes: bool = True,
-) -> None:
+) -> None:  # fmt: skip
     """Train a run, with a line of progress on a terminal; print the result and what comes next."""
     from sdnn.runs.run import resume_command
 
@@ -271,140 +247,8 @@ def json_text(values: object) -> str:
     return msgspec.json.format(msgspec.json.encode(values), indent=2).decode()
 
 
-def run_or_forecast(
-    context: click.Context, study: Study, *, out: Path, executor: Executor, as_json: bool,
-    full: bool, dry_run: bool,
-) -> None:  # fmt: skip
-    """Run a study with a line of progress and print its results, or only what is to be run."""
-    from rich.console import Console
-
-    from sdnn.reports.pages import duration_words
-    from sdnn.runs.engine import TrialBars
-    from sdnn.runs.forecast import forecast
-    from sdnn.runs.sweep import run_study
-
-    with errors_in_a_line():
-        if dry_run:
-            estimate = forecast(study, out, executor.jobs)
-            if as_json:
-                click.echo(json.dumps(estimate, indent=2))
-            else:
-                text = rendered("forecast.txt.jinja", out=out, duration=duration_words, **estimate)
-                click.echo(text, nl=bool(text))
-            return
-        with TrialBars(Console(stderr=True)) as observer:
-            done = run_study(study, out, executor=executor, observer=observer)
-    outcome = done.outcome
-    n_stored = outcome.n_reused + outcome.n_run
-    stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
-    for failure in outcome.failures:
-        message = f"{type(failure.error).__name__}: {failure.error}"
-        variants = ", ".join(study.variants_of(failure.planned.key))
-        click.echo(f"Error: {failure.planned.title} ({variants}) failed: {message}", err=True)
-    if outcome.interrupted:
-        what = "terminated" if outcome.signal == SIGTERM else "interrupted"
-        message = f"{what}; {stored}; the same command continues from there"
-        exit_interrupted(message, outcome.signal or SIGINT)
-    if done.page is None:
-        click.echo(f"Error: nothing is complete, no figure drawn; {stored}", err=True)
-    elif as_json:
-        click.echo(json.dumps(done.table, indent=2))
-    else:
-        done.page.print(make_console(), full=full)
-        page = next(str(file) for file in done.files if file.suffix == ".html")
-        done_now = f"{stored} ({outcome.n_run} run now); " if outcome.n_planned else ""
-        click.echo(f"{done_now}wrote {len(done.files)} files: see {page}")
-    if done.page is None or outcome.failures:
-        context.exit(1)
-
-
 def make_console() -> Console:
     """Make the console that tables are printed on: as wide as the terminal, if it is one."""
     from rich.console import Console
 
     return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
-
-
-Function = Callable[..., object]
-
-_OPTIONS = (
-    click.option(
-        "--executor",
-        "where",
-        type=click.Choice(("threads", "dask")),
-        default="threads",
-        show_default=True,
-        help="Where trials run: threads of this process, or the workers of a Dask cluster.",
-    ),
-    click.option(
-        "--jobs",
-        type=click.IntRange(1, 10_000),
-        help="Trials to run at the same time, with threads.  [default: all cores]",
-    ),
-    click.option(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="The Dask scheduler: host:port, tcp://host:port, or its scheduler file.",
-    ),
-    click.option(
-        "--scheduler-timeout",
-        type=click.FloatRange(min=0, min_open=True),
-        metavar="SECONDS",
-        help="Longest wait for the scheduler and a suitable worker.  [default: 300]",
-    ),
-    click.option(
-        "--out",
-        type=click.Path(file_okay=False, path_type=Path),
-        default=Path("results"),
-        show_default=True,
-        help="Folder for the result file, figures, tables and page.",
-    ),
-    click.option("--json", "as_json", is_flag=True, help="Print the table as JSON."),
-    click.option(
-        "--full", is_flag=True, help="Print all tables and columns, wider than 80 characters."
-    ),
-    click.option("--dry-run", is_flag=True, help="Print what would be run and how long it takes."),
-)
-_OF_DASK = ("scheduler", "scheduler_timeout")
-
-
-def trial_options(command: Function) -> Function:
-    """Add the options of commands that run trials.
-
-    The command receives those of `run_or_forecast` together, as ``ways``.
-    """
-
-    @functools.wraps(command)
-    def wrapped(*arguments: object, where: str, jobs: int | None, **options: Any) -> object:
-        of_dask = {name: options.pop(name) for name in _OF_DASK}
-        options_of_dask = {name: value for name, value in of_dask.items() if value is not None}
-        ways = {name: options.pop(name) for name in ("out", "as_json", "full", "dry_run")}
-        ways["executor"] = _make_executor(where, jobs, options_of_dask)
-        return command(*arguments, ways=ways, **options)
-
-    for option in reversed(_OPTIONS):
-        wrapped = option(wrapped)
-    return wrapped
-
-
-def _make_executor(where: str, jobs: int | None, of_dask: Options) -> Executor:
-    if where == "threads":
-        if of_dask:
-            name = next(iter(of_dask)).replace("_", "-")
-            raise click.UsageError(f"--{name} needs --executor dask")
-        from sdnn.runs.engine import ThreadExecutor
-
-        return ThreadExecutor(jobs)
-    if jobs is not None:
-        raise click.UsageError("--jobs is for threads; a cluster runs one trial a worker thread")
-    if "scheduler" not in of_dask:
-        raise click.UsageError("--executor dask needs --scheduler ADDRESS")
-    from sdnn.runs.dask_executor import DaskExecutor
-    from sdnn.runs.errors import ClusterError
-
-    try:
-        return DaskExecutor(of_dask.pop("scheduler"), **of_dask)
-    except ValueError as error:
-        raise click.UsageError(str(error)) from error
-    except ClusterError as error:
-        raise click.ClickException(str(error)) from error

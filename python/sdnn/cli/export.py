@@ -213,7 +213,6 @@ def _new_agent(
     settings: Sequence[str],
     seed: int | None,
 ) -> AnyAgent:
-    """Make an agent that has learned nothing, of the options that `export` has for it."""
     import gymnasium as gym
     import numpy as np
 
@@ -272,7 +271,6 @@ def _action_space(texts: Sequence[str]) -> gym.Space[Any]:
 
 
 def _ends(option: str, text: str) -> tuple[float, float]:
-    """Read LOW:HIGH."""
     low, _, high = text.partition(":")
     try:
         bounds = float(low), float(high)

@@ -47,7 +47,6 @@ class SpecCommand(click.Command):
 
 
 def _options() -> Iterator[click.Option]:
-    """Make the options of `KEYS` from the schema of the specification's fields."""
     from sdnn.runs import RunSpec
     from sdnn.runs.settings import schemas_of
 

@@ -7,8 +7,6 @@ results that no seed fixes; they are stored like trials, and figures are drawn f
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 
@@ -19,6 +17,7 @@ from sdnn import _core
 from sdnn.agents.registry import AGENTS, split_label
 from sdnn.runs.engine import Counted, Observer
 from sdnn.runs.store import ResultStore
+from sdnn.runs.trial import canonical_json, config_hash
 from sdnn.support import machine
 
 SEED = 1
@@ -119,8 +118,7 @@ class CostConfig:
         Times of another machine or version are no part of one comparison.
         """
         values = {**asdict(self), "version": _core.__version__, "machine": machine.description()}
-        text = json.dumps(values, sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
+        return config_hash(canonical_json(values))
 
 
 QUICK_COST = CostConfig(n_rounds=3, round_seconds=0.01, most_plain_inputs=5)

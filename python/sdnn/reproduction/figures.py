@@ -110,7 +110,6 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
 
 
 def _watermark(axes: Axes) -> None:
-    """Write across a panel that it is a quick look."""
     axes.text(
         0.5, 0.6, "quick", transform=axes.transAxes, ha="center", va="center",
         fontsize=44, color=_WARNING_COLOR, alpha=0.13, weight="bold", zorder=0,
@@ -120,7 +119,6 @@ def _watermark(axes: Axes) -> None:
 def _label(
     figure: Figure, title: str, results: Sequence[CaseResult], *, smooth: bool, quick: bool
 ) -> None:
-    """Write title, what kind of run it is, and where the rows come from."""
     fewest, most = min(r.n_trials for r in results), max(r.n_trials for r in results)
     trials = f"{fewest}" if fewest == most else f"{fewest} to {most}"
     n_episodes = max(result.last_episode for result in results)
@@ -131,14 +129,12 @@ def _label(
         below = f"{what}: {scale} instead of {PAPER_TRIALS} x {PAPER_EPISODES:,}"
     hashes = [f"{r.case_id}/{r.agent} {r.config_hash[:8]}" for r in results]
     lines = [", ".join(hashes[i : i + 4]) for i in range(0, len(hashes), 4)]
-    lines_are = (
-        "Thin line: median over trials; thick line and band: its running median and that of the"
-        f" quartiles over {SMOOTHED_TESTS} tests."
-        if smooth
-        else "Line: median over trials; band: quartiles."
-    )
-    versions = ", ".join(
-        sorted({record.version for result in results for record in result.records})
-    )
+    lines_are = "Line: median over trials; band: quartiles."
+    if smooth:
+        lines_are = (
+            "Thin line: median over trials; thick line and band: its running median and that"
+        )
+        lines_are += f" of the quartiles over {SMOOTHED_TESTS} tests."
+    versions = ", ".join(sorted({record.version for r in results for record in r.records}))
     footer = f"{lines_are} {scale} per case and agent.\nsdnn {versions}; configuration "
     label(figure, title, below, footer + ",\n".join(lines), _WARNING_COLOR)

@@ -129,7 +129,6 @@ class Report:
         )
 
     def _first_sections(self, pictures: Mapping[str, bytes]) -> Iterator[Section]:
-        """Make what the page opens with: the claims, a line each, and the figures."""
         if self.claims:
             table = _claim_table(self.claims)
             yield Section(table=table, notes=[DECIDED_NOTE] if "verdict" in table.header else [])
@@ -148,7 +147,6 @@ class Report:
             )
 
     def _details(self) -> Iterator[Section]:
-        """Make what opens on demand: the rule, every quantity, measures and settings."""
         folded = []
         if self.claims:
             title = "Each quantity of the claims, by these trials alone"

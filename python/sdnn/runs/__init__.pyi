@@ -24,7 +24,6 @@ from sdnn.runs.errors import (
     StoreError as StoreError,
     WorkerLostError as WorkerLostError,
 )
-from sdnn.runs.outcome import RunEvaluation as RunEvaluation, RunOutcome as RunOutcome
 from sdnn.runs.results import CaseResult as CaseResult, measure as measure
 from sdnn.runs.run import Goal as Goal, Run as Run
 from sdnn.runs.settings import (
@@ -36,6 +35,8 @@ from sdnn.runs.settings import (
 from sdnn.runs.spec import RunSpec as RunSpec
 from sdnn.runs.store import ResultStore as ResultStore
 from sdnn.runs.trial import (
+    RunEvaluation as RunEvaluation,
+    RunOutcome as RunOutcome,
     Trial as Trial,
     TrialKey as TrialKey,
     TrialRecord as TrialRecord,

@@ -176,7 +176,6 @@ def _curves_of_run(group: Group, run: Run, rows: Sequence[Row]) -> Iterator[Curv
 
 
 def _series(rows: Sequence[Row], kind: Kind) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the steps of a curve of a run, and its values."""
     wanted, name = "episode", "return"
     if kind == "evaluation":
         wanted, name = "evaluation", "mean_return"

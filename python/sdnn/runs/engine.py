@@ -196,23 +196,13 @@ def run_trials(
 ) -> TrialsOutcome:
     """Run the planned trials that are not stored, and store each as soon as it is finished.
 
-    Ctrl-C and SIGTERM end the run after the chunks under way; finished trials are stored before it
-    returns. A trial that raises does not stop the others.
+    They run by default in threads of this process, one for each core; the observer is told what
+    happens. Ctrl-C and SIGTERM end the run after the chunks under way; finished trials are stored
+    before it returns. A trial that raises does not stop the others.
 
     ValueError if the environment variable SDNN_INSTRUCTION_SET is wrong. StoreError if the store
     cannot be read or written: running trials are given up. RunError if the executor can run no
     trial any more: what was finished is stored.
-
-    Parameters
-    ----------
-    plan
-        Trials the run needs.
-    store
-        Where they go.
-    executor
-        Where they run; default threads of this process, one for each core.
-    observer
-        Notified of what happens.
     """
     instruction_set()
     executor = ThreadExecutor() if executor is None else executor

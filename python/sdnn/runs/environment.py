@@ -172,17 +172,10 @@ class EnvironmentSpec(Settings, frozen=True):
         return self.noise > 0.0 or self.redundant > 0
 
     def make(self, stream: Stream = "sensor_noise", render_mode: str | None = None) -> Env:
-        """Make the environment; every reset with a seed starts its noise.
+        """Make the environment; every reset with a seed starts its noise, which is of a stream.
 
         ConfigError if there is no such environment, it cannot be made, or ranges are missing or
         wrong. RunError if it can be made, but not with this render mode.
-
-        Parameters
-        ----------
-        stream
-            Where its noise comes from.
-        render_mode
-            As Gymnasium has it.
         """
         env = self._bare(stream, render_mode)
         try:
@@ -240,14 +233,8 @@ class EnvironmentSpec(Settings, frozen=True):
         """Return how observations are scaled; None: not at all.
 
         Where the agent acts without the noisy or redundant sensors of its run, it needs
-        ``UnitSensors(env, *scaling.ends)``.
-
-        ConfigError as `make`.
-
-        Parameters
-        ----------
-        env
-            An environment that `make` gave. By default one is made.
+        ``UnitSensors(env, *scaling.ends)``. ``env`` is one that `make` gave; by default one is
+        made. ConfigError as `make`.
 
         Examples
         --------

@@ -17,7 +17,6 @@ from sdnn.environments.types import Env
 from sdnn.runs.environment import render_modes
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import Run
-from sdnn.runs.spec import RunSpec
 from sdnn.support.files import whole_file
 from sdnn.training.evaluation import greedy_episode
 
@@ -61,7 +60,11 @@ def record(
     agent = run.agent()
     root = run.fresh_seed if seed is None else seed
     recording = Recording(agent.is_warming_up)
-    with closing(_filmed(run.spec)) as env:
+    env = run.spec.make_env("evaluation_sensor_noise", render_mode="rgb_array")
+    if "rgb_array_list" in render_modes(env):
+        env.close()
+        env = run.spec.make_env("evaluation_sensor_noise", render_mode="rgb_array_list")
+    with closing(env):
         run.check_spaces(agent, env)
 
         def frames() -> Iterator[NDArray[np.uint8]]:
@@ -93,18 +96,9 @@ def _rendered(env: Env) -> Iterator[NDArray[np.uint8]]:
     for picture in rendered if isinstance(rendered, list) else [rendered]:
         frame = np.asarray(picture)
         if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
-            raise RunError(
-                f"render() must give a picture of red, green and blue, got {frame!r:.80}"
-            )
+            expected = "a picture of red, green and blue"
+            raise RunError(f"render() must give {expected}, got {frame!r:.80}")
         yield frame
-
-
-def _filmed(spec: RunSpec) -> Env:
-    env = spec.make_env("evaluation_sensor_noise", render_mode="rgb_array")
-    if "rgb_array_list" not in render_modes(env):
-        return env
-    env.close()
-    return spec.make_env("evaluation_sensor_noise", render_mode="rgb_array_list")
 
 
 def _write(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,7 +18,6 @@ from sdnn.runs.engine import TrialsOutcome
 from sdnn.runs.errors import PlotUnavailableError
 from sdnn.runs.results import MEASURES, RETURN_MEASURES, CaseResult, MeasureName
 from sdnn.support import machine
-from sdnn.support.files import write_whole
 
 if TYPE_CHECKING:
     from sdnn.runs.trial import TrialRecord
@@ -53,20 +52,6 @@ class Content:
     table: dict[str, object]
     files: Mapping[str, bytes | Iterable[bytes]]
     shown: Sequence[TrialRecord]
-
-    def write(
-        self, outcome: TrialsOutcome, path_of: Callable[[str], Path], call: str
-    ) -> WrittenReport:
-        """Write everything, each under its name; `call` is the command that made it."""
-        everything = dict(self.files) | {
-            "results.md": self.page.to_markdown().encode(),
-            "table.json": (json.dumps(self.table, indent=2, allow_nan=False) + "\n").encode(),
-            "report.html": self.page.to_html(call).encode(),
-        }
-        files = {path_of(name): content for name, content in everything.items()}
-        for path, content in files.items():
-            write_whole(path, content)
-        return WrittenReport(outcome, self.page, tuple(files), self.table)
 
 
 def require_matplotlib() -> None:

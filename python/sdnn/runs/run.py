@@ -35,11 +35,12 @@ from sdnn.environments.types import Data, Env
 from sdnn.runs.config_file import FORMAT, ConfigFile, read_spec
 from sdnn.runs.environment import episode_option, render_modes, takes_episode
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
-from sdnn.runs.outcome import RunEvaluation, RunOutcome
 from sdnn.runs.settings import BudgetSpec, read
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import (
+    RunEvaluation,
+    RunOutcome,
     TrainingTrial,
     TrialKey,
     TrialRecord,
@@ -123,7 +124,6 @@ class Run(Displayed):
         return cls(place, read_spec(path), made)
 
     def _facts(self) -> dict[str, object]:
-        """Return what is shown of it."""
         return {
             "folder": self.folder,
             "task": self.spec.task,
@@ -175,10 +175,9 @@ class Run(Displayed):
             stack.enter_context(self._locked())
             remove_abandoned_files(self.folder)
             if (self.folder / AGENT).exists() and not (self.folder / CHECKPOINT).exists():
-                raise RunError(
-                    f"{self.folder} was trained, but has no {CHECKPOINT} to resume from: a new run"
-                    f" needs another folder, {AGENT} would be written over"
-                )
+                missing = f"{self.folder} was trained, but has no {CHECKPOINT} to resume from"
+                way = f"a new run needs another folder, {AGENT} would be written over"
+                raise RunError(f"{missing}: {way}")
             store = stack.enter_context(ResultStore(self.folder))
             begun = store.keys(unfinished=True)
             if begun and self.key not in begun:
@@ -209,7 +208,13 @@ class Run(Displayed):
                     if trial.reason != "target":  # reached just before the run was killed
                         training.run()
             except UnusableStepError as error:
-                raise self._explained(error, checkpoints.n_saved or began_at) from error
+                n_saved, resume = checkpoints.n_saved or began_at, resume_command(self.folder)
+                saved = f"the first {n_saved} steps are saved: {resume} continues there"
+                saved += " with a new episode"
+                if n_saved == 0:
+                    saved = f"nothing is learned yet: {resume} begins again"
+                    saved += " once the environment is fixed"
+                raise RunError(f"{self.spec.task}: {error}; {saved}") from error
             if trial.finished:
                 checkpoints.finish(training)
             if signals.received == signal.SIGTERM:
@@ -346,14 +351,6 @@ class Run(Displayed):
         self.goals += (Goal(at_step=training.n_steps, **goal),)
         self.write_config()
 
-    def _explained(self, error: Exception, n_saved: int) -> RunError:
-        """Return the error of a step that could not be learned, with what is saved."""
-        resume = resume_command(self.folder)
-        saved = f"the first {n_saved} steps are saved: {resume} continues there with a new episode"
-        if n_saved == 0:
-            saved = f"nothing is learned yet: {resume} begins again once the environment is fixed"
-        return RunError(f"{self.spec.task}: {error}; {saved}")
-
 
 class _StoredCheckpoints(CheckpointCallback):
     """Stores rows every few seconds and before each checkpoint."""
@@ -401,7 +398,6 @@ class _StoredCheckpoints(CheckpointCallback):
         self._rows, self._stored_at = [], time.monotonic()
 
     def _seconds(self) -> float:
-        """Return the processor time since the last call."""
         before, self._clock = self._clock, time.thread_time()
         return self._clock - before
 

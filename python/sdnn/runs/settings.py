@@ -8,8 +8,7 @@ import functools
 import math
 import types
 import typing
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Mapping
 from typing import Annotated, Any, Literal, Protocol, TypeAlias, TypeVar, get_args, get_origin
 
 import msgspec
@@ -89,7 +88,6 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 @functools.cache
 def _kinds_of(kind: type[object]) -> Mapping[str, Any]:
-    """Return the types of the fields of a class, with their bounds."""
     try:
         hints = typing.get_type_hints(kind, include_extras=True)
     except (NameError, TypeError):  # an agent from elsewhere: its values are taken as they are
@@ -184,11 +182,13 @@ def read(kind: type[AnySettings], values: object, where: str = "") -> AnySetting
     or missing, or a value does not fit.
     """
     values = check_names(values, kind.__struct_fields__, where)
-    with within(where):
+    try:
         for field in msgspec.structs.fields(kind):
             if field.required and field.name not in values:
                 raise ConfigError(field.name, "must be given")
         return kind(**values)
+    except ConfigError as error:
+        raise ConfigError(_path(where, error.key), error.problem, error.place) from error
 
 
 def changed(base: AnyPart, values: object, where: str, hint: str = "") -> AnyPart:
@@ -243,15 +243,6 @@ def changed_size(approximator: PartSettings, n_inputs: int) -> PartSettings:
     if "n_inputs" not in names_of(type(approximator)):
         return approximator
     return dataclasses.replace(approximator, n_inputs=n_inputs)
-
-
-@contextmanager
-def within(table: str) -> Iterator[None]:
-    """Put the key of a table before the keys of errors about its values."""
-    try:
-        yield
-    except ConfigError as error:
-        raise ConfigError(_path(table, error.key), error.problem, error.place) from error
 
 
 def _path(table: str, name: str) -> str:
@@ -419,15 +410,7 @@ _REPLACED = {
 
 
 def overridden(values: Mapping[str, object], options: Mapping[str, object]) -> Values:
-    """Return the values of a specification with others in their place.
-
-    Parameters
-    ----------
-    values
-        As a file has them.
-    options
-        Values by their keys, with dots between tables.
-    """
+    """Return the values of a file with the options, by dotted keys, in their place."""
     made: Values = copy.deepcopy(dict(values))
     for name, key in SHORTHANDS.items():
         if isinstance(made.get(name), str):

@@ -293,19 +293,12 @@ class RunSpec(Settings, frozen=True):
             return TrainingTrial(training, environments.pop_all(), target)
 
     def make_env(self, stream: Stream = "sensor_noise", *, render_mode: str | None = None) -> Env:
-        """Make an environment to learn in or, of the other stream, to be evaluated in.
+        """Make an environment to learn in or, of the other stream of noise, to be evaluated in.
 
         Each reset with a seed starts the sensors' noise. Where episodes have no seeds, the first
         reset has the run's.
 
         ConfigError if it cannot be made. RunError if it can be made, but not with this render mode.
-
-        Parameters
-        ----------
-        stream
-            Where its sensor noise comes from.
-        render_mode
-            As Gymnasium has it.
         """
         environment = self.environment
         if stream == "evaluation_sensor_noise" and not self.protocol.noisy_evaluations:
@@ -345,7 +338,6 @@ class RunSpec(Settings, frozen=True):
         return agent
 
     def _optional_settings(self) -> dict[str, object]:
-        """Return the settings of `_OPTIONAL` that are not the default."""
         values = {name: getattr(self.agent, name) for name in _OPTIONAL}
         defaults = AgentSpec(angle_pairs="none", inputs="all")
         return {k: value for k, value in values.items() if value != getattr(defaults, k)}

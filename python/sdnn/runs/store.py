@@ -269,7 +269,6 @@ class ResultStore:
             raise StoreError(f"{self.path} is damaged: {table}.{column}: {problem}") from None
 
     def _runs(self, key: TrialKey | None = None) -> list[_Run]:
-        """Read the run of a key, if it is stored; by default all runs."""
         rest = "ORDER BY id" if key is None else f"WHERE {_KEY}"
         runs = self._read(list[_Run], "*", "runs", rest, *([] if key is None else _stored(key)))
         for run in runs:
@@ -281,7 +280,6 @@ class ResultStore:
         return runs
 
     def _begun(self, key: TrialKey, config: str, version: str) -> _Run:
-        """Return a run, which is begun if it is not there."""
         for run in self._runs(key):
             return run
         nothing = (0, 0.0, None, TrialRows(np.zeros(0, ROW)).checksum())

@@ -83,27 +83,13 @@ class Combination(NamedTuple):
 class Study:
     """Variants in cases; `sdnn.runs.study_file.StudyFile` reads one from its file.
 
-    Parameters
-    ----------
-    title
-        For a reader.
-    specs
-        Each variant in each case in which it runs, what is run of it, and the settings of a file
-        that made it.
-    n_trials, seed
-        Trials of each variant in each case, and the root of all seeds. The seed of a trial depends
-        on the root, its case and its number only, so that variants can be compared trial by trial.
-    reference
-        Id of the variant that the others are compared with.
+    ``specs`` are each variant in each case in which it runs, what is run of it, and the settings of
+    a file that made it. The seed of a trial depends on the root ``seed``, its case and its number
+    only, so that variants can be compared trial by trial: with that of the id ``reference``.
 
-    Attributes
-    ----------
-    cases, variants : tuple
-        In the order in which they are first named.
-    combinations : dict
-        Every variant in every case in which it runs, by their ids (case, variant).
-    pairs : tuple
-        Ids of those that are to be run: all by default; what is stored of others is shown, too.
+    ``combinations`` has every variant in every case in which it runs, by their ids (case, variant);
+    ``pairs`` are the ids of those that are to be run: all by default. What is stored of others is
+    shown, too. ``cases`` and ``variants`` are in the order in which they are first named.
     """
 
     source, text = "", ""  # of the file that it is from
@@ -126,16 +112,12 @@ class Study:
             seeds = (trial_seed(seed, case.id, number) for number in range(n_trials))
             keys = (TrialKey(case.id, label, *pair, config_hash) for pair in enumerate(seeds))
             trials = tuple(PlannedTrial(key, spec) for key in keys)
-            combination = Combination(case, variant, spec, settings, trials)
-            self.combinations.setdefault((case.id, variant.id), combination)
+            made = Combination(case, variant, spec, settings, trials)
+            self.combinations.setdefault((case.id, variant.id), made)
         self.pairs = tuple(self.combinations)
         combinations = self.combinations.values()
-        self.cases = tuple(
-            {combination.case.id: combination.case for combination in combinations}.values()
-        )
-        self.variants = tuple(
-            {combination.variant.id: combination.variant for combination in combinations}.values()
-        )
+        self.cases = tuple({c.case.id: c.case for c in combinations}.values())
+        self.variants = tuple({c.variant.id: c.variant for c in combinations}.values())
 
     def keys(self, case_id: str, variant_id: str) -> tuple[TrialKey, ...]:
         """List where the results of the trials of a variant in a case are stored."""
@@ -184,19 +166,16 @@ class Study:
         setting if one is refused.
         """
         tried: set[str] = set()
-        for (case_id, variant_id), combination in self.combinations.items():
-            keys = self.keys(case_id, variant_id)
-            if keys[0].config_hash in tried or all(key in stored for key in keys):
+        for case, variant, spec, settings, trials in self.combinations.values():
+            first = trials[0].key
+            if first.config_hash in tried or all(trial.key in stored for trial in trials):
                 continue
-            tried.add(keys[0].config_hash)
+            tried.add(first.config_hash)
             try:
-                with opened(combination.spec.make_trial(keys[0].seed)):
-                    _require_comparable(combination.spec)
+                with opened(spec.make_trial(first.seed)):
+                    _require_comparable(spec)
             except Exception as error:  # of whatever agent or environment
-                refusal = combination.spec.refusal(error)
-                raise self.refusal(
-                    combination.case, combination.variant, combination.settings, refusal
-                ) from error
+                raise self.refusal(case, variant, settings, spec.refusal(error)) from error
 
     def refusal(
         self, case: StudyCase, variant: StudyVariant, settings: Layer, error: ConfigError
@@ -206,17 +185,14 @@ class Study:
 
 
 def _require_comparable(spec: RunSpec) -> None:
-    """Check that all trials have the same number of evaluations, at least one."""
     if spec.budget.target_return is not None:
         raise ConfigError("budget.target_return", "must be omitted in a study")
     unit = "episodes" if spec.budget.steps is None else "steps"
     name = "evaluate_every_episodes" if unit == "episodes" else "evaluate_every"
     budget, every = getattr(spec.budget, unit), getattr(spec.protocol, name)
     if not 1 <= (every or 0) <= budget:
-        raise ConfigError(
-            f"protocol.{name}",
-            f"a study with budget.{unit} needs protocol.{name} from 1 to {budget}, got {every}",
-        )
+        expected = f"a study with budget.{unit} needs protocol.{name} from 1 to {budget}"
+        raise ConfigError(f"protocol.{name}", f"{expected}, got {every}")
 
 
 @dataclass(frozen=True)

@@ -230,20 +230,17 @@ class StudyFile(Study):
         where = next(iter(near), variant.where or case.where)
         return ConfigError(error.key, text, self.file.place(where))
 
-    def _layer(self, where: KeyPath, table: Mapping[str, object]) -> Layer:
+    def _layer(
+        self, where: KeyPath, table: Mapping[str, object], prefix: tuple[str, ...] = (),
+        layer: Layer | None = None,
+    ) -> Layer:  # fmt: skip
         """Read a table of settings: nested, with dotted keys, or with quoted dotted keys."""
-        layer: Layer = {}
-        self._collect(where, table, (), layer)
-        return layer
-
-    def _collect(
-        self, where: KeyPath, table: Mapping[str, object], prefix: tuple[str, ...], layer: Layer
-    ) -> None:
+        layer = {} if layer is None else layer
         for key, value in table.items():
             name, place = (*prefix, *key.split(".")), (*where, key)
             depth = _DEPTHS.get(name[:2], 2)
             if isinstance(value, dict) and len(name) < depth:
-                self._collect(place, value, name, layer)
+                self._layer(place, value, name, layer)
                 continue
             if len(name) > depth:
                 expected = "SECTION.NAME, or environment.kwargs.NAME"
@@ -259,6 +256,7 @@ class StudyFile(Study):
             if len(layer) == MOST_SETTINGS:
                 raise self.file.error(where, f"must have at most {MOST_SETTINGS} settings")
             layer[name] = Setting(value, place)
+        return layer
 
     def _import(self) -> None:
         search_folder(self.file.path.resolve().parent)
@@ -267,10 +265,8 @@ class StudyFile(Study):
             try:
                 importlib.import_module(module)
             except Exception as error:
-                raise self.file.error(
-                    ("study", "imports", number),
-                    f"importing {module} failed: {type(error).__name__}: {error}",
-                ) from error
+                problem = f"importing {module} failed: {type(error).__name__}: {error}"
+                raise self.file.error(("study", "imports", number), problem) from error
 
     def _read_agents(self) -> Iterator[tuple[str, Layer]]:
         for agent, table in self.tables.agents.items():
@@ -288,11 +284,9 @@ class StudyFile(Study):
         known = list(dict.fromkeys([*tables, *self.known_cases]))
         for number, case_id in enumerate(listed or ()):
             if case_id not in known:
-                raise self.file.error(
-                    ("study", "cases", number),
-                    f"no case {case_id!r}: neither a table [cases.{case_id}] nor a case of the"
-                    f" paper; {advice(case_id, known)}",
-                )
+                missing = f"neither a table [cases.{case_id}] nor a case of the paper"
+                problem = f"no case {case_id!r}: {missing}; {advice(case_id, known)}"
+                raise self.file.error(("study", "cases", number), problem)
         ids = tables if listed is None else listed
         for case_id in tables:
             if case_id not in ids:
@@ -321,10 +315,8 @@ class StudyFile(Study):
         for name, setting in settings.items():
             if setting.value != fixed.get(name, setting.value):
                 texts = (f"{key} = {value}" for key, value in known.settings.items())
-                raise self.file.error(
-                    setting.where,
-                    f"{case_id} is a case with {', '.join(texts)}: give another one another name",
-                )
+                problem = f"is a case with {', '.join(texts)}: give another one another name"
+                raise self.file.error(setting.where, f"{case_id} {problem}")
         fixed_settings = {name: Setting(value, where) for name, value in fixed.items()}
         return StudyCase(case_id, title, fixed_settings | settings, where)
 

@@ -1,7 +1,8 @@
-"""Run studies, compare variants and write the results: ``sdnn sweep``, and what any study needs."""
+"""Run studies or estimate their time, and write the report of a study that was read from a file."""
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -11,7 +12,8 @@ from sdnn import _core
 from sdnn.agents.registry import title_of
 from sdnn.reports.pages import Page, Section, Table
 from sdnn.reports.plots import figure_bytes
-from sdnn.runs.engine import Executor, Observer, run_trials
+from sdnn.runs.engine import Executor, Observer, PlannedTrial, run_trials
+from sdnn.runs.errors import RunError
 from sdnn.runs.figures import draw_study
 from sdnn.runs.report import (
     MEASURE_END,
@@ -28,9 +30,10 @@ from sdnn.runs.report import (
 from sdnn.runs.results import FINAL_WINDOW, MEASURES, SHARE_STABLE, MeasureName
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import MIN_TRIALS_TO_DIFFER, Comparison, Measured, Study, compare
-from sdnn.runs.trial import ROW_HEADER, records_digest, trial_rows
+from sdnn.runs.trial import ROW_HEADER, TrialKey, opened, records_digest, trial_rows
 from sdnn.support.csv_files import csv_pieces, gzip_pieces
-from sdnn.support.files import remove_abandoned_files
+from sdnn.support.files import remove_abandoned_files, write_whole
+from sdnn.support.machine import n_cores
 
 DIFFERENCE_NOTE = (
     "Differences are paired: a trial minus the reference's trial of the same number, which has the"
@@ -51,7 +54,7 @@ def run_study(
     executor: Executor | None = None,
     observer: Observer | None = None,
 ) -> WrittenReport:
-    """Run what is missing, then draw and write everything that is complete.
+    """Run what is missing of a study, then write into a folder everything that is complete.
 
     A variant in a case is complete when all its trials are stored, whether asked for now or not. A
     trial that raises leaves its variant out of the report and nothing else. There is no report if
@@ -59,16 +62,7 @@ def run_study(
 
     RunError before any trial if a configuration is refused, matplotlib is not installed or
     the result file cannot be used; later if the cluster cannot run trials any more: what was
-    finished is stored.
-
-    Parameters
-    ----------
-    study
-        What is run.
-    out
-        Folder of the result file, figures, tables and page.
-    executor, observer
-        See `sdnn.runs.engine.run_trials`.
+    finished is stored. ``executor`` and ``observer``: see `sdnn.runs.engine.run_trials`.
     """
     require_matplotlib()
     begin = time.monotonic()
@@ -88,7 +82,100 @@ def run_study(
     if content is None:
         return WrittenReport(outcome)
     call = describe_call(outcome, time.monotonic() - begin, content.shown)
-    return content.write(outcome, lambda name: out / study.file_name(name), call)
+    named = dict(content.files) | {
+        "results.md": content.page.to_markdown().encode(),
+        "table.json": (json.dumps(content.table, indent=2, allow_nan=False) + "\n").encode(),
+        "report.html": content.page.to_html(call).encode(),
+    }
+    files = {out / study.file_name(name): data for name, data in named.items()}
+    for path, data in files.items():
+        write_whole(path, data)
+    return WrittenReport(outcome, content.page, tuple(files), content.table)
+
+
+PROBE_SECONDS = 0.3  # processor time of a probe, about
+
+
+def forecast(study: Study, out: Path, jobs: int) -> dict[str, object]:
+    """Count what is to be run and estimate how long it takes, without making any file.
+
+    Returns values that JSON can hold. Estimates from the start of a trial are too low where the
+    task gets harder: later episodes are longer. A RunError says that a configuration is refused,
+    that a trial that is begun to see how long it takes fails, or that the result file cannot be
+    used.
+    """
+    stored: dict[TrialKey, float] = {}
+    if (out / STORE_NAME).exists() or out.is_file():
+        with ResultStore(out, read_only=True) as store:
+            stored = store.seconds()
+    study.check(stored)
+    works: list[dict[str, object]] = []
+    missing: dict[TrialKey, tuple[float, bool]] = {}  # variants that are the same share trials
+    probes: dict[tuple[str, str, bool], tuple[float, int]] = {}
+    for pair in study.pairs:
+        keys, spec = study.keys(*pair), study.combinations[pair].spec
+        left = [key for key in keys if key not in stored]
+        times = [stored[key] for key in keys if key in stored]
+        source = f"{len(times)} stored trial{'s' if len(times) > 1 else ''}"
+        if not times:
+            kind = (*keys[0][:2], spec.budget.steps is None)  # a rate is by the budget's unit
+            if kind not in probes:
+                probes[kind] = _probe(PlannedTrial(keys[0], spec))
+            rate, n_episodes = probes[kind]
+            times, source = [rate * spec.length], f"the first {n_episodes} episodes of one"
+        seconds = sum(times) / len(times)
+        missing |= dict.fromkeys(left, (seconds, spec.is_compiled))
+        works.append(
+            {
+                "case": pair[0],
+                "variant": pair[1],
+                "agent": spec.label,
+                "steps": spec.budget.steps,
+                "episodes": spec.budget.episodes,
+                "config_hash": spec.config_hash,
+                "planned": len(keys),
+                "stored": len(keys) - len(left),
+                "seconds_of_a_trial": seconds,
+                "source": source,
+            }
+        )
+    n_planned = len(study.plan())
+    return {
+        "trials": works,
+        "planned": n_planned,
+        "stored": n_planned - len(missing),
+        "jobs": jobs,
+        "seconds": wall_seconds([*missing.values()], jobs),
+        **study.other_work(out),
+    }
+
+
+def _probe(planned: PlannedTrial) -> tuple[float, int]:
+    """Run the start of a trial: processor time by its budget's unit, and how many episodes."""
+    spec = planned.spec
+    try:
+        with opened(spec.make_trial(planned.key.seed)) as trial:
+            begin = time.thread_time()
+            seconds = 0.0
+            while seconds < PROBE_SECONDS and not trial.finished:
+                trial.advance(spec.protocol.evaluate_every_episodes or 1)
+                seconds = time.thread_time() - begin
+            n_episodes = int(trial.episode)
+            amount = n_episodes if spec.budget.steps is None else int(trial.n_decisions)
+            return seconds / amount, n_episodes
+    except Exception as error:  # whatever a trial raises
+        raise RunError(f"{planned.title} fails: {type(error).__name__}: {error}") from error
+
+
+def wall_seconds(trials: list[tuple[float, bool]], jobs: int) -> float:
+    """Estimate the time that passes while trials run, from processor times and who is compiled.
+
+    Those that are not share one core however many jobs there are, because they hold Python's lock;
+    no more jobs than cores are any help.
+    """
+    times = [seconds for seconds, _ in trials]
+    locked = sum(seconds for seconds, is_compiled in trials if not is_compiled)
+    return max(sum(times) / max(1, min(jobs, n_cores())), max(times, default=0.0), locked)
 
 
 Addition: TypeAlias = tuple[Sequence[Section], Mapping[str, object]]
@@ -190,7 +277,6 @@ def _difference(measured: Measured, name: MeasureName) -> str:
 
 
 def _measures(comparison: Comparison) -> Section:
-    """Explain the measures shown, and which variants are the same."""
     measured, study = comparison.measured.values(), comparison.study
     copies = study.copies().items()
     notes = [f"The variant {variant} is the same as {first}." for variant, first in copies]

@@ -13,14 +13,14 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn._core import __version__
-from sdnn.agents import Evaluation, StopTrainingOnRewardThreshold, Training
+from sdnn.agents import Evaluation, Scaling, StopTrainingOnRewardThreshold, Training
 from sdnn.support.arguments import whole
 from sdnn.training.loop import Row
 
@@ -280,6 +280,33 @@ def rows_of(trial: Trial | TrainingTrial) -> TrialRows:
     if isinstance(trial, TrainingTrial):
         return trial.rows()
     return TrialRows.of_tests(**trial.test_rows())
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOutcome:
+    """The result of training a run.
+
+    ``learning_report``: see `sdnn.agents.SDNNQLearning`, None for fuzzy agents and while one is
+    warming up; ``is_solved``: whether the last evaluation reached the environment's reward
+    threshold; ``has_pictures``: whether `record` can render the environment.
+    """
+
+    n_steps: int
+    n_episodes: int
+    reason: Reason
+    last_evaluation: Row | None
+    learning_report: Mapping[str, Any] | None
+    is_warming_up: bool
+    is_solved: bool
+    has_pictures: bool
+    scaling: Scaling | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunEvaluation(Evaluation):
+    """The result of greedy episodes; ``is_warming_up``: all actions of the agent are random."""
+
+    is_warming_up: bool
 
 
 class TrainingTrial:

@@ -62,7 +62,6 @@ class Evaluation(Displayed):
         return float(np.median(self.returns))
 
     def _facts(self) -> dict[str, object]:
-        """Return what is shown of it."""
         low, high = self.returns.min(), self.returns.max()
         spread = f"{self.mean_return:.5g} ({low:.5g} to {high:.5g})"
         return {"episodes": self.returns.size, "mean return": spread}

@@ -61,7 +61,6 @@ class TrainingResult(Displayed):
         return np.array(pairs, np.float64).reshape(-1, 2)
 
     def _facts(self) -> dict[str, object]:
-        """Return what is shown of it."""
         last = [f"{mean:.5g}" for _, mean in self.evaluations[-1:]] or ["none"]
         facts = {"steps": self.n_steps, "episodes": self.n_episodes}
         return {**facts, "last evaluation": last[0]}

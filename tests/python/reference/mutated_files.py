@@ -17,7 +17,7 @@ from made_records import make_record
 from sdnn import SDNNClassifier, SDNNRegressor, libsdnn
 from sdnn.agents import load_agent
 from sdnn.coding import Symbolic, WithMissing
-from sdnn.reproduction.claim_study import ClaimStudy
+from sdnn.reproduction.reproduce import ClaimStudy
 from sdnn.runs import ResultStore, StoreError
 from sdnn.runs.config_file import read_spec
 from sdnn.runs.errors import RunError

@@ -8,8 +8,8 @@ import pytest
 
 from sdnn.reports.plots import figure_bytes
 from sdnn.reports.statistics import Estimate
-from sdnn.reproduction.claim_study import judge_variants
 from sdnn.reproduction.claims import Verdict
+from sdnn.reproduction.reproduce import judge_variants
 from sdnn.runs.figures import draw_study
 from sdnn.runs.report import format_estimate
 from sdnn.runs.study import compare

@@ -4,8 +4,8 @@ import pytest
 
 import fake_trial
 from made_records import make_record
-from sdnn.runs import ResultStore, forecast
-from sdnn.runs.forecast import wall_seconds
+from sdnn.runs import ResultStore, sweep
+from sdnn.runs.sweep import wall_seconds
 
 STUDY = """
 [study]
@@ -31,7 +31,7 @@ def test_stored_trials_count_and_else_a_probe(use_trial, study, tmp_path, monkey
             super().advance(n)
 
     clock = [0.0]
-    monkeypatch.setattr(forecast.time, "thread_time", lambda: clock[0])
+    monkeypatch.setattr(sweep.time, "thread_time", lambda: clock[0])
     use_trial(Probed)
     mine = study(STUDY)
     out = tmp_path / "out"
@@ -39,7 +39,7 @@ def test_stored_trials_count_and_else_a_probe(use_trial, study, tmp_path, monkey
     with ResultStore(out) as store:
         config = first.spec.canonical_json()
         store.add(make_record(0, config, key=first.key, seconds=3.0))
-    found = forecast.forecast(mine, out, 1)
+    found = sweep.forecast(mine, out, 1)
     by_variant = {one["variant"]: one for one in found["trials"]}
     stored = by_variant["discount=0.8"]
     assert (stored["seconds_of_a_trial"], stored["source"]) == (3.0, "1 stored trial")
@@ -55,7 +55,7 @@ def test_goals_in_steps_and_in_episodes_are_probed_apart(study, tmp_path, monkey
     def probe(planned):
         return 3.0 if planned.spec.budget.steps is None else 0.01, 5  # for an episode, a step
 
-    monkeypatch.setattr(forecast, "_probe", probe)
+    monkeypatch.setattr(sweep, "_probe", probe)
     mine = study("""
     [study]
     trials = 1
@@ -68,16 +68,16 @@ def test_goals_in_steps_and_in_episodes_are_probed_apart(study, tmp_path, monkey
     budget.steps = 20000
     protocol.evaluate_every = 10000
     """)
-    found = forecast.forecast(mine, tmp_path / "out", 1)
+    found = sweep.forecast(mine, tmp_path / "out", 1)
     assert [one["seconds_of_a_trial"] for one in found["trials"]] == [300.0, 200.0]
 
 
 def test_python_trials_share_a_core(monkeypatch):
-    monkeypatch.setattr(forecast, "n_cores", lambda: 16)
+    monkeypatch.setattr(sweep, "n_cores", lambda: 16)
     compiled, locked = (8.0, True), (4.0, False)
     assert wall_seconds(4 * [compiled], 2) == 16.0
     assert wall_seconds(2 * [compiled], 4) == 8.0, "no trial is cut in parts"
     assert wall_seconds([compiled, *4 * [locked]], 8) == 16.0
     assert wall_seconds([], 2) == 0.0
-    monkeypatch.setattr(forecast, "n_cores", lambda: 2)
+    monkeypatch.setattr(sweep, "n_cores", lambda: 2)
     assert wall_seconds(4 * [compiled], 64) == 16.0, "no more at once than there are cores"
