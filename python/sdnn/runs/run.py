@@ -225,7 +225,8 @@ class Run(Displayed):
             agent.save(self.folder / AGENT)
         evaluations = [row for row in self.rows() if row["kind"] == "evaluation"]
         has_report = isinstance(agent, ValueAgent) and not agent.is_warming_up
-        single: Env = env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env
+        single = env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env
+        assert isinstance(single, gym.Env)  # as a specification makes it
         threshold = single.spec.reward_threshold if single.spec else None
         last = evaluations[-1] if evaluations else None
         return RunOutcome(
