@@ -442,12 +442,6 @@ def test_a_wrong_instruction_set_is_named_by_its_variable(tmp_path, monkeypatch,
     assert list(tmp_path.iterdir()) == []
 
 
-def test_cmakedir_is_the_installed_package():
-    done = python("-m", "sdnn", "--cmakedir")
-    assert done.returncode == 0
-    assert (Path(done.stdout.strip()) / "sdnnConfig.cmake").is_file()
-
-
 @pytest.mark.parametrize("arguments", [["--help"], *([name, "--help"] for name in main.commands)])
 def test_command_line_starts_without_heavy_imports(arguments):
     code = (

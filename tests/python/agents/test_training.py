@@ -672,7 +672,7 @@ def test_lines_of_a_resumed_training_are_those_of_a_whole_one(tmp_path):
     assert [json.loads(line)["kind"] for line in whole.splitlines()] == ["episode"] * len(
         whole.splitlines()
     )
-    callbacks = [JSONLines(path), Killed(tmp_path / "c", 60), Stop(90, tmp_path / "unused")]
+    callbacks = [JSONLines(path), Killed(tmp_path / "c", 60), Stop(90)]
     Training(corridor_agent(), Corridor(), steps=120, callbacks=callbacks).run()
     assert len(path.read_text()) < len(whole)
     Training.load(tmp_path / "c", Corridor(), callbacks=[JSONLines(path)]).run()
@@ -816,9 +816,9 @@ def test_an_early_stop_counts_the_evaluations_before_a_training_was_loaded(tmp_p
     assert len(result.evaluations) == 3 - cut // 10
 
 
-def test_a_result_has_the_rows_of_all_that_was_run(tmp_path):
+def test_a_result_has_the_rows_of_all_that_was_run():
     training = Training(corridor_agent(), Corridor(), steps=300)
-    training.callbacks = (Stop(100, tmp_path / "c"),)
+    training.callbacks = (Stop(100),)
     training.run()
     training.callbacks = ()
     result = training.run()

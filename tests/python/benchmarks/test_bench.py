@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from refusals import refuses
 from sdnn import _core
 from sdnn.benchmarks import measurements, report
 from sdnn.cli import main
@@ -123,10 +122,6 @@ def test_tables_are_on_the_screen_and_in_markdown(quick, with_yardsticks, monkey
     assert report.QUICK_WARNING not in page.to_markdown({**with_yardsticks, "quick": False})
 
 
-def test_wrong_usage():
-    assert CliRunner().invoke(main, ["bench", "--long"]).exit_code == 2
-
-
 def test_turns_alternate_and_drop_their_cold_repetitions():
     calls = []
 
@@ -153,8 +148,6 @@ def test_times_of_the_core_are_nanoseconds_per_repetition():
     parts = _core.NetworkParts(trial.agent.networks[0], 1)
     assert (parts.time_values(3) > 0).all()
     assert _core.DenseProduct(5, 7, 1).run(0).size == 0
-    refuses("n_repetitions", parts.time_values, -1)
-    refuses("n_corrected", parts.time_corrections, 1, 0)
 
 
 def test_machines_that_tell_nothing(tmp_path, monkeypatch, yardsticks):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from measurements_for_tests import squared
+from sdnn.agents import Transition
 from sdnn.reports.statistics import Estimate
 
 EVIDENCE = Path(__file__).parents[3] / "docs" / "evidence"
@@ -341,12 +342,12 @@ def test_stream_q_follows_the_gradient_of_its_value(scripts):
         following, reward, *_ = env.step(action)
         if n > 20 and agent._is_greedy:
             break
-        agent.learn(streaming_transition(observation, action, reward, following))
+        agent.learn(Transition(observation, action, reward, following, False))
         observation = following
     (network,), agent_action = agent.networks, agent._chosen
     network.end_episode()
     state, before = agent._state.copy(), network.parameters.copy()
-    agent.learn(streaming_transition(observation, action, reward, following))
+    agent.learn(Transition(observation, action, reward, following, False))
     agent.act(following)
     moved = network.parameters - before
     network.parameters[:] = before
@@ -361,9 +362,3 @@ def test_stream_q_follows_the_gradient_of_its_value(scripts):
         slopes.append((ends[0] - ends[1]) / 2e-3)
     ratios = moved[largest] / np.array(slopes)
     assert np.allclose(ratios, np.median(ratios), rtol=0.05)
-
-
-def streaming_transition(observation, action, reward, following):
-    from sdnn.agents import Transition
-
-    return Transition(observation, action, reward, following, False)

@@ -61,17 +61,6 @@ def test_an_episode_that_is_set_holds_from_the_next_reset_on():
     assert [tolerance(env) for _ in range(2)] == [0.5, 0.5]
 
 
-def test_evaluating_leaves_the_learning_task_alone():
-    learning, evaluation = (TighteningGoal(AcrobotSwingUpEnv()) for _ in range(2))
-    seen = []
-    for episode in range(1, 31):
-        seen.append(tolerance(learning, options={"episode": episode}))
-        if episode % 10 == 0:
-            for env in (evaluation, learning):
-                assert tolerance(env, options={"episode": episode}) == seen[-1]
-    assert seen == [GoalSchedule()(episode) for episode in range(1, 31)]
-
-
 def test_any_function_of_the_episode_is_a_schedule():
     env = TighteningGoal(AcrobotSwingUpEnv(), lambda episode: 0.5**episode)
     assert [tolerance(env, options={"episode": k}) for k in (1, 2, 3)] == [0.5, 0.25, 0.125]

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn.environments import NoisySensors, UnitSensors
+from sdnn.environments import UnitSensors
 
 
 class Fixed(gym.Env):
@@ -55,9 +55,3 @@ def test_ranges_that_do_not_fit(arguments, message):
 
 def test_other_observations_are_refused():
     refuses("Box", UnitSensors, gym.make("FrozenLake-v1"))
-
-
-def test_noise_is_in_parts_of_each_range():
-    env = NoisySensors(UnitSensors(Fixed([0, 0], [1, 1000], [0.5, 500])), 0.01, "saturate", seed=3)
-    deviations = np.array([env.reset()[0] for _ in range(2000)]) - 0.5
-    np.testing.assert_allclose(deviations.std(axis=0), 0.01, rtol=0.06)

@@ -3,8 +3,6 @@
 ``nox -s emulation`` has other compilers and processors.
 """
 
-import doctest
-import importlib
 import itertools
 import math
 from dataclasses import replace
@@ -18,6 +16,7 @@ from c_policies import (
     AGENTS,
     SMALL,
     STRICT,
+    STRICT_CPP,
     TARGETS,
     agents,
     box,
@@ -27,6 +26,7 @@ from c_policies import (
     discrete_agent,
     learning,
     lone_agent,
+    program,
     run,
     symbols_agent,
 )
@@ -103,10 +103,9 @@ def test_the_angle_of_a_pair_is_in_the_agents_bin(needs, tmp_path):
     points = np.column_stack([np.cos(angles), np.sin(angles)]).tolist()
     points += [(1, 0), (0, 1), (-1, 0), (0, -1), (0, 0), (1.5, 1.5), (-0.5, 0.5)]
     (tmp_path / "policy.h").write_text(header.text)
-    (tmp_path / "bins.c").write_text(source)
-    run("gcc", "-std=c99", tmp_path / "bins.c", "-o", tmp_path / "bins")
+    bins = program(tmp_path, source, "gcc", "-std=c99")
     text = "".join(f"{c!r} {s!r}\n" for c, s in points)
-    found = np.array(run(tmp_path / "bins", input=text.encode()).split(), int).reshape(-1, 2)
+    found = np.array(run(bins, input=text.encode()).split(), int).reshape(-1, 2)
     unit = [agent._controller.state_of([c, s, 0.0])[0] for c, s in points]
     expected = np.minimum((np.array(unit) * n_bins).astype(int), n_bins - 1)
     assert expected[: bounds.size].tolist() == list(range(n_bins - 1))
@@ -135,12 +134,11 @@ def test_what_the_library_refuses_is_defined(needs, tmp_path):
           return 0;
         }
     """
-    (tmp_path / "bins.c").write_text(source + "\n")
-    run("clang", *STRICT, *caught, tmp_path / "bins.c", "-o", tmp_path / "bins")
+    bins = program(tmp_path, source, "clang", *STRICT, *caught)
     numbers = [math.nan, math.inf, -math.inf, 0.5]
     points = list(itertools.product(numbers, repeat=3))
     text = "".join(f"{x} {y} {z}\n" for x, y, z in points)
-    found = np.array(run(tmp_path / "bins", input=text.encode()).split(), int).reshape(-1, 3)
+    found = np.array(run(bins, input=text.encode()).split(), int).reshape(-1, 3)
     for (x, y, z), (angle, speed, symbol) in zip(points, found.tolist(), strict=True):
         finite = math.isfinite(x) and math.isfinite(y)
         assert angle == (5 * 9 * 5 // 8 if finite else 5 * 9 // 2)  # an eighth of a turn beyond 0
@@ -173,14 +171,8 @@ def test_two_headers_share_a_program_and_cpp_takes_them(needs, tmp_path):
     """
     left = agents()["discrete"].act([2.0, -1.0, 20000 / 65536, 3000 / 65536], explore=False)
     right = agents()["pairs"].act(np.float32([0.6, -0.8, 2.0]), explore=False)
-    for compiler, options, ending in (
-        ("gcc", STRICT, "c"),
-        ("g++", ("-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-Werror"), "cpp"),
-        ("clang++", ("-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-Werror"), "cpp"),
-    ):
-        (tmp_path / f"both.{ending}").write_text(source)
-        run(compiler, *options, tmp_path / f"both.{ending}", "-o", tmp_path / "both")
-        said = [float(word) for word in run(tmp_path / "both").split()]
+    for compiler, options in (("gcc", STRICT), ("g++", STRICT_CPP), ("clang++", STRICT_CPP)):
+        said = [float(word) for word in run(program(tmp_path, source, compiler, *options)).split()]
         assert said == [left, right[0], right[1]]
 
 
@@ -219,12 +211,6 @@ def test_the_example_balances_as_the_agent_does(needs, tmp_path):
     n_steps = int(run(tmp_path / "main"))
     assert n_steps == balance(agent, 2.0**header.fraction_bits)
     assert n_steps > 40  # at random it falls after 20
-
-
-def test_docstrings():
-    result = doctest.testmod(importlib.import_module("sdnn.export.header"))
-    assert result.failed == 0
-    assert result.attempted > 0
 
 
 def test_values_of_actions_are_those_of_act():

@@ -25,7 +25,7 @@ from c_learners import (
     several,
     small_steps,
 )
-from c_policies import STRICT, TARGETS, box, run
+from c_policies import STRICT, STRICT_CPP, TARGETS, box, program, run
 from refusals import refuses
 from sdnn.agents import QLambdaConfig, RBFQLearning, SDNNQLambda, SDNNQLearning, Transition
 from sdnn.export import c_header, load_image, save_image
@@ -114,9 +114,8 @@ def test_images_of_extreme_numbers_are_refused_or_learn(make, target, tmp_path):
     agent = make()
     live(agent, lines_of(agent, 300, 1, 16), 16)
     (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
-    (tmp_path / "hostile.c").write_text(HOSTILE)
     options = (*STRICT, "-O1", *SANITIZED, "-fsanitize=address")
-    run(target.compiler, *options, tmp_path / "hostile.c", "-o", tmp_path / "hostile")
+    hostile = program(tmp_path, HOSTILE, target.compiler, *options)
     random = np.random.default_rng(3)
     whole = [0, 1, 255, 2**31 - 1, 2**31, 2**32 - 1, 2**45, 2**62 - 1001, 2**63, 2**64 - 1]
     real = np.array([1.0, -1.0, 2.0**99, -(2.0**99), 5e-324, 1e300, np.inf, np.nan, -0.0])
@@ -135,7 +134,7 @@ def test_images_of_extreme_numbers_are_refused_or_learn(make, target, tmp_path):
             image[-4 - half : -4] = one * (half // len(one))
         image[-4:] = zlib.crc32(image[:-4]).to_bytes(4, "little")
         images.append(bytes(image))
-    n_loaded = int(run(tmp_path / "hostile", input=b"".join(images)))
+    n_loaded = int(run(hostile, input=b"".join(images)))
     assert 40 < n_loaded < 180
 
 
@@ -193,10 +192,7 @@ def test_cpp_takes_it_as_functions_and_as_a_class(compiler, make, act, needs, tm
                      ? 0 : 1;
         }}
     """
-    (tmp_path / "main.cpp").write_text(source + "\n")
-    options = ("-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-Werror")
-    run(compiler, *options, tmp_path / "main.cpp", "-o", tmp_path / "main")
-    run(tmp_path / "main")
+    run(program(tmp_path, source, compiler, *STRICT_CPP))
 
 
 @pytest.mark.parametrize("name", LEARNERS)
@@ -204,10 +200,8 @@ def test_memory_is_as_the_header_says(name, target, tmp_path):
     header = c_header(LEARNERS[name](), "agent", learning=True)
     (tmp_path / "agent.h").write_text(header.text)
     source = '#include "agent.h"\n#include <stdio.h>\nint main(void)'
-    source += ' { printf("%d", (int)sizeof(agent_agent)); return 0; }\n'
-    (tmp_path / "size.c").write_text(source)
-    run(target.compiler, *STRICT, tmp_path / "size.c", "-o", tmp_path / "size")
-    assert int(run(tmp_path / "size")) == header.ram_bytes
+    source += ' { printf("%d", (int)sizeof(agent_agent)); return 0; }'
+    assert int(run(program(tmp_path, source, target.compiler, *STRICT))) == header.ram_bytes
 
 
 @pytest.mark.parametrize("make", [discrete, network])
@@ -299,8 +293,7 @@ int main(void) {
 def test_real_numbers_are_ieee_754(target, tmp_path):
     """Numbers of all sizes, subnormal ones too, and such as are nearly equal."""
     (tmp_path / "agent.h").write_text(c_header(network(), "agent", learning=True).text)
-    (tmp_path / "real.c").write_text(REAL_NUMBERS)
-    run(target.compiler, *STRICT, *SANITIZED, tmp_path / "real.c", "-o", tmp_path / "real")
+    real = program(tmp_path, REAL_NUMBERS, target.compiler, *STRICT, *SANITIZED)
     random = np.random.default_rng(1)
     bits = random.integers(0, 2**64, (50_000, 2), np.uint64)
     near = bits[:, :1] ^ (bits[:, 1:] >> random.integers(1, 63, (50_000, 1)).astype(np.uint64))
@@ -310,7 +303,7 @@ def test_real_numbers_are_ieee_754(target, tmp_path):
     with np.errstate(all="ignore"):
         a, b = numbers.T
         expected = np.column_stack([a + b, a - b, a * b, a / b])
-    came = np.frombuffer(run(tmp_path / "real", input=numbers.tobytes()), "<u8").reshape(-1, 4)
+    came = np.frombuffer(run(real, input=numbers.tobytes()), "<u8").reshape(-1, 4)
     is_finite = np.isfinite(expected)
     assert is_finite.mean() > 0.9
     assert (came == expected.view(np.uint64))[is_finite].all()

@@ -5,12 +5,10 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from refusals import refuses
 from sdnn.agents import SDNNQLambda, SDNNQLearning
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
-from sdnn.cli import main
 from sdnn.export import c_header, new_agent
 
 SPACE = gym.spaces.Box(np.array([-2.0, -np.pi]), np.array([1.0, np.pi]), dtype=np.float64)
@@ -19,14 +17,8 @@ GIVEN = ("--range", "-2:1", "--range", "angle")
 
 
 @pytest.fixture
-def export(monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-
-    def invoke(*arguments):
-        words = ["export", *map(str, arguments), "--c-header", "agent.h"]
-        return CliRunner().invoke(main, words)
-
-    return invoke
+def export(invoke):
+    return lambda *arguments: invoke("export", *arguments, "--c-header", "agent.h")
 
 
 @pytest.mark.parametrize("ram_bytes", [6000, 20_000, 10**6])
@@ -135,8 +127,8 @@ def test_actions_are_numbers_or_ranges(actions, space, export, tmp_path):
     assert (tmp_path / "agent.h").read_text() == c_header(agent, "agent", learning=True).text
 
 
-def test_the_help_has_a_command_in_lines_of_its_own():
-    told = CliRunner().invoke(main, ["export", "--help"]).stdout
+def test_the_help_has_a_command_in_lines_of_its_own(invoke):
+    told = invoke("export", "--help").stdout
     assert "\n  sdnn export --new --range -2.4:2.4 --range -3:3 --range -0.21:0.21\n" in told
 
 

@@ -18,35 +18,7 @@ FILES = Path(__file__).parents[1] / "reference" / "libsdnn_files"
 
 BLANKS = ((400, 600, 400, 600), (200, 800, 100, 300), (100, 200, 300, 700), (800, 900, 300, 700))
 
-PARAMETERS = """<ISSUE> % what to learn
-{
-\ttype = function_approximation
-\t<FA>
-\t{
-\t\toutput_range = [-0.2, 1.2]
-\t\trequired_step_size = 0.01 / 2
-\t}
-\tinput_number = 2
-}
-<SDNN>
-{
-\t<PC>
-\t{
-\t\tn = 2000
-\t\tinput_type_and_creation_method = [NUMERICAL(RANDOM_INVERSE(1001,5)):2]
-\t\trandom_seed = [1]
-\t}
-\t<SD>
-\t{
-\t\tcombination_setting = mutual
-\t}
-\t<NN>
-\t{
-\t\trandom_seed = [1]
-\t\tinitial_value_range = [-5, 5]
-\t}
-}
-"""
+PARAMETERS = (FILES / "demonstration.txt").read_text()
 
 
 def demonstration_sample(n_samples, state=1):

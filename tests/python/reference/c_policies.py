@@ -14,6 +14,7 @@ from sdnn.export import c_header, export_c_header
 
 Box, Discrete = gym.spaces.Box, gym.spaces.Discrete
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
+STRICT_CPP = ("-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-Werror")
 ALONE = ("-ffreestanding", "-nostdlib")
 N_STATES = 10_000
 SMALL = SDNNCConfig(n_pattern_units=24, n_hidden_units=60, n_active_units=20, n_actions=5)
@@ -41,6 +42,14 @@ def run(*command, **options):
     done = subprocess.run([str(word) for word in command], capture_output=True, **options)
     assert done.returncode == 0, done.stderr.decode()
     return done.stdout
+
+
+def program(folder, source, compiler, *options):
+    """Compile a program in C or C++, by the compiler; return its path."""
+    path = folder / ("main.cpp" if compiler.endswith("++") else "main.c")
+    path.write_text(source + "\n")
+    run(compiler, *options, path, "-o", folder / "main")
+    return folder / "main"
 
 
 def learned(agent, n_steps=300, seed=1):

@@ -163,38 +163,14 @@ def test_costs_of_some_agents():
     refuses("tiles", planned_costs, SMALL, ["tiles"])
 
 
-def make_agents(n_inputs, seed):
-    """An agent of every kind, by name."""
-    learning = _core.QLearningConfig()
-    rbf = _core.RBFNetworkConfig(n_inputs=n_inputs, n_actions=21)
-    rules = _core.FuzzyRulesConfig(n_inputs=n_inputs)
-    fuzzy = _core.FuzzyQLearningConfig()
-    network = _core.SDNNCConfig(n_inputs=n_inputs)
-    return {
-        "sdnn": _core.BareAgent(approximator=network, learning=learning, seed=seed),
-        "fuzzy": _core.BareAgent(approximator=rules, learning=fuzzy, seed=seed),
-        "rbf": _core.BareAgent(approximator=rbf, learning=learning, seed=seed),
-        "plain rbf": _core.PlainRBFQLearning(approximator=rbf, learning=learning, seed=seed),
-    }
-
-
-@pytest.mark.parametrize("kind", ["sdnn", "fuzzy", "rbf", "plain rbf"])
-def test_steps_of_every_agent_are_timed(kind):
-    agent = make_agents(3, 1)[kind]
-    times = _core.time_agent_steps(agent, 12, seed=1)
-    assert times.dtype == np.int64
-    assert times.shape == (12,)
-    assert (times > 0).all()
-    assert _core.time_agent_steps(agent, 0, seed=1).size == 0
-    refuses("n_repetitions", _core.time_agent_steps, agent, -1, seed=1)
-
-
 def test_the_seed_decides_what_the_timed_agent_learns():
     def weights(kind, seed):
-        agent = make_agents(2, 5)[kind]
-        _core.time_agent_steps(agent, 40, seed)
-        return (agent.network if kind == "plain rbf" else agent.networks[0]).weights()
+        rbf = _core.RBFNetworkConfig(n_inputs=2, n_actions=21)
+        agent = kind(approximator=rbf, learning=_core.QLearningConfig(), seed=5)
+        assert (_core.time_agent_steps(agent, 40, seed) > 0).all()
+        return (agent.networks[0] if kind is _core.BareAgent else agent.network).weights()
 
-    np.testing.assert_array_equal(weights("rbf", 1), weights("rbf", 1))
-    assert (weights("rbf", 1) != weights("rbf", 2)).any()
-    np.testing.assert_allclose(weights("plain rbf", 1), weights("rbf", 1), rtol=0, atol=1e-10)
+    first, plain = weights(_core.BareAgent, 1), weights(_core.PlainRBFQLearning, 1)
+    np.testing.assert_array_equal(first, weights(_core.BareAgent, 1))
+    assert (first != weights(_core.BareAgent, 2)).any()
+    np.testing.assert_allclose(plain, first, rtol=0, atol=1e-10)

@@ -270,17 +270,16 @@ def test_chances_are_shown_from_twice_the_papers_trials_on(study):
 
 def test_small_runs_are_not_judged_and_claims_without_their_cases_not_shown(study):
     mine = study(CLAIMED, n_trials=2)
-    records = [r for r in claimed_records_of(mine, 2) if r.key.case_id != "s5-noise"]
+    records = [
+        record(mine, case, variant, number, steps_of((60, 4)))
+        for case, variant in mine.combinations
+        for number in range(2)
+        if case != "s5-noise"
+    ]
     found = compare(mine, records)
     judged = {number: c for own in judge_variants(found).values() for number, c in own.items()}
     assert sorted(judged) == [3, 5, 7]
     assert {c.verdict for c in judged.values()} == {Verdict.NOT_JUDGED}
-
-
-def claimed_records_of(study, n_trials):
-    for case, variant in study.combinations:
-        for number in range(n_trials):
-            yield record(study, case, variant, number, steps_of((60, 4)))
 
 
 OWN = "[base]\nenvironment = 'sdnn/PaperAcrobot-v0'\n"

@@ -8,10 +8,8 @@ import threading
 from types import SimpleNamespace
 
 import pytest
-from click.testing import CliRunner
 
 from refusals import refuses
-from sdnn.cli import main
 from sdnn.reproduction import EXPERIMENTS, plan_trials
 from sdnn.runs import ClusterError, DaskExecutor
 from sdnn.runs.dask_executor import ended, probe, probes_of
@@ -73,13 +71,12 @@ def test_a_bad_address_is_named(tmp_path, closed_port, kind):
     assert scheduler in str(caught.value)
 
 
-def test_a_missing_dask_names_the_package_to_install(monkeypatch, tmp_path):
+def test_a_missing_dask_names_the_package_to_install(monkeypatch, invoke):
     find = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == "distributed" else find(name)
     )
-    arguments = ["reproduce", "a", "--executor", "dask", "--scheduler", "h:1", "--out", tmp_path]
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
+    result = invoke("reproduce", "a", "--executor", "dask", "--scheduler", "h:1")
     assert result.exit_code == 1
     assert 'pip install "dask[distributed]"' in result.stderr
 
@@ -104,9 +101,8 @@ def test_bad_arguments_are_named(name, value):
         (["--executor", "dask", "--scheduler", ""], "scheduler must be"),
     ],
 )
-def test_wrong_usage_is_exit_code_2(options, words, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(main, ["reproduce", "a", *options])
+def test_wrong_usage_is_exit_code_2(options, words, invoke):
+    result = invoke("reproduce", "a", *options)
     assert result.exit_code == 2
     assert words in result.stderr
     assert os.listdir() == []
