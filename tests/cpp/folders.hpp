@@ -11,6 +11,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "errors.hpp"
+
 namespace sdnn::testing {
 
 /// A folder of this test alone, also where another build's tests run beside it; gone in the end.
@@ -51,12 +53,7 @@ inline void write_content(const std::filesystem::path& path, const std::string& 
 /// The message of the std::runtime_error that `call` throws, or "no error".
 template <class Call>
 std::string runtime_error_of(const Call& call) {
-  try {
-    call();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "no error";
+  return message_of<std::runtime_error>(call);
 }
 
 }  // namespace sdnn::testing

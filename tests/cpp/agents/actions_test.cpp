@@ -4,9 +4,9 @@
 
 #include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "errors.hpp"
 #include "states.hpp"
 
 namespace sdnn::agents {
@@ -15,12 +15,7 @@ namespace {
 using Numbers = std::vector<double>;
 
 std::string error_of(const ActionConfig& config, std::size_t n_in_box) {
-  try {
-    const Actions actions(config, n_in_box);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
+  return testing::message_of([&] { const Actions actions(config, n_in_box); });
 }
 
 TEST(Actions, OfABoxCutItsRangesEvenly) {

@@ -8,13 +8,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <stdexcept>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "agents/one_dimension.hpp"
+#include "errors.hpp"
 #include "sdnn/core/random.hpp"
 #include "states.hpp"
 #include "threads.hpp"
@@ -224,6 +224,7 @@ TEST(Controller, RemembersWhichIndexAWholeActionWasWhileItsRobotIsThere) {
     if (leaves) {
       for (const std::size_t n : {1U, 2U}) controller.set_n_environments(n);
     }
+    (void)controller.act(Numbers(4, 0.5), false, 1);  // a greedy action is not the one taken
     controller.learn(observed, Numbers{1.0}, 1.0, observed, true, 1);
     agent.learn(state, learned, 1.0, state, true, 1);
     const auto networks = std::get<QLearning<RBFNetwork>>(controller.agent()).networks();
@@ -363,13 +364,8 @@ TEST(Controller, RefusesStatesThatDoNotFit) {
 
 // A state may ask for no more memory than it has arrays.
 TEST(Controller, ComparesSizesBeforeMemoryIsAskedFor) {
-  const auto error_of = [](ControllerConfig config, const core::State& state) -> std::string {
-    try {
-      (void)Controller::restored(config, state);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "no error";
+  const auto error_of = [](const ControllerConfig& config, const core::State& state) {
+    return testing::message_of([&] { (void)Controller::restored(config, state); });
   };
   ControllerConfig config = sdnn();
   core::State state = core::state_of(Controller(config));

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <stdexcept>
 
+#include "errors.hpp"
 #include "states.hpp"
 
 namespace sdnn::agents {
@@ -59,12 +60,8 @@ TEST(Episodes, OfTheFirstEnvironmentHaveTheNamesOfTheOnlyOne) {
 TEST(Episodes, NameWhatIsImpossible) {
   Episodes<Count> episodes(Count{1});
   const auto make = [] { return Count{}; };
-  try {
-    (void)episodes.of(1);
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "environment must be less than 1, got 1");
-  }
+  EXPECT_EQ(testing::message_of([&] { (void)episodes.of(1); }),
+            "environment must be less than 1, got 1");
   for (const std::size_t bad : {std::size_t{0}, Episodes<Count>::kMost + 1}) {
     EXPECT_THROW(episodes.resize(bad, make), std::invalid_argument);
   }

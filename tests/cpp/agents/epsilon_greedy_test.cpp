@@ -159,6 +159,8 @@ TEST(EpsilonGreedy, TheSameSeedGivesTheSameActionsAndAnotherSeedOthers) {
 // Which of numbers and NaN is the best one Eigen leaves open: a number of the row, or refused.
 TEST(EpsilonGreedy, ANaNIsNeverTaken) {
   for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
+    EXPECT_THROW(best_by(rule, {}), std::invalid_argument);
+    EXPECT_THROW(best_by(rule, Row(2, std::nan(""))), std::invalid_argument);
     for (std::size_t at = 0; at < 20; ++at) {
       Row values(20, 1.0);
       values[at] = std::numeric_limits<double>::quiet_NaN();

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -12,9 +11,9 @@
 #include "agents/lives.hpp"
 #include "agents/one_dimension.hpp"
 #include "allocation_count.hpp"
+#include "errors.hpp"
 #include "sdnn/core/random.hpp"
 #include "states.hpp"
-#include "threads.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -105,16 +104,6 @@ TEST(FuzzyQLearning, RulesExploreIndependentlyAfterTheGreedyFirstSteps) {
   EXPECT_NEAR(random_picks, n * p, 5 * std::sqrt(n * p * (1 - p)));
 }
 
-TEST(FuzzyQLearning, ATerminatedTransitionDoesNotBootstrapATruncatedOneDoes) {
-  FuzzyRules rules({.n_inputs = 1, .n_sets = 3, .n_actions = 2});
-  rules.set_value(2, 0, 20.0F);
-  for (const bool terminated : {true, false}) {
-    Fuzzy agent(rules, {.policy = kGreedy}, 1);
-    agent.learn(State{0.0}, agent.act(State{0.0}), 1.0, State{1.0}, terminated);
-    EXPECT_EQ(agent.rules().values(0)[0], terminated ? 0.5F : 9.5F);
-  }
-}
-
 // At a centre one rule fires: fuzzy Q-learning is Q-learning on a table there.
 TEST(FuzzyQLearning, AtTheCentresItIsTabularQLearning) {
   Fuzzy agent(FuzzyRules({.n_inputs = 1, .n_sets = 5, .n_actions = 2}),
@@ -198,19 +187,9 @@ TEST(FuzzyQLearning, AStepAllocatesNothingWithAndWithoutTraces) {
   }
 }
 
-template <class Call>
-std::string message(Call call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 TEST(FuzzyQLearning, NamesWhatIsImpossible) {
   const auto of = [](const FuzzyQLearningConfig& config) {
-    return message([&] { Fuzzy(FuzzyRules({.n_inputs = 1}), config, 1); });
+    return testing::message_of([&] { Fuzzy(FuzzyRules({.n_inputs = 1}), config, 1); });
   };
   EXPECT_EQ(of({.learning_coefficient = 0.0}), "learning_coefficient must be in (0, 1], got 0");
   EXPECT_EQ(of({.discount = 1.5}), "discount must be in [0, 1], got 1.5");
@@ -230,7 +209,7 @@ TEST(FuzzyQLearning, ABadTransitionTeachesNothing) {
   Fuzzy agent(FuzzyRules({.n_inputs = 2}), {}, 1);
   const State state = {0.3, 0.6}, other = {0.3, 0.7}, bad = {0.3, 1.7};
   const auto learn = [&agent](const State& s, double a, double r, const State& next) {
-    return message([&] { agent.learn(s, a, r, next, false); });
+    return testing::message_of([&] { agent.learn(s, a, r, next, false); });
   };
   EXPECT_EQ(learn(state, 0.0, 1.0, other),
             "state must be that of the last exploring act, got another");
@@ -268,9 +247,6 @@ TEST(FuzzyQLearning, ARewardThatIsTooLargeLeavesTheTraces) {
 
 TEST(FuzzyQLearning, ALifeCanBeCutAnywhere) {
   testing::expect_that_a_life_can_be_cut(traced_agent);
-}
-
-TEST(FuzzyQLearning, ALifeInSeveralEnvironmentsCanBeCutAnywhere) {
   testing::expect_that_a_life_can_be_cut(traced_agent, 3);
 }
 
@@ -452,30 +428,6 @@ TEST(FuzzyQLearning, NeedsRulesOfTheSameInputs) {
   const std::vector<FuzzyRules> rules = {FuzzyRules({.n_inputs = 2}), FuzzyRules({.n_inputs = 3})};
   EXPECT_THROW(FuzzyQLearning(rules, {}, 1), std::invalid_argument);
   EXPECT_THROW(FuzzyQLearning(std::vector<FuzzyRules>{}, {}, 1), std::invalid_argument);
-}
-
-// Between two updates many threads may ask for values and choose greedy actions.
-TEST(FuzzyQLearning, OfVectorsManyThreadsMayReadIt) {
-  FuzzyQLearning agent = agent_of_two();
-  testing::World<FuzzyQLearning> world(agent.n_inputs(), 7);
-  for (int t = 0; t < 300; ++t) world.tick(agent);
-  const auto read = [](const FuzzyQLearning& learned) {
-    core::Random random(5, core::Stream::sensor_noise), ties(1, core::Stream::evaluation_ties);
-    auto workspace = learned.workspace();
-    std::vector<Numbers> all;
-    Numbers state(learned.n_inputs());
-    for (int i = 0; i < 50; ++i) {
-      for (double& x : state) x = random.uniform();
-      all.push_back(testing::copied(learned.best_action(state, workspace, ties)));
-      all.back().push_back(learned.values(state, workspace, 1)[0]);
-    }
-    return all;
-  };
-  const FuzzyQLearning alone = agent;
-  const auto expected = read(alone);
-  for (const auto& values : testing::in_threads(4, [&](std::size_t) { return read(agent); })) {
-    EXPECT_EQ(values, expected);
-  }
 }
 
 }  // namespace

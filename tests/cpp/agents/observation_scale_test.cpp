@@ -5,10 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <string>
-#include <utility>
 #include <vector>
 
+#include "errors.hpp"
 #include "sdnn/core/random.hpp"
 #include "states.hpp"
 
@@ -101,13 +100,8 @@ TEST(ObservationScale, MissingReadingsAreRefusedHeldOrCoded) {
 }
 
 TEST(ObservationScale, NamesWhatDoesNotFit) {
-  const auto error_of = [](Numbers low, Numbers high, ObservedInput input) -> std::string {
-    try {
-      const ObservationScale scale(std::move(low), std::move(high), {input});
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "no error";
+  const auto error_of = [](const Numbers& low, const Numbers& high, ObservedInput input) {
+    return testing::message_of([&] { const ObservationScale scale(low, high, {input}); });
   };
   const ObservedInput first{ObservedKind::variable, 0, 0};
   EXPECT_EQ(error_of({0.0}, {1.0, 1.0}, first),

@@ -11,45 +11,15 @@
 #include "agents/small_q_learning.hpp"
 #include "allocation_count.hpp"
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/core/random.hpp"
 #include "states.hpp"
-#include "threads.hpp"
 
 namespace sdnn::agents::small_q_learning {
 namespace {
-
-// Between two updates many threads may choose greedy actions; equal ties streams, equal actions.
-TEST(QLearning, ManyThreadsMayChooseGreedyActions) {
-  auto agent = vector_agent();
-  testing::World<decltype(agent)> world(agent.n_inputs(), 7);
-  for (int t = 0; t < 300; ++t) world.tick(agent);
-  const auto greedy_actions = [](const auto& learned) {
-    core::Random random(5, core::Stream::sensor_noise), ties(1, core::Stream::evaluation_ties);
-    auto workspace = learned.workspace();
-    std::vector<double> state(learned.n_inputs());
-    std::vector<std::vector<std::size_t>> actions;
-    for (int i = 0; i < 50; ++i) {
-      for (double& x : state) x = random.uniform();
-      const auto action = learned.best_action(state, workspace, ties);
-      actions.emplace_back(action.begin(), action.end());
-    }
-    return actions;
-  };
-  const auto alone = agent;
-  const auto expected = greedy_actions(alone);
-  for (const auto& actions :
-       testing::in_threads(4, [&](std::size_t) { return greedy_actions(agent); })) {
-    EXPECT_EQ(actions, expected);
-  }
-}
 
 TEST(QLearning, ALifeCanBeCutAnywhere) {
   testing::expect_that_a_life_can_be_cut(sdnn_agent);
   testing::expect_that_a_life_can_be_cut(rbf_agent);
   testing::expect_that_a_life_can_be_cut(vector_agent);
-}
-
-TEST(QLearning, ALifeInSeveralEnvironmentsCanBeCutAnywhere) {
   testing::expect_that_a_life_can_be_cut(rbf_agent, 2);
   testing::expect_that_a_life_can_be_cut(vector_agent, 3);
 }

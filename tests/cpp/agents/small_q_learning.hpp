@@ -3,12 +3,12 @@
 
 #include <array>
 #include <cstddef>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "agents/one_dimension.hpp"
 #include "approximators/lookup_table.hpp"
+#include "errors.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
@@ -27,12 +27,7 @@ using Position = std::array<double, 1>;
 inline Position cell(int i) { return {(i + 0.5) / 5.0}; }
 
 inline std::string message(const QLearningConfig& config) {
-  try {
-    Agent(LookupTable(1, 5, 2), config, 1);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
+  return testing::message_of([&] { Agent(LookupTable(1, 5, 2), config, 1); });
 }
 
 /// A network of which counts from 4 to 36 stand for values from -16 to 16: all whole numbers.

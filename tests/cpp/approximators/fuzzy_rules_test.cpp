@@ -4,12 +4,11 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "allocation_count.hpp"
+#include "errors.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators {
@@ -113,12 +112,7 @@ TEST(FuzzyRules, FiringAllocatesNothing) {
 
 template <class Error>
 std::string refusal(const FuzzyRulesConfig& config) {
-  try {
-    FuzzyRules rules(config);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
+  return testing::message_of<Error>([&] { FuzzyRules rules(config); });
 }
 
 TEST(FuzzyRules, TooLargeATableIsRefusedBeforeMemoryIsAskedFor) {

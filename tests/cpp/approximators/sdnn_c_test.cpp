@@ -163,59 +163,6 @@ TEST(SDNNC, PopcountsOfWindowsEqualTheSlidingCount) {
   }
 }
 
-/// A walk of transitions, as an agent meets them: mostly small steps, sometimes a jump.
-void walk(State& state, core::Random& random) {
-  if (random.below(20) == 0) {
-    state = random_state(state.size(), random);
-    return;
-  }
-  for (double& value : state) {
-    value = std::clamp(value + 0.1 * (random.uniform() - 0.5), 0.0, 1.0);
-  }
-}
-
-// The remembered potentials must be those of a full pass, whatever has been learned since.
-TEST(SDNNC, RememberingChangesNothingOverThousandsOfLearningSteps) {
-  Network remembering(small(), 2);
-  Network forgetful(small(), 2);
-  const State away = {0.0, 0.0, 0.0};
-  const State further_away = {1.0, 1.0, 1.0};
-  core::Random random(5, core::Stream::weights);
-  State state = random_state(3, random);
-  for (int step = 0; step < 4000; ++step) {
-    const State next = [&] {
-      State moved = state;
-      walk(moved, random);
-      return moved;
-    }();
-    const std::size_t action = random.below(remembering.n_actions());
-    const double reward = random.below(10) == 0 ? 10.0 : -1.0;
-    const auto learn = [&](Network& network, bool forget) {
-      const std::vector<double> following = values(network, next);
-      if (forget) {
-        (void)network.value(away, 0);
-        (void)network.value(further_away, 0);
-      }
-      network.update(
-          state, action,
-          0.5 * network.value(state, action) +
-              0.5 * (reward + 0.9 * *std::max_element(following.begin(), following.end())));
-      if (forget) {
-        (void)network.value(away, 0);
-        (void)network.value(further_away, 0);
-      }
-    };
-    learn(remembering, false);
-    learn(forgetful, true);
-    if (step % 50 == 0) {
-      ASSERT_EQ(values(remembering, next), values_by_masks(remembering, next)) << step;
-      ASSERT_EQ(values(remembering, state), values_by_masks(remembering, state)) << step;
-    }
-    state = next;
-  }
-  expect_equal_parameters(remembering, forgetful);
-}
-
 TEST(SDNNC, ActingAndLearningAllocateNothing) {
   Network network({}, 1);
   network.warm_caches();
@@ -306,21 +253,6 @@ TEST(SDNNC, TheSameSeedGivesTheSameNetworkAndAnotherSeedAnother) {
   EXPECT_EQ(first.state_code().permutation(0, 2), same.state_code().permutation(0, 2));
   EXPECT_NE(first.state_code().permutation(0, 2), other.state_code().permutation(0, 2));
   EXPECT_NE(first.state_code().permutation(0, 2), first.state_code().permutation(2, 0));
-}
-
-TEST(SDNNC, ARateMixesTargetAndValue) {
-  Network one(small(), 5);
-  Network other(small(), 5);
-  const State state = {0.3, 0.6, 0.2};
-  for (int i = 0; i < 50; ++i) {
-    one.update(state, 70, 12.0, 0.25);
-    other.update(state, 70, 0.75 * other.value(state, 70) + 0.25 * 12.0);
-  }
-  expect_equal_parameters(one, other);
-  for (const double rate : {0.0, -0.5, 1.5, std::nan("")}) {
-    EXPECT_THROW(one.update(state, 70, 1.0, rate), std::invalid_argument);
-  }
-  expect_equal_parameters(one, other);
 }
 
 TEST(SDNNC, WarmCachesChangeNothing) {

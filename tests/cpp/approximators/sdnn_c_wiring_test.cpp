@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "approximators/small_sdnn_c.hpp"
+#include "errors.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/coding/anchor_patterns.hpp"
 #include "sdnn/coding/random_inverse.hpp"
@@ -141,12 +142,7 @@ TEST(SDNNC, SymbolsHavePatternsOfTheirOwn) {
 }
 
 std::string message(const SDNNCConfig& config) {
-  try {
-    Network(config, 1);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
+  return testing::message_of([&] { Network(config, 1); });
 }
 
 void expect_named(const SDNNCConfig& config, const std::string& name) {
@@ -154,13 +150,8 @@ void expect_named(const SDNNCConfig& config, const std::string& name) {
 }
 
 TEST(SDNNC, TooLargeANetworkIsRefusedBeforeMemoryIsAskedFor) {
-  const auto refusal = [](const SDNNCConfig& config) -> std::string {
-    try {
-      Network(config, 1);
-    } catch (const std::length_error& error) {
-      return error.what();
-    }
-    return "no error";
+  const auto refusal = [](const SDNNCConfig& config) {
+    return testing::message_of<std::length_error>([&] { Network(config, 1); });
   };
   EXPECT_EQ(refusal({.n_inputs = 16, .n_pattern_units = 4096}),
             "max_pairs, n_hidden_units, n_pattern_units or n_inputs must be smaller: weights, "

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "errors.hpp"
+
 namespace sdnn::coding {
 namespace {
 
@@ -27,13 +29,8 @@ TEST(ActionCode, TheTorqueRangeIsCutEvenly) {
 }
 
 TEST(ActionCode, NamesWhatIsImpossible) {
-  const auto message = [](int n, int active, int actions) -> std::string {
-    try {
-      ActionCode(n, active, actions);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "no error";
+  const auto message = [](int n, int active, int actions) {
+    return testing::message_of([&] { ActionCode(n, active, actions); });
   };
   EXPECT_EQ(message(900, 901, 0), "n_active_units must be in [1, 900], got 901");
   EXPECT_EQ(message(900, 0, 0), "n_active_units must be in [1, 900], got 0");

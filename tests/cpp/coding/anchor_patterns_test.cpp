@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "errors.hpp"
+
 namespace sdnn::coding {
 namespace {
 
@@ -39,14 +41,17 @@ TEST(AnchorPatterns, OddPatternsAreBalancedToOneUnit) {
 // Between two anchors every differing unit flips once: distances to the first anchor are the cuts
 // floor(j * differing / 45), and the last portion leads to the next anchor.
 TEST(AnchorPatterns, NeighboursDifferByNearlyEqualPortions) {
-  const PatternTable table = paper_table(3);
-  for (std::size_t segment = 0; segment + 1 < 8; ++segment) {
-    const std::size_t first = 45 * segment;
-    const std::size_t differing = table[first].distance(table[first + 45]);
-    for (std::size_t j = 0; j < 45; ++j) {
-      const std::size_t here = first + j;
-      EXPECT_EQ(table[first].distance(table[here]), j * differing / 45);
-      EXPECT_EQ(table[here].distance(table[first + 45]), differing - j * differing / 45);
+  for (const bool circular : {false, true}) {
+    const PatternTable table = paper_table(3, {.n_units = 200, .circular = circular});
+    for (std::size_t first = 0; first < (circular ? 360U : 315U); first += 45) {
+      const std::size_t last = (first + 45) % 360;
+      const std::size_t differing = table[first].distance(table[last]);
+      for (std::size_t j = 0; j < 45; ++j) {
+        const std::size_t here = first + j, cut = j * differing / 45;
+        EXPECT_EQ(table[first].distance(table[here]), cut);
+        EXPECT_EQ(table[here].distance(table[last]), differing - cut);
+        EXPECT_EQ(table[here].distance(table[(here + 1) % 360]), (j + 1) * differing / 45 - cut);
+      }
     }
   }
 }
@@ -60,13 +65,8 @@ TEST(AnchorPatterns, ACircularBookEndsNextToItsBeginning) {
 }
 
 TEST(AnchorPatterns, NamesWhatIsImpossible) {
-  const auto message = [](AnchorConfig config) -> std::string {
-    try {
-      paper_table(1, config);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "no error";
+  const auto message = [](AnchorConfig config) {
+    return testing::message_of([&] { paper_table(1, config); });
   };
   EXPECT_EQ(message({.n_units = 1}), "n_units must be in [2, 16777216], got 1");
   EXPECT_EQ(message({.n_units = 9, .n_anchor_patterns = 1}),

@@ -3,9 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -195,25 +193,6 @@ TEST(StateCode, AnAnchorStateHasHalfOfItsColumns) {
   const auto code = small_code(4, 64, 7);
   const std::vector<Bin> anchors = {0, 45, 90, 135};
   EXPECT_EQ(code.inner_product(anchors, anchors), 12 * 32);
-}
-
-TEST(StateCode, RefusesWhatIsNoState) {
-  const auto code = small_code(2, 10, 8);
-  std::vector<Bin> bins(2);
-  const auto message = [&](std::vector<double> state) -> std::string {
-    try {
-      code.bins_of(state, bins);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "no error";
-  };
-  EXPECT_EQ(message({0.0, 1.0}), "no error");
-  EXPECT_EQ(message({0.5}), "state must be 2 values, got 1");
-  EXPECT_EQ(message({0.5, 1.5}), "state[1] must be in [0, 1], got 1.5");
-  EXPECT_EQ(message({std::nan(""), 0.5}), "state[0] must be in [0, 1], got nan");
-  EXPECT_EQ(message({-std::numeric_limits<double>::infinity(), 0.5}),
-            "state[0] must be in [0, 1], got -inf");
 }
 
 TEST(StateCode, RefusesWrongWiring) {

@@ -4,17 +4,18 @@
 
 #include <new>
 #include <stdexcept>
+#include <string>
+
+#include "errors.hpp"
 
 namespace sdnn::core {
 namespace {
 
 // Without exceptions: tests/python/core/test_compiler_options.py.
 TEST(Fail, ThrowsTheErrorItself) {
-  try {
-    fail(std::out_of_range("index must be below 3, got 4"));
-  } catch (const std::out_of_range& error) {
-    EXPECT_STREQ(error.what(), "index must be below 3, got 4");
-  }
+  const std::string message = "index must be below 3, got 4";
+  EXPECT_EQ(testing::message_of<std::out_of_range>([&] { fail(std::out_of_range(message)); }),
+            message);
   EXPECT_THROW(fail(std::bad_alloc()), std::bad_alloc);
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "errors.hpp"
 #include "states.hpp"
 
 namespace sdnn::core {
@@ -142,12 +143,9 @@ TEST(StateReader, NamesTheTensorOfWhatCouldNotBeTaken) {
   StateReader reader(state);
   reader.prefix = "net.";
   EXPECT_NO_THROW(reader.taking("weights", [] {}));
-  try {
-    reader.taking("weights", [] { throw std::invalid_argument("weight must be small, got 9"); });
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "state: net.weights must be such that weight must be small, got 9");
-  }
+  const auto bad = [] { throw std::invalid_argument("weight must be small, got 9"); };
+  EXPECT_EQ(testing::message_of([&] { reader.taking("weights", bad); }),
+            "state: net.weights must be such that weight must be small, got 9");
 }
 
 TEST(Tensor, TypesHaveTheNamesAndSizesOfSafetensors) {

@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "allocation_count.hpp"
+#include "errors.hpp"
 #include "instruction_sets.hpp"
 #include "sdnn/core/random.hpp"
 
@@ -128,12 +128,8 @@ TEST(AcrobotBatch, OneOverflowLeavesTheOthersAlone) {
     Step step(5);
     step.torques.assign(5, 2.5);
     single.step(2.5, 1.0);
-    try {
-      step.of(batch);
-      FAIL();
-    } catch (const std::overflow_error& error) {
-      EXPECT_STREQ(error.what(), "the speed of acrobot 3 is too high for this integration_step");
-    }
+    EXPECT_EQ(testing::message_of<std::overflow_error>([&] { step.of(batch); }),
+              "the speed of acrobot 3 is too high for this integration_step");
     EXPECT_TRUE(same_bits(batch.state(4), single.state()));
     EXPECT_EQ(batch.decisions(4), 1);
     EXPECT_THROW(step.of(batch), std::logic_error);  // 3 is over
@@ -144,22 +140,14 @@ TEST(AcrobotBatch, OneOverflowLeavesTheOthersAlone) {
 
 TEST(AcrobotBatch, RejectsBadArgumentsBeforeAnythingMoves) {
   AcrobotBatch batch({}, 3);
-  const auto message = [&batch](const Step& wrong) {
-    Step step = wrong;
-    try {
-      step.of(batch);
-    } catch (const std::invalid_argument& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
+  const auto message = [&batch](Step step) { return testing::message_of([&] { step.of(batch); }); };
   Step step(3);
   step.torques[2] = 10.5;
   EXPECT_EQ(message(step), "torques[2] must be in [-10, 10], got 10.5");
   step.torques[2] = kNaN;
   EXPECT_EQ(message(step), "torques[2] must be in [-10, 10], got nan");
   step.moving[2] = 0;
-  EXPECT_EQ(message(step), "");
+  EXPECT_EQ(message(step), "no error");
   step.tolerances[1] = -1.0;
   EXPECT_EQ(message(step), "goal_tolerances[1] must be at least 0, got -1");
   step.tolerances[1] = 1.0;
@@ -177,14 +165,12 @@ TEST(AcrobotBatch, RejectsBadArgumentsBeforeAnythingMoves) {
   EXPECT_THROW(batch.decisions(3), std::out_of_range);
   EXPECT_THROW(AcrobotBatch({}, 0), std::invalid_argument);
   EXPECT_THROW(AcrobotBatch({}, kMaxAcrobots + 1), std::invalid_argument);
-  AcrobotConfig config;
-  config.max_decisions = 0;
+  const AcrobotConfig config{.max_decisions = 0};
   EXPECT_THROW(AcrobotBatch(config, 1), std::invalid_argument);
 }
 
 TEST(AcrobotBatch, EndsEpisodesOneByOne) {
-  AcrobotConfig config;
-  config.max_decisions = 2;
+  const AcrobotConfig config{.max_decisions = 2};
   AcrobotBatch batch(config, 2);
   EXPECT_EQ(batch.size(), 2u);
   batch.set_state(0, {2.0, 0.0, 2.0, 0.0});

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
-#include <string>
 
+#include "errors.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace {
@@ -21,8 +21,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // The state reached from `start` after one second without goal or torque.
 AcrobotState after_a_second(const AcrobotState& start, double integration_step) {
-  AcrobotConfig config;
-  config.integration_step = integration_step;
+  const AcrobotConfig config{.integration_step = integration_step};
   Acrobot acrobot(config);
   acrobot.set_state(start);
   acrobot.step(0.0, 0.0);
@@ -69,8 +68,7 @@ TEST(AcrobotDynamics, AgreesWithTheEquationsAsPrinted) {
 }
 
 TEST(AcrobotDynamics, KeepsItsEnergyWithoutTorque) {
-  AcrobotConfig config;
-  config.integration_step = 0.001;
+  const AcrobotConfig config{.integration_step = 0.001};
   Acrobot acrobot(config);
   acrobot.set_state({1.0, -0.5, 1.5, -2.0});
   const double energy = acrobot.energy();
@@ -89,10 +87,7 @@ TEST(AcrobotDynamics, HasTheMassMatrixWorkedByHand) {
 // M a + h + phi = (0, torque), with h and phi as printed by Spong.
 TEST(AcrobotDynamics, SolvesTheMassMatrixForTheAccelerations) {
   sdnn::core::Random random(2, sdnn::core::Stream::exploration);
-  AcrobotConfig config;
-  config.link_mass_2 = 1.5;
-  config.link_length_1 = 0.75;
-  config.center_of_mass_2 = 0.3;
+  const AcrobotConfig config{.link_mass_2 = 1.5, .link_length_1 = 0.75, .center_of_mass_2 = 0.3};
   const Acrobot acrobot(config);
   const double swirl = 1.5 * 0.75 * 0.3, g = 9.8;
   for (int i = 0; i < 200; ++i) {
@@ -187,9 +182,7 @@ TEST(AcrobotTask, PenalizesIdlingAtTheDecisionInstant) {
 }
 
 TEST(AcrobotTask, PenalizesSpeedWithoutEndingAnything) {
-  AcrobotConfig config;
-  config.gravity = 0.0;
-  config.goal_height = 3.0;
+  AcrobotConfig config{.gravity = 0.0, .goal_height = 3.0};
   Acrobot acrobot(config);
   acrobot.set_state({1.0, 0.0, 9.5, 0.0});  // 3 pi = 9.42
   const auto fast_1 = acrobot.step(0.0, 1.0);
@@ -225,8 +218,7 @@ TEST(AcrobotTask, EndsAtTheInstantTheGoalIsReached) {
 }
 
 TEST(AcrobotTask, LooksForTheGoalOnlyAtDecisionsIfAsked) {
-  AcrobotConfig config;
-  config.goal_test = GoalTest::decision_instant;
+  const AcrobotConfig config{.goal_test = GoalTest::decision_instant};
   Acrobot acrobot(config);
   acrobot.set_state({2.0, 0.0, 2.0, 0.0});
   const auto result = acrobot.step(0.0, 1.0);
@@ -237,9 +229,7 @@ TEST(AcrobotTask, LooksForTheGoalOnlyAtDecisionsIfAsked) {
 
 TEST(AcrobotTask, NeedsSpeedsBelowTheScaledLimits) {
   const auto ends = [](const AcrobotState& start, double goal_tolerance) {
-    AcrobotConfig config;
-    config.gravity = 0.0;
-    config.decision_interval = 0.02;
+    const AcrobotConfig config{.gravity = 0.0, .decision_interval = 0.02};
     Acrobot acrobot(config);
     acrobot.set_state(start);
     return acrobot.step(0.0, goal_tolerance).terminated;
@@ -278,11 +268,8 @@ TEST(AcrobotTask, RejectsBadArguments) {
   EXPECT_THROW(acrobot.set_state({0.0, kNaN, 0.0, 0.0}), std::invalid_argument);
   EXPECT_THROW(acrobot.set_state({0.0, 0.0, kInfinity, 0.0}), std::invalid_argument);
   EXPECT_EQ(acrobot.state(), AcrobotState::Zero());
-  try {
-    acrobot.step(kNaN, 1.0);
-  } catch (const std::invalid_argument& error) {
-    EXPECT_EQ(std::string(error.what()), "torque must be in [-10, 10], got nan");
-  }
+  EXPECT_EQ(sdnn::testing::message_of([&] { acrobot.step(kNaN, 1.0); }),
+            "torque must be in [-10, 10], got nan");
 }
 
 TEST(AcrobotTask, SaysWhenTheSpeedBreaksTheIntegration) {

@@ -23,8 +23,7 @@ TEST(GoalSchedule, InverseLinearIsTheDefault) {
 }
 
 TEST(GoalSchedule, InverseSqrtIsContinuousAtItsLastEpisode) {
-  GoalScheduleConfig config;
-  config.kind = GoalScheduleKind::inverse_sqrt;
+  const GoalScheduleConfig config{.kind = GoalScheduleKind::inverse_sqrt};
   const GoalSchedule lambda(config);
   EXPECT_DOUBLE_EQ(lambda(3), 0.5);
   EXPECT_DOUBLE_EQ(lambda(99), 0.1);
@@ -33,9 +32,7 @@ TEST(GoalSchedule, InverseSqrtIsContinuousAtItsLastEpisode) {
 }
 
 TEST(GoalSchedule, ConstantIgnoresTheEpisode) {
-  GoalScheduleConfig config;
-  config.kind = GoalScheduleKind::constant;
-  config.constant_value = 0.25;
+  const GoalScheduleConfig config{.kind = GoalScheduleKind::constant, .constant_value = 0.25};
   const GoalSchedule lambda(config);
   EXPECT_EQ(lambda(1), 0.25);
   EXPECT_EQ(lambda(20000), 0.25);
@@ -43,9 +40,7 @@ TEST(GoalSchedule, ConstantIgnoresTheEpisode) {
 
 TEST(GoalSchedule, NeverRises) {
   for (const auto kind : {GoalScheduleKind::inverse_linear, GoalScheduleKind::inverse_sqrt}) {
-    GoalScheduleConfig config;
-    config.kind = kind;
-    config.floor = 0.005;
+    const GoalScheduleConfig config{.kind = kind, .floor = 0.005};
     const GoalSchedule lambda(config);
     for (int k = 1; k < 12000; ++k) EXPECT_LE(lambda(k + 1), lambda(k));
   }
@@ -61,8 +56,7 @@ TEST(GoalSchedule, RejectsBadArguments) {
     EXPECT_THROW(GoalSchedule{floor}, std::invalid_argument);
     EXPECT_THROW(GoalSchedule{constant}, std::invalid_argument);
   }
-  GoalScheduleConfig config;
-  config.last_episode = -1;
+  const GoalScheduleConfig config{.last_episode = -1};
   EXPECT_THROW(GoalSchedule{config}, std::invalid_argument);
 }
 

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <stdexcept>
@@ -105,19 +104,6 @@ TEST(TimeAgentSteps, EveryStepOfALargeNetworkTakesAFullPass) {
   time_agent_steps(agent, 100, 1);
   EXPECT_GE(agent.agent_workspace().networks.front().cache().counts().full, 98U);
   EXPECT_LE(agent.agent_workspace().networks.front().cache().counts().full, 101U);
-}
-
-TEST(TimeAgentSteps, PlainAndFactoredAgentsLearnTheSame) {
-  const RBFNetworkConfig rbf = {.n_inputs = 3};
-  QLearning<RBFNetwork> factored(RBFNetwork(rbf), {}, 1);
-  QLearning<PlainRBFNetwork> plain(PlainRBFNetwork(rbf), {}, 1);
-  time_agent_steps(factored, 200, 1);
-  time_agent_steps(plain, 200, 1);
-  const auto expected = factored.networks().front().weights();
-  const auto weights = plain.networks().front().network().weights();
-  EXPECT_GT(*std::ranges::max_element(expected), 0.1);
-  ASSERT_EQ(weights.size(), expected.size());
-  for (std::size_t j = 0; j < weights.size(); ++j) EXPECT_NEAR(weights[j], expected[j], 1e-10);
 }
 
 }  // namespace

@@ -105,22 +105,6 @@ TEST(PlainRBFNetwork, AgreesWithTheFactoredOneAtEverySize) {
   }
 }
 
-// Normalized bases: equal weights give that weight everywhere.
-TEST(PlainRBFNetwork, TheBasesSumToOne) {
-  for (const double width : {0.1, 1.0, 100.0}) {
-    Factored equal({.n_inputs = 3, .n_actions = 11, .width = width});
-    equal.set_weights(std::vector<double>(256, 5.0));
-    Plain network(equal);
-    core::Random random(1, core::Stream::ties);
-    std::vector<double> out(11);
-    for (int i = 0; i < 100; ++i) {
-      network.values(std::vector<double>{random.uniform(), random.uniform(), random.uniform()},
-                     out);
-      for (const double value : out) EXPECT_NEAR(value, 5.0, 1e-13);
-    }
-  }
-}
-
 TEST(PlainRBFNetwork, ValuesAllocateNothing) {
   Plain network({.n_inputs = 3});
   const std::vector<double> state = {0.1, 0.2, 0.3};

@@ -8,11 +8,11 @@
 
 #include <bit>
 #include <cmath>
-#include <string>
 #include <vector>
 
 #include "allocation_count.hpp"
 #include "approximators/lookup_table.hpp"
+#include "errors.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
@@ -326,30 +326,21 @@ TEST(AcrobotTrial, AnEpisodeMeetsNoMemoryForTheFirstTime) {
 
 #endif
 
-template <class Make>
-std::string message(Make make) {
-  try {
-    make();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 TEST(AcrobotTrial, NamesWhatIsImpossible) {
-  EXPECT_EQ(message([] { table_trial({.protocol = {.episodes = 0}}); }),
+  using testing::message_of;
+  EXPECT_EQ(message_of([] { table_trial({.protocol = {.episodes = 0}}); }),
             "episodes must be in [1, 1073741824], got 0");
-  EXPECT_EQ(message([] { table_trial({.protocol = {.evaluate_every_episodes = 0}}); }),
+  EXPECT_EQ(message_of([] { table_trial({.protocol = {.evaluate_every_episodes = 0}}); }),
             "evaluate_every_episodes must be in [1, 1073741824], got 0");
-  EXPECT_EQ(message([] { trial(LookupTable(5, 2, 3), {}); }),
+  EXPECT_EQ(message_of([] { trial(LookupTable(5, 2, 3), {}); }),
             "n_inputs must be the number of inputs of the sensors, 4, got 5");
-  EXPECT_EQ(message([] { trial(LookupTable(4, 2, 3), {.sensors = {.n_sensors = 7}}); }),
+  EXPECT_EQ(message_of([] { trial(LookupTable(4, 2, 3), {.sensors = {.n_sensors = 7}}); }),
             "n_sensors must be in [4, 6], got 7");
-  EXPECT_EQ(message([] { table_trial({}).advance(-1); }),
+  EXPECT_EQ(message_of([] { table_trial({}).advance(-1); }),
             "n_episodes must be in [0, 1073741824], got -1");
   auto one = table_trial({}), other = table_trial({.acrobot = {.gravity = 1.6}});
   const auto together = [&](std::vector<decltype(one)*> trials, int n_decisions) {
-    return message([&] { decltype(one)::advance_together(trials, n_decisions); });
+    return message_of([&] { decltype(one)::advance_together(trials, n_decisions); });
   };
   EXPECT_EQ(together({}, 1), "number of trials must be in [1, 8], got 0");
   EXPECT_EQ(together({&one}, -1), "n_decisions must be in [0, 1073741824], got -1");

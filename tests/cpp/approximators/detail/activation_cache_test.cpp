@@ -13,10 +13,7 @@ namespace {
 // A walk with small steps and jumps, with corrections of random actions in between: every way to
 // come by potentials is used, and each gives the integers of a full pass.
 TEST(ActivationCache, WhateverWayIsTakenThePotentialsAreThoseOfAFullPass) {
-  SDNNCConfig config;
-  config.n_hidden_units = 130;
-  config.n_active_units = 50;
-  config.n_pattern_units = 90;
+  const SDNNCConfig config{.n_pattern_units = 90, .n_hidden_units = 130, .n_active_units = 50};
   testing::WithWorkspace<SDNNC> network(config, 3);
   core::Random random(5, core::Stream::sensor_noise);
   std::vector<double> centre(4);
@@ -49,10 +46,7 @@ TEST(ActivationCache, WhateverWayIsTakenThePotentialsAreThoseOfAFullPass) {
 }
 
 TEST(ActivationCache, ReplacedWeightsAreNotRemembered) {
-  SDNNCConfig config;
-  config.n_hidden_units = 20;
-  config.n_active_units = 10;
-  config.n_pattern_units = 10;
+  const SDNNCConfig config{.n_pattern_units = 10, .n_hidden_units = 20, .n_active_units = 10};
   testing::WithWorkspace<SDNNC> network(config, 1);
   const std::vector<double> state = {0.1, 0.2, 0.3, 0.4};
   EXPECT_EQ(network.value(state, 0), 0.0);

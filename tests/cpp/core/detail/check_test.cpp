@@ -4,25 +4,18 @@
 
 #include <limits>
 #include <stdexcept>
-#include <string>
 #include <vector>
+
+#include "errors.hpp"
 
 namespace {
 
 using namespace sdnn::core;
 
+using sdnn::testing::message_of;
+
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-template <class Call>
-std::string message_of(const Call& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 TEST(Require, SaysWhatWasExpectedAndWhatCame) {
   EXPECT_EQ(message_of([] { require(false, "n_bins", "even", 7); }), "n_bins must be even, got 7");

@@ -6,21 +6,20 @@
 #include <cstdint>
 #include <string>
 
+#include "errors.hpp"
+
 namespace {
 
 using sdnn::core::grid_cells;
 using sdnn::core::require_table_bytes;
+using sdnn::testing::message_of;
 
 constexpr std::uint64_t kAnything = UINT64_MAX;
 
 std::string message(std::size_t n_per_dimension, std::size_t n_dimensions, std::size_t bytes,
                     std::uint64_t limit) {
-  try {
-    grid_cells("n_sets", "rules", n_per_dimension, n_dimensions, bytes, limit);
-  } catch (const std::length_error& error) {
-    return error.what();
-  }
-  return "no error";
+  return message_of<std::length_error>(
+      [&] { grid_cells("n_sets", "rules", n_per_dimension, n_dimensions, bytes, limit); });
 }
 
 TEST(GridCells, IsThePower) {
@@ -62,14 +61,7 @@ TEST(GridCells, NoMoreThanCanBeAddressed) {
 TEST(RequireTableBytes, SaysWhatToReduce) {
   require_table_bytes("n_actions", "bases", 800.0, 800);
   EXPECT_EQ(
-      [] {
-        try {
-          require_table_bytes("n_actions", "bases", 1e18, 800);
-        } catch (const std::length_error& error) {
-          return std::string(error.what());
-        }
-        return std::string("no error");
-      }(),
+      message_of<std::length_error>([] { require_table_bytes("n_actions", "bases", 1e18, 800); }),
       "n_actions must be smaller: bases need 1000000000000000000 bytes, but max_table_bytes is "
       "800");
 }

@@ -25,8 +25,7 @@ void move_eight(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays, st
 // Every kernel this processor can run, against one acrobot after the other.
 TEST(AcrobotKernel, KeepsTheBitsAtEveryLevel) {
   constexpr std::size_t kSize = 4096;
-  AcrobotConfig config;
-  config.link_mass_1 = 0.9;
+  const AcrobotConfig config{.link_mass_1 = 0.9};
   const AcrobotDynamics dynamics(config);
   core::Random random(5, core::Stream::exploration);
   std::vector<One::State> starts(kSize);

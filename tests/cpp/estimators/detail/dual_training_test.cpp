@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -58,24 +57,6 @@ TEST(DualTraining, EmptiesCoefficientsBeforeTheyOverflow) {
   }
   testing::compare_with_plain(problem, estimators::TrainingForm::dual, 1,
                               [](bool same) { ASSERT_TRUE(same); });
-}
-
-TEST(DualTraining, AgreesOverManyPresentationsOfFewSamples) {
-  auto problem = testing::random_problem(3);
-  const auto one = testing::layer_for(problem);
-  const auto other = testing::layer_for(problem);
-  auto plain = testing::trainer_for(problem, one, estimators::TrainingForm::plain);
-  auto dual = testing::trainer_for(problem, other, estimators::TrainingForm::dual);
-  const std::size_t n_samples = problem.bins.size() / problem.code->n_inputs();
-  std::vector<std::int32_t> order(20000);
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    order[i] = static_cast<std::int32_t>(i % std::min<std::size_t>(n_samples, 3));
-  }
-  for (int epoch = 0; epoch < 2; ++epoch) {
-    EXPECT_EQ(plain.present(order).n_units, dual.present(order).n_units);
-  }
-  dual.synchronize();
-  EXPECT_EQ(testing::bits_of(*one), testing::bits_of(*other));
 }
 
 TEST(DualTraining, KeepsProductsIn32BitsOfLongCodes) {
