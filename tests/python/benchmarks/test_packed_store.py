@@ -4,11 +4,10 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+from made_records import make_record
 from sdnn.runs.store import ResultStore
-from sdnn.runs.trial import TrialKey, TrialRecord, TrialRows
 
 ROOT = Path(__file__).parents[3]
 
@@ -26,12 +25,8 @@ def packed_store():
 
 
 def record(trial, returns, **about):
-    lengths = np.arange(3, 3 + len(returns))
-    rows = TrialRows.of_tests(10 * np.arange(len(returns)), lengths, returns, lengths < 5)
-    return TrialRecord(
-        key=TrialKey("s4", "sdnn-c", trial, 2**64 - 1 - trial, "44136fa355b3678a"), config="{}",
-        n_decisions=12, seconds=0.1 + trial, rows=rows, **about,
-    )  # fmt: skip
+    made = make_record(trial, steps=range(48, 48 + len(returns)), returns=returns, **about)
+    return replace(made, key=made.key._replace(seed=2**64 - 1 - trial), seconds=0.1 + trial)
 
 
 def content(folder):

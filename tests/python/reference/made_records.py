@@ -14,12 +14,12 @@ def hash_of(config):
     return hashlib.sha256(config.encode()).hexdigest()[:16]
 
 
-def make_record(trial=0, config="{}", steps=(50, 7), **changes):
+def make_record(trial=0, config="{}", steps=(50, 7), returns=None, **changes):
     n = len(steps)
     rows = TrialRows.of_tests(
         episode=10 * np.arange(1, n + 1, dtype=np.int32),
         steps=np.array(steps, np.int32),
-        episode_return=np.linspace(-5.0, 0.1, n),
+        episode_return=np.linspace(-5.0, 0.1, n) if returns is None else np.asarray(returns, float),
         solved=np.array(steps) < 50,
     )
     record = TrialRecord(

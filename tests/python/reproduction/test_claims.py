@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from made_records import make_record
 from sdnn.reproduction.cases import EXPERIMENTS
 from sdnn.reproduction.claims import (
     CLAIMS,
@@ -17,31 +18,16 @@ from sdnn.reproduction.claims import (
     verdict_of,
 )
 from sdnn.reproduction.cost import QUICK_COST, SERIES, CostConfig, CostRecord
-from sdnn.runs import Estimate, TrialKey, TrialRecord, TrialRows, measure
+from sdnn.runs import Estimate, TrialKey, measure
 
-PICTURES = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
 CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
 
 
 def result(case_id, agent, steps, n_trials=10, n_tests=1500):
     """Trials that take the given steps in every test episode; one value, or one per trial."""
-    per_trial = np.broadcast_to(steps, (n_trials,))
     records = tuple(
-        TrialRecord(
-            key=TrialKey(case_id, agent, trial, trial, "hash"),
-            config="{}",
-            version="0",
-            n_decisions=1,
-            seconds=1.0,
-            finished_at="",
-            rows=TrialRows.of_tests(
-                episode=10 * np.arange(1, n_tests + 1, dtype=np.int32),
-                steps=np.full(n_tests, taken, np.int32),
-                episode_return=np.zeros(n_tests),
-                solved=np.full(n_tests, taken < 50),
-            ),
-        )
-        for trial, taken in enumerate(per_trial)
+        make_record(key=TrialKey(case_id, agent, trial, trial, "hash"), steps=np.full(n_tests, n))
+        for trial, n in enumerate(np.broadcast_to(steps, (n_trials,)))
     )
     return measure(CASES[case_id].title, records)
 

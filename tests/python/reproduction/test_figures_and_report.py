@@ -17,7 +17,7 @@ from sdnn.reports.plots import figure_bytes
 from sdnn.reports.statistics import Estimate, running_median
 from sdnn.reproduction import PaperStudy, draw_experiment, plan_trials, select_experiments
 from sdnn.reproduction.report import Report
-from sdnn.runs import AGENTS, PlotUnavailableError, ResultStore, measure
+from sdnn.runs import AGENTS, ResultStore, measure
 from sdnn.runs.engine import TrialsOutcome
 from sdnn.runs.figures import SMOOTHED_TESTS, agent_colors
 from sdnn.runs.report import describe_call, format_estimate
@@ -96,13 +96,6 @@ def test_figures_are_repeatable_to_the_byte(results):
     assert png.startswith(b"\x89PNG")
     assert svg.rstrip().endswith(b"</svg>")
     assert (png, svg) == figure_bytes(draw_experiment(EXPERIMENT, results))
-
-
-def test_a_missing_matplotlib_is_an_error_before_any_trial(monkeypatch, tmp_path):
-    monkeypatch.setattr("sdnn.runs.report.find_spec", lambda name: None)
-    with pytest.raises(PlotUnavailableError, match="pip install matplotlib"):
-        run_study(PaperStudy("a", quick=True), tmp_path / "out")
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_run_reads_its_trials_once(monkeypatch, tmp_path, use_trial):

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from made_records import make_record
 from sdnn.reports.plots import figure_bytes
 from sdnn.reports.statistics import Estimate
 from sdnn.reproduction.claims import Verdict
@@ -14,27 +15,15 @@ from sdnn.runs.figures import draw_study
 from sdnn.runs.report import format_estimate
 from sdnn.runs.study import compare
 from sdnn.runs.sweep import study_json, study_page
-from sdnn.runs.trial import TrialRecord, TrialRows
 
 
-def record(study, case, variant, number, steps, returns=None, interval=10):
+def record(study, case, variant, number, steps, returns=None):
     """A trial whose tests took so many steps; 50 is not solved."""
-    steps = np.asarray(steps, np.int32)
-    rows = TrialRows.of_tests(
-        episode=interval * np.arange(1, steps.size + 1, dtype=np.int32),
-        steps=steps,
-        episode_return=np.zeros(steps.size) if returns is None else np.asarray(returns, float),
-        solved=steps < 50,
-    )
-    key = study.keys(case, variant)[number]
-    return TrialRecord(
-        key=key,
+    return make_record(
         config=study.combinations[case, variant].spec.canonical_json(),
-        version="1",
-        n_decisions=100,
-        seconds=1.0,
-        finished_at="",
-        rows=rows,
+        key=study.keys(case, variant)[number],
+        steps=steps,
+        returns=np.zeros(len(steps)) if returns is None else returns,
     )
 
 

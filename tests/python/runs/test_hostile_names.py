@@ -5,17 +5,16 @@ import json
 from html.parser import HTMLParser
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 from hypothesis import example, given, settings, strategies as st
 from markdown_it import MarkdownIt
 
+from made_records import make_record
 from sdnn.reports.pages import Page, Section, Table
 from sdnn.reports.plots import figure_bytes
 from sdnn.runs.figures import draw_study
 from sdnn.runs.study import compare
 from sdnn.runs.sweep import study_json, study_page, trial_table
-from sdnn.runs.trial import TrialRecord, TrialRows
 from sdnn.support.csv_files import csv_bytes
 
 FRAGMENTS = (
@@ -113,13 +112,16 @@ def test_a_study_of_hostile_names(study, name):
         "learning.discount = 0.5\n"
     )
     records = [
-        TrialRecord(
-            key=key, config=mine.combinations[pair].spec.canonical_json(), version=name,
-            n_decisions=1, seconds=1.0, finished_at=name, rows=rows_of_tests(),
+        make_record(
+            config=one.spec.canonical_json(),
+            key=key,
+            version=name,
+            finished_at=name,
+            steps=[4] * 20,
         )
-        for pair in mine.combinations
+        for pair, one in mine.combinations.items()
         for key in mine.keys(*pair)
-    ]  # fmt: skip
+    ]
     comparison = compare(mine, records)
     _, svg = figure_bytes(draw_study(comparison, name))
     assert "script" not in {element.tag for element in ElementTree.fromstring(svg).iter()}
@@ -133,12 +135,3 @@ def test_a_study_of_hostile_names(study, name):
     cells = {cell for row in csv.reader(table.splitlines(True)) for cell in row}
     assert {cell for cell in cells if cell.startswith(("=", "+", "-", "@", "\t"))} == set()
     assert name in {cell.removeprefix("'") for cell in cells}
-
-
-def rows_of_tests():
-    return TrialRows.of_tests(
-        episode=10 * np.arange(1, 21, dtype=np.int32),
-        steps=np.full(20, 4, np.int32),
-        episode_return=np.zeros(20),
-        solved=np.ones(20, bool),
-    )
