@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from sdnn.runs.spec_schema import PAPER_ARGUMENTS, PARTS, spec_schema
+from sdnn.runs.config_file import PAPER_ARGUMENTS, PARTS, spec_schema
 
 PAGE = Path(__file__).parent / "reference" / "settings.md"
 

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from sdnn.cli import main
 from sdnn.config import fields_of
-from sdnn.runs.spec_schema import PAPER_ARGUMENTS, PARTS, spec_schema
+from sdnn.runs.config_file import PAPER_ARGUMENTS, PARTS, spec_schema
 
 SCRIPT = Path(__file__).parents[2] / "docs" / "write_settings.py"
 

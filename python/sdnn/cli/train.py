@@ -136,7 +136,7 @@ def train(
     a crash, as if nothing had happened.
     """
     if schema:
-        from sdnn.runs.spec_schema import spec_schema
+        from sdnn.runs.config_file import spec_schema
 
         click.echo(json.dumps(spec_schema(), indent=2))
         return

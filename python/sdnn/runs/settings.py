@@ -299,8 +299,7 @@ class AgentSpec(Settings, frozen=True):
         ),
     ] = None
     warm_up_steps: Annotated[
-        Annotated[int, Meta(ge=int(WARM_UP.low), le=int(WARM_UP.high))],
-        doc(WARM_UP.doc),
+        int, Meta(ge=int(WARM_UP.low), le=int(WARM_UP.high)), doc(WARM_UP.doc)
     ] = WARM_UP.default
     missing: Annotated[
         Literal["error", "hold", "code"],
@@ -350,9 +349,8 @@ class ProtocolSpec(Settings, frozen=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.evaluate_every is not None and self.evaluate_every_episodes is not None:
-            raise ConfigError(
-                "evaluate_every_episodes", "must not be given together with evaluate_every"
-            )
+            problem = "must not be given together with evaluate_every"
+            raise ConfigError("evaluate_every_episodes", problem)
 
 
 class BudgetSpec(Settings, frozen=True):

@@ -8,7 +8,7 @@ import json
 import operator
 import re
 from contextlib import suppress
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 import msgspec
 
@@ -65,21 +65,13 @@ def parse_toml(text: str) -> dict[str, object]:
     return values
 
 
-def deep_key(values: dict[str, object]) -> KeyPath | None:
-    """Return the key of a value that is too deep, or None."""
-    level: list[tuple[KeyPath, dict[str, object] | list[object]]] = [((), values)]
-    for _ in range(MOST_LEVELS):
-        items = (
-            (key, value.items() if isinstance(value, dict) else enumerate(value))
-            for key, value in level
-        )
-        level = [
-            ((*key, name), inner)
-            for key, pairs in items
-            for name, inner in pairs
-            if isinstance(inner, dict | list)
-        ]
-    return level[0][0] if level else None
+def deep_key(value: object, key: KeyPath = ()) -> KeyPath | None:
+    """Return the key of a table or array that is too deep in a value, or None."""
+    if len(key) == MOST_LEVELS:
+        return key
+    items = value.items() if isinstance(value, dict) else enumerate(cast("list[object]", value))
+    inner = (((*key, name), item) for name, item in items if isinstance(item, dict | list))
+    return next((deep for at, item in inner if (deep := deep_key(item, at))), None)
 
 
 def dotted(key: KeyPath) -> str:
