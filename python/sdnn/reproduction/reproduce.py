@@ -27,13 +27,7 @@ from sdnn.reproduction.cases import (
 from sdnn.reproduction.claims import ClaimOutcome, TenTrials, judge_claims, more_trials
 from sdnn.reproduction.cost import CostConfig
 from sdnn.reproduction.figures import draw_cost, draw_experiment
-from sdnn.reproduction.report import (
-    CHECKS_HEADER,
-    RULE_NOTE,
-    VERDICT_KINDS,
-    Report,
-    check_rows,
-)
+from sdnn.reproduction.report import CHECKS_HEADER, RULE_NOTE, VERDICT_KINDS, Report, check_rows
 from sdnn.runs.engine import Observer, PlannedTrial
 from sdnn.runs.report import Content, format_share
 from sdnn.runs.results import CaseResult
