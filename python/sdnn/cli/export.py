@@ -92,9 +92,7 @@ _LARGEST = 2**31  # of readings
     " be repeated.",
 )
 @click.option(
-    "--seed",
-    type=SEED,
-    help="With --new: root of the agent's random numbers.  [default: 0]",
+    "--seed", type=SEED, help="With --new: root of the agent's random numbers.  [default: 0]"
 )
 @click.option(
     "--name", metavar="PREFIX", help="Prefix of its names.  [default: FILE without ending]"

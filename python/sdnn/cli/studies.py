@@ -193,9 +193,7 @@ def sweep(file: Path, trials: int | None, seed: int | None, only: tuple[str, ...
 )
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Root of all seeds.")
 @click.option(
-    "--quick",
-    is_flag=True,
-    help="Run a fraction: 2 trials x 300 episodes; not the result.",
+    "--quick", is_flag=True, help="Run a fraction: 2 trials x 300 episodes; not the result."
 )
 @click.option(
     "--agent",

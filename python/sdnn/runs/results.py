@@ -249,9 +249,7 @@ class CaseResult(TrialMeasures):
 
 
 def measure(
-    title: str,
-    records: Sequence[TrialRecord],
-    names: Iterable[MeasureName] = STEP_MEASURES,
+    title: str, records: Sequence[TrialRecord], names: Iterable[MeasureName] = STEP_MEASURES
 ) -> CaseResult:
     """Measure the trials of an agent in a case of some title.
 

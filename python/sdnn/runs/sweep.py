@@ -48,11 +48,7 @@ SOLVED_NOTE = (
 
 
 def run_study(
-    study: Study,
-    out: Path,
-    *,
-    executor: Executor | None = None,
-    observer: Observer | None = None,
+    study: Study, out: Path, *, executor: Executor | None = None, observer: Observer | None = None
 ) -> WrittenReport:
     """Run what is missing of a study, then write into a folder everything that is complete.
 
