@@ -37,7 +37,7 @@ def test_the_last_epochs_are_averaged_whatever_their_number():
     model = SDNNRegressor(**OPTIONS).fit(X, Y)
     for n_epochs, earlier in zip((3, 4, 5), model._earlier, strict=True):
         one = SDNNRegressor(**{**OPTIONS, "max_iter": n_epochs}).fit(X, Y)
-        np.testing.assert_array_equal(earlier.weights, one.weights_)
+        np.testing.assert_array_equal(earlier.layer.weights, one.weights_)
     assert model.score(X, Y) > 0.95
 
 

@@ -93,7 +93,7 @@ def test_a_warm_start_continues_where_fit_ended(kind, options, targets):
     first, weights = model.network_, model.weights_
     assert model.set_params(max_iter=3).fit(X, targets).n_iter_ == 3
     same(model, kind(**options, shuffle=False, max_iter=5).fit(X, targets))
-    np.testing.assert_array_equal(first.weights, weights)
+    np.testing.assert_array_equal(first.layer.weights, weights)
     model.set_params(max_iter=1, training="dual", memory_limit=100)
     now = model.weights_
     refuses("memory_limit", model.fit, X, targets)
@@ -374,7 +374,7 @@ def test_networks_that_are_averaged_count_in_memory():
     plain = {**REGRESSOR, "output_range": (-3, 3)}
     model = SDNNRegressor(**plain, max_iter=2).fit(X, Y)
     weights = 4 * model.weights_.size
-    table_bytes = code_bytes(model.codings_, model.pairs_, model.network_.input_code.n_units)
+    table_bytes = code_bytes(model.codings_, model.pairs_, model.network_.input_code.core.n_units)
     options = {**plain, "n_averaged_epochs": 5}
     for more, n_networks in [
         ({"max_iter": 16}, 5),
