@@ -162,7 +162,7 @@ class BaseSDNN(Fitted, CodedInputs):
     def _check_samples(
         self, X: object, y: object, codings: Sequence[Coding] | None, in_fit: bool = False
     ) -> tuple[Array, Array]:
-        """Return samples and targets, checked as by `CodedInputs._validated`."""
+        """Return samples and targets, checked as by `_validated`."""
 
     @abc.abstractmethod
     def _set_outputs(self, y: ArrayLike) -> int:
@@ -193,7 +193,9 @@ class BaseSDNN(Fitted, CodedInputs):
         return weights
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
-        resumes = bool(self.warm_start) and hasattr(self, "network_")
+        if self.warm_start and self.refit:
+            raise ValueError("refit=True trains a new network: it cannot be with warm_start=True")
+        resumes = self.warm_start and hasattr(self, "network_")
         codings = self.codings_ if resumes else None
         table, observed = self._check_samples(X, y, codings, in_fit=True)
         weights = sample_weights(sample_weight, len(table))
@@ -258,7 +260,7 @@ class BaseSDNN(Fitted, CodedInputs):
             work.n_iter_ = 0
         else:
             work._check_outputs(observed, classes)
-            work._note_inputs(work._finite(table, work.codings_))
+            work._note_inputs(table)
         weights = sample_weights(sample_weight, len(table))
         if weights is not None:
             rows = presented(len(table), weights, 0, work._n_weighted)
@@ -326,7 +328,7 @@ class BaseSDNN(Fitted, CodedInputs):
         if n_networks > 1:
             limit, n_units = self.memory_limit, network.n_units
             require_memory(limit, n_units, n_networks, code.core.n_units, code.codings, code.pairs)
-        self._note_inputs(self._finite(table, self.codings_))
+        self._note_inputs(table)
         self.network_ = network.copy()
         random: np.random.RandomState = check_random_state(self.random_state)
         return random
@@ -357,19 +359,15 @@ class BaseSDNN(Fitted, CodedInputs):
 
     def _trainer(self, bins: Ints, targets: Array, n_epochs: int) -> Trainer:
         rule = self._rule_arguments(targets)
-        trainer_class: type[Any] = (
-            _core.PDeltaTrainer if len(rule) == 2 else _core.PerceptronTrainer
-        )
-        trainer: Trainer = trainer_class(
-            self.network_.layer,
-            bins,
-            *rule,
-            form=self.training,
-            memory_limit=self.memory_limit,
-            n_threads=self._n_threads(),
-            n_epochs=n_epochs,
-        )
-        return trainer
+        options: dict[str, Any] = {
+            "form": self.training,
+            "memory_limit": self.memory_limit,
+            "n_threads": self._n_threads(),
+            "n_epochs": n_epochs,
+        }
+        if len(rule) == 2:
+            return _core.PDeltaTrainer(self.network_.layer, bins, *rule, **options)
+        return _core.PerceptronTrainer(self.network_.layer, bins, *rule, **options)
 
     def _learn(self, bins: Ints, targets: Array) -> None:
         """Present every sample once, in order; all or nothing.
@@ -405,8 +403,7 @@ class BaseSDNN(Fitted, CodedInputs):
 
     def _bins(self, X: object) -> Ints:
         """Check samples to predict and return their bins."""
-        codings = self.codings_
-        table = self._finite(self._validated(X, codings=codings), codings)
+        table = self._validated(X, codings=self.codings_)
         return self.network_.input_code.bins(table)
 
     def _bins_of_one(self, x: Sample) -> Ints:

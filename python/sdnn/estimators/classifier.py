@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -12,7 +11,6 @@ from sklearn.utils.metaestimators import available_if
 from sklearn.utils.multiclass import _ovr_decision_function, unique_labels
 
 from sdnn import _core
-from sdnn.coding import Coding
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.columns import Array, Floats, Ints, Sample
 from sdnn.estimators.fitted import mean_of
@@ -134,11 +132,6 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
             raise ValueError(f"class_weight works in fit only, got {shown(self.class_weight)}")
         if classes is None and not hasattr(self, "network_"):
             raise ValueError("classes must be given in the first call of partial_fit or learn_one")
-
-    def _check_samples(
-        self, X: object, y: object, codings: Sequence[Coding] | None, in_fit: bool = False
-    ) -> tuple[Array, Array]:
-        return self._validated_labels(X, y, codings, n_samples=2 if in_fit else 1)
 
     def _set_outputs(self, y: ArrayLike) -> int:
         self._set_classes(y)

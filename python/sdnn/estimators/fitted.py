@@ -202,7 +202,16 @@ class Fitted(Learned):
         for name in NAMES:
             if name in description["names"]:
                 setattr(estimator, name, array_of_names(name, description["names"][name]))
-        estimator.network_, *earlier = read_networks(description, arrays, memory_limit)
+        code = read_code(description, arrays, memory_limit)
+        estimator.network_, *earlier = (
+            Network(
+                code,
+                description["n_units"],
+                weights=arrays[f"weights.{number}"].astype(np.int32),
+                thresholds=arrays[f"thresholds.{number}"].astype(np.int32),
+            )
+            for number in range(description["n_networks"])
+        )
         estimator._earlier = tuple(earlier)
         require_consistent(estimator)
         return estimator
@@ -340,15 +349,3 @@ def read_code(description: Description, arrays: Arrays, memory_limit: int) -> In
         [tables[number] for number in description["modified"]],
         [tables[number] for number in description["modifiers"]],
     )
-
-
-def read_networks(description: Description, arrays: Arrays, memory_limit: int) -> Iterator[Network]:
-    """Build the code and the networks that share it."""
-    code = read_code(description, arrays, memory_limit)
-    for number in range(description["n_networks"]):
-        yield Network(
-            code,
-            description["n_units"],
-            weights=arrays[f"weights.{number}"].astype(np.int32),
-            thresholds=arrays[f"thresholds.{number}"].astype(np.int32),
-        )

@@ -165,21 +165,21 @@ class CodedInputs(BaseEstimator):
     ) -> Any:
         """Check data by scikit-learn's rules; words pass where a coding takes them.
 
-        ``codings`` are the fitted codings of the inputs, None if they are to be learned.
+        ``codings`` are the fitted codings of the inputs; None if they are to be learned, and
+        numbers to be checked with them.
         """
         refuse_dates(X)
         every = (*(coding for coding, _ in coding_entries(self.coding)), *(codings or ()))
         numeric = all(coding.is_numeric for coding in every)
         numeric = numeric and (codings is not None or not of_categories(X))
-        # `_finite` checks the numbers afterwards, because missing ones may have a pattern.
         options["reset"] = codings is None
         try:
-            return validate_data(
+            validated = validate_data(
                 self,
                 X if numeric else with_types_kept(X),
                 y,
                 dtype=np.float64 if numeric else None,
-                ensure_all_finite="allow-nan" if numeric else False,
+                ensure_all_finite="allow-nan" if numeric else False,  # they may have a pattern
                 **options,
             )
         except ValueError as error:
@@ -187,11 +187,15 @@ class CodedInputs(BaseEstimator):
                 name, column = first_of_words(X)
                 raise ValueError(f"{error} in column {name!r}; {hint_about(column)}") from None
             raise
+        if codings is not None:
+            table = validated[0] if isinstance(validated, tuple) else validated
+            self._check_numbers(table, codings)
+        return validated
 
-    def _finite(self, table: Array, codings: Sequence[Coding]) -> Array:
-        """Check the numbers of a table; only columns coded with `WithMissing` may lack values."""
+    def _check_numbers(self, table: Array, codings: Sequence[Coding]) -> None:
+        """Raise ValueError for missing values without `WithMissing`, infinity and words."""
         if table.dtype == np.float64 and np.isfinite(table).all():
-            return table
+            return
         names = self._feature_names() or range(len(codings))
         for index, (name, coding) in enumerate(zip(names, codings, strict=True)):
             if not coding.is_numeric:
@@ -207,7 +211,6 @@ class CodedInputs(BaseEstimator):
                     f" or fit with coding=[('with-missing', [{name!r}])]"
                 )
             assert_all_finite(numbers, input_name="X")
-        return table
 
     def _feature_names(self) -> list[str] | None:
         names = getattr(self, "feature_names_in_", None)
@@ -219,7 +222,7 @@ class CodedInputs(BaseEstimator):
         codings = [lacking(coding, table[:, index]) for index, coding in enumerate(codings)]
         if any(coding.learns for coding in codings):
             self._need_two(table, "ranges and categories that are not given")
-        self._finite(table, codings)
+        self._check_numbers(table, codings)
         return codings
 
     def _fit_codings(self, codings: Sequence[Coding], table: Array, n_units: int) -> list[Coding]:
@@ -283,7 +286,7 @@ class CodedInputs(BaseEstimator):
             row = np.array(values, dtype=object)
         require(row.shape == (len(codings),), "x", f"have {len(codings)} features", x)
         if not code.is_numeric:
-            self._finite(row[None], codings)
+            self._check_numbers(row[None], codings)
             return row
         is_number = np.isfinite(row)
         if not is_number.all():
@@ -328,9 +331,10 @@ class CodedRegressor(RegressorMixin, CodedInputs):
         tags.target_tags.multi_output = True
         return tags
 
-    def _validated_numbers(
-        self, X: object, y: object, codings: Sequence[Coding] | None = None
+    def _check_samples(
+        self, X: object, y: object, codings: Sequence[Coding] | None = None, in_fit: bool = False
     ) -> tuple[Array, Floats]:
+        """Return samples and targets, checked as by `_validated`."""
         if y is None:
             # scikit-learn's message for several outputs is less clear.
             raise ValueError(
@@ -354,11 +358,11 @@ class CodedClassifier(ClassifierMixin, CodedInputs):
 
     class_weight: ClassWeight = parameter(None, words("balanced"), dict, None)
 
-    def _validated_labels(
-        self, X: object, y: object, codings: Sequence[Coding] | None = None, n_samples: int = 1
+    def _check_samples(
+        self, X: object, y: object, codings: Sequence[Coding] | None = None, in_fit: bool = False
     ) -> tuple[Array, Array]:
-        """Return samples and labels; ValueError for fewer than ``n_samples``."""
-        table, labels = self._validated(X, y, codings, ensure_min_samples=n_samples)
+        """Return samples and labels, checked as by `_validated`."""
+        table, labels = self._validated(X, y, codings, ensure_min_samples=2 if in_fit else 1)
         examples: dict[type, object] = {}
         for label in labels.ravel().tolist() if labels.dtype == object else ():
             label_type = str if isinstance(label, str) else type(label)

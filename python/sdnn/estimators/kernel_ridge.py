@@ -284,8 +284,7 @@ class BaseKernelRidge(CodedInputs):
     def _outputs(self, X: ArrayLike) -> Floats:
         """Return the outputs of samples, shape (n_samples, n_outputs)."""
         check_is_fitted(self, "dual_coef_")
-        codings = self.kernel_.codings
-        table = self._finite(self._validated(X, codings=codings), codings)
+        table = self._validated(X, codings=self.kernel_.codings)
         parts = [self._kernel(table[rows]) @ self.dual_coef_ for rows in portions(len(table))]
         return np.concatenate(parts) + self.intercept_
 
@@ -309,7 +308,7 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
     """
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
-        table, targets = self._validated_numbers(X, y)
+        table, targets = self._check_samples(X, y)
         counts = self._counts_of(sample_weight, len(table))
         self._flat = targets.ndim == 1
         targets = targets.reshape(len(table), -1)
@@ -351,7 +350,7 @@ class SDNNKernelClassifier(CodedClassifier, BaseKernelRidge):
     """
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
-        table, labels = self._validated_labels(X, y)
+        table, labels = self._check_samples(X, y)
         counts = self._counts_of(sample_weight, len(table))
         self._set_classes(labels)
         one_hot = (labels[:, None] == self.classes_).astype(np.float64)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sdnn.coding import Coding
 from sdnn.estimators.base import BaseSDNN, OutOfRangeWarning
 from sdnn.estimators.columns import Array, Floats, Ints, Sample
 from sdnn.estimators.fitted import mean_of
@@ -130,13 +128,6 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             return values[:, 0] if self._flat else values
         spread = self._step() * np.std(counts, axis=0)
         return (values[:, 0], spread[:, 0]) if self._flat else (values, spread)
-
-    def _check_samples(
-        self, X: object, y: object, codings: Sequence[Coding] | None, in_fit: bool = False
-    ) -> tuple[Array, Floats]:
-        if in_fit and self.warm_start and self.refit:
-            raise ValueError("refit=True trains a new network: it cannot be with warm_start=True")
-        return self._validated_numbers(X, y, codings)
 
     def _set_outputs(self, y: ArrayLike) -> int:
         targets = np.asarray(y)

@@ -120,11 +120,7 @@ def choice(name: str, word: object, members: Mapping[str, Member]) -> Member:
 
 
 def one_of(name: str, word: object, choices: tuple[str, ...]) -> str:
-    """Check that an argument is one of several words; ValueError if not.
-
-    >>> one_of("direction", "up", ("up", "down"))
-    'up'
-    """
+    """Check that an argument is one of several words; ValueError if not."""
     return choice(name, word, {member: member for member in choices})
 
 
@@ -158,12 +154,7 @@ def seed_of(value: object) -> int:
 
 
 def real(name: str, value: object) -> float:
-    """Check that an argument is a number, perhaps NaN or infinite; ValueError if not.
-
-    >>> real("period", "a day")
-    Traceback (most recent call last):
-    ValueError: period must be a number, got 'a day'
-    """
+    """Check that an argument is a number, perhaps NaN or infinite; ValueError if not."""
     if type(value) is float:
         return value
     if not isinstance(value, Real) or _is_no_number(value):
@@ -196,24 +187,14 @@ def reward_of(reward: object) -> float:
 
 
 def flag(name: str, value: object) -> bool:
-    """Check that an argument is a bool, Python's or NumPy's; TypeError if not.
-
-    >>> flag("explore", "no")
-    Traceback (most recent call last):
-    TypeError: explore must be True or False, got 'no'
-    """
+    """Check that an argument is a bool, Python's or NumPy's; TypeError if not."""
     if not isinstance(value, bool) and not _is_of_numpy(value, "bool", "bool_"):
         raise argument_error(name, f"must be True or False, got {shown(value)}", TypeError)
     return bool(value)
 
 
 def path_of(name: str, value: object) -> Path:
-    """Check that an argument can name a file; TypeError or ValueError if not.
-
-    >>> path_of("path", None)
-    Traceback (most recent call last):
-    TypeError: path must be the name of a file, got None
-    """
+    """Check that an argument can name a file; TypeError or ValueError if not."""
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     if isinstance(text, str) and text and "\0" not in text:
         return Path(text)
@@ -235,12 +216,7 @@ def is_of_class(value: object, expected: type) -> bool:
 
 
 def has_methods(name: str, value: object, what: str, *methods: str) -> None:
-    """Check that an argument has some methods; TypeError if not.
-
-    >>> has_methods("env", 5, "a Gymnasium environment", "reset", "step")
-    Traceback (most recent call last):
-    TypeError: env must be a Gymnasium environment, got 5
-    """
+    """Check that an argument, called ``what`` in messages, has some methods; TypeError if not."""
     has_all = all(callable(getattr(value, method, None)) for method in methods)
     require(has_all and not isinstance(value, type), name, f"be {what}", value, TypeError)
 
