@@ -7,7 +7,7 @@ import secrets
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar, cast
 
 import msgspec
 import numpy as np
@@ -177,7 +177,6 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         self._warm_up_steps = whole("warm_up_steps", steps, int(WARM_UP.low), int(WARM_UP.high))
 
     def _make(self, **made_of: Any) -> None:
-        """Make the core's controller."""
         approximator: Any = self._approximator
         learning: Any = self.learning
         try:
@@ -200,8 +199,7 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
     @property
     def approximator(self) -> Approximator:
         """Settings as used; sizes that follow from the spaces are known after the warm-up."""
-        used: Any = self._controller.approximator
-        return used  # type: ignore[no-any-return]
+        return cast(Approximator, self._controller.approximator)
 
     @property
     def is_warming_up(self) -> bool:
@@ -314,10 +312,10 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         OSError if the file cannot be read; ValueError if it is damaged, of another format, or holds
         another kind of agent.
         """
-        agent: Any = read_agent(path_of("path", path), "agent", "training")[0]
+        agent: object = read_agent(path_of("path", path), "agent", "training")[0]
         if not is_of_class(agent, cls):
             raise ValueError(f"{path} holds a {type(agent).__name__}, not a {cls.__name__}")
-        return agent  # type: ignore[no-any-return]
+        return cast("Self", agent)
 
     def description(self) -> Description:
         """Return the settings, from which `rebuild` makes an agent like this one."""

@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.environments.types import Array, Data, Env, Space, VectorEnv
+from sdnn.environments.types import AnyEnv, Array, Data, Space
 from sdnn.support.arguments import require, shown
 
 _MOST_VARIABLES = 2**20
@@ -180,7 +180,7 @@ def space_of(data: Mapping[str, Any]) -> Space:
     return gym.spaces.Tuple([space_of(part) for part in data["tuple"]])
 
 
-Observed: TypeAlias = Space | Env | VectorEnv
+Observed: TypeAlias = Space | AnyEnv
 """An observation space, or an environment that has one."""
 
 _WAYS_OUT = {

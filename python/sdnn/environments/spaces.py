@@ -148,27 +148,25 @@ def _flat_parts(space: Space, observation: Element) -> Iterator[Array]:
     elif isinstance(space, gym.spaces.Tuple):
         for part, item in zip(space.spaces, observation, strict=True):
             yield from _flat_parts(part, item)
-    elif isinstance(space, gym.spaces.Discrete | gym.spaces.MultiDiscrete):
-        values = _readings("a part", observation)
-        if values.shape != space.shape:
-            raise ValueError(f"must have shape {space.shape}")
-        is_read = np.isfinite(values)
-        if is_read.all() and values.dtype.kind == "f":
-            raise ValueError("must be whole numbers")
-        sizes = space.n if isinstance(space, gym.spaces.Discrete) else space.nvec
-        steps = np.where(is_read, values, space.start) - space.start
-        if not ((steps >= 0) & (steps < sizes) & (steps == np.floor(steps))).all():
-            raise ValueError(f"must be in {space}")
-        triples = zip(np.ravel(steps), np.ravel(is_read), np.ravel(sizes), strict=True)
-        for step, was_read, size in triples:
-            one_hot = np.zeros(size) if was_read else np.full(size, np.nan)
-            if was_read:
-                one_hot[int(step)] = 1.0
-            yield one_hot
     else:
         values = _readings("a part", observation)
         if values.shape != space.shape:
             raise ValueError(f"must have shape {space.shape}")
+        if isinstance(space, gym.spaces.Discrete | gym.spaces.MultiDiscrete):
+            is_read = np.isfinite(values)
+            if is_read.all() and values.dtype.kind == "f":
+                raise ValueError("must be whole numbers")
+            sizes = space.n if isinstance(space, gym.spaces.Discrete) else space.nvec
+            steps = np.where(is_read, values, space.start) - space.start
+            if not ((steps >= 0) & (steps < sizes) & (steps == np.floor(steps))).all():
+                raise ValueError(f"must be in {space}")
+            triples = zip(np.ravel(steps), np.ravel(is_read), np.ravel(sizes), strict=True)
+            for step, was_read, size in triples:
+                one_hot = np.full(size, 0.0 if was_read else np.nan)
+                if was_read:
+                    one_hot[int(step)] = 1.0
+                yield one_hot
+            return
         is_whole = np.dtype(space.dtype).kind in "iub" and np.isfinite(values).all()
         is_cast = is_whole or np.dtype(space.dtype).kind == "f"
         yield (values.astype(space.dtype) if is_cast else values).reshape(-1)
@@ -181,9 +179,8 @@ def _symbols_of(space: Space, first: int = 0) -> Iterator[tuple[int, int]]:
             yield from _symbols_of(part, first)
             first += gym.spaces.flatdim(part)
     elif isinstance(space, gym.spaces.Discrete | gym.spaces.MultiDiscrete):
-        for n in np.ravel(
-            space.n if isinstance(space, gym.spaces.Discrete) else space.nvec
-        ).tolist():
+        for low, high in wholes_of(space) or ():
+            n = high - low + 1
             yield first, n
             first += n
 

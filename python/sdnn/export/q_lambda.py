@@ -188,7 +188,6 @@ class QLambdaLearner(Learner, QLambdaWriter):
         )
 
     def _learning_rule(self) -> Data:
-        """Return the settings of the learning rule."""
         learning, discount = self.agent.learning, round(self.agent.learning.discount * 32768)
         number, exponent = self.tolerance()
         return {

@@ -245,7 +245,6 @@ class Writer(ABC):
         )
 
     def _usage(self) -> list[str]:
-        """Return an example of a program."""
         observation = f"int32_t observation[{self.name.upper()}_N_OBSERVED];"
         return [
             f'  #include "{self.name}.h"',
@@ -273,7 +272,6 @@ class Writer(ABC):
         return [array, f"{self.name}_act_fixed(observation, action);"]
 
     def _action_value(self) -> str:
-        """Return the value of an action in C."""
         if self.box is None:
             d, action = ("d", "action[d]") if self.is_vector else ("0", "action")
             return f"{self.name}_first_action[{d}] + (int32_t){action}"

@@ -157,17 +157,12 @@ class Episodes:
             episode.n_steps += 1
             if self._seed is not None:
                 episode.actions.append(elements[i])
-        # The calls of _checked are written out: this runs at every step.
         try:
             observations = self.adapter.step(elements)
         except UnusableStepError as error:
             raise self._unusable(error, None) from error
-        try:
-            self.observations = self._learner.read("next_observation", observations)
-            if self.adapter.masks is not None:
-                self.masks = self._learner.masks(self.adapter.masks)
-        except ValueError as error:
-            raise self._unusable(error, None) from error
+        self.observations = self._checked(self._learner.read, "next_observation", observations)
+        self._read_masks()
         for i, number in self._begins_with_step.items():
             self.present[i] = Episode(number)
             self._learner.begin_episode(i)
