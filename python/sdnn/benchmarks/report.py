@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from sdnn.reports.pages import Table
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 Results: TypeAlias = Mapping[str, Any]
 """The results of `sdnn.benchmarks.run_benchmarks`."""
@@ -57,14 +54,6 @@ def tables(results: Results) -> list[Table]:
               f" {threads['processor_together_s']:.3f} at once")],
         ),
     ]  # fmt: skip
-
-
-def print_results(results: Results, console: Console) -> None:
-    """Print all tables."""
-    for line in describe_run(results):
-        console.print(line, highlight=False)
-    for table in tables(results):
-        table.print(console)
 
 
 def _parts_table(results: Results) -> Table:

@@ -18,10 +18,14 @@ def bench(quick: bool, as_json: bool) -> None:
     Takes about half a minute. SDNN_INSTRUCTION_SET=portable, neon, avx2 or avx512 forces a level.
     """
     from sdnn.benchmarks import run_benchmarks
-    from sdnn.benchmarks.report import print_results
+    from sdnn.benchmarks.report import describe_run, tables
 
     results = run_benchmarks(quick=quick)
     if as_json:
         click.echo(json.dumps(results, indent=2))
         return
-    print_results(results, make_console())
+    console = make_console()
+    for line in describe_run(results):
+        console.print(line, highlight=False)
+    for table in tables(results):
+        table.print(console)

@@ -29,7 +29,6 @@ from sdnn.runs.report import (
     MEASURE_END,
     PERCENT,
     format_estimate,
-    format_share,
     measure_cells,
     measures_section,
     settings_section,
@@ -260,7 +259,7 @@ def _more_table(claims: Iterable[ClaimOutcome]) -> Table:
         if claim.more is None:
             continue
         start = (str(claim.claim.number), claim.claim.text, "", "", "")
-        rows.append((*start, claim.decided.value, format_share(claim.chance)))
+        rows.append((*start, claim.decided.value, format_estimate(claim.chance)))
         for check in claim.more.checks:
             cells = (str(check.check), str(min(samples.size for samples in check.samples)))
             rows.append(("", "", *cells, format_quantity(check), check.verdict.value, ""))

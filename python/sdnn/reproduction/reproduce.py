@@ -29,7 +29,7 @@ from sdnn.reproduction.cost import CostConfig
 from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.report import CHECKS_HEADER, RULE_NOTE, VERDICT_KINDS, Report, check_rows
 from sdnn.runs.engine import Observer, PlannedTrial
-from sdnn.runs.report import Content, format_share
+from sdnn.runs.report import Content, format_estimate
 from sdnn.runs.results import CaseResult
 from sdnn.runs.settings import Values, overridden
 from sdnn.runs.spec import RunSpec
@@ -298,7 +298,7 @@ class ClaimStudy(StudyFile):
         table = Table("The paper's claims", header, verdicts, {"-": "none", **VERDICT_KINDS})
         sections = [Section(table=table, notes=[CLAIMS_NOTE, RULE_NOTE])]
         if self.n_trials >= MIN_TRIALS_TO_DRAW:
-            chances = rows(lambda outcome: format_share(outcome.chance))
+            chances = rows(lambda outcome: format_estimate(outcome.chance))
             table = Table("How often ten trials show the claims", header, chances)
             sections.append(Section(level=3, table=table, notes=[CHANCES_NOTE]))
         checks = [

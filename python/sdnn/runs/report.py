@@ -98,14 +98,17 @@ def settings_section(results: Iterable[tuple[str, CaseResult]]) -> Section:
 def measure_cells(result: CaseResult, names: Iterable[MeasureName]) -> tuple[str, ...]:
     """Write the medians of measures, then `MEASURE_END`; what a result lacks is ``"-"``."""
     medians, last = result.medians, result.last_episode
-    cells = (format_estimate(medians[n], n, last) if n in medians else "-" for n in names)
+    cells = (format_estimate(medians.get(name), name, last) for name in names)
     return *cells, f"{result.n_decisions:,}", f"{result.microseconds_per_decision:.1f}"
 
 
 def format_estimate(
-    estimate: Estimate, measure: MeasureName, last_episode: int | None = None, sign: str = ""
-) -> str:
-    """Write an estimate with its interval; what is censored becomes ``>last_episode``.
+    estimate: Estimate | None, measure: MeasureName = "final_share_solved",
+    last_episode: int | None = None, sign: str = "",
+) -> str:  # fmt: skip
+    """Write an estimate with its interval, or ``"-"``; what is censored becomes ``>last_episode``.
+
+    By default it is a share. A return has two digits of its interval, everything else one decimal.
 
     >>> format_estimate(Estimate(120.0, 90.0, math.inf), "episodes_to_learn", 15000)
     '120 [90, >15,000]'
@@ -114,35 +117,21 @@ def format_estimate(
     >>> format_estimate(Estimate(-0.5, -2.0, 1.0), "final_steps", sign="+")
     '-0.5 [-2, +1]'
     """
+    if estimate is None or math.isnan(estimate.value):
+        return "-"
     scale, unit = (100, " %") if measure == "final_share_solved" else (1, "")
-    decimals = decimals_of(estimate, measure)
+    decimals = 1
+    ends = np.array([estimate.value, estimate.lower, estimate.upper])
+    ends = ends[np.isfinite(ends)]
+    if measure in RETURN_MEASURES and ends.any():
+        extent = float(np.ptp(ends)) or float(np.abs(ends).max()) / 100
+        decimals = min(max(1, 1 - math.floor(math.log10(extent))), 300)
 
     def number(value: float) -> str:
         if math.isinf(value):
             return f">{last_episode:,}"
         return plain_number(scale * value, decimals, sign)
 
-    if math.isnan(estimate.value):
-        return "-"
     if math.isnan(estimate.lower):
         return number(estimate.value) + unit
     return f"{number(estimate.value)}{unit} [{number(estimate.lower)}, {number(estimate.upper)}]"
-
-
-def format_share(estimate: Estimate | None) -> str:
-    """Write a share with its interval; None is ``"-"``.
-
-    >>> format_share(Estimate(0.479, 0.26, 0.712))
-    '47.9 % [26, 71.2]'
-    """
-    return "-" if estimate is None else format_estimate(estimate, "final_share_solved")
-
-
-def decimals_of(estimate: Estimate, measure: MeasureName) -> int:
-    """Choose the decimals of an estimate: two digits of a return's interval, else one decimal."""
-    ends = np.array([estimate.value, estimate.lower, estimate.upper])
-    ends = ends[np.isfinite(ends)]
-    if measure not in RETURN_MEASURES or not ends.any():
-        return 1
-    extent = float(np.ptp(ends)) or float(np.abs(ends).max()) / 100
-    return min(max(1, 1 - math.floor(math.log10(extent))), 300)

@@ -266,9 +266,7 @@ def _case_sections(comparison: Comparison) -> Iterator[Section]:
 
 
 def _difference(measured: Measured, name: MeasureName) -> str:
-    if name not in measured.differences:
-        return "-"
-    text = format_estimate(measured.differences[name], name, sign="+")
+    text = format_estimate(measured.differences.get(name), name, sign="+")
     return text + (" *" if measured.differs(name) else "")
 
 
