@@ -46,8 +46,8 @@ def test_one_loop_steps_environments_and_learns():
     assert outside == {"training/loop", "training/episodes", "training/interfaces"}
     agents = {"agents/agent", "agents/q_learning", "agents/fuzzy_q_learning"}
     logged = {"agents/datasets"}  # learns transitions of files, and steps no environment
-    assert learns - agents - logged == {"training/loop", "training/learners"}
-    assert acts - agents == {"training/loop", "training/learners", "training/evaluation"}
+    assert learns - agents - logged == {"training/loop", "training/interfaces"}
+    assert acts - agents == {"training/loop", "training/interfaces", "training/evaluation"}
 
 
 def test_one_store_knows_sqlite():
