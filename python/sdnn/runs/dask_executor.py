@@ -214,9 +214,15 @@ class _Run:
                 looked = time.monotonic()
                 yield from self.look_at_workers()
             while self.waiting and len(self.placed) < sum(self.threads.values()):
-                placed = self.place(*self.waiting.popleft())
-                completed.add(placed.future)
-                yield Advanced(placed.planned, 0)
+                planned, n = self.waiting.popleft()
+                # Drivers with the same trial share it, since its identity is its key; with the
+                # number of the submission, because Dask remembers how a key ended.
+                key = "-".join(map(str, ("trial", _core.__version__, *planned.key, n)))
+                workers = list(self.threads)
+                future = self.client.submit(run_on_worker, planned, key=key, workers=workers)
+                self.placed[key] = _Placed(planned, n, frozenset(workers), future)
+                completed.add(future)
+                yield Advanced(planned, 0)
             if stop.wait(RESULTS_SECONDS):
                 return
             while not progress.empty():
@@ -264,14 +270,6 @@ class _Run:
         elif time.monotonic() - self.unserved_since > seconds:
             fits = f" fits: {'; '.join(self.problems.values())}" if self.problems else ""
             raise self.executor.failure(f"no worker at {scheduler}{fits}; waited {seconds:g} s")
-
-    def place(self, planned: PlannedTrial, n: int) -> _Placed:
-        """Submit a trial; its identity is its key, so that drivers with the same trial share it."""
-        # With the number of the submission, because Dask remembers how a key ended.
-        key = "-".join(map(str, ("trial", _core.__version__, *planned.key, n)))
-        future = self.client.submit(run_on_worker, planned, key=key, workers=list(self.threads))
-        self.placed[key] = _Placed(planned, n, frozenset(self.threads), future)
-        return self.placed[key]
 
 
 def ended(placed: _Placed, result: Any) -> Message:
