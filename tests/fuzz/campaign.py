@@ -12,33 +12,27 @@ adds its executions. Small inputs in C++ are up to ten times as quick. What fail
 import argparse
 import concurrent.futures
 import json
-import multiprocessing
 import os
 import re
-import resource
-import signal
 import subprocess
 import sys
 import tempfile
 import time
-import traceback
-import warnings
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+sys.path.append(str(ROOT / "tests" / "python" / "reference"))
+
+from damaged_files import MUTATED, mutation_cells, read_mutation  # noqa: E402
+from watched_cells import failures  # noqa: E402
+
 BUILD = ROOT / "build" / "fuzz" / "tests" / "fuzz"
 SEEDS = {"agent_file_fuzz": ["agents", "files"], "safetensors_fuzz": ["agents", "files"]}
 """Folders of tests/data, beside the target's corpus."""
 
-MOST_SECONDS = 5.0
-"""Limit of the processor time of an execution."""
-MOST_BYTES = 2**28
-HANG_SECONDS = 300.0
-"""Without an execution's end, whatever the machine does."""
-HEADROOM = 2**32
 MOST_FAULTS = 50
-PER_WORKER = 200_000
-"""Executions; a new process shows what is kept from one to the next."""
+PER_WORKER = 2000
+"""Executions of a reader in a process."""
 
 
 def run_cpp(name, seconds, executions, out, max_bytes):
@@ -60,74 +54,19 @@ def run_cpp(name, seconds, executions, out, max_bytes):
 
 
 def run_python(name, seconds, executions, out, first):
-    """Let a reader read the inputs of numbers from the first on; return their number and faults."""
-    context = multiprocessing.get_context("spawn")
-    number = first
+    """Let a reader read mutations from a number on; return how many, and faults."""
+    number, faults = first, []
     last = first + executions if executions else sys.maxsize
     until = time.monotonic() + seconds
-    faults = []
-    with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
-        while number < last and time.monotonic() < until and len(faults) < MOST_FAULTS:
-            present = context.Value("q", number, lock=False)
-            there, here = context.Pipe(duplex=False)
-            end = min(last, number + PER_WORKER)
-            worker = context.Process(target=_work, args=(name, present, end, until, here, folder))
-            worker.start()
-            here.close()
-            found = _watched(worker, present, there)
-            number = present.value + bool(found)
-            for fault in found:
-                faults.append(fault)
-                (out / name).mkdir(parents=True, exist_ok=True)
-                with (out / name / "faults.txt").open("a") as file:
-                    file.write(fault + "\n")
+    while number < last and time.monotonic() < until and len(faults) < MOST_FAULTS:
+        n_mutations = min(last - number, PER_WORKER)
+        faults += failures(mutation_cells, name, number, n_mutations)[1]
+        number += n_mutations
+    if faults:
+        (out / name).mkdir(parents=True, exist_ok=True)
+        with (out / name / "faults.txt").open("a") as file:
+            file.writelines(f"{fault}\n" for fault in faults)
     return number - first, faults
-
-
-def _watched(worker, present, pipe):
-    """Wait for a worker; return its fault, after which another one has to go on."""
-    before, began = present.value, time.monotonic()
-    while not pipe.poll(1.0):
-        if present.value != before:
-            before, began = present.value, time.monotonic()
-        elif time.monotonic() - began > HANG_SECONDS:
-            worker.kill()
-    try:
-        found = pipe.recv()
-    except EOFError:
-        worker.join()
-        what = "took too long" if worker.exitcode == -signal.SIGPROF else "ended the process"
-        found = [f"{present.value}: {what}, exit code {worker.exitcode}"]
-    worker.join()
-    return found
-
-
-def _work(name, present, end, until, pipe, folder):
-    warnings.simplefilter("ignore")
-    os.chdir(folder)
-    import python_readers
-
-    with open("/proc/self/statm") as file:
-        used = int(file.read().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (used + HEADROOM,) * 2)
-    most = None
-    fault = ""
-    for number in range(present.value, end):
-        present.value = number
-        signal.setitimer(signal.ITIMER_PROF, MOST_SECONDS)  # its signal ends the process
-        try:
-            fault = python_readers.execute(name, number)
-        except Exception:
-            fault = traceback.format_exc()
-        highest = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        most = most or highest + MOST_BYTES  # the first has loaded what all need
-        if not fault and highest > most:
-            fault = f"took {(highest - most + MOST_BYTES) / 2**20:.0f} MiB"
-        if fault or time.monotonic() > until:
-            break
-    else:
-        present.value = end
-    pipe.send([f"{number}: {fault}"] if fault else [])
 
 
 def timed(name, cpp, given, first):
@@ -155,8 +94,6 @@ def commit():
 
 
 def main():
-    import python_readers
-
     cpp = sorted(path.stem for path in (ROOT / "tests" / "fuzz").glob("*_fuzz.cpp"))
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("targets", nargs="*", metavar="TARGET", help="default: all")
@@ -167,20 +104,20 @@ def main():
     parser.add_argument("--jobs", type=int, default=1, help="targets at a time")
     parser.add_argument("--number", type=int, help="an execution of a reader to repeat")
     given = parser.parse_args()
-    known = [*cpp, *python_readers.NAMES, python_readers.FAULTY]
+    known = [*cpp, *MUTATED]
     if unknown := set(given.targets).difference(known):
         parser.error(f"unknown: {', '.join(sorted(unknown))}; possible: {', '.join(known)}")
     if given.number is not None:
         with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
             os.chdir(folder)
-            sys.exit(python_readers.execute(given.targets[0], given.number) or 0)
+            sys.exit(read_mutation(given.targets[0], given.number) or 0)
     given.out.mkdir(parents=True, exist_ok=True)
     path = given.out / "counts.json"
     counts = json.loads(path.read_text()) if path.exists() else {}
     n_faults = 0
     with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
         runs = {}
-        for name in given.targets or known[:-1]:
+        for name in given.targets or known:
             first = sum(own.get(name, {}).get("executions", 0) for own in counts.values())
             runs[pool.submit(timed, name, name in cpp, given, first)] = name
         for run in concurrent.futures.as_completed(runs):

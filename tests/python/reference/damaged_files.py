@@ -14,12 +14,22 @@ import numpy as np
 import agent_files
 from bad_inputs import leaves, replaced
 from checksums import with_checksum
-from mutated_files import READERS as OTHERS, Reader, contents_of, written
+from mutated_files import (
+    READERS as OTHERS,
+    Reader,
+    contents_of,
+    with_other_bytes,
+    with_other_contents,
+    with_other_header,
+    with_other_rows,
+    written,
+)
 from sdnn import libsdnn
 from sdnn.agents import JSONLines, SDNNQLearning, Training
 from sdnn.runs import Run
 from sdnn.runs.errors import RunError
 from sdnn.support.state_files import read_file, write_file
+from sdnn.training.files import read_statistics
 
 MOST_SECONDS = 5.0
 MOST_BYTES = 2**28
@@ -287,3 +297,57 @@ def _header_cell(name, arrays, description):
     path = Path.cwd() / READERS[name].name
     write_file(path, name, arrays, description)
     return verdict(READERS[name], path, is_refused=False)
+
+
+def statistics():
+    numbers = {"dtype": "<f8", "shape": [2], "values": "AAAAAAAA8D8AAAAAAADwPw=="}
+    one = {"wrapper": "NormalizeObservation", "numbers": {"obs_rms.mean": numbers}}
+    return [json.dumps([one, one]).encode()]
+
+
+def read_numbers(path):
+    try:
+        read_statistics(json.loads(path.read_bytes()))
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from error
+
+
+MUTATED = {
+    **READERS, "statistics": Reader("statistics.json", statistics, read_numbers, (ValueError,))
+}  # fmt: skip
+"""Readers, one of them of a part of a file alone."""
+
+OTHER_CONTENTS = {
+    ".safetensors": (with_other_contents, with_other_header),
+    ".sqlite": (with_other_rows,),
+}
+
+
+@functools.cache
+def good_files(name):
+    return MUTATED[name].good()
+
+
+def read_mutation(name, number):
+    """Say what is wrong with how a reader takes a mutation, which its number gives again."""
+    reader, random = MUTATED[name], np.random.RandomState(number % 2**32)
+    path = Path.cwd() / reader.name
+    changes = (with_other_bytes, *OTHER_CONTENTS.get(path.suffix, ()))
+    data = good_files(name)[number % len(good_files(name))]
+    path.write_bytes(changes[random.randint(len(changes))](data, random))
+    return verdict(reader, path, is_refused=False)
+
+
+def mutation_cells(name, first, n_mutations):
+    """Mutations of good files from a number on; before the first of all, the files themselves."""
+    for number, data in enumerate(good_files(name) if first == 0 else ()):
+        yield f"{name}, good file {number}", functools.partial(read_good, name, data)
+    for number in range(first, first + n_mutations):
+        yield f"{name}, mutation {number}", functools.partial(read_mutation, name, number)
+
+
+def read_good(name, data):
+    path = Path.cwd() / MUTATED[name].name
+    path.write_bytes(data)
+    MUTATED[name].read(path)
+    return ""

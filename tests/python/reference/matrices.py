@@ -9,7 +9,6 @@ import core_cells
 import damaged_files
 import incomplete_samples
 import logged_data
-import mutated_files
 import public_cells
 import random_lives
 
@@ -42,7 +41,7 @@ MATRICES = {
     ],
     "commands": [(bad_options.command_cells, name) for name in bad_options.COMMANDS],
     "files": [
-        *((mutated_files.mutation_cells, name, N_MUTATIONS) for name in mutated_files.READERS),
+        *((damaged_files.mutation_cells, name, 0, N_MUTATIONS) for name in damaged_files.MUTATED),
         *((damaged_files.damage_cells, name) for name in damaged_files.READERS),
         *((damaged_files.header_cells, "estimator", number) for number in range(3)),
         *((damaged_files.header_cells, "agent", number) for number in (0, 5)),

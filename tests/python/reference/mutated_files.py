@@ -1,10 +1,14 @@
 """Files that a reader may meet: good ones, changed at random places."""
 
+import contextlib
 import dataclasses
-import functools
+import hashlib
 import json
+import math
 import re
+import sqlite3
 import tempfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,15 +16,16 @@ import gymnasium as gym
 import numpy as np
 from safetensors.numpy import load, save
 
-from checksums import with_checksum
+from checksums import BEFORE, with_checksum
 from made_records import make_record
 from sdnn import SDNNClassifier, SDNNRegressor, libsdnn
 from sdnn.agents import load_agent
 from sdnn.coding import Symbolic, WithMissing
 from sdnn.reproduction.reproduce import ClaimStudy
-from sdnn.runs import ResultStore, StoreError
+from sdnn.runs import ResultStore, StoreError, TrialRows
 from sdnn.runs.config_file import read_spec
 from sdnn.runs.errors import RunError
+from sdnn.runs.trial import HASH_DIGITS, ROW
 
 ROOT = Path(__file__).parents[3]
 X = np.random.RandomState(0).uniform(size=(40, 2))
@@ -81,7 +86,8 @@ def read_agent(path):
     agent = load_agent(path)
     space = agent.observation_space
     is_box = isinstance(space, gym.spaces.Box)
-    agent.act(np.zeros(space.shape, space.dtype) if is_box else space.sample())
+    action = agent.act(np.zeros(space.shape, space.dtype) if is_box else space.sample())
+    assert action in agent.action_space, f"the action is {action!r}"
 
 
 def read_libsdnn_model(path):
@@ -189,36 +195,91 @@ def with_other_contents(data, random):
     return with_checksum(save(tensors, metadata={"sdnn": metadata}))
 
 
-@functools.cache
-def good_files(name):
-    return READERS[name].good()
+def with_other_header(data, random):
+    """Change the header or the numbers of a file, whatever fits, under the right checksum."""
+    length = int.from_bytes(data[:8], "little")
+    start = len(BEFORE) + 8
+    beginning, header, body = data[8 : 8 + start], data[8 + start : 8 + length], data[8 + length :]
+    kind = random.randint(8)
+    if kind == 0:
+        body = with_other_bytes(body, random)
+    elif kind == 1:
+        header = with_other_array(beginning + header, random)[start:]
+    else:
+        header = with_other_bytes(header, random)
+    header += b" " * (-(start + len(header)) % 8)
+    whole = (start + len(header)).to_bytes(8, "little") + beginning + header + body
+    return with_checksum(whole)
 
 
-def read_mutation(name, number):
-    """Return what is wrong with how a reader takes a mutation, or ""."""
-    reader = READERS[name]
-    random = np.random.RandomState(number)
-    data = good_files(name)[number % len(good_files(name))]
-    deep = reader.name.endswith(".safetensors") and random.randint(2)
-    path = Path.cwd() / reader.name
-    path.write_bytes((with_other_contents if deep else with_other_bytes)(data, random))
-    try:
-        reader.read(path)
-    except reader.errors as error:
-        return "" if len(str(error)) > 10 else f"says no more than {error!r}"
-    return ""
+SAME_SIZE = ("BOOL U8 I8", "U16 I16 F16", "U32 I32 F32", "U64 I64 F64")
 
 
-def mutation_cells(name, n_mutations):
-    """The good files, which must be read, and mutations of them."""
-    for number, data in enumerate(good_files(name)):
-        yield f"{name}, good file {number}", functools.partial(read_good, name, data)
-    for number in range(n_mutations):
-        yield f"{name}, mutation {number}", functools.partial(read_mutation, name, number)
+def with_other_array(header, random):
+    """Let an array have another type or shape, of as many bytes."""
+    values = json.loads(header)
+    names = sorted(values.keys() - {"__metadata__"})
+    array = values[names[random.randint(len(names))]]
+    shape = array["shape"]
+    (kinds,) = (one.split() for one in SAME_SIZE if array["dtype"] in one.split())
+    if random.randint(2):
+        array["dtype"] = kinds[random.randint(len(kinds))]
+    else:
+        array["shape"] = ([*shape, 1], [1, *shape], [math.prod(shape)], shape[::-1])[
+            random.randint(4)
+        ]
+    return json.dumps(values, separators=(",", ":")).encode()
 
 
-def read_good(name, data):
-    path = Path.cwd() / READERS[name].name
-    path.write_bytes(data)
-    READERS[name].read(path)
-    return ""
+VALUES = (0, 1, -1, 2**31, 2**63 - 1, -(2**63), 0.5, 1e400, None, "", "x", "{}", "[]", "NaN",
+          "\ud800".encode("utf-8", "surrogatepass"), b"", b"\0" * 9, "x" * 9999,
+          "[" * 5000)  # fmt: skip
+
+
+def with_other_rows(data, random):
+    """A store some of whose values are others, most of them under the right checksums."""
+    with contextlib.closing(sqlite3.connect(":memory:")) as connection:
+        connection.deserialize(data)
+        with contextlib.suppress(sqlite3.Error):
+            change_rows(connection, random)
+        connection.commit()
+        return connection.serialize()
+
+
+def change_rows(connection, random):
+    for _ in range(random.randint(1, 4)):
+        table = ("runs", "rows", "measurements")[random.randint(3)]
+        columns = [row[1] for row in connection.execute(f"PRAGMA table_info({table})")]
+        column = columns[random.randint(len(columns))]
+        value = VALUES[random.randint(len(VALUES))]
+        if random.randint(3) == 0:  # a little changed
+            (old,) = connection.execute(f'SELECT "{column}" FROM {table} LIMIT 1').fetchone() or "x"
+            value = with_other_bytes(str(old).encode(), random).decode("utf-8", "replace")
+        connection.execute(f'UPDATE OR IGNORE {table} SET "{column}" = ?', (value,))
+    if random.randint(4):
+        repair(connection)
+
+
+def repair(connection):
+    for run_id, config in connection.execute("SELECT id, config FROM runs").fetchall():
+        rows = connection.execute(
+            "SELECT number, part, kind, episode, ifnull(step, -1), length, \"return\", terminated,"
+            " ifnull(environment, -1) FROM rows WHERE run_id = ? ORDER BY number, part", (run_id,)
+        ).fetchall()  # fmt: skip
+        table = np.zeros(len(rows), ROW)
+        try:
+            for i, row in enumerate(rows):
+                table[i] = row
+            checksum = TrialRows(table).checksum()
+        except (TypeError, ValueError, OverflowError):
+            checksum = "none"
+        digest = hashlib.sha256(str(config).encode("utf-8", "replace")).hexdigest()
+        connection.execute(
+            "UPDATE OR IGNORE runs SET config_hash = ?, checksum = ? WHERE id = ?",
+            (digest[:HASH_DIGITS], checksum, run_id),
+        )
+    for table, key in (("runs", "id"), ("measurements", "key")):
+        for row in connection.execute(f"SELECT * FROM {table}").fetchall():
+            crc = zlib.crc32(repr(row[:-1]).encode("utf-8", "surrogatepass"))
+            index = 0 if key == "id" else 1
+            connection.execute(f"UPDATE {table} SET crc = ? WHERE {key} = ?", (crc, row[index]))
