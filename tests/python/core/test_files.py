@@ -1,6 +1,7 @@
 """A format for every kind of file: files are read as written, and no damage is missed."""
 
 import json
+import os
 
 import gymnasium as gym
 import numpy as np
@@ -138,3 +139,18 @@ def test_invalid_content_with_a_valid_checksum_is_damage(part, other, tmp_path):
     assert part in content
     path.write_bytes(with_checksum(content.replace(part, other)))
     refuses("crafted", read_file, path, "agent")
+
+
+def test_only_regular_files_are_read(tmp_path, monkeypatch):
+    refuses("nothing", read_file, tmp_path / "nothing", "agent", error=FileNotFoundError)
+    with pytest.raises(OSError, match=tmp_path.name):
+        read_file(tmp_path, "agent")
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe")  # without a writer, for which reading would wait
+        (tmp_path / "link").symlink_to(tmp_path / "pipe")
+        for name in (tmp_path / "pipe", tmp_path / "link", "/dev/zero"):
+            with pytest.raises(OSError, match=f"{name}"):
+                read_file(name, "agent")
+    write_file(tmp_path / "file", "agent", ARRAYS, {})
+    monkeypatch.setattr(state_files, "MAX_BYTES", 100)
+    refuses("100", read_file, tmp_path / "file", "agent", error=OSError)

@@ -176,6 +176,8 @@ def test_bad_arguments():
     refuses("goal_tolerance", env.reset, options={"goal_tolerance": "low"})
     refuses("'episode'", env.reset, options={"episode": 3})
     assert env.goal_tolerance == 1.0
+    refuses("dtype", AcrobotSwingUpEnv, dtype="float16")
+    refuses("render_mode", AcrobotSwingUpEnv, render_mode="ansi")
 
 
 def test_frames_show_the_state():

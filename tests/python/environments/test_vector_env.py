@@ -184,6 +184,9 @@ def test_bad_actions_name_the_argument_and_move_nothing():
 
 
 def test_bad_arguments():
+    refuses("num_envs", AcrobotSwingUpVectorEnv, 0)
+    refuses("dtype", AcrobotSwingUpVectorEnv, 1, dtype="float16")
+    refuses("render_mode", AcrobotSwingUpVectorEnv, 1, render_mode="human")
     envs = AcrobotSwingUpVectorEnv(2)
     refuses("seed", envs.reset, seed=[1, 2, 3])
     for bad in (-0.1, [1.0, np.nan], [1.0] * 3):
