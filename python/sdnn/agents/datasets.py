@@ -131,11 +131,11 @@ def _followed(rows: Iterable[tuple[str, Data]], *, is_episode: bool = False) -> 
         if "next_observations" in row:
             yield _logged(row, place)
             continue
-        ends = _flag("terminations", row.get("terminations", False))
+        is_end = _flag("terminations", row.get("terminations", False))
         is_cut = _flag("truncations", row.get("truncations", False))
-        if is_episode or not (ends or is_cut):
+        if is_episode or not (is_end or is_cut):
             waiting = row, place
-        elif ends:
+        elif is_end:
             row["next_observations"] = row["observations"]  # whose value is not asked for
             yield _logged(row, place)
 

@@ -344,8 +344,8 @@ class Learner(Writer):
         """Return the state as the header's bytes."""
         state, image = self.state(), np.zeros((), self.layout())
         known = {"magic": self.magic, "fingerprint": self.fingerprint(), **state}
-        words = np.array([state[f"{stream}.words"] for stream in self.streams], np.uint64)
-        known |= {"words": words, **self.remembered(state)}
+        generators = np.array([state[f"{stream}.words"] for stream in self.streams], np.uint64)
+        known |= {"words": generators, **self.remembered(state)}
         for name in image.dtype.names or ():
             image[name] = known.get(name, 0)
         content = image.tobytes()
@@ -390,7 +390,9 @@ class Learner(Writer):
         """Add the head of the agent's image, which ends with the field ``end``."""
         fields: Mapping[str, Any] = self.layout().fields or {}
         head = np.frombuffer(self.image()[: fields[end][1]], np.uint8)
-        tables.add("uint8_t", "first_head", head, "What the agent begins with, as in an image.")
+        tables.add(
+            "uint8_t", "first_head", head, "The state that the agent begins with, as in an image."
+        )
 
     def learning_defines(self) -> Data:
         """Return the settings of all agents that learn."""
