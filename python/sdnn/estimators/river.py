@@ -203,12 +203,15 @@ class Waiting:
 
     def _sample(self, sample: Mapping[str, object], learns: bool = False) -> dict[str, object]:
         """Return the values of the known features, None for missing values."""
+        read = self._read(sample)
+        return read if self.ranges is None else self.ranges.moved(read, learns)
+
+    def _read(self, sample: Mapping[str, object]) -> dict[str, object]:
         get = sample.get
-        read = {
+        return {
             name: None if (value := get(name)) is None else as_read(value)
             for name, as_read in self.reads.items()
         }
-        return read if self.ranges is None else self.ranges.moved(read, learns)
 
     def _codings(self, names: list[str], new: list[str]) -> list[Coding]:
         """Return the codings of new features among all names, and set how their values are read."""
@@ -232,11 +235,8 @@ class Waiting:
 
     def _frame(self) -> pd.DataFrame:
         """Return the last samples as a table, with values as the model reads them."""
-        columns = {
-            name: [None if (value := x.get(name)) is None else read(value) for x in self.samples]
-            for name, read in self.reads.items()
-        }
-        return pd.DataFrame(columns)
+        rows = list(map(self._read, self.samples))
+        return pd.DataFrame({name: [row[name] for row in rows] for name in self.reads})
 
     def _begin(self) -> None:
         """Learn ranges, categories, classes and weights from the last samples."""

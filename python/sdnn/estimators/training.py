@@ -213,7 +213,6 @@ def run_epochs(
     history = History(network)
     weights = presentations(weights)
     quiet, n_quiet = 0, epochs_to_present_all(weights)
-    best: tuple[Network, int, tuple[Network, ...]] = network, 0, ()
     kept: deque[Network] = deque(maxlen=n_averaged_epochs - 1)
     with progress_bar(model.verbose, max_iter) as advance:
         for epoch in range(max_iter):
@@ -226,9 +225,10 @@ def run_epochs(
             if score is not None:
                 trainer.synchronize()
                 history.scores.append(score())
-                if best[1] == 0 or history.scores[-1] > history.scores[best[1] - 1]:
-                    best = network.copy(), epoch + 1, tuple(kept)
-                elif epoch + 1 - best[1] >= model.n_iter_no_change:
+                if epoch == 0 or history.scores[-1] > history.scores[history.n_epochs - 1]:
+                    history.network, history.earlier = network.copy(), tuple(kept)
+                    history.n_epochs = epoch + 1
+                elif epoch + 1 - history.n_epochs >= model.n_iter_no_change:
                     break
             quiet = quiet + 1 if n_corrected == 0 else 0
             if quiet == n_quiet:
@@ -238,6 +238,6 @@ def run_epochs(
                 trainer.synchronize()
                 kept.append(network.copy())
     trainer.synchronize()
-    last = network, len(history.n_corrected), tuple(kept)
-    history.network, history.n_epochs, history.earlier = last if score is None else best
+    if score is None:
+        history.earlier = tuple(kept)
     return history
