@@ -147,11 +147,9 @@ class RandomInverse(Ranged):
             raise ValueError("low and high cannot be given with spacing='quantile'")
         is_length = 0 < real("length_scale", self.length_scale) <= LONGEST
         require(is_length, "length_scale", f"be in (0, {LONGEST}]", self.length_scale)
-        if self.knots is not None and not (is_learned and self.spacing == "quantile"):
-            raise ValueError(
-                "knots must be given with spacing='quantile' and the range, low and high,"
-                f" got {shown(self.knots)}"
-            )
+        fits = self.knots is None or (is_learned and self.spacing == "quantile")
+        expected = "be given with spacing='quantile' and the range, low and high"
+        require(fits, "knots", expected, self.knots)
         values = numbers(column)
         low, high = self._learned_range(values)
         n_bins, n_flipped = self._bins_and_flips(n_units)
@@ -172,11 +170,8 @@ class RandomInverse(Ranged):
             flipped = min(most, max(1, round(n_units * (1 - kept) / 4)))
         else:
             flipped = max(1, math.ceil(n_units / (4 * self.length_scale * FINE)))
-            if flipped > most:
-                raise ValueError(
-                    f"length_scale must be at least {1 / (2 * FINE)},"
-                    f" got {shown(self.length_scale)}"
-                )
+            expected = f"be at least {1 / (2 * FINE)}"
+            require(flipped <= most, "length_scale", expected, self.length_scale)
         if n_bins is not None:
             return n_bins, flipped
         per_length = n_units / (4 * flipped)

@@ -17,15 +17,7 @@ from sklearn.utils._param_validation import Interval
 
 from sdnn import _core
 from sdnn.coding import Coding
-from sdnn.estimators.columns import (
-    Array,
-    Floats,
-    Ints,
-    PairChoice,
-    Pairs,
-    Sample,
-    input_pairs,
-)
+from sdnn.estimators.columns import Array, Floats, Ints, PairChoice, Pairs, Sample, input_pairs
 from sdnn.estimators.fitted import Fitted
 from sdnn.estimators.inputs import CodedInputs
 from sdnn.estimators.network import (
@@ -208,11 +200,10 @@ class BaseSDNN(Fitted, CodedInputs):
         bins = self.network_.input_code.bins(table)
         share = self.validation_fraction if self.early_stopping else 0.0
         held, kept = held_out(share, random, len(table))
-        held_bins, held_targets = bins[held], targets[held]
-        held_weights = None if weights is None else weights[held]
 
         def score() -> float:
-            return self._validation_score(held_bins, held_targets, held_weights)
+            weights_of_held = None if weights is None else weights[held]
+            return self._validation_score(bins[held], targets[held], weights_of_held)
 
         def train(rows: Rows, max_iter: int, n_averaged: int) -> tuple[Trainer, History]:
             weights_of_rows = None if weights is None else weights[rows]
@@ -292,12 +283,7 @@ class BaseSDNN(Fitted, CodedInputs):
         return self
 
     def _begin(
-        self,
-        X: object,
-        table: Array,
-        y: ArrayLike,
-        pairs: Pairs | None = None,
-        n_networks: int = 1,
+        self, X: object, table: Array, y: ArrayLike, pairs: Pairs | None = None, n_networks: int = 1
     ) -> np.random.RandomState:
         """Fit the codings, draw tables and weights; return the generator of orders."""
         n_units = self._set_outputs(y)
@@ -310,8 +296,7 @@ class BaseSDNN(Fitted, CodedInputs):
         if n_pattern_units % 2:
             raise ValueError(f"n_pattern_units must be even, got {n_pattern_units}")
         fitted = self._fit_codings(codings, table, n_pattern_units)
-        limit = self.memory_limit
-        require_memory(limit, n_units, n_networks, n_pattern_units, fitted, pairs)
+        require_memory(self.memory_limit, n_units, n_networks, n_pattern_units, fitted, pairs)
         code = draw_input_code(fitted, pairs, n_pattern_units, self.tables, code_seed)
         self.network_ = Network(code, n_units, seed=weight_seed)
         self._weight_seed = weight_seed

@@ -86,11 +86,7 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
         return self._partial_fit(X, y, classes, sample_weight)
 
     def learn_one(self, x: Sample, y: object, classes: ArrayLike | None = None) -> Self:
-        """Learn one sample: `partial_fit` of one row, to the same bits, without its overhead.
-
-        ``x`` is a row or a mapping from feature names to values, which may lack features coded with
-        `WithMissing`. An error changes nothing.
-        """
+        """Learn one sample, as `SDNNRegressor.learn_one` does; ``classes`` as in `partial_fit`."""
         self._require_classes(classes)
         return self._learn_one(x, np.array([y]), classes)
 

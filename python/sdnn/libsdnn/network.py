@@ -7,7 +7,7 @@ import operator
 import re
 import struct
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.support.arguments import one_of, path_of
+from sdnn.support.arguments import one_of, path_of, require
 from sdnn.support.files import read_bytes
 
 Library = Literal["msvc", "libstdc++"]
@@ -77,10 +77,8 @@ class LibsdnnParameters:
     def bins(self, inputs: ArrayLike) -> NDArray[np.int32]:
         """Return the bins of samples, shape (n_samples, n_inputs), values outside clipped."""
         values = np.asarray(inputs, dtype=np.float64)
-        if values.ndim != 2 or values.shape[1] != len(self.inputs):
-            raise ValueError(
-                f"inputs must have shape (n_samples, {len(self.inputs)}), got {values.shape}"
-            )
+        is_table = values.ndim == 2 and values.shape[1] == len(self.inputs)
+        require(is_table, "inputs", f"have shape (n_samples, {len(self.inputs)})", values.shape)
         if not np.isfinite(values).all():
             raise ValueError("inputs must be finite, got NaN or infinity")
         factors = np.array([1 if coded.symbolic else coded.n_bins for coded in self.inputs])
@@ -182,13 +180,11 @@ def number_of(text: str, what: str) -> float:
             return float(OPERATORS[type(node.op)](value(node.left), value(node.right)))
         raise ValueError
 
-    try:
+    errors = ArithmeticError, LookupError, MemoryError, RecursionError, TypeError, ValueError
+    with suppress(SyntaxError, *errors):
         result = value(ast.parse(text[:1001].replace("^", "**"), mode="eval").body)
         if len(text) <= 1000 and np.isfinite(result):
             return result
-    except (ArithmeticError, LookupError, MemoryError, RecursionError, SyntaxError, TypeError,
-            ValueError):  # fmt: skip
-        pass
     raise ValueError(f"{what} must be a number, got {text[:80]!r}")
 
 
