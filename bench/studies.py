@@ -19,7 +19,7 @@ from measured import Processes, is_wanted, measured, run_missing
 
 from sdnn.agents import Callback, Training
 from sdnn.runs import RunSpec
-from sdnn.runs.engine import PlannedTrial, run_to_end
+from sdnn.runs.engine import Finished, PlannedTrial, run_to_end
 from sdnn.runs.store import ResultStore
 from sdnn.runs.study_file import StudyFile
 from sdnn.runs.trial import TrainingTrial, TrialKey, TrialRecord, TrialRows
@@ -104,7 +104,11 @@ class _Clocked:
 def learn(planned: PlannedTrial, advanced: Callable[[int], None]) -> tuple[TrialRecord, Any]:
     """Run a trial; returns the record, of evaluations only, and the curve."""
     spec = _Clocked(planned.spec, MILESTONES.get(planned.key.case_id))
-    record = run_to_end(PlannedTrial(planned.key, spec), wanted=lambda: True, advanced=advanced)
+    for message in run_to_end(PlannedTrial(planned.key, spec)):
+        if isinstance(message, Finished):
+            record = message.record
+        else:
+            advanced(message.episode)
     table = record.rows.table
     rows = TrialRows(table[table["kind"] == "evaluation"])
     return replace(record, rows=rows), spec.clock.curve
@@ -134,7 +138,7 @@ def run_study(
     """Run the trials of a study that are not stored, and store their curves under a kind."""
     study.pairs = tuple(pair for pair in study.combinations if is_wanted(pair[::-1], arguments))
     if not arguments.redraw:
-        executor = Processes(learn, arguments.jobs, study.header.imports)
+        executor = Processes(learn, arguments.jobs, study.tables.study.imports)
         run_missing(study.plan(), executor, arguments.folder, lambda store: _Trials(store, kind))
 
 
