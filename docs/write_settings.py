@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from sdnn.runs.config_file import PAPER_ARGUMENTS, PARTS, spec_schema
+from sdnn.runs.config_file import PAPER_ARGUMENTS, core_parts, spec_schema
 
 PAGE = Path(__file__).parent / "reference" / "settings.md"
 
@@ -36,7 +36,7 @@ def page() -> str:
     described: dict[str, str] = {}
     for table, schema in definitions["RunSpec"]["properties"].items():
         text += f"\n## {table}\n\n{schema['description']}\n"
-        names = [config_type.__name__ for config_type in PARTS.get(table, ())]
+        names = [config_type.__name__ for config_type in core_parts().get(table, ())]
         names = names or [
             alternative["$ref"].rpartition("/")[2]
             for alternative in schema.get("anyOf", [schema])

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from sdnn.cli import main
 from sdnn.config import fields_of
-from sdnn.runs.config_file import PAPER_ARGUMENTS, PARTS, spec_schema
+from sdnn.runs.config_file import PAPER_ARGUMENTS, core_parts, spec_schema
 
 SCRIPT = Path(__file__).parents[2] / "docs" / "write_settings.py"
 
@@ -23,7 +23,7 @@ def test_the_page_is_that_of_the_declarations():
 
 def test_the_schema_has_every_setting_and_is_printed():
     schema = spec_schema()
-    parts = [config for configs in PARTS.values() for config in configs]
+    parts = [config for configs in core_parts().values() for config in configs]
     for config in (*parts, *PAPER_ARGUMENTS.values()):
         names = {field.name for field in fields_of(config)} - {"n_inputs"}
         assert set(schema["$defs"][config.__name__]["properties"]) == names

@@ -107,11 +107,13 @@ def read_spec(path: str | Path) -> RunSpec:
 PAPER_ARGUMENTS: dict[str, type[object]] = get_type_hints(PaperSettings)
 """The core's settings that are arguments of the paper's acrobot."""
 
-PARTS: dict[str, tuple[type[object], ...]] = {
-    part: tuple({getattr(entry, part): None for entry in AGENTS.values() if entry.core_trial})
-    for part in ("approximator", "learning")
-}
-"""The core's settings of the parts of agents, by their tables."""
+
+def core_parts() -> dict[str, tuple[type[object], ...]]:
+    """Return the core's settings of the parts of agents, by their tables."""
+    return {
+        part: tuple({getattr(entry, part): None for entry in AGENTS.values() if entry.core_trial})
+        for part in ("approximator", "learning")
+    }
 
 
 def spec_schema() -> Values:
@@ -122,7 +124,8 @@ def spec_schema() -> Values:
     >>> spec_schema()["$defs"]["QLearningConfig"]["properties"]["epsilon"]["maximum"]
     1.0
     """
-    configs = [config for configs in PARTS.values() for config in configs]
+    parts = core_parts()
+    configs = [config for configs in parts.values() for config in configs]
     structs = [
         msgspec.defstruct(
             config.__name__,
@@ -133,7 +136,7 @@ def spec_schema() -> Values:
     ]
     components = schemas_of(RunSpec, *structs)
     properties = components["RunSpec"]["properties"]
-    for table, core in PARTS.items():
+    for table, core in parts.items():
         properties[table]["anyOf"] = [
             *({"$ref": f"#/$defs/{kind.__name__}"} for kind in core),
             {"type": "object"},  # of an agent from elsewhere
