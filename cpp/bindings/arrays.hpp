@@ -55,6 +55,20 @@ std::span<const T> matrix(const ArrayArgument<T>& array, const char* name,
   return bindings::flat(array);
 }
 
+/// An array with a copy of numbers. Shape: (n,).
+template <class T>
+pybind11::array_t<T> array_of(std::span<const T> numbers) {
+  return pybind11::array_t<T>(static_cast<pybind11::ssize_t>(numbers.size()), numbers.data());
+}
+
+/// An array whose numbers `fill` writes, row by row.
+template <class T, class Fill>
+pybind11::array_t<T> filled(const std::vector<std::size_t>& shape, const Fill& fill) {
+  pybind11::array_t<T> array(shape);
+  fill(std::span<T>(array.mutable_data(), static_cast<std::size_t>(array.size())));
+  return array;
+}
+
 /// Throws std::length_error unless patterns fit in an array of 1 GiB. To be asked before they are
 /// made.
 inline void require_room_for_signs(double n_bins, double n_units) {
@@ -64,15 +78,15 @@ inline void require_room_for_signs(double n_bins, double n_units) {
 
 /// The patterns of a table, +1 and -1. Shapes: (n_bins, n_units).
 inline pybind11::array_t<std::int8_t> signs_of(const coding::PatternTable& table) {
-  pybind11::array_t<std::int8_t> signs({table.n_bins(), table.n_units()});
-  std::int8_t* sign = signs.mutable_data();
-  for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
-    core::interruption_point();
-    for (std::size_t k = 0; k < table.n_units(); ++k) {
-      *sign++ = static_cast<std::int8_t>(table.sign(bin, k));
+  return filled<std::int8_t>({table.n_bins(), table.n_units()}, [&](auto signs) {
+    auto sign = signs.begin();
+    for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {
+      core::interruption_point();
+      for (std::size_t k = 0; k < table.n_units(); ++k) {
+        *sign++ = static_cast<std::int8_t>(table.sign(bin, k));
+      }
     }
-  }
-  return signs;
+  });
 }
 
 /// The table of patterns +1 and -1. Shapes: (n_bins, n_units).

@@ -3,6 +3,8 @@
 #include <pybind11/stl.h>
 #include <pybind11/typing.h>
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "arrays.hpp"
@@ -27,6 +29,21 @@ using agents::QLearningConfig;
 using approximators::LinearSDNNConfig;
 using approximators::SDNNCConfig;
 using bindings::ArrayArgument;
+
+namespace {
+
+/// Titles, settings of the approximator and of learning.
+template <class Approximator, class Learning, std::size_t N>
+auto by_name(
+    const std::array<agents::Named<agents::Settings<Approximator, Learning>>, N>& presets) {
+  py::typing::Dict<py::str, py::typing::Tuple<py::str, Approximator, Learning>> named;
+  for (const auto& [name, title, preset] : presets) {
+    named[name] = py::make_tuple(title, preset.approximator, preset.learning);
+  }
+  return named;
+}
+
+}  // namespace
 
 void bind_agents(py::module_& module) {
   bindings::bind_config<agents::EpsilonGreedyConfig>(
@@ -57,26 +74,11 @@ void bind_agents(py::module_& module) {
       "The parameters of fuzzy Q-learning; the defaults are the paper's (section 4.3).");
 
   module.def(
-      "presets",
-      [] {
-        py::typing::Dict<py::str, py::typing::Tuple<py::str, SDNNCConfig, QLearningConfig>> found;
-        for (const auto& [name, title, preset] : agents::presets(SDNNCConfig{}.n_inputs)) {
-          found[name] = py::make_tuple(title, preset.approximator, preset.learning);
-        }
-        return found;
-      },
+      "presets", [] { return by_name(agents::presets(SDNNCConfig{}.n_inputs)); },
       "Named settings of Q-learning with SDNN-C: titles, settings of approximator and learning");
   module.def(
       "q_lambda_presets",
-      [] {
-        py::typing::Dict<py::str, py::typing::Tuple<py::str, LinearSDNNConfig, QLambdaConfig>>
-            found;
-        for (const auto& [name, title, preset] :
-             agents::q_lambda_presets(LinearSDNNConfig{}.n_inputs)) {
-          found[name] = py::make_tuple(title, preset.approximator, preset.learning);
-        }
-        return found;
-      },
+      [] { return by_name(agents::q_lambda_presets(LinearSDNNConfig{}.n_inputs)); },
       "The presets of Q(lambda), by name");
 
   bindings::Class<agents::FixedRate>(module, "FixedRate", "Waits for ticks at a fixed rate")

@@ -52,73 +52,48 @@ void bind_code(py::class_<Network>& network) {
       .def(
           "permutation",
           [](const Network& net, std::size_t mu, std::size_t nu) {
-            const auto& units = net.state_code().permutation(mu, nu);
-            return py::array_t<std::uint32_t>(static_cast<py::ssize_t>(units.size()), units.data());
+            return bindings::array_of(std::span(net.state_code().permutation(mu, nu)));
           },
           py::arg("mu"), py::arg("nu"), "sigma_mu_nu: (m,)");
 }
 
-/// weight(i, j) of all units and inputs: (n, D).
-template <class Weight>
-py::array_t<std::int32_t> matrix(const SDNNC& network, const Weight& weight) {
+/// number(i, j) of all units and inputs: (n, D).
+template <class Number>
+py::array_t<std::int32_t> weight_matrix(const SDNNC& network, const Number& number) {
   const std::size_t n_units = network.hidden_layer().n_units();
   const std::size_t n_columns = network.state_code().n_columns();
-  py::array_t<std::int32_t> out({n_units, n_columns});
-  std::int32_t* to = out.mutable_data();
-  for (std::size_t i = 0; i < n_units; ++i) {
-    for (std::size_t j = 0; j < n_columns; ++j) *to++ = weight(i, j);
-  }
-  return out;
+  return bindings::filled<std::int32_t>({n_units, n_columns}, [&](auto out) {
+    for (std::size_t k = 0; k < out.size(); ++k) out[k] = number(k / n_columns, k % n_columns);
+  });
 }
 
-/// threshold(i) of all units: (n,).
-template <class Threshold>
-py::array_t<std::int32_t> vector_of_units(const SDNNC& network, const Threshold& threshold) {
-  const std::size_t n_units = network.hidden_layer().n_units();
-  py::array_t<std::int32_t> out(static_cast<py::ssize_t>(n_units));
-  std::int32_t* to = out.mutable_data();
-  for (std::size_t i = 0; i < n_units; ++i) *to++ = threshold(i);
-  return out;
+/// number(i) of i = 0 .. n - 1: (n,).
+template <class T, class Number>
+py::array_t<T> numbers(std::size_t n, const Number& number) {
+  return bindings::filled<T>({n}, [&](auto out) {
+    for (std::size_t i = 0; i < n; ++i) out[i] = number(i);
+  });
 }
 
 py::array_t<std::int32_t> weights(const SDNNC& network) {
-  return matrix(network, [&](std::size_t i, std::size_t j) { return network.weight(i, j); });
+  return weight_matrix(network, [&](std::size_t i, std::size_t j) { return network.weight(i, j); });
 }
 
 py::array_t<std::int32_t> thresholds(const SDNNC& network) {
-  return vector_of_units(network,
-                         [&](std::size_t i) { return network.hidden_layer().threshold(i); });
+  const auto& layer = network.hidden_layer();
+  return numbers<std::int32_t>(layer.n_units(), [&](std::size_t i) { return layer.threshold(i); });
 }
 
 py::array_t<std::int32_t> averaged_weights(const SDNNC& network) {
   if (!network.has_average()) return weights(network);
-  return matrix(network,
-                [&](std::size_t i, std::size_t j) { return network.averaged_weight(i, j); });
+  return weight_matrix(network,
+                       [&](std::size_t i, std::size_t j) { return network.averaged_weight(i, j); });
 }
 
 py::array_t<std::int32_t> averaged_thresholds(const SDNNC& network) {
   if (!network.has_average()) return thresholds(network);
-  return vector_of_units(network, [&](std::size_t i) { return network.averaged_threshold(i); });
-}
-
-py::array_t<std::uint32_t> first_units(const SDNNC& network) {
-  const auto& actions = network.action_code();
-  py::array_t<std::uint32_t> out(static_cast<py::ssize_t>(actions.n_actions()));
-  std::uint32_t* unit = out.mutable_data();
-  for (std::size_t action = 0; action < actions.n_actions(); ++action) {
-    *unit++ = static_cast<std::uint32_t>(actions.first_unit(action));
-  }
-  return out;
-}
-
-py::array_t<double> output_values(const SDNNC& network) {
-  const std::size_t n_counts = network.action_code().n_active_units() + 1;
-  py::array_t<double> out(static_cast<py::ssize_t>(n_counts));
-  double* value = out.mutable_data();
-  for (std::size_t u = 0; u < n_counts; ++u) {
-    *value++ = network.output_scale()(static_cast<int>(u));
-  }
-  return out;
+  return numbers<std::int32_t>(network.hidden_layer().n_units(),
+                               [&](std::size_t i) { return network.averaged_threshold(i); });
 }
 
 /// Binds the members of all networks that give Q(s, a) for every action.
@@ -130,10 +105,9 @@ py::class_<Network> bind_network(py::module_& module, const char* name, const ch
       .def(
           "values",
           [](const Network& net, const ArrayArgument<double>& state) {
-            py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions()));
-            net.values(bindings::vector(state, "state"), bindings::workspace_of(net),
-                       {out.mutable_data(), net.n_actions()});
-            return out;
+            return bindings::filled<double>({net.n_actions()}, [&](auto out) {
+              net.values(bindings::vector(state, "state"), bindings::workspace_of(net), out);
+            });
           },
           py::arg("state"), "Q(state, a) for every action; shapes (n_inputs,) -> (n_actions,)")
       .def(
@@ -161,18 +135,16 @@ void bind_fuzzy_rules(py::module_& module) {
           [](const FuzzyRules& rules, const ArrayArgument<double>& state) {
             approximators::FiredRules fired;
             rules.fire(bindings::vector(state, "state"), fired);
-            const auto n = static_cast<py::ssize_t>(fired.size());
-            return std::pair(py::array_t<std::size_t>(n, fired.rules.data()),
-                             py::array_t<double>(n, fired.truth_values.data()));
+            return std::pair(
+                bindings::array_of<std::size_t>(std::span(fired.rules).first(fired.size())),
+                bindings::array_of<double>(std::span(fired.truth_values).first(fired.size())));
           },
           py::arg("state"), "The rules that fire and their truth values")
       .def(
           "values",
           [](const FuzzyRules& rules, std::size_t rule) {
-            core::require(rule < rules.n_rules(), "rule",
-                          "less than " + std::to_string(rules.n_rules()), rule);
-            const auto row = rules.values(rule);
-            return py::array_t<float>(static_cast<py::ssize_t>(row.size()), row.data());
+            core::require_below("rule", rule, rules.n_rules());
+            return bindings::array_of(rules.values(rule));
           },
           py::arg("rule"), "A copy of v(rule, a) for every action: (n_actions,)");
 }
@@ -199,29 +171,26 @@ void bind_linear_sdnn(py::module_& module) {
           [](const LinearSDNN& net, const ArrayArgument<double>& state) {
             auto& workspace = bindings::workspace_of(net);
             net.read(bindings::vector(state, "state"), workspace);
-            py::array_t<std::int8_t> out(static_cast<py::ssize_t>(net.n_slots()));
-            std::ranges::copy(workspace.code().signs(), out.mutable_data());
-            return out;
+            return bindings::array_of<std::int8_t>(workspace.code().signs());
           },
           py::arg("state"), "The paired code of a state, -1, 0 or +1: (n_inputs,) -> (n_slots,)")
       .def(
           "values",
           [](const LinearSDNN& net, const ArrayArgument<double>& state, std::size_t dimension) {
-            core::require(dimension < net.n_dimensions(), "dimension",
-                          "less than " + std::to_string(net.n_dimensions()), dimension);
-            py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions(dimension)));
-            net.values(bindings::vector(state, "state"), bindings::workspace_of(net),
-                       {out.mutable_data(), net.n_actions(dimension)}, dimension, true);
-            return out;
+            core::require_below("dimension", dimension, net.n_dimensions());
+            return bindings::filled<double>({net.n_actions(dimension)}, [&](auto out) {
+              net.values(bindings::vector(state, "state"), bindings::workspace_of(net), out,
+                         dimension, true);
+            });
           },
           py::arg("state"), py::arg("dimension") = 0,
           "A dimension's part of Q(state, a) for its actions, by averaged weights if there are any")
       .def(
           "weights",
           [](const LinearSDNN& net) {
-            py::array_t<std::int32_t> out({net.n_rows(), net.n_slots()});
-            std::ranges::copy(net.weights(), out.mutable_data());
-            return out;
+            return bindings::filled<std::int32_t>({net.n_rows(), net.n_slots()}, [&](auto out) {
+              std::ranges::copy(net.weights(), out.begin());
+            });
           },
           "A copy, in units: (n_rows, n_slots), the units of one dimension after the other");
 }
@@ -230,18 +199,13 @@ void bind_rbf_network(py::module_& module) {
   bindings::bind_config<RBFNetworkConfig>(
       module, "RBFNetworkConfig",
       "The sizes of an RBF network: normalized Gaussians on an even grid, linear in the weights. "
-      "The "
-      "paper gives 4 bases per dimension and 601 actions; the rest are assumptions.");
+      "The paper gives 4 bases per dimension and 601 actions; the rest are assumptions.");
 
   bind_network<RBFNetwork>(module, "RBFNetwork", "Q(s, a) linear in normalized Gaussian bases")
       .def(py::init<const RBFNetworkConfig&>(), py::arg("config"))
       .def_property_readonly("n_joint_bases", &RBFNetwork::n_joint_bases)
       .def(
-          "weights",
-          [](const RBFNetwork& net) {
-            return py::array_t<double>(static_cast<py::ssize_t>(net.n_joint_bases()),
-                                       net.weights().data());
-          },
+          "weights", [](const RBFNetwork& net) { return bindings::array_of(net.weights()); },
           "A copy, row-major over inputs and action: (n_bases^(d+1),)")
       .def(
           "set_weights",
@@ -292,10 +256,9 @@ void bind_approximators(py::module_& module) {
       .def(
           "potentials",
           [](const SDNNC& net, const ArrayArgument<double>& state) {
-            py::array_t<std::int32_t> out(static_cast<py::ssize_t>(net.hidden_layer().n_units()));
-            net.potentials(bindings::vector(state, "state"),
-                           {out.mutable_data(), net.hidden_layer().n_units()});
-            return out;
+            return bindings::filled<std::int32_t>({net.hidden_layer().n_units()}, [&](auto out) {
+              net.potentials(bindings::vector(state, "state"), out);
+            });
           },
           py::arg("state"), "Inner potentials in lattice steps; shapes (l,) -> (n,)")
       .def("weights", &weights, "A copy, in lattice steps: (n, D)")
@@ -303,16 +266,31 @@ void bind_approximators(py::module_& module) {
       .def(
           "averaged_values",
           [](const SDNNC& net, const ArrayArgument<double>& state) {
-            py::array_t<double> out(static_cast<py::ssize_t>(net.n_actions()));
-            net.averaged_values(bindings::vector(state, "state"), bindings::workspace_of(net),
-                                {out.mutable_data(), net.n_actions()});
-            return out;
+            return bindings::filled<double>({net.n_actions()}, [&](auto out) {
+              net.averaged_values(bindings::vector(state, "state"), bindings::workspace_of(net),
+                                  out);
+            });
           },
           py::arg("state"), "As values, by the average of the weights: (l,) -> (n_actions,)")
       .def("averaged_weights", &averaged_weights, "Their average, or the weights: (n, D)")
       .def("averaged_thresholds", &averaged_thresholds, "Their average, or the thresholds: (n,)")
-      .def("first_units", &first_units, "Where the window of every action begins: (n_actions,)")
-      .def("output_values", &output_values, "g(u) of u = 0 .. n' active units: (n' + 1,)")
+      .def(
+          "first_units",
+          [](const SDNNC& net) {
+            const auto& actions = net.action_code();
+            return numbers<std::uint32_t>(actions.n_actions(), [&](std::size_t action) {
+              return static_cast<std::uint32_t>(actions.first_unit(action));
+            });
+          },
+          "Where the window of every action begins: (n_actions,)")
+      .def(
+          "output_values",
+          [](const SDNNC& net) {
+            return numbers<double>(net.action_code().n_active_units() + 1, [&](std::size_t u) {
+              return net.output_scale()(static_cast<int>(u));
+            });
+          },
+          "g(u) of u = 0 .. n' active units: (n' + 1,)")
       .def_property_readonly(
           "output_range",
           [](const SDNNC& net) {

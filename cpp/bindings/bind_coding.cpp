@@ -39,9 +39,8 @@ std::shared_ptr<Code> make_code(const std::vector<ArrayArgument<std::int8_t>>& m
 
 py::array_t<std::int8_t> transform(const Code& code, const Bins& bins) {
   const auto values = matrix(bins, "bins", code.n_inputs());
-  py::array_t<std::int8_t> out({static_cast<std::size_t>(bins.shape(0)), code.n_columns()});
-  coding::write_signs(code, values, {out.mutable_data(), static_cast<std::size_t>(out.size())});
-  return out;
+  return bindings::filled<std::int8_t>({static_cast<std::size_t>(bins.shape(0)), code.n_columns()},
+                                       [&](auto out) { coding::write_signs(code, values, out); });
 }
 
 py::array_t<std::int32_t> gram(const Code& code, const Bins& bins,
@@ -49,11 +48,11 @@ py::array_t<std::int32_t> gram(const Code& code, const Bins& bins,
   const auto values = copied(matrix(bins, "bins", code.n_inputs()));
   const auto others =
       other_bins ? copied(matrix(*other_bins, "other_bins", code.n_inputs())) : values;
-  py::array_t<std::int32_t> out({values.size() / code.n_inputs(), others.size() / code.n_inputs()});
-  const std::span products(out.mutable_data(), static_cast<std::size_t>(out.size()));
-  const bindings::WithoutGIL unlocked(code);
-  coding::write_products(code, values, others, products);
-  return out;
+  return bindings::filled<std::int32_t>(
+      {values.size() / code.n_inputs(), others.size() / code.n_inputs()}, [&](auto out) {
+        const bindings::WithoutGIL unlocked(code);
+        coding::write_products(code, values, others, out);
+      });
 }
 
 }  // namespace
@@ -62,8 +61,7 @@ void bind_coding(py::module_& module) {
   module.def(
       "action_value",
       [](std::size_t action, std::size_t n_actions, double low, double high) {
-        core::require(action < n_actions, "action", "less than " + std::to_string(n_actions),
-                      action);
+        core::require_below("action", action, n_actions);
         core::require(low <= high && std::isfinite(high - low), "high",
                       "at least low, and a finite distance from it", high);
         return coding::action_value(action, n_actions, low, high);

@@ -21,7 +21,6 @@
 
 #include "objects.hpp"
 #include "sdnn/core/config_fields.hpp"
-#include "sdnn/core/detail/check_fields.hpp"
 #include "words.hpp"
 
 namespace sdnn::bindings {
@@ -35,54 +34,33 @@ inline constexpr bool kIsList = false;
 template <class Value>
 inline constexpr bool kIsList<std::vector<Value>> = true;
 
-/// A type in the words of Python's type hints.
+/// A type in the words of Python's type hints, or of error messages.
 template <class Value>
-std::string hint_of() {
+std::string words_of_type(bool is_hint) {
   if constexpr (kIsOptional<Value>) {
-    return hint_of<typename Value::value_type>() + " | None";
+    return words_of_type<typename Value::value_type>(is_hint) + (is_hint ? " | None" : ", or None");
   } else if constexpr (kIsList<Value>) {
-    return "tuple[" + hint_of<typename Value::value_type>() + ", ...]";
+    const std::string item = words_of_type<typename Value::value_type>(is_hint);
+    return is_hint ? "tuple[" + item + ", ...]" : "a sequence, each " + item;
   } else if constexpr (core::HasWords<Value>) {
     std::string words;
     for (const auto word : words_of(Value{})) {
       words += (words.empty() ? "'" : ", '") + std::string(word) + "'";
     }
-    return "typing.Literal[" + words + "]";
+    return is_hint ? "typing.Literal[" + words + "]" : "one of " + words;
   } else if constexpr (std::is_same_v<Value, bool>) {
-    return "bool";
+    return is_hint ? "bool" : "True or False";
   } else if constexpr (std::integral<Value>) {
-    return "int";
+    return is_hint ? "int" : "a whole number";
   } else {
-    return "float";
-  }
-}
-
-/// Describes the type of a value for error messages.
-template <class Value>
-std::string expected_words() {
-  if constexpr (kIsOptional<Value>) {
-    return expected_words<typename Value::value_type>() + ", or None";
-  } else if constexpr (kIsList<Value>) {
-    return "a sequence, each " + expected_words<typename Value::value_type>();
-  } else if constexpr (core::HasWords<Value>) {
-    std::string words = "one of ";
-    for (const auto word : words_of(Value{})) {
-      words += (words.back() == ' ' ? "'" : ", '") + std::string(word) + "'";
-    }
-    return words;
-  } else if constexpr (std::is_same_v<Value, bool>) {
-    return "True or False";
-  } else if constexpr (std::integral<Value>) {
-    return "a whole number";
-  } else {
-    return "a number";
+    return is_hint ? "float" : "a number";
   }
 }
 
 /// An argument is of another type. Python gets a TypeError with the attribute `argument`.
 class ArgumentTypeError : public core::ArgumentError {
  public:
-  using ArgumentError::ArgumentError;
+  using NamedError::NamedError;
 };
 
 /// The representation of any value, for a message.
@@ -105,8 +83,7 @@ struct Field;
 
 /// The description of a type of values that Python needs.
 struct ValueType {
-  std::string (*hint)();
-  std::string (*expected)();
+  std::string (*words)(bool is_hint);
   bool has_bounds;
   bool is_whole;
   pybind11::object (*to_python)(const void* value);
@@ -167,13 +144,11 @@ bool read_value(pybind11::handle source, Value& value, const Field& field) {
     }
     return true;
   } else if constexpr (core::HasWords<Value>) {
-    const auto words = words_of(Value{});
-    const auto found =
-        py::isinstance<py::str>(source) ? std::ranges::find(words, text_of(source)) : words.end();
-    if (found == words.end()) {
-      core::require(false, field.name, expected_words<Value>(), shown(source));
+    py::detail::make_caster<Value> word;
+    if (!word.load(source, false)) {
+      core::require(false, field.name, words_of_type<Value>(false), shown(source));
     }
-    value = static_cast<Value>(found - words.begin());
+    value = word;
     return true;
   } else if constexpr (std::is_same_v<Value, bool>) {
     if (!is_truth(source)) return false;
@@ -210,8 +185,7 @@ pybind11::object python_value(const Value& value) {
 
 template <class Value>
 inline constexpr ValueType kValueType{
-    .hint = &hint_of<Value>,
-    .expected = &expected_words<Value>,
+    .words = &words_of_type<Value>,
     .has_bounds = !std::is_same_v<Value, bool> && !core::HasWords<Value>,
     .is_whole = std::integral<Value>,
     .to_python = [](const void* value) -> pybind11::object {
@@ -256,7 +230,7 @@ inline void change(std::span<const Field> fields, const pybind11::kwargs& change
     const py::object source = changes[field.name];
     if (field.type->read(source, field.value, field)) continue;
     throw ArgumentTypeError(field.name, std::string(field.name) + " must be " +
-                                            field.type->expected() + ", got " + shown(source));
+                                            field.type->words(false) + ", got " + shown(source));
   }
   if (n_known == changes.size()) return;
   const py::dict known = dictionary_of(fields);
@@ -283,7 +257,7 @@ inline pybind11::tuple described_fields(std::span<const Field> fields) {
   for (std::size_t i = 0; i < fields.size(); ++i) {
     const Field& field = fields[i];
     described[i] =
-        pybind11::make_tuple(field.name, field.type->hint(), python_value_of(field), field.doc,
+        pybind11::make_tuple(field.name, field.type->words(true), python_value_of(field), field.doc,
                              field.bounds.low, field.bounds.high, field.bounds.excludes_low);
   }
   return described;
@@ -293,7 +267,7 @@ inline pybind11::tuple described_fields(std::span<const Field> fields) {
 inline std::string docstring(const char* doc, std::span<const Field> fields) {
   std::string text = std::string(doc) + "\n\nParameters\n----------\n";
   for (const Field& field : fields) {
-    std::string hint = field.type->hint();
+    std::string hint = field.type->words(true);
     if (hint.starts_with("typing.Literal[")) hint = '{' + hint.substr(15, hint.size() - 16) + '}';
     text += std::string(field.name) + " : " + hint + "\n    " + field.doc;
     if (field.type->has_bounds) {

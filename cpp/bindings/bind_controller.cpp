@@ -12,7 +12,7 @@
 #include <variant>
 #include <vector>
 
-#include "agent_parts.hpp"
+#include "agents.hpp"
 #include "arrays.hpp"
 #include "bind_config.hpp"
 #include "bindings.hpp"
@@ -28,6 +28,7 @@ namespace py = pybind11;
 using namespace sdnn;
 using agents::Controller;
 using agents::ControllerConfig;
+using bindings::array_of;
 using bindings::ArrayArgument;
 
 namespace {
@@ -79,13 +80,12 @@ std::span<const double> best_action(Controller& controller, std::span<const doub
 py::array_t<double> values(Controller& controller, const ArrayArgument<double>& observation,
                            std::size_t dimension) {
   require_warm(controller);
-  core::require(dimension < controller.n_dimensions(), "dimension",
-                "less than " + std::to_string(controller.n_dimensions()), dimension);
+  core::require_below("dimension", dimension, controller.n_dimensions());
   const auto variables = bindings::copied(bindings::flat(observation));
   auto& workspace = bindings::workspace_of(std::as_const(controller));
   std::span<const double> row;
   read_without_gil(controller, [&] { row = controller.values(variables, workspace, dimension); });
-  return py::array_t<double>(static_cast<py::ssize_t>(row.size()), row.data());
+  return array_of(row);
 }
 
 /// Which actions are allowed; None: all.
@@ -149,34 +149,39 @@ std::size_t learn_each(Controller& controller, const ArrayArgument<double>& obse
   return n_learned;
 }
 
+/// Binds a member function that takes a transition.
+template <class Call>
+void def_transition(py::class_<Controller>& type, const char* name, const char* doc,
+                    const Call& call) {
+  type.def(
+      name,
+      [call](Controller& self, const ArrayArgument<double>& observation,
+             const ArrayArgument<double>& action, double reward,
+             const ArrayArgument<double>& next_observation, bool terminated,
+             std::size_t environment, const MaskArgument& next_mask) {
+        call(self, bindings::flat(observation), bindings::flat(action), reward,
+             bindings::flat(next_observation), terminated, environment, mask_of(next_mask));
+      },
+      py::arg("observation"), py::arg("action"), py::arg("reward"), py::arg("next_observation"),
+      py::arg("terminated"), py::arg("environment") = 0, py::arg("next_mask") = py::none(), doc);
+}
+
 }  // namespace
 
 void bind_controller(py::module_& module) {
   bindings::bind_config<agents::ObservationConfig>(module, "ObservationConfig",
                                                    "The observed variables of a task.");
   bindings::bind_config<agents::ActionConfig>(module, "ActionConfig", "The actions of a task.");
-  const auto config_of = [](const agents::AnyApproximatorConfig& approximator,
-                            const agents::AnyLearningConfig& learning, std::uint64_t seed,
-                            const agents::ObservationConfig& observation,
-                            const agents::ActionConfig& action, int warm_up_steps) {
-    return ControllerConfig{approximator, learning, seed, observation, action, warm_up_steps};
-  };
-  const auto array_of = [](std::span<const double> values) {
-    return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
-  };
-  const auto ends_of = [array_of](const Controller& self) {
-    return std::pair(array_of(self.observations().low()), array_of(self.observations().high()));
-  };
   bindings::Class<Controller> type(module, "Controller", "An agent in the units of its task");
   type.attr("fields") = bindings::described_fields(bindings::fields_of(ControllerConfig{}));
-  type.def(py::init([config_of](const agents::AnyApproximatorConfig& approximator,
-                                const agents::AnyLearningConfig& learning, std::uint64_t seed,
-                                const agents::ObservationConfig& observation,
-                                const agents::ActionConfig& action, int warm_up_steps,
-                                const std::vector<ArrayArgument<std::int8_t>>& tables,
-                                const std::optional<py::dict>& state) {
-             auto config =
-                 config_of(approximator, learning, seed, observation, action, warm_up_steps);
+  type.def(py::init([](const agents::AnyApproximatorConfig& approximator,
+                       const agents::AnyLearningConfig& learning, std::uint64_t seed,
+                       const agents::ObservationConfig& observation,
+                       const agents::ActionConfig& action, int warm_up_steps,
+                       const std::vector<ArrayArgument<std::int8_t>>& tables,
+                       const std::optional<py::dict>& state) {
+             ControllerConfig config{approximator, learning, seed,
+                                     observation,  action,   warm_up_steps};
              if (state)
                return Controller::restored(std::move(config), bindings::state_from(*state));
              return Controller(std::move(config), bindings::tables_of(tables));
@@ -191,7 +196,13 @@ void bind_controller(py::module_& module) {
       .def_property_readonly("n_variables", &Controller::n_variables)
       .def_property_readonly("n_actions",
                              [](const Controller& self) { return self.actions().n_actions(); })
-      .def_property_readonly("ranges", ends_of, "Lowest and highest values, (n_variables,) each")
+      .def_property_readonly(
+          "ranges",
+          [](const Controller& self) {
+            return std::pair(array_of(self.observations().low()),
+                             array_of(self.observations().high()));
+          },
+          "Lowest and highest values, (n_variables,) each")
       .def_property_readonly(
           "inputs",
           [](const Controller& self) {
@@ -237,8 +248,8 @@ void bind_controller(py::module_& module) {
            "The next acts without `explore` hold no earlier readings")
       .def(
           "act",
-          [array_of](Controller& self, const ArrayArgument<double>& observation, bool explore,
-                     std::size_t environment, const MaskArgument& mask) {
+          [](Controller& self, const ArrayArgument<double>& observation, bool explore,
+             std::size_t environment, const MaskArgument& mask) {
             const auto variables = bindings::flat(observation);
             const bool is_reader = !explore && has_other_threads() && !self.is_warming_up() &&
                                    environment < self.n_environments();
@@ -248,45 +259,21 @@ void bind_controller(py::module_& module) {
           py::arg("observation"), py::arg("explore") = true, py::arg("environment") = 0,
           py::arg("mask") = py::none())
       .def(
-          "learn",
-          [](Controller& self, const ArrayArgument<double>& observation,
-             const ArrayArgument<double>& action, double reward,
-             const ArrayArgument<double>& next_observation, bool terminated,
-             std::size_t environment, const MaskArgument& next_mask) {
-            bindings::wait_for_readers(self);
-            self.learn(bindings::flat(observation), bindings::flat(action), reward,
-                       bindings::flat(next_observation), terminated, environment,
-                       mask_of(next_mask));
-          },
-          py::arg("observation"), py::arg("action"), py::arg("reward"), py::arg("next_observation"),
-          py::arg("terminated"), py::arg("environment") = 0, py::arg("next_mask") = py::none())
-      .def(
-          "check",
-          [](const Controller& self, const ArrayArgument<double>& observation,
-             const ArrayArgument<double>& action, double reward,
-             const ArrayArgument<double>& next_observation, bool terminated,
-             std::size_t environment, const MaskArgument& next_mask) {
-            self.check(bindings::flat(observation), bindings::flat(action), reward,
-                       bindings::flat(next_observation), terminated, environment,
-                       mask_of(next_mask));
-          },
-          py::arg("observation"), py::arg("action"), py::arg("reward"), py::arg("next_observation"),
-          py::arg("terminated"), py::arg("environment") = 0, py::arg("next_mask") = py::none(),
-          "Raises what learn would; changes nothing")
-      .def(
           "act_each",
           [](Controller& self, const ArrayArgument<double>& observations,
              const py::list& environments, const MaskArgument& masks) {
-            py::array_t<double> actions(
-                {static_cast<std::size_t>(observations.shape(0)), self.n_dimensions()});
-            std::ranges::fill_n(actions.mutable_data(), actions.size(), 0.0);
-            for (const py::handle environment : environments) {
-              const auto i = environment.cast<std::size_t>();
-              const auto action = self.act(row(observations, "observations", self.n_variables(), i),
-                                           true, i, mask_of(masks, "masks", i));
-              std::ranges::copy(action, actions.mutable_data(static_cast<py::ssize_t>(i)));
-            }
-            return actions;
+            const std::size_t n = self.n_dimensions();
+            const auto n_rows = static_cast<std::size_t>(observations.shape(0));
+            return bindings::filled<double>({n_rows, n}, [&](auto actions) {
+              std::ranges::fill(actions, 0.0);
+              for (const py::handle environment : environments) {
+                const auto i = environment.cast<std::size_t>();
+                const auto action =
+                    self.act(row(observations, "observations", self.n_variables(), i), true, i,
+                             mask_of(masks, "masks", i));
+                std::ranges::copy(action, actions.begin() + static_cast<std::ptrdiff_t>(n * i));
+              }
+            });
           },
           py::arg("observations"), py::arg("environments"), py::arg("masks") = py::none(),
           "Exploring actions in some environments, in order; other rows are zeros")
@@ -302,7 +289,7 @@ void bind_controller(py::module_& module) {
            "of the observation alone")
       .def(
           "state_of",
-          [array_of](Controller& self, const ArrayArgument<double>& observation) {
+          [](Controller& self, const ArrayArgument<double>& observation) {
             return array_of(self.state_of(bindings::flat(observation)));
           },
           py::arg("observation"), "The agent's state, shape (n_inputs,)")
@@ -329,5 +316,12 @@ void bind_controller(py::module_& module) {
       .def_property_readonly(
           "reward_size", [](const Controller& self) { return self.reward_scale().size(); },
           "The largest recent reward is 2 to this power, or up to twice that; or None");
+  def_transition(type, "learn", nullptr, [](Controller& self, const auto&... transition) {
+    bindings::wait_for_readers(self);
+    self.learn(transition...);
+  });
+  def_transition(
+      type, "check", "Raises what learn would; changes nothing",
+      [](const Controller& self, const auto&... transition) { self.check(transition...); });
   bindings::def_state(type);
 }

@@ -20,8 +20,10 @@
 namespace py = pybind11;
 using namespace sdnn;
 using namespace sdnn::environments;
+using bindings::array_of;
 using bindings::ArrayArgument;
 using bindings::copied;
+using bindings::filled;
 
 namespace {
 
@@ -29,10 +31,6 @@ AcrobotState state_vector(const ArrayArgument<double>& state) {
   const auto values = bindings::vector(state, "state");
   core::require(values.size() == 4, "state", "of 4 numbers", values.size());
   return {values[0], values[1], values[2], values[3]};
-}
-
-py::array_t<double> array(std::span<const double> values) {
-  return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
 std::span<const std::uint8_t> flags(const ArrayArgument<bool>& array, const char* name) {
@@ -83,7 +81,7 @@ void bind_acrobot(py::module_& module) {
       .def("state",
            [](const Acrobot& acrobot) {
              const AcrobotState state = acrobot.state();
-             return array({state.data(), 4});
+             return array_of<double>({state.data(), 4});
            })
       .def("tip_height", &Acrobot::tip_height)
       .def("decisions", &Acrobot::decisions);
@@ -94,9 +92,7 @@ void bind_acrobot_batch(py::module_& module) {
   using Write = void (AcrobotBatch::*)(std::span<double>) const;
   const auto rows = [](Write write) {
     return [write](const AcrobotBatch& batch) {
-      py::array_t<double> result({batch.size(), std::size_t{4}});
-      (batch.*write)(items(result));
-      return result;
+      return filled<double>({batch.size(), 4}, [&](auto out) { (batch.*write)(out); });
     };
   };
   bindings::Class<AcrobotBatch>(module, "AcrobotBatch", "Many acrobots in step, in vector lanes")
@@ -134,9 +130,7 @@ void bind_acrobot_batch(py::module_& module) {
       .def("observations", rows(&AcrobotBatch::observations), "s1..s4 of every state")
       .def("tip_heights",
            [](const AcrobotBatch& batch) {
-             py::array_t<double> heights(static_cast<py::ssize_t>(batch.size()));
-             batch.tip_heights(items(heights));
-             return heights;
+             return filled<double>({batch.size()}, [&](auto out) { batch.tip_heights(out); });
            })
       .def("decisions", &AcrobotBatch::decisions, py::arg("index"));
 }
@@ -146,7 +140,7 @@ void bind_sensors(py::module_& module) {
       "basic_observation",
       [](const ArrayArgument<double>& state) {
         const Eigen::Vector4d observation = basic_observation(state_vector(state));
-        return array({observation.data(), 4});
+        return array_of<double>({observation.data(), 4});
       },
       py::arg("state"), "s1..s4 of a state");
   module.def("energy_sensor", &energy_sensor, py::arg("s3"), py::arg("s4"));
@@ -162,7 +156,7 @@ void bind_sensors(py::module_& module) {
                           "of " + std::to_string(noise.n_channels()) + " numbers", clean.size());
             std::vector<double> noisy(clean.begin(), clean.end());
             noise.apply(noisy);
-            return array(noisy);
+            return array_of<double>(noisy);
           },
           py::arg("values"), "A noisy copy");
   bindings::bind_config<SensorConfig>(module, "SensorConfig",
@@ -176,7 +170,7 @@ void bind_sensors(py::module_& module) {
           [](AcrobotSensors& sensors, const ArrayArgument<double>& state) {
             std::vector<double> out(sensors.n_inputs());
             sensors.observe(state_vector(state), out);
-            return array(out);
+            return array_of<double>(out);
           },
           py::arg("state"));
 }

@@ -31,6 +31,8 @@ using Matrix = py::array_t<std::int32_t>;
 
 using estimators::ParallelPerceptron;
 
+std::size_t n_rows(const Bins& bins) { return static_cast<std::size_t>(bins.shape(0)); }
+
 std::shared_ptr<ParallelPerceptron> make_layer(
     const std::shared_ptr<coding::SelectiveDesensitization>& code, std::size_t n_units,
     std::uint64_t seed, const std::optional<ArrayArgument<std::int32_t>>& weights,
@@ -44,34 +46,30 @@ std::shared_ptr<ParallelPerceptron> make_layer(
 }
 
 Matrix weights_of(const ParallelPerceptron& layer) {
-  Matrix out({layer.n_units(), layer.code().n_columns()});
-  layer.copy_weights({out.mutable_data(), static_cast<std::size_t>(out.size())});
-  return out;
+  return bindings::filled<std::int32_t>({layer.n_units(), layer.code().n_columns()},
+                                        [&](auto out) { layer.copy_weights(out); });
 }
 
 py::array_t<std::int32_t> thresholds_of(const ParallelPerceptron& layer) {
-  return py::array_t<std::int32_t>(static_cast<py::ssize_t>(layer.n_units()),
-                                   layer.thresholds().data());
+  return bindings::array_of(layer.thresholds());
 }
 
 Matrix potentials_of(const ParallelPerceptron& layer, const Bins& bins, int n_threads) {
   const auto values = copied(matrix(bins, "bins", layer.code().n_inputs()));
-  Matrix out({static_cast<std::size_t>(bins.shape(0)), layer.n_units()});
-  const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
-  const bindings::WithoutGIL unlocked(layer);
-  layer.potentials(values, n_threads, items);
-  return out;
+  return bindings::filled<std::int32_t>({n_rows(bins), layer.n_units()}, [&](auto out) {
+    const bindings::WithoutGIL unlocked(layer);
+    layer.potentials(values, n_threads, out);
+  });
 }
 
 Matrix counts_of(const ParallelPerceptron& layer, const Bins& bins, std::size_t n_groups,
                  int n_threads) {
   const auto values = copied(matrix(bins, "bins", layer.code().n_inputs()));
   static_cast<void>(layer.group_size(n_groups));  // before an array of that many is asked for
-  Matrix out({static_cast<std::size_t>(bins.shape(0)), n_groups});
-  const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
-  const bindings::WithoutGIL unlocked(layer);
-  layer.counts(values, n_groups, n_threads, items);
-  return out;
+  return bindings::filled<std::int32_t>({n_rows(bins), n_groups}, [&](auto out) {
+    const bindings::WithoutGIL unlocked(layer);
+    layer.counts(values, n_groups, n_threads, out);
+  });
 }
 
 py::array_t<std::int32_t> counts_of_all(
@@ -85,11 +83,10 @@ py::array_t<std::int32_t> counts_of_all(
   core::require(!layers.empty(), "layers", "at least one layer", layers.size());
   const auto values = copied(matrix(bins, "bins", layers[0]->code().n_inputs()));
   static_cast<void>(layers[0]->group_size(n_groups));  // before an array of that many is asked for
-  py::array_t<std::int32_t> out({layers.size(), static_cast<std::size_t>(bins.shape(0)), n_groups});
-  const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
-  const bindings::WithoutGIL unlocked(pointers);
-  ParallelPerceptron::counts(pointers, values, n_groups, n_threads, items);
-  return out;
+  return bindings::filled<std::int32_t>({layers.size(), n_rows(bins), n_groups}, [&](auto out) {
+    const bindings::WithoutGIL unlocked(pointers);
+    ParallelPerceptron::counts(pointers, values, n_groups, n_threads, out);
+  });
 }
 
 py::tuple libsdnn_tables(int n_units, const std::vector<std::pair<int, int>>& inputs,
@@ -118,10 +115,9 @@ py::tuple libsdnn_weights(std::size_t n_units, std::size_t n_columns, int low, i
                           const std::vector<std::uint32_t>& seed, const std::string& library) {
   estimators::LibsdnnRandom random(seed, estimators::standard_library_named(library));
   const auto drawn = estimators::libsdnn_weights(n_units, n_columns, low, high, random);
-  Matrix weights({n_units, n_columns});
-  std::copy(drawn.weights.begin(), drawn.weights.end(), weights.mutable_data());
-  return py::make_tuple(weights, py::array_t<std::int32_t>(static_cast<py::ssize_t>(n_units),
-                                                           drawn.thresholds.data()));
+  const auto weights = bindings::filled<std::int32_t>(
+      {n_units, n_columns}, [&](auto out) { std::ranges::copy(drawn.weights, out.begin()); });
+  return py::make_tuple(weights, bindings::array_of<std::int32_t>(drawn.thresholds));
 }
 
 /// The names of all of `values`.
@@ -132,24 +128,25 @@ py::tuple names_of(const Values& values) {
   return py::tuple(names);
 }
 
-template <class Trainer, class Rule>
-std::shared_ptr<Trainer> make_trainer(std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
-                                      Rule rule, const std::string& form, std::size_t memory_limit,
-                                      int n_threads, std::size_t n_epochs) {
-  const auto values = copied(matrix(bins, "bins", layer->code().n_inputs()));
-  const auto chosen = estimators::training_form_named(form);
-  const bindings::WithoutGIL unlocked(*layer);
-  return std::make_shared<Trainer>(layer, values, std::move(rule), chosen, memory_limit, n_threads,
-                                   n_epochs);
+estimators::PDeltaRule p_delta_rule(const ParallelPerceptron& layer,
+                                    const ArrayArgument<double>& targets, double share) {
+  return {layer.n_units(), matrix(targets, "targets"), static_cast<std::size_t>(targets.shape(1)),
+          share};
+}
+
+estimators::PerceptronRule perceptron_rule(const ParallelPerceptron& layer,
+                                           const ArrayArgument<std::int32_t>& labels,
+                                           std::size_t n_classes, const std::string& scheme) {
+  return {layer.n_units(), bindings::vector(labels, "labels"), n_classes,
+          estimators::class_scheme_named(scheme)};
 }
 
 Matrix online_potentials_of(const estimators::OnlineLayer& layer, const Bins& bins) {
   const auto values = copied(matrix(bins, "bins", layer.layer().code().n_inputs()));
-  Matrix out({static_cast<std::size_t>(bins.shape(0)), layer.layer().n_units()});
-  const std::span items(out.mutable_data(), static_cast<std::size_t>(out.size()));
-  const bindings::WithoutGIL unlocked(layer);
-  layer.potentials(values, items);
-  return out;
+  return bindings::filled<std::int32_t>({n_rows(bins), layer.layer().n_units()}, [&](auto out) {
+    const bindings::WithoutGIL unlocked(layer);
+    layer.potentials(values, out);
+  });
 }
 
 template <class Rule>
@@ -172,10 +169,7 @@ void bind_online_layer(py::module_& module) {
           "learn_counts",
           [](OnlineLayer& self, const Bins& bins, const ArrayArgument<double>& targets,
              double share) {
-            return present_online(
-                self, bins,
-                estimators::PDeltaRule(self.layer().n_units(), matrix(targets, "targets"),
-                                       static_cast<std::size_t>(targets.shape(1)), share));
+            return present_online(self, bins, p_delta_rule(self.layer(), targets, share));
           },
           py::arg("bins"), py::arg("targets"), py::arg("share") = 1.0,
           "The p-delta rule; how many samples and units were corrected. What raises changes "
@@ -185,9 +179,7 @@ void bind_online_layer(py::module_& module) {
           [](OnlineLayer& self, const Bins& bins, const ArrayArgument<std::int32_t>& labels,
              std::size_t n_classes, const std::string& scheme) {
             return present_online(self, bins,
-                                  estimators::PerceptronRule(
-                                      self.layer().n_units(), bindings::vector(labels, "labels"),
-                                      n_classes, estimators::class_scheme_named(scheme)));
+                                  perceptron_rule(self.layer(), labels, n_classes, scheme));
           },
           py::arg("bins"), py::arg("labels"), py::arg("n_classes"), py::arg("scheme"),
           "Error correction; how many samples and units were corrected. What raises changes "
@@ -203,9 +195,24 @@ void bind_online_layer(py::module_& module) {
           "Brings the layer up to date");
 }
 
-template <class Trainer>
-void bind_trainer_methods(py::class_<Trainer, std::shared_ptr<Trainer>>& trainer) {
-  trainer
+/// Binds a trainer whose rule is `rule_of(layer, arguments...)`, of arguments that `names` names.
+template <class Trainer, class Rule, class... Arguments, class... Names>
+void bind_trainer(py::module_& module, const char* name, const char* doc,
+                  Rule (*rule_of)(const ParallelPerceptron&, Arguments...), const Names&... names) {
+  const auto make = [rule_of](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
+                              Arguments... arguments, const std::string& form,
+                              std::size_t memory_limit, int n_threads, std::size_t n_epochs) {
+    auto rule = rule_of(*layer, arguments...);
+    const auto values = copied(matrix(bins, "bins", layer->code().n_inputs()));
+    const auto chosen = estimators::training_form_named(form);
+    const bindings::WithoutGIL unlocked(*layer);
+    return std::make_shared<Trainer>(layer, values, std::move(rule), chosen, memory_limit,
+                                     n_threads, n_epochs);
+  };
+  bindings::Class<Trainer, std::shared_ptr<Trainer>>(module, name, doc)
+      .def(py::init(make), py::arg("layer"), py::arg("bins"), names..., py::arg("form") = "auto",
+           py::arg("memory_limit") = estimators::kMemoryLimit, py::arg("n_threads") = 1,
+           py::arg("n_epochs") = estimators::kExpectedEpochs)
       .def_property_readonly(
           "form", [](const Trainer& self) { return std::string(estimators::name_of(self.form())); })
       .def_property_readonly("memory", &Trainer::memory, "Bytes beside the layer")
@@ -261,40 +268,12 @@ void bind_estimators(py::module_& module) {
       },
       py::arg("scheme"), py::arg("n_classes"), "Units that separate so many classes");
 
-  using estimators::PDeltaTrainer;
-  bindings::Class<PDeltaTrainer, std::shared_ptr<PDeltaTrainer>> p_delta(
-      module, "PDeltaTrainer", "Trains groups of units to fire in given numbers");
-  p_delta.def(
-      py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
-                  const ArrayArgument<double>& targets, double share, const std::string& form,
-                  std::size_t memory_limit, int n_threads, std::size_t n_epochs) {
-        estimators::PDeltaRule rule(layer->n_units(), matrix(targets, "targets"),
-                                    static_cast<std::size_t>(targets.shape(1)), share);
-        return make_trainer<PDeltaTrainer>(std::move(layer), bins, std::move(rule), form,
-                                           memory_limit, n_threads, n_epochs);
-      }),
-      py::arg("layer"), py::arg("bins"), py::arg("targets"), py::arg("share") = 1.0,
-      py::arg("form") = "auto", py::arg("memory_limit") = estimators::kMemoryLimit,
-      py::arg("n_threads") = 1, py::arg("n_epochs") = estimators::kExpectedEpochs);
-  bind_trainer_methods(p_delta);
-
-  using estimators::PerceptronTrainer;
-  bindings::Class<PerceptronTrainer, std::shared_ptr<PerceptronTrainer>> perceptron(
-      module, "PerceptronTrainer", "Trains units to separate classes");
-  perceptron.def(
-      py::init([](std::shared_ptr<ParallelPerceptron> layer, const Bins& bins,
-                  const ArrayArgument<std::int32_t>& labels, std::size_t n_classes,
-                  const std::string& scheme, const std::string& form, std::size_t memory_limit,
-                  int n_threads, std::size_t n_epochs) {
-        estimators::PerceptronRule rule(layer->n_units(), bindings::vector(labels, "labels"),
-                                        n_classes, estimators::class_scheme_named(scheme));
-        return make_trainer<PerceptronTrainer>(std::move(layer), bins, std::move(rule), form,
-                                               memory_limit, n_threads, n_epochs);
-      }),
-      py::arg("layer"), py::arg("bins"), py::arg("labels"), py::arg("n_classes"), py::arg("scheme"),
-      py::arg("form") = "auto", py::arg("memory_limit") = estimators::kMemoryLimit,
-      py::arg("n_threads") = 1, py::arg("n_epochs") = estimators::kExpectedEpochs);
-  bind_trainer_methods(perceptron);
+  bind_trainer<estimators::PDeltaTrainer>(
+      module, "PDeltaTrainer", "Trains groups of units to fire in given numbers", &p_delta_rule,
+      py::arg("targets"), py::arg("share") = 1.0);
+  bind_trainer<estimators::PerceptronTrainer>(
+      module, "PerceptronTrainer", "Trains units to separate classes", &perceptron_rule,
+      py::arg("labels"), py::arg("n_classes"), py::arg("scheme"));
 
   module.def("libsdnn_tables", &libsdnn_tables, py::arg("n_units"), py::arg("inputs"),
              py::arg("pairs"), py::arg("seed"), py::arg("library") = "libstdc++",

@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 #include <pybind11/typing.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -9,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "agent_parts.hpp"
+#include "agents.hpp"
 #include "arrays.hpp"
 #include "bind_config.hpp"
 #include "bindings.hpp"
@@ -17,12 +18,8 @@
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
-#include "times.hpp"
-#include "tools/agent_steps.hpp"
-#include "tools/bare_agent.hpp"
-#include "tools/decisions.hpp"
-#include "tools/network_parts.hpp"
 #include "tools/plain_rbf_network.hpp"
+#include "tools/timings.hpp"
 #include "tools/trial.hpp"
 #include "tools/yardsticks.hpp"
 
@@ -36,10 +33,11 @@ using bindings::ArrayArgument;
 using environments::AcrobotConfig;
 using environments::GoalScheduleConfig;
 using environments::SensorConfig;
+using tools::BareAgent;
 using tools::PlainRBFNetwork;
 using tools::ProtocolConfig;
 
-using Trial = tools::AcrobotTrial<tools::BareAgent>;
+using Trial = tools::AcrobotTrial<BareAgent>;
 using PlainRBFAgent = QLearning<PlainRBFNetwork>;
 
 template <>
@@ -49,13 +47,23 @@ constexpr bool sdnn::bindings::kIsComposed<PlainRBFAgent> = false;
 
 namespace {
 
+/// The times that `measure` of an object returns, int64 nanoseconds (n,); it runs without the GIL.
+template <class Object, class Measure>
+py::array_t<std::int64_t> times_of(Object& object, const Measure& measure) {
+  tools::Times times;
+  {
+    const bindings::WithoutGIL unlocked(object);
+    times = measure();
+  }
+  return bindings::array_of<std::int64_t>(times);
+}
+
 template <class Agent>
 void def_time_agent_steps(py::module_& module) {
   module.def(
       "time_agent_steps",
       [](Agent& agent, int n_repetitions, std::uint64_t seed) {
-        return bindings::times_of(
-            agent, [&] { return tools::time_agent_steps(agent, n_repetitions, seed); });
+        return times_of(agent, [&] { return tools::time_agent_steps(agent, n_repetitions, seed); });
       },
       py::arg("agent"), py::arg("n_repetitions"), py::arg("seed"),
       "The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)");
@@ -63,10 +71,9 @@ void def_time_agent_steps(py::module_& module) {
 
 template <class Value, class Read>
 py::array_t<Value> column(const Trial& trial, Read read) {
-  py::array_t<Value> out(static_cast<py::ssize_t>(trial.rows().size()));
-  Value* item = out.mutable_data();
-  for (const auto& row : trial.rows()) *item++ = read(row);
-  return out;
+  return bindings::filled<Value>({trial.rows().size()}, [&](auto out) {
+    std::ranges::transform(trial.rows(), out.begin(), read);
+  });
 }
 
 py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
@@ -92,7 +99,6 @@ py::typing::Dict<py::str, py::int_> cache_counts(const Trial& trial) {
 }
 
 void bind_bare_agent(py::module_& module) {
-  using tools::BareAgent;
   bindings::Class<BareAgent>(
       module, "BareAgent",
       "An agent of any kind without a task: states in [0, 1], actions as indices "
@@ -137,8 +143,8 @@ void bind_trial(py::module_& module) {
                        const agents::AnyLearningConfig& learning, const AcrobotConfig& acrobot,
                        const GoalScheduleConfig& goal, const SensorConfig& sensors,
                        const ProtocolConfig& protocol, std::uint64_t seed) {
-             return Trial(tools::BareAgent(approximator, learning, seed), acrobot, goal, sensors,
-                          protocol, seed);
+             return Trial(BareAgent(approximator, learning, seed), acrobot, goal, sensors, protocol,
+                          seed);
            }),
            py::kw_only(), py::arg("approximator"), py::arg("learning"), py::arg("acrobot"),
            py::arg("goal"), py::arg("sensors"), py::arg("protocol"), py::arg("seed"))
@@ -146,7 +152,7 @@ void bind_trial(py::module_& module) {
       .def_property_readonly("finished", &Trial::finished)
       .def_property_readonly("n_decisions", &Trial::n_decisions)
       .def_property_readonly(
-          "agent", [](Trial& self) -> tools::BareAgent& { return self.agent(); },
+          "agent", [](Trial& self) -> BareAgent& { return self.agent(); },
           py::return_value_policy::reference_internal,
           "The agent at work: asking for values changes nothing that follows")
       .def(
@@ -184,7 +190,7 @@ void bind_trials(py::module_& module) {
 
   bind_bare_agent(module);
   bind_trial(module);
-  def_time_agent_steps<tools::BareAgent>(module);
+  def_time_agent_steps<BareAgent>(module);
 
   bindings::Class<PlainRBFAgent>(module, "PlainRBFQLearning",
                                  "Q-learning with an RBF network evaluated without its product "
@@ -200,62 +206,49 @@ void bind_trials(py::module_& module) {
   def_time_agent_steps<PlainRBFAgent>(module);
 }
 
+/// Binds a member function that returns times.
+template <class Object, class... Arguments, class... Extra>
+void def_times(py::class_<Object>& type, const char* name,
+               tools::Times (Object::*measure)(Arguments...), const Extra&... extra) {
+  type.def(
+      name,
+      [measure](Object& object, Arguments... arguments) {
+        return times_of(object, [&] { return (object.*measure)(arguments...); });
+      },
+      py::arg("n_repetitions"), extra...);
+}
+
 void bind_times(py::module_& module) {
-  bindings::Class<tools::DenseProduct>(module, "DenseProduct",
-                                       "A dense float32 matrix-vector product")
-      .def(py::init<std::size_t, std::size_t, std::uint64_t>(), py::arg("n_rows"),
-           py::arg("n_columns"), py::arg("seed"))
-      .def(
-          "run",
-          [](tools::DenseProduct& product, int n) {
-            return bindings::times_of(product, [&] { return product.run(n); });
-          },
-          py::arg("n_repetitions"), "Nanoseconds per product: (n_repetitions,)");
-  bindings::Class<tools::NetworkParts>(module, "NetworkParts", "The network's parts of a decision")
-      .def(py::init<SDNNC, std::uint64_t>(), py::arg("network"), py::arg("seed"),
-           "Times a copy of the network")
-      .def(
-          "time_values",
-          [](tools::NetworkParts& parts, int n) {
-            return bindings::times_of(parts, [&] { return parts.time_values(n); });
-          },
-          py::arg("n_repetitions"), "All values at a new state: nanoseconds (n_repetitions,)")
-      .def(
-          "time_remembered_values",
-          [](tools::NetworkParts& parts, int n) {
-            return bindings::times_of(parts, [&] { return parts.time_remembered_values(n); });
-          },
-          py::arg("n_repetitions"), "All values at the same state again")
-      .def(
-          "time_corrections",
-          [](tools::NetworkParts& parts, int n, int n_corrected) {
-            return bindings::times_of(parts,
-                                      [&] { return parts.time_corrections(n, n_corrected); });
-          },
-          py::arg("n_repetitions"), py::arg("n_corrected"), "Learning steps")
-      .def(
-          "time_selections",
-          [](tools::NetworkParts& parts, int n, int n_selections, int n_selected) {
-            return bindings::times_of(
-                parts, [&] { return parts.time_selections(n, n_selections, n_selected); });
-          },
-          py::arg("n_repetitions"), py::arg("n_selections"), py::arg("n_selected"),
-          "n_selections selections of units per repetition");
-  bindings::Class<tools::AcrobotDecisions>(module, "AcrobotDecisions",
-                                           "The acrobot under random torques")
+  using tools::AcrobotDecisions, tools::DenseProduct, tools::NetworkParts;
+  bindings::Class<DenseProduct> product(module, "DenseProduct",
+                                        "A dense float32 matrix-vector product");
+  product.def(py::init<std::size_t, std::size_t, std::uint64_t>(), py::arg("n_rows"),
+              py::arg("n_columns"), py::arg("seed"));
+  def_times(product, "run", &DenseProduct::run, "Nanoseconds per product: (n_repetitions,)");
+
+  bindings::Class<NetworkParts> parts(module, "NetworkParts", "The network's parts of a decision");
+  parts.def(py::init<SDNNC, std::uint64_t>(), py::arg("network"), py::arg("seed"),
+            "Times a copy of the network");
+  def_times(parts, "time_values", &NetworkParts::time_values,
+            "All values at a new state: nanoseconds (n_repetitions,)");
+  def_times(parts, "time_remembered_values", &NetworkParts::time_remembered_values,
+            "All values at the same state again");
+  def_times(parts, "time_corrections", &NetworkParts::time_corrections, py::arg("n_corrected"),
+            "Learning steps");
+  def_times(parts, "time_selections", &NetworkParts::time_selections, py::arg("n_selections"),
+            py::arg("n_selected"), "n_selections selections of units per repetition");
+
+  bindings::Class<AcrobotDecisions> acrobot(module, "AcrobotDecisions",
+                                            "The acrobot under random torques");
+  acrobot
       .def(py::init<const environments::AcrobotConfig&, std::uint64_t>(), py::arg("config"),
            py::arg("seed"))
-      .def_property_readonly("n_integration_steps", &tools::AcrobotDecisions::n_integration_steps)
-      .def(
-          "run",
-          [](tools::AcrobotDecisions& acrobot, int n) {
-            return bindings::times_of(acrobot, [&] { return acrobot.run(n); });
-          },
-          py::arg("n_repetitions"), "Nanoseconds per decision: (n_repetitions,)");
+      .def_property_readonly("n_integration_steps", &AcrobotDecisions::n_integration_steps);
+  def_times(acrobot, "run", &AcrobotDecisions::run, "Nanoseconds per decision: (n_repetitions,)");
   module.def(
       "time_decisions",
       [](Trial& trial, int n_episodes) {
-        return bindings::times_of(trial, [&] { return tools::time_decisions(trial, n_episodes); });
+        return times_of(trial, [&] { return tools::time_decisions(trial, n_episodes); });
       },
       py::arg("trial"), py::arg("n_episodes"),
       "Advances a trial; nanoseconds of every decision in it");

@@ -5,7 +5,6 @@
 #include <pybind11/pybind11.h>
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstring>
 #include <string>
@@ -17,16 +16,11 @@
 
 namespace sdnn::bindings {
 
-/// NumPy's letters of the tensor types, in their order.
-inline constexpr std::array<const char*, 8> kDtypes{"<i1", "<u1", "<i2", "<i4",
-                                                    "<i8", "<u8", "<f4", "<f8"};
-
 /// Copies.
 inline pybind11::dict arrays_of(const core::State& state) {
   pybind11::dict arrays;
   for (const auto& [name, tensor] : state) {
-    const pybind11::dtype dtype(kDtypes[static_cast<std::size_t>(tensor.type)]);
-    pybind11::array array(dtype, tensor.shape);
+    pybind11::array array(pybind11::dtype(core::facts_of(tensor.type).dtype), tensor.shape);
     if (!tensor.bytes.empty()) {
       std::memcpy(array.mutable_data(), tensor.bytes.data(), tensor.bytes.size());
     }
@@ -43,13 +37,13 @@ inline core::State state_from(const pybind11::dict& arrays) {
     const auto array =
         pybind11::array::ensure(value, pybind11::array::c_style);  // nothing is converted
     core::Tensor tensor;
-    const auto found = std::ranges::find_if(kDtypes, [&array](const char* dtype) {
-      return array && array.dtype().equal(pybind11::dtype(dtype));
+    const auto found = std::ranges::find_if(core::kTensorTypes, [&array](const auto& known) {
+      return array && array.dtype().equal(pybind11::dtype(known.dtype));
     });
-    if (found == kDtypes.end()) {
+    if (found == core::kTensorTypes.end()) {
       throw std::invalid_argument("state: " + name + " must be an array of whole or real numbers");
     }
-    tensor.type = static_cast<core::TensorType>(found - kDtypes.begin());
+    tensor.type = static_cast<core::TensorType>(found - core::kTensorTypes.begin());
     tensor.shape.assign(array.shape(), array.shape() + array.ndim());
     const auto* const bytes = static_cast<const std::byte*>(array.data());
     tensor.bytes.assign(bytes, bytes + array.nbytes());

@@ -45,8 +45,7 @@ class PlainRBFNetwork {
   }
 
   void values(std::span<const double> state, Workspace& workspace, std::span<double> out) const {
-    core::require(out.size() == n_actions(), "out", std::to_string(n_actions()) + " values",
-                  out.size());
+    core::require_size("out", out.size(), n_actions());
     core::require_unit_values("state", state, n_inputs());
     add_up_exponents(state, workspace);
     for (std::size_t action = 0; action < out.size(); ++action) {

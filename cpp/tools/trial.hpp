@@ -14,7 +14,6 @@
 #include "sdnn/agents/agent.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/errors.hpp"

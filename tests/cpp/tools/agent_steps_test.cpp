@@ -1,5 +1,3 @@
-#include "tools/agent_steps.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -13,6 +11,7 @@
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "tools/plain_rbf_network.hpp"
+#include "tools/timings.hpp"
 
 namespace sdnn::tools {
 namespace {

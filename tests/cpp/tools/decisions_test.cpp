@@ -1,11 +1,10 @@
-#include "tools/decisions.hpp"
-
 #include <gtest/gtest.h>
 
 #include <stdexcept>
 
 #include "approximators/lookup_table.hpp"
 #include "sdnn/agents/q_learning.hpp"
+#include "tools/timings.hpp"
 
 namespace sdnn::tools {
 namespace {

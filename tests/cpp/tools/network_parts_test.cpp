@@ -1,9 +1,9 @@
-#include "tools/network_parts.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cstddef>
 #include <stdexcept>
+
+#include "tools/timings.hpp"
 
 namespace sdnn::tools {
 namespace {

@@ -62,9 +62,7 @@ void require_mask(std::string_view name, ActionMask mask, std::size_t n_dimensio
   if (mask.empty()) return;
   std::size_t n = 0;
   for (std::size_t d = 0; d < n_dimensions; ++d) n += n_actions(d);
-  if (mask.size() != n) {
-    core::require(false, name, std::to_string(n) + " numbers, one per action", mask.size());
-  }
+  core::require_size(name, mask.size(), n, "numbers, one per action");
   for (std::size_t d = 0; d < n_dimensions; ++d) {
     core::require(is_mask(take_part(mask, n_actions(d))), name,
                   "of 0 and 1, and 1 for an action of each dimension at least", "others");
@@ -76,12 +74,9 @@ void require_mask(std::string_view name, ActionMask mask, std::size_t n_dimensio
 template <class NActions>
 void require_action(std::span<const std::size_t> action, std::size_t n_dimensions,
                     const NActions& n_actions) {
-  if (action.size() != n_dimensions) {  // only a bad one's text costs memory
-    core::require(false, "action", std::to_string(n_dimensions) + " numbers", action.size());
-  }
+  core::require_size("action", action.size(), n_dimensions, "numbers");
   for (std::size_t d = 0; d < action.size(); ++d) {
-    if (action[d] < n_actions(d)) continue;
-    core::require(false, "action", "less than " + std::to_string(n_actions(d)), action[d]);
+    core::require_below("action", action[d], n_actions(d));
   }
 }
 

@@ -154,9 +154,7 @@ class Actions {
 
   /// Throws std::invalid_argument unless the task has such an action. Shape: (n_dimensions,).
   void require_action(std::span<const double> action) const {
-    if (action.size() != n_dimensions()) {  // only a bad one's text costs memory
-      core::require(false, "action", std::to_string(n_dimensions()) + " numbers", action.size());
-    }
+    core::require_size("action", action.size(), n_dimensions(), "numbers");
     for (std::size_t d = 0; d < action.size(); ++d) {
       const double x = action[d], low = config_.low[d], high = config_.high[d];
       if (x >= low && x <= high && (!config_.discrete || std::floor(x) == x)) continue;

@@ -185,32 +185,25 @@ inline ControllerConfig controller_config_in(const nlohmann::json& description) 
   const auto name = value_from<std::string>(at("kind"), "kind");
   const auto kind = std::ranges::find(kAgentKinds, name, &AgentKind::name);
   ControllerConfig config;
+  const auto read = [&]<class Approximator, class Learning>(Approximator, Learning) {
+    config.approximator = config_from_json<Approximator>(approximator, "approximator");
+    config.learning = config_from_json<Learning>(learning, "learning");
+  };
   switch (kind - kAgentKinds.begin()) {
     case 0:
-      config.approximator =
-          config_from_json<approximators::SDNNCConfig>(approximator, "approximator");
+      read(approximators::SDNNCConfig(), QLearningConfig());
       break;
     case 1:
-      config.approximator =
-          config_from_json<approximators::RBFNetworkConfig>(approximator, "approximator");
+      read(approximators::RBFNetworkConfig(), QLearningConfig());
       break;
     case 2:
-      config.approximator =
-          config_from_json<approximators::FuzzyRulesConfig>(approximator, "approximator");
+      read(approximators::FuzzyRulesConfig(), FuzzyQLearningConfig());
       break;
     case 3:
-      config.approximator =
-          config_from_json<approximators::LinearSDNNConfig>(approximator, "approximator");
+      read(approximators::LinearSDNNConfig(), QLambdaConfig());
       break;
     default:
       refuse("kind", "sdnn-c, rbf, fuzzy or q-lambda", name);
-  }
-  if (is_fuzzy(config.approximator)) {
-    config.learning = config_from_json<FuzzyQLearningConfig>(learning, "learning");
-  } else if (is_linear(config.approximator)) {
-    config.learning = config_from_json<QLambdaConfig>(learning, "learning");
-  } else {
-    config.learning = config_from_json<QLearningConfig>(learning, "learning");
   }
   config.seed = value_from<std::uint64_t>(at("seed"), "seed");
   config.observation = config_from_json<ObservationConfig>(at("observation"), "observation");

@@ -18,8 +18,8 @@
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller_config.hpp"
 #include "sdnn/agents/detail/approximator_of.hpp"
-#include "sdnn/agents/detail/saved_tables.hpp"
 #include "sdnn/agents/detail/taken_actions.hpp"
+#include "sdnn/agents/exploration.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/last_readings.hpp"
 #include "sdnn/agents/latest_transitions.hpp"
@@ -31,8 +31,8 @@
 #include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/coding/pattern_table.hpp"
+#include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/identity.hpp"
 #include "sdnn/core/pcg64.hpp"
 #include "sdnn/core/random.hpp"
@@ -302,7 +302,6 @@ class Controller : public WithRates<Controller> {
   /// How each variable used its range in the last 2,048 transitions or so.
   std::vector<std::optional<RangeUse>> range_use() const { return notes_.use(observations_); }
 
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive);
 
@@ -310,7 +309,6 @@ class Controller : public WithRates<Controller> {
   friend class WithRates<Controller>;
   struct PrivateTag {};
 
-  static constexpr double kLargestReward = 1e300;
   static constexpr double kCaution = 1.5;  // of looking again and again
 
   Controller(ControllerConfig config, std::vector<coding::PatternTable> tables, PrivateTag)

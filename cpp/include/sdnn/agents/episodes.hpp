@@ -25,11 +25,11 @@ class Episodes {
 
   /// The episode of an environment, from 0. Throws std::invalid_argument if there is none.
   Episode& of(std::size_t environment) {
-    require_environment(environment);
+    core::require_below("environment", environment, size());
     return episodes_[environment];
   }
   const Episode& of(std::size_t environment) const {
-    require_environment(environment);
+    core::require_below("environment", environment, size());
     return episodes_[environment];
   }
 
@@ -55,11 +55,6 @@ class Episodes {
   }
 
  private:
-  void require_environment(std::size_t environment) const {
-    if (environment < size()) return;  // only a bad one's text costs memory
-    core::require(false, "environment", "less than " + std::to_string(size()), environment);
-  }
-
   std::vector<Episode> episodes_;
 };
 

@@ -13,7 +13,6 @@
 
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::agents {
@@ -94,7 +93,6 @@ class EpsilonGreedy {
     config_.epsilon = epsilon;
   }
 
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.part("exploration", self.exploration_);

@@ -1,14 +1,20 @@
-/// Random actions: when they are taken, how they are drawn, and how long they are kept.
+/// Random actions: when they are taken, how they are drawn, and how long they are kept; and the
+/// part of agents whose actions are indices.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "sdnn/agents/action_mask.hpp"
+#include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
+#include "sdnn/agents/schedule_config.hpp"
+#include "sdnn/coding/action_code.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::agents {
@@ -86,7 +92,6 @@ class Exploration {
     return true;
   }
 
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.part("policy", self.policy_);
@@ -139,6 +144,98 @@ class Exploration {
   [[maybe_unused]] int start_steps_;  ///< which only templates read
   int n_random_left_;                 ///< steps that will still be random
   int n_ended_ = 0;                   ///< episodes that terminated, kMostEnded at most
+};
+
+/// The largest size of rewards: sums of some, and steps to them, stay finite.
+inline constexpr double kLargestReward = 1e300;
+
+/// Base of agents whose actions are indices, one for each dimension.
+///
+/// The agent has `exploration_`, `workspace_`, `episodes_`, each with a member `exploration`, and
+/// - new_episode();
+/// - read(state, workspace): reads a state for greedy actions;
+/// - read_to_explore(state, episode): reads one into workspace_ for actions of learning;
+/// - best_of_read(workspace, ties, mask): a best action in the state that was read last.
+template <class Agent>
+class IndexAgent : public WithRates<Agent> {
+ public:
+  using Action = std::span<const std::size_t>;
+
+  double epsilon() const noexcept { return agent().exploration_.policy().config().epsilon; }
+
+  /// In how many environments at once the agent learns: each has an episode of its own. Of those
+  /// that are no more, what waits is learned. Throws std::invalid_argument outside [1, 2^14], and
+  /// as learn does.
+  void set_n_environments(std::size_t n) {
+    core::require_in_range("n_environments", n, 1, Episodes<int>::kMost);
+    for (std::size_t i = n; i < n_environments(); ++i) agent().begin_episode(i);
+    agent().episodes_.resize(n, [this] { return agent().new_episode(); });
+  }
+  std::size_t n_environments() const noexcept { return agent().episodes_.size(); }
+
+  /// Returns an allowed action to take in `state`; without `explore` a best one, by the average of
+  /// the weights where the approximator keeps one. Valid until the next act. Shapes: state (l,) in
+  /// [0, 1], mask as ActionMask has it. Throws std::invalid_argument.
+  Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
+             ActionMask mask = {}) {
+    Agent& own = agent();
+    auto& episode = own.episodes_.of(environment);
+    core::require_unit_values("state", state, own.n_inputs());  // before anything is drawn
+    require_mask("mask", mask);
+    if (!explore) {
+      own.read(state, own.workspace_);
+    } else if (own.exploration_.takes_random_action(episode.exploration, n_actions_of(), mask)) {
+      return episode.exploration.kept;
+    } else {
+      own.read_to_explore(state, episode);
+    }
+    return own.best_of_read(own.workspace_, own.exploration_.policy().ties(explore), mask);
+  }
+
+  /// Returns a best action, as act without `explore` does; `ties` decides between several. The span
+  /// is valid until the workspace is used again.
+  template <class Workspace>
+  Action best_action(std::span<const double> state, Workspace& workspace, core::Random& ties,
+                     ActionMask mask = {}) const {
+    require_mask("mask", mask);
+    agent().read(state, workspace);
+    return agent().best_of_read(workspace, ties, mask);
+  }
+  /// The second step of act without `explore`, of which `read` is the first: the action in the
+  /// state that was read last.
+  template <class Workspace>
+  Action best_of(Workspace& workspace, ActionMask mask = {}) {
+    require_mask("mask", mask);
+    return agent().best_of_read(workspace, agent().exploration_.policy().ties(false), mask);
+  }
+
+  /// The action of the first dimension as a number in [-1, 1]: actions cut the range evenly.
+  double normalized_action(Action action) const {
+    return coding::action_value(action.front(), agent().n_actions(0), -1.0, 1.0);
+  }
+
+ protected:
+  /// The function that gives the number of actions of a dimension.
+  auto n_actions_of() const noexcept {
+    return [this](std::size_t d) { return agent().n_actions(d); };
+  }
+  void require_mask(const char* name, ActionMask mask) const {
+    agents::require_mask(name, mask, agent().n_dimensions(), n_actions_of());
+  }
+  /// Throws std::invalid_argument unless learn takes these.
+  void require_transition(std::span<const double> state, Action action, double reward,
+                          std::span<const double> next_state, ActionMask next_mask) const {
+    core::require_unit_values("state", state, agent().n_inputs());
+    agents::require_action(action, agent().n_dimensions(), n_actions_of());
+    core::require_finite("reward", reward);
+    core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
+    core::require_unit_values("next_state", next_state, agent().n_inputs());
+    require_mask("next_mask", next_mask);
+  }
+
+ private:
+  Agent& agent() noexcept { return static_cast<Agent&>(*this); }
+  const Agent& agent() const noexcept { return static_cast<const Agent&>(*this); }
 };
 
 }  // namespace sdnn::agents

@@ -187,9 +187,7 @@ class FuzzyQLearning {
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
              ActionMask /*next_mask*/ = {}) {
-    if (action.size() != n_dimensions()) {  // only a bad one's text costs memory
-      core::require(false, "action", std::to_string(n_dimensions()) + " numbers", action.size());
-    }
+    core::require_size("action", action.size(), n_dimensions(), "numbers");
     core::require(explored_in(state, environment), "state", "that of the last exploring act",
                   "another");
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
@@ -202,7 +200,6 @@ class FuzzyQLearning {
     }
   }
 
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     if (self.n_dimensions() == 1) {

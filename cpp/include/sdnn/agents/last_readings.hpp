@@ -68,7 +68,6 @@ class LastReadings {
     if (last_.size() > environment) last_.resize(environment);
   }
 
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     serialize(self, archive, "learned", &Environment::learned);

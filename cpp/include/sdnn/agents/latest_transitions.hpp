@@ -32,7 +32,6 @@ class LatestTransitions {
   const WarmUp& transitions() const noexcept { return latest_; }
   void forget() { latest_ = empty_; }
 
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.number("n_seen", self.n_seen_);

@@ -79,7 +79,6 @@ class NStepBuffer {
     return true;
   }
 
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     std::vector<double> states;

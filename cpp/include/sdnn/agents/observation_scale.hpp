@@ -82,9 +82,7 @@ class ObservationScale {
   /// finite.
   void operator()(std::span<const double> observation, std::span<double> state,
                   const char* name = "observation") const {
-    if (observation.size() != n_observed()) {
-      core::require(false, name, std::to_string(n_observed()) + " numbers", observation.size());
-    }
+    core::require_size(name, observation.size(), n_observed(), "numbers");
     if (missing_ == Missing::error) {
       require_present(name, observation);
       for (std::size_t k = 0; k < inputs_.size(); ++k) state[k] = value(inputs_[k], observation);

@@ -134,9 +134,7 @@ class Observations {
 
   /// Throws std::invalid_argument unless these are readings of all variables.
   void require_readings(const char* name, std::span<const double> values) const {
-    if (values.size() != n_variables()) {
-      core::require(false, name, std::to_string(n_variables()) + " numbers", values.size());
-    }
+    core::require_size(name, values.size(), n_variables(), "numbers");
     if (config_.missing == Missing::error) ObservationScale::require_present(name, values);
   }
 

@@ -10,11 +10,14 @@
 
 namespace sdnn::agents {
 
-/// Settings that belong together.
-struct Preset {
-  approximators::SDNNCConfig approximator = {};
-  QLearningConfig learning = {};
+/// Settings of an approximator and a learning rule that belong together.
+template <class Approximator, class Learning>
+struct Settings {
+  Approximator approximator = {};
+  Learning learning = {};
 };
+using Preset = Settings<approximators::SDNNCConfig, QLearningConfig>;
+using QLambdaPreset = Settings<approximators::LinearSDNNConfig, QLambdaConfig>;
 
 /// The paper's settings (section 4.2): the defaults.
 inline Preset paper_preset(int n_inputs) { return {.approximator = {.n_inputs = n_inputs}}; }
@@ -58,11 +61,14 @@ inline Preset robust_preset(int n_inputs) {
 }
 
 /// A preset, as users know it.
-struct NamedPreset {
+template <class Preset>
+struct Named {
   const char* name;
   const char* title;
   Preset preset;
 };
+using NamedPreset = Named<Preset>;
+using NamedQLambdaPreset = Named<QLambdaPreset>;
 
 inline std::array<NamedPreset, 4> presets(int n_inputs) {
   return {{{"paper", "as in the paper", paper_preset(n_inputs)},
@@ -72,17 +78,6 @@ inline std::array<NamedPreset, 4> presets(int n_inputs) {
            {"small", "as recommended for small processors: the general one, fewer units",
             small_preset(n_inputs)}}};
 }
-
-/// Settings of Q(lambda) with a linear readout that belong together.
-struct QLambdaPreset {
-  approximators::LinearSDNNConfig approximator = {};
-  QLambdaConfig learning = {};
-};
-struct NamedQLambdaPreset {
-  const char* name;
-  const char* title;
-  QLambdaPreset preset;
-};
 
 /// The paper's rule and rates, one-step Q-learning with alpha 0.5, in the paper's task: 61 torques
 /// that share no units, and patterns of 200 units.

@@ -21,7 +21,6 @@
 #include "sdnn/agents/schedule_config.hpp"
 #include "sdnn/approximators/detail/linear_rows.hpp"
 #include "sdnn/approximators/linear_sdnn.hpp"
-#include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
@@ -53,10 +52,9 @@ namespace sdnn::agents {
 /// An agent may learn in several environments at once, numbered from 0: each has a trace of its
 /// own, a replacing one where there are several: Q - Q_old would hold what the others corrected,
 /// and dutch traces would carry it further.
-class QLambda : public WithRates<QLambda> {
+class QLambda : public IndexAgent<QLambda> {
  public:
   using Readout = approximators::LinearSDNN;
-  using Action = std::span<const std::size_t>;
 
   /// The memory of one reader: the readout's workspace, the values of each dimension, and the best
   /// action.
@@ -90,9 +88,8 @@ class QLambda : public WithRates<QLambda> {
   /// Transitions that were learned.
   std::int64_t n_learned() const noexcept { return n_learned_; }
 
-  /// Alpha and epsilon at present, in steps of 2^-16.
+  /// Alpha at present, as epsilon in steps of 2^-16.
   double learning_rate() const noexcept { return static_cast<double>(rate_) / kOne; }
-  double epsilon() const noexcept { return exploration_.policy().config().epsilon; }
   /// Where epsilon goes with schedule_steps: by default to 0. Symbols tell nothing of each other:
   /// where states have nothing else, epsilon stays, so that all of them are tried for good.
   double final_epsilon() const {
@@ -100,15 +97,6 @@ class QLambda : public WithRates<QLambda> {
     const bool is_symbol = !n_symbols.empty() && std::ranges::find(n_symbols, 0) == n_symbols.end();
     return config_.final_epsilon.value_or(is_symbol ? config_.policy.epsilon : 0.0);
   }
-
-  /// In how many environments at once the agent learns. What waits of those that are no more is
-  /// learned. Throws std::invalid_argument outside [1, 2^14].
-  void set_n_environments(std::size_t n) {
-    core::require_in_range("n_environments", n, 1, Episodes<Episode>::kMost);
-    for (std::size_t i = n; i < n_environments(); ++i) begin_episode(i);
-    episodes_.resize(n, [this] { return new_episode(); });
-  }
-  std::size_t n_environments() const noexcept { return episodes_.size(); }
 
   /// Ends the trace, and learns the transition that still waits of an episode that did not
   /// terminate. Throws std::invalid_argument if there is no such environment.
@@ -133,50 +121,10 @@ class QLambda : public WithRates<QLambda> {
     return workspace.values[d];
   }
 
-  /// Returns a best action, as act without `explore` does; `ties` decides between several. The span
-  /// is valid until the workspace is used again.
-  Action best_action(std::span<const double> state, Workspace& workspace, core::Random& ties,
-                     ActionMask mask = {}) const {
-    require_mask("mask", mask);
-    read(state, workspace);
-    exclude_from(workspace, mask);
-    return each_best(workspace, ties);
-  }
-
-  /// The two steps of act without `explore`: `read` takes the time and is for many threads, as
-  /// values is; `best_of` gives the action in the state that was read last.
+  /// Reads a state for best_of: this takes the time and is for many threads, as values is.
   void read(std::span<const double> state, Workspace& workspace) const {
-    read(state, workspace, true);
-  }
-  Action best_of(Workspace& workspace, ActionMask mask = {}) {
-    require_mask("mask", mask);
-    return best_of(workspace, false, mask);
-  }
-
-  /// Returns an allowed action to take in `state`; without `explore` a best one, by the average of
-  /// the weights where there is one. Valid until the next act. Shapes: state (l,) in [0, 1], mask
-  /// as ActionMask has it. Throws std::invalid_argument.
-  Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
-             ActionMask mask = {}) {
-    Episode& episode = episodes_.of(environment);
-    core::require_unit_values("state", state, n_inputs());  // before anything is drawn
-    require_mask("mask", mask);
-    const auto n_actions_of = [this](std::size_t d) { return n_actions(d); };
-    if (explore && exploration_.takes_random_action(episode.exploration, n_actions_of, mask)) {
-      return episode.exploration.kept;
-    }
-    if (!explore) {
-      read(state, workspace_, true);
-      return best_of(workspace_, false, mask);
-    }
-    readout_.read_next(state, episode.next);
-    take_values(episode.next, workspace_.values, false);
-    return best_of(workspace_, true, mask);
-  }
-
-  /// The action of the first dimension as a number in [-1, 1]: actions cut the range evenly.
-  double normalized_action(Action action) const {
-    return coding::action_value(action.front(), n_actions(0), -1.0, 1.0);
+    readout_.read(state, workspace.readout);
+    take_values(workspace.readout, workspace.values, true);
   }
 
   /// Learns one transition: with Sarsa when the next one is known, unless it terminated. The best
@@ -186,12 +134,7 @@ class QLambda : public WithRates<QLambda> {
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
              ActionMask next_mask = {}) {
-    core::require_unit_values("state", state, n_inputs());
-    require_action(action);
-    core::require_finite("reward", reward);
-    core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
-    core::require_unit_values("next_state", next_state, n_inputs());
-    require_mask("next_mask", next_mask);
+    require_transition(state, action, reward, next_state, next_mask);
     Episode& episode = episodes_.of(environment);
     if (episode.waits && !std::ranges::equal(episode.next_state, state)) finish_at_end(episode);
     readout_.read_next(state, episode.next);
@@ -253,7 +196,6 @@ class QLambda : public WithRates<QLambda> {
     apply_rates();
   }
 
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.part("action_value", self.readout_);
@@ -274,8 +216,8 @@ class QLambda : public WithRates<QLambda> {
 
  private:
   friend class WithRates<QLambda>;
+  friend class IndexAgent<QLambda>;
 
-  static constexpr double kLargestReward = detail::kLargestReward;
   static constexpr double kMostTolerance = 0x1p62;  ///< in units: above any difference of values
   static constexpr std::int64_t kMostLearned = std::int64_t{1} << 45;
   static constexpr std::int32_t kOne = Readout::kRateOne;
@@ -324,19 +266,9 @@ class QLambda : public WithRates<QLambda> {
     return std::lround(config_.discount * static_cast<double>(kDiscountOne));
   }
 
-  void require_mask(const char* name, ActionMask mask) const {
-    agents::require_mask(name, mask, n_dimensions(), [this](auto d) { return n_actions(d); });
-  }
-  static void exclude_from(Workspace& workspace, ActionMask mask) {
-    for (std::vector<double>& row : workspace.values) exclude(take_part(mask, row.size()), row);
-  }
-  void require_action(Action action) const {
-    agents::require_action(action, n_dimensions(), [this](auto d) { return n_actions(d); });
-  }
-
-  void read(std::span<const double> state, Workspace& workspace, bool averaged) const {
-    readout_.read(state, workspace.readout);
-    take_values(workspace.readout, workspace.values, averaged);
+  void read_to_explore(std::span<const double> state, Episode& episode) {
+    readout_.read_next(state, episode.next);
+    take_values(episode.next, workspace_.values, false);
   }
   /// Values in units, which are exact and in the same order.
   void take_values(Readout::Workspace& read, std::vector<std::vector<double>>& values,
@@ -346,8 +278,10 @@ class QLambda : public WithRates<QLambda> {
     }
   }
 
-  /// Returns a best action of each dimension. The tolerance is in whole units, as values are.
-  Action each_best(Workspace& workspace, core::Random& ties) const {
+  /// Returns a best one of the allowed actions in the state that was read last. The tolerance is in
+  /// whole units, as values are.
+  Action best_of_read(Workspace& workspace, core::Random& ties, ActionMask mask) const {
+    for (std::vector<double>& row : workspace.values) exclude(take_part(mask, row.size()), row);
     const EpsilonGreedy& policy = exploration_.policy();
     const double tolerance =
         std::ldexp(policy.config().tie_tolerance, -readout_.exponent().value_or(0));
@@ -358,10 +292,6 @@ class QLambda : public WithRates<QLambda> {
       workspace.action[d] = policy.best_action(row, best_value(row) - whole, ties);
     }
     return workspace.action;
-  }
-  Action best_of(Workspace& workspace, bool explore, ActionMask mask) {
-    exclude_from(workspace, mask);
-    return each_best(workspace, exploration_.policy().ties(explore));
   }
 
   /// After the unit was doubled so often.

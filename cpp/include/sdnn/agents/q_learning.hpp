@@ -21,9 +21,7 @@
 #include "sdnn/agents/return_range.hpp"
 #include "sdnn/agents/schedule_config.hpp"
 #include "sdnn/approximators/action_value.hpp"
-#include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::agents {
@@ -54,9 +52,9 @@ namespace sdnn::agents {
 /// (the steps that wait, the kept action, the number of its steps, its rewards) is then
 /// kept for each, all else is shared. Which of them acts or learns when is the caller's choice.
 template <approximators::ActionValue Q>
-class QLearning : public WithRates<QLearning<Q>> {
+class QLearning : public IndexAgent<QLearning<Q>> {
  public:
-  using Action = std::span<const std::size_t>;
+  using typename IndexAgent<QLearning>::Action;
 
   /// The memory of one reader: a workspace and the values of each dimension, and the best action.
   struct Workspace {
@@ -93,19 +91,8 @@ class QLearning : public WithRates<QLearning<Q>> {
   /// Actions of a dimension.
   std::size_t n_actions(std::size_t d) const { return networks_[d].n_actions(); }
 
-  /// Alpha and epsilon: as set, or as progress has made them.
+  /// Alpha, as set, or as progress has made it.
   double learning_rate() const noexcept { return learning_rate_; }
-  double epsilon() const noexcept { return exploration_.policy().config().epsilon; }
-
-  /// In how many environments at once the agent learns: each has an episode of its own. Of those
-  /// that are no more, what waits is learned. Throws std::invalid_argument outside [1, 2^14], and
-  /// as learn does.
-  void set_n_environments(std::size_t n) {
-    core::require_in_range("n_environments", n, 1, Episodes<Episode>::kMost);
-    for (std::size_t i = n; i < n_environments(); ++i) begin_episode(i);
-    episodes_.resize(n, [this] { return new_episode(); });
-  }
-  std::size_t n_environments() const noexcept { return episodes_.size(); }
 
   /// Starts counting the steps of an episode anew, for the greedy first steps, and learns what
   /// still waits of an episode that did not terminate. The caller decides when: learning a
@@ -155,48 +142,9 @@ class QLearning : public WithRates<QLearning<Q>> {
     return row;
   }
 
-  /// Returns a best action, as act without `explore` does; `ties` decides between several. The span
-  /// is valid until the workspace is used again.
-  Action best_action(std::span<const double> state, Workspace& workspace, core::Random& ties,
-                     ActionMask mask = {}) const {
-    require_mask("mask", mask);
-    read(state, workspace);
-    return best_of_read(workspace, ties, mask);
-  }
-
-  /// The two steps of act without `explore`: `read` takes the time and is for many threads, as
-  /// values is; `best_of` gives the action in the state that was read last.
+  /// Reads a state for best_of: this takes the time and is for many threads, as values is.
   void read(std::span<const double> state, Workspace& workspace) const {
     for (std::size_t d = 0; d < n_dimensions(); ++d) read(state, workspace, d, true);
-  }
-  Action best_of(Workspace& workspace, ActionMask mask = {}) {
-    require_mask("mask", mask);
-    return best_of_read(workspace, exploration_.policy().ties(false), mask);
-  }
-
-  /// Returns an allowed action to take in `state`; without `explore` a best one, by the average of
-  /// the weights where the approximator keeps one. Valid until the next act. Shapes: state (l,) in
-  /// [0, 1], mask as ActionMask has it.
-  Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
-             ActionMask mask = {}) {
-    Episode& episode = episodes_.of(environment);
-    if (!explore) {
-      read(state, workspace_);
-      return best_of(workspace_, mask);
-    }
-    core::require_unit_values("state", state, n_inputs());  // before anything is drawn
-    require_mask("mask", mask);
-    const auto n_actions_of = [this](std::size_t d) { return n_actions(d); };
-    if (exploration_.takes_random_action(episode.exploration, n_actions_of, mask)) {
-      return episode.exploration.kept;
-    }
-    for (std::size_t d = 0; d < n_dimensions(); ++d) read(state, workspace_, d, false);
-    return best_of_read(workspace_, exploration_.policy().ties(true), mask);
-  }
-
-  /// The action of the first dimension as a number in [-1, 1]: actions cut the range evenly.
-  double normalized_action(Action action) const {
-    return coding::action_value(action.front(), n_actions(0), -1.0, 1.0);
   }
 
   /// Learns one transition; the best value of the next state is that of its allowed actions.
@@ -207,12 +155,7 @@ class QLearning : public WithRates<QLearning<Q>> {
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
              ActionMask next_mask = {}) {
     // Refuses at once what could not be learned: a correction may come later.
-    core::require_unit_values("state", state, n_inputs());
-    require_action(action);
-    core::require_finite("reward", reward);
-    core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
-    core::require_unit_values("next_state", next_state, n_inputs());
-    require_mask("next_mask", next_mask);
+    this->require_transition(state, action, reward, next_state, next_mask);
     Episode& episode = episodes_.of(environment);
     if constexpr (kHasRange) {
       if (adapts_range() && range_.note(reward, terminated, episode.rewards)) {
@@ -232,7 +175,6 @@ class QLearning : public WithRates<QLearning<Q>> {
     }
   }
 
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     if (self.n_dimensions() == 1) {
@@ -258,8 +200,8 @@ class QLearning : public WithRates<QLearning<Q>> {
 
  private:
   friend class WithRates<QLearning>;
+  friend class IndexAgent<QLearning>;
 
-  static constexpr double kLargestReward = 1e300;  // sums of some, and steps to them, stay finite
   /// Whether numbers that stand for values may be read in their place.
   static constexpr bool kCounts = approximators::CountedActionValue<Q>;
   static constexpr bool kHasRange = requires(Q& q) { q.set_output_range(0.0, 1.0); };
@@ -282,7 +224,7 @@ class QLearning : public WithRates<QLearning<Q>> {
   template <class Self, class Listed, class Archive>
   static void serialize_episode(Self& self, Listed& episode, Archive& archive) {
     archive.part("n_step_buffer", episode.buffer);
-    const auto n_actions_of = [&self](std::size_t d) { return self.n_actions(d); };
+    const auto n_actions_of = self.n_actions_of();
     serialize_mask("next_mask", episode.next_mask, archive, self.n_dimensions(), n_actions_of);
     archive.within("range", [&] { self.range_.serialize_rewards(episode.rewards, archive); });
     self.exploration_.serialize_episode(episode.exploration, archive, n_actions_of);
@@ -317,13 +259,6 @@ class QLearning : public WithRates<QLearning<Q>> {
     return networks;
   }
 
-  void require_mask(const char* name, ActionMask mask) const {
-    agents::require_mask(name, mask, n_dimensions(), [this](auto d) { return n_actions(d); });
-  }
-  void require_action(Action action) const {
-    agents::require_action(action, n_dimensions(), [this](auto d) { return n_actions(d); });
-  }
-
   /// Reads the values of a dimension; `averaged`: by the average of the weights where the
   /// approximator keeps one.
   void read(std::span<const double> state, Workspace& workspace, std::size_t d,
@@ -350,7 +285,7 @@ class QLearning : public WithRates<QLearning<Q>> {
     return best_value(std::span<const double>(workspace.values[d]));
   }
   /// An action that has it, or ties with those that have.
-  std::size_t best_of(const Workspace& workspace, std::size_t d, core::Random& ties) const {
+  std::size_t best_in(const Workspace& workspace, std::size_t d, core::Random& ties) const {
     const EpsilonGreedy& policy = exploration_.policy();
     if constexpr (kCounts) {
       const Q& q = networks_[d];
@@ -365,11 +300,14 @@ class QLearning : public WithRates<QLearning<Q>> {
     return policy.best_action(workspace.values[d], ties);
   }
 
+  void read_to_explore(std::span<const double> state, const Episode& /*episode*/) {
+    for (std::size_t d = 0; d < n_dimensions(); ++d) read(state, workspace_, d, false);
+  }
   /// Returns a best one of the allowed actions in the state that was read last.
   Action best_of_read(Workspace& workspace, core::Random& ties, ActionMask mask) const {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
       exclude(take_part(mask, n_actions(d)), workspace, d);
-      workspace.action[d] = best_of(workspace, d, ties);
+      workspace.action[d] = best_in(workspace, d, ties);
     }
     return workspace.action;
   }

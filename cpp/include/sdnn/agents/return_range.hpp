@@ -61,7 +61,6 @@ class ReturnRange {
     return follow() || grows;
   }
 
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.number("low", self.low_);

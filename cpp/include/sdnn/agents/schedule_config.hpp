@@ -10,7 +10,6 @@
 
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/elementary.hpp"
 
 namespace sdnn::agents {
@@ -167,7 +166,6 @@ class WithRates {
   }
 
  protected:
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize_rates(Self& self, Archive& archive) {
     auto& rates = self.rates_;

@@ -132,7 +132,6 @@ class WarmUp {
             std::span(next_masks_).subspan(t * mask_size(), mask_size())};
   }
 
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.numbers("observations", self.observations_);

@@ -14,7 +14,6 @@
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 
 namespace sdnn::approximators {
@@ -82,7 +81,6 @@ class FuzzyRules {
   std::size_t n_rules() const noexcept { return n_rules_; }
   std::size_t max_fired() const noexcept { return std::size_t{1} << n_inputs(); }
 
-  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.fixed("values", {self.n_rules_, self.n_actions()}, self.table_.span());

@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "sdnn/approximators/detail/column_changes.hpp"
 #include "sdnn/approximators/detail/column_set.hpp"
 #include "sdnn/approximators/detail/column_sums.hpp"
 #include "sdnn/coding/detail/ternary_code.hpp"

@@ -16,8 +16,6 @@
 #include <vector>
 
 #include "sdnn/approximators/detail/linear_rows.hpp"
-#include "sdnn/approximators/detail/linear_workspace.hpp"
-#include "sdnn/approximators/detail/more_inputs.hpp"
 #include "sdnn/approximators/detail/state_wiring.hpp"
 #include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/coding/action_code.hpp"
@@ -337,7 +335,6 @@ class LinearSDNN {
     std::ranges::fill(versions_, ++version_);
   }
 
-  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.fixed("weights", {self.n_rows_, self.n_slots()}, self.weights_);

@@ -17,7 +17,6 @@
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/detail/identity.hpp"
 #include "sdnn/core/elementary.hpp"
@@ -120,8 +119,7 @@ class RBFNetwork {
 
   /// Replaces the weights. Throws std::invalid_argument for another number of them.
   void set_weights(std::span<const double> weights) {
-    core::require(weights.size() == n_joint_bases_, "weights",
-                  std::to_string(n_joint_bases_) + " values", weights.size());
+    core::require_size("weights", weights.size(), n_joint_bases_);
     for (std::size_t i = 0; i < weights.size(); ++i) {
       if (std::abs(weights[i]) <= kLargestWeight) continue;
       core::require_in_range("weights[" + std::to_string(i) + "]", weights[i], -kLargestWeight,
@@ -131,7 +129,6 @@ class RBFNetwork {
     ++n_updates_;
   }
 
-  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.fixed("weights", {self.n_joint_bases_}, self.weights_.span());
@@ -147,9 +144,7 @@ class RBFNetwork {
   ///
   /// Throws std::invalid_argument for a state of wrong size or outside [0, 1].
   void values(std::span<const double> state, Workspace& workspace, std::span<double> out) const {
-    if (out.size() != n_actions()) {  // only the message allocates
-      core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
-    }
+    core::require_size("out", out.size(), n_actions());
     const Eigen::ArrayXd& mixed = mix(state, workspace);
     Eigen::Map<Eigen::ArrayXd> q(out.data(), action_bases_.rows());
     q.setZero();
@@ -158,9 +153,7 @@ class RBFNetwork {
 
   /// Q(state, action). Throws like values, and std::invalid_argument for an action out of range.
   double value(std::span<const double> state, Workspace& workspace, std::size_t action) const {
-    if (action >= n_actions()) {
-      core::require(false, "action", "less than " + std::to_string(n_actions()), action);
-    }
+    core::require_below("action", action, n_actions());
     const Eigen::ArrayXd& mixed = mix(state, workspace);
     const auto bases = action_bases_.row(index(action));
     double q = 0.0;

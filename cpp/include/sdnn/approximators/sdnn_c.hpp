@@ -15,9 +15,6 @@
 #include <vector>
 
 #include "sdnn/approximators/detail/activation_cache.hpp"
-#include "sdnn/approximators/detail/averaged_layer.hpp"
-#include "sdnn/approximators/detail/correction_log.hpp"
-#include "sdnn/approximators/detail/initial_layer.hpp"
 #include "sdnn/approximators/detail/paired_weights.hpp"
 #include "sdnn/approximators/detail/sdnn_c_room.hpp"
 #include "sdnn/approximators/detail/state_wiring.hpp"
@@ -32,7 +29,7 @@
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/state_code.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/on_demand.hpp"
+#include "sdnn/core/detail/threads.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators {
@@ -110,10 +107,6 @@ class SDNNC {
         hidden_layer_(paired_layer(*code_, actions_.n_hidden_units())),
         log_(code_->n_inputs(), actions_.n_active_units()),
         rounding_(seed, core::Stream::rounding) {
-    core::require_positive("learning_coefficient", config.learning_coefficient);
-    core::require_in_range("lattice", config.lattice, 1, 64);
-    core::require_in_range("weight_limit", config.weight_limit, 0, HiddenLayer::kWeightLimit);
-    core::require_in_range("averaging_interval", config.averaging_interval, 0, 1000000000);
     if (config.averaging_interval > 0) average_.emplace(hidden_layer_, config.averaging_interval);
     tabulate_values();
     add_initial_weights(hidden_layer_, *code_, config, seed);
@@ -210,8 +203,7 @@ class SDNNC {
   /// Writes the inner potentials in lattice steps (c / lattice), by a full pass without a
   /// workspace. Shape: out (n,). Allocates.
   void potentials(std::span<const double> state, std::span<std::int32_t> out) const {
-    core::require(out.size() == hidden_layer_.n_units(), "out",
-                  std::to_string(hidden_layer_.n_units()) + " values", out.size());
+    core::require_size("out", out.size(), hidden_layer_.n_units());
     std::vector<coding::Bin> bins(n_inputs());
     code_->bins_of(state, bins);
     std::vector<std::uint64_t> words(2 * code_->n_words());
@@ -260,7 +252,6 @@ class SDNNC {
     tabulate_values();
   }
 
-  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     const std::size_t n_units = self.hidden_layer_.n_units();
@@ -346,9 +337,7 @@ class SDNNC {
 
   void fill_values(std::span<const double> state, Workspace& workspace, std::span<double> out,
                    bool averaged) const {
-    if (out.size() != n_actions()) {  // only the message allocates
-      core::require(false, "out", std::to_string(n_actions()) + " values", out.size());
-    }
+    core::require_size("out", out.size(), n_actions());
     count(state, workspace, averaged);
     std::ranges::transform(workspace.counts_.of_actions(), out.begin(),
                            [this](std::int32_t count) { return value_of_count(count); });
@@ -422,9 +411,7 @@ class SDNNC {
   }
 
   int count_in_window(std::span<const std::int32_t> potentials, std::size_t action) const {
-    if (action >= n_actions()) {
-      core::require(false, "action", "less than " + std::to_string(n_actions()), action);
-    }
+    core::require_below("action", action, n_actions());
     const std::size_t first = actions_.first_unit(action);
     int n_firing = 0;
     for (std::size_t i = first; i < first + actions_.n_active_units(); ++i) {

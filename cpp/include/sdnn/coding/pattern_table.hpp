@@ -48,8 +48,7 @@ class PatternTable {
   static PatternTable from_signs(std::span<const std::int8_t> signs, std::size_t n_bins,
                                  std::size_t n_units) {
     PatternTable table(n_bins, n_units);
-    core::require(signs.size() == n_bins * n_units, "signs",
-                  std::to_string(n_bins * n_units) + " values", signs.size());
+    core::require_size("signs", signs.size(), n_bins * n_units);
     const std::int8_t* sign = signs.data();
     for (std::size_t bin = 0; bin < n_bins; ++bin) {
       core::interruption_point();

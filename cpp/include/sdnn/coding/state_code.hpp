@@ -105,7 +105,7 @@ class StateCode {
 
   /// Throws std::invalid_argument if there is no such unit.
   PairedColumns columns_of(std::size_t unit) const {
-    core::require(unit < n_columns(), "unit", "less than " + std::to_string(n_columns()), unit);
+    core::require_below("unit", unit, n_columns());
     const std::size_t m = n_pattern_units();
     const std::size_t group = unit / m;
     const std::size_t nu = groups_[group].modifier;

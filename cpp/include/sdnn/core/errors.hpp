@@ -15,31 +15,24 @@
 
 namespace sdnn::core {
 
-/// An error about the value of an argument or a field of a configuration.
-class ArgumentError : public std::invalid_argument {
+/// An error about an argument, or a field of a configuration.
+template <class Error>
+class NamedError : public Error {
  public:
-  ArgumentError(std::string name, const std::string& message)
-      : std::invalid_argument(message), name_(std::move(name)) {}
+  NamedError(std::string name, const std::string& message)
+      : Error(message), name_(std::move(name)) {}
 
-  /// Name of the argument or field.
+  /// Name of the argument or field; the first one where there are several.
   const std::string& name() const noexcept { return name_; }
 
  private:
   std::string name_;
 };
 
-/// An error about an argument or a field that needs more memory than is allowed.
-class SizeError : public std::length_error {
- public:
-  SizeError(std::string name, const std::string& message)
-      : std::length_error(message), name_(std::move(name)) {}
-
-  /// Name of the argument or field to reduce, or of the first of several.
-  const std::string& name() const noexcept { return name_; }
-
- private:
-  std::string name_;
-};
+/// An error about the value of an argument or a field.
+using ArgumentError = NamedError<std::invalid_argument>;
+/// An error about an argument or a field to reduce, which needs more memory than is allowed.
+using SizeError = NamedError<std::length_error>;
 
 #if !SDNN_EXCEPTIONS
 

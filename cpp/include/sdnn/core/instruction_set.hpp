@@ -3,6 +3,7 @@
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdlib>
 #include <stdexcept>
 #include <string>
@@ -36,16 +37,8 @@ enum class InstructionSet {
 
 /// The level's name, as the environment variable SDNN_INSTRUCTION_SET spells it.
 inline std::string_view name_of(InstructionSet level) noexcept {
-  switch (level) {
-    case InstructionSet::avx512:
-      return "avx512";
-    case InstructionSet::avx2:
-      return "avx2";
-    case InstructionSet::neon:
-      return "neon";
-    default:
-      return "portable";
-  }
+  constexpr std::array<std::string_view, 4> kNames{"portable", "neon", "avx2", "avx512"};
+  return kNames[static_cast<std::size_t>(level)];
 }
 
 inline constexpr std::array kInstructionSets = {InstructionSet::portable, InstructionSet::neon,

@@ -55,7 +55,6 @@ class Pcg64 {
     return static_cast<std::uint32_t>(scaled >> 32U);
   }
 
-  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     std::array<std::uint64_t, 6> words{self.state_.high,    self.state_.low, self.increment_.high,

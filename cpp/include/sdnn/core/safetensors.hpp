@@ -103,20 +103,19 @@ inline TensorPlace tensor_place(const std::string& name, const nlohmann::json& e
   const auto& dtype = entry["dtype"];
   const auto& shape = entry["shape"];
   const auto& offsets = entry["data_offsets"];
-  constexpr std::array kTypes{TensorType::i8,  TensorType::u8,  TensorType::i16, TensorType::i32,
-                              TensorType::i64, TensorType::u64, TensorType::f32, TensorType::f64};
-  const auto type = std::ranges::find_if(
-      kTypes, [&dtype](TensorType known) { return dtype == facts_of(known).name; });
-  expect(type != kTypes.end(), "has a dtype that is not known");
+  const auto found = std::ranges::find_if(
+      kTensorTypes, [&dtype](const TensorTypeFacts& known) { return dtype == known.name; });
+  expect(found != kTensorTypes.end(), "has a dtype that is not known");
+  const auto type = static_cast<TensorType>(found - kTensorTypes.begin());
   const auto is_number = [](const nlohmann::json& value) { return value.is_number_unsigned(); };
   expect(offsets.is_array() && offsets.size() == 2 && std::ranges::all_of(offsets, is_number),
          "has no data_offsets of two numbers");
-  TensorPlace place{*type, {}, offsets[0].get<std::uint64_t>(), offsets[1].get<std::uint64_t>()};
+  TensorPlace place{type, {}, offsets[0].get<std::uint64_t>(), offsets[1].get<std::uint64_t>()};
   expect(place.begin <= place.end && place.end <= n_bytes, "reaches beyond the end of the file");
   expect(shape.is_array() && std::ranges::all_of(shape, is_number), "has no shape of numbers");
   const bool is_empty = std::ranges::any_of(
       shape, [](const auto& n) { return n.template get<std::uint64_t>() == 0; });
-  std::uint64_t size = is_empty ? 0 : facts_of(*type).n_bytes;
+  std::uint64_t size = is_empty ? 0 : found->n_bytes;
   for (const auto& entry_of_shape : shape) {
     const auto extent = entry_of_shape.get<std::uint64_t>();
     expect(is_empty || size <= n_bytes / extent, "is not as large as its shape");
@@ -232,29 +231,6 @@ inline Safetensors read_checked(const std::filesystem::path& path) {
   return parse_safetensors(file.size(), read);
 }
 
-/// The place of a type in the order in which the format's own library stores tensors.
-constexpr int storage_rank(TensorType type) noexcept {
-  switch (type) {
-    case TensorType::u64:
-      return 0;
-    case TensorType::i64:
-      return 1;
-    case TensorType::f64:
-      return 2;
-    case TensorType::f32:
-      return 3;
-    case TensorType::i32:
-      return 4;
-    case TensorType::i16:
-      return 5;
-    case TensorType::i8:
-      return 6;
-    case TensorType::u8:
-      break;
-  }
-  return 7;
-}
-
 }  // namespace detail
 
 /// Reads a file of one of several kinds. Its checksum is compared before anything else is used.
@@ -291,7 +267,7 @@ inline void write_file(const std::filesystem::path& path, const FileContent& con
   std::vector<const State::value_type*> order;
   for (const auto& named : content.tensors) order.push_back(&named);
   std::ranges::stable_sort(order, {}, [](const State::value_type* named) {
-    return detail::storage_rank(named->second.type);  // aligns numbers; ties are ordered by name
+    return facts_of(named->second.type).storage_rank;  // aligns numbers; ties are ordered by name
   });
   const nlohmann::json about = {{"checksum", "00000000"},
                                 {"description", content.description},

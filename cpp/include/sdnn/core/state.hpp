@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -39,16 +40,26 @@ constexpr TensorType tensor_type() noexcept {
   if constexpr (std::is_same_v<T, std::uint64_t>) return TensorType::u64;
 }
 
-/// The name of a type, and the bytes of a number.
+/// The name of a type in files and in NumPy, the bytes of a number, and the place of its tensors
+/// among those of other types in a file.
 struct TensorTypeFacts {
   const char* name;
+  const char* dtype;
   std::size_t n_bytes;
+  int storage_rank;
 };
+/// The facts of all types, in their order.
+inline constexpr std::array<TensorTypeFacts, 8> kTensorTypes{{{"I8", "<i1", 1, 6},
+                                                              {"U8", "<u1", 1, 7},
+                                                              {"I16", "<i2", 2, 5},
+                                                              {"I32", "<i4", 4, 4},
+                                                              {"I64", "<i8", 8, 1},
+                                                              {"U64", "<u8", 8, 0},
+                                                              {"F32", "<f4", 4, 3},
+                                                              {"F64", "<f8", 8, 2}}};
 
-constexpr TensorTypeFacts facts_of(TensorType type) noexcept {
-  constexpr TensorTypeFacts kFacts[] = {{"I8", 1},  {"U8", 1},  {"I16", 2}, {"I32", 4},
-                                        {"I64", 8}, {"U64", 8}, {"F32", 4}, {"F64", 8}};
-  return kFacts[static_cast<std::size_t>(type)];
+constexpr const TensorTypeFacts& facts_of(TensorType type) noexcept {
+  return kTensorTypes[static_cast<std::size_t>(type)];
 }
 
 /// Numbers of one type in a shape, row by row, in the byte order of memory.
@@ -66,21 +77,35 @@ using State = std::map<std::string, Tensor, std::less<>>;
 
 namespace detail {
 
-/// Adds a prefix to the names that a part of an object lists.
+/// The nested parts of an object, whose names have prefixes.
 template <class Archive>
-class Prefixed {
+class Nested {
  public:
-  Prefixed(Archive& archive, std::string_view prefix) : archive_(archive), before_(prefix) {
-    std::swap(before_, archive.prefix);
-    archive.prefix = before_ + archive.prefix + ".";
+  template <class Part>
+  void part(std::string_view name, Part& part) {
+    within(name, [&] { std::remove_const_t<Part>::serialize(part, static_cast<Archive&>(*this)); });
   }
-  Prefixed(const Prefixed&) = delete;
-  Prefixed& operator=(const Prefixed&) = delete;
-  ~Prefixed() { archive_.prefix = std::move(before_); }
+  /// The entries of `list`, prefixed by `name`.
+  template <class List>
+  void within(std::string_view name, const List& list) {
+    const Prefixed prefixed(prefix, name);
+    list();
+  }
+
+  std::string prefix;
 
  private:
-  Archive& archive_;
-  std::string before_;
+  struct Prefixed {
+    Prefixed(std::string& own, std::string_view name) : prefix(own), before(own) {
+      prefix.append(name).append(".");
+    }
+    Prefixed(const Prefixed&) = delete;
+    Prefixed& operator=(const Prefixed&) = delete;
+    ~Prefixed() { prefix = std::move(before); }
+
+    std::string& prefix;
+    std::string before;
+  };
 };
 
 }  // namespace detail
@@ -93,7 +118,7 @@ class Prefixed {
 ///       archive.numbers("rewards", self.rewards_);
 ///       archive.part("network", self.network_);
 ///     }
-class StateWriter {
+class StateWriter : public detail::Nested<StateWriter> {
  public:
   static constexpr bool kReads = false;
 
@@ -127,19 +152,8 @@ class StateWriter {
     using T = std::remove_cvref_t<decltype(*values.data())>;
     add<T>(name, std::move(shape), {values.data(), values.size()});
   }
-  template <class Part>
-  void part(std::string_view name, const Part& part) {
-    within(name, [&] { Part::serialize(part, *this); });
-  }
-  /// The entries of `list`, prefixed by `name`.
-  template <class List>
-  void within(std::string_view name, const List& list) {
-    const detail::Prefixed prefixed(*this, name);
-    list();
-  }
 
   State state;
-  std::string prefix;
 
  private:
   template <class T>
@@ -153,7 +167,7 @@ class StateWriter {
 
 /// Restores a state. Every member throws std::invalid_argument naming a tensor that is missing or
 /// does not fit; read into a copy, and move it after success.
-class StateReader {
+class StateReader : public detail::Nested<StateReader> {
  public:
   static constexpr bool kReads = true;
 
@@ -191,16 +205,6 @@ class StateReader {
   void fixed(std::string_view name, const std::vector<std::size_t>& shape, Values&& values) {
     using T = std::remove_cvref_t<decltype(*values.data())>;
     copy<T>(find<T>(name, shape), {values.data(), values.size()});
-  }
-  template <class Part>
-  void part(std::string_view name, Part& part) {
-    within(name, [&] { Part::serialize(part, *this); });
-  }
-  /// The entries of `list`, prefixed by `name`.
-  template <class List>
-  void within(std::string_view name, const List& list) {
-    const detail::Prefixed prefixed(*this, name);
-    list();
   }
 
   /// Number of parts called `name`.1, `name`.2 and so on.
@@ -251,8 +255,6 @@ class StateReader {
       fail(std::invalid_argument("state: " + name + " must not be there"));
     }
   }
-
-  std::string prefix;
 
  private:
   template <class T>

@@ -9,7 +9,6 @@
 
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/check_fields.hpp"
 
 namespace sdnn::environments {
 

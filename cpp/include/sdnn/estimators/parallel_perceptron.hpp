@@ -19,7 +19,6 @@
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/detail/interruption.hpp"
-#include "sdnn/core/detail/on_demand.hpp"
 #include "sdnn/core/detail/threads.hpp"
 #include "sdnn/core/errors.hpp"
 #include "sdnn/core/random.hpp"

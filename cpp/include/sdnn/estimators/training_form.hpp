@@ -31,16 +31,8 @@ inline constexpr std::array kTrainingForms{TrainingForm::automatic, TrainingForm
                                            TrainingForm::block, TrainingForm::plain};
 
 inline std::string_view name_of(TrainingForm form) noexcept {
-  switch (form) {
-    case TrainingForm::dual:
-      return "dual";
-    case TrainingForm::block:
-      return "block";
-    case TrainingForm::plain:
-      return "plain";
-    default:
-      return "auto";
-  }
+  constexpr std::array<std::string_view, 4> kNames{"auto", "dual", "block", "plain"};
+  return kNames[static_cast<std::size_t>(form)];
 }
 
 /// Throws std::invalid_argument if there is no such form.

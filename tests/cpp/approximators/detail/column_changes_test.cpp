@@ -1,5 +1,3 @@
-#include "sdnn/approximators/detail/column_changes.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "instruction_sets.hpp"
+#include "sdnn/approximators/detail/column_sums.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/random.hpp"
 

@@ -1,5 +1,3 @@
-#include "sdnn/core/detail/check_fields.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,8 @@
 #include <string>
 #include <tuple>
 #include <vector>
+
+#include "sdnn/core/config_fields.hpp"
 
 namespace sdnn::core {
 namespace {

@@ -1,10 +1,10 @@
-#include "sdnn/core/detail/integer_register.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cstdint>
 #include <limits>
 #include <vector>
+
+#include "sdnn/core/detail/lanes.hpp"
 
 namespace sdnn::core {
 namespace {

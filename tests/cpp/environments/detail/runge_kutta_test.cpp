@@ -1,9 +1,9 @@
-#include "sdnn/environments/detail/runge_kutta.hpp"
-
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
+
+#include "sdnn/environments/detail/acrobot_dynamics.hpp"
 
 namespace {
 

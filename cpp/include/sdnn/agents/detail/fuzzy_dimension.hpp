@@ -16,8 +16,8 @@
 #include "sdnn/agents/fuzzy_q_learning_config.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/coding/action_code.hpp"
+#include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
-#include "sdnn/core/detail/check_fields.hpp"
 #include "sdnn/core/detail/grid_cells.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/core/errors.hpp"
@@ -135,7 +135,6 @@ class FuzzyDimension {
     if (terminated) episode.traces.clear();
   }
 
-  /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.part("rules", self.rules_);

@@ -14,8 +14,6 @@
 
 namespace sdnn::agents::detail {
 
-inline constexpr double kLargestReward = 1e300;
-
 /// The state of the present episode.
 struct QLambdaEpisode {
   approximators::LinearSDNN::Trace trace;

@@ -1,4 +1,5 @@
-/// The kernel of the hidden pass, sums of byte columns, for each instruction set.
+/// Kernels on the weights of a block of units, for each instruction set: sums of columns, which are
+/// the hidden pass, corrections, and the largest weight of each unit.
 #pragma once
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/kernel.hpp"
+#include "sdnn/core/detail/lanes.hpp"
 #include "sdnn/core/instruction_set.hpp"
 
 #if SDNN_X86_KERNELS
@@ -331,5 +333,50 @@ SDNN_DISPATCH(void, add_columns,
               (const std::int8_t* block, const ColumnPlaces& places, int group, int factor,
                std::int32_t* sums),
               (block, places, group, factor, sums))
+
+namespace detail {
+
+using ByteRegister = core::IntegerRegister<std::int8_t>;
+inline constexpr std::size_t kRegistersOfColumn = kBlockUnits / ByteRegister::kSize;
+
+SDNN_INLINE void add_to_columns_body(std::int8_t* block, const std::uint32_t* columns,
+                                     std::size_t n_columns, const Bytes& change) noexcept {
+  for (std::size_t k = 0; k < n_columns; ++k) {
+    std::int8_t* const column = block + columns[k] * kBlockUnits;
+    core::unrolled<kRegistersOfColumn>([&](auto r) SDNN_INLINE_LAMBDA {
+      ByteRegister sum;
+      sum.load(column + r() * ByteRegister::kSize);
+      sum.add(change.data() + r() * ByteRegister::kSize);
+      sum.store(column + r() * ByteRegister::kSize);
+    });
+  }
+}
+
+SDNN_INLINE void find_largest_bytes_body(const std::int8_t* block, std::size_t n_columns,
+                                         Bytes& largest) noexcept {
+  ByteRegister sizes[kRegistersOfColumn];
+  core::unrolled<kRegistersOfColumn>([&](auto r) SDNN_INLINE_LAMBDA { sizes[r()].clear(); });
+  for (std::size_t j = 0; j < n_columns; ++j, block += kBlockUnits) {
+    core::unrolled<kRegistersOfColumn>([&](auto r) SDNN_INLINE_LAMBDA {
+      sizes[r()].rise_to_size(block + r() * ByteRegister::kSize);
+    });
+  }
+  core::unrolled<kRegistersOfColumn>([&](auto r) SDNN_INLINE_LAMBDA {
+    sizes[r()].store(largest.data() + r() * ByteRegister::kSize);
+  });
+}
+
+}  // namespace detail
+
+/// Adds `change`, a byte for each unit, to columns of a block, modulo 256.
+SDNN_KERNEL(void, add_to_columns,
+            (std::int8_t* block, const std::uint32_t* columns, std::size_t n_columns,
+             const detail::Bytes& change),
+            (block, columns, n_columns, change))
+
+/// The largest |byte| of each unit in the first columns of a block. No byte may be -128.
+SDNN_KERNEL(void, find_largest_bytes,
+            (const std::int8_t* block, std::size_t n_columns, detail::Bytes& largest),
+            (block, n_columns, largest))
 
 }  // namespace sdnn::approximators

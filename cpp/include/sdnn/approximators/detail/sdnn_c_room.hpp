@@ -5,7 +5,6 @@
 #include <cstddef>
 
 #include "sdnn/approximators/detail/activation_cache.hpp"
-#include "sdnn/approximators/detail/correction_log.hpp"
 #include "sdnn/approximators/detail/state_wiring.hpp"
 #include "sdnn/approximators/detail/weight_average.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"

@@ -1,4 +1,4 @@
-/// The average of a hidden layer's weights during learning.
+/// The average of a hidden layer's weights during learning, and the layer with these weights.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,10 @@
 #include <span>
 #include <vector>
 
+#include "sdnn/approximators/detail/activation_cache.hpp"
+#include "sdnn/approximators/detail/paired_weights.hpp"
 #include "sdnn/approximators/hidden_layer.hpp"
+#include "sdnn/coding/state_code.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 
 namespace sdnn::approximators {
@@ -67,7 +70,6 @@ class WeightAverage {
   }
   std::int64_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
 
-  /// Lists the state; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     std::vector<std::int16_t> weights(self.n_units_ * self.n_columns_);
@@ -168,6 +170,45 @@ class WeightAverage {
   int fraction_bits_ = kFractionBits;
   core::AlignedBuffer<std::int16_t> weights_;  ///< [block][column][unit in block]
   std::vector<std::int64_t> thresholds_;
+};
+
+namespace detail {
+
+/// Returns value / 2^bits, halves rounded up.
+inline std::int64_t rounded_average(std::int64_t value, int bits) noexcept {
+  return (value + (std::int64_t{1} << (bits - 1))) >> bits;
+}
+
+}  // namespace detail
+
+/// The averages of a threshold, and of the weight of the unit of x_SD with these columns, whose
+/// magnitude is at most `limit`, so that sums of two are within a layer's range.
+inline std::int32_t averaged_threshold(const WeightAverage& average, std::size_t unit) noexcept {
+  return static_cast<std::int32_t>(
+      detail::rounded_average(average.threshold(unit), WeightAverage::kFractionBits));
+}
+inline std::int32_t averaged_weight(const WeightAverage& average, std::size_t unit,
+                                    const PairedColumns& columns, std::int64_t limit) noexcept {
+  std::int64_t weight = average.weight(unit, columns.first);
+  if (columns.paired) weight += columns.sign * std::int64_t{average.weight(unit, columns.second)};
+  return static_cast<std::int32_t>(std::clamp(
+      detail::rounded_average(weight, average.fraction_bits() + (columns.paired ? 1 : 0)), -limit,
+      limit));
+}
+
+/// A constant layer of averaged weights, and its log for caches.
+struct AveragedLayer {
+  AveragedLayer(const WeightAverage& average, const coding::StateCode& code, std::size_t n_units,
+                std::int64_t limit)
+      : layer(paired_layer(
+            code, n_units,
+            [&](std::size_t unit, const PairedColumns& columns, std::size_t) {
+              return averaged_weight(average, unit, columns, limit);
+            },
+            [&](std::size_t unit) { return averaged_threshold(average, unit); })) {}
+
+  HiddenLayer layer;
+  CorrectionLog log;
 };
 
 }  // namespace sdnn::approximators

@@ -55,12 +55,24 @@ inline void require_finite(std::string_view name, double value) {
   require(std::isfinite(value), name, "finite", value);
 }
 
+/// Throws std::invalid_argument unless there are as many items, "values", as expected. Only the
+/// text of an error allocates, here and below.
+inline void require_size(std::string_view name, std::size_t size, std::size_t expected,
+                         const char* items = "values") {
+  if (size != expected) require(false, name, std::to_string(expected) + ' ' + items, size);
+}
+
+/// Throws std::invalid_argument unless an index is below a number.
+inline void require_below(std::string_view name, std::size_t index, std::size_t end) {
+  if (index >= end) require(false, name, "less than " + std::to_string(end), index);
+}
+
 /// Throws std::invalid_argument unless `values` are `size` numbers in [0, 1].
 inline void require_unit_values(std::string_view name, std::span<const double> values,
                                 std::size_t size) {
-  if (values.size() != size) require(false, name, std::to_string(size) + " values", values.size());
+  require_size(name, values.size(), size);
   for (std::size_t i = 0; i < size; ++i) {
-    if (values[i] >= 0.0 && values[i] <= 1.0) continue;  // only the name of a bad value allocates
+    if (values[i] >= 0.0 && values[i] <= 1.0) continue;
     require_in_range(std::string(name) + '[' + std::to_string(i) + ']', values[i], 0.0, 1.0);
   }
 }

@@ -16,45 +16,47 @@
 // `parameters` and `arguments` are lists in parentheses. The function `name_body` in `detail`, and
 // everything that it calls, must be SDNN_INLINE, so that it is compiled inside each version.
 
-#define SDNN_KERNEL_PORTABLE(Result, name, parameters, arguments)            \
-  namespace detail {                                                         \
-  inline Result name##_portable parameters { return name##_body arguments; } \
+// A program of several units may compile these versions once, in a unit that defines
+// SDNN_KERNELS_HERE before all includes; all units are compiled with SDNN_KERNELS_ELSEWHERE.
+#if defined(SDNN_KERNELS_ELSEWHERE) && !defined(SDNN_KERNELS_HERE)
+#define SDNN_KERNEL_VERSION(attributes, Result, version, parameters, body) \
+  namespace detail {                                                       \
+  attributes Result version parameters;                                    \
   }
+#else
+#if defined(SDNN_KERNELS_HERE)
+#define SDNN_KERNEL_LINKAGE
+#else
+#define SDNN_KERNEL_LINKAGE inline
+#endif
+#define SDNN_KERNEL_VERSION(attributes, Result, version, parameters, body)  \
+  namespace detail {                                                        \
+  attributes SDNN_KERNEL_LINKAGE Result version parameters { return body; } \
+  }
+#endif
+
+#define SDNN_KERNEL_PORTABLE(Result, name, parameters, arguments) \
+  SDNN_KERNEL_VERSION(, Result, name##_portable, parameters, name##_body arguments)
 
 // Builds for NEON may use it everywhere, so their portable version already does.
 #if SDNN_NEON_KERNELS
-
-#define SDNN_KERNEL_NEON(Result, name, parameters, arguments)                \
-  namespace detail {                                                         \
-  inline Result name##_neon parameters { return name##_portable arguments; } \
-  }
-
+#define SDNN_KERNEL_NEON(Result, name, parameters, arguments) \
+  SDNN_KERNEL_VERSION(, Result, name##_neon, parameters, name##_portable arguments)
 #else
-
 #define SDNN_KERNEL_NEON(Result, name, parameters, arguments)
-
 #endif
 
 #if SDNN_X86_KERNELS
-
 #define SDNN_TARGET_AVX2 gnu::target("avx2,bmi,popcnt")
 #define SDNN_TARGET_AVX512 gnu::target("avx512f,avx512bw,avx2,bmi,popcnt")
-
-#define SDNN_KERNEL_AVX2(Result, name, parameters, arguments)                                 \
-  namespace detail {                                                                          \
-  [[SDNN_TARGET_AVX2]] inline Result name##_avx2 parameters { return name##_body arguments; } \
-  }
-
-#define SDNN_KERNEL_AVX512(Result, name, parameters, arguments)                                   \
-  namespace detail {                                                                              \
-  [[SDNN_TARGET_AVX512]] inline Result name##_avx512 parameters { return name##_body arguments; } \
-  }
-
+#define SDNN_KERNEL_AVX2(Result, name, parameters, arguments) \
+  SDNN_KERNEL_VERSION([[SDNN_TARGET_AVX2]], Result, name##_avx2, parameters, name##_body arguments)
+#define SDNN_KERNEL_AVX512(Result, name, parameters, arguments)                  \
+  SDNN_KERNEL_VERSION([[SDNN_TARGET_AVX512]], Result, name##_avx512, parameters, \
+                      name##_body arguments)
 #else
-
 #define SDNN_KERNEL_AVX2(Result, name, parameters, arguments)
 #define SDNN_KERNEL_AVX512(Result, name, parameters, arguments)
-
 #endif
 
 #if SDNN_NEON_KERNELS

@@ -1,9 +1,10 @@
-/// Several doubles side by side in a vector register.
+/// Several numbers side by side in a vector register: doubles, or 32 bytes of integers.
 ///
 /// A formula written as a template over its number type runs on one double or on several of them,
 /// by the same IEEE operations in the same order, hence with the same bits in every lane.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -26,6 +27,17 @@
 #define SDNN_INLINE_LAMBDA
 #endif
 
+// Around functions of wide vectors, which are all inlined: GCC's convention for passing them does
+// not matter.
+#if SDNN_LANES && !defined(__clang__)
+#define SDNN_WIDE_VECTORS_BEGIN \
+  _Pragma("GCC diagnostic push") _Pragma("GCC diagnostic ignored \"-Wpsabi\"")
+#define SDNN_WIDE_VECTORS_END _Pragma("GCC diagnostic pop")
+#else
+#define SDNN_WIDE_VECTORS_BEGIN
+#define SDNN_WIDE_VECTORS_END
+#endif
+
 namespace sdnn::core {
 
 // For a single number, the mask is a bool and the bits are an integer.
@@ -44,11 +56,7 @@ SDNN_INLINE double double_of(std::uint64_t bits) noexcept { return std::bit_cast
 
 #if SDNN_LANES
 
-// These functions are always inlined, so GCC's convention for passing wide vectors does not matter.
-#if !defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpsabi"
-#endif
+SDNN_WIDE_VECTORS_BEGIN
 
 /// `Size` unsigned 64-bit integers; as a mask, all ones or all zeros in each.
 template <std::size_t Size>
@@ -176,9 +184,7 @@ SDNN_INLINE LaneBits<Size> first_only(const LaneBits<Size>& first,
   return {first.v & ~second.v};
 }
 
-#if !defined(__clang__)
-#pragma GCC diagnostic pop
-#endif
+SDNN_WIDE_VECTORS_END
 
 #endif  // SDNN_LANES
 
@@ -196,5 +202,96 @@ SDNN_INLINE void unrolled(const Function& function) noexcept {
     (function(std::integral_constant<std::size_t, Index>()), ...);
   }(std::make_index_sequence<Size>());
 }
+
+#if SDNN_LANES
+
+SDNN_WIDE_VECTORS_BEGIN
+
+/// A register of the integers that fit into 32 bytes; sums wrap around.
+template <class Integer>
+struct IntegerRegister {
+  typedef Integer Vector __attribute__((vector_size(32)));
+  typedef std::make_unsigned_t<Integer> Wrapping __attribute__((vector_size(32)));
+  static constexpr std::size_t kSize = 32 / sizeof(Integer);
+
+  Vector v;
+
+  SDNN_INLINE void clear() noexcept { v = Vector{}; }
+  SDNN_INLINE void load(const Integer* from) noexcept { std::memcpy(&v, from, sizeof v); }
+  SDNN_INLINE void add(const Integer* from) noexcept {
+    Wrapping other;
+    std::memcpy(&other, from, sizeof other);
+    v = (Vector)((Wrapping)v + other);
+  }
+  SDNN_INLINE void subtract(const Integer* from) noexcept {
+    Wrapping other;
+    std::memcpy(&other, from, sizeof other);
+    v = (Vector)((Wrapping)v - other);
+  }
+  /// Rises to the size of each integer that has a larger one; none may be the least of its type.
+  SDNN_INLINE void rise_to_size(const Integer* from) noexcept {
+    Vector other;
+    std::memcpy(&other, from, sizeof other);
+    const Vector negative = (Vector)(other < 0);
+    other = (other ^ negative) - negative;
+    const Vector larger = (Vector)(other > v);
+    v = (other & larger) | (v & ~larger);
+  }
+  SDNN_INLINE void store(Integer* to) const noexcept { std::memcpy(to, &v, sizeof v); }
+  /// Adds the i-th integer to to[i], whose type is at least as wide.
+  template <class Wide>
+  SDNN_INLINE void add_to(Wide* to) const noexcept {
+    if constexpr (sizeof(Wide) == sizeof(Integer)) {
+      IntegerRegister sum = *this;
+      sum.add(to);
+      sum.store(to);
+    } else {  // interleaves integers with their signs, because GCC converts vectors slowly
+      using Twice = std::conditional_t<sizeof(Integer) == 1, std::int16_t, std::int32_t>;
+      using Half = IntegerRegister<Twice>;
+      static_assert(std::endian::native == std::endian::little, "the sign comes second");
+      const Vector sign = (Vector)(v < 0);
+      [&]<std::size_t... Index>(std::index_sequence<Index...>) SDNN_INLINE_LAMBDA {
+        Half{(typename Half::Vector)__builtin_shufflevector(v, sign,
+                                                            (Index / 2 + Index % 2 * kSize)...)}
+            .add_to(to);
+        Half{(typename Half::Vector)__builtin_shufflevector(
+                 v, sign, (kSize / 2 + Index / 2 + Index % 2 * kSize)...)}
+            .add_to(to + kSize / 2);
+      }(std::make_index_sequence<kSize>());
+    }
+  }
+};
+
+SDNN_WIDE_VECTORS_END
+
+#else
+
+template <class Integer>
+struct IntegerRegister {
+  static constexpr std::size_t kSize = 32 / sizeof(Integer);
+
+  Integer v[kSize];
+
+  void clear() noexcept { std::fill_n(v, kSize, Integer{0}); }
+  void load(const Integer* from) noexcept { std::copy_n(from, kSize, v); }
+  void add(const Integer* from) noexcept {
+    for (std::size_t i = 0; i < kSize; ++i) v[i] = static_cast<Integer>(v[i] + from[i]);
+  }
+  void subtract(const Integer* from) noexcept {
+    for (std::size_t i = 0; i < kSize; ++i) v[i] = static_cast<Integer>(v[i] - from[i]);
+  }
+  void rise_to_size(const Integer* from) noexcept {
+    for (std::size_t i = 0; i < kSize; ++i) {
+      v[i] = std::max(v[i], static_cast<Integer>(from[i] < 0 ? -from[i] : from[i]));
+    }
+  }
+  void store(Integer* to) const noexcept { std::copy_n(v, kSize, to); }
+  template <class Wide>
+  void add_to(Wide* to) const noexcept {
+    for (std::size_t i = 0; i < kSize; ++i) to[i] = static_cast<Wide>(to[i] + v[i]);
+  }
+};
+
+#endif  // SDNN_LANES
 
 }  // namespace sdnn::core

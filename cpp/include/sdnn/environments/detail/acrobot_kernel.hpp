@@ -48,13 +48,11 @@ SDNN_INLINE void move_in_lanes(const AcrobotDynamics& dynamics, const AcrobotArr
     mask.store(arrays.mask + i);
   }
 }
-#endif
-
-inline void move_acrobots_portable(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
-                                   std::size_t n) {
-#if SDNN_LANES
-  move_in_lanes<2>(dynamics, arrays, n);  // two doubles: the baseline of x86-64 and AArch64
 #else
+/// Without such registers one acrobot moves after the other.
+template <std::size_t Size>
+void move_in_lanes(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
+                   std::size_t n) noexcept {
   using Form = SeparateForm<double>;
   for (std::size_t i = 0; i < n; ++i) {
     if (arrays.mask[i] == 0) continue;
@@ -67,30 +65,26 @@ inline void move_acrobots_portable(const AcrobotDynamics& dynamics, const Acrobo
     for (std::size_t k = 0; k < 4; ++k) arrays.state[k][i] = state[k];
     arrays.mask[i] = goal ? ~std::uint64_t{0} : 0;
   }
-#endif
-}
-
-#if SDNN_NEON_KERNELS
-inline void move_acrobots_neon(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
-                               std::size_t n) {
-  move_acrobots_portable(dynamics, arrays, n);  // already uses the two doubles of NEON
-}
-#endif
-
-#if SDNN_X86_KERNELS
-[[SDNN_TARGET_AVX2]] inline void move_acrobots_avx2(const AcrobotDynamics& dynamics,
-                                                    const AcrobotArrays& arrays, std::size_t n) {
-  move_in_lanes<4>(dynamics, arrays, n);
-}
-
-[[SDNN_TARGET_AVX512]] inline void move_acrobots_avx512(const AcrobotDynamics& dynamics,
-                                                        const AcrobotArrays& arrays,
-                                                        std::size_t n) {
-  move_in_lanes<8>(dynamics, arrays, n);
 }
 #endif
 
 }  // namespace detail
+
+// Two doubles are the baseline of x86-64 and AArch64.
+SDNN_KERNEL_VERSION(, void, move_acrobots_portable,
+                    (const AcrobotDynamics& dynamics, const AcrobotArrays& arrays, std::size_t n),
+                    move_in_lanes<2>(dynamics, arrays, n))
+SDNN_KERNEL_NEON(void, move_acrobots,
+                 (const AcrobotDynamics& dynamics, const AcrobotArrays& arrays, std::size_t n),
+                 (dynamics, arrays, n))
+#if SDNN_X86_KERNELS
+SDNN_KERNEL_VERSION([[SDNN_TARGET_AVX2]], void, move_acrobots_avx2,
+                    (const AcrobotDynamics& dynamics, const AcrobotArrays& arrays, std::size_t n),
+                    move_in_lanes<4>(dynamics, arrays, n))
+SDNN_KERNEL_VERSION([[SDNN_TARGET_AVX512]], void, move_acrobots_avx512,
+                    (const AcrobotDynamics& dynamics, const AcrobotArrays& arrays, std::size_t n),
+                    move_in_lanes<8>(dynamics, arrays, n))
+#endif
 
 /// Advances `n` acrobots by one decision interval or to the goal; angles are not wrapped.
 SDNN_DISPATCH(void, move_acrobots,

@@ -10,7 +10,6 @@
 
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
-#include "sdnn/core/detail/integer_register.hpp"
 #include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/core/detail/lanes.hpp"
 
@@ -93,10 +92,7 @@ SDNN_INLINE void add_row_body(std::int32_t* to, const Product* row, std::int32_t
   }
 }
 
-#if SDNN_LANES && !defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpsabi"
-#endif
+SDNN_WIDE_VECTORS_BEGIN
 
 /// Sets entries[k] = bit k of `plus` minus bit k of `minus`, for 32 bits.
 SDNN_INLINE void expand_bits(std::uint32_t plus, std::uint32_t minus,
@@ -124,9 +120,7 @@ SDNN_INLINE void expand_bits(std::uint32_t plus, std::uint32_t minus,
 #endif
 }
 
-#if SDNN_LANES && !defined(__clang__)
-#pragma GCC diagnostic pop
-#endif
+SDNN_WIDE_VECTORS_END
 
 SDNN_INLINE void expand_code_body(const coding::TernaryCode& code,
                                   std::span<const std::size_t> words, std::size_t chunk_words,

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <cstring>
 
-#include "sdnn/core/detail/integer_register.hpp"
 #include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/core/detail/lanes.hpp"
 
@@ -15,10 +14,7 @@ namespace detail {
 
 #if SDNN_LANES
 
-#if !defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpsabi"
-#endif
+SDNN_WIDE_VECTORS_BEGIN
 
 using Shorts = core::IntegerRegister<std::int16_t>;
 using Words = core::IntegerRegister<std::int32_t>;
@@ -126,9 +122,7 @@ struct WordBlock {
 inline ShortBlock block_of(const std::int16_t*) noexcept { return {}; }
 inline WordBlock block_of(const std::int32_t*) noexcept { return {}; }
 
-#if !defined(__clang__)
-#pragma GCC diagnostic pop
-#endif
+SDNN_WIDE_VECTORS_END
 
 #endif  // SDNN_LANES
 

@@ -7,7 +7,6 @@
 #include <cstring>
 #include <limits>
 
-#include "sdnn/core/detail/integer_register.hpp"
 #include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/core/detail/lanes.hpp"
 
@@ -15,10 +14,7 @@ namespace sdnn::estimators {
 
 namespace detail {
 
-#if SDNN_LANES && !defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpsabi"
-#endif
+SDNN_WIDE_VECTORS_BEGIN
 
 SDNN_INLINE std::int32_t count_firing_body(const std::int32_t* potentials,
                                            std::size_t size) noexcept {
@@ -88,9 +84,7 @@ SDNN_INLINE std::int32_t least_above_body(const std::int32_t* values, std::size_
   return least;
 }
 
-#if SDNN_LANES && !defined(__clang__)
-#pragma GCC diagnostic pop
-#endif
+SDNN_WIDE_VECTORS_END
 
 }  // namespace detail
 

@@ -13,7 +13,6 @@
 
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
-#include "sdnn/core/detail/integer_register.hpp"
 #include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/core/detail/lanes.hpp"
 

@@ -1,18 +1,25 @@
-/// The parts of a decision that belong to the network, timed one by one.
+/// Timings: of the parts of a decision that belong to the network, of the acrobot, of whole
+/// decisions in a trial, and of the steps of any agent.
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "sdnn/agents/agent.hpp"
 #include "sdnn/approximators/error_correction.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
+#include "sdnn/environments/acrobot.hpp"
+#include "sdnn/environments/acrobot_config.hpp"
 #include "tools/stopwatch.hpp"
+#include "tools/trial.hpp"
 
 namespace sdnn::tools {
 
@@ -121,5 +128,99 @@ class NetworkParts {
   std::vector<double> values_;
   std::vector<std::int32_t> potentials_;
 };
+
+/// The times of all decisions in the next `n_episodes` learning episodes of a trial: choosing an
+/// action, the acrobot, its sensors, and learning from it. Test episodes among them count too.
+///
+/// Equal trials make the same decisions whenever it is run, so several runs can be compared
+/// decision by decision. Throws as the trial's advance does.
+template <agents::Agent Agent>
+Times time_decisions(AcrobotTrial<Agent>& trial, int n_episodes) {
+  Times times;
+  std::int64_t before = now();
+  trial.advance(n_episodes, [&] {
+    const std::int64_t after = now();
+    times.push_back(after - before);
+    before = now();  // without the vector's growth
+  });
+  return times;
+}
+
+/// An acrobot under random torques, which never reaches the goal: every decision takes all of its
+/// integration steps.
+class AcrobotDecisions {
+ public:
+  /// The goal and the number of decisions of `config` are not used. Throws as Acrobot does.
+  AcrobotDecisions(environments::AcrobotConfig config, std::uint64_t seed)
+      : acrobot_(endless(config)), random_(seed, core::Stream::exploration) {}
+
+  /// Integration steps in one decision.
+  int n_integration_steps() const noexcept {
+    const auto& config = acrobot_.config();
+    return static_cast<int>(std::lround(config.decision_interval / config.integration_step));
+  }
+
+  const environments::Acrobot& acrobot() const noexcept { return acrobot_; }
+
+  /// Times of `n_repetitions` decisions; one in 50 starts at rest.
+  Times run(int n_repetitions) {
+    double torque = 0.0;
+    return time_each(
+        n_repetitions,
+        [&](int) {
+          if (acrobot_.decisions() == kDecisionsPerEpisode) acrobot_.reset();
+          torque = acrobot_.config().max_torque * (2.0 * random_.uniform() - 1.0);
+        },
+        [&](int) { keep(acrobot_.step(torque, 1.0)); });
+  }
+
+ private:
+  static constexpr int kDecisionsPerEpisode = 50;
+
+  static environments::AcrobotConfig endless(environments::AcrobotConfig config) {
+    config.goal_height = std::numeric_limits<double>::max();
+    config.max_decisions = kDecisionsPerEpisode + 1;
+    return config;
+  }
+
+  environments::Acrobot acrobot_;
+  core::Random random_;
+};
+
+/// The times of `n_repetitions` whole steps at random states: learning the transition from the
+/// state before to a new one, then acting, with exploration, in the new one.
+///
+/// States are uniform in [0, 1)^d and rewards in [-1, 1), both from `seed`; nothing terminates, and
+/// all steps are one episode. Drawing is not timed, nor is the first act. A new state is new to the
+/// agent's memory too: give each call a seed of its own. An agent that never learned can be quicker
+/// than one at work, so measure after an untimed call. Throws std::invalid_argument unless
+/// n_repetitions is in [0, kMaxRepetitions], and as the agent does.
+template <agents::Agent Agent>
+Times time_agent_steps(Agent& agent, int n_repetitions, std::uint64_t seed) {
+  core::Random random(seed, core::Stream::exploration);
+  std::vector<double> before(agent.n_inputs());
+  std::vector<double> state(agent.n_inputs());
+  const auto draw_state = [&] {
+    for (double& value : state) value = random.uniform();
+  };
+  decltype(agent.act(std::span<const double>(state), true)) action{};
+  double reward = 0.0;
+  return time_each(
+      n_repetitions,
+      [&](int i) {
+        if (i == 0) {
+          draw_state();
+          agent.begin_episode();
+          action = agent.act(state, true);
+        }
+        std::swap(before, state);
+        draw_state();
+        reward = 2.0 * random.uniform() - 1.0;
+      },
+      [&](int) {
+        agent.learn(before, action, reward, state, false);
+        action = agent.act(state, true);
+      });
+}
 
 }  // namespace sdnn::tools
