@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "sdnn/agents/action_mask.hpp"
+#include "sdnn/agents/detail/linear_td.hpp"
 #include "sdnn/agents/detail/q_lambda_episode.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/exploration.hpp"
@@ -67,7 +68,7 @@ class QLambda : public IndexAgent<QLambda> {
   /// Throws std::invalid_argument naming the field that is out of range.
   QLambda(Readout readout, const QLambdaConfig& config, std::uint64_t seed)
       : config_(checked_schedule(config)),
-        readout_(std::move(readout)),
+        td_(std::move(readout), config.discount, config.trace_decay),
         exploration_(config, seed),
         workspace_(workspace()),
         episodes_(new_episode()) {
@@ -76,15 +77,15 @@ class QLambda : public IndexAgent<QLambda> {
 
   const QLambdaConfig& config() const noexcept { return config_; }
   /// The readout of all dimensions.
-  std::span<Readout> networks() noexcept { return {&readout_, 1}; }
-  std::span<const Readout> networks() const noexcept { return {&readout_, 1}; }
-  const Readout& readout() const noexcept { return readout_; }
+  std::span<Readout> networks() noexcept { return {&td_.readout(), 1}; }
+  std::span<const Readout> networks() const noexcept { return {&td_.readout(), 1}; }
+  const Readout& readout() const noexcept { return td_.readout(); }
 
-  std::size_t n_inputs() const { return readout_.n_inputs(); }
+  std::size_t n_inputs() const { return readout().n_inputs(); }
   /// Dimensions of an action.
-  std::size_t n_dimensions() const { return readout_.n_dimensions(); }
+  std::size_t n_dimensions() const { return readout().n_dimensions(); }
   /// Actions of a dimension.
-  std::size_t n_actions(std::size_t d) const { return readout_.n_actions(d); }
+  std::size_t n_actions(std::size_t d) const { return readout().n_actions(d); }
   /// Transitions that were learned.
   std::int64_t n_learned() const noexcept { return n_learned_; }
 
@@ -93,7 +94,7 @@ class QLambda : public IndexAgent<QLambda> {
   /// Where epsilon goes with schedule_steps: by default to 0. Symbols tell nothing of each other:
   /// where states have nothing else, epsilon stays, so that all of them are tried for good.
   double final_epsilon() const {
-    const std::vector<int>& n_symbols = readout_.config().n_symbols;
+    const std::vector<int>& n_symbols = readout().config().n_symbols;
     const bool is_symbol = !n_symbols.empty() && std::ranges::find(n_symbols, 0) == n_symbols.end();
     return config_.final_epsilon.value_or(is_symbol ? config_.policy.epsilon : 0.0);
   }
@@ -107,7 +108,7 @@ class QLambda : public IndexAgent<QLambda> {
   }
 
   Workspace workspace() const {
-    Workspace workspace{readout_.workspace(), {}, std::vector<std::size_t>(n_dimensions())};
+    Workspace workspace{readout().workspace(), {}, std::vector<std::size_t>(n_dimensions())};
     for (std::size_t d = 0; d < n_dimensions(); ++d) workspace.values.emplace_back(n_actions(d));
     return workspace;
   }
@@ -117,13 +118,13 @@ class QLambda : public IndexAgent<QLambda> {
   /// state (l,) in [0, 1]. Throws std::invalid_argument.
   std::span<const double> values(std::span<const double> state, Workspace& workspace,
                                  std::size_t d = 0, bool averaged = false) const {
-    readout_.values(state, workspace.readout, workspace.values[d], d, averaged);
+    readout().values(state, workspace.readout, workspace.values[d], d, averaged);
     return workspace.values[d];
   }
 
   /// Reads a state for best_of: this takes the time and is for many threads, as values is.
   void read(std::span<const double> state, Workspace& workspace) const {
-    readout_.read(state, workspace.readout);
+    readout().read(state, workspace.readout);
     take_values(workspace.readout, workspace.values, true);
   }
 
@@ -137,7 +138,7 @@ class QLambda : public IndexAgent<QLambda> {
     require_transition(state, action, reward, next_state, next_mask);
     Episode& episode = episodes_.of(environment);
     if (episode.waits && !std::ranges::equal(episode.next_state, state)) finish_at_end(episode);
-    readout_.read_next(state, episode.next);
+    readout().read_next(state, episode.next);
     if (episode.waits) finish(episode, action);
     std::swap(episode.present, episode.next);
     episode.state.assign(state.begin(), state.end());
@@ -146,7 +147,7 @@ class QLambda : public IndexAgent<QLambda> {
     episode.next_state.assign(next_state.begin(), next_state.end());
     episode.next_mask.assign(next_mask.begin(), next_mask.end());
     episode.waits = true;
-    halve_old_values(readout_.fit_unit(reward));
+    td_.fit_unit(reward, episodes_);
     ++n_learned_;
     apply_rates();
     if (terminated) {
@@ -158,25 +159,10 @@ class QLambda : public IndexAgent<QLambda> {
     }
   }
 
-  /// Makes the unit of values smaller where it is larger than it has to be: while no weight needs
-  /// its 8 upper bits; and where recent rewards have so few bits that values 1,024 times those they
-  /// could sum up to would fit. Then weights of larger values are clipped. Sizes of rewards are
-  /// those of RewardScale, the last window's and the recent one.
+  /// Makes the unit of values smaller where it is larger than it has to be; see LinearTD. Sizes of
+  /// rewards are those of RewardScale, the last window's and the recent one.
   void refine_unit(std::int32_t size_in_window, std::int32_t size) {
-    if (!readout_.exponent()) return;
-    const std::int32_t exponent = *readout_.exponent();
-    const std::int64_t n_weights = readout_.n_weights_of(episodes_.of(0).present.code());
-    const std::int64_t rest = std::max<std::int64_t>(kDiscountOne - discount(), 1);
-    const int least_bits =
-        Readout::most_bits_of(n_weights) - (kDiscountBits - floor_log2(rest)) - kImplausibleBits;
-    const int n_free =
-        std::min(readout_.spare_bits(), 30 - (size_in_window - exponent)) - kRoomBits;
-    const int n_lacking = least_bits - (size - exponent);
-    const int n_refined = readout_.refine_unit(std::max({n_free, n_lacking, 0}));
-    for (std::size_t i = 0; i < episodes_.size(); ++i) {
-      std::int64_t& old_value = episodes_.of(i).old_value;
-      old_value = Readout::refined(old_value, n_refined);
-    }
+    td_.refine_unit(size_in_window, size, episodes_);
   }
 
   /// Takes over what an agent with fewer inputs has learned; see LinearSDNN. In each environment
@@ -185,7 +171,7 @@ class QLambda : public IndexAgent<QLambda> {
     for (std::size_t i = 0; i < fewer.n_environments(); ++i) {
       if (fewer.episodes_.of(i).waits) fewer.finish_at_end(fewer.episodes_.of(i));
     }
-    readout_.continue_from(fewer.readout_);
+    td_.readout().continue_from(fewer.readout());
     exploration_ = std::move(fewer.exploration_);
     rates_ = fewer.rates_;
     n_learned_ = fewer.n_learned_;
@@ -198,14 +184,14 @@ class QLambda : public IndexAgent<QLambda> {
 
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
-    archive.part("action_value", self.readout_);
+    archive.part("action_value", self.td_.readout());
     Exploration::serialize(self.exploration_, archive);
     QLambda::serialize_rates(self, archive);
     archive.number("n_learned", self.n_learned_);
     Episodes<Episode>::serialize(
         self.episodes_, archive, [&self] { return self.new_episode(); },
         [&](auto& episode) {
-          detail::serialize_episode(self.readout_, self.exploration_, episode, archive);
+          detail::serialize_episode(self.td_.readout(), self.exploration_, episode, archive);
         });
     if constexpr (Archive::kReads) {
       archive.expect(self.n_learned_ >= 0 && self.n_learned_ <= kMostLearned, "n_learned",
@@ -221,17 +207,13 @@ class QLambda : public IndexAgent<QLambda> {
   static constexpr double kMostTolerance = 0x1p62;  ///< in units: above any difference of values
   static constexpr std::int64_t kMostLearned = std::int64_t{1} << 45;
   static constexpr std::int32_t kOne = Readout::kRateOne;
-  static constexpr int kDiscountBits = 15;
-  static constexpr std::int64_t kDiscountOne = std::int64_t{1} << kDiscountBits;
-  static constexpr int kRoomBits = 8;  ///< that a smaller unit leaves for larger weights
-  static constexpr int kImplausibleBits = 10;
 
   using Episode = detail::QLambdaEpisode;
 
   Episode new_episode() const {
-    return {.trace = readout_.trace(),
-            .present = readout_.workspace(),
-            .next = readout_.workspace(),
+    return {.trace = readout().trace(),
+            .present = readout().workspace(),
+            .next = readout().workspace(),
             .state = std::vector<double>(n_inputs()),
             .action = std::vector<std::size_t>(n_dimensions()),
             .next_state = std::vector<double>(n_inputs()),
@@ -259,22 +241,15 @@ class QLambda : public IndexAgent<QLambda> {
                                       static_cast<double>(kOne));
   }
 
-  static int floor_log2(std::int64_t x) noexcept {
-    return static_cast<int>(std::bit_width(static_cast<std::uint64_t>(x))) - 1;
-  }
-  std::int64_t discount() const noexcept {
-    return std::lround(config_.discount * static_cast<double>(kDiscountOne));
-  }
-
   void read_to_explore(std::span<const double> state, Episode& episode) {
-    readout_.read_next(state, episode.next);
+    readout().read_next(state, episode.next);
     take_values(episode.next, workspace_.values, false);
   }
   /// Values in units, which are exact and in the same order.
   void take_values(Readout::Workspace& read, std::vector<std::vector<double>>& values,
                    bool averaged) const {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
-      std::ranges::copy(readout_.sums(read, d, averaged), values[d].begin());
+      std::ranges::copy(readout().sums(read, d, averaged), values[d].begin());
     }
   }
 
@@ -284,7 +259,7 @@ class QLambda : public IndexAgent<QLambda> {
     for (std::vector<double>& row : workspace.values) exclude(take_part(mask, row.size()), row);
     const EpsilonGreedy& policy = exploration_.policy();
     const double tolerance =
-        std::ldexp(policy.config().tie_tolerance, -readout_.exponent().value_or(0));
+        std::ldexp(policy.config().tie_tolerance, -readout().exponent().value_or(0));
     // Finite, so that actions that are not allowed never tie.
     const double whole = std::floor(std::min(tolerance, kMostTolerance));
     for (std::size_t d = 0; d < workspace.action.size(); ++d) {
@@ -294,37 +269,14 @@ class QLambda : public IndexAgent<QLambda> {
     return workspace.action;
   }
 
-  /// After the unit was doubled so often.
-  void halve_old_values(int n_doubled) {
-    for (; n_doubled > 0; --n_doubled) {
-      for (std::size_t i = 0; i < episodes_.size(); ++i) {
-        std::int64_t& old_value = episodes_.of(i).old_value;
-        old_value = approximators::halved(old_value);
-      }
-    }
-  }
-
-  /// A value that `compute` returns, in units that are large enough for it; `other` is in units
-  /// too.
-  template <class Compute>
-  std::int64_t in_range(const Compute& compute, std::int64_t* other = nullptr) {
-    std::int64_t value = compute();
-    while (Readout::is_too_large(value)) {
-      readout_.double_unit();
-      halve_old_values(1);
-      if (other != nullptr) *other = approximators::halved(*other);
-      value = compute();
-    }
-    return value;
-  }
-
   /// Continues the episode: in the state of episode.next, `action` is taken.
   void finish(Episode& episode, Action action) {
     if (config_.bootstrap == Bootstrap::q_learning) {
-      const std::int64_t best = detail::best_sum(readout_, episode.next, episode.next_mask);
-      if (readout_.sum(episode.next, action) < best) end(episode);
+      const std::int64_t best = detail::best_sum(readout(), episode.next, episode.next_mask);
+      if (readout().sum(episode.next, action) < best) end(episode);
     } else {
-      correct(episode, in_range([&] { return readout_.sum(episode.next, action); }));
+      correct(episode,
+              td_.in_range(episodes_, [&] { return readout().sum(episode.next, action); }));
     }
     episode.waits = false;
   }
@@ -337,9 +289,10 @@ class QLambda : public IndexAgent<QLambda> {
 
   /// Learns a transition by the best value of its next state.
   void correct_by_best(Episode& episode) {
-    readout_.read_next(episode.next_state, episode.next);
-    correct(episode,
-            in_range([&] { return detail::best_sum(readout_, episode.next, episode.next_mask); }));
+    readout().read_next(episode.next_state, episode.next);
+    correct(episode, td_.in_range(episodes_, [&] {
+      return detail::best_sum(readout(), episode.next, episode.next_mask);
+    }));
   }
 
   static void end(Episode& episode) noexcept {
@@ -350,25 +303,14 @@ class QLambda : public IndexAgent<QLambda> {
 
   /// Learns one step; `next` is Q' in units.
   void correct(Episode& episode, std::int64_t next) {
-    const std::int64_t value =
-        in_range([&] { return readout_.sum(episode.present, episode.action); }, &next);
-    const std::int64_t target = readout_.units_of(episode.reward) +
-                                ((next * discount() + (kDiscountOne >> 1)) >> kDiscountBits);
     const bool is_dutch = config_.traces == TraceKind::dutch && n_environments() == 1;
-    const std::int64_t drift = is_dutch ? value - episode.old_value : 0;
-    episode.old_value = next;
-    const auto decay = static_cast<std::int32_t>(
-        std::lround(config_.discount * config_.trace_decay * approximators::kDecayOne));
-    halve_old_values(readout_.learn(episode.present.code(), episode.action, episode.trace,
-                                    {.error = target - value + drift,
-                                     .correction = drift,
-                                     .rate = rate_,
-                                     .decay = decay,
-                                     .is_dutch = is_dutch}));
+    const auto error =
+        td_.error_of(episode, episodes_, episode.action, episode.reward, next, is_dutch);
+    td_.correct(episode, episodes_, episode.action, error, rate_, is_dutch);
   }
 
   QLambdaConfig config_;
-  Readout readout_;
+  detail::LinearTD<Episode> td_;
   Exploration exploration_;
   std::int64_t n_learned_ = 0;
   std::int32_t rate_ = 0;  ///< alpha, kOne for 1

@@ -1,0 +1,135 @@
+/// True-online TD(lambda) with a linear readout, in one or several environments.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+
+#include "sdnn/agents/episodes.hpp"
+#include "sdnn/approximators/detail/linear_rows.hpp"
+#include "sdnn/approximators/linear_sdnn.hpp"
+
+namespace sdnn::agents::detail {
+
+/// A readout, and the episodes that it learns from: each has a trace, the workspace of its
+/// `present` state, and old_value, Q_old in units.
+///
+/// Gamma counts 2^-15, gamma lambda 2^-13, values units of the readout.
+template <class Episode>
+class LinearTD {
+ public:
+  using Readout = approximators::LinearSDNN;
+  using Action = std::span<const std::size_t>;
+
+  /// The parts of a step: r + gamma Q' - Q and Q - Q_old, in units.
+  struct Error {
+    std::int64_t error;
+    std::int64_t drift;
+  };
+
+  LinearTD(Readout readout, double discount, double trace_decay)
+      : readout_(std::move(readout)),
+        discount_(std::lround(discount * static_cast<double>(kDiscountOne))),
+        decay_(static_cast<std::int32_t>(
+            std::lround(discount * trace_decay * approximators::kDecayOne))) {}
+
+  Readout& readout() noexcept { return readout_; }
+  const Readout& readout() const noexcept { return readout_; }
+  /// gamma lambda, kDecayOne for 1.
+  std::int32_t decay() const noexcept { return decay_; }
+
+  /// Makes the unit large enough for a reward.
+  void fit_unit(double reward, Episodes<Episode>& episodes) {
+    halve_old_values(readout_.fit_unit(reward), episodes);
+  }
+
+  /// A value that `compute` returns, in units that are large enough for it; `other` is in units
+  /// too.
+  template <class Compute>
+  std::int64_t in_range(Episodes<Episode>& episodes, const Compute& compute,
+                        std::int64_t* other = nullptr) {
+    std::int64_t value = compute();
+    while (Readout::is_too_large(value)) {
+      readout_.double_unit();
+      halve_old_values(1, episodes);
+      if (other != nullptr) *other = approximators::halved(*other);
+      value = compute();
+    }
+    return value;
+  }
+
+  /// Returns the error of the present state's action, and notes Q', `next` in units, for the
+  /// episode's next step. Without `is_dutch` there is no drift.
+  Error error_of(Episode& episode, Episodes<Episode>& episodes, Action action, double reward,
+                 std::int64_t next, bool is_dutch) {
+    const std::int64_t value =
+        in_range(episodes, [&] { return readout_.sum(episode.present, action); }, &next);
+    const std::int64_t target =
+        readout_.units_of(reward) + ((next * discount_ + (kDiscountOne >> 1)) >> kDiscountBits);
+    const std::int64_t drift = is_dutch ? value - episode.old_value : 0;
+    episode.old_value = next;
+    return {target - value, drift};
+  }
+
+  /// Learns the error at a rate, kRateOne for 1.
+  void correct(Episode& episode, Episodes<Episode>& episodes, Action action, Error error,
+               std::int32_t rate, bool is_dutch) {
+    const int n_doubled = readout_.learn(episode.present.code(), action, episode.trace,
+                                         {.error = error.error + error.drift,
+                                          .correction = error.drift,
+                                          .rate = rate,
+                                          .decay = decay_,
+                                          .is_dutch = is_dutch});
+    halve_old_values(n_doubled, episodes);
+  }
+
+  /// Makes the unit of values smaller where it is larger than it has to be: while no weight needs
+  /// its 8 upper bits; and where recent rewards have so few bits that values 1,024 times those they
+  /// could sum up to would fit. Then weights of larger values are clipped. Sizes of rewards are
+  /// those of RewardScale, the last window's and the recent one.
+  void refine_unit(std::int32_t size_in_window, std::int32_t size, Episodes<Episode>& episodes) {
+    if (!readout_.exponent()) return;
+    const std::int32_t exponent = *readout_.exponent();
+    const std::int64_t n_weights = readout_.n_weights_of(episodes.of(0).present.code());
+    const std::int64_t rest = std::max<std::int64_t>(kDiscountOne - discount_, 1);
+    const int least_bits =
+        Readout::most_bits_of(n_weights) - (kDiscountBits - floor_log2(rest)) - kImplausibleBits;
+    const int n_free =
+        std::min(readout_.spare_bits(), 30 - (size_in_window - exponent)) - kRoomBits;
+    const int n_lacking = least_bits - (size - exponent);
+    const int n_refined = readout_.refine_unit(std::max({n_free, n_lacking, 0}));
+    for (std::size_t i = 0; i < episodes.size(); ++i) {
+      std::int64_t& old_value = episodes.of(i).old_value;
+      old_value = Readout::refined(old_value, n_refined);
+    }
+  }
+
+ private:
+  static constexpr int kDiscountBits = 15;
+  static constexpr std::int64_t kDiscountOne = std::int64_t{1} << kDiscountBits;
+  static constexpr int kRoomBits = 8;  ///< that a smaller unit leaves for larger weights
+  static constexpr int kImplausibleBits = 10;
+
+  static int floor_log2(std::int64_t x) noexcept {
+    return static_cast<int>(std::bit_width(static_cast<std::uint64_t>(x))) - 1;
+  }
+  /// After the unit was doubled so often.
+  void halve_old_values(int n_doubled, Episodes<Episode>& episodes) {
+    for (; n_doubled > 0; --n_doubled) {
+      for (std::size_t i = 0; i < episodes.size(); ++i) {
+        std::int64_t& old_value = episodes.of(i).old_value;
+        old_value = approximators::halved(old_value);
+      }
+    }
+  }
+
+  Readout readout_;
+  std::int64_t discount_;
+  std::int32_t decay_;
+};
+
+}  // namespace sdnn::agents::detail
