@@ -196,7 +196,7 @@ def run_trials(
 ) -> TrialsOutcome:
     """Run the planned trials that are not stored, and store each as soon as it is finished.
 
-    They run by default in threads of this process, one for each core; the observer is told what
+    They run by default in threads of this process, one for each core; the observer receives what
     happens. Ctrl-C and SIGTERM end the run after the chunks under way; finished trials are stored
     before it returns. A trial that raises does not stop the others.
 
