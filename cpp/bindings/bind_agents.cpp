@@ -10,6 +10,7 @@
 #include "arrays.hpp"
 #include "bind_config.hpp"
 #include "bindings.hpp"
+#include "sdnn/agents/actor_critic_config.hpp"
 #include "sdnn/agents/detail/dimensions.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/fixed_rate.hpp"
@@ -69,6 +70,8 @@ void bind_agents(py::module_& module) {
   def_schedule(bindings::bind_config<QLambdaConfig>(
       module, "QLambdaConfig",
       "The parameters of Q(lambda) and Sarsa(lambda) with a linear readout of the SDNN code."));
+  bindings::bind_config<agents::ActorCriticConfig>(
+      module, "ActorCriticConfig", "The parameters of the actor-critic, linear in the SDNN code.");
   bindings::bind_config<FuzzyQLearningConfig>(
       module, "FuzzyQLearningConfig",
       "The parameters of fuzzy Q-learning; the defaults are the paper's (section 4.3).");
@@ -80,6 +83,10 @@ void bind_agents(py::module_& module) {
       "q_lambda_presets",
       [] { return by_name(agents::q_lambda_presets(LinearSDNNConfig{}.n_inputs)); },
       "The presets of Q(lambda), by name");
+  module.def(
+      "actor_critic_presets",
+      [] { return by_name(agents::actor_critic_presets(LinearSDNNConfig{}.n_inputs)); },
+      "The presets of the actor-critic, by name");
 
   bindings::Class<agents::FixedRate>(module, "FixedRate", "Waits for ticks at a fixed rate")
       .def(py::init<double, agents::FixedRate::Clock, agents::FixedRate::Sleep>(), py::arg("hz"),

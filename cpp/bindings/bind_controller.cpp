@@ -286,7 +286,15 @@ void bind_controller(py::module_& module) {
           "it comes first")
       .def("values", &values, py::arg("observation"), py::arg("dimension") = 0,
            "Q of all actions of a dimension, as greedy actions follow it; of fuzzy rules the value "
-           "of the observation alone")
+           "of the observation alone, of an actor-critic the probabilities of the actions")
+      .def(
+          "state_value",
+          [](Controller& self, const ArrayArgument<double>& observation) {
+            require_warm(self);
+            const auto state = self.state_of(bindings::flat(observation));
+            return std::get<agents::ActorCritic>(self.agent()).value(state);
+          },
+          py::arg("observation"), "V(observation) of an actor-critic")
       .def(
           "state_of",
           [](Controller& self, const ArrayArgument<double>& observation) {

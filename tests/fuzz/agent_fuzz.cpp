@@ -4,8 +4,11 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <variant>
 
 #include "input.hpp"
+#include "sdnn/agents/actor_critic.hpp"
+#include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_lambda.hpp"
 #include "sdnn/agents/q_learning.hpp"
@@ -34,7 +37,7 @@ void use(Agent& agent, FuzzedDataProvider& input) {
   agent.begin_episode();
   while (input.remaining_bytes() > 0) {
     const auto state = fuzz::any_doubles(input, n_inputs, 0.0, 1.0);
-    switch (input.ConsumeIntegralInRange(0, 3)) {
+    switch (input.ConsumeIntegralInRange(0, 4)) {
       case 0:
         fuzz::accepted([&] { agent.act(state, input.ConsumeBool()); });
         break;
@@ -141,6 +144,28 @@ void linear(FuzzedDataProvider& input) {
   }
 }
 
+void actor_critic(FuzzedDataProvider& input) {
+  approximators::LinearSDNNConfig config{
+      .n_inputs = input.ConsumeIntegralInRange(2, 4), .n_pattern_units = 20, .n_interpolated = 4};
+  fuzz::change(config, input);
+  config.max_table_bytes = kMostBytes;
+  agents::ActorCriticConfig learning;
+  fuzz::change(learning, input);
+  std::vector<std::size_t> n_actions(input.ConsumeIntegralInRange<std::size_t>(1, 2));
+  for (auto& n : n_actions) n = input.ConsumeIntegralInRange<std::size_t>(1, 9);
+  auto made = agents::make_agent(config, learning, n_actions, 1);
+  auto& agent = std::get<agents::ActorCritic>(made);
+  use(agent, input);
+  auto workspace = agent.workspace();
+  const std::vector<double> state(agent.n_inputs(), 0.5);
+  for (std::size_t d = 0; d < agent.n_dimensions(); ++d) {
+    double sum = 0.0;
+    for (const double p : agent.values(state, workspace, d)) sum += p;
+    fuzz::expect(std::abs(sum - 1.0) < 1e-9, "probabilities do not sum to 1");
+  }
+  fuzz::expect(std::isfinite(agent.value(state)), "a value is not finite");
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -153,6 +178,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         return rbf(input);
       case 2:
         return linear(input);
+      case 3:
+        return actor_critic(input);
       default:
         return fuzzy(input);
     }

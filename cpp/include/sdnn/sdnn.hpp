@@ -3,6 +3,8 @@
 
 #include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/actions.hpp"
+#include "sdnn/agents/actor_critic.hpp"
+#include "sdnn/agents/actor_critic_config.hpp"
 #include "sdnn/agents/agent.hpp"
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller.hpp"
@@ -28,7 +30,9 @@
 #include "sdnn/agents/relevance.hpp"
 #include "sdnn/agents/return_range.hpp"
 #include "sdnn/agents/reward_scale.hpp"
+#include "sdnn/agents/running_ranges.hpp"
 #include "sdnn/agents/schedule_config.hpp"
+#include "sdnn/agents/softmax_policy.hpp"
 #include "sdnn/agents/warm_up.hpp"
 #include "sdnn/approximators/action_value.hpp"
 #include "sdnn/approximators/error_correction.hpp"

@@ -156,7 +156,8 @@ TEST(AgentFile, SaysWhatDoesNotFit) {
     content.description[json::json_pointer(pointer)] = value;
     return error_of(content);
   };
-  EXPECT_EQ(with("/kind", "sarsa"), "kind must be sdnn-c, rbf, fuzzy or q-lambda, got \"sarsa\"");
+  EXPECT_EQ(with("/kind", "sarsa"),
+            "kind must be sdnn-c, rbf, fuzzy, q-lambda or actor-critic, got \"sarsa\"");
   EXPECT_EQ(with("/seed", -1), "seed must be a whole number of 0 or more, got -1");
   EXPECT_EQ(with("/approximator", 3), "approximator must be an object, got 3");
   EXPECT_EQ(with("/approximator/n_scales", 3), "approximator.n_scales is not known");

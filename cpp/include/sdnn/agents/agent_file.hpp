@@ -19,6 +19,7 @@
 #include <variant>
 #include <vector>
 
+#include "sdnn/agents/actor_critic_config.hpp"
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
@@ -165,15 +166,20 @@ Config config_from_json(const nlohmann::json& object, const std::string& name) {
 
 namespace detail {
 
-/// The names of the kinds of agents in files, and of their classes in Python, in the order of
-/// AnyApproximatorConfig.
+/// The names of the kinds of agents in files, and of their classes in Python: in the order of
+/// AnyApproximatorConfig, then the actor-critic.
 struct AgentKind {
   std::string_view name, class_in_python;
 };
-inline constexpr std::array<AgentKind, 4> kAgentKinds{{{"sdnn-c", "SDNNQLearning"},
+inline constexpr std::array<AgentKind, 5> kAgentKinds{{{"sdnn-c", "SDNNQLearning"},
                                                        {"rbf", "RBFQLearning"},
                                                        {"fuzzy", "FuzzyQLearning"},
-                                                       {"q-lambda", "SDNNQLambda"}}};
+                                                       {"q-lambda", "SDNNQLambda"},
+                                                       {"actor-critic", "SDNNActorCritic"}}};
+inline const AgentKind& kind_of(const ControllerConfig& config) {
+  const bool is_actor_critic = std::holds_alternative<ActorCriticConfig>(config.learning);
+  return is_actor_critic ? kAgentKinds.back() : kAgentKinds.at(config.approximator.index());
+}
 
 /// The settings of a controller in a file's description.
 inline ControllerConfig controller_config_in(const nlohmann::json& description) {
@@ -202,8 +208,11 @@ inline ControllerConfig controller_config_in(const nlohmann::json& description) 
     case 3:
       read(approximators::LinearSDNNConfig(), QLambdaConfig());
       break;
+    case 4:
+      read(approximators::LinearSDNNConfig(), ActorCriticConfig());
+      break;
     default:
-      refuse("kind", "sdnn-c, rbf, fuzzy or q-lambda", name);
+      refuse("kind", "sdnn-c, rbf, fuzzy, q-lambda or actor-critic", name);
   }
   config.seed = value_from<std::uint64_t>(at("seed"), "seed");
   config.observation = config_from_json<ObservationConfig>(at("observation"), "observation");
@@ -214,7 +223,7 @@ inline ControllerConfig controller_config_in(const nlohmann::json& description) 
 
 /// Writes the settings of a controller into a description, as Python does.
 inline void describe(const ControllerConfig& config, nlohmann::json& description) {
-  const AgentKind& kind = kAgentKinds[config.approximator.index()];
+  const AgentKind& kind = kind_of(config);
   if (!description.contains("class")) description["class"] = kind.class_in_python;
   description["kind"] = kind.name;
   const auto to_json = [](const auto& part) { return config_to_json(part); };

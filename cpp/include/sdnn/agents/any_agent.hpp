@@ -10,7 +10,10 @@
 #include <variant>
 #include <vector>
 
+#include "sdnn/agents/actor_critic.hpp"
+#include "sdnn/agents/actor_critic_config.hpp"
 #include "sdnn/agents/detail/dimensions.hpp"
+#include "sdnn/agents/detail/make_actor_critic.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_lambda.hpp"
 #include "sdnn/agents/q_lambda_config.hpp"
@@ -31,7 +34,7 @@ namespace sdnn::agents {
 
 /// An agent of any kind.
 using AnyAgent = std::variant<QLearning<approximators::SDNNC>, QLearning<approximators::RBFNetwork>,
-                              FuzzyQLearning, QLambda>;
+                              FuzzyQLearning, QLambda, ActorCritic>;
 
 /// The memory of one reader of such an agent.
 template <class Agents>
@@ -46,10 +49,16 @@ using AnyWorkspace = WorkspacesOf<AnyAgent>::type;
 using AnyApproximatorConfig =
     std::variant<approximators::SDNNCConfig, approximators::RBFNetworkConfig,
                  approximators::FuzzyRulesConfig, approximators::LinearSDNNConfig>;
-using AnyLearningConfig = std::variant<QLearningConfig, FuzzyQLearningConfig, QLambdaConfig>;
+using AnyLearningConfig =
+    std::variant<QLearningConfig, FuzzyQLearningConfig, QLambdaConfig, ActorCriticConfig>;
 
 inline bool is_fuzzy(const AnyApproximatorConfig& config) noexcept {
   return std::holds_alternative<approximators::FuzzyRulesConfig>(config);
+}
+/// Whether an agent learns from actions of its own policy alone: not what a warm-up did.
+inline bool is_on_policy(const AnyLearningConfig& config) noexcept {
+  return std::holds_alternative<FuzzyQLearningConfig>(config) ||
+         std::holds_alternative<ActorCriticConfig>(config);
 }
 inline bool is_linear(const AnyApproximatorConfig& config) noexcept {
   return std::holds_alternative<approximators::LinearSDNNConfig>(config);
@@ -97,9 +106,19 @@ void expect_code_room(const Config& config, double weight_bytes, double n_dimens
 /// as large as the settings make them: before memory is asked for.
 template <class Reader>
 void expect_sizes(const Reader& reader, const AnyApproximatorConfig& config,
-                  const std::vector<std::size_t>& n_actions, bool has_tables) {
+                  const AnyLearningConfig& learning, const std::vector<std::size_t>& n_actions,
+                  bool has_tables) {
   const std::string name = "agent.action_value.";
   if (const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&config)) {
+    if (const auto* const actor_critic = std::get_if<ActorCriticConfig>(&learning)) {
+      const auto thermometers = has_tables ? approximators::Thermometers()
+                                           : detail::thermometers_of(*linear, *actor_critic);
+      const double n_columns = detail::n_columns_of(*linear, thermometers);
+      reader.expect_size(name + "weights", n_columns);
+      reader.expect_size("agent.actor.weights", n_columns * detail::n_rows_of(n_actions));
+      if (!has_tables) detail::expect_code_room(*linear, 4.0 * n_columns, 1.0);
+      return;
+    }
     const double n_weights = approximators::n_linear_weights(*linear, n_actions);
     reader.expect_size(name + "weights", n_weights);
     if (!has_tables) detail::expect_code_room(*linear, 4.0 * n_weights, 1.0);
@@ -154,11 +173,12 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
                            std::size_t n_first = 0, bool codes_missing = false) {
   using namespace approximators;
   const bool fits = is_fuzzy(config)    ? std::holds_alternative<FuzzyQLearningConfig>(learning)
-                    : is_linear(config) ? std::holds_alternative<QLambdaConfig>(learning)
+                    : is_linear(config) ? std::holds_alternative<QLambdaConfig>(learning) ||
+                                              std::holds_alternative<ActorCriticConfig>(learning)
                                         : std::holds_alternative<QLearningConfig>(learning);
   core::require(fits, "learning",
-                "FuzzyQLearningConfig with fuzzy rules, QLambdaConfig with a linear readout, else "
-                "QLearningConfig",
+                "FuzzyQLearningConfig with fuzzy rules, QLambdaConfig or ActorCriticConfig with a "
+                "linear readout, else QLearningConfig",
                 "another one");
   core::require(tables.empty() || is_linear(config) || (is_sdnn(config) && n_actions.size() == 1),
                 "tables", "None where actions have several dimensions", tables.size());
@@ -174,6 +194,11 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
       if (!tables.empty()) return tables;
       return codes_missing ? code_books_with_missing(config, seed) : code_books_of(config, seed);
     };
+    if (const auto* const rule = std::get_if<ActorCriticConfig>(&learning)) {
+      return detail::make_actor_critic(
+          *linear, *rule, n_actions, books(),
+          tables.empty() ? detail::thermometers_of(*linear, *rule) : Thermometers(), seed);
+    }
     return QLambda(LinearSDNN(*linear, n_actions, books(), seed, tables.empty() ? n_first : 0),
                    std::get<QLambdaConfig>(learning), seed);
   }

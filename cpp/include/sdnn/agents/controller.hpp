@@ -18,6 +18,7 @@
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller_config.hpp"
 #include "sdnn/agents/detail/approximator_of.hpp"
+#include "sdnn/agents/detail/last_states.hpp"
 #include "sdnn/agents/detail/taken_actions.hpp"
 #include "sdnn/agents/exploration.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
@@ -44,7 +45,8 @@ namespace sdnn::agents {
 ///
 /// Where ranges of observations are not known it begins with a *warm-up*: it acts at random for a
 /// while, takes the ranges from what it observed, and then learns what it did, in order; fuzzy
-/// Q-learning, which can learn its own actions only, begins anew. From then on the ranges stay.
+/// Q-learning and the actor-critic, which learn their own actions only, begin anew. From then on
+/// the ranges stay.
 ///
 /// Thread safety: const functions may be called by many threads at once, with a workspace each.
 class Controller : public WithRates<Controller> {
@@ -115,6 +117,7 @@ class Controller : public WithRates<Controller> {
       if (latest_) latest_->set_n_environments(n);
     }
     taken_.forget_from(n);
+    last_states_.forget_from(n);
     readings_.forget_from(n);
   }
   std::size_t n_environments() const {
@@ -266,9 +269,9 @@ class Controller : public WithRates<Controller> {
       if (warm_up_->is_over()) end_warm_up();
       return;
     }
-    observations_.scale(held.observation, state_);
+    last_states_.read(observations_, environment, held.observation, state_);
     find_indices(action, environment);
-    observations_.scale(held.next_observation, next_state_, "next_observation");
+    last_states_.follow(observations_, environment, held.next_observation, next_state_);
     learn_scaled(reward, terminated, environment, next_mask);
     readings_.note_step(environment);
     notes_.note(observation);
@@ -373,6 +376,7 @@ class Controller : public WithRates<Controller> {
 
   void begin_learned_episode(std::size_t environment) {
     std::visit([environment](auto& agent) { agent.begin_episode(environment); }, *agent_);
+    last_states_.forget(environment);
     if (latest_) latest_->begin_episode(environment);
   }
 
@@ -413,9 +417,14 @@ class Controller : public WithRates<Controller> {
         *agent_);
     const auto size_in_window = scale.end_window();
     reward_scale_ = scale;
-    if (auto* const linear = std::get_if<QLambda>(&*agent_); linear != nullptr && size_in_window) {
-      linear->refine_unit(*size_in_window, *scale.size());
-    }
+    if (!size_in_window) return;
+    std::visit(
+        [&](auto& agent) {
+          if constexpr (requires { agent.refine_unit(0, 0); }) {
+            agent.refine_unit(*size_in_window, *scale.size());
+          }
+        },
+        *agent_);
   }
 
   ControllerConfig config_;
@@ -431,6 +440,7 @@ class Controller : public WithRates<Controller> {
   std::vector<double> held_, state_, next_state_, action_;
   std::vector<std::size_t> indices_;
   detail::TakenActions taken_;
+  detail::LastStates last_states_{0, 0};  ///< where ranges are running
   RewardScale reward_scale_;
   core::Identity identity_;
 };

@@ -16,6 +16,7 @@ struct ObservationConfig {
   std::vector<std::optional<double>> high = {};
   bool adaptive = false;
   bool narrowed = false;
+  bool running = false;
   std::vector<int> angles = {};
   std::vector<std::vector<int>> angle_pairs = {};
   bool find_angle_pairs = false;
@@ -35,6 +36,8 @@ struct ObservationConfig {
         core::field("narrowed", &ObservationConfig::narrowed,
                     "Whether ranges of few inputs that are far wider than what is observed are "
                     "fitted."),
+        core::field("running", &ObservationConfig::running,
+                    "Whether ranges of numbers follow what is observed, whatever low and high."),
         core::field("angles", &ObservationConfig::angles,
                     "Variables that wrap around in their ranges."),
         core::field("angle_pairs", &ObservationConfig::angle_pairs,

@@ -74,6 +74,12 @@ class ObservationScale {
                   "one number for each input", n_bins_.size());
   }
 
+  /// Gives a variable another range, of finite ends.
+  void set_range(std::size_t i, double low, double high) noexcept {
+    low_[i] = low;
+    high_[i] = high;
+  }
+
   std::size_t n_observed() const noexcept { return low_.size(); }
   std::size_t n_inputs() const noexcept { return inputs_.size(); }
 

@@ -18,6 +18,7 @@
 #include "sdnn/agents/last_readings.hpp"
 #include "sdnn/agents/observation_config.hpp"
 #include "sdnn/agents/observation_scale.hpp"
+#include "sdnn/agents/running_ranges.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
 
@@ -30,7 +31,7 @@ namespace sdnn::agents {
 /// end and stay within the fixed range; narrowed ones are fitted where the fixed range is more than
 /// twice as wide and inputs are few: many would have too little data for finer bins. Pairs of
 /// neighbouring variables that lie and move on the unit circle, or around it by what is noise, can
-/// be found.
+/// be found. Running ranges are those of RunningRanges, and change with each observation.
 class Observations {
  public:
   /// Symbols are inputs of their own where the approximator codes symbols; it gets `least_inputs`
@@ -59,6 +60,7 @@ class Observations {
       for (const int variable : pair) claim(Role::pair, variable, "angle_pairs");
     }
     for (const int variable : config_.inputs) require_variable("inputs", variable);
+    if (config_.running) running_.emplace(n_variables());
     const Ranges fixed = fixed_ranges(config_.angle_pairs);
     needs_fit_ =
         may_find_pairs() || may_leave_out_inputs() || std::ranges::any_of(fixed.low, is_unknown);
@@ -119,6 +121,14 @@ class Observations {
     (*scale_)(observation, state, name);
   }
 
+  /// Whether ranges change.
+  bool is_running() const noexcept { return running_.has_value(); }
+  /// Lets running ranges follow an observation. Requires that it is fitted.
+  void note(std::span<const double> observation) {
+    running_->note(observation);
+    follow();
+  }
+
   /// Which inputs have a variable that is never left out.
   std::vector<bool> required() const {
     std::vector<bool> required;
@@ -144,13 +154,17 @@ class Observations {
   /// std::invalid_argument where there is no range, and then nothing has changed.
   void fit(std::span<const double> seen) {
     const auto pairs = config_.find_angle_pairs ? pairs_in(seen) : config_.angle_pairs;
+    for (std::size_t i = 0; running_ && i < seen.size() / 2; i += n_variables()) {
+      running_->note(seen.subspan(i, n_variables()));
+    }
     Ranges ranges = fixed_ranges(pairs);
     const bool narrows = config_.narrowed && inputs_with(pairs).size() <= kFewInputs;
     for (std::size_t i = 0; i < n_variables(); ++i) {
       if (is_unknown(ranges.low[i])) {
-        std::tie(ranges.low[i], ranges.high[i]) = fitted_range(column(seen, i), i);
+        std::tie(ranges.low[i], ranges.high[i]) =
+            fitted_range(detail::column(seen, n_variables(), i), i);
       } else if (narrows && roles_[i] == Role::number && !is_one_of(pairs, i)) {
-        narrow(ranges, i, column(seen, i));
+        narrow(ranges, i, detail::column(seen, n_variables(), i));
       }
     }
     take(ranges, pairs);
@@ -189,6 +203,12 @@ class Observations {
   /// Lists what was fitted; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
+    if (self.running_) {
+      archive.part("running", *self.running_);
+      if constexpr (Archive::kReads) {
+        if (!self.needs_fit_) self.follow();
+      }
+    }
     if (!self.needs_fit_) return;
     Ranges ranges = self.ranges_;
     std::vector<std::int32_t> listed;
@@ -272,6 +292,9 @@ class Observations {
           !config_.adaptive || roles_[i] == Role::symbol || roles_[i] == Role::circular;
       if (bounds && is_fixed) std::tie(ranges.low[i], ranges.high[i]) = *bounds;
     }
+    for (std::size_t i = 0; running_ && i < n_variables(); ++i) {
+      if (roles_[i] == Role::number) std::tie(ranges.low[i], ranges.high[i]) = (*running_)[i];
+    }
     for (const auto& pair : pairs) {
       for (const int variable : pair) {
         ranges.low[index(variable)] = -1.0;
@@ -333,32 +356,13 @@ class Observations {
     return {std::max(wide_low, std::min(low, first)), std::min(wide_high, std::max(high, last))};
   }
 
-  std::vector<double> column(std::span<const double> seen, std::size_t i) const {
-    std::vector<double> values;
-    for (; i < seen.size(); i += n_variables()) {
-      if (std::isfinite(seen[i])) values.push_back(seen[i]);
+  /// Takes the ranges as they are now.
+  void follow() {
+    for (std::size_t i = 0; i < n_variables(); ++i) {
+      if (roles_[i] != Role::number || is_one_of(pairs_, i)) continue;
+      std::tie(ranges_.low[i], ranges_.high[i]) = (*running_)[i];
+      scale_->set_range(i, ranges_.low[i], ranges_.high[i]);
     }
-    if (values.empty()) values.push_back(0.0);
-    return values;
-  }
-
-  /// Two variables where both were read, before a step and after it: halves as those of `seen`.
-  std::pair<std::vector<double>, std::vector<double>> columns(std::span<const double> seen,
-                                                              std::size_t i, std::size_t j) const {
-    const std::size_t n = n_variables();
-    const std::size_t half = seen.size() / n / 2 * n;
-    const auto is_read = [&](std::size_t row) {
-      return std::isfinite(seen[row + i]) && std::isfinite(seen[row + j]);
-    };
-    std::pair<std::vector<double>, std::vector<double>> columns;
-    for (const std::size_t first : {std::size_t{0}, half}) {
-      for (std::size_t row = 0; row < half; row += n) {
-        if (!is_read(row) || !is_read(half + row)) continue;
-        columns.first.push_back(seen[first + row + i]);
-        columns.second.push_back(seen[first + row + j]);
-      }
-    }
-    return columns;
   }
 
   bool may_find_pairs() const {
@@ -374,7 +378,7 @@ class Observations {
     Pairs pairs;
     for (std::size_t i = 0; i + 1 < n_variables(); ++i) {
       if (roles_[i] != Role::number || roles_[i + 1] != Role::number) continue;
-      const auto [cosines, sines] = columns(seen, i, i + 1);
+      const auto [cosines, sines] = detail::columns(seen, n_variables(), i, i + 1);
       if (!detail::is_on_circle(cosines, sines) && !detail::is_around_circle(cosines, sines))
         continue;
       pairs.push_back({static_cast<int>(i), static_cast<int>(i + 1)});
@@ -431,6 +435,7 @@ class Observations {
   std::vector<std::size_t> n_bins_;
   std::vector<Role> roles_;  ///< as the configuration has them
   bool needs_fit_ = false;
+  std::optional<RunningRanges> running_;
   Ranges ranges_;
   Pairs pairs_;
   std::vector<ObservedInput> inputs_;

@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "sdnn/agents/actor_critic_config.hpp"
 #include "sdnn/agents/q_lambda_config.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
 #include "sdnn/approximators/linear_sdnn_config.hpp"
@@ -18,6 +19,7 @@ struct Settings {
 };
 using Preset = Settings<approximators::SDNNCConfig, QLearningConfig>;
 using QLambdaPreset = Settings<approximators::LinearSDNNConfig, QLambdaConfig>;
+using ActorCriticPreset = Settings<approximators::LinearSDNNConfig, ActorCriticConfig>;
 
 /// The paper's settings (section 4.2): the defaults.
 inline Preset paper_preset(int n_inputs) { return {.approximator = {.n_inputs = n_inputs}}; }
@@ -69,6 +71,7 @@ struct Named {
 };
 using NamedPreset = Named<Preset>;
 using NamedQLambdaPreset = Named<QLambdaPreset>;
+using NamedActorCriticPreset = Named<ActorCriticPreset>;
 
 inline std::array<NamedPreset, 4> presets(int n_inputs) {
   return {{{"paper", "as in the paper", paper_preset(n_inputs)},
@@ -105,6 +108,15 @@ inline QLambdaPreset general_q_lambda_preset(int n_inputs) {
 inline std::array<NamedQLambdaPreset, 2> q_lambda_presets(int n_inputs) {
   return {{{"paper", "the paper's rule, in the paper's task", paper_q_lambda_preset(n_inputs)},
            {"general", "as recommended for any task", general_q_lambda_preset(n_inputs)}}};
+}
+
+/// The defaults of the actor-critic: five actions in each dimension of a box.
+inline ActorCriticPreset general_actor_critic_preset(int n_inputs) {
+  return {.approximator = {.n_inputs = n_inputs, .n_actions = 5}};
+}
+
+inline std::array<NamedActorCriticPreset, 1> actor_critic_presets(int n_inputs) {
+  return {{{"general", "as recommended for any task", general_actor_critic_preset(n_inputs)}}};
 }
 
 }  // namespace sdnn::agents

@@ -85,18 +85,27 @@ bool follows_progress(const Config& config) noexcept {
 
 }  // namespace detail
 
-/// Alpha and epsilon at a progress in [0, 1]; the first values where they do not follow it.
+/// Alpha and epsilon at a progress in [0, 1]; the first values where they do not follow it. Epsilon
+/// is 0 where no policy is epsilon-greedy.
 template <class Config>
 double learning_rate_at(const Config& config, double progress) noexcept {
-  if (!detail::follows_progress(config)) return config.learning_rate;
-  return detail::scheduled(config.learning_rate, config.final_learning_rate, config.schedule,
-                           progress);
+  if constexpr (requires { config.schedule; }) {
+    if (detail::follows_progress(config)) {
+      return detail::scheduled(config.learning_rate, config.final_learning_rate, config.schedule,
+                               progress);
+    }
+  }
+  return config.learning_rate;
 }
 template <class Config>
 double epsilon_at(const Config& config, double progress) noexcept {
-  if (!detail::follows_progress(config)) return config.policy.epsilon;
-  return detail::scheduled(config.policy.epsilon, config.final_epsilon, config.schedule,
-                           std::min(1.0, progress / config.exploration_fraction));
+  if constexpr (requires { config.policy; }) {
+    if (!detail::follows_progress(config)) return config.policy.epsilon;
+    return detail::scheduled(config.policy.epsilon, config.final_epsilon, config.schedule,
+                             std::min(1.0, progress / config.exploration_fraction));
+  } else {
+    return 0.0;
+  }
 }
 
 /// Throws std::invalid_argument naming the field that is out of range or would have no effect.

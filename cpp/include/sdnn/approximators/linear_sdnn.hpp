@@ -17,6 +17,7 @@
 
 #include "sdnn/approximators/detail/linear_rows.hpp"
 #include "sdnn/approximators/detail/state_wiring.hpp"
+#include "sdnn/approximators/detail/thermometers.hpp"
 #include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/coding/action_code.hpp"
 #include "sdnn/coding/pattern_table.hpp"
@@ -68,11 +69,14 @@ class LinearSDNN {
       : LinearSDNN(config, n_actions, code_books_of(with_pattern_units(config), seed), seed,
                    n_first) {}
 
-  /// Takes code books of any coding, a table per input. Throws like the other constructor.
+  /// Takes code books of any coding, a table per input, and adds the columns of `thermometers`.
+  /// Throws like the other constructor.
   LinearSDNN(const LinearSDNNConfig& config, std::span<const std::size_t> n_actions,
-             std::vector<coding::PatternTable> tables, std::uint64_t seed, std::size_t n_first = 0)
+             std::vector<coding::PatternTable> tables, std::uint64_t seed, std::size_t n_first = 0,
+             Thermometers thermometers = {})
       : config_(with_pattern_units(config)),
-        code_(wiring_of(config_, std::move(tables), seed, n_first)) {
+        code_(wiring_of(config_, std::move(tables), seed, n_first)),
+        thermometers_(std::move(thermometers)) {
     core::require(!n_actions.empty(), "n_actions", "of one dimension at least", 0);
     for (const std::size_t n : n_actions) {
       core::require_in_range("n_actions", n, std::size_t{1}, std::size_t{1} << 16);
@@ -103,7 +107,7 @@ class LinearSDNN {
   /// The number of units of all dimensions, the rows of the weights.
   std::size_t n_rows() const noexcept { return n_rows_; }
   /// The number of columns of a row, including those that are always 0.
-  std::size_t n_slots() const noexcept { return 64 * code_->n_words(); }
+  std::size_t n_slots() const noexcept { return 64 * code_->n_words() + thermometers_.n_columns(); }
   /// Shape: (n_rows, n_slots).
   std::span<const std::int32_t> weights() const noexcept { return weights_; }
   /// The exponent of the unit of values, 2^exponent; none before the first reward that is not 0.
@@ -143,9 +147,11 @@ class LinearSDNN {
       positive[w] = active[w] & ~positive[w];
     }
     Code& code = workspace.code_;
-    code.n_active_ = static_cast<std::int32_t>(n_active);
     spread_bits(active, code_->n_words(), code.active_.data());
     spread_bits(positive, code_->n_words(), code.negative_.data());
+    n_active += thermometers_.write(workspace.bins_, code.active_.data() + 64 * code_->n_words(),
+                                    code.negative_.data() + 64 * code_->n_words());
+    code.n_active_ = static_cast<std::int32_t>(n_active);
   }
 
   /// The dimension's part of Q(s, a) of the state that was read, for each of its actions, in units;
@@ -345,7 +351,7 @@ class LinearSDNN {
       archive.number("n_snapshots", self.n_snapshots_);
     }
     if constexpr (Archive::kReads) {
-      const auto fits = [](std::int32_t w) { return w > -kLargestWeight && w < kLargestWeight; };
+      const auto fits = [](std::int32_t w) { return size_bits(w) < kLargestWeight; };
       archive.expect(std::ranges::all_of(self.weights_, fits), "weights", "below 2^23 in size");
       archive.expect(std::ranges::all_of(self.averaged_, fits), "averaged_weights",
                      "below 2^23 in size");
@@ -420,6 +426,7 @@ class LinearSDNN {
 
   LinearSDNNConfig config_;
   std::shared_ptr<const coding::StateCode> code_;
+  Thermometers thermometers_;
   std::vector<Dimension> dimensions_;
   std::size_t n_rows_ = 0;
   std::vector<std::int32_t> weights_;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "sdnn/core/detail/floating_point.hpp"
@@ -15,6 +17,36 @@ inline constexpr double kNearCircle = 1e-3;  // single precision and some roundi
 // that of a radius that moves smoothly is above 0.5.
 inline constexpr std::size_t kFewest = 200;  // steps
 inline constexpr double kLargestBias = 0.15, kLeastOpposed = 0.5, kMostAlike = 0.2;
+
+/// The readings of a variable, shape (n, n_variables) row by row; 0 where there is none.
+inline std::vector<double> column(std::span<const double> seen, std::size_t n_variables,
+                                  std::size_t i) {
+  std::vector<double> values;
+  for (; i < seen.size(); i += n_variables) {
+    if (std::isfinite(seen[i])) values.push_back(seen[i]);
+  }
+  if (values.empty()) values.push_back(0.0);
+  return values;
+}
+
+/// Two variables where both were read, before a step and after it: halves as those of `seen`.
+inline std::pair<std::vector<double>, std::vector<double>> columns(std::span<const double> seen,
+                                                                   std::size_t n_variables,
+                                                                   std::size_t i, std::size_t j) {
+  const std::size_t half = seen.size() / n_variables / 2 * n_variables;
+  const auto is_read = [&](std::size_t row) {
+    return std::isfinite(seen[row + i]) && std::isfinite(seen[row + j]);
+  };
+  std::pair<std::vector<double>, std::vector<double>> columns;
+  for (const std::size_t first : {std::size_t{0}, half}) {
+    for (std::size_t row = 0; row < half; row += n_variables) {
+      if (!is_read(row) || !is_read(half + row)) continue;
+      columns.first.push_back(seen[first + row + i]);
+      columns.second.push_back(seen[first + row + j]);
+    }
+  }
+  return columns;
+}
 
 /// Whether all points are on the unit circle, and move.
 inline bool is_on_circle(const std::vector<double>& cosines, const std::vector<double>& sines) {

@@ -62,7 +62,7 @@ inline RandomExperience experience_of(const Observations& fitted, const WarmUp& 
 
 inline WarmUp Controller::new_warm_up() const {
   return {n_variables(), n_dimensions(), static_cast<std::size_t>(config_.warm_up_steps),
-          config_.seed, !is_fuzzy(approximator_)};
+          config_.seed, !is_on_policy(config_.learning)};
 }
 
 /// Makes the agent: all ranges are known. Of a state that is read, sizes are compared first.
@@ -70,7 +70,7 @@ inline void Controller::fit(const core::StateReader* reader) {
   approximator_ = detail::approximator_of(config_, observations_, actions_, tables_);
   const auto tables = detail::tables_of(config_, observations_, approximator_, tables_);
   if (reader != nullptr) {
-    expect_sizes(*reader, approximator_, actions_.n_actions(), !tables.empty());
+    expect_sizes(*reader, approximator_, config_.learning, actions_.n_actions(), !tables.empty());
   }
   agent_.emplace(make_agent(approximator_, config_.learning, actions_.n_actions(), config_.seed,
                             tables, n_first_inputs(), observations_.codes_missing()));
@@ -78,6 +78,7 @@ inline void Controller::fit(const core::StateReader* reader) {
     if (n_dimensions() == 1) sdnn->n_actions = static_cast<int>(actions_.n_actions().front());
   }
   apply_rates([this](auto& agent) { agent.set_rates(rates_); });
+  last_states_ = {n_variables(), observations_.n_inputs()};
   state_.resize(observations_.n_inputs());
   next_state_.resize(state_.size());
 }
@@ -95,7 +96,7 @@ inline void Controller::end_warm_up() {
   reward_scale_ = RewardScale(warm_up.rewards());
   warm_up_.reset();
   set_n_environments(warm_up.n_in_all());
-  if (is_fuzzy(approximator_)) {
+  if (is_on_policy(config_.learning)) {
     for (std::size_t i = 0; i < n_environments(); ++i) begin_learned_episode(i);
   } else {
     LastReadings readings = observations_.last_readings();
@@ -116,8 +117,8 @@ inline void Controller::watch() {
   latest_.reset();
   const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&approximator_);
   const auto kept = observations_.kept_inputs();
-  if (linear == nullptr || linear->max_pairs != 0 || !tables_.empty() ||
-      std::ranges::find(kept, false) == kept.end()) {
+  if (linear == nullptr || !std::holds_alternative<QLambdaConfig>(config_.learning) ||
+      linear->max_pairs != 0 || !tables_.empty() || std::ranges::find(kept, false) == kept.end()) {
     return;
   }
   latest_.emplace(new_warm_up(), static_cast<std::size_t>(config_.warm_up_steps));
@@ -209,6 +210,9 @@ void Controller::serialize(Self& self, Archive& archive) {
     archive.part("reward_scale", self.reward_scale_);
   }
   archive.part("taken", self.taken_);
+  if (self.observations_.is_running() && !is_warming_up) {
+    archive.part("last_states", self.last_states_);
+  }
   if (self.readings_.is_held()) archive.part("readings", self.readings_);
   if constexpr (Archive::kReads) self.end_reading(archive);
 }

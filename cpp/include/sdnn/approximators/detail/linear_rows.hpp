@@ -183,9 +183,10 @@ class LinearCode {
     return signs;
   }
 
+  CodeMasks masks() const noexcept { return {active_.data(), negative_.data()}; }
+
  private:
   friend class LinearSDNN;
-  CodeMasks masks() const noexcept { return {active_.data(), negative_.data()}; }
 
   std::vector<std::int32_t> active_, negative_;
   std::int32_t n_active_ = 0;
@@ -210,6 +211,14 @@ class LinearWorkspace {
 /// The traces of a stream of experience: the weights that contributed to earlier values.
 class LinearTrace {
  public:
+  /// Begins with zeros.
+  LinearTrace(std::size_t n_rows, std::size_t n_columns)
+      : n_columns_(n_columns), values_(n_rows * n_columns), live_(n_rows) {}
+
+  /// The traces of a row's weights, to be changed, after which set_live tells whether one is not 0.
+  std::int32_t* row(std::size_t i) noexcept { return &values_[i * n_columns_]; }
+  void set_live(std::size_t i, bool is_live) noexcept { live_[i] = is_live; }
+
   void clear() noexcept {
     for (std::size_t row = 0; row < live_.size(); ++row) {
       if (live_[row]) std::fill_n(&values_[row * n_columns_], n_columns_, 0);
@@ -239,8 +248,6 @@ class LinearTrace {
 
  private:
   friend class LinearSDNN;
-  LinearTrace(std::size_t n_rows, std::size_t n_columns)
-      : n_columns_(n_columns), values_(n_rows * n_columns), live_(n_rows) {}
 
   std::size_t n_columns_;
   std::vector<std::int32_t> values_;

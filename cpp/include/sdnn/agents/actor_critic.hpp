@@ -1,0 +1,351 @@
+/// An actor-critic, linear in the SDNN code, in integers.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/agents/action_mask.hpp"
+#include "sdnn/agents/actor_critic_config.hpp"
+#include "sdnn/agents/detail/error_scale.hpp"
+#include "sdnn/agents/detail/linear_td.hpp"
+#include "sdnn/agents/detail/q_lambda_episode.hpp"
+#include "sdnn/agents/episodes.hpp"
+#include "sdnn/agents/exploration.hpp"
+#include "sdnn/agents/schedule_config.hpp"
+#include "sdnn/agents/softmax_policy.hpp"
+#include "sdnn/approximators/detail/linear_rows.hpp"
+#include "sdnn/approximators/linear_sdnn.hpp"
+#include "sdnn/coding/action_code.hpp"
+#include "sdnn/core/config_fields.hpp"
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::agents {
+
+/// An agent that learns a softmax policy over the actions of each dimension, and the value of
+/// states, by traces.
+///
+/// The critic learns V(s) by true-online TD(lambda), as QLambda learns Q(s, a), with one action.
+/// The actor moves its preferences by
+///
+///     z <- gamma lambda z + gradient of log pi(a | s)
+///     w <- w + beta / n (clip(delta / sigma) z + entropy * gradient of H(pi(. | s)))
+///     delta = r + gamma V(s') - V(s)
+///
+/// where n is the number of columns of the code that are not 0, sigma the running root mean square
+/// of delta, and errors are clipped at 3. As n hardly changes, a step of beta moves preferences as
+/// far in every state, whatever the scale of rewards.
+///
+/// After the scaling of observations everything is an integer; see QLambda and SoftmaxPolicy.
+///
+/// Source: Barto, A., Sutton, R., Anderson, C. (1983); Degris, T., Pilarski, P., Sutton, R. (2012),
+/// Model-free reinforcement learning with continuous action in practice (traces of actor and
+/// critic), with a softmax over bins.
+class ActorCritic : public WithRates<ActorCritic> {
+ public:
+  using Readout = approximators::LinearSDNN;
+  using Policy = SoftmaxPolicy;
+  using Action = std::span<const std::size_t>;
+
+  /// The memory of one reader.
+  struct Workspace {
+    Readout::Workspace critic;
+    Policy::Workspace actor;
+    std::vector<double> values;
+    std::vector<std::size_t> action;
+  };
+
+  /// Takes a critic of one action. Throws std::invalid_argument naming the field that is out of
+  /// range.
+  ActorCritic(Readout critic, std::vector<std::size_t> n_actions, const ActorCriticConfig& config,
+              std::uint64_t seed)
+      : config_(config),
+        td_(std::move(critic), config.discount, config.trace_decay),
+        actor_(std::move(n_actions), this->critic().n_slots()),
+        exploration_(seed, core::Stream::exploration),
+        ties_(seed, core::Stream::evaluation_ties),
+        workspace_(workspace()),
+        episodes_(new_episode()) {
+    core::check_fields(config_);
+    apply_rates();
+  }
+
+  const ActorCriticConfig& config() const noexcept { return config_; }
+  /// The critic.
+  std::span<Readout> networks() noexcept { return {&td_.readout(), 1}; }
+  std::span<const Readout> networks() const noexcept { return {&td_.readout(), 1}; }
+  const Readout& critic() const noexcept { return td_.readout(); }
+  const Policy& actor() const noexcept { return actor_; }
+
+  std::size_t n_inputs() const { return critic().n_inputs(); }
+  std::size_t n_dimensions() const { return actor_.n_dimensions(); }
+  std::size_t n_actions(std::size_t d) const { return actor_.n_actions(d); }
+  /// Transitions that were learned.
+  std::int64_t n_learned() const noexcept { return n_learned_; }
+
+  /// The critic's alpha at present, in steps of 2^-16; epsilon is 0: the policy itself is random.
+  double learning_rate() const noexcept { return static_cast<double>(rate_) / kOne; }
+  double epsilon() const noexcept { return 0.0; }
+
+  /// In how many environments at once the agent learns. Throws std::invalid_argument outside
+  /// [1, 2^14].
+  void set_n_environments(std::size_t n) {
+    episodes_.resize(n, [this] { return new_episode(); });
+  }
+  std::size_t n_environments() const noexcept { return episodes_.size(); }
+
+  /// Ends the traces. Throws std::invalid_argument if there is no such environment.
+  void begin_episode(std::size_t environment = 0) {
+    Episode& episode = episodes_.of(environment);
+    end(episode);
+    episode.mask.clear();
+    episode.has_acted = false;
+  }
+
+  Workspace workspace() const {
+    return {critic().workspace(), actor_.workspace(), {}, std::vector<std::size_t>(n_dimensions())};
+  }
+
+  /// The probabilities of the dimension's actions. Valid until the workspace is used again. Shape:
+  /// state (l,) in [0, 1]. Throws std::invalid_argument.
+  std::span<const double> values(std::span<const double> state, Workspace& workspace,
+                                 std::size_t d = 0, bool /*averaged*/ = false) const {
+    read(state, workspace);
+    const auto terms = actor_.terms(workspace.actor, d);
+    std::uint64_t sum = 0;
+    for (const auto& term : terms) sum += term.weight;
+    workspace.values.clear();
+    for (const auto& term : terms) {
+      workspace.values.push_back(static_cast<double>(term.weight) / static_cast<double>(sum));
+    }
+    return workspace.values;
+  }
+  /// V(state). Throws std::invalid_argument.
+  double value(std::span<const double> state) {
+    critic().read(state, workspace_.critic);
+    return critic().value_of(critic().sum(workspace_.critic, kOnlyAction));
+  }
+
+  /// Returns a most probable action; `ties` decides between several. The span is valid until the
+  /// workspace is used again.
+  Action best_action(std::span<const double> state, Workspace& workspace, core::Random& ties,
+                     ActionMask mask = {}) const {
+    require_mask("mask", mask);
+    critic().read(state, workspace.critic);
+    return best_of(workspace, ties, mask);
+  }
+  /// The two steps of act without `explore`; see QLambda.
+  void read(std::span<const double> state, Workspace& workspace) const {
+    critic().read(state, workspace.critic);
+    actor_.read(workspace.critic.code(), {}, workspace.actor);
+  }
+  Action best_of(Workspace& workspace, ActionMask mask = {}) {
+    require_mask("mask", mask);
+    return best_of(workspace, ties_, mask);
+  }
+
+  /// Returns an allowed action to take in `state`, drawn by the policy; without `explore` a most
+  /// probable one. Valid until the next act. Shapes: state (l,) in [0, 1], mask as ActionMask has
+  /// it. Throws std::invalid_argument.
+  Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
+             ActionMask mask = {}) {
+    Episode& episode = episodes_.of(environment);
+    core::require_unit_values("state", state, n_inputs());  // before anything is drawn
+    require_mask("mask", mask);
+    if (!explore) {
+      critic().read(state, workspace_.critic);
+      return best_of(workspace_, ties_, mask);
+    }
+    critic().read_next(state, episode.next);
+    actor_.read(episode.next.code(), mask, workspace_.actor);
+    actor_.draw(workspace_.actor, exploration_, workspace_.action);
+    episode.mask.assign(mask.begin(), mask.end());
+    episode.has_acted = true;
+    return workspace_.action;
+  }
+
+  /// The action of the first dimension as a number in [-1, 1]: actions cut the range evenly.
+  double normalized_action(Action action) const {
+    return coding::action_value(action.front(), n_actions(0), -1.0, 1.0);
+  }
+
+  /// Learns one transition. One that does not begin where the last one ended begins traces anew.
+  /// Throws std::invalid_argument for a reward that is not finite or beyond +- 1e300 or an
+  /// environment that is none; then nothing has been learned.
+  void learn(std::span<const double> state, Action action, double reward,
+             std::span<const double> next_state, bool terminated, std::size_t environment = 0,
+             ActionMask next_mask = {}) {
+    core::require_unit_values("state", state, n_inputs());
+    agents::require_action(action, n_dimensions(), [this](auto d) { return n_actions(d); });
+    core::require_finite("reward", reward);
+    core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
+    core::require_unit_values("next_state", next_state, n_inputs());
+    require_mask("next_mask", next_mask);
+    Episode& episode = episodes_.of(environment);
+    if (!std::ranges::equal(episode.next_state, state)) {
+      if (!episode.has_acted) episode.mask.clear();
+      end(episode);
+    }
+    episode.has_acted = false;
+    critic().read_next(state, episode.present);
+    critic().read_next(next_state, episode.next);
+    ++n_learned_;
+    apply_rates();
+    td_.fit_unit(reward, episodes_);
+    std::int64_t next = 0;
+    if (!terminated) {
+      next = td_.in_range(episodes_, [&] { return critic().sum(episode.next, kOnlyAction); });
+    }
+    const bool is_allowed = allows_action(episode.mask, action);
+    learn_step(episode, action, reward, next, is_allowed ? ActionMask(episode.mask) : ActionMask());
+    if (terminated) {
+      end(episode);
+      episode.mask.clear();
+      return;
+    }
+    episode.next_state.assign(next_state.begin(), next_state.end());
+    episode.mask.assign(next_mask.begin(), next_mask.end());
+  }
+
+  /// Makes the unit of values smaller where it is larger than it has to be; see QLambda.
+  void refine_unit(std::int32_t size_in_window, std::int32_t size) {
+    td_.refine_unit(size_in_window, size, episodes_);
+  }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    archive.part("action_value", self.td_.readout());
+    archive.part("actor", self.actor_);
+    archive.part("exploration", self.exploration_);
+    archive.part("ties", self.ties_);
+    archive.part("error_scale", self.scale_);
+    ActorCritic::serialize_rates(self, archive);
+    archive.number("n_learned", self.n_learned_);
+    Episodes<Episode>::serialize(
+        self.episodes_, archive, [&self] { return self.new_episode(); },
+        [&](auto& episode) { self.serialize_episode(self, episode, archive); });
+    if constexpr (Archive::kReads) {
+      archive.expect(self.n_learned_ >= 0 && self.n_learned_ <= kMostLearned, "n_learned",
+                     "in [0, 2^45]");
+      self.apply_rates();
+    }
+  }
+
+ private:
+  friend class WithRates<ActorCritic>;
+
+  static constexpr std::int64_t kMostLearned = std::int64_t{1} << 45;
+  static constexpr std::int32_t kOne = Readout::kRateOne;
+  static constexpr std::size_t kOnlyActions[] = {0};
+  static constexpr Action kOnlyAction{kOnlyActions};
+
+  /// The state of the present episode in one environment.
+  struct Episode {
+    approximators::LinearTrace trace;  ///< of the critic
+    approximators::LinearTrace actor_trace;
+    Readout::Workspace present;      ///< of the state that is learned
+    Readout::Workspace next;         ///< of the state after it, or another
+    std::vector<double> next_state;  ///< where the last transition ended; empty: it terminated
+    std::vector<std::uint8_t> mask;  ///< of the present state
+    bool has_acted = false;          ///< since the last transition: the mask is that of the act
+    std::int64_t old_value = 0;      ///< V_old, in units
+  };
+
+  Episode new_episode() const {
+    return {.trace = critic().trace(),
+            .actor_trace = actor_.trace(),
+            .present = critic().workspace(),
+            .next = critic().workspace(),
+            .next_state = {},
+            .mask = {}};
+  }
+
+  template <class Self, class Listed, class Archive>
+  static void serialize_episode(Self& self, Listed& episode, Archive& archive) {
+    archive.part("trace", episode.trace);
+    archive.part("actor_trace", episode.actor_trace);
+    archive.number("old_value", episode.old_value);
+    archive.numbers("next_state", episode.next_state);
+    archive.number("has_acted", episode.has_acted);
+    serialize_mask("mask", episode.mask, archive, self.n_dimensions(),
+                   [&self](std::size_t d) { return self.n_actions(d); });
+    if constexpr (Archive::kReads) {
+      const auto is_unit = [](double x) { return x >= 0.0 && x <= 1.0; };
+      archive.expect(
+          episode.next_state.empty() || (episode.next_state.size() == self.n_inputs() &&
+                                         std::ranges::all_of(episode.next_state, is_unit)),
+          "next_state", "a state in [0, 1], or empty");
+      archive.expect(!Readout::is_too_large(episode.old_value), "old_value", "below 2^33 in size");
+    }
+  }
+
+  void apply_rates(const auto& /*change*/) { apply_rates(); }
+  void apply_rates() {
+    const auto by_steps = [this](double first, const std::optional<double>& last) {
+      return std::max(1, detail::scheduled(first, last.value_or(first), n_learned_,
+                                           config_.schedule_steps, kOne));
+    };
+    rate_ = by_steps(config_.learning_rate, config_.final_learning_rate);
+    if (rates_.set_learning_rate) {
+      rate_ = std::max(1, static_cast<std::int32_t>(std::lround(*rates_.set_learning_rate * kOne)));
+    }
+    actor_rate_ = by_steps(config_.actor_learning_rate, config_.final_actor_learning_rate);
+  }
+
+  void require_mask(const char* name, ActionMask mask) const {
+    agents::require_mask(name, mask, n_dimensions(), [this](auto d) { return n_actions(d); });
+  }
+  bool allows_action(ActionMask mask, Action action) const noexcept {
+    for (std::size_t d = 0; d < action.size(); ++d) {
+      if (!allows(take_part(mask, n_actions(d)), action[d])) return false;
+    }
+    return true;
+  }
+
+  Action best_of(Workspace& workspace, core::Random& ties, ActionMask mask) const {
+    actor_.read(workspace.critic.code(), mask, workspace.actor);
+    actor_.best(workspace.actor, ties, workspace.action);
+    return workspace.action;
+  }
+
+  static void end(Episode& episode) noexcept {
+    episode.trace.clear();
+    episode.actor_trace.clear();
+    episode.old_value = 0;
+    episode.next_state.clear();
+  }
+
+  /// Learns one step; `next` is V(s') in units.
+  void learn_step(Episode& episode, Action action, double reward, std::int64_t next,
+                  ActionMask mask) {
+    const bool is_dutch = n_environments() == 1;
+    const auto error = td_.error_of(episode, episodes_, kOnlyAction, reward, next, is_dutch);
+    actor_.read(episode.present.code(), mask, workspace_.actor);
+    actor_.learn(episode.present.code(), workspace_.actor, action, episode.actor_trace,
+                 {.error = scale_.normalized(error.error, critic().exponent().value_or(0)),
+                  .rate = actor_rate_,
+                  .entropy = static_cast<std::int32_t>(std::lround(config_.entropy * kOne)),
+                  .decay = td_.decay()});
+    td_.correct(episode, episodes_, kOnlyAction, error, rate_, is_dutch);
+  }
+
+  ActorCriticConfig config_;
+  detail::LinearTD<Episode> td_;
+  Policy actor_;
+  core::Random exploration_;
+  core::Random ties_;
+  detail::ErrorScale scale_;
+  std::int64_t n_learned_ = 0;
+  std::int32_t rate_ = 0;        ///< the critic's alpha, kOne for 1
+  std::int32_t actor_rate_ = 0;  ///< the actor's
+  Workspace workspace_;
+  Episodes<Episode> episodes_;
+};
+
+}  // namespace sdnn::agents

@@ -1,0 +1,77 @@
+/// The running root mean square of TD errors, in integers.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+
+namespace sdnn::agents::detail {
+
+/// Returns the integer part of the square root.
+constexpr std::uint64_t square_root(std::uint64_t x) noexcept {
+  std::uint64_t root = 0;
+  for (std::uint64_t bit = std::uint64_t{1} << 62; bit != 0; bit >>= 2) {
+    if (x >= root + bit) {
+      x -= root + bit;
+      root = (root >> 1) + bit;
+    } else {
+      root >>= 1;
+    }
+  }
+  return root;
+}
+
+/// Divides errors by their root mean square, of all errors until there are 1,024, then of about the
+/// last 1,024.
+class ErrorScale {
+ public:
+  /// Returns an error that counts 2^exponent in units of the root mean square, with 12 fractional
+  /// bits, clipped at 3; the error itself counts among those that are averaged.
+  std::int32_t normalized(std::int64_t error, std::int32_t exponent) noexcept {
+    for (; exponent_ < exponent && mean_square_ > 0; ++exponent_) mean_square_ >>= 2;
+    for (; exponent_ > exponent && mean_square_ > 0; --exponent_) {
+      mean_square_ = std::min(mean_square_ << 2, kLargestMean);
+    }
+    exponent_ = exponent;
+    const std::int64_t size = std::min(std::abs(error) >> kLowBits, kLargestSize);
+    const std::int64_t square = (size * size) << kFractionBits;
+    if (n_errors_ < kWindow) {
+      ++n_errors_;
+      mean_square_ += (square - mean_square_) / n_errors_;
+    } else {
+      mean_square_ += (square - mean_square_) / kWindow;
+    }
+    const auto root = static_cast<std::int64_t>(
+        square_root(static_cast<std::uint64_t>(mean_square_ >> kFractionBits)));
+    const auto quotient =
+        std::min((size << 12) / std::max<std::int64_t>(root, 1), std::int64_t{3} << 12);
+    return static_cast<std::int32_t>(error < 0 ? -quotient : quotient);
+  }
+
+  /// Lists the state; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    archive.number("mean_square", self.mean_square_);
+    archive.number("n_errors", self.n_errors_);
+    archive.number("exponent", self.exponent_);
+    if constexpr (Archive::kReads) {
+      archive.expect(self.mean_square_ >= 0 && self.mean_square_ <= kLargestMean, "mean_square",
+                     "in [0, 2^60]");
+      archive.expect(self.n_errors_ >= 0 && self.n_errors_ <= kWindow, "n_errors", "in [0, 1024]");
+      archive.expect(std::abs(self.exponent_) <= 1100, "exponent", "in [-1100, 1100]");
+    }
+  }
+
+ private:
+  static constexpr int kLowBits = 8;
+  static constexpr int kFractionBits = 10;
+  static constexpr std::int64_t kLargestSize = (std::int64_t{1} << 25) - 1;
+  static constexpr std::int64_t kLargestMean = std::int64_t{1} << 60;
+  static constexpr std::int64_t kWindow = 1024;
+
+  std::int64_t mean_square_ = 0;  ///< of sizes, with 10 fractional bits
+  std::int64_t n_errors_ = 0;
+  std::int32_t exponent_ = 0;  ///< of the unit of errors
+};
+
+}  // namespace sdnn::agents::detail

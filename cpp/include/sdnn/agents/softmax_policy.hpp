@@ -1,0 +1,169 @@
+/// A softmax policy with preferences that are linear in the SDNN code, in integers.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/agents/action_mask.hpp"
+#include "sdnn/agents/detail/softmax.hpp"
+#include "sdnn/approximators/detail/linear_rows.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::agents {
+
+/// pi(a | s) = exp h(s, a) / sum of exp h(s, b), for each dimension of the action apart; h(s, a) is
+/// the inner product of the action's weights and the code of s.
+///
+/// A preference counts units of 2^-n_unit_bits(); weights have 23 bits. Weights that would need
+/// more are clipped: the preferences of a code reach +-64 at least.
+class SoftmaxPolicy {
+ public:
+  using Code = approximators::LinearCode;
+  using Trace = approximators::LinearTrace;
+
+  /// The memory of one reader: the preferences of all actions and their probabilities.
+  struct Workspace {
+    std::vector<std::int64_t> preferences;
+    std::vector<detail::SoftmaxTerm> terms;  ///< of all dimensions
+  };
+
+  /// The rates of a step of learning.
+  struct Step {
+    std::int32_t error = 0;    ///< the normalized TD error, kErrorOne for 1
+    std::int32_t rate = 0;     ///< of the error, 2^16 for 1
+    std::int32_t entropy = 0;  ///< the weight of the entropy's gradient, 2^16 for 1
+    std::int32_t decay = 0;    ///< gamma lambda, kDecayOne for 1
+  };
+  static constexpr int kErrorBits = 12;
+  static constexpr std::int32_t kErrorOne = 1 << kErrorBits;
+
+  /// Makes equal preferences for n_actions[d] actions of each dimension d, over codes of
+  /// `n_columns` columns of which about a quarter are not 0.
+  SoftmaxPolicy(std::vector<std::size_t> n_actions, std::size_t n_columns)
+      : n_actions_(std::move(n_actions)),
+        n_columns_(n_columns),
+        n_unit_bits_(16 + static_cast<int>(std::bit_width(n_columns / 4))) {
+    for (const std::size_t n : n_actions_) n_rows_ += n;
+    weights_.resize(n_rows_ * n_columns_);
+  }
+
+  std::size_t n_dimensions() const noexcept { return n_actions_.size(); }
+  std::size_t n_actions(std::size_t d) const noexcept { return n_actions_[d]; }
+  std::size_t n_rows() const noexcept { return n_rows_; }
+  int n_unit_bits() const noexcept { return n_unit_bits_; }
+  /// Shape: (n_rows, n_columns).
+  std::span<const std::int32_t> weights() const noexcept { return weights_; }
+
+  Workspace workspace() const {
+    return {std::vector<std::int64_t>(n_rows_), std::vector<detail::SoftmaxTerm>(n_rows_)};
+  }
+  Trace trace() const { return {n_rows_, n_columns_}; }
+
+  /// Computes the probabilities of the allowed actions in the state of a code.
+  void read(const Code& code, ActionMask mask, Workspace& workspace) const {
+    constexpr std::size_t kAtOnce = 64;
+    const std::int32_t* rows[kAtOnce];
+    for (std::size_t row = 0; row < n_rows_;) {
+      const std::size_t first = row;
+      for (; row < n_rows_ && row - first < kAtOnce; ++row) {
+        rows[row - first] = &weights_[row * n_columns_];
+      }
+      approximators::row_sums(rows, row - first, code.masks(), n_columns_,
+                              &workspace.preferences[first]);
+    }
+    std::size_t first = 0;
+    for (const std::size_t n : n_actions_) {
+      detail::softmax(std::span(workspace.preferences).subspan(first, n), take_part(mask, n),
+                      n_unit_bits_, std::span(workspace.terms).subspan(first, n));
+      first += n;
+    }
+  }
+
+  /// The terms of a dimension, of the state that was read last.
+  std::span<const detail::SoftmaxTerm> terms(const Workspace& workspace, std::size_t d) const {
+    std::size_t first = 0;
+    for (std::size_t i = 0; i < d; ++i) first += n_actions_[i];
+    return std::span(workspace.terms).subspan(first, n_actions_[d]);
+  }
+
+  /// Draws an action of each dimension by its probability.
+  void draw(const Workspace& workspace, core::Random& random, std::span<std::size_t> action) const {
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      action[d] = detail::draw_term(terms(workspace, d), random);
+    }
+  }
+  /// Finds a most probable action of each dimension; `ties` decides between several.
+  void best(const Workspace& workspace, core::Random& ties, std::span<std::size_t> action) const {
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      action[d] = detail::best_term(terms(workspace, d), ties);
+    }
+  }
+
+  /// Decays the trace, adds the gradient of log pi(action | s) to it, and moves the weights along
+  /// the trace by rate / n times the error, and along the gradient of the entropy, where n is the
+  /// number of columns of the code that are not 0. Requires that `read` has read the code.
+  void learn(const Code& code, const Workspace& workspace, std::span<const std::size_t> action,
+             Trace& trace, const Step& step) {
+    const std::int64_t n = std::max<std::int64_t>(1, code.n_active());
+    const std::int64_t rate = (std::int64_t{step.rate} << 12) / n;  // 2^28 for 1
+    const std::int64_t along_trace =
+        approximators::scaled(step.error, rate, kErrorBits + 28 - n_unit_bits_);
+    int n_bits = 0;
+    while (std::abs(along_trace) >> n_bits >= (1 << 13) - 1) ++n_bits;
+    approximators::RowStep row_step{
+        .decay = step.decay,
+        .gain = 0,
+        .replace = 0,
+        .step = static_cast<std::int32_t>(approximators::scaled(along_trace, 1, n_bits)),
+        .shift = std::max(12 - n_bits, 1),
+        .correction = 0};
+    std::size_t row = 0;
+    for (std::size_t d = 0; d < n_dimensions(); ++d) {
+      const auto of_dimension = terms(workspace, d);
+      for (std::size_t a = 0; a < of_dimension.size(); ++a, ++row) {
+        const detail::SoftmaxTerm& term = of_dimension[a];
+        row_step.gain =
+            (a == action[d] ? approximators::kTraceOne : 0) -
+            static_cast<std::int32_t>(approximators::scaled(term.probability, 1, 16 - 12));
+        row_step.correction = static_cast<std::int32_t>(approximators::scaled(
+            std::int64_t{term.entropy_slope} * step.entropy, rate, 60 - n_unit_bits_));
+        std::int32_t* const weights = &weights_[row * n_columns_];
+        const approximators::RowUse use =
+            approximators::learn_row(weights, trace.row(row), code.masks(), n_columns_, row_step);
+        trace.set_live(row, use.traces != 0);
+        if (use.weights >= approximators::kLargestWeight - 1) clip(weights);
+      }
+    }
+  }
+
+  /// Lists the state; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    archive.fixed("weights", {self.n_rows_, self.n_columns_}, self.weights_);
+    if constexpr (Archive::kReads) {
+      const auto fits = [](std::int32_t w) {
+        return w > -approximators::kLargestWeight && w < approximators::kLargestWeight;
+      };
+      archive.expect(std::ranges::all_of(self.weights_, fits), "weights", "below 2^23 in size");
+    }
+  }
+
+ private:
+  void clip(std::int32_t* weights) const noexcept {
+    constexpr std::int32_t kMost = approximators::kLargestWeight - 1;
+    for (std::size_t j = 0; j < n_columns_; ++j) weights[j] = std::clamp(weights[j], -kMost, kMost);
+  }
+
+  std::vector<std::size_t> n_actions_;
+  std::size_t n_rows_ = 0;
+  std::size_t n_columns_;
+  int n_unit_bits_;
+  std::vector<std::int32_t> weights_;
+};
+
+}  // namespace sdnn::agents

@@ -1,0 +1,63 @@
+/// Columns that tell the size of each input by itself, beside the code of pairs of inputs.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/coding/pattern_table.hpp"
+
+namespace sdnn::approximators {
+
+/// Thermometer codes: unit k of an input is +1 where the input is above threshold k, else -1, with
+/// thresholds at even distances over its bins.
+///
+/// The inner product of two such codes falls linearly with the distance of the inputs, from n_units
+/// to -n_units at opposite ends. So a readout of them learns trends over the whole range at once,
+/// as one of the plain inputs does, and no other arithmetic is needed.
+class Thermometers {
+ public:
+  /// No columns.
+  Thermometers() = default;
+  /// Codes of `n_units` units for inputs with n_bins[i] bins; inputs with 0 have none.
+  Thermometers(std::size_t n_units, std::vector<coding::Bin> n_bins)
+      : n_units_(static_cast<coding::Bin>(n_units)), n_bins_(std::move(n_bins)) {}
+
+  /// The number of columns: one for each unit, 0 for an input without a code.
+  std::size_t n_columns() const noexcept {
+    const auto n_codes = std::ranges::count_if(n_bins_, [](auto n) { return n > 0; });
+    return static_cast<std::size_t>(n_codes) * static_cast<std::size_t>(n_units_);
+  }
+
+  /// Writes the masks of the codes; see CodeMasks. A bin beyond the others stands for a missing
+  /// reading: its code is 0. Shapes: bins (l,), active and negative (n_columns,). Returns how many
+  /// columns are not 0.
+  std::size_t write(std::span<const coding::Bin> bins, std::int32_t* active,
+                    std::int32_t* negative) const noexcept {
+    std::size_t n_active = 0;
+    for (std::size_t i = 0; i < n_bins_.size(); ++i) {
+      const coding::Bin n_bins = n_bins_[i];
+      if (n_bins == 0) continue;
+      const bool is_read = bins[i] < n_bins;
+      const coding::Bin last = std::max(n_bins - 1, 1);
+      const coding::Bin n_above = is_read ? (2 * bins[i] * n_units_ + last) / (2 * last) : 0;
+      std::fill_n(active, n_units_, is_read ? -1 : 0);
+      std::fill_n(negative, n_units_, 0);
+      if (is_read) std::fill_n(negative + n_above, n_units_ - n_above, -1);
+      active += n_units_;
+      negative += n_units_;
+      if (is_read) n_active += static_cast<std::size_t>(n_units_);
+    }
+    return n_active;
+  }
+
+ private:
+  coding::Bin n_units_ = 0;
+  std::vector<coding::Bin> n_bins_;
+};
+
+}  // namespace sdnn::approximators

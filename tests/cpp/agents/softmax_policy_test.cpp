@@ -1,0 +1,103 @@
+#include "sdnn/agents/softmax_policy.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include "sdnn/agents/detail/softmax.hpp"
+#include "sdnn/approximators/detail/thermometers.hpp"
+#include "sdnn/core/random.hpp"
+
+namespace sdnn::agents::detail {
+namespace {
+
+constexpr int kBits = 24;
+
+std::vector<SoftmaxTerm> softmax_of(const std::vector<double>& preferences,
+                                    ActionMask allowed = {}) {
+  std::vector<std::int64_t> units;
+  for (const double h : preferences) units.push_back(std::llround(std::ldexp(h, kBits)));
+  std::vector<SoftmaxTerm> terms(units.size());
+  softmax(units, allowed, kBits, terms);
+  return terms;
+}
+
+TEST(Softmax, EqualsItsFormulaInDoubles) {
+  core::Random random(1, core::Stream::weights);
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<double> preferences(1 + random.below(7));
+    for (double& h : preferences) h = 4.0 * random.normal();
+    std::vector<double> p;
+    for (const double h : preferences) p.push_back(std::exp(h));
+    const double sum = std::accumulate(p.begin(), p.end(), 0.0);
+    double entropy = 0.0;
+    for (double& part : p) {
+      part /= sum;
+      entropy -= part * std::log(part);
+    }
+    const auto terms = softmax_of(preferences);
+    for (std::size_t a = 0; a < p.size(); ++a) {
+      EXPECT_NEAR(terms[a].probability / 65536.0, p[a], 3e-5);
+      EXPECT_NEAR(terms[a].entropy_slope / 65536.0, p[a] * (std::log(p[a]) + entropy), 4e-4);
+    }
+  }
+}
+
+TEST(Softmax, EqualPreferencesAreExactlyEven) {
+  for (const SoftmaxTerm& term : softmax_of({3.0, 3.0, 3.0, 3.0})) {
+    EXPECT_EQ(term.weight, 1U << 30);
+    EXPECT_EQ(term.probability, 1 << 14);
+    EXPECT_EQ(term.entropy_slope, 0);
+  }
+}
+
+TEST(Softmax, AnActionThatIsNotAllowedHasNoPart) {
+  const std::uint8_t allowed[] = {0, 1, 1};
+  const auto terms = softmax_of({9.0, 1.0, 1.0}, allowed);
+  EXPECT_EQ(terms[0].weight, 0U);
+  EXPECT_EQ(terms[0].entropy_slope, 0);
+  EXPECT_EQ(terms[1].probability, 1 << 15);
+  core::Random random(1, core::Stream::exploration);
+  for (int i = 0; i < 50; ++i) EXPECT_NE(draw_term(terms, random), 0U);
+}
+
+TEST(Softmax, PreferencesFarBelowTheBestAreNeverDrawn) {
+  const auto terms = softmax_of({0.0, -60.0, 1e5});
+  EXPECT_EQ(terms[2].probability, 1 << 16);
+  EXPECT_EQ(terms[0].weight + terms[1].weight, 0U);
+}
+
+TEST(Softmax, ActionsAreDrawnByTheirProbability) {
+  const auto terms = softmax_of({0.0, std::log(3.0)});
+  core::Random random(1, core::Stream::exploration);
+  int n_second = 0;
+  for (int i = 0; i < 10000; ++i) n_second += draw_term(terms, random) == 1 ? 1 : 0;
+  EXPECT_NEAR(n_second / 10000.0, 0.75, 0.02);
+}
+
+// Three units over five bins: thresholds between bins 0 and 1, at bin 2, between bins 3 and 4.
+TEST(Thermometers, UnitsAreAboveTheThresholdsBelowTheBin) {
+  const approximators::Thermometers thermometers(3, {5, 0});
+  ASSERT_EQ(thermometers.n_columns(), 3U);
+  const std::vector<std::vector<std::int32_t>> negative{
+      {-1, -1, -1}, {0, -1, -1}, {0, 0, -1}, {0, 0, -1}, {0, 0, 0}};
+  for (coding::Bin bin = 0; bin < 5; ++bin) {
+    std::vector<std::int32_t> active(3, 7), found(3, 7);
+    const coding::Bin bins[] = {bin, 0};
+    EXPECT_EQ(thermometers.write(bins, active.data(), found.data()), 3U);
+    EXPECT_EQ(active, std::vector<std::int32_t>(3, -1));
+    EXPECT_EQ(found, negative[static_cast<std::size_t>(bin)]) << bin;
+  }
+  std::vector<std::int32_t> active(3, 7), found(3, 7);
+  const coding::Bin missing[] = {5, 0};
+  EXPECT_EQ(thermometers.write(missing, active.data(), found.data()), 0U);
+  EXPECT_EQ(active, std::vector<std::int32_t>(3, 0));
+}
+
+}  // namespace
+}  // namespace sdnn::agents::detail
