@@ -172,8 +172,7 @@ class QLambda:
             self.double_unit()
             next_value = rounded(next_value, 1)
         value = self.value(x, action)  # the textbook's Q; old_value is its Q_old
-        reward = math.floor(math.ldexp(reward, -(self.exponent or 0)) + 0.5)
-        target = reward + rounded(next_value * round(s.discount * 2**15), 15)
+        target = self.units_of(reward) + rounded(next_value * round(s.discount * 2**15), 15)
         drift, self.old_value = value - self.old_value, next_value
         # (8) Alpha is divided by the number of weights that have a part in Q(s, a): a step of 1
         #     corrects the whole error of a new state, and no step overshoots.
@@ -214,6 +213,9 @@ class QLambda:
 
     # (9) The unit follows the rewards: the first one has 31 bits. It doubles where a weight would
     #     need more than 23 bits, or a value more than 33.
+
+    def units_of(self, reward):
+        return math.floor(math.ldexp(reward, -(self.exponent or 0)) + 0.5)
 
     def fit_unit(self, reward):
         if reward != 0.0 and self.exponent is None:

@@ -1,19 +1,16 @@
 """
 The compiled core of sdnn; use it through the packages above it.
 """
-
 from __future__ import annotations
 import collections.abc
 import enum
 import numpy
 import numpy.typing
 import typing
-
 class Stream(enum.Enum):
     """
     What a random number is for
     """
-
     code_books = 1
     evaluation_sensor_noise = 8
     evaluation_ties = 7
@@ -22,44 +19,36 @@ class Stream(enum.Enum):
     sensor_noise = 6
     ties = 4
     weights = 3
-
 class SelectiveDesensitization:
     """
     The desensitized code of a sample, from its bins
     """
-    def __init__(
-        self,
-        modified: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]],
-        modifiers: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]],
-        pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-    ) -> None: ...
-    def gram(
-        self,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        other_bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None,
-    ) -> numpy.typing.NDArray[numpy.int32]:
+    def __init__(self, modified: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]], modifiers: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]], pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> None:
+        ...
+    def gram(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], other_bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None) -> numpy.typing.NDArray[numpy.int32]:
         """
         Inner products of codes
         """
-    def transform(
-        self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]
-    ) -> numpy.typing.NDArray[numpy.int8]:
+    def transform(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.int8]:
         """
         Entries +1, 0, -1, sample by sample
         """
     @property
-    def n_columns(self) -> int: ...
+    def n_columns(self) -> int:
+        ...
     @property
-    def n_inputs(self) -> int: ...
+    def n_inputs(self) -> int:
+        ...
     @property
-    def n_pairs(self) -> int: ...
+    def n_pairs(self) -> int:
+        ...
     @property
-    def n_units(self) -> int: ...
-
+    def n_units(self) -> int:
+        ...
 class SDNNCConfig:
     """
     Everything that defines an SDNN-C; the defaults are the paper's values.
-
+    
     Parameters
     ----------
     n_inputs : int
@@ -110,48 +99,26 @@ class SDNNCConfig:
         Corrections between snapshots of the weights, of which the network keeps an average for greedy actions, or a 64th part of all if that is more. The latest count most; weights take three times the memory. 0, as in the paper: no average. Must be in [0, 1000000000].
     max_table_bytes : int
         A larger network (weights, patterns, remembered potentials) is refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        n_inputs: int = ...,
-        max_pairs: int = ...,
-        n_pattern_units: int = ...,
-        n_anchor_patterns: int = ...,
-        n_interpolated: int = ...,
-        balanced_anchors: bool = ...,
-        circular: collections.abc.Sequence[bool] = ...,
-        n_symbols: collections.abc.Sequence[int] = ...,
-        n_hidden_units: int = ...,
-        n_active_units: int = ...,
-        n_actions: int = ...,
-        q_low: float = ...,
-        q_high: float = ...,
-        u_low: int | None = ...,
-        u_high: int | None = ...,
-        learning_coefficient: float = ...,
-        lattice: int = ...,
-        initial_threshold: float = ...,
-        initial_weights: typing.Literal["ternary", "uniform"] = ...,
-        initial_weight_limit: float = ...,
-        rounding: typing.Literal["half_up", "random", "away"] = ...,
-        weight_limit: int = ...,
-        averaging_interval: int = ...,
-        max_table_bytes: int = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> SDNNCConfig: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_inputs: int = ..., max_pairs: int = ..., n_pattern_units: int = ..., n_anchor_patterns: int = ..., n_interpolated: int = ..., balanced_anchors: bool = ..., circular: collections.abc.Sequence[bool] = ..., n_symbols: collections.abc.Sequence[int] = ..., n_hidden_units: int = ..., n_active_units: int = ..., n_actions: int = ..., q_low: float = ..., q_high: float = ..., u_low: int | None = ..., u_high: int | None = ..., learning_coefficient: float = ..., lattice: int = ..., initial_threshold: float = ..., initial_weights: typing.Literal['ternary', 'uniform'] = ..., initial_weight_limit: float = ..., rounding: typing.Literal['half_up', 'random', 'away'] = ..., weight_limit: int = ..., averaging_interval: int = ..., max_table_bytes: int = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> SDNNCConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
     def replace(self, **changes: typing.Any) -> SDNNCConfig:
         """
         Return a copy with other values of some fields.
@@ -182,7 +149,7 @@ class SDNNCConfig:
         Of `uniform` initial weights, in units of c.
         """
     @property
-    def initial_weights(self) -> typing.Literal["ternary", "uniform"]:
+    def initial_weights(self) -> typing.Literal['ternary', 'uniform']:
         """
         The "small random" initial weights: `ternary`: one lattice step down, none, or up with probabilities 1/4, 1/2, 1/4; `uniform`: within initial_weight_limit, rounded to the lattice. An assumption.
         """
@@ -267,7 +234,7 @@ class SDNNCConfig:
         Lowest value of the output range (section 4.2: -20).
         """
     @property
-    def rounding(self) -> typing.Literal["half_up", "random", "away"]:
+    def rounding(self) -> typing.Literal['half_up', 'random', 'away']:
         """
         Of the number of units that are to fire. `half_up`: to the nearest; `random`: up or down at random in proportion, so that no small change is lost on average; `away`: in the direction of the change by at least one unit. An assumption.
         """
@@ -286,22 +253,15 @@ class SDNNCConfig:
         """
         Largest size, in steps of the lattice, of the sum or difference of two weights of a hidden unit: where a correction would exceed it, the unit is not corrected. An agent that learns in C needs 127 or less. 0: 16383, beyond which is an error.
         """
-
 class SDNNC:
     """
     A network that gives Q(s, a) for every action at once
     """
     @typing.overload
-    def __init__(
-        self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex
-    ) -> None: ...
+    def __init__(self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @typing.overload
-    def __init__(
-        self,
-        config: SDNNCConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-        tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]],
-    ) -> None:
+    def __init__(self, config: SDNNCConfig, seed: typing.SupportsInt | typing.SupportsIndex, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]]) -> None:
         """
         With the patterns of each input: (n_bins, m) of -1, +1
         """
@@ -309,9 +269,7 @@ class SDNNC:
         """
         Their average, or the thresholds: (n,)
         """
-    def averaged_values(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def averaged_values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         As values, by the average of the weights: (l,) -> (n_actions,)
         """
@@ -327,28 +285,17 @@ class SDNNC:
         """
         g(u) of u = 0 .. n' active units: (n' + 1,)
         """
-    def permutation(
-        self,
-        mu: typing.SupportsInt | typing.SupportsIndex,
-        nu: typing.SupportsInt | typing.SupportsIndex,
-    ) -> numpy.typing.NDArray[numpy.uint32]:
+    def permutation(self, mu: typing.SupportsInt | typing.SupportsIndex, nu: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.uint32]:
         """
         sigma_mu_nu: (m,)
         """
-    def potentials(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.int32]:
+    def potentials(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.int32]:
         """
         Inner potentials in lattice steps; shapes (l,) -> (n,)
         """
-    def set_parameters(
-        self,
-        weights: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        thresholds: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-    ) -> None: ...
-    def table(
-        self, input: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int8]:
+    def set_parameters(self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], thresholds: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> None:
+        ...
+    def table(self, input: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
         """
         Patterns of an input: (n_bins, m) of -1, +1
         """
@@ -356,24 +303,13 @@ class SDNNC:
         """
         A copy, in lattice steps: (n,)
         """
-    def update(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.SupportsInt | typing.SupportsIndex,
-        target: typing.SupportsFloat | typing.SupportsIndex,
-        rate: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-    ) -> None:
+    def update(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         """
         One correction of Q = Q(state, action) towards (1 - rate) Q + rate target
         """
-    def value(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.SupportsInt | typing.SupportsIndex,
-    ) -> float: ...
-    def values(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def value(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex) -> float:
+        ...
+    def values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Q(state, a) for every action; shapes (n_inputs,) -> (n_actions,)
         """
@@ -382,7 +318,8 @@ class SDNNC:
         A copy, in lattice steps: (n, D)
         """
     @property
-    def config(self) -> SDNNCConfig: ...
+    def config(self) -> SDNNCConfig:
+        ...
     @property
     def correction_counts(self) -> tuple[int, int, int, int]:
         """
@@ -394,9 +331,11 @@ class SDNNC:
         How far targets, clipped to the range, were from values: of the last thousand or so
         """
     @property
-    def n_actions(self) -> int: ...
+    def n_actions(self) -> int:
+        ...
     @property
-    def n_inputs(self) -> int: ...
+    def n_inputs(self) -> int:
+        ...
     @property
     def output_range(self) -> tuple[float, float]:
         """
@@ -408,19 +347,20 @@ class SDNNC:
         (mu, nu) of every group of x_SD, in its order
         """
     @property
-    def u_high(self) -> int: ...
+    def u_high(self) -> int:
+        ...
     @property
-    def u_low(self) -> int: ...
+    def u_low(self) -> int:
+        ...
     @property
     def value_step(self) -> float:
         """
         What one active unit more is worth
         """
-
 class FuzzyRulesConfig:
     """
     The sizes of a table of fuzzy rules; the defaults are the paper's.
-
+    
     Parameters
     ----------
     n_inputs : int
@@ -431,28 +371,26 @@ class FuzzyRulesConfig:
         Discrete actions that every rule has values of, evenly spaced over the action's range. Must be in [1, 1048576].
     max_table_bytes : int
         A larger table is refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        n_inputs: int = ...,
-        n_sets: int = ...,
-        n_actions: int = ...,
-        max_table_bytes: int = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> FuzzyRulesConfig: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_inputs: int = ..., n_sets: int = ..., n_actions: int = ..., max_table_bytes: int = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> FuzzyRulesConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
     def replace(self, **changes: typing.Any) -> FuzzyRulesConfig:
         """
         Return a copy with other values of some fields.
@@ -477,31 +415,27 @@ class FuzzyRulesConfig:
         """
         Triangular sets per input, evenly spaced over its range. There are n_sets to the power of n_inputs rules of 4 n_actions bytes: 45 MB with 6 inputs.
         """
-
 class FuzzyRules:
     """
     Rules over a grid of triangular sets
     """
-    def __init__(self, config: FuzzyRulesConfig) -> None: ...
-    def fire(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> tuple[numpy.typing.NDArray[numpy.uint64], numpy.typing.NDArray[numpy.float64]]:
+    def __init__(self, config: FuzzyRulesConfig) -> None:
+        ...
+    def fire(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.uint64], numpy.typing.NDArray[numpy.float64]]:
         """
         The rules that fire and their truth values
         """
-    def values(
-        self, rule: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.float32]:
+    def values(self, rule: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float32]:
         """
         A copy of v(rule, a) for every action: (n_actions,)
         """
     @property
-    def n_rules(self) -> int: ...
-
+    def n_rules(self) -> int:
+        ...
 class RBFNetworkConfig:
     """
     The sizes of an RBF network: normalized Gaussians on an even grid, linear in the weights. The paper gives 4 bases per dimension and 601 actions; the rest are assumptions.
-
+    
     Parameters
     ----------
     n_inputs : int
@@ -516,30 +450,26 @@ class RBFNetworkConfig:
         Rate of a gradient step. With Q-learning's learning_rate 0.5 the default is stable whatever the sizes and the width. Must be in (0, 1000000].
     max_table_bytes : int
         More weights are refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        n_inputs: int = ...,
-        n_bases: int = ...,
-        n_actions: int = ...,
-        width: float = ...,
-        gradient_rate: float = ...,
-        max_table_bytes: int = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> RBFNetworkConfig: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_inputs: int = ..., n_bases: int = ..., n_actions: int = ..., width: float = ..., gradient_rate: float = ..., max_table_bytes: int = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> RBFNetworkConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
     def replace(self, **changes: typing.Any) -> RBFNetworkConfig:
         """
         Return a copy with other values of some fields.
@@ -574,28 +504,19 @@ class RBFNetworkConfig:
         """
         Standard deviation of a Gaussian in units of the spacing of the centres.
         """
-
 class RBFNetwork:
     """
     Q(s, a) linear in normalized Gaussian bases
     """
-    def __init__(self, config: RBFNetworkConfig) -> None: ...
-    def set_weights(
-        self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> None: ...
-    def update(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.SupportsInt | typing.SupportsIndex,
-        target: typing.SupportsFloat | typing.SupportsIndex,
-        rate: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-    ) -> None:
+    def __init__(self, config: RBFNetworkConfig) -> None:
+        ...
+    def set_weights(self, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def update(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.SupportsInt | typing.SupportsIndex, target: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         """
         One correction of Q = Q(state, action) towards (1 - rate) Q + rate target
         """
-    def values(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Q(state, a) for every action; shapes (n_inputs,) -> (n_actions,)
         """
@@ -604,16 +525,18 @@ class RBFNetwork:
         A copy, row-major over inputs and action: (n_bases^(d+1),)
         """
     @property
-    def config(self) -> RBFNetworkConfig: ...
+    def config(self) -> RBFNetworkConfig:
+        ...
     @property
-    def n_actions(self) -> int: ...
+    def n_actions(self) -> int:
+        ...
     @property
-    def n_joint_bases(self) -> int: ...
-
+    def n_joint_bases(self) -> int:
+        ...
 class LinearSDNNConfig:
     """
     Everything that defines a linear readout of the SDNN code; not in the paper.
-
+    
     Parameters
     ----------
     n_inputs : int
@@ -640,36 +563,26 @@ class LinearSDNNConfig:
         With more than 0 the readout keeps an average of its weights, by which greedy actions are chosen, and takes a snapshot for it after so many corrections. What was learned last counts most. Must be in [0, 1000000000].
     max_table_bytes : int
         A larger readout (weights, patterns, one trace) is refused before memory is allocated; 1 GiB by default.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        n_inputs: int = ...,
-        max_pairs: int = ...,
-        n_pattern_units: int = ...,
-        n_anchor_patterns: int = ...,
-        n_interpolated: int = ...,
-        balanced_anchors: bool = ...,
-        circular: collections.abc.Sequence[bool] = ...,
-        n_symbols: collections.abc.Sequence[int] = ...,
-        n_actions: int = ...,
-        action_window: int = ...,
-        averaging_interval: int = ...,
-        max_table_bytes: int = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> LinearSDNNConfig: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_inputs: int = ..., max_pairs: int = ..., n_pattern_units: int = ..., n_anchor_patterns: int = ..., n_interpolated: int = ..., balanced_anchors: bool = ..., circular: collections.abc.Sequence[bool] = ..., n_symbols: collections.abc.Sequence[int] = ..., n_actions: int = ..., action_window: int = ..., averaging_interval: int = ..., max_table_bytes: int = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> LinearSDNNConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
     def replace(self, **changes: typing.Any) -> LinearSDNNConfig:
         """
         Return a copy with other values of some fields.
@@ -734,42 +647,25 @@ class LinearSDNNConfig:
         """
         Per input, how many symbols it may be, each with a random pattern of its own: symbol k of n is a value of (k + 0.5) / n. 0 for a number; empty: numbers only. Not in the paper.
         """
-
 class LinearSDNN:
     """
     Q(s, a) linear in the SDNN code, in integers
     """
-    def __init__(
-        self,
-        config: LinearSDNNConfig,
-        n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
-    def code(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.int8]:
+    def __init__(self, config: LinearSDNNConfig, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def code(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.int8]:
         """
         The paired code of a state, -1, 0 or +1: (n_inputs,) -> (n_slots,)
         """
-    def permutation(
-        self,
-        mu: typing.SupportsInt | typing.SupportsIndex,
-        nu: typing.SupportsInt | typing.SupportsIndex,
-    ) -> numpy.typing.NDArray[numpy.uint32]:
+    def permutation(self, mu: typing.SupportsInt | typing.SupportsIndex, nu: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.uint32]:
         """
         sigma_mu_nu: (m,)
         """
-    def table(
-        self, input: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int8]:
+    def table(self, input: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
         """
         Patterns of an input: (n_bins, m) of -1, +1
         """
-    def values(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        dimension: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def values(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         """
         A dimension's part of Q(state, a) for its actions, by averaged weights if there are any
         """
@@ -778,26 +674,28 @@ class LinearSDNN:
         A copy, in units: (n_rows, n_slots), the units of one dimension after the other
         """
     @property
-    def config(self) -> LinearSDNNConfig: ...
+    def config(self) -> LinearSDNNConfig:
+        ...
     @property
     def exponent(self) -> int | None:
         """
         A unit of values is 2 to this power; None before any reward
         """
     @property
-    def n_dimensions(self) -> int: ...
+    def n_dimensions(self) -> int:
+        ...
     @property
-    def n_inputs(self) -> int: ...
+    def n_inputs(self) -> int:
+        ...
     @property
     def pairs(self) -> list[tuple[int, int]]:
         """
         (mu, nu) of every group of x_SD, in its order
         """
-
 class GoalScheduleConfig:
     """
     How the goal tolerance lambda(k) falls with the learning episode k (section 4.1).
-
+    
     Parameters
     ----------
     kind : {'inverse_linear', 'inverse_sqrt', 'constant'}
@@ -810,29 +708,26 @@ class GoalScheduleConfig:
         lambda beyond last_episode. Must be finite and at least 0.
     constant_value : float
         lambda of `constant`. Must be finite and at least 0.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        kind: typing.Literal["inverse_linear", "inverse_sqrt", "constant"] = ...,
-        scale: float = ...,
-        last_episode: int = ...,
-        floor: float = ...,
-        constant_value: float = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> GoalScheduleConfig: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, kind: typing.Literal['inverse_linear', 'inverse_sqrt', 'constant'] = ..., scale: float = ..., last_episode: int = ..., floor: float = ..., constant_value: float = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> GoalScheduleConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
     def replace(self, **changes: typing.Any) -> GoalScheduleConfig:
         """
         Return a copy with other values of some fields.
@@ -848,7 +743,7 @@ class GoalScheduleConfig:
         lambda beyond last_episode.
         """
     @property
-    def kind(self) -> typing.Literal["inverse_linear", "inverse_sqrt", "constant"]:
+    def kind(self) -> typing.Literal['inverse_linear', 'inverse_sqrt', 'constant']:
         """
         `inverse_linear`: 1 / (1 + k / scale); `inverse_sqrt`: 1 / sqrt(1 + k); or `constant`: constant_value. An assumption: the formula is garbled in print.
         """
@@ -862,18 +757,18 @@ class GoalScheduleConfig:
         """
         Episodes; of `inverse_linear`.
         """
-
 class GoalSchedule:
     """
     lambda as a function of the learning episode
     """
-    def __call__(self, episode: typing.SupportsInt | typing.SupportsIndex) -> float: ...
-    def __init__(self, config: GoalScheduleConfig) -> None: ...
-
+    def __call__(self, episode: typing.SupportsInt | typing.SupportsIndex) -> float:
+        ...
+    def __init__(self, config: GoalScheduleConfig) -> None:
+        ...
 class AcrobotConfig:
     """
     The numbers of the acrobot's task; the defaults are the paper's (section 4.1).
-
+    
     Parameters
     ----------
     link_mass_1 : float
@@ -916,44 +811,26 @@ class AcrobotConfig:
         Reward for idling or too much speed at a decision instant; it ends nothing.
     idle_angle : float
         rad: |theta1| below it is idling; 0 turns the rule off. An assumption: 5 degrees; pi / 5 is the alternative. Must be in [0, 3.14159].
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        link_mass_1: float = ...,
-        link_mass_2: float = ...,
-        link_length_1: float = ...,
-        link_length_2: float = ...,
-        center_of_mass_1: float = ...,
-        center_of_mass_2: float = ...,
-        inertia_1: float = ...,
-        inertia_2: float = ...,
-        gravity: float = ...,
-        max_torque: float = ...,
-        decision_interval: float = ...,
-        integration_step: float = ...,
-        max_decisions: int = ...,
-        goal_height: float = ...,
-        goal_velocity_1: float = ...,
-        goal_velocity_2: float = ...,
-        goal_test: typing.Literal["every_step", "decision_instant"] = ...,
-        goal_reward: float = ...,
-        penalty: float = ...,
-        idle_angle: float = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> AcrobotConfig: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, link_mass_1: float = ..., link_mass_2: float = ..., link_length_1: float = ..., link_length_2: float = ..., center_of_mass_1: float = ..., center_of_mass_2: float = ..., inertia_1: float = ..., inertia_2: float = ..., gravity: float = ..., max_torque: float = ..., decision_interval: float = ..., integration_step: float = ..., max_decisions: int = ..., goal_height: float = ..., goal_velocity_1: float = ..., goal_velocity_2: float = ..., goal_test: typing.Literal['every_step', 'decision_instant'] = ..., goal_reward: float = ..., penalty: float = ..., idle_angle: float = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> AcrobotConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
     def replace(self, **changes: typing.Any) -> AcrobotConfig:
         """
         Return a copy with other values of some fields.
@@ -984,7 +861,7 @@ class AcrobotConfig:
         Reward at the goal.
         """
     @property
-    def goal_test(self) -> typing.Literal["every_step", "decision_instant"]:
+    def goal_test(self) -> typing.Literal['every_step', 'decision_instant']:
         """
         When the goal is tested: `every_step`: after every integration step, and the episode ends there; `decision_instant`: only when the next decision is due. An assumption.
         """
@@ -1058,83 +935,66 @@ class AcrobotConfig:
         """
         Reward for idling or too much speed at a decision instant; it ends nothing.
         """
-
 class Acrobot:
     """
     Dynamics, reward and episode end of the acrobot
     """
-    def __init__(self, config: AcrobotConfig) -> None: ...
-    def decisions(self) -> int: ...
-    def reset(self) -> None: ...
-    def set_state(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None: ...
-    def state(self) -> numpy.typing.NDArray[numpy.float64]: ...
-    def step(
-        self,
-        torque: typing.SupportsFloat | typing.SupportsIndex,
-        goal_tolerance: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> tuple[float, bool, bool]:
+    def __init__(self, config: AcrobotConfig) -> None:
+        ...
+    def decisions(self) -> int:
+        ...
+    def reset(self) -> None:
+        ...
+    def set_state(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def state(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def step(self, torque: typing.SupportsFloat | typing.SupportsIndex, goal_tolerance: typing.SupportsFloat | typing.SupportsIndex) -> tuple[float, bool, bool]:
         """
         (reward, terminated, truncated)
         """
-    def tip_height(self) -> float: ...
-
+    def tip_height(self) -> float:
+        ...
 class AcrobotBatch:
     """
     Many acrobots in step, in vector lanes
     """
-    def __init__(
-        self, config: AcrobotConfig, n_acrobots: typing.SupportsInt | typing.SupportsIndex
-    ) -> None: ...
-    def __len__(self) -> int: ...
-    def decisions(self, index: typing.SupportsInt | typing.SupportsIndex) -> int: ...
+    def __init__(self, config: AcrobotConfig, n_acrobots: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __len__(self) -> int:
+        ...
+    def decisions(self, index: typing.SupportsInt | typing.SupportsIndex) -> int:
+        ...
     def observations(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         s1..s4 of every state
         """
-    def reset(self, mask: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> None: ...
-    def set_state(
-        self,
-        index: typing.SupportsInt | typing.SupportsIndex,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> None: ...
-    def states(self) -> numpy.typing.NDArray[numpy.float64]: ...
-    def step(
-        self,
-        torques: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        goal_tolerances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        moving: typing.Annotated[numpy.typing.ArrayLike, numpy.bool],
-    ) -> tuple[
-        numpy.typing.NDArray[numpy.float64],
-        numpy.typing.NDArray[numpy.bool],
-        numpy.typing.NDArray[numpy.bool],
-    ]:
+    def reset(self, mask: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> None:
+        ...
+    def set_state(self, index: typing.SupportsInt | typing.SupportsIndex, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def states(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def step(self, torques: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], goal_tolerances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], moving: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool], numpy.typing.NDArray[numpy.bool]]:
         """
         (rewards, terminated, truncated)
         """
-    def tip_heights(self) -> numpy.typing.NDArray[numpy.float64]: ...
-
+    def tip_heights(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
 class SensorNoise:
     """
     Gaussian noise on every channel
     """
-    def __init__(
-        self,
-        sigma: typing.SupportsFloat | typing.SupportsIndex,
-        edges: collections.abc.Sequence[str],
-        seed: typing.SupportsInt | typing.SupportsIndex,
-        stream: Stream,
-    ) -> None: ...
-    def apply(
-        self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def __init__(self, sigma: typing.SupportsFloat | typing.SupportsIndex, edges: collections.abc.Sequence[str], seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream) -> None:
+        ...
+    def apply(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         A noisy copy
         """
-
 class SensorConfig:
     """
     What the agent observes (section 4.3).
-
+    
     Parameters
     ----------
     n_sensors : int
@@ -1147,29 +1007,26 @@ class SensorConfig:
         Useless inputs besides: always 1/2, with noise as on the sensors. Not in the paper. Must be in [0, 100].
     n_random : int
         Useless inputs besides: a new uniform number each time. Not in the paper. Must be in [0, 100].
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        n_sensors: int = ...,
-        noise: float = ...,
-        noise_entry: typing.Literal["every_sensor", "basic_sensors"] = ...,
-        n_constant: int = ...,
-        n_random: int = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> SensorConfig: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, n_sensors: int = ..., noise: float = ..., noise_entry: typing.Literal['every_sensor', 'basic_sensors'] = ..., n_constant: int = ..., n_random: int = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> SensorConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
     def replace(self, **changes: typing.Any) -> SensorConfig:
         """
         Return a copy with other values of some fields.
@@ -1200,110 +1057,70 @@ class SensorConfig:
         Standard deviation of the noise on every sensor; 0.02 in the paper's noisy cases.
         """
     @property
-    def noise_entry(self) -> typing.Literal["every_sensor", "basic_sensors"]:
+    def noise_entry(self) -> typing.Literal['every_sensor', 'basic_sensors']:
         """
         Where noise enters: `every_sensor`: s5 and s6 are computed from the true s1..s4 and get noise of their own; `basic_sensors`: they are computed from the noisy ones. An assumption.
         """
-
 class AcrobotSensors:
     """
     s1..s4, s5 and s6 with their noise
     """
-    def __init__(
-        self, config: SensorConfig, seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream
-    ) -> None: ...
-    def observe(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]: ...
-
+    def __init__(self, config: SensorConfig, seed: typing.SupportsInt | typing.SupportsIndex, stream: Stream) -> None:
+        ...
+    def observe(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        ...
 class ParallelPerceptron:
     """
     Units over a code, with integer weights
     """
-    def __init__(
-        self,
-        code: SelectiveDesensitization,
-        n_units: typing.SupportsInt | typing.SupportsIndex,
-        seed: typing.SupportsInt | typing.SupportsIndex = 0,
-        weights: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None,
-        thresholds: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None,
-        initial_range: typing.SupportsInt | typing.SupportsIndex = 5,
-    ) -> None: ...
+    def __init__(self, code: SelectiveDesensitization, n_units: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex = 0, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, thresholds: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, initial_range: typing.SupportsInt | typing.SupportsIndex = 5) -> None:
+        ...
     def copy(self) -> ParallelPerceptron:
         """
         A layer of its own with the same weights
         """
-    def counts(
-        self,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        n_groups: typing.SupportsInt | typing.SupportsIndex = 1,
-        n_threads: typing.SupportsInt | typing.SupportsIndex = 1,
-    ) -> numpy.typing.NDArray[numpy.int32]:
+    def counts(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_groups: typing.SupportsInt | typing.SupportsIndex = 1, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.int32]:
         """
         How many units of each group fire
         """
-    def potentials(
-        self,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        n_threads: typing.SupportsInt | typing.SupportsIndex = 1,
-    ) -> numpy.typing.NDArray[numpy.int32]: ...
+    def potentials(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.int32]:
+        ...
     @property
-    def n_units(self) -> int: ...
+    def n_units(self) -> int:
+        ...
     @property
-    def thresholds(self) -> numpy.typing.NDArray[numpy.int32]: ...
+    def thresholds(self) -> numpy.typing.NDArray[numpy.int32]:
+        ...
     @property
-    def weights(self) -> numpy.typing.NDArray[numpy.int32]: ...
-
+    def weights(self) -> numpy.typing.NDArray[numpy.int32]:
+        ...
 class OnlineLayer:
     """
     Weights in bytes, for samples that come one at a time; the layer lags behind
     """
-    def __init__(self, layer: ParallelPerceptron) -> None: ...
-    def learn_counts(
-        self,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        share: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-    ) -> tuple[int, int]:
+    def __init__(self, layer: ParallelPerceptron) -> None:
+        ...
+    def learn_counts(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], share: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> tuple[int, int]:
         """
         The p-delta rule; how many samples and units were corrected. What raises changes nothing.
         """
-    def learn_labels(
-        self,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        n_classes: typing.SupportsInt | typing.SupportsIndex,
-        scheme: str,
-    ) -> tuple[int, int]:
+    def learn_labels(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_classes: typing.SupportsInt | typing.SupportsIndex, scheme: str) -> tuple[int, int]:
         """
         Error correction; how many samples and units were corrected. What raises changes nothing.
         """
-    def potentials(
-        self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]
-    ) -> numpy.typing.NDArray[numpy.int32]: ...
+    def potentials(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.int32]:
+        ...
     def synchronize(self) -> None:
         """
         Brings the layer up to date
         """
-
 class PDeltaTrainer:
     """
     Trains groups of units to fire in given numbers
     """
-    def __init__(
-        self,
-        layer: ParallelPerceptron,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        share: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        form: str = "auto",
-        memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824,
-        n_threads: typing.SupportsInt | typing.SupportsIndex = 1,
-        n_epochs: typing.SupportsInt | typing.SupportsIndex = 30,
-    ) -> None: ...
-    def present(
-        self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]
-    ) -> tuple[int, int]:
+    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], share: typing.SupportsFloat | typing.SupportsIndex = 1.0, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, n_epochs: typing.SupportsInt | typing.SupportsIndex = 30) -> None:
+        ...
+    def present(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
         """
         Presents samples in that order; returns how many corrected something, and how many units were corrected
         """
@@ -1312,32 +1129,20 @@ class PDeltaTrainer:
         Brings the layer's weights to those of plain training in the same order
         """
     @property
-    def form(self) -> str: ...
+    def form(self) -> str:
+        ...
     @property
     def memory(self) -> int:
         """
         Bytes beside the layer
         """
-
 class PerceptronTrainer:
     """
     Trains units to separate classes
     """
-    def __init__(
-        self,
-        layer: ParallelPerceptron,
-        bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-        n_classes: typing.SupportsInt | typing.SupportsIndex,
-        scheme: str,
-        form: str = "auto",
-        memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824,
-        n_threads: typing.SupportsInt | typing.SupportsIndex = 1,
-        n_epochs: typing.SupportsInt | typing.SupportsIndex = 30,
-    ) -> None: ...
-    def present(
-        self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]
-    ) -> tuple[int, int]:
+    def __init__(self, layer: ParallelPerceptron, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], labels: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_classes: typing.SupportsInt | typing.SupportsIndex, scheme: str, form: str = 'auto', memory_limit: typing.SupportsInt | typing.SupportsIndex = 1073741824, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, n_epochs: typing.SupportsInt | typing.SupportsIndex = 30) -> None:
+        ...
+    def present(self, order: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> tuple[int, int]:
         """
         Presents samples in that order; returns how many corrected something, and how many units were corrected
         """
@@ -1346,17 +1151,17 @@ class PerceptronTrainer:
         Brings the layer's weights to those of plain training in the same order
         """
     @property
-    def form(self) -> str: ...
+    def form(self) -> str:
+        ...
     @property
     def memory(self) -> int:
         """
         Bytes beside the layer
         """
-
 class EpsilonGreedyConfig:
     """
     The parameters of the policy; the defaults are the paper's (section 4.2).
-
+    
     Parameters
     ----------
     epsilon : float
@@ -1367,28 +1172,26 @@ class EpsilonGreedyConfig:
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
     tie_tolerance : float
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        epsilon: float = ...,
-        n_greedy_steps: int = ...,
-        tie_rule: typing.Literal["uniform", "lowest", "middle"] = ...,
-        tie_tolerance: float = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> EpsilonGreedyConfig: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> EpsilonGreedyConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
     def replace(self, **changes: typing.Any) -> EpsilonGreedyConfig:
         """
         Return a copy with other values of some fields.
@@ -1404,7 +1207,7 @@ class EpsilonGreedyConfig:
         First steps of an episode in which epsilon is 0.
         """
     @property
-    def tie_rule(self) -> typing.Literal["uniform", "lowest", "middle"]:
+    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
         """
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
         """
@@ -1413,25 +1216,18 @@ class EpsilonGreedyConfig:
         """
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau.
         """
-
 class EpsilonGreedy:
     """
     The policy, over rows of values
     """
-    def __init__(
-        self, config: EpsilonGreedyConfig, seed: typing.SupportsInt | typing.SupportsIndex
-    ) -> None: ...
-    def select(
-        self,
-        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        step: typing.SupportsInt | typing.SupportsIndex,
-        explore: bool = True,
-    ) -> int: ...
-
+    def __init__(self, config: EpsilonGreedyConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def select(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step: typing.SupportsInt | typing.SupportsIndex, explore: bool = True) -> int:
+        ...
 class QLearningConfig:
     """
     The parameters of Q-learning; the defaults are the paper's (section 4.2).
-
+    
     Parameters
     ----------
     learning_rate : float
@@ -1462,40 +1258,30 @@ class QLearningConfig:
         Part of the progress in which epsilon goes to final_epsilon, where it then stays. Not in the paper. Must be in (0, 1].
     start_steps : int
         First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing. Must be in [0, 1073741824].
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        learning_rate: float = ...,
-        discount: float = ...,
-        epsilon: float = ...,
-        n_greedy_steps: int = ...,
-        tie_rule: typing.Literal["uniform", "lowest", "middle"] = ...,
-        tie_tolerance: float = ...,
-        n_steps: int = ...,
-        value_range: typing.Literal["fixed", "adaptive"] = ...,
-        max_action_repeat: int = ...,
-        final_learning_rate: float | None = ...,
-        final_epsilon: float | None = ...,
-        schedule: typing.Literal["linear", "exponential"] = ...,
-        exploration_fraction: float = ...,
-        start_steps: int = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> QLearningConfig: ...
-    def __repr__(self) -> str: ...
-    def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float: ...
-    def learning_rate_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., n_steps: int = ..., value_range: typing.Literal['fixed', 'adaptive'] = ..., max_action_repeat: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., start_steps: int = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> QLearningConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
+    def learning_rate_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
     def replace(self, **changes: typing.Any) -> QLearningConfig:
         """
         Return a copy with other values of some fields.
@@ -1546,7 +1332,7 @@ class QLearningConfig:
         Rewards in a target before it bootstraps. Not in the paper, which has 1: with more, a transition is learned, once, when so many steps are known or the episode ends.
         """
     @property
-    def schedule(self) -> typing.Literal["linear", "exponential"]:
+    def schedule(self) -> typing.Literal['linear', 'exponential']:
         """
         How alpha and epsilon approach their final values: `linear`, or `exponential`, first * (final / first) ** progress, with no final value of 0. For any other function of the progress: `sdnn.agents.Schedule`.
         """
@@ -1556,7 +1342,7 @@ class QLearningConfig:
         First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing.
         """
     @property
-    def tie_rule(self) -> typing.Literal["uniform", "lowest", "middle"]:
+    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
         """
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
         """
@@ -1566,15 +1352,14 @@ class QLearningConfig:
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau.
         """
     @property
-    def value_range(self) -> typing.Literal["fixed", "adaptive"]:
+    def value_range(self) -> typing.Literal['fixed', 'adaptive']:
         """
         Whether Q has the approximator's range, q_low to q_high (`fixed`), or one that follows the returns of late (`adaptive`): rare ones are clipped, and time limits end no return. An RBF network has no range. Not in the paper.
         """
-
 class QLambdaConfig:
     """
     The parameters of Q(lambda) and Sarsa(lambda) with a linear readout of the SDNN code.
-
+    
     Parameters
     ----------
     learning_rate : float
@@ -1609,48 +1394,36 @@ class QLambdaConfig:
         Part of the progress in which epsilon goes to final_epsilon, where it then stays. Not in the paper. Must be in (0, 1].
     start_steps : int
         First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing. Must be in [0, 1073741824].
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        learning_rate: float = ...,
-        discount: float = ...,
-        epsilon: float = ...,
-        n_greedy_steps: int = ...,
-        tie_rule: typing.Literal["uniform", "lowest", "middle"] = ...,
-        tie_tolerance: float = ...,
-        trace_decay: float = ...,
-        bootstrap: typing.Literal["sarsa", "q_learning"] = ...,
-        traces: typing.Literal["dutch", "replacing"] = ...,
-        schedule_steps: int = ...,
-        max_action_repeat: int = ...,
-        final_learning_rate: float | None = ...,
-        final_epsilon: float | None = ...,
-        schedule: typing.Literal["linear", "exponential"] = ...,
-        exploration_fraction: float = ...,
-        start_steps: int = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> QLambdaConfig: ...
-    def __repr__(self) -> str: ...
-    def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float: ...
-    def learning_rate_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, learning_rate: float = ..., discount: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ..., trace_decay: float = ..., bootstrap: typing.Literal['sarsa', 'q_learning'] = ..., traces: typing.Literal['dutch', 'replacing'] = ..., schedule_steps: int = ..., max_action_repeat: int = ..., final_learning_rate: float | None = ..., final_epsilon: float | None = ..., schedule: typing.Literal['linear', 'exponential'] = ..., exploration_fraction: float = ..., start_steps: int = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> QLambdaConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def epsilon_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
+    def learning_rate_at(self, progress: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
     def replace(self, **changes: typing.Any) -> QLambdaConfig:
         """
         Return a copy with other values of some fields.
         """
     @property
-    def bootstrap(self) -> typing.Literal["sarsa", "q_learning"]:
+    def bootstrap(self) -> typing.Literal['sarsa', 'q_learning']:
         """
         What targets bootstrap from: `sarsa`: the value of the next action; `q_learning`: the best value, and traces end where a worse action is taken (Watkins).
         """
@@ -1695,7 +1468,7 @@ class QLambdaConfig:
         First steps of an episode in which epsilon is 0.
         """
     @property
-    def schedule(self) -> typing.Literal["linear", "exponential"]:
+    def schedule(self) -> typing.Literal['linear', 'exponential']:
         """
         How alpha and epsilon approach their final values: `linear`, or `exponential`, first * (final / first) ** progress, with no final value of 0. For any other function of the progress: `sdnn.agents.Schedule`.
         """
@@ -1710,7 +1483,7 @@ class QLambdaConfig:
         First steps of the agent's life in which every action is random, whatever epsilon. Not in the paper, which has 0: a rare success is found before the greedy actions have learned to do nothing.
         """
     @property
-    def tie_rule(self) -> typing.Literal["uniform", "lowest", "middle"]:
+    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
         """
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
         """
@@ -1725,15 +1498,107 @@ class QLambdaConfig:
         lambda: what remains of a trace after a step, beside the discount. 0: one-step targets.
         """
     @property
-    def traces(self) -> typing.Literal["dutch", "replacing"]:
+    def traces(self) -> typing.Literal['dutch', 'replacing']:
         """
         What a trace becomes in a state that returns: `dutch`: such that learning equals the forward view at every step (true online), in one environment; `replacing`: as if it were the first time, always so in several.
         """
-
+class ActorCriticConfig:
+    """
+    The parameters of the actor-critic, linear in the SDNN code.
+    
+    Parameters
+    ----------
+    learning_rate : float
+        alpha of the critic: the share of an error that a step corrects. Must be in (0, 1].
+    discount : float
+        gamma. Must be in [0, 1].
+    trace_decay : float
+        lambda: what remains of a trace after a step, beside the discount. Must be in [0, 1].
+    actor_learning_rate : float
+        alpha of the actor, for TD errors in units of their root mean square. Must be in (0, 1].
+    entropy : float
+        The weight of the policy's entropy, in units of the same: with more, actions stay random for longer. Must be in [0, 1].
+    schedule_steps : int
+        Steps after which both rates have gone half of the way to their final values: after t steps they have gone t / (t + schedule_steps) of it. Must be in [1, 1073741824].
+    final_learning_rate : float | None
+        What the critic's alpha approaches; None: it stays. Must be in (0, 1].
+    final_actor_learning_rate : float | None
+        What the actor's alpha approaches; None: it stays. Must be in (0, 1].
+    thermometers : bool
+        Whether the code has thermometers of single inputs, too, by which trends over whole ranges are learned at once.
+    
+    Raises
+    ------
+    TypeError, ValueError
+        For a value of another type or out of its bounds; ``argument`` is its name.
+    """
+    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
+    fields: typing.ClassVar[tuple[typing.Any, ...]]
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, learning_rate: float = ..., discount: float = ..., trace_decay: float = ..., actor_learning_rate: float = ..., entropy: float = ..., schedule_steps: int = ..., final_learning_rate: float | None = ..., final_actor_learning_rate: float | None = ..., thermometers: bool = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> ActorCriticConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def replace(self, **changes: typing.Any) -> ActorCriticConfig:
+        """
+        Return a copy with other values of some fields.
+        """
+    @property
+    def actor_learning_rate(self) -> float:
+        """
+        alpha of the actor, for TD errors in units of their root mean square.
+        """
+    @property
+    def discount(self) -> float:
+        """
+        gamma.
+        """
+    @property
+    def entropy(self) -> float:
+        """
+        The weight of the policy's entropy, in units of the same: with more, actions stay random for longer.
+        """
+    @property
+    def final_actor_learning_rate(self) -> float | None:
+        """
+        What the actor's alpha approaches; None: it stays.
+        """
+    @property
+    def final_learning_rate(self) -> float | None:
+        """
+        What the critic's alpha approaches; None: it stays.
+        """
+    @property
+    def learning_rate(self) -> float:
+        """
+        alpha of the critic: the share of an error that a step corrects.
+        """
+    @property
+    def schedule_steps(self) -> int:
+        """
+        Steps after which both rates have gone half of the way to their final values: after t steps they have gone t / (t + schedule_steps) of it.
+        """
+    @property
+    def thermometers(self) -> bool:
+        """
+        Whether the code has thermometers of single inputs, too, by which trends over whole ranges are learned at once.
+        """
+    @property
+    def trace_decay(self) -> float:
+        """
+        lambda: what remains of a trace after a step, beside the discount.
+        """
 class FuzzyQLearningConfig:
     """
     The parameters of fuzzy Q-learning; the defaults are the paper's (section 4.3).
-
+    
     Parameters
     ----------
     learning_coefficient : float
@@ -1750,31 +1615,26 @@ class FuzzyQLearningConfig:
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
     tie_tolerance : float
         Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        learning_coefficient: float = ...,
-        discount: float = ...,
-        trace_decay: float = ...,
-        epsilon: float = ...,
-        n_greedy_steps: int = ...,
-        tie_rule: typing.Literal["uniform", "lowest", "middle"] = ...,
-        tie_tolerance: float = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> FuzzyQLearningConfig: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, learning_coefficient: float = ..., discount: float = ..., trace_decay: float = ..., epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> FuzzyQLearningConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
     def replace(self, **changes: typing.Any) -> FuzzyQLearningConfig:
         """
         Return a copy with other values of some fields.
@@ -1800,7 +1660,7 @@ class FuzzyQLearningConfig:
         First steps of an episode in which epsilon is 0.
         """
     @property
-    def tie_rule(self) -> typing.Literal["uniform", "lowest", "middle"]:
+    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
         """
         Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
         """
@@ -1814,34 +1674,32 @@ class FuzzyQLearningConfig:
         """
         lambda of accumulating eligibility traces; 0: none, as in the paper. At most 0.99 / discount.
         """
-
 class FixedRate:
     """
     Waits for ticks at a fixed rate
     """
-    def __init__(
-        self,
-        hz: typing.SupportsFloat | typing.SupportsIndex,
-        clock: collections.abc.Callable[[], typing.SupportsFloat | typing.SupportsIndex],
-        sleep: collections.abc.Callable[[float], None],
-    ) -> None: ...
+    def __init__(self, hz: typing.SupportsFloat | typing.SupportsIndex, clock: collections.abc.Callable[[], typing.SupportsFloat | typing.SupportsIndex], sleep: collections.abc.Callable[[float], None]) -> None:
+        ...
     def wait(self) -> int:
         """
         Waits for the next tick and returns its number
         """
     @property
-    def hz(self) -> float: ...
+    def hz(self) -> float:
+        ...
     @property
-    def n_misses(self) -> int: ...
+    def n_misses(self) -> int:
+        ...
     @property
-    def n_skipped(self) -> int: ...
+    def n_skipped(self) -> int:
+        ...
     @property
-    def worst_lateness(self) -> float: ...
-
+    def worst_lateness(self) -> float:
+        ...
 class ObservationConfig:
     """
     The observed variables of a task.
-
+    
     Parameters
     ----------
     low : tuple[float | None, ...]
@@ -1852,6 +1710,8 @@ class ObservationConfig:
         Whether ranges of numbers are fitted, within low and high.
     narrowed : bool
         Whether ranges of few inputs that are far wider than what is observed are fitted.
+    running : bool
+        Whether ranges of numbers follow what is observed, whatever low and high.
     angles : tuple[int, ...]
         Variables that wrap around in their ranges.
     angle_pairs : tuple[tuple[int, ...], ...]
@@ -1866,35 +1726,26 @@ class ObservationConfig:
         Variables that are never left out.
     missing : {'error', 'hold', 'code'}
         Whether readings that are NaN or infinite are refused, the last reading is used instead, or each input has a pattern for them.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        low: collections.abc.Sequence[float | None] = ...,
-        high: collections.abc.Sequence[float | None] = ...,
-        adaptive: bool = ...,
-        narrowed: bool = ...,
-        angles: collections.abc.Sequence[int] = ...,
-        angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ...,
-        find_angle_pairs: bool = ...,
-        symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ...,
-        relevant_only: bool = ...,
-        inputs: collections.abc.Sequence[int] = ...,
-        missing: typing.Literal["error", "hold", "code"] = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> ObservationConfig: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., narrowed: bool = ..., running: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., relevant_only: bool = ..., inputs: collections.abc.Sequence[int] = ..., missing: typing.Literal['error', 'hold', 'code'] = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> ObservationConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
     def replace(self, **changes: typing.Any) -> ObservationConfig:
         """
         Return a copy with other values of some fields.
@@ -1935,7 +1786,7 @@ class ObservationConfig:
         Lowest value of each variable; none: not known.
         """
     @property
-    def missing(self) -> typing.Literal["error", "hold", "code"]:
+    def missing(self) -> typing.Literal['error', 'hold', 'code']:
         """
         Whether readings that are NaN or infinite are refused, the last reading is used instead, or each input has a pattern for them.
         """
@@ -1950,15 +1801,19 @@ class ObservationConfig:
         Whether inputs that have nothing to do with rewards or actions, as the warm-up finds, are left out.
         """
     @property
+    def running(self) -> bool:
+        """
+        Whether ranges of numbers follow what is observed, whatever low and high.
+        """
+    @property
     def symbols(self) -> tuple[tuple[int, ...], ...]:
         """
         First variables, and how many there are, of which one is 1.
         """
-
 class ActionConfig:
     """
     The actions of a task.
-
+    
     Parameters
     ----------
     low : tuple[float, ...]
@@ -1969,28 +1824,26 @@ class ActionConfig:
         Every whole number from low to high is an action of its own.
     number : {'float64', 'float32', 'float16', 'whole'}
         To what numbers actions are rounded.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        low: collections.abc.Sequence[float] = ...,
-        high: collections.abc.Sequence[float] = ...,
-        discrete: bool = ...,
-        number: typing.Literal["float64", "float32", "float16", "whole"] = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> ActionConfig: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, low: collections.abc.Sequence[float] = ..., high: collections.abc.Sequence[float] = ..., discrete: bool = ..., number: typing.Literal['float64', 'float32', 'float16', 'whole'] = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> ActionConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
     def replace(self, **changes: typing.Any) -> ActionConfig:
         """
         Return a copy with other values of some fields.
@@ -2011,102 +1864,40 @@ class ActionConfig:
         Lowest action of each dimension.
         """
     @property
-    def number(self) -> typing.Literal["float64", "float32", "float16", "whole"]:
+    def number(self) -> typing.Literal['float64', 'float32', 'float16', 'whole']:
         """
         To what numbers actions are rounded.
         """
-
 class Controller:
     """
     An agent in the units of its task
     """
-
-    fields: typing.ClassVar[tuple] = (
-        "warm_up_steps",
-        "int",
-        1000,
-        "Random steps before learning, where ranges are not known.",
-        2.0,
-        10000000.0,
-        False,
-    )
-    def __init__(
-        self,
-        *,
-        approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig,
-        learning: QLearningConfig | FuzzyQLearningConfig | QLambdaConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-        observation: ObservationConfig,
-        action: ActionConfig,
-        warm_up_steps: typing.SupportsInt | typing.SupportsIndex = 1000,
-        tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = [],
-        state: dict | None = None,
-    ) -> None:
+    fields: typing.ClassVar[tuple] = (('warm_up_steps', 'int', 1000, 'Random steps before learning, where ranges are not known.', 2.0, 10000000.0, False))
+    def __init__(self, *, approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig, learning: QLearningConfig | FuzzyQLearningConfig | QLambdaConfig | ActorCriticConfig, seed: typing.SupportsInt | typing.SupportsIndex, observation: ObservationConfig, action: ActionConfig, warm_up_steps: typing.SupportsInt | typing.SupportsIndex = 1000, tables: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.int8]] = [], state: dict | None = None) -> None:
         """
         New, or as it was when `state` was taken
         """
-    def act(
-        self,
-        observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        explore: bool = True,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-        mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None,
-    ) -> numpy.typing.NDArray[numpy.float64]: ...
-    def act_each(
-        self,
-        observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        environments: list,
-        masks: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None,
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def act(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0, mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    def act_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], environments: list, masks: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
         Exploring actions in some environments, in order; other rows are zeros
         """
-    def action_of(
-        self,
-        index: typing.SupportsInt | typing.SupportsIndex,
-        dimension: typing.SupportsInt | typing.SupportsIndex,
-    ) -> float: ...
-    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None: ...
-    def begin_greedy_episode(
-        self, environment: typing.SupportsInt | typing.SupportsIndex = 0
-    ) -> None:
+    def action_of(self, index: typing.SupportsInt | typing.SupportsIndex, dimension: typing.SupportsInt | typing.SupportsIndex) -> float:
+        ...
+    def begin_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def begin_greedy_episode(self, environment: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
         The next acts without `explore` hold no earlier readings
         """
-    def check(
-        self,
-        observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        reward: typing.SupportsFloat | typing.SupportsIndex,
-        next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        terminated: bool,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-        next_mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None,
-    ) -> None:
+    def check(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0, next_mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> None:
         """
         Raises what learn would; changes nothing
         """
-    def learn(
-        self,
-        observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        reward: typing.SupportsFloat | typing.SupportsIndex,
-        next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        terminated: bool,
-        environment: typing.SupportsInt | typing.SupportsIndex = 0,
-        next_mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None,
-    ) -> None: ...
-    def learn_each(
-        self,
-        observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        actions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        rewards: list,
-        next_observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        terminated: list,
-        environments: list,
-        progress: list,
-        next_masks: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None,
-    ) -> int:
+    def learn(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0, next_mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> None:
+        ...
+    def learn_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], actions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rewards: list, next_observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: list, environments: list, progress: list, next_masks: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> int:
         """
         Learns in some environments, in order; `progress` is set between two, if given. Returns how many were learned: all before the first that cannot be, whose error is raised where it comes first
         """
@@ -2122,28 +1913,27 @@ class Controller:
         """
         What it remembers: arrays by name
         """
-    def state_of(
-        self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def state_of(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         The agent's state, shape (n_inputs,)
         """
-    def values(
-        self,
-        observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        dimension: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def state_value(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> float:
         """
-        Q of all actions of a dimension, as greedy actions follow it; of fuzzy rules the value of the observation alone
+        V(observation) of an actor-critic
+        """
+    def values(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dimension: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Q of all actions of a dimension, as greedy actions follow it; of fuzzy rules the value of the observation alone, of an actor-critic the probabilities of the actions
         """
     @property
-    def approximator(
-        self,
-    ) -> SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig: ...
+    def approximator(self) -> SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig:
+        ...
     @property
-    def epsilon(self) -> float: ...
+    def epsilon(self) -> float:
+        ...
     @epsilon.setter
-    def epsilon(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
+    def epsilon(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
     @property
     def final_epsilon(self) -> float | None:
         """
@@ -2155,32 +1945,39 @@ class Controller:
         Of a state: kinds, and the variables that they are made of
         """
     @property
-    def is_warming_up(self) -> bool: ...
+    def is_warming_up(self) -> bool:
+        ...
     @property
-    def learning_rate(self) -> float: ...
+    def learning_rate(self) -> float:
+        ...
     @learning_rate.setter
-    def learning_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
+    def learning_rate(self, arg1: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
     @property
-    def n_actions(self) -> list[int]: ...
+    def n_actions(self) -> list[int]:
+        ...
     @property
-    def n_environments(self) -> int: ...
+    def n_environments(self) -> int:
+        ...
     @n_environments.setter
-    def n_environments(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def n_environments(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
-    def n_variables(self) -> int: ...
+    def n_variables(self) -> int:
+        ...
     @property
     def networks(self) -> list:
         """
         Networks or rules of each dimension, or the readout of all; states are in [0, 1]
         """
     @property
-    def progress(self) -> float: ...
+    def progress(self) -> float:
+        ...
     @progress.setter
-    def progress(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def progress(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     @property
-    def ranges(
-        self,
-    ) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    def ranges(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
         Lowest and highest values, (n_variables,) each
         """
@@ -2194,11 +1991,10 @@ class Controller:
         """
         The largest recent reward is 2 to this power, or up to twice that; or None
         """
-
 class ProtocolConfig:
     """
     Learning protocol of a trial; the defaults are the paper's (section 4.2).
-
+    
     Parameters
     ----------
     episodes : int
@@ -2209,28 +2005,26 @@ class ProtocolConfig:
         Whether the last transition before a time limit bootstraps, as if the episode continued; else it counts as terminated.
     noisy_evaluations : bool
         Whether the sensors are as noisy in evaluations as in learning.
-
+    
     Raises
     ------
     TypeError, ValueError
         For a value of another type or out of its bounds; ``argument`` is its name.
     """
-
     __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
     fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        episodes: int = ...,
-        evaluate_every_episodes: int = ...,
-        limit_bootstraps: bool = ...,
-        noisy_evaluations: bool = ...,
-    ) -> None: ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]: ...
-    def __replace__(self, **changes: typing.Any) -> ProtocolConfig: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, episodes: int = ..., evaluate_every_episodes: int = ..., limit_bootstraps: bool = ..., noisy_evaluations: bool = ...) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __replace__(self, **changes: typing.Any) -> ProtocolConfig:
+        ...
+    def __repr__(self) -> str:
+        ...
     def replace(self, **changes: typing.Any) -> ProtocolConfig:
         """
         Return a copy with other values of some fields.
@@ -2255,59 +2049,34 @@ class ProtocolConfig:
         """
         Whether the sensors are as noisy in evaluations as in learning.
         """
-
 class BareAgent:
     """
     An agent of any kind without a task: states in [0, 1], actions as indices or, of fuzzy rules, numbers in [-1, 1]
     """
-    def __init__(
-        self,
-        *,
-        approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig,
-        learning: QLearningConfig | FuzzyQLearningConfig | QLambdaConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-        n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [],
-    ) -> None: ...
-    def act(
-        self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True
-    ) -> list[float]: ...
-    def begin_episode(self) -> None: ...
-    def learn(
-        self,
-        state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        reward: typing.SupportsFloat | typing.SupportsIndex,
-        next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        terminated: bool,
-    ) -> None: ...
+    def __init__(self, *, approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig, learning: QLearningConfig | FuzzyQLearningConfig | QLambdaConfig | ActorCriticConfig, seed: typing.SupportsInt | typing.SupportsIndex, n_actions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = []) -> None:
+        ...
+    def act(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True) -> list[float]:
+        ...
+    def begin_episode(self) -> None:
+        ...
+    def learn(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool) -> None:
+        ...
     @property
     def networks(self) -> list:
         """
         Networks or rules of each dimension, or the readout of all
         """
-
 class AcrobotTrial:
     """
     An agent learns the acrobot swing-up
     """
     @staticmethod
-    def advance_together(
-        trials: tuple[AcrobotTrial, ...], n_decisions: typing.SupportsInt | typing.SupportsIndex
-    ) -> None:
+    def advance_together(trials: tuple[AcrobotTrial, ...], n_decisions: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         Lets each of several trials make n more decisions, or come to its end
         """
-    def __init__(
-        self,
-        *,
-        approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig,
-        learning: QLearningConfig | FuzzyQLearningConfig | QLambdaConfig,
-        acrobot: AcrobotConfig,
-        goal: GoalScheduleConfig,
-        sensors: SensorConfig,
-        protocol: ProtocolConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
+    def __init__(self, *, approximator: SDNNCConfig | RBFNetworkConfig | FuzzyRulesConfig | LinearSDNNConfig, learning: QLearningConfig | FuzzyQLearningConfig | QLambdaConfig | ActorCriticConfig, acrobot: AcrobotConfig, goal: GoalScheduleConfig, sensors: SensorConfig, protocol: ProtocolConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     def advance(self, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         Runs up to n more learning episodes
@@ -2326,46 +2095,35 @@ class AcrobotTrial:
         The agent at work: asking for values changes nothing that follows
         """
     @property
-    def episode(self) -> int: ...
+    def episode(self) -> int:
+        ...
     @property
-    def finished(self) -> bool: ...
+    def finished(self) -> bool:
+        ...
     @property
-    def n_decisions(self) -> int: ...
-
+    def n_decisions(self) -> int:
+        ...
 class PlainRBFQLearning:
     """
     Q-learning with an RBF network evaluated without its product structure; only to be timed
     """
-    def __init__(
-        self,
-        *,
-        approximator: RBFNetworkConfig,
-        learning: QLearningConfig,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
+    def __init__(self, *, approximator: RBFNetworkConfig, learning: QLearningConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
     @property
     def network(self) -> RBFNetwork:
         """
         A copy of the network behind it
         """
-
 class DenseProduct:
     """
     A dense float32 matrix-vector product
     """
-    def __init__(
-        self,
-        n_rows: typing.SupportsInt | typing.SupportsIndex,
-        n_columns: typing.SupportsInt | typing.SupportsIndex,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
-    def run(
-        self, n_repetitions: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def __init__(self, n_rows: typing.SupportsInt | typing.SupportsIndex, n_columns: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def run(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         Nanoseconds per product: (n_repetitions,)
         """
-
 class NetworkParts:
     """
     The network's parts of a decision
@@ -2374,212 +2132,126 @@ class NetworkParts:
         """
         Times a copy of the network
         """
-    def time_corrections(
-        self,
-        n_repetitions: typing.SupportsInt | typing.SupportsIndex,
-        n_corrected: typing.SupportsInt | typing.SupportsIndex,
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def time_corrections(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex, n_corrected: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         Learning steps
         """
-    def time_remembered_values(
-        self, n_repetitions: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def time_remembered_values(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         All values at the same state again
         """
-    def time_selections(
-        self,
-        n_repetitions: typing.SupportsInt | typing.SupportsIndex,
-        n_selections: typing.SupportsInt | typing.SupportsIndex,
-        n_selected: typing.SupportsInt | typing.SupportsIndex,
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def time_selections(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex, n_selections: typing.SupportsInt | typing.SupportsIndex, n_selected: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         n_selections selections of units per repetition
         """
-    def time_values(
-        self, n_repetitions: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def time_values(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         All values at a new state: nanoseconds (n_repetitions,)
         """
-
 class AcrobotDecisions:
     """
     The acrobot under random torques
     """
-    def __init__(
-        self, config: AcrobotConfig, seed: typing.SupportsInt | typing.SupportsIndex
-    ) -> None: ...
-    def run(
-        self, n_repetitions: typing.SupportsInt | typing.SupportsIndex
-    ) -> numpy.typing.NDArray[numpy.int64]:
+    def __init__(self, config: AcrobotConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def run(self, n_repetitions: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
         Nanoseconds per decision: (n_repetitions,)
         """
     @property
-    def n_integration_steps(self) -> int: ...
-
-def action_value(
-    action: typing.SupportsInt | typing.SupportsIndex,
-    n_actions: typing.SupportsInt | typing.SupportsIndex,
-    low: typing.SupportsFloat | typing.SupportsIndex,
-    high: typing.SupportsFloat | typing.SupportsIndex,
-) -> float:
+    def n_integration_steps(self) -> int:
+        ...
+def action_value(action: typing.SupportsInt | typing.SupportsIndex, n_actions: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsFloat | typing.SupportsIndex, high: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     The value of an action in a range cut evenly
     """
-
-def anchor_patterns(
-    n_units: typing.SupportsInt | typing.SupportsIndex,
-    n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex,
-    n_interpolated: typing.SupportsInt | typing.SupportsIndex,
-    circular: bool,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int8]: ...
-def atan2(
-    y: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> typing.Any: ...
+def actor_critic_presets() -> dict[str, tuple[str, LinearSDNNConfig, ActorCriticConfig]]:
+    """
+    The presets of the actor-critic, by name
+    """
+def anchor_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_anchor_patterns: typing.SupportsInt | typing.SupportsIndex, n_interpolated: typing.SupportsInt | typing.SupportsIndex, circular: bool, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+    ...
+def atan2(y: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    ...
 def available_instruction_sets() -> list[str]:
     """
     The instruction sets that this machine offers, in rising order
     """
-
-def basic_observation(
-    state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> numpy.typing.NDArray[numpy.float64]:
+def basic_observation(state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
     s1..s4 of a state
     """
-
-def correlation_matrix_patterns(
-    n_units: typing.SupportsInt | typing.SupportsIndex,
-    correlations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int8]: ...
-def counts_of_all(
-    layers: collections.abc.Sequence[ParallelPerceptron],
-    bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-    n_groups: typing.SupportsInt | typing.SupportsIndex = 1,
-    n_threads: typing.SupportsInt | typing.SupportsIndex = 1,
-) -> numpy.typing.NDArray[numpy.int32]:
+def correlation_matrix_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, correlations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+    ...
+def counts_of_all(layers: collections.abc.Sequence[ParallelPerceptron], bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_groups: typing.SupportsInt | typing.SupportsIndex = 1, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.int32]:
     """
     How many units of each group fire, in each of some layers of one code
     """
-
-def energy_sensor(
-    s3: typing.SupportsFloat | typing.SupportsIndex, s4: typing.SupportsFloat | typing.SupportsIndex
-) -> float: ...
-def exp(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any: ...
-def height_sensor(
-    s1: typing.SupportsFloat | typing.SupportsIndex, s2: typing.SupportsFloat | typing.SupportsIndex
-) -> float: ...
+def energy_sensor(s3: typing.SupportsFloat | typing.SupportsIndex, s4: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    ...
+def exp(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    ...
+def height_sensor(s1: typing.SupportsFloat | typing.SupportsIndex, s2: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    ...
 def instruction_set() -> str:
     """
     The instruction set in use
     """
-
-def libsdnn_tables(
-    n_units: typing.SupportsInt | typing.SupportsIndex,
-    inputs: collections.abc.Sequence[
-        tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]
-    ],
-    pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-    seed: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-    library: str = "libstdc++",
-) -> tuple:
+def libsdnn_tables(n_units: typing.SupportsInt | typing.SupportsIndex, inputs: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]], pairs: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], seed: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], library: str = 'libstdc++') -> tuple:
     """
     LIBSDNN's code tables, (modified, modifiers); inputs are (n_bins, n_flipped)
     """
-
-def libsdnn_weights(
-    n_units: typing.SupportsInt | typing.SupportsIndex,
-    n_columns: typing.SupportsInt | typing.SupportsIndex,
-    low: typing.SupportsInt | typing.SupportsIndex,
-    high: typing.SupportsInt | typing.SupportsIndex,
-    seed: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-    library: str = "libstdc++",
-) -> tuple:
+def libsdnn_weights(n_units: typing.SupportsInt | typing.SupportsIndex, n_columns: typing.SupportsInt | typing.SupportsIndex, low: typing.SupportsInt | typing.SupportsIndex, high: typing.SupportsInt | typing.SupportsIndex, seed: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], library: str = 'libstdc++') -> tuple:
     """
     LIBSDNN's first (weights, thresholds)
     """
-
-def log(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any: ...
+def log(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    ...
 def n_units_for(scheme: str, n_classes: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
     Units that separate so many classes
     """
-
-def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any: ...
+def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    ...
 def presets() -> dict[str, tuple[str, SDNNCConfig, QLearningConfig]]:
     """
     Named settings of Q-learning with SDNN-C: titles, settings of approximator and learning
     """
-
 def q_lambda_presets() -> dict[str, tuple[str, LinearSDNNConfig, QLambdaConfig]]:
     """
     The presets of Q(lambda), by name
     """
-
-def random_inverse_patterns(
-    n_units: typing.SupportsInt | typing.SupportsIndex,
-    n_bins: typing.SupportsInt | typing.SupportsIndex,
-    n_flipped: typing.SupportsInt | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int8]: ...
-def seed_of_dimension(
-    seed: typing.SupportsInt | typing.SupportsIndex, d: typing.SupportsInt | typing.SupportsIndex
-) -> int:
+def random_inverse_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_bins: typing.SupportsInt | typing.SupportsIndex, n_flipped: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+    ...
+def seed_of_dimension(seed: typing.SupportsInt | typing.SupportsIndex, d: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
     The seed of the network of a dimension of the action
     """
-
 def set_instruction_set(name: str) -> None:
     """
     Forces an instruction set, for the whole process
     """
-
-def sin_cos(
-    x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+def sin_cos(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     (sin x, cos x), item by item
     """
-
-def symbol_patterns(
-    n_symbols: typing.SupportsInt | typing.SupportsIndex,
-    n_units: typing.SupportsInt | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int8]: ...
+def symbol_patterns(n_symbols: typing.SupportsInt | typing.SupportsIndex, n_units: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
+    ...
 @typing.overload
-def time_agent_steps(
-    agent: BareAgent,
-    n_repetitions: typing.SupportsInt | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int64]:
+def time_agent_steps(agent: BareAgent, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """
-
 @typing.overload
-def time_agent_steps(
-    agent: PlainRBFQLearning,
-    n_repetitions: typing.SupportsInt | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.int64]:
+def time_agent_steps(agent: PlainRBFQLearning, n_repetitions: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)
     """
-
-def time_decisions(
-    trial: AcrobotTrial, n_episodes: typing.SupportsInt | typing.SupportsIndex
-) -> numpy.typing.NDArray[numpy.int64]:
+def time_decisions(trial: AcrobotTrial, n_episodes: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
     """
     Advances a trial; nanoseconds of every decision in it
     """
-
-CLASS_SCHEMES: tuple = ("one_vs_rest", "one_vs_one")
-TRAINING_FORMS: tuple = ("auto", "dual", "block", "plain")
+CLASS_SCHEMES: tuple = ('one_vs_rest', 'one_vs_one')
+TRAINING_FORMS: tuple = ('auto', 'dual', 'block', 'plain')
 __version__: str
-compiler: str = "GCC 12.2.0"
+compiler: str = 'GCC 12.2.0'

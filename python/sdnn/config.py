@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from sdnn._core import (
     AcrobotConfig as AcrobotConfig,
+    ActorCriticConfig as ActorCriticConfig,
     Controller as Controller,
     FuzzyQLearningConfig as FuzzyQLearningConfig,
     FuzzyRulesConfig as FuzzyRulesConfig,

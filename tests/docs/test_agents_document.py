@@ -7,13 +7,21 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLambda, SDNNQLearning, Transition
+from sdnn.agents import (
+    FuzzyQLearning,
+    RBFQLearning,
+    SDNNActorCritic,
+    SDNNQLambda,
+    SDNNQLearning,
+    Transition,
+)
 from sdnn.cli import main
 from sdnn.export import export_c_header
 
 DOCS = Path(__file__).parents[2] / "docs"
 AGENTS = {
     "q-lambda": SDNNQLambda,
+    "actor-critic": SDNNActorCritic,
     "sdnn-c": SDNNQLearning,
     "rbf": RBFQLearning,
     "fuzzy": FuzzyQLearning,

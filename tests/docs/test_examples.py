@@ -11,15 +11,17 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 import pytest
+import sdnn_actor_critic
 import sdnn_q_lambda
 
-from sdnn.agents import SDNNQLambda, Transition
+from sdnn.agents import SDNNActorCritic, SDNNQLambda, Transition
 
 FOLDER = Path(__file__).parents[2] / "docs" / "examples"
 MAKER = FOLDER / "make_notebooks.py"
 PAGE = FOLDER / "sdnn_q_learning.py"
 Q_LAMBDA = FOLDER / "sdnn_q_lambda.py"
-PAGES = (PAGE, Q_LAMBDA)
+ACTOR_CRITIC = FOLDER / "sdnn_actor_critic.py"
+PAGES = (PAGE, Q_LAMBDA, ACTOR_CRITIC)
 SCRIPTS = sorted(path for path in FOLDER.glob("*.py") if path not in (MAKER, *PAGES))
 
 
@@ -73,16 +75,14 @@ class Recorded(gym.Wrapper):
         return outcome
 
 
-@pytest.mark.parametrize(
-    ("env_id", "n_steps"), [("CartPole-v1", 3000), ("Pendulum-v1", 600), ("Acrobot-v1", 600)]
-)
-def test_the_page_of_q_lambda_has_the_weights_of_the_library(env_id, n_steps):
+def trained_as_on_page(page, agent_class, env_id, n_steps):
+    """Return the page's agent, and the library's after the same steps."""
     env = Recorded(gym.make(env_id))
-    page = sdnn_q_lambda.train(env, sdnn_q_lambda.Settings(steps=n_steps, seed=7), str)
+    agent_of_page = page.train(env, page.Settings(steps=n_steps, seed=7), str)
     space = env.observation_space
     ranges = tuple(np.clip(bound.astype(float), -3, 3) for bound in (space.low, space.high))
     options = {"observation_range": ranges, "inputs": "all", "angle_pairs": "none"}
-    agent = SDNNQLambda(env, seed=7, **options)
+    agent = agent_class(env, seed=7, **options)
     for action, *outcome in env.history:
         if not outcome:
             agent.begin_episode()
@@ -91,11 +91,31 @@ def test_the_page_of_q_lambda_has_the_weights_of_the_library(env_id, n_steps):
         np.testing.assert_array_equal(agent.act(observation), action)
         agent.learn(Transition(observation, action, outcome[1], outcome[0], outcome[2]))
         observation = outcome[0]
+    return agent_of_page, agent
+
+
+@pytest.mark.parametrize(
+    ("env_id", "n_steps"), [("CartPole-v1", 3000), ("Pendulum-v1", 600), ("Acrobot-v1", 600)]
+)
+def test_the_page_of_q_lambda_has_the_weights_of_the_library(env_id, n_steps):
+    page, agent = trained_as_on_page(sdnn_q_lambda, SDNNQLambda, env_id, n_steps)
     state = agent.state()
     for name, numbers in (("weights", page.weights), ("averaged_weights", page.average)):
         np.testing.assert_array_equal(state[f"agent.action_value.{name}"], numbers)
     assert state["agent.action_value.exponent"] == page.exponent
     assert np.abs(page.weights).max() > 2**20, "something was learned"
+
+
+@pytest.mark.parametrize(
+    ("env_id", "n_steps"), [("CartPole-v1", 2000), ("Pendulum-v1", 500), ("Acrobot-v1", 400)]
+)
+def test_the_page_of_the_actor_critic_has_the_weights_of_the_library(env_id, n_steps):
+    page, agent = trained_as_on_page(sdnn_actor_critic, SDNNActorCritic, env_id, n_steps)
+    state = agent.state()
+    np.testing.assert_array_equal(state["agent.actor.weights"], page.weights)
+    np.testing.assert_array_equal(state["agent.action_value.weights"], page.critic.weights)
+    assert state["agent.error_scale.mean_square"] == page.scale.mean_square
+    assert np.abs(page.weights).max() > 2**12, "something was learned"
 
 
 def test_cited_sections_of_the_method_are_there():

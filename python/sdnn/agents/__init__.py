@@ -1,5 +1,6 @@
 """Agents: ``agent.train(env, steps=...)``, or ``act(observation)`` and ``learn(transition)``."""
 
+from sdnn.agents.actor_critic import SDNNActorCritic
 from sdnn.agents.agent import Agent, load_agent
 from sdnn.agents.base import Preset
 from sdnn.agents.datasets import learn_from
@@ -8,7 +9,12 @@ from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.scaling import Scaling
-from sdnn.config import FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
+from sdnn.config import (
+    ActorCriticConfig,
+    FuzzyQLearningConfig,
+    QLambdaConfig,
+    QLearningConfig,
+)
 from sdnn.training.callbacks import (
     JSONLines,
     SaveBestAgent,
@@ -23,6 +29,7 @@ from sdnn.training.interfaces import Transition, UnusableStepError
 from sdnn.training.training import Callback, CheckpointCallback, Training, TrainingResult
 
 __all__ = [
+    "ActorCriticConfig",
     "Agent",
     "Callback",
     "CheckpointCallback",
@@ -35,6 +42,7 @@ __all__ = [
     "QLambdaConfig",
     "QLearningConfig",
     "RBFQLearning",
+    "SDNNActorCritic",
     "SDNNQLambda",
     "SDNNQLearning",
     "SaveBestAgent",

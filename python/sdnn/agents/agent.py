@@ -48,11 +48,12 @@ class Agent(BaseAgent[Approximator, Learning]):
         Settings of the agent's parts; sizes are taken from the spaces.
     seed : int, optional
         The root of every random stream of the agent. None: drawn, and kept as ``agent.seed``.
-    observation_range : (low, high) or "adaptive", optional
+    observation_range : (low, high), "adaptive" or "running", optional
         Two numbers, or two for each observed variable; values outside are clipped. By default the
         bounds of the space, and what the warm-up sees where these are infinite or, in `SDNNQLambda`
         with at most four inputs, more than twice as wide. ``"adaptive"``: what the warm-up sees of
-        all variables but angles, without a twentieth at each end.
+        all variables but angles, without a twentieth at each end. ``"running"``, the default of
+        `SDNNActorCritic`: 2.5 standard deviations around the mean of all that was observed so far.
     angles : sequence of int
         Variables that are angles: their ranges wrap around.
     tables : sequence of array_like, shape (n_bins, n_pattern_units), optional

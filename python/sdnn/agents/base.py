@@ -7,7 +7,7 @@ import secrets
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, TypeVar, cast
 
 import msgspec
 import numpy as np
@@ -89,6 +89,8 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
     presets: ClassVar[Mapping[str, Preset]]
     """Settings by name."""
     default_preset: ClassVar[str] = "general"
+    default_range: ClassVar[Literal["running"] | None] = None
+    """The rule for ranges of observations where none are given."""
     narrows_ranges: ClassVar[bool] = False
     """Whether a warm-up narrows bounds of the space that are far wider than what it sees."""
     wrappers: Sequence[Statistics] = ()
@@ -135,7 +137,7 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
             warm_up_steps,
         )
         self._observation = self._observations.config(
-            observation_range,
+            self.default_range if observation_range is None else observation_range,
             angles,
             chosen.angle_pairs if angle_pairs is None else angle_pairs,
             chosen.inputs if inputs is None else inputs,

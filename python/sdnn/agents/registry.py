@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sdnn import _core
+from sdnn.agents.actor_critic import SDNNActorCritic
 from sdnn.agents.agent import AnyAgent
 from sdnn.agents.base import Preset
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
@@ -181,3 +182,4 @@ _register(
     table_bytes=lambda network: 8 * network.n_bases ** (network.n_inputs + 1),
 )
 _register(SDNNQLambda, "SDNNQLambda", SDNNQLambda.presets)
+_register(SDNNActorCritic, "SDNNActorCritic", SDNNActorCritic.presets)

@@ -99,9 +99,10 @@ def _option_type(kind: Mapping[str, Any]) -> click.ParamType[Any]:
 @click.option(
     "--range",
     "ranges",
-    metavar="[VARIABLE=]LOW:HIGH|adaptive",
+    metavar="[VARIABLE=]LOW:HIGH|adaptive|running",
     multiple=True,
-    help="Range of an observed variable, from 0, or of all; repeatable. adaptive: from a warm-up.",
+    help="Range of an observed variable, from 0, or of all; repeatable. adaptive: from a warm-up;"
+    " running: they follow what is observed.",
 )
 @click.option(
     "--set",
@@ -192,8 +193,8 @@ def _given(env_id: str | None, options: Options) -> Options:
     for name, text in named_values("--env-arg", options["kwargs"]):
         give(f"--env-arg {name}", f"environment.kwargs.{name}", value_of(text))
     for text in options["ranges"]:
-        if text == "adaptive":
-            give("--range", "agent.observation_range", "adaptive")
+        if text in ("adaptive", "running"):
+            give("--range", "agent.observation_range", text)
         else:
             name, bounds = _range(text)
             give(f"--range {name}", f"environment.ranges.{name}", bounds)
@@ -217,5 +218,5 @@ def _range(text: str) -> tuple[str, list[float]]:
         return name or "all", [float(low), float(high)]
     except ValueError:
         raise click.UsageError(
-            f"--range must be [VARIABLE=]LOW:HIGH or adaptive, got {text!r}"
+            f"--range must be [VARIABLE=]LOW:HIGH, adaptive or running, got {text!r}"
         ) from None

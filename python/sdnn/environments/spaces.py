@@ -20,8 +20,8 @@ Inputs: TypeAlias = Literal["all", "relevant"] | Sequence[int]
 AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
 """Pairs of variables that are the cosine and the sine of one angle."""
 
-Ranges: TypeAlias = Literal["adaptive"] | tuple[ArrayLike, ArrayLike]
-"""Lowest and highest values, a number for all variables or one for each; or adaptive ones."""
+Ranges: TypeAlias = Literal["adaptive", "running"] | tuple[ArrayLike, ArrayLike]
+"""Lowest and highest values, a number for all variables or one for each; or a rule for them."""
 
 Missing: TypeAlias = Literal["error", "hold", "code"]
 """The treatment of missing readings."""
@@ -62,8 +62,8 @@ class Observations:
         narrows: bool = False,
     ) -> _core.ObservationConfig:
         """Return the core's settings for these arguments of `sdnn.agents.Agent`."""
-        is_adaptive = isinstance(ranges, str) and ranges == "adaptive"
-        low, high = _ranges(self._low, self._high, None if is_adaptive else ranges)
+        rule = ranges if isinstance(ranges, str) and ranges in ("adaptive", "running") else None
+        low, high = _ranges(self._low, self._high, None if rule else ranges)
         pairs: Any = angle_pairs
         if isinstance(angle_pairs, str):
             pairs, expected = (), "be 'none', 'find' or pairs of variables"
@@ -74,7 +74,8 @@ class Observations:
         return _core.ObservationConfig(
             low=[None if np.isnan(x) else x for x in low.tolist()],
             high=[None if np.isnan(x) else x for x in high.tolist()],
-            adaptive=is_adaptive,
+            adaptive=rule == "adaptive",
+            running=rule == "running",
             narrowed=narrows and ranges is None,
             angles=angles,
             angle_pairs=pairs,
@@ -191,7 +192,7 @@ def _ranges(
     """Return the range of each variable, as given or from the bounds; NaN: not known."""
     if ranges is not None:
         is_pair = isinstance(ranges, Sequence) and not isinstance(ranges, str) and len(ranges) == 2
-        require(is_pair, "observation_range", "be (low, high) or 'adaptive'", ranges)
+        require(is_pair, "observation_range", "be (low, high), 'adaptive' or 'running'", ranges)
         try:
             low, high = (
                 with_infinities(

@@ -263,8 +263,8 @@ class AgentSpec(Settings, frozen=True):
     name: Annotated[
         str | None,
         doc(
-            "The agent: `q-lambda`, `sdnn-c`, `rbf`, `fuzzy`, or one that was registered. "
-            "By default `q-lambda`."
+            "The agent: `q-lambda`, `actor-critic`, `sdnn-c`, `rbf`, `fuzzy`, or one that was"
+            " registered. By default `q-lambda`."
         ),
     ] = None
     preset: Annotated[
@@ -275,8 +275,11 @@ class AgentSpec(Settings, frozen=True):
         ),
     ] = None
     observation_range: Annotated[
-        Literal["adaptive"] | None,
-        doc("`adaptive`: ranges of the observed variables come from a warm-up."),
+        Literal["adaptive", "running"] | None,
+        doc(
+            "`adaptive`: ranges of the observed variables come from a warm-up; `running`: they"
+            " follow what is observed, the default of `actor-critic`."
+        ),
     ] = None
     angles: Annotated[
         tuple[Index, ...],

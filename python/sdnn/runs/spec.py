@@ -352,7 +352,7 @@ class RunSpec(Settings, frozen=True):
         if environment.has_other_sensors:  # given ranges are the space's then
             return {"observation_range": flat_bounds(env.observation_space), **arguments}
         if "observation_range" in arguments:
-            problem = "must not be given together with adaptive ranges"
+            problem = "must not be given together with agent.observation_range"
             raise ConfigError("environment.ranges", problem)
         return {**arguments, "observation_range": environment.ends(env)}
 

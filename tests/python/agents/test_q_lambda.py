@@ -7,31 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from q_lambda_transcription import Code, QLambda
+from q_lambda_transcription import SMALL, Code, QLambda, life
 from sdnn import _core
 from sdnn.agents import QLambdaConfig, RBFQLearning, SDNNQLambda, Transition, evaluate, load_agent
 from sdnn.approximators import LinearSDNNConfig
-
-SMALL = {
-    "n_inputs": 2,
-    "averaging_interval": 0,
-    "n_pattern_units": 6,
-    "n_anchor_patterns": 3,
-    "n_interpolated": 2,
-}
-
-
-def life(seed, n_steps, n_actions, scale):
-    """Transitions of episodes that end in a terminal state, at a limit, or not at all."""
-    rng = np.random.default_rng(seed)
-    state = rng.random(2)
-    for _ in range(n_steps):
-        action = [int(rng.integers(n)) for n in n_actions]
-        reward = float(scale ** rng.integers(-1, 3) * rng.normal()) if rng.random() < 0.7 else 0.0
-        next_state = rng.random(2)
-        end = rng.choice(["none", "terminal", "limit", "jump"], p=[0.8, 0.1, 0.05, 0.05])
-        yield state, action, reward, next_state, end
-        state = next_state if end == "none" else rng.random(2)
 
 
 @given(

@@ -22,6 +22,7 @@ FIRST = {
     "fuzzy": ({"n_sets": 3, "n_actions": 5}, POLICY),
     "rbf": ({"n_bases": 3, "n_actions": 5}, RATES),
     "q-lambda": (CODE, RATES | {"schedule_steps": 0}),
+    "actor-critic": (CODE, {"schedule_steps": 100}),
 }
 """Settings of which one at a time is changed: small, and such that the others matter."""
 
@@ -32,6 +33,10 @@ WITHOUT_EFFECT = {
     },
     "sdnn-c": {"learning_coefficient": "it scales weights and thresholds alike"},
     "rbf": {"value_range": "such a network has no range"},
+    "actor-critic": {
+        "action_window": "each action has preferences of its own",
+        "averaging_interval": "it acts by its present weights",
+    },
 }
 """Settings that change nothing, and why."""
 
@@ -76,7 +81,8 @@ def life(entry, n_dimensions, approximator, learning):
             agent.begin_episode()
             observation = random.random(3)
         actions.append(action)
-    values = getattr(agent, "q_values", None) or agent.value
+    names = ("action_probabilities", "q_values", "value")
+    values = next(getattr(agent, name) for name in names if hasattr(agent, name))
     probes = random.random((20, 3))
     actions += [agent.act(probe, explore=False) for probe in probes]
     return np.stack(actions), np.stack([values(probe) for probe in probes])

@@ -32,6 +32,7 @@ def scripts():
         import page
         import report
         import run
+
         import studies
 
         yield argparse.Namespace(
@@ -99,7 +100,7 @@ def test_every_agent_learns_on_the_engine(scripts, monkeypatch):
         assert record.rows.table["kind"].tolist() == 3 * ["evaluation"]
         assert np.round(record.rows.episode_return, 2).tolist() == curve["mean_return"]
         assert curve["bytes"] > 0
-    assert len(tried) == 9
+    assert len(tried) == 10
 
 
 def test_a_trial_runs_in_a_process_of_its_own_and_once(scripts, tmp_path):

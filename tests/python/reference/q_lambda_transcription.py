@@ -8,6 +8,27 @@ from typing import Any
 import numpy as np
 import sdnn_q_lambda as page
 
+SMALL = {
+    "n_inputs": 2,
+    "averaging_interval": 0,
+    "n_pattern_units": 6,
+    "n_anchor_patterns": 3,
+    "n_interpolated": 2,
+}
+
+
+def life(seed, n_steps, n_actions, scale):
+    """Transitions of episodes that end in a terminal state, at a limit, or not at all."""
+    rng = np.random.default_rng(seed)
+    state = rng.random(2)
+    for _ in range(n_steps):
+        action = [int(rng.integers(n)) for n in n_actions]
+        reward = float(scale ** rng.integers(-1, 3) * rng.normal()) if rng.random() < 0.7 else 0.0
+        next_state = rng.random(2)
+        end = rng.choice(["none", "terminal", "limit", "jump"], p=[0.8, 0.1, 0.05, 0.05])
+        yield state, action, reward, next_state, end
+        state = next_state if end == "none" else rng.random(2)
+
 
 class Code:
     """A code of `n_columns` features that `code_of(state)` returns."""

@@ -12,11 +12,13 @@ import gymnasium as gym
 import numpy as np
 
 from sdnn.agents import (
+    ActorCriticConfig,
     FuzzyQLearning,
     FuzzyQLearningConfig,
     QLambdaConfig,
     QLearningConfig,
     RBFQLearning,
+    SDNNActorCritic,
     SDNNQLambda,
     SDNNQLearning,
     Transition,
@@ -26,7 +28,7 @@ from sdnn.agents import (
 )
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 
-AGENTS = (SDNNQLambda, SDNNQLearning, RBFQLearning, FuzzyQLearning)
+AGENTS = (SDNNQLambda, SDNNActorCritic, SDNNQLearning, RBFQLearning, FuzzyQLearning)
 INF = np.inf
 SINGLE_INPUTS = {
     "bounded": gym.spaces.Box(-1.0, 1.0, (1,)),
@@ -138,6 +140,14 @@ def random_settings(random, agent_class):
             n_pattern_units=int(random.choice([16, 40])), averaging_interval=n,
             max_pairs=int(random.choice([0, 0, 6])), n_actions=int(random.choice([3, 5])),
         )  # fmt: skip
+    elif agent_class is SDNNActorCritic:
+        common["observation_range"] = random.choice([None, "adaptive", "running"])
+        learning = ActorCriticConfig(
+            discount=float(random.choice([0.0, 0.9, 1.0])),
+            entropy=float(random.choice([0.0, 1.0])),
+            thermometers=bool(random.choice([False, True])),
+        )
+        config = LinearSDNNConfig(n_pattern_units=16, n_actions=int(random.choice([1, 5])))
     elif agent_class is SDNNQLearning:
         learning = QLearningConfig(n_steps=int(random.choice([1, 4])))
         config = SDNNCConfig(
@@ -225,7 +235,7 @@ ENTRIES = {
 def missing_reading_cells():
     """Missing readings are refused by name, or held or coded, at every entry."""
     for agent_class in AGENTS:
-        coded = agent_class in (SDNNQLambda, SDNNQLearning)
+        coded = agent_class in (SDNNQLambda, SDNNActorCritic, SDNNQLearning)
         for missing in ("error", "hold", "code") if coded else ("error", "hold"):
             for name in ("bounded", "unbounded", "angle", "symbol", "Dict"):
                 for entry in ENTRIES if agent_class is not FuzzyQLearning else [*ENTRIES][:-1]:
@@ -260,7 +270,7 @@ def soak_cells(first, n):
 def _soak_cell(number):
     def run():
         random = np.random.default_rng(number)
-        agent_class = AGENTS[random.choice(4, p=[0.6, 0.2, 0.1, 0.1])]
+        agent_class = AGENTS[random.choice(5, p=[0.5, 0.15, 0.15, 0.1, 0.1])]
         space, has_angle = random_space(random)
         if agent_class in (RBFQLearning, FuzzyQLearning) and gym.spaces.flatdim(space) > 4:
             agent_class = SDNNQLambda

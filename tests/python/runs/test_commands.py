@@ -378,11 +378,11 @@ def test_several_environments_are_learned_in(invoke):
         (["CartPole-v1", "--redundant", 5000, "--range", "0:1"], "--redundant"),
         (
             ["CartPole-v1", "--range", "5"],
-            "--range must be [VARIABLE=]LOW:HIGH or adaptive, got '5'",
+            "--range must be [VARIABLE=]LOW:HIGH, adaptive or running, got '5'",
         ),
         (
             ["CartPole-v1", "--range", "0=adaptive"],
-            "--range must be [VARIABLE=]LOW:HIGH or adaptive",
+            "--range must be [VARIABLE=]LOW:HIGH, adaptive or running",
         ),
         (
             ["CartPole-v1", "--range", "adaptive", "--range", "0:1"],
@@ -491,7 +491,7 @@ discount = 0.5
         (
             "[agent]\nobservation_range = 'adaptive'\n",
             ["CartPole-v1", "--range", "0:1"],
-            "Error: --range: must not be given together with adaptive ranges",
+            "Error: --range: must not be given together with agent.observation_range",
         ),
         (
             "[approximator]\nn_hidden_units = 1000000000\n",

@@ -63,4 +63,4 @@ def test_one_display_draws_progress():
 def test_one_name_for_each_agent():
     kinds = {entry.agent for entry in AGENTS.values()}
     assert len(kinds) == len(AGENTS)
-    assert set(AGENTS) == {"sdnn-c", "q-lambda", "rbf", "fuzzy"}
+    assert set(AGENTS) == {"sdnn-c", "q-lambda", "actor-critic", "rbf", "fuzzy"}

@@ -151,12 +151,13 @@ def test_ids_are_registered_once():
 
 
 def test_agents_are_looked_up_by_word():
-    words = ["sdnn-c", "fuzzy", "rbf", "q-lambda", "sdnn-c-general", "sdnn-c-robust"]
-    words += ["sdnn-c-small", "q-lambda-general"]
+    words = ["sdnn-c", "fuzzy", "rbf", "q-lambda", "actor-critic"]
+    words += ["sdnn-c-general", "sdnn-c-robust"]
+    words += ["sdnn-c-small", "q-lambda-general", "actor-critic-general"]
     assert list(labels()) == words
     assert [title_of(word) for word in words] == [
-        "SDNN-C", "FQL", "RBFN", "SDNNQLambda", "SDNN-C, general", "SDNN-C, robust",
-        "SDNN-C, small", "SDNNQLambda, general",
+        "SDNN-C", "FQL", "RBFN", "SDNNQLambda", "SDNNActorCritic", "SDNN-C, general",
+        "SDNN-C, robust", "SDNN-C, small", "SDNNQLambda, general", "SDNNActorCritic, general",
     ]  # fmt: skip
     assert all(agent_entry(name) is entry for name, entry in AGENTS.items())
     assert agent_entry("sdnn-c-small") is AGENTS["sdnn-c"]

@@ -1,0 +1,219 @@
+"""SDNNActorCritic on one page: a softmax policy and state values in plain NumPy.
+
+    python docs/examples/sdnn_actor_critic.py --env-id CartPole-v1 --steps 10000
+
+The critic is the agent of sdnn_q_lambda.py with a single action, so that it learns V(s) by true
+online TD(lambda). The actor has a row of preferences for each action, linear in the same code.
+Numbered comments mark the differences from the textbook's actor-critic with traces (Sutton, Barto,
+2018, section 13.5). The library learns the same weights, bit for bit, and faster; a test compares
+them. The warm-up, which fits ranges, is not on this page.
+"""
+
+import argparse
+import dataclasses
+import math
+
+import gymnasium as gym
+import numpy as np
+import sdnn_q_lambda
+from sdnn_q_lambda import SDNNCode, clipped, rounded
+from sdnn_q_learning import EXPLORATION, Random
+
+
+@dataclasses.dataclass
+class Settings(sdnn_q_lambda.Settings):
+    """The library's defaults. Each field is an option of the command."""
+
+    steps: int = 10_000
+    n_box_actions: int = 5
+    learning_rate: float = 0.5  # of the critic
+    actor_learning_rate: float = 0.1
+    final_actor_learning_rate: float = 0.02
+    entropy: float = 0.01
+    averaging_interval: int = 10**9  # never
+
+
+class CodeWithThermometers(SDNNCode):
+    """(1) The code of pairs, and for each input a thermometer: unit k is +1 above threshold k.
+
+    So the policy finds trends over the whole range of an input at once.
+    """
+
+    def __init__(self, n_inputs, s):
+        super().__init__(n_inputs, s)
+        n_active = s.n_pattern_units * (n_inputs - 1) // 4
+        self.n_units = 64 * max(1, n_active // 128)
+        self.n_columns += n_inputs * self.n_units
+
+    def __call__(self, state):
+        last = len(self.books[0]) - 1
+        bins = np.minimum((np.array(state) * (last + 1)).astype(int), last)
+        n_above = (2 * bins * self.n_units + last) // (2 * last)
+        thermometers = np.where(np.arange(self.n_units) < n_above[:, None], 1, -1)
+        return np.concatenate([super().__call__(state), thermometers.ravel()])
+
+
+def power_of_half(x):
+    """2^-x in units of 2^-30, by a polynomial; x in units of 2^-20."""
+    power = 0
+    for coefficient in (7356191, -57204762, 257158220, -744180561, 1 << 30):
+        power = coefficient + rounded(power * (x % 2**20), 20)
+    return power >> (x >> 20)
+
+
+def log2_of(x):
+    """log2(x / 2^30) in units of 2^-20, by a polynomial."""
+    exponent = int(x).bit_length() - 1
+    fraction = ((x << 30 >> exponent) - 2**30) >> 10
+    logarithm = 0
+    for coefficient in (-86117, 336784, -710703, 1508612, 0):
+        logarithm = coefficient + rounded(logarithm * fraction, 20)
+    return ((exponent - 30) << 20) + logarithm
+
+
+class ErrorScale:
+    """(2) TD errors in units of their root mean square, clipped at 3, with 12 fractional bits."""
+
+    def __init__(self):
+        self.mean_square, self.n_errors, self.exponent = 0, 0, 0
+
+    def normalized(self, error, exponent):
+        n_doubled = exponent - self.exponent
+        self.mean_square = min(rounded_down(self.mean_square, 2 * n_doubled), 2**60)
+        self.exponent = exponent
+        size = min(abs(error) >> 8, 2**25 - 1)
+        self.n_errors = min(self.n_errors + 1, 1024)
+        self.mean_square += quotient((size * size << 10) - self.mean_square, self.n_errors)
+        root = max(math.isqrt(self.mean_square >> 10), 1)
+        return (-1 if error < 0 else 1) * min((size << 12) // root, 3 << 12)
+
+
+def rounded_down(x, n_bits):
+    return x >> n_bits if n_bits >= 0 else x << -n_bits
+
+
+def quotient(x, n):
+    return abs(x) // n * (1 if x >= 0 else -1)
+
+
+class ActorCritic:
+    """The agent. States are in [0, 1]^l, an action has an index for each of its dimensions."""
+
+    def __init__(self, code, n_actions, s):
+        self.code, self.settings = code, s
+        self.critic = sdnn_q_lambda.QLambda(code, [1], s)
+        self.first_rows = np.cumsum([0, *n_actions])
+        # (3) Preferences count units of 2^-unit_bits, so that weights of 23 bits are enough.
+        self.unit_bits = 16 + (code.n_columns // 4).bit_length()
+        self.weights = np.zeros((self.first_rows[-1], code.n_columns), np.int64)
+        self.trace = np.zeros_like(self.weights)
+        self.scale, self.exploration = ErrorScale(), Random(s.seed, EXPLORATION)
+        self.next_state = None
+
+    def begin_episode(self):
+        self.critic.end_trace()
+        self.trace[:], self.next_state = 0, None
+
+    def terms(self, x):
+        """Return weights exp(h - max h), probabilities and their logarithms, for each dimension."""
+        for preferences in np.split(self.weights @ x, self.first_rows[1:-1]):
+            below = (preferences.max() - preferences) >> (self.unit_bits - 20)
+            bits = np.minimum(rounded(np.minimum(below, 40 << 20) * 1549082005, 30), 40 << 20)
+            weights = [int(power_of_half(int(b))) for b in bits]
+            total = sum(weights)
+            logarithms = [-int(b) - log2_of(total) for b in bits]
+            yield weights, [((w << 16) + total // 2) // total for w in weights], logarithms
+
+    def act(self, state):
+        """Draw an action of each dimension by its probability."""
+        action = []
+        for weights, _, _ in self.terms(self.code(state)):
+            drawn = self.exploration.below(sum(weights))
+            action.append(int(np.searchsorted(np.cumsum(weights), drawn, "right")))
+        return action
+
+    def learn(self, state, action, reward, next_state, terminated):
+        critic, s = self.critic, self.settings
+        if self.next_state is None or not np.array_equal(self.next_state, state):
+            self.begin_episode()
+        x, next_x = self.code(state), self.code(next_state)
+        critic.n_learned += 1
+        critic.fit_unit(reward)
+        while not terminated and abs(critic.best_value(next_x)) >= 2**33:
+            critic.double_unit()
+        next_value = 0 if terminated else critic.best_value(next_x)
+        while abs(critic.value(x, [0])) >= 2**33:
+            critic.double_unit()
+            next_value = rounded(next_value, 1)
+        target = critic.units_of(reward) + rounded(next_value * round(s.discount * 2**15), 15)
+        error = self.scale.normalized(target - critic.value(x, [0]), critic.exponent or 0)
+        self.update_actor(x, action, error)
+        critic.correct(x, [0], reward, next_value)
+        self.next_state = next_state
+        if terminated:
+            self.begin_episode()
+
+    def update_actor(self, x, action, error):
+        """Add the gradient of log pi(a | s) to the trace, and move the weights along the trace."""
+        s, critic = self.settings, self.critic
+        rate = critic.scheduled(s.actor_learning_rate, s.final_actor_learning_rate)
+        # (4) As in the critic, the rate is divided by the number of features that are not 0.
+        rate = (max(1, rate) << 12) // max(1, np.count_nonzero(x))
+        step, n_bits = rounded(error * rate, 40 - self.unit_bits), 0
+        while abs(step) >> n_bits >= 2**13 - 1:
+            n_bits += 1
+        decay = round(s.discount * s.trace_decay * 2**13)
+        self.trace = np.sign(self.trace) * (abs(self.trace) * decay >> 13)
+        slopes = []
+        for d, (_, probabilities, logarithms) in enumerate(self.terms(x)):
+            entropy = rounded(-np.dot(probabilities, logarithms), 16)
+            for a, p in enumerate(probabilities):
+                gain = 2**12 * (a == action[d]) - rounded(p, 4)
+                self.trace[self.first_rows[d] + a] += gain * x
+                # (5) A step along the gradient of the policy's entropy keeps it random.
+                nats = rounded((entropy + logarithms[a]) * 45426, 16)
+                slopes.append(rounded(p * nats, 20))
+        self.trace = clipped(self.trace, 17)
+        self.weights += rounded(rounded(step, n_bits) * self.trace, 12 - n_bits)
+        pull = rounded(np.array(slopes) * round(s.entropy * 2**16) * rate, 60 - self.unit_bits)
+        self.weights = clipped(self.weights - np.outer(pull, x), 23)
+
+
+def train(env, s, report=print):
+    """Learn for some steps; return the agent. Ranges as in sdnn_q_lambda.py."""
+    low, high = (
+        np.clip(bound.astype(float), -3.0, 3.0)
+        for bound in (env.observation_space.low, env.observation_space.high)
+    )
+
+    def state_of(observation):
+        return np.clip((observation - low) / (high - low), 0.0, 1.0)
+
+    actions = env.action_space
+    is_box = isinstance(actions, gym.spaces.Box)
+    n_actions = [s.n_box_actions] * actions.shape[0] if is_box else [int(actions.n)]
+    agent = ActorCritic(CodeWithThermometers(len(low), s), n_actions, s)
+    state, total = state_of(env.reset(seed=s.seed)[0]), 0.0
+    for step in range(1, s.steps + 1):
+        action = agent.act(state)
+        task_action = action[0]
+        if is_box:
+            part = np.array(action) / (s.n_box_actions - 1)
+            task_action = (actions.low + (actions.high - actions.low) * part).astype(actions.dtype)
+        observation, reward, terminated, truncated, _ = env.step(task_action)
+        agent.learn(state, action, reward, state_of(observation), terminated)
+        state, total = state_of(observation), total + reward
+        if terminated or truncated:
+            report(f"step {step}: return {total:g}")
+            agent.begin_episode()
+            state, total = state_of(env.reset()[0]), 0.0
+    return agent
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(formatter_class=argparse.ArgumentDefaultsHelpFormatter)
+    for field in dataclasses.fields(Settings):
+        option = "--" + field.name.replace("_", "-")
+        parser.add_argument(option, type=type(field.default), default=field.default, help=" ")
+    settings = Settings(**vars(parser.parse_args()))
+    train(gym.make(settings.env_id), settings)

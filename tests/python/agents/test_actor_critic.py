@@ -1,0 +1,150 @@
+"""The actor-critic: equal to its transcription, and what users meet."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import sdnn_actor_critic as page
+from hypothesis import given, settings, strategies as st
+
+from q_lambda_transcription import SMALL, life
+from sdnn import _core
+from sdnn.agents import ActorCriticConfig, SDNNActorCritic, Transition, evaluate, load_agent
+from sdnn.approximators import LinearSDNNConfig
+
+STILL = {"observation_range": (-1.0, 1.0)}
+
+
+class Code(page.CodeWithThermometers):
+    """The code of a small network."""
+
+    def __init__(self, readout):
+        self.readout, self.n_columns = readout, len(readout.code([0.5, 0.5]))
+
+    def __call__(self, state):
+        return np.array(self.readout.code(state), np.int64)
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    n_actions=st.lists(st.integers(1, 4), min_size=1, max_size=2),
+    trace_decay=st.sampled_from([0.0, 0.8, 1.0]),
+    discount=st.sampled_from([0.0, 0.9, 1.0]),
+    rate=st.sampled_from([1e-6, 0.3, 1.0]),
+    entropy=st.sampled_from([0.0, 0.01, 1.0]),
+    scale=st.sampled_from([1.0, 100.0, 1e6, 1e-40]),
+)
+@settings(max_examples=40, deadline=None)
+def test_weights_are_those_of_the_transcription(
+    seed, n_actions, trace_decay, discount, rate, entropy, scale
+):
+    learning = {
+        "learning_rate": rate,
+        "actor_learning_rate": rate,
+        "final_actor_learning_rate": rate,
+        "entropy": entropy,
+        "schedule_steps": 7,
+        "trace_decay": trace_decay,
+        "discount": discount,
+    }
+    agent = _core.BareAgent(
+        approximator=LinearSDNNConfig(**SMALL),
+        n_actions=n_actions,
+        learning=ActorCriticConfig(**learning),
+        seed=seed,
+    )
+    (critic,) = agent.networks
+    slow = page.ActorCritic(Code(critic), n_actions, page.Settings(**learning, seed=seed))
+    for state, action, reward, next_state, end in life(seed, 25, n_actions, scale):
+        np.testing.assert_array_equal(agent.act(state), slow.act(state))
+        for one in (agent, slow):
+            one.learn(state, action, reward, next_state, end == "terminal")
+            if end == "limit":
+                one.begin_episode()
+        assert critic.exponent == slow.critic.exponent
+        np.testing.assert_array_equal(critic.weights(), slow.critic.weights)
+
+
+def test_continuous_control_is_learned_without_a_warm_up():
+    env = gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0")
+    agent = SDNNActorCritic(env, seed=1)
+    assert not agent.is_warming_up
+    assert agent.act(env.reset(seed=1)[0]) in env.action_space
+
+
+def test_cartpole_is_learned_in_a_few_thousand_steps():
+    env = gym.make("CartPole-v1")
+    agent = SDNNActorCritic(env, seed=1)
+    agent.train(env, steps=20_000, seed=1)
+    assert evaluate(agent, gym.make("CartPole-v1"), episodes=10, seed=7).mean_return > 300
+
+
+def test_a_bandit_is_solved_by_probabilities_and_valued_by_its_mean():
+    space, arms = gym.spaces.Box(-1.0, 1.0, (2,), np.float64), gym.spaces.Discrete(3, start=1)
+    agent = SDNNActorCritic(space, arms, seed=1, **STILL)
+    zeros = np.zeros(2)
+    np.testing.assert_allclose(agent.action_probabilities(zeros), 1 / 3)
+    for _ in range(1500):
+        action = agent.act(zeros)
+        agent.learn(Transition(zeros, action, float(action == 2), zeros, True))
+    probabilities = agent.action_probabilities(zeros)
+    assert probabilities.sum() == pytest.approx(1)
+    assert probabilities[1] > 0.9
+    assert agent.value(zeros) == pytest.approx(probabilities[1], abs=0.1)
+    assert agent.act(zeros, explore=False) == 2
+
+
+def test_values_of_actions_and_epsilon_are_refused_with_what_there_is_instead():
+    agent = SDNNActorCritic(gym.spaces.Box(-1.0, 1.0, (2,)), gym.spaces.Discrete(2), seed=1)
+    assert not hasattr(agent, "q_values")
+    with pytest.raises(AttributeError, match="action_probabilities"):
+        agent.q_values(np.zeros(2))
+    with pytest.raises(ValueError, match="entropy"):
+        agent.epsilon = 0.1
+    agent.epsilon = None
+    assert agent.epsilon == 0
+
+
+@pytest.mark.parametrize("n_environments", [1, 3])
+def test_a_saved_agent_continues_to_the_bit(n_environments, tmp_path):
+    """Running ranges, the states of episodes and traces are saved, too."""
+    space = gym.spaces.Box(-np.inf, np.inf, (3,), np.float64)
+    agent = SDNNActorCritic(space, gym.spaces.Box(-1.0, 1.0, (2,)), seed=1)
+    agent.n_environments = n_environments
+    rng, observations = np.random.default_rng(1), np.zeros((n_environments, 3))
+    for step in range(300):
+        i = step % n_environments
+        if step == 150:
+            agent.save(tmp_path / "agent.safetensors")
+            same = load_agent(tmp_path / "agent.safetensors")
+        agents = [agent, same] if step >= 150 else [agent]
+        actions = [one.act(observations[i], environment=i) for one in agents]
+        next_observation = 5.0 + 3.0 * rng.normal(size=3)
+        transition = Transition(
+            observations[i], actions[0], rng.normal(), next_observation, rng.random() < 0.1
+        )
+        agent.learn(transition, environment=i)
+        if step >= 150:
+            np.testing.assert_array_equal(*actions)
+            same.learn(transition, environment=i)
+        observations[i] = next_observation
+    assert agent.state().keys() == same.state().keys()
+    for name, values in agent.state().items():
+        np.testing.assert_array_equal(same.state()[name], values)
+    low, high = agent.observation_range
+    np.testing.assert_allclose((low + high) / 2, 5.0, atol=0.7)
+    np.testing.assert_allclose(high - low, 2 * 2.5 * 3.0, rtol=0.2)
+
+
+def test_a_warm_up_finds_inputs_and_is_not_learned():
+    space = gym.spaces.Box(-np.inf, np.inf, (3,), np.float64)
+    agent = SDNNActorCritic(
+        space, gym.spaces.Discrete(2), seed=1, inputs="relevant", warm_up_steps=300
+    )
+    rng, observation = np.random.default_rng(1), np.zeros(3)
+    while agent.is_warming_up:
+        action = agent.act(observation)
+        following = np.array([0.9 * observation[0] + action - 0.5, *rng.normal(size=2)])
+        agent.learn(Transition(observation, action, following[0], following, False))
+        observation = following
+    assert ("variable", [0]) in agent.inputs
+    np.testing.assert_allclose(agent.action_probabilities(observation), 0.5)
