@@ -58,7 +58,7 @@ class Logged(NamedTuple):
 
 
 @cache
-def _column_of() -> dict[str, str]:
+def _columns_by_name() -> dict[str, str]:
     """Return the usual name for each name."""
     return {other: name for name, others in NAMES.items() for other in (name, *others)}
 
@@ -168,7 +168,7 @@ def _items(items: Iterable[Any]) -> Iterator[Logged]:
         elif isinstance(item, tuple | list) and len(item) in (5, 6):
             yield _logged(dict(zip(_ROW, item, strict=False)), f"transition {number}")
         else:
-            values = _fields_of(item)
+            values = _columns_in(item)
             if values is None:
                 expected = "be a Transition, a mapping, or an episode with observations"
                 raise argument_error(f"dataset, transition {number}",
@@ -184,11 +184,14 @@ def _items(items: Iterable[Any]) -> Iterator[Logged]:
 _ROW = ("observations", "actions", "rewards", "next_observations", "terminations", "truncations")
 
 
-def _fields_of(item: Any) -> Data | None:
-    """Return the columns of a mapping or of an object with attributes of such names."""
+def _columns_in(item: Any) -> Data | None:
+    """Return the columns of a mapping, or of an object's attributes that `NAMES` lists.
+
+    None for an object without observations or rewards.
+    """
     if isinstance(item, Mapping):
         return dict(item)
-    named = {name: getattr(item, name) for name in _column_of() if hasattr(item, name)}
+    named = {name: getattr(item, name) for name in _columns_by_name() if hasattr(item, name)}
     has_all = all(_value(named, name) is not None for name in ("observations", "rewards"))
     return named if has_all else None
 
@@ -203,7 +206,7 @@ def _transition(values: Info, place: str) -> Logged:
     for name, value in values.items():
         if _IGNORED.match(name):
             continue
-        column = _column_of().get(name)
+        column = _columns_by_name().get(name)
         require(column, f"dataset, {place}", f"have no {name!r}: {advice(name, NAMES)}", [*values])
         require(column not in row, f"dataset, {place}", f"have {column} once", [*values])
         row[str(column)] = value
@@ -244,8 +247,8 @@ def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = Fals
         if column is None or _IGNORED.match(str(name)):
             continue
         numbered = _NUMBERED.fullmatch(str(name))
-        whole = _column_of().get(str(name))
-        part = _column_of().get(numbered[1]) if numbered and whole is None else None
+        whole = _columns_by_name().get(str(name))
+        part = _columns_by_name().get(numbered[1]) if numbered and whole is None else None
         if part is not None and numbered is not None:
             parts.setdefault(part, {})[int(numbered[2])] = array_of(f"{where}[{name!r}]", column)
         elif whole is not None:

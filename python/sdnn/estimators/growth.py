@@ -35,11 +35,11 @@ def pairs_of_new(n_before: int, n_new: int, random: np.random.RandomState) -> Pa
 def grow(
     model: BaseSDNN, new: Mapping[str, Coding], changed: Mapping[int, Coding], most_columns: int
 ) -> bool:
-    """Give a trained model new inputs, and inputs codings with more categories.
+    """Add new inputs to a trained model, and give some inputs codings with more categories.
 
-    The new weights are 0, so that predictions stay as they are. All codings are fitted, and those
-    in ``changed`` have missing values. Return False, and change nothing, if the code would have
-    more columns than ``most_columns``.
+    The new weights are 0, so that predictions stay as they are. All codings are fitted; each one
+    in ``changed`` has a pattern for missing values, its last. Return False, and change nothing, if
+    the code would have more columns than ``most_columns``.
     """
     network, before = model.network_, model.network_.input_code
     n_before, n_units = len(before.codings), before.core.n_units

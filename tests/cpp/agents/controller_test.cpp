@@ -380,7 +380,7 @@ TEST(Controller, ComparesSizesBeforeMemoryIsAskedFor) {
   EXPECT_NE(error_of(config, state).find("agent.rules.values"), std::string::npos);
 }
 
-TEST(Controller, KeepsThePatternsItWasGiven) {
+TEST(Controller, KeepsPatternsAndRefusesThemForActionsOfSeveralDimensions) {
   ControllerConfig config = sdnn();
   std::vector<coding::PatternTable> tables;
   std::vector<std::int8_t> signs;
@@ -390,7 +390,7 @@ TEST(Controller, KeepsThePatternsItWasGiven) {
   const core::State state = core::state_of(controller);
   EXPECT_TRUE(state.contains("table.2"));
   EXPECT_EQ(core::state_of(Controller::restored(config, state)), state);
-  config.action = {.low = {0.0, 0.0}, .high = {1.0, 1.0}};
+  config.action = {.low = {0.0, 0.0}, .high = {1.0, 1.0}};  // a network for each dimension
   EXPECT_THROW(Controller(config, tables), std::invalid_argument);
 }
 

@@ -44,7 +44,9 @@ TEST(TrainingForm, MemoryByHand) {
                 4U * 288 * (128 + 32) + 2U * 128 * 128);
 }
 
-TEST(TrainingForm, CountsTheInnerProducts) {  // 16,000 columns of 20,000 samples take too long
+/// The dual form computes an inner product of codes for every two samples: too slow for 20,000
+/// samples of 16,000 columns.
+TEST(TrainingForm, IsBlockWhereInnerProductsOfAllSamplesTakeTooLong) {
   const auto code = demonstration_code(8000);
   const auto chosen = [&](std::size_t n_samples, std::size_t n_units) {
     return estimators::choose_form(TrainingForm::automatic, n_units, code, n_samples,

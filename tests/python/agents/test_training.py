@@ -569,7 +569,7 @@ def test_an_environment_that_does_not_repeat_itself_is_refused(tmp_path):
     refuses("env", Training.load, tmp_path / "t", env, error=UnrepeatedEpisodeError)
 
 
-def test_new_episodes_begin_where_none_are_repeated(tmp_path):
+def test_a_training_that_repeats_no_episode_abandons_the_unfinished_one(tmp_path):
     env = Corridor(is_random=True)
     first = corridor_agent()
     path = tmp_path / "rows.jsonl"

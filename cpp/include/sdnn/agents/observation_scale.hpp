@@ -94,8 +94,8 @@ class ObservationScale {
       for (std::size_t k = 0; k < inputs_.size(); ++k) state[k] = value(inputs_[k], observation);
     } else {
       for (std::size_t k = 0; k < inputs_.size(); ++k) {
-        state[k] =
-            missing_ == Missing::code ? coded(k, observation) : held(inputs_[k], observation);
+        state[k] = missing_ == Missing::code ? coded(k, observation)
+                                             : value_or_middle(inputs_[k], observation);
       }
     }
   }
@@ -146,7 +146,10 @@ class ObservationScale {
     return (static_cast<double>(bin) + 0.5) / static_cast<double>(n + 1);
   }
 
-  double held(const ObservedInput& input, std::span<const double> observation) const noexcept {
+  /// The input's value; where a reading is missing, the middle of its range, of a symbol the first
+  /// one, of an angle the middle of the reading that is missing.
+  double value_or_middle(const ObservedInput& input,
+                         std::span<const double> observation) const noexcept {
     if (!is_missing(input, observation)) return value(input, observation);
     if (input.kind == ObservedKind::symbol) return 0.5 / static_cast<double>(input.second);
     if (input.kind != ObservedKind::angle) return 0.5;

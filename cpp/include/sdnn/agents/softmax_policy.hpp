@@ -19,8 +19,8 @@ namespace sdnn::agents {
 /// pi(a | s) = exp h(s, a) / sum of exp h(s, b), for each dimension of the action apart; h(s, a) is
 /// the inner product of the action's weights and the code of s.
 ///
-/// A preference counts units of 2^-n_unit_bits(); weights have 23 bits. Weights that would need
-/// more are clipped: the preferences of a code reach +-64 at least.
+/// A preference is an integer in units of 2^-n_unit_bits(); weights have 23 bits. Weights that
+/// would need more are clipped: the preferences of a code reach +-64 at least.
 class SoftmaxPolicy {
  public:
   using Code = approximators::LinearCode;

@@ -76,7 +76,8 @@ class LinearSDNN {
              Thermometers thermometers = {})
       : config_(with_pattern_units(config)),
         code_(wiring_of(config_, std::move(tables), seed, n_first)),
-        thermometers_(std::move(thermometers)) {
+        thermometers_(std::move(thermometers)),
+        n_slots_(64 * code_->n_words() + thermometers_.n_columns()) {
     core::require(!n_actions.empty(), "n_actions", "of one dimension at least", 0);
     for (const std::size_t n : n_actions) {
       core::require_in_range("n_actions", n, std::size_t{1}, std::size_t{1} << 16);
@@ -107,7 +108,7 @@ class LinearSDNN {
   /// The number of units of all dimensions, the rows of the weights.
   std::size_t n_rows() const noexcept { return n_rows_; }
   /// The number of columns of a row, including those that are always 0.
-  std::size_t n_slots() const noexcept { return 64 * code_->n_words() + thermometers_.n_columns(); }
+  std::size_t n_slots() const noexcept { return n_slots_; }
   /// Shape: (n_rows, n_slots).
   std::span<const std::int32_t> weights() const noexcept { return weights_; }
   /// The exponent of the unit of values, 2^exponent; none before the first reward that is not 0.
@@ -427,6 +428,7 @@ class LinearSDNN {
   LinearSDNNConfig config_;
   std::shared_ptr<const coding::StateCode> code_;
   Thermometers thermometers_;
+  std::size_t n_slots_;
   std::vector<Dimension> dimensions_;
   std::size_t n_rows_ = 0;
   std::vector<std::int32_t> weights_;

@@ -343,6 +343,8 @@ class SDNNC {
                            [this](std::int32_t count) { return value_of_count(count); });
   }
 
+  /// The hidden layer with weights averaged over the corrections so far; made when it is first
+  /// asked for after a correction.
   std::shared_ptr<const AveragedLayer> averaged_layer() const {
     return averaged_.get([this] {
       return AveragedLayer(*average_, *code_, actions_.n_hidden_units(),

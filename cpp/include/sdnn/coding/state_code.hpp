@@ -25,19 +25,19 @@ namespace sdnn::coding {
 ///
 /// In the paper all pairs (mu, nu), nu != mu, have a *group* of m units. Here each input may have
 /// fewer partners, given by *strides*: mu is modified by mu + stride, modulo l, so that every input
-/// is modified by k others and modifies k. With all l - 1 strides it is the paper's code.
+/// is modified by p others and modifies p. With all l - 1 strides it is the paper's code.
 ///
-/// In the paper's order groups are sorted by mu, then nu. Unit k of a group is unit
-/// number * m + k of x_SD: unit k of x^mu, modified by unit sigma_mu_nu[k] of x^nu. Stored, a group
-/// is in the order of the units that modify it: then all groups (mu, nu) of one nu share a gate,
-/// the plain pattern of nu.
+/// In the paper's order groups are sorted by mu, then nu. Unit k of group g is unit g * m + k of
+/// x_SD: unit k of x^mu, modified by unit sigma_mu_nu[k] of x^nu. Stored, a group is in the order
+/// of the units that modify it: then all groups (mu, nu) of one nu are switched by one pattern,
+/// that of nu, their *gate*.
 ///
-/// The k units that unit q of x^nu modifies, one in each group (mu, nu), are neutral together. Two
-/// of them, x_i and x_j, are stored as (x_i + x_j) / 2 and (x_i - x_j) / 2. One of these is always
-/// neutral, which halves the number of columns to read or correct. This is the *paired code*, D
-/// columns too. Its first n_double_columns() are such halves: for each nu and each two of its
-/// groups m half sums, then m half differences, in the order of q. If k is odd, the group of the
-/// last mu of each nu has no partner and follows unchanged.
+/// Sums and differences halve the number of columns to read or correct. The p units that unit q of
+/// x^nu modifies, one in each group (mu, nu), are neutral together. Two of them, x_i and x_j, are
+/// stored as (x_i + x_j) / 2 and (x_i - x_j) / 2, one of which is always neutral. This is the
+/// *paired code*, D columns too. Its first n_double_columns() are such halves: for each nu and each
+/// two of its groups m half sums, then m half differences, in the order of q. If p is odd, the
+/// group of the last mu of each nu has no partner and follows unchanged.
 class StateCode {
  public:
   /// Makes the wiring from tables, one per input, permutations, one per group in the paper's order,

@@ -25,9 +25,10 @@ constexpr std::uint64_t square_root(std::uint64_t x) noexcept {
 /// last 1,024.
 class ErrorScale {
  public:
-  /// Returns an error that counts 2^exponent in units of the root mean square, with 12 fractional
-  /// bits, clipped at 3; the error itself counts among those that are averaged.
+  /// Divides an error, an integer in units of 2^exponent, by the root mean square of the errors so
+  /// far, this one included. The quotient has 12 fractional bits and is clipped to [-3, 3].
   std::int32_t normalized(std::int64_t error, std::int32_t exponent) noexcept {
+    // The mean square is converted to the unit of this error.
     for (; exponent_ < exponent && mean_square_ > 0; ++exponent_) mean_square_ >>= 2;
     for (; exponent_ > exponent && mean_square_ > 0; --exponent_) {
       mean_square_ = std::min(mean_square_ << 2, kLargestMean);

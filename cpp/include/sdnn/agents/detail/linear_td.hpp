@@ -15,10 +15,9 @@
 
 namespace sdnn::agents::detail {
 
-/// A readout, and the episodes that it learns from: each has a trace, the workspace of its
-/// `present` state, and old_value, Q_old in units.
-///
-/// Gamma counts 2^-15, gamma lambda 2^-13, values units of the readout.
+/// A readout that learns from episodes. An episode has a trace, a workspace for its present state,
+/// and old_value, the Q_old of true-online TD. All are integers: gamma in units of 2^-15, gamma *
+/// lambda of 2^-13, values in the readout's unit.
 template <class Episode>
 class LinearTD {
  public:

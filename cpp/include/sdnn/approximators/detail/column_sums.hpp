@@ -174,6 +174,8 @@ void add_groups_neon(const std::int8_t* block, const ColumnPlaces& places, int f
   }
 }
 
+/// Adds `factor` times the sum of the columns; `group` columns, 4, 2 or 1, are added in bytes
+/// before the sum is widened.
 inline void add_columns_neon(const std::int8_t* block, const ColumnPlaces& places, int group,
                              int factor, std::int32_t* sums) {
   switch (group) {

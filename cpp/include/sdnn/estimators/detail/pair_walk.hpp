@@ -1,8 +1,9 @@
 /// Potentials of a block of samples, computed by pairs of inputs.
 ///
-/// With many inputs, no order of the samples gives consecutive samples similar codes. The columns
-/// of a pair depend on two inputs alone, so each pair has a separate order, a short walk through a
-/// plane.
+/// The potentials of a sample are those of the one before, corrected by the columns in which their
+/// codes differ, so consecutive samples should have similar codes. With many inputs no single order
+/// achieves that; but the columns of a pair depend on two inputs alone, so each pair has an order
+/// of its own, a short walk through the plane of these inputs.
 #pragma once
 
 #include <algorithm>

@@ -166,9 +166,9 @@ class WeightTiles {
     return tile(unit / kTileUnits)[slot * width(unit / kTileUnits) + unit % kTileUnits];
   }
 
-  /// Adds unit i's weights in the slots to add to sums[i], and subtracts those in the slots to
-  /// subtract; at most `n_per_sum` of them, whose sum fits into Weight, are added before the sum is
-  /// widened. Shapes: sums (n_padded_units,).
+  /// Adds to sums[i] the weights of unit i in the columns `slots.plus`, and subtracts those in
+  /// `slots.minus`. Up to `n_per_sum` weights, whose sum fits into Weight, are added before the sum
+  /// is widened. Shapes: sums (n_padded_units,).
   void add_columns(const coding::SignedColumns& slots, std::size_t n_per_sum,
                    std::int32_t* sums) const {
     for (std::size_t t = 0; t < n_tiles(); ++t) {
