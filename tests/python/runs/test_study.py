@@ -307,7 +307,7 @@ def wrong_studies(name):
 
     A file of them has a title before each study, and the message after ``#!``.
     """
-    text = Path(__file__, "../../reference/studies", name).resolve().read_text()
+    text = Path(__file__, "../../reference/wrong_studies", name).resolve().read_text()
     for title, study in re.findall(r"^=== (.*)\n((?:(?!===).*\n)+)", text, re.MULTILINE):
         lines = [title, *study.splitlines()]
         ((number, line),) = [(n, line) for n, line in enumerate(lines) if "#! " in line]
