@@ -6,7 +6,7 @@ The critic is the agent of sdnn_q_lambda.py with a single action, so that it lea
 online TD(lambda). The actor has a row of preferences for each action, linear in the same code.
 Numbered comments mark the differences from the textbook's actor-critic with traces (Sutton, Barto,
 2018, section 13.5). The library learns the same weights, bit for bit, and faster; a test compares
-them. The warm-up, which fits ranges, is not on this page.
+them. Ranges that follow what is observed, the library's default, are not on this page.
 """
 
 import argparse

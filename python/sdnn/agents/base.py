@@ -227,6 +227,11 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         return self._controller.inputs
 
     @property
+    def has_running_ranges(self) -> bool:
+        """Whether ranges of observations follow what is observed."""
+        return self._observation.running
+
+    @property
     def missing(self) -> str:
         """The treatment of missing readings: ``"error"``, ``"hold"`` or ``"code"``."""
         return self._observation.missing

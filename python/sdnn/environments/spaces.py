@@ -63,7 +63,11 @@ class Observations:
     ) -> _core.ObservationConfig:
         """Return the core's settings for these arguments of `sdnn.agents.Agent`."""
         rule = ranges if isinstance(ranges, str) and ranges in ("adaptive", "running") else None
-        low, high = _ranges(self._low, self._high, None if rule else ranges)
+        low, high = self._low, self._high
+        if rule == "running":  # bounds have no effect; those of a constant are none
+            is_range = low < high
+            low, high = (np.where(is_range, bound, np.nan) for bound in (low, high))
+        low, high = _ranges(low, high, None if rule else ranges)
         pairs: Any = angle_pairs
         if isinstance(angle_pairs, str):
             pairs, expected = (), "be 'none', 'find' or pairs of variables"

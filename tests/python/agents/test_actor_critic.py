@@ -7,9 +7,18 @@ import sdnn_actor_critic as page
 from hypothesis import given, settings, strategies as st
 
 from q_lambda_transcription import SMALL, life
+from refusals import refuses
 from sdnn import _core
-from sdnn.agents import ActorCriticConfig, SDNNActorCritic, Transition, evaluate, load_agent
+from sdnn.agents import (
+    ActorCriticConfig,
+    SDNNActorCritic,
+    SDNNQLambda,
+    Transition,
+    evaluate,
+    load_agent,
+)
 from sdnn.approximators import LinearSDNNConfig
+from sdnn.export import c_header
 
 STILL = {"observation_range": (-1.0, 1.0)}
 
@@ -148,3 +157,46 @@ def test_a_warm_up_finds_inputs_and_is_not_learned():
         observation = following
     assert ("variable", [0]) in agent.inputs
     np.testing.assert_allclose(agent.action_probabilities(observation), 0.5)
+
+
+def test_running_ranges_follow_first_observations_of_episodes_too():
+    """The ends of one-step episodes are all alike; their beginnings tell what to do."""
+    space = gym.spaces.Box(-np.inf, np.inf, (1,), np.float64)
+    agent = SDNNActorCritic(space, gym.spaces.Discrete(2), seed=1)
+    rng, rewards = np.random.default_rng(1), []
+    for _ in range(2000):
+        observation = rng.normal(100.0, 10.0, 1)
+        agent.begin_episode()
+        action = agent.act(observation)
+        rewards.append(1.0 if action == (observation[0] > 100.0) else -1.0)
+        agent.learn(Transition(observation, action, rewards[-1], np.zeros(1), True))
+    assert np.mean(rewards[-300:]) > 0.7
+
+
+def test_environments_and_missing_readings_keep_their_traces():
+    space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
+    agent = SDNNActorCritic(space, gym.spaces.Discrete(2), seed=1, missing="code")
+    agent.n_environments = 2
+    rng, observations = np.random.default_rng(1), np.full((2, 2), np.nan)
+    for step in range(40):
+        i = step % 2
+        action = agent.act(observations[i], environment=i)
+        following = np.array([rng.normal(), np.nan])
+        agent.learn(Transition(observations[i], action, 1.0, following, False), environment=i)
+        observations[i] = following
+    traces = agent.state()["agent.trace.values"]
+    assert len(np.unique(np.abs(traces))) > 3, "of several steps"
+
+
+def test_what_learns_in_c_needs_ranges_that_stay():
+    agent = SDNNQLambda(
+        gym.spaces.Box(-1.0, 1.0, (2,)), gym.spaces.Discrete(2), seed=1, inputs="all",
+        angle_pairs="none", observation_range="running",
+    )  # fmt: skip
+    refuses("agent", c_header, agent, "robot", learning=True)
+
+
+def test_a_constant_variable_needs_no_range():
+    space = gym.spaces.Box(np.array([0.0, 1.0]), np.array([1.0, 1.0]), dtype=np.float64)
+    agent = SDNNActorCritic(space, gym.spaces.Discrete(2), seed=1)
+    agent.act(np.array([0.5, 1.0]))

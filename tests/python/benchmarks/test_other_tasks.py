@@ -32,7 +32,6 @@ def scripts():
         import page
         import report
         import run
-
         import studies
 
         yield argparse.Namespace(

@@ -44,9 +44,8 @@ namespace sdnn::agents {
 /// An agent of any kind that observes variables and chooses actions in the units of its task.
 ///
 /// Where ranges of observations are not known it begins with a *warm-up*: it acts at random for a
-/// while, takes the ranges from what it observed, and then learns what it did, in order; fuzzy
-/// Q-learning and the actor-critic, which learn their own actions only, begin anew. From then on
-/// the ranges stay.
+/// while, takes the ranges from what it observed, and then learns what it did, in order, unless it
+/// learns its own actions only. From then on ranges stay, unless they are running.
 ///
 /// Thread safety: const functions may be called by many threads at once, with a workspace each.
 class Controller : public WithRates<Controller> {
@@ -163,7 +162,7 @@ class Controller : public WithRates<Controller> {
       readings_.note(held_, environment, !explore);
       return action_;
     }
-    observations_.scale(held, state_);
+    last_states_.read(observations_, environment, held, state_, explore);
     std::visit(
         [&](auto& agent) {
           actions_.take(agent.act(state_, explore, environment, mask), action_, indices_);
@@ -271,7 +270,8 @@ class Controller : public WithRates<Controller> {
     }
     last_states_.read(observations_, environment, held.observation, state_);
     find_indices(action, environment);
-    last_states_.follow(observations_, environment, held.next_observation, next_state_);
+    last_states_.follow(observations_, environment, held.observation, held.next_observation,
+                        next_state_);
     learn_scaled(reward, terminated, environment, next_mask);
     readings_.note_step(environment);
     notes_.note(observation);

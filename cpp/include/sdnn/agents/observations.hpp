@@ -123,12 +123,15 @@ class Observations {
 
   /// Whether ranges change.
   bool is_running() const noexcept { return running_.has_value(); }
+  /// Lets running ranges begin anew.
+  void forget() {
+    if (running_) running_.emplace(n_variables());
+  }
   /// Lets running ranges follow an observation. Requires that it is fitted.
   void note(std::span<const double> observation) {
     running_->note(observation);
     follow();
   }
-
   /// Which inputs have a variable that is never left out.
   std::vector<bool> required() const {
     std::vector<bool> required;

@@ -37,9 +37,9 @@ class RunningRanges {
   /// The lowest and the highest value of a variable, as it is now.
   std::pair<double, double> operator[](std::size_t i) const noexcept {
     const double mean = means_[i];
-    double deviation = 1.0;
+    const double least = std::max(kRounding * std::abs(mean), kSmallest);
+    double deviation = std::max(1.0, least);
     if (counts_[i] > 1) {
-      const double least = std::max(kRounding * std::abs(mean), kSmallest);
       const auto n_more = static_cast<double>(counts_[i] - 1);
       deviation = std::max(std::sqrt(squares_[i] / n_more), least);
     }

@@ -47,7 +47,7 @@ class SoftmaxPolicy {
   SoftmaxPolicy(std::vector<std::size_t> n_actions, std::size_t n_columns)
       : n_actions_(std::move(n_actions)),
         n_columns_(n_columns),
-        n_unit_bits_(16 + static_cast<int>(std::bit_width(n_columns / 4))) {
+        n_unit_bits_(std::min(40, 16 + static_cast<int>(std::bit_width(n_columns / 4)))) {
     for (const std::size_t n : n_actions_) n_rows_ += n;
     weights_.resize(n_rows_ * n_columns_);
   }

@@ -161,6 +161,7 @@ void Controller::begin_reading(bool is_warming_up, const Archive& archive) {
                  "0, as all ranges are known");
   agent_.reset();
   warm_up_.reset();
+  observations_.forget();
   if (is_warming_up) warm_up_.emplace(new_warm_up());
 }
 

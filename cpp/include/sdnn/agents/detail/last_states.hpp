@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -19,28 +20,30 @@ class LastStates {
   LastStates(std::size_t n_variables, std::size_t n_inputs)
       : n_variables_(n_variables), n_inputs_(n_inputs) {}
 
-  /// Finds the state of an observation from which a transition starts. Throws as
-  /// Observations::scale.
+  /// Finds the state of an observation in which an agent acts, or from which a transition starts;
+  /// `is_kept` where the agent may learn from it. Throws as Observations::scale.
   void read(const Observations& observations, std::size_t environment,
-            std::span<const double> observation, std::span<double> state) const {
-    // A missing reading equals none.
-    if (environment < last_.size() &&
-        std::ranges::equal(last_[environment].observation, observation)) {
+            std::span<const double> observation, std::span<double> state, bool is_kept = false) {
+    if (is_last(environment, observation)) {
       std::ranges::copy(last_[environment].state, state.begin());
-    } else {
-      observations.scale(observation, state);
+      return;
     }
-  }
-  /// Finds the state in which it ends; running ranges follow the observation first.
-  void follow(Observations& observations, std::size_t environment,
-              std::span<const double> observation, std::span<double> state) {
-    observations.scale(observation, state, "next_observation");
-    if (!observations.is_running()) return;
-    observations.note(observation);
     observations.scale(observation, state);
-    if (last_.size() <= environment) last_.resize(environment + 1);
-    last_[environment].observation.assign(observation.begin(), observation.end());
-    last_[environment].state.assign(state.begin(), state.end());
+    if (is_kept && observations.is_running()) keep(environment, observation, state, false);
+  }
+  /// Finds the state in which a transition ends. Running ranges follow both observations, each
+  /// once.
+  void follow(Observations& observations, std::size_t environment,
+              std::span<const double> observation, std::span<const double> next_observation,
+              std::span<double> next_state) {
+    observations.scale(next_observation, next_state, "next_observation");
+    if (!observations.is_running()) return;
+    if (!is_last(environment, observation) || !last_[environment].is_noted) {
+      observations.note(observation);
+    }
+    observations.note(next_observation);
+    observations.scale(next_observation, next_state);
+    keep(environment, next_observation, next_state, true);
   }
   void forget(std::size_t environment) {
     if (environment < last_.size()) last_[environment] = {};
@@ -63,8 +66,9 @@ class LastStates {
       archive.within(std::to_string(i), [&] {
         archive.numbers("observation", self.last_[i].observation);
         archive.numbers("state", self.last_[i].state);
+        archive.number("is_noted", self.last_[i].is_noted);
         if constexpr (Archive::kReads) {
-          const auto& [observation, state] = self.last_[i];
+          const auto& [observation, state, is_noted] = self.last_[i];
           const auto is_unit = [](double x) { return x >= 0.0 && x <= 1.0; };
           const bool is_empty = observation.empty() && state.empty();
           const bool is_whole =
@@ -79,9 +83,26 @@ class LastStates {
  private:
   struct Last {
     std::vector<double> observation, state;
+    bool is_noted = false;  ///< whether ranges have followed it
   };
 
   static constexpr std::uint64_t kMostEnvironments = 1 << 14;
+
+  /// Whether this is the environment's last observation; missing readings are alike.
+  bool is_last(std::size_t environment, std::span<const double> observation) const {
+    const auto are_alike = [](double x, double y) {
+      return x == y || (!std::isfinite(x) && !std::isfinite(y));
+    };
+    return environment < last_.size() &&
+           std::ranges::equal(last_[environment].observation, observation, are_alike);
+  }
+  void keep(std::size_t environment, std::span<const double> observation,
+            std::span<const double> state, bool is_noted) {
+    if (environment >= kMostEnvironments) return;  // there is none, as the agent will say
+    if (last_.size() <= environment) last_.resize(environment + 1);
+    last_[environment] = {
+        {observation.begin(), observation.end()}, {state.begin(), state.end()}, is_noted};
+  }
 
   [[maybe_unused]] std::size_t n_variables_, n_inputs_;
   std::vector<Last> last_;

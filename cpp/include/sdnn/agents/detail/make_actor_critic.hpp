@@ -16,14 +16,17 @@
 #include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/coding/state_code_config.hpp"
+#include "sdnn/core/config_fields.hpp"
 
 namespace sdnn::agents::detail {
 
 /// The thermometers of all inputs but circular ones and symbols. Together they have at most half as
-/// many columns as are not 0 in the code of pairs, but for one word of each input.
+/// many columns as are not 0 in the code of pairs, but for one word of each input. Throws
+/// std::invalid_argument naming the field that is out of range.
 inline approximators::Thermometers thermometers_of(approximators::LinearSDNNConfig config,
                                                    const ActorCriticConfig& learning) {
   if (!learning.thermometers) return {};
+  core::check_fields(config);
   config = approximators::with_pattern_units(config);
   const auto n_bins = (config.n_anchor_patterns - 1) * (config.n_interpolated + 1);
   std::vector<coding::Bin> n_bins_of(static_cast<std::size_t>(config.n_inputs), n_bins);

@@ -44,7 +44,9 @@ class Thermometers {
       if (n_bins == 0) continue;
       const bool is_read = bins[i] < n_bins;
       const coding::Bin last = std::max(n_bins - 1, 1);
-      const coding::Bin n_above = is_read ? (2 * bins[i] * n_units_ + last) / (2 * last) : 0;
+      const std::int64_t twice_above = std::int64_t{2} * bins[i] * n_units_ + last;
+      const auto n_above =
+          is_read ? static_cast<coding::Bin>(twice_above / (std::int64_t{2} * last)) : 0;
       std::fill_n(active, n_units_, is_read ? -1 : 0);
       std::fill_n(negative, n_units_, 0);
       if (is_read) std::fill_n(negative + n_above, n_units_ - n_above, -1);
