@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self, get_origin, get_type_hints
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +45,25 @@ class Learned(BaseEstimator):
     _weight_seed: int
 
 
-ATTRIBUTES = {name: get_origin(hint) or hint for name, hint in get_type_hints(Learned).items()}
-"""Types of the attributes of `Learned` as a file has them."""
+ATTRIBUTES: dict[str, type] = {
+    "n_corrected_": np.ndarray,
+    "n_features_in_": int,
+    "n_inputs_out_of_range_": int,
+    "n_iter_": int,
+    "n_outputs_": int,
+    "n_outputs_out_of_range_": int,
+    "output_range_": np.ndarray,
+    "training_form_": str,
+    "training_memory_": int,
+    "validation_scores_": np.ndarray,
+    "_counts_of_range": int,
+    "_flat": bool,
+    "_n_units_each": int,
+    "_n_weighted": int,
+    "_scheme": str,
+    "_weight_seed": int,
+}
+"""Types of the attributes of `Learned` as a file has them; annotations are not read at run time."""
 
 
 class Fitted(Learned):
