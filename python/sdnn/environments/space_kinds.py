@@ -160,13 +160,16 @@ def space_of(data: Mapping[str, Any]) -> Space:
         raise ValueError(f"a space must have at most {_MOST_VALUES} values, got {sizes}")
     dtype: Any = np.dtype(kind)
     if "box" in data:
-        low, high = (
-            np.array([float(x) if isinstance(x, str) else x for x in end], dtype).reshape(
-                data["shape"]
-            )
-            for end in data["box"]
-        )
-        return gym.spaces.Box(low, high, dtype=dtype.type)
+        try:
+            with np.errstate(over="raise"):
+                low, high = (
+                    np.array([float(x) if isinstance(x, str) else x for x in end], dtype)
+                    for end in data["box"]
+                )
+        except FloatingPointError:
+            raise ValueError(f"box must be of bounds that fit into {dtype}") from None
+        shape = data["shape"]
+        return gym.spaces.Box(low.reshape(shape), high.reshape(shape), dtype=dtype.type)
     if "discrete" in data:
         options = {} if dtype == np.int64 else {"dtype": dtype.type}  # Gymnasium 1.1 has no dtype
         return gym.spaces.Discrete(data["discrete"], start=data["start"], **options)

@@ -9,7 +9,7 @@ from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Tu
 
 from refusals import refuses
 from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, load_agent
-from sdnn.environments.space_kinds import require_same_kind
+from sdnn.environments.space_kinds import require_same_kind, space_of
 
 PLANE = Box(-1.0, 1.0, (2,))
 
@@ -175,3 +175,8 @@ def test_a_memory_limit_is_for_all_networks_of_an_agent(kind):
     for n in (2, 3):
         assert fits(n, n * low)
         assert not fits(n, n * low - 1)
+
+
+def test_bounds_in_a_file_that_their_type_cannot_hold_are_refused():
+    data = {"dtype": "<f4", "shape": [1], "box": [[-1.0], [1e300]]}
+    refuses("box", space_of, data)
