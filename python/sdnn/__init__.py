@@ -22,4 +22,14 @@ core uses.
 from sdnn._core import __version__ as __version__
 from sdnn.support.lazy import attach
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(
+    __name__,
+    {
+        "sdnn": (
+            "agents approximators benchmarks coding environments estimators export libsdnn "
+            "reproduction runs"
+        ),
+        "sdnn.estimators": "SDNNClassifier SDNNKernelClassifier SDNNKernelRidge SDNNRegressor",
+        "sdnn.support.machine": "instruction_set set_instruction_set",
+    },
+)

@@ -7,7 +7,16 @@ from __future__ import annotations
 
 from sdnn.support.lazy import attach
 
-_load, __dir__, __all__ = attach(__name__, __file__)
+_load, __dir__, __all__ = attach(
+    __name__,
+    {
+        "sdnn.estimators.base": "OutOfRangeWarning",
+        "sdnn.estimators.classifier": "SDNNClassifier",
+        "sdnn.estimators.kernel_ridge": "SDNNKernelClassifier SDNNKernelRidge",
+        "sdnn.estimators.outliers": "OutlierWarning",
+        "sdnn.estimators.regressor": "SDNNRegressor",
+    },
+)
 
 
 def __getattr__(name: str) -> object:

@@ -10,4 +10,23 @@ evaluations), ``checkpoint.safetensors`` (where it is resumed) and, once it is f
 
 from sdnn.support.lazy import attach
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(
+    __name__,
+    {
+        "sdnn.agents.registry": "AGENTS AgentEntry agent_entry register",
+        "sdnn.reports.statistics": "Estimate",
+        "sdnn.runs.dask_executor": "DaskExecutor",
+        "sdnn.runs.engine": "Executor Observer PlannedTrial ThreadExecutor run_trials trial_seed",
+        "sdnn.runs.environment": "EnvironmentSpec",
+        "sdnn.runs.errors": (
+            "ClusterError ConfigError PlotUnavailableError RunError RunTerminatedError "
+            "StoreError WorkerLostError"
+        ),
+        "sdnn.runs.results": "CaseResult measure",
+        "sdnn.runs.run": "Goal Run",
+        "sdnn.runs.settings": "AgentSpec BudgetSpec OutputSpec ProtocolSpec",
+        "sdnn.runs.spec": "RunSpec",
+        "sdnn.runs.store": "ResultStore",
+        "sdnn.runs.trial": "RunEvaluation RunOutcome Trial TrialKey TrialRecord TrialRows",
+    },
+)

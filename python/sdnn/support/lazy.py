@@ -2,35 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
+from typing import Any
 
 
 def attach(
-    package: str, file: str
-) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
-    """Make ``__getattr__``, ``__dir__`` and ``__all__`` of a package whose ``__file__`` is given.
+    package: str, names: Mapping[str, str]
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """Make ``__getattr__``, ``__dir__`` and ``__all__`` of a package.
 
-    Its names are those that the stub beside it, ``__init__.pyi``, imports: nothing but statements
-    such as ``from sdnn.runs.run import Goal as Goal, Run as Run``. Type checkers read the same.
+    ``names`` has the names of each module, with spaces between them; those of the package are its
+    modules. Type checkers read them in the stub beside the package, which a frozen program lacks.
 
     Examples
     --------
-    >>> import sdnn
-    >>> load, names, public = attach("sdnn", sdnn.__file__)
-    >>> load("coding").__name__, "SDNNRegressor" in names(), "SDNNRegressor" in public
-    ('sdnn.coding', True, True)
+    >>> load, names, public = attach("sdnn", {"sdnn": "coding", "sdnn.estimators": "SDNNRegressor"})
+    >>> load("coding").__name__, names(), public
+    ('sdnn.coding', ['SDNNRegressor', 'coding'], ['SDNNRegressor', 'coding'])
     """
-    with open(file.rpartition(".")[0] + ".pyi", encoding="utf-8") as stub:
-        words = stub.read().translate({ord(mark): " " for mark in "(),"}).split()
-    modules: dict[str, str] = {}
-    for place, word in enumerate(words):
-        if word == "from":
-            module = words[place + 1]
-        elif word == "as":
-            modules[words[place + 1]] = module
+    modules = {name: module for module, listed in names.items() for name in listed.split()}
 
-    def load(name: str) -> object:
+    def load(name: str) -> Any:
         if name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         if modules[name] == package:

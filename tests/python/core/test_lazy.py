@@ -45,7 +45,7 @@ def test_an_installation_without_sources_works(tmp_path):
     shutil.copytree(folder, tmp_path / "sdnn", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(_core.__file__, tmp_path / "sdnn")
     compileall.compile_dir(tmp_path / "sdnn", quiet=1, legacy=True)
-    for source in (tmp_path / "sdnn").rglob("*.py"):
+    for source in [*(tmp_path / "sdnn").rglob("*.py"), *(tmp_path / "sdnn").rglob("*.pyi")]:
         source.unlink()
     code = f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
     code += "sys.meta_path[:] = sys.meta_path[-3:]  # not an editable installation's\n"
