@@ -33,6 +33,7 @@ def build(folder):
         "-O3",
         "-DNDEBUG",
         "-ffp-contract=off",
+        "-DSDNN_NO_CONTRACTION",
         f"-I{ROOT / 'cpp' / 'include'}",
         f"-I{ROOT / 'cpp'}",
     )

@@ -9,7 +9,6 @@ Numbered comments mark the differences from the textbook's actor-critic with tra
 them. Ranges that follow what is observed, the library's default, are not on this page.
 """
 
-import argparse
 import dataclasses
 import math
 
@@ -179,41 +178,15 @@ class ActorCritic:
         self.weights = clipped(self.weights - np.outer(pull, x), 23)
 
 
+def new_agent(n_inputs, n_actions, s):
+    return ActorCritic(CodeWithThermometers(n_inputs, s), n_actions, s)
+
+
 def train(env, s, report=print):
-    """Learn for some steps; return the agent. Ranges as in sdnn_q_lambda.py."""
-    low, high = (
-        np.clip(bound.astype(float), -3.0, 3.0)
-        for bound in (env.observation_space.low, env.observation_space.high)
-    )
-
-    def state_of(observation):
-        return np.clip((observation - low) / (high - low), 0.0, 1.0)
-
-    actions = env.action_space
-    is_box = isinstance(actions, gym.spaces.Box)
-    n_actions = [s.n_box_actions] * actions.shape[0] if is_box else [int(actions.n)]
-    agent = ActorCritic(CodeWithThermometers(len(low), s), n_actions, s)
-    state, total = state_of(env.reset(seed=s.seed)[0]), 0.0
-    for step in range(1, s.steps + 1):
-        action = agent.act(state)
-        task_action = action[0]
-        if is_box:
-            part = np.array(action) / (s.n_box_actions - 1)
-            task_action = (actions.low + (actions.high - actions.low) * part).astype(actions.dtype)
-        observation, reward, terminated, truncated, _ = env.step(task_action)
-        agent.learn(state, action, reward, state_of(observation), terminated)
-        state, total = state_of(observation), total + reward
-        if terminated or truncated:
-            report(f"step {step}: return {total:g}")
-            agent.begin_episode()
-            state, total = state_of(env.reset()[0]), 0.0
-    return agent
+    """Learn for some steps as sdnn_q_lambda.py does; return the agent."""
+    return sdnn_q_lambda.train(env, s, report, new_agent)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(formatter_class=argparse.ArgumentDefaultsHelpFormatter)
-    for field in dataclasses.fields(Settings):
-        option = "--" + field.name.replace("_", "-")
-        parser.add_argument(option, type=type(field.default), default=field.default, help=" ")
-    settings = Settings(**vars(parser.parse_args()))
+    settings = sdnn_q_lambda.settings_of_command(Settings)
     train(gym.make(settings.env_id), settings)

@@ -229,7 +229,11 @@ class QLambda:
         self.old_value = rounded(self.old_value, 1)
 
 
-def train(env, s, report=print):
+def new_agent(n_inputs, n_actions, s):
+    return QLambda(SDNNCode(n_inputs, s), n_actions, s)
+
+
+def train(env, s, report=print, new_agent=new_agent):
     """Learn for some steps; return the agent.
 
     Ranges of observations are those of the space, or -3 to 3 where these are wider.
@@ -245,7 +249,7 @@ def train(env, s, report=print):
     actions = env.action_space
     is_box = isinstance(actions, gym.spaces.Box)
     n_actions = [s.n_box_actions] * actions.shape[0] if is_box else [int(actions.n)]
-    agent = QLambda(SDNNCode(len(low), s), n_actions, s)
+    agent = new_agent(len(low), n_actions, s)
     state, total = state_of(env.reset(seed=s.seed)[0]), 0.0
     for step in range(1, s.steps + 1):
         action = agent.act(state)
@@ -263,10 +267,14 @@ def train(env, s, report=print):
     return agent
 
 
-if __name__ == "__main__":
+def settings_of_command(settings_class):
     parser = argparse.ArgumentParser(formatter_class=argparse.ArgumentDefaultsHelpFormatter)
-    for field in dataclasses.fields(Settings):
+    for field in dataclasses.fields(settings_class):
         option = "--" + field.name.replace("_", "-")
         parser.add_argument(option, type=type(field.default), default=field.default, help=" ")
-    settings = Settings(**vars(parser.parse_args()))
+    return settings_class(**vars(parser.parse_args()))
+
+
+if __name__ == "__main__":
+    settings = settings_of_command(Settings)
     train(gym.make(settings.env_id), settings)

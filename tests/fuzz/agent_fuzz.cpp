@@ -122,6 +122,13 @@ void fuzzy(FuzzedDataProvider& input) {
   use(agent, input);
 }
 
+/// Numbers of actions of one or two dimensions.
+std::vector<std::size_t> some_actions(FuzzedDataProvider& input) {
+  std::vector<std::size_t> n_actions(input.ConsumeIntegralInRange<std::size_t>(1, 2));
+  for (auto& n : n_actions) n = input.ConsumeIntegralInRange<std::size_t>(1, 9);
+  return n_actions;
+}
+
 void linear(FuzzedDataProvider& input) {
   approximators::LinearSDNNConfig config{.n_inputs = input.ConsumeIntegralInRange(2, 4),
                                          .n_pattern_units = 20,
@@ -131,8 +138,7 @@ void linear(FuzzedDataProvider& input) {
   config.max_table_bytes = kMostBytes;
   agents::QLambdaConfig learning;
   fuzz::change(learning, input);
-  std::vector<std::size_t> n_actions(input.ConsumeIntegralInRange<std::size_t>(1, 2));
-  for (auto& n : n_actions) n = input.ConsumeIntegralInRange<std::size_t>(1, 9);
+  const auto n_actions = some_actions(input);
   agents::QLambda agent(approximators::LinearSDNN(config, n_actions, 1), learning, 1);
   use(agent, input);
   auto workspace = agent.workspace();
@@ -151,8 +157,7 @@ void actor_critic(FuzzedDataProvider& input) {
   config.max_table_bytes = kMostBytes;
   agents::ActorCriticConfig learning;
   fuzz::change(learning, input);
-  std::vector<std::size_t> n_actions(input.ConsumeIntegralInRange<std::size_t>(1, 2));
-  for (auto& n : n_actions) n = input.ConsumeIntegralInRange<std::size_t>(1, 9);
+  const auto n_actions = some_actions(input);
   auto made = agents::make_agent(config, learning, n_actions, 1);
   auto& agent = std::get<agents::ActorCritic>(made);
   use(agent, input);

@@ -109,7 +109,9 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         declared = list(zip(self._observation.low, self._observation.high, strict=True))
         return {
             "left_out": [i for i in range(len(use)) if i not in inside],
-            "fitted": [i for i, ends in enumerate(ranges) if ends != declared[i]],
+            "fitted": []
+            if self.has_running_ranges
+            else [i for i, ends in enumerate(ranges) if ends != declared[i]],
             "share_of_range": [shares and shares[0] for shares in use],
             "share_beyond_range": [shares and shares[1] for shares in use],
         }

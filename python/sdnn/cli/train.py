@@ -176,8 +176,8 @@ def _given(env_id: str | None, options: Options) -> Options:
     """Return the values of the options by their keys; UsageError if two options set the same."""
     from sdnn.runs.settings import KEYS_BY_NAME
 
-    given = {key: options.pop(key.replace(".", "_")) for key in KEYS}
-    values = {k: value for k, value in given.items() if value is not None and value is not False}
+    by_key = {key: options.pop(key.replace(".", "_")) for key in KEYS}
+    values = {k: value for k, value in by_key.items() if value is not None and value is not False}
     by_option = {key: (option_of(key), value) for key, value in values.items()}
 
     def give(option: str, key: str, value: object) -> None:

@@ -105,11 +105,11 @@ def test_the_angle_of_a_pair_is_in_the_agents_bin(needs, tmp_path):
     (tmp_path / "policy.h").write_text(header.text)
     bins = program(tmp_path, source, "gcc", "-std=c99")
     text = "".join(f"{c!r} {s!r}\n" for c, s in points)
-    found = np.array(run(bins, input=text.encode()).split(), int).reshape(-1, 2)
+    bins_in_c = np.array(run(bins, input=text.encode()).split(), int).reshape(-1, 2)
     unit = [agent._controller.state_of([c, s, 0.0])[0] for c, s in points]
     expected = np.minimum((np.array(unit) * n_bins).astype(int), n_bins - 1)
     assert expected[: bounds.size].tolist() == list(range(n_bins - 1))
-    np.testing.assert_array_equal(found, np.column_stack([expected, expected]))
+    np.testing.assert_array_equal(bins_in_c, np.column_stack([expected, expected]))
 
 
 def test_what_the_library_refuses_is_defined(needs, tmp_path):
@@ -138,8 +138,8 @@ def test_what_the_library_refuses_is_defined(needs, tmp_path):
     numbers = [math.nan, math.inf, -math.inf, 0.5]
     points = list(itertools.product(numbers, repeat=3))
     text = "".join(f"{x} {y} {z}\n" for x, y, z in points)
-    found = np.array(run(bins, input=text.encode()).split(), int).reshape(-1, 3)
-    for (x, y, z), (angle, speed, symbol) in zip(points, found.tolist(), strict=True):
+    bins_in_c = np.array(run(bins, input=text.encode()).split(), int).reshape(-1, 3)
+    for (x, y, z), (angle, speed, symbol) in zip(points, bins_in_c.tolist(), strict=True):
         finite = math.isfinite(x) and math.isfinite(y)
         assert angle == (5 * 9 * 5 // 8 if finite else 5 * 9 // 2)  # an eighth of a turn beyond 0
         assert speed == {-math.inf: 0, 0.5: 5 * 9 * 8.5 // 16, math.inf: 44}.get(z, 0)

@@ -301,8 +301,8 @@ def _header_cell(name, arrays, description):
 
 def statistics():
     numbers = {"dtype": "<f8", "shape": [2], "values": "AAAAAAAA8D8AAAAAAADwPw=="}
-    one = {"wrapper": "NormalizeObservation", "numbers": {"obs_rms.mean": numbers}}
-    return [json.dumps([one, one]).encode()]
+    statistics = {"wrapper": "NormalizeObservation", "numbers": {"obs_rms.mean": numbers}}
+    return [json.dumps([statistics, statistics]).encode()]
 
 
 def read_numbers(path):

@@ -13,5 +13,5 @@ def environment(**variables):
 
 def python(*arguments, **options):
     """Run Python to its end."""
-    given = {"capture_output": True, "text": True, "check": False, "env": environment()}
-    return subprocess.run([sys.executable, *map(str, arguments)], **(given | options))
+    settings = {"capture_output": True, "text": True, "check": False, "env": environment()}
+    return subprocess.run([sys.executable, *map(str, arguments)], **(settings | options))

@@ -39,8 +39,8 @@ def test_stored_trials_count_and_else_a_probe(use_trial, study, tmp_path, monkey
     with ResultStore(out) as store:
         config = first.spec.canonical_json()
         store.add(make_record(0, config, key=first.key, seconds=3.0))
-    found = sweep.forecast(mine, out, 1)
-    by_variant = {one["variant"]: one for one in found["trials"]}
+    forecast = sweep.forecast(mine, out, 1)
+    by_variant = {trial["variant"]: trial for trial in forecast["trials"]}
     stored = by_variant["discount=0.8"]
     assert (stored["seconds_of_a_trial"], stored["source"]) == (3.0, "1 stored trial")
     # 10 episodes in 0.1 s: 0.3 s are reached after 30 or 40.
@@ -48,7 +48,7 @@ def test_stored_trials_count_and_else_a_probe(use_trial, study, tmp_path, monkey
         assert by_variant[name]["seconds_of_a_trial"] == pytest.approx(10.05)
         assert by_variant[name]["source"].startswith("the first ")
     assert len(made) == 2 + 1  # tried, but for one that is the same, and one probe
-    assert found["seconds"] == pytest.approx(3.0 + 2 * 10.05)
+    assert forecast["seconds"] == pytest.approx(3.0 + 2 * 10.05)
 
 
 def test_goals_in_steps_and_in_episodes_are_probed_apart(study, tmp_path, monkeypatch):
@@ -68,8 +68,8 @@ def test_goals_in_steps_and_in_episodes_are_probed_apart(study, tmp_path, monkey
     budget.steps = 20000
     protocol.evaluate_every = 10000
     """)
-    found = sweep.forecast(mine, tmp_path / "out", 1)
-    assert [one["seconds_of_a_trial"] for one in found["trials"]] == [300.0, 200.0]
+    forecast = sweep.forecast(mine, tmp_path / "out", 1)
+    assert [trial["seconds_of_a_trial"] for trial in forecast["trials"]] == [300.0, 200.0]
 
 
 def test_python_trials_share_a_core(monkeypatch):

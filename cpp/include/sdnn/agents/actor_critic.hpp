@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -20,7 +21,6 @@
 #include "sdnn/agents/softmax_policy.hpp"
 #include "sdnn/approximators/detail/linear_rows.hpp"
 #include "sdnn/approximators/linear_sdnn.hpp"
-#include "sdnn/coding/action_code.hpp"
 #include "sdnn/core/config_fields.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
@@ -46,11 +46,10 @@ namespace sdnn::agents {
 /// Source: Barto, A., Sutton, R., Anderson, C. (1983); Degris, T., Pilarski, P., Sutton, R. (2012),
 /// Model-free reinforcement learning with continuous action in practice (traces of actor and
 /// critic), with a softmax over bins.
-class ActorCritic : public WithRates<ActorCritic> {
+class ActorCritic : public IndexAgent<ActorCritic> {
  public:
   using Readout = approximators::LinearSDNN;
   using Policy = SoftmaxPolicy;
-  using Action = std::span<const std::size_t>;
 
   /// The memory of one reader.
   struct Workspace {
@@ -92,13 +91,6 @@ class ActorCritic : public WithRates<ActorCritic> {
   double learning_rate() const noexcept { return static_cast<double>(rate_) / kOne; }
   double epsilon() const noexcept { return 0.0; }
 
-  /// In how many environments at once the agent learns. Throws std::invalid_argument outside
-  /// [1, 2^14].
-  void set_n_environments(std::size_t n) {
-    episodes_.resize(n, [this] { return new_episode(); });
-  }
-  std::size_t n_environments() const noexcept { return episodes_.size(); }
-
   /// Ends the traces. Throws std::invalid_argument if there is no such environment.
   void begin_episode(std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
@@ -116,6 +108,7 @@ class ActorCritic : public WithRates<ActorCritic> {
   std::span<const double> values(std::span<const double> state, Workspace& workspace,
                                  std::size_t d = 0, bool /*averaged*/ = false) const {
     read(state, workspace);
+    actor_.allow({}, workspace.actor);
     const auto terms = actor_.terms(workspace.actor, d);
     std::uint64_t sum = 0;
     for (const auto& term : terms) sum += term.weight;
@@ -131,47 +124,10 @@ class ActorCritic : public WithRates<ActorCritic> {
     return critic().value_of(critic().sum(workspace_.critic, kOnlyAction));
   }
 
-  /// Returns a most probable action; `ties` decides between several. The span is valid until the
-  /// workspace is used again.
-  Action best_action(std::span<const double> state, Workspace& workspace, core::Random& ties,
-                     ActionMask mask = {}) const {
-    require_mask("mask", mask);
-    critic().read(state, workspace.critic);
-    return best_of(workspace, ties, mask);
-  }
-  /// The two steps of act without `explore`; see QLambda.
+  /// Reads a state for best_of: this takes the time and is for many threads, as values is.
   void read(std::span<const double> state, Workspace& workspace) const {
     critic().read(state, workspace.critic);
-    actor_.read(workspace.critic.code(), {}, workspace.actor);
-  }
-  Action best_of(Workspace& workspace, ActionMask mask = {}) {
-    require_mask("mask", mask);
-    return best_of(workspace, ties_, mask);
-  }
-
-  /// Returns an allowed action to take in `state`, drawn by the policy; without `explore` a most
-  /// probable one. Valid until the next act. Shapes: state (l,) in [0, 1], mask as ActionMask has
-  /// it. Throws std::invalid_argument.
-  Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
-             ActionMask mask = {}) {
-    Episode& episode = episodes_.of(environment);
-    core::require_unit_values("state", state, n_inputs());  // before anything is drawn
-    require_mask("mask", mask);
-    if (!explore) {
-      critic().read(state, workspace_.critic);
-      return best_of(workspace_, ties_, mask);
-    }
-    critic().read_next(state, episode.next);
-    actor_.read(episode.next.code(), mask, workspace_.actor);
-    actor_.draw(workspace_.actor, exploration_, workspace_.action);
-    episode.mask.assign(mask.begin(), mask.end());
-    episode.has_acted = true;
-    return workspace_.action;
-  }
-
-  /// The action of the first dimension as a number in [-1, 1]: actions cut the range evenly.
-  double normalized_action(Action action) const {
-    return coding::action_value(action.front(), n_actions(0), -1.0, 1.0);
+    actor_.read(workspace.critic.code(), workspace.actor);
   }
 
   /// Learns one transition. One that does not begin where the last one ended begins traces anew.
@@ -180,19 +136,15 @@ class ActorCritic : public WithRates<ActorCritic> {
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
              ActionMask next_mask = {}) {
-    core::require_unit_values("state", state, n_inputs());
-    agents::require_action(action, n_dimensions(), [this](auto d) { return n_actions(d); });
-    core::require_finite("reward", reward);
-    core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
-    core::require_unit_values("next_state", next_state, n_inputs());
-    require_mask("next_mask", next_mask);
+    require_transition(state, action, reward, next_state, next_mask);
     Episode& episode = episodes_.of(environment);
     if (!std::ranges::equal(episode.next_state, state)) {
       if (!episode.has_acted) episode.mask.clear();
       end(episode);
     }
     episode.has_acted = false;
-    critic().read_next(state, episode.present);
+    critic().read_next(state, episode.next);  // as acting left it
+    std::swap(episode.present, episode.next);
     critic().read_next(next_state, episode.next);
     ++n_learned_;
     apply_rates();
@@ -239,6 +191,7 @@ class ActorCritic : public WithRates<ActorCritic> {
 
  private:
   friend class WithRates<ActorCritic>;
+  friend class IndexAgent<ActorCritic>;
 
   static constexpr std::int64_t kMostLearned = std::int64_t{1} << 45;
   static constexpr std::int32_t kOne = Readout::kRateOne;
@@ -298,9 +251,6 @@ class ActorCritic : public WithRates<ActorCritic> {
     actor_rate_ = by_steps(config_.actor_learning_rate, config_.final_actor_learning_rate);
   }
 
-  void require_mask(const char* name, ActionMask mask) const {
-    agents::require_mask(name, mask, n_dimensions(), [this](auto d) { return n_actions(d); });
-  }
   bool allows_action(ActionMask mask, Action action) const noexcept {
     for (std::size_t d = 0; d < action.size(); ++d) {
       if (!allows(take_part(mask, n_actions(d)), action[d])) return false;
@@ -308,8 +258,20 @@ class ActorCritic : public WithRates<ActorCritic> {
     return true;
   }
 
-  Action best_of(Workspace& workspace, core::Random& ties, ActionMask mask) const {
-    actor_.read(workspace.critic.code(), mask, workspace.actor);
+  core::Random& evaluation_ties() noexcept { return ties_; }
+  /// Draws an action by the policy.
+  Action explore(std::span<const double> state, Episode& episode, ActionMask mask) {
+    critic().read_next(state, episode.next);
+    actor_.read(episode.next.code(), workspace_.actor);
+    actor_.allow(mask, workspace_.actor);
+    actor_.draw(workspace_.actor, exploration_, workspace_.action);
+    episode.mask.assign(mask.begin(), mask.end());
+    episode.has_acted = true;
+    return workspace_.action;
+  }
+  /// Returns a most probable one of the allowed actions in the state that was read last.
+  Action best_of_read(Workspace& workspace, core::Random& ties, ActionMask mask) const {
+    actor_.allow(mask, workspace.actor);
     actor_.best(workspace.actor, ties, workspace.action);
     return workspace.action;
   }
@@ -326,7 +288,8 @@ class ActorCritic : public WithRates<ActorCritic> {
                   ActionMask mask) {
     const bool is_dutch = n_environments() == 1;
     const auto error = td_.error_of(episode, episodes_, kOnlyAction, reward, next, is_dutch);
-    actor_.read(episode.present.code(), mask, workspace_.actor);
+    actor_.read(episode.present.code(), workspace_.actor);
+    actor_.allow(mask, workspace_.actor);
     actor_.learn(episode.present.code(), workspace_.actor, action, episode.actor_trace,
                  {.error = scale_.normalized(error.error, critic().exponent().value_or(0)),
                   .rate = actor_rate_,

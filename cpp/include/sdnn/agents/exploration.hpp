@@ -151,11 +151,13 @@ inline constexpr double kLargestReward = 1e300;
 
 /// Base of agents whose actions are indices, one for each dimension.
 ///
-/// The agent has `exploration_`, `workspace_`, `episodes_`, each with a member `exploration`, and
+/// The agent has `workspace_`, `episodes_`, and
 /// - new_episode();
 /// - read(state, workspace): reads a state for greedy actions;
-/// - read_to_explore(state, episode): reads one into workspace_ for actions of learning;
 /// - best_of_read(workspace, ties, mask): a best action in the state that was read last.
+/// An epsilon-greedy one has `exploration_`, with a member `exploration` in each episode, and
+/// - read_to_explore(state, episode): reads one into workspace_ for actions of learning;
+/// another one hides epsilon, explore and evaluation_ties.
 template <class Agent>
 class IndexAgent : public WithRates<Agent> {
  public:
@@ -182,14 +184,9 @@ class IndexAgent : public WithRates<Agent> {
     auto& episode = own.episodes_.of(environment);
     core::require_unit_values("state", state, own.n_inputs());  // before anything is drawn
     require_mask("mask", mask);
-    if (!explore) {
-      own.read(state, own.workspace_);
-    } else if (own.exploration_.takes_random_action(episode.exploration, n_actions_of(), mask)) {
-      return episode.exploration.kept;
-    } else {
-      own.read_to_explore(state, episode);
-    }
-    return own.best_of_read(own.workspace_, own.exploration_.policy().ties(explore), mask);
+    if (explore) return own.explore(state, episode, mask);
+    own.read(state, own.workspace_);
+    return own.best_of_read(own.workspace_, own.evaluation_ties(), mask);
   }
 
   /// Returns a best action, as act without `explore` does; `ties` decides between several. The span
@@ -206,7 +203,7 @@ class IndexAgent : public WithRates<Agent> {
   template <class Workspace>
   Action best_of(Workspace& workspace, ActionMask mask = {}) {
     require_mask("mask", mask);
-    return agent().best_of_read(workspace, agent().exploration_.policy().ties(false), mask);
+    return agent().best_of_read(workspace, agent().evaluation_ties(), mask);
   }
 
   /// The action of the first dimension as a number in [-1, 1]: actions cut the range evenly.
@@ -215,6 +212,16 @@ class IndexAgent : public WithRates<Agent> {
   }
 
  protected:
+  core::Random& evaluation_ties() noexcept { return agent().exploration_.policy().ties(false); }
+  /// Returns the action of act in a step of learning.
+  Action explore(std::span<const double> state, auto& episode, ActionMask mask) {
+    Agent& own = agent();
+    if (own.exploration_.takes_random_action(episode.exploration, n_actions_of(), mask)) {
+      return episode.exploration.kept;
+    }
+    own.read_to_explore(state, episode);
+    return own.best_of_read(own.workspace_, own.exploration_.policy().ties(true), mask);
+  }
   /// The function that gives the number of actions of a dimension.
   auto n_actions_of() const noexcept {
     return [this](std::size_t d) { return agent().n_actions(d); };

@@ -64,8 +64,8 @@ class SoftmaxPolicy {
   }
   Trace trace() const { return {n_rows_, n_columns_}; }
 
-  /// Computes the probabilities of the allowed actions in the state of a code.
-  void read(const Code& code, ActionMask mask, Workspace& workspace) const {
+  /// Computes the preferences in the state of a code, which takes the time.
+  void read(const Code& code, Workspace& workspace) const {
     constexpr std::size_t kAtOnce = 64;
     const std::int32_t* rows[kAtOnce];
     for (std::size_t row = 0; row < n_rows_;) {
@@ -76,6 +76,9 @@ class SoftmaxPolicy {
       approximators::row_sums(rows, row - first, code.masks(), n_columns_,
                               &workspace.preferences[first]);
     }
+  }
+  /// Computes the probabilities of the allowed actions in the state that was read last.
+  void allow(ActionMask mask, Workspace& workspace) const {
     std::size_t first = 0;
     for (const std::size_t n : n_actions_) {
       detail::softmax(std::span(workspace.preferences).subspan(first, n), take_part(mask, n),
@@ -106,7 +109,8 @@ class SoftmaxPolicy {
 
   /// Decays the trace, adds the gradient of log pi(action | s) to it, and moves the weights along
   /// the trace by rate / n times the error, and along the gradient of the entropy, where n is the
-  /// number of columns of the code that are not 0. Requires that `read` has read the code.
+  /// number of columns of the code that are not 0. Requires that `read` has read the code, and
+  /// `allow` was called.
   void learn(const Code& code, const Workspace& workspace, std::span<const std::size_t> action,
              Trace& trace, const Step& step) {
     const std::int64_t n = std::max<std::int64_t>(1, code.n_active());
