@@ -187,7 +187,7 @@ def live(agent, env, warm_up_steps, n_steps):
     if agent._controller.is_warming_up:
         return "the warm-up does not end"
     state = agent._controller.state().items()
-    learned = (values for name, values in state if not re.search("^readings|observations$", name))
+    learned = (values for name, values in state if not re.search("^readings|observations?$", name))
     numbers = [values for values in learned if values.dtype.kind == "f"]
     return "" if all(np.isfinite(values).all() for values in numbers) else "values are not finite"
 
