@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import click
 
+from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
 from sdnn.support.arguments import advice
 from sdnn.support.progress import is_shown
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sdnn.runs import ConfigError, Run
+    from sdnn.runs.run import Run
 
 Options: TypeAlias = dict[str, Any]
 """The options of a command by their names."""
@@ -128,8 +129,6 @@ def errors_in_a_line(
     ``words`` returns the message about a configuration whose file is not known, ``then`` what
     becomes of a run after a signal.
     """
-    from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
-
     try:
         yield
     except ConfigError as error:
@@ -160,7 +159,6 @@ def run_command(
     import gymnasium as gym
 
     from sdnn.runs.environment import search_folder
-    from sdnn.runs.errors import RunError
 
     search_folder(Path.cwd())
     with errors_in_a_line(words, lambda: _how_to_resume(folder)):

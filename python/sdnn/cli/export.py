@@ -23,6 +23,7 @@ from sdnn.cli.common import (
     value_of,
     words_of_run,
 )
+from sdnn.runs.errors import ConfigError
 
 if TYPE_CHECKING:
     import gymnasium as gym
@@ -182,7 +183,6 @@ def export(
 def _known_agent(source: Path) -> AnyAgent:
     from sdnn.agents import load_agent
     from sdnn.runs.config_file import ConfigFile
-    from sdnn.runs.errors import ConfigError
     from sdnn.runs.run import CONFIG, agent_of
 
     try:

@@ -50,7 +50,7 @@ def resume(
     repeated first, with the actions that were taken. A run that is done stays as it is unless
     --steps or --episodes is larger.
     """
-    from sdnn.runs import Run
+    from sdnn.runs.run import Run
 
     with run_command(words_of_run(folder), folder=folder):
         run = Run.open(folder)
@@ -73,7 +73,7 @@ def evaluate(folder: Path, episodes: int, best: bool, seed: int | None, as_json:
     """Evaluate the agent of RUN as it is now: greedy episodes in which nothing is learned."""
     import numpy as np
 
-    from sdnn.runs import Run
+    from sdnn.runs.run import Run
 
     with run_command(words_of_run(folder)):
         evaluation = Run.open(folder).evaluate(episodes, seed, best=best)
@@ -125,8 +125,8 @@ def plot(folders: tuple[Path, ...], out: Path | None) -> None:
     only: the median of their evaluations with the quartiles over the runs. Runs that differ in
     anything else stay apart. A panel per task.
     """
-    from sdnn.runs import Run
     from sdnn.runs.curves import SUFFIXES, curves_of, write_curves
+    from sdnn.runs.run import Run
 
     if out is not None:
         _check_ending("--out", out, SUFFIXES)
@@ -155,8 +155,8 @@ def record(folder: Path, out: Path, seed: int | None, steps: int | None) -> None
     It is the first episode of `sdnn evaluate` with the same seed.
     """
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # pictures need no screen
-    from sdnn.runs import Run
     from sdnn.runs.recording import SUFFIXES, record as record_run
+    from sdnn.runs.run import Run
 
     _check_ending("OUT", out, SUFFIXES)
     with run_command(words_of_run(folder)):

@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -22,10 +22,8 @@ from sdnn.cli.common import (
     train_run,
     value_of,
 )
+from sdnn.runs.errors import ConfigError
 from sdnn.support.arguments import advice
-
-if TYPE_CHECKING:
-    from sdnn.runs import ConfigError
 
 
 class SpecCommand(click.Command):
@@ -47,8 +45,8 @@ class SpecCommand(click.Command):
 
 
 def _options() -> Iterator[click.Option]:
-    from sdnn.runs import RunSpec
     from sdnn.runs.settings import schemas_of
+    from sdnn.runs.spec import RunSpec
 
     schemas = schemas_of(RunSpec)
     for key in KEYS:
@@ -141,10 +139,10 @@ def train(
 
         click.echo(json.dumps(spec_schema(), indent=2))
         return
-    from sdnn.runs import Run, RunSpec
     from sdnn.runs.config_file import ConfigFile
-    from sdnn.runs.run import resume_command
+    from sdnn.runs.run import Run, resume_command
     from sdnn.runs.settings import overridden
+    from sdnn.runs.spec import RunSpec
 
     settings = _given(env_id, options)
     with run_command(option_words):
