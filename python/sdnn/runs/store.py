@@ -12,7 +12,7 @@ import shutil
 import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias, TypeVar
 import msgspec
 import numpy as np
 
-from sdnn.runs.connection import as_store_error, connect, foreign_journal, has_rows, is_hot
 from sdnn.runs.errors import StoreError
+from sdnn.runs.journal import BUSY_SECONDS, foreign_journal, has_rows, is_hot
 from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows, config_hash as hash_of
 from sdnn.support.files import is_there, open_regular
 
@@ -39,6 +39,8 @@ APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 MOST_BYTES = 2**37
 """Largest file; SQLite's check of it needs a bit for each page."""
 
+MOST_BYTES_OF_VALUE = 2**24
+"""Longest text in the file."""
 MOST_MEASUREMENTS = 10**5  # a report has some hundreds
 _SCHEMA = files("sdnn.runs").joinpath("schema.sql").read_text("utf-8")
 
@@ -74,7 +76,7 @@ class _Run(NamedTuple):
         return key._replace(seed=key.seed % 2**64)
 
 
-class ResultStore:
+class ResultStore(AbstractContextManager["ResultStore"]):
     """The result file of a folder, made if it is not there; with ``read_only``, nothing is made.
 
     What is read is checked: the tables are those of this version, every value has its column's
@@ -152,9 +154,6 @@ class ResultStore:
                 connection.rollback()
                 if _inspect(self.path):  # else another process has just made it
                     raise
-
-    def __enter__(self) -> ResultStore:
-        return self
 
     def __exit__(self, *_error: object) -> None:
         self.close()
@@ -317,9 +316,8 @@ class ResultStore:
         """Return the hash of a run's rows before a number, and remove the others."""
         hashed = self._hashes.get(run.id)
         later = "FROM rows WHERE run_id = ? AND number >= ?"
-        (n_later,) = self._connection.execute(
-            f"SELECT count(*) {later}", (run.id, first)
-        ).fetchone()
+        query = f"SELECT count(*) {later}"
+        (n_later,) = self._connection.execute(query, (run.id, first)).fetchone()
         if n_later == 0 and hashed is not None and hashed.hexdigest() == run.checksum:
             return hashed
         rows = self._rows(run).table
@@ -418,3 +416,35 @@ def _own_objects() -> set[tuple[str | None, ...]]:
     with closing(sqlite3.connect(":memory:")) as connection:
         connection.executescript(_SCHEMA)
         return _objects(connection)
+
+
+def connect(path: Path | None, *, read_only: bool = False) -> sqlite3.Connection:
+    """Open a file, or a database in memory, in which nothing but its data counts."""
+    place = ":memory:"
+    if path is not None:
+        place = f"{path.absolute().as_uri()}?mode={'ro' if read_only else 'rwc'}"
+    connection = sqlite3.connect(place, uri=path is not None, timeout=BUSY_SECONDS)
+    for setting in (
+        "trusted_schema = OFF", "cell_size_check = ON", "mmap_size = 0",
+        f"query_only = {int(read_only)}",
+    ):  # fmt: skip
+        connection.execute(f"PRAGMA {setting}")
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES_OF_VALUE)
+    connection.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
+    return connection
+
+
+@contextmanager
+def as_store_error(path: Path) -> Iterator[None]:
+    """Turn errors of SQLite and the file system into one that names the file."""
+    try:
+        yield
+    except MemoryError as error:
+        raise StoreError(f"cannot use {path}: out of memory") from error
+    except (sqlite3.OperationalError, OSError) as error:
+        raise StoreError(f"cannot use {path}: {error}") from error
+    except (sqlite3.DatabaseError, ValueError, TypeError, OverflowError, RecursionError) as error:
+        raise StoreError(
+            f"{path} is damaged or not a result file of sdnn ({error});"
+            " move it away or choose another output folder"
+        ) from error

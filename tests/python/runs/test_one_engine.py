@@ -51,7 +51,7 @@ def test_one_loop_steps_environments_and_learns():
 
 
 def test_one_store_knows_sqlite():
-    assert modules_with(imports("sqlite3")) == {"runs/connection", "runs/store"}
+    assert modules_with(imports("sqlite3")) == {"runs/journal", "runs/store"}
 
 
 def test_one_display_draws_progress():
