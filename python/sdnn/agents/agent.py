@@ -1,36 +1,43 @@
-"""The base of all agents: Gymnasium's spaces around the core's controller."""
+"""The base of all agents: how they are trained, inspected and read from files."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn import _core
 from sdnn.agents.base import Approximator, BaseAgent, Learning
-from sdnn.environments.types import AnyEnv, Element, Elements, Env, Mask, Space
+from sdnn.agents.scaling import Scaling
+from sdnn.environments.space_kinds import space_of
+from sdnn.environments.spaces import Actions, Observations, action_space_of, observation_space_of
+from sdnn.environments.types import AnyEnv, Array, Data, Element, Elements, Env, Mask, Space
 from sdnn.support.arguments import (
     argument_error,
     blamed,
     flag,
+    is_of_class,
     path_of,
     require,
-    reward_of,
-    shown,
     whole,
 )
+from sdnn.support.display import Displayed
 from sdnn.support.progress import is_shown
+from sdnn.support.state_files import Arrays
 from sdnn.training.callbacks import ProgressBarCallback
-from sdnn.training.files import read_agent
-from sdnn.training.interfaces import CoreParts, Transition, explained
+from sdnn.training.files import read_agent, read_statistics
+from sdnn.training.interfaces import explained
 from sdnn.training.training import Callback, Training, TrainingResult, listed
 
+if TYPE_CHECKING:
+    from typing import Self
 
-class Agent(BaseAgent[Approximator, Learning]):
+
+class Agent(Displayed, BaseAgent[Approximator, Learning]):
     """An agent in a Gymnasium environment that learns one transition at a time.
 
     ``train`` is a loop over environments; a robot that brings its own loop calls `begin_episode`,
@@ -82,132 +89,59 @@ class Agent(BaseAgent[Approximator, Learning]):
         For spaces of another kind; for spaces, ranges or settings that are impossible.
     """
 
-    _has_warned = False
+    @property
+    def observation_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lowest and highest values of the observed variables, shapes (n_variables,), as used.
 
-    def _check_environment(self, environment: int) -> None:
-        if type(environment) is not int or environment:  # most agents have no other than 0
-            whole("environment", environment, 0, self.n_environments - 1)
-
-    def begin_episode(self, environment: int = 0) -> None:
-        """Note that an episode begins: `learn` never does.
-
-        Starts the greedy first steps of an episode anew, and learns the transitions that wait.
+        RuntimeError if the warm-up has not found them yet.
         """
-        self._check_environment(environment)
-        self._controller.begin_episode(environment)
+        self._require_warm()
+        return self._controller.ranges
 
-    def begin_greedy_episode(self) -> None:
-        """Note that the next acts without ``explore`` are of another episode: `evaluate` does."""
-        self._controller.begin_greedy_episode()
+    @property
+    def inputs(self) -> list[tuple[str, list[int]]]:
+        """Kinds of the inputs of a state, with the numbers of observed variables.
 
-    @explained
-    def act(
-        self, observation: Element, explore: bool = True, environment: int = 0, mask: Mask = None
-    ) -> Element:
-        """Return the action to take, an element of the action space.
-
-        Parameters
-        ----------
-        observation : element of the observation space
-        explore : bool
-            False: always a best action, and no effect on the agent's later learning. Several
-            threads may call it so at once; `learn` waits for them.
-        environment : int
-            In which environment, below `n_environments`.
-        mask : array_like, optional
-            1 for the discrete actions that are allowed, 0 for others: of a Discrete space shape
-            (n,), of others a tuple with the mask of each dimension.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If an argument is not usable, such as an observation that holds NaN; see
-            ``missing``.
+        ``("variable", [i])``, ``("circular", [i])``, ``("angle", [cosine, sine])`` or
+        ``("symbol", [first, n])``. Empty until a warm-up is over.
         """
-        explore = flag("explore", explore)
-        self._check_environment(environment)
-        variables = self._observations.vector("observation", observation)
-        allowed = self._actions.mask("mask", mask)
-        numbers = self._controller.act(variables, explore, environment, allowed)
-        return self._actions.elements(numbers)[0]
+        return self._controller.inputs
 
-    def flat_observation(self, observation: Element) -> NDArray[np.float64]:
-        """Return the observed variables as a vector, shape (n_variables,), in their own units.
+    @property
+    def has_running_ranges(self) -> bool:
+        """Whether ranges of observations follow what is observed."""
+        return self._observation.running
 
-        Missing readings are NaN. ValueError if the observation has another shape, or holds some
-        that the agent refuses.
-        """
-        vector: NDArray[np.float64] = self._observations.rows("observation", [observation])[0]
-        is_read = np.isfinite(vector)
-        if self.missing == "error":
-            require(is_read.all(), "observation", "be finite", vector)
-        return np.where(is_read, vector, np.nan)
+    @property
+    def n_dimensions(self) -> int:
+        """Dimensions of an action."""
+        return len(self._action.low)
 
-    @explained
-    def learn(self, transition: Transition, environment: int = 0) -> None:
-        """Learn one transition; `train` runs a whole training.
+    def _dimension(self, dimension: int) -> int:
+        return whole("dimension", dimension, 0, self.n_dimensions - 1)
 
-        Any action of the space can be learned, not only that of the last `act` (except by
-        `FuzzyQLearning`); of a ``Box`` the nearest one is. A terminated transition begins no
-        episode. With ``n_steps`` above 1 a transition waits for the next ones in its environment.
-        One that does not begin where the last one ended starts anew; `begin_episode` learns what
-        still waits.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If an observation, the action, the reward (beyond +-1e300, for example) or
-            ``terminated`` is not usable, or there is no such environment; nothing is learned then.
-        OverflowError
-            If a weight would leave its range. Earlier transitions, or other dimensions of the
-            action, may have been learned: load a checkpoint.
-        """
-        self._check_environment(environment)
-        self._controller.learn(*self._parts_of(transition, environment))
-        self.warn_of_refused_reward()
-
-    def check(self, transition: Transition) -> None:
-        """Raise what `learn` would for a transition that cannot be learned; learn nothing."""
-        self._controller.check(*self._parts_of(transition, 0))
-
-    def _parts_of(self, transition: Transition, environment: int) -> tuple[Any, ...]:
-        """Return a transition as the core takes it; TypeError or ValueError if it is none."""
-        if not isinstance(transition, Transition):
-            raise TypeError(
-                f"transition must be a Transition, got {shown(transition)}: train(env, steps=...)"
-                " learns in an environment"
+    def _require_warm(self) -> _core.Controller:
+        """Return the controller; RuntimeError while it is warming up."""
+        if self.is_warming_up:
+            raise RuntimeError(
+                "the agent is still warming up: it has no ranges of its observations until it has"
+                f" learned {self._warm_up_steps} transitions, or is given observation_range"
             )
-        observation, action, reward, next_observation, terminated, next_mask = transition
-        return (
-            self._observations.vector("observation", observation),
-            self._actions.numbers(action),
-            reward_of(reward),
-            self._observations.vector("next_observation", next_observation),
-            flag("terminated", terminated),
-            environment,
-            self._actions.mask("next_mask", next_mask),
-        )
+        return self._controller
 
-    def warn_of_refused_reward(self) -> None:
-        """Warn once if a reward was too large to be learned, as the glitch of a sensor is."""
-        refused = self._controller.refused_reward
-        if refused is None or self._has_warned:
-            return
-        self._has_warned = True
-        reward, number = refused
-        warnings.warn(
-            f"reward {reward:g} of transition {number} is more than 65,536 times as large as all"
-            " recent ones: it was not learned. If such rewards are true and recur, they will be",
-            stacklevel=2,
-        )
+    def _values(self, observation: Element, dimension: int) -> NDArray[np.float64]:
+        """Return the values of a dimension's actions, or of fuzzy rules that of the observation."""
+        variables = self._observations.vector("observation", observation)
+        return self._require_warm().values(variables, dimension)
 
-    def core_parts(self) -> CoreParts | None:
-        """Return the core and functions around it, unless `act` or `learn` has been replaced."""
-        functions = [getattr(method, "__func__", None) for method in (self.act, self.learn)]
-        actions = self._actions
-        if functions != [Agent.act, Agent.learn]:
-            return None
-        return CoreParts(self._controller, self._observations.rows, actions.elements, actions.mask)
+    def _facts(self) -> dict[str, object]:
+        inputs = "found in the warm-up" if self.is_warming_up else len(self.inputs)
+        return {
+            "observation": self.observation_space,
+            "action": self.action_space,
+            "inputs": inputs,
+            "seed": self.seed,
+        }
 
     @explained
     def predict(
@@ -310,6 +244,66 @@ class Agent(BaseAgent[Approximator, Learning]):
         finally:
             if seed is None:
                 self._next_episode = training.next_episode
+
+    def _state_of(self, part: str) -> Arrays:
+        """Return the arrays of a part, such as ``"agent"``, by their names in it."""
+        arrays, prefix = self.state().items(), f"{part}."
+        return {name.removeprefix(prefix): a for name, a in arrays if name.startswith(prefix)}
+
+    def _restore(self, **parts: Mapping[str, Array]) -> None:
+        """Replace parts of the state; ValueError if they do not fit, and nothing changes."""
+        kept = {k: a for k, a in self.state().items() if k.partition(".")[0] not in parts}
+        new = {f"{part}.{name}": a for part, state in parts.items() for name, a in state.items()}
+        self._controller.restore(kept | new)
+
+    @classmethod
+    @explained
+    def load(cls, path: str | Path) -> Self:
+        """Read an agent that `save` wrote.
+
+        OSError if the file cannot be read; ValueError if it is damaged, of another format, or holds
+        another kind of agent.
+        """
+        agent: object = read_agent(path_of("path", path), "agent", "training")[0]
+        if not is_of_class(agent, cls):
+            raise ValueError(f"{path} holds a {type(agent).__name__}, not a {cls.__name__}")
+        return cast("Self", agent)
+
+    @classmethod
+    def rebuild(cls, description: Data, arrays: Mapping[str, Array]) -> Self:
+        """Make an agent from its `description` and `state`; ValueError if they do not fit."""
+        agent = cls.__new__(cls)
+        agent._observation = _core.ObservationConfig(**description["observation"])
+        agent._action = _core.ActionConfig(**description["action"])
+        if "observation_space" in description:
+            observations = space_of(description["observation_space"])
+            actions = space_of(description["action_space"])
+        else:  # it was made in C++
+            observations = observation_space_of(agent._observation)
+            actions = action_space_of(agent._action)
+            agent.has_bounds = False
+        agent._take_spaces(observations, actions)
+        agent._take_settings(
+            cls.approximator_type(**description["approximator"]),
+            cls.learning_type(**description["learning"]),
+            description["seed"],
+            description["warm_up_steps"],
+        )
+        agent._make(state=dict(arrays))
+        n_variables = Observations(observations).n_variables
+        if agent._controller.n_variables != n_variables:
+            raise ValueError(f"observation must be of {n_variables} variables")
+        if "action_space" in description and agent._action != Actions(actions).config:
+            raise ValueError(f"action must be of {agent.action_space}, got {agent._action}")
+        if "wrappers" in description:
+            agent.wrappers = read_statistics(description["wrappers"])
+        if "scaling" in description:
+            agent.scaling = Scaling.of_values(description["scaling"], n_variables)
+        agent._next_episode = whole("next_episode", description.get("next_episode", 0), 0, 2**53)
+        return agent
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return type(self).rebuild, (self.description(), self.state())
 
 
 AnyAgent: TypeAlias = Agent[Any, Any]

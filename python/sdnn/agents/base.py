@@ -1,13 +1,14 @@
-"""The settings and the state of all agents, and the files of agents and trainings."""
+"""Agents as trainings and robots call them: Gymnasium's spaces around the core's controller."""
 
 from __future__ import annotations
 
 import abc
 import secrets
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, TypeVar, cast
+from typing import Any, ClassVar, Generic, Literal, NamedTuple, TypeVar, cast
 
 import msgspec
 import numpy as np
@@ -22,7 +23,6 @@ from sdnn.environments.space_kinds import (
     require_same_variables,
     require_unbatched,
     space_data,
-    space_of,
     spaces_of,
 )
 from sdnn.environments.spaces import (
@@ -32,29 +32,26 @@ from sdnn.environments.spaces import (
     Missing,
     Observations,
     Ranges,
-    action_space_of,
-    observation_space_of,
     space_of_error,
 )
-from sdnn.environments.types import Array, Data, Element, Space
+from sdnn.environments.types import Element, Mask, Space
 from sdnn.support.arguments import (
     argument_error,
     blamed,
     choice,
+    flag,
     is_of_class,
     path_of,
     real,
     require,
+    reward_of,
     seed_of,
+    shown,
     whole,
 )
-from sdnn.support.display import Displayed
 from sdnn.support.state_files import Arrays, Description, write_file
-from sdnn.training.files import CLASSES, Statistics, read_agent, read_statistics
-from sdnn.training.interfaces import explained
-
-if TYPE_CHECKING:
-    from typing import Self
+from sdnn.training.files import CLASSES, Statistics
+from sdnn.training.interfaces import CoreParts, Transition, explained
 
 _MOST_ENVIRONMENTS = 2**14
 
@@ -79,8 +76,11 @@ def presets_of(listed: Mapping[str, Any], **more: Mapping[str, Any]) -> Mapping[
     )
 
 
-class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
-    """The settings and the state of an agent, and its files; `Agent` adds acting and learning."""
+class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
+    """An agent that acts, learns and can be saved.
+
+    `Agent` adds trainings, reading from files, and properties for its user.
+    """
 
     kind: ClassVar[str]
     """The word for this approximator and learning rule in files."""
@@ -100,6 +100,7 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
     _controller: _core.Controller
     _scaling: Scaling | None = None
     _next_episode = 0  # of `train` without a seed
+    _has_warned = False
     has_bounds = True
     """Whether its spaces are those of an environment: else it was made in C++, of ranges."""
 
@@ -209,29 +210,6 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         return self._controller.is_warming_up
 
     @property
-    def observation_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lowest and highest values of the observed variables, shapes (n_variables,), as used.
-
-        RuntimeError if the warm-up has not found them yet.
-        """
-        self._require_warm()
-        return self._controller.ranges
-
-    @property
-    def inputs(self) -> list[tuple[str, list[int]]]:
-        """Kinds of the inputs of a state, with the numbers of observed variables.
-
-        ``("variable", [i])``, ``("circular", [i])``, ``("angle", [cosine, sine])`` or
-        ``("symbol", [first, n])``. Empty until a warm-up is over.
-        """
-        return self._controller.inputs
-
-    @property
-    def has_running_ranges(self) -> bool:
-        """Whether ranges of observations follow what is observed."""
-        return self._observation.running
-
-    @property
     def missing(self) -> str:
         """The treatment of missing readings: ``"error"``, ``"hold"`` or ``"code"``."""
         return self._observation.missing
@@ -261,36 +239,130 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
     def n_environments(self, n: int) -> None:
         self._controller.n_environments = whole("n_environments", n, 1, _MOST_ENVIRONMENTS)
 
-    def _require_warm(self) -> _core.Controller:
-        """Return the controller; RuntimeError while it is warming up."""
-        if self.is_warming_up:
-            raise RuntimeError(
-                "the agent is still warming up: it has no ranges of its observations until it has"
-                f" learned {self._warm_up_steps} transitions, or is given observation_range"
-            )
-        return self._controller
+    def _check_environment(self, environment: int) -> None:
+        if type(environment) is not int or environment:  # most agents have no other than 0
+            whole("environment", environment, 0, self.n_environments - 1)
 
-    def _values(self, observation: Element, dimension: int) -> NDArray[np.float64]:
-        """Return the values of a dimension's actions, or of fuzzy rules that of the observation."""
+    def begin_episode(self, environment: int = 0) -> None:
+        """Note that an episode begins: `learn` never does.
+
+        Starts the greedy first steps of an episode anew, and learns the transitions that wait.
+        """
+        self._check_environment(environment)
+        self._controller.begin_episode(environment)
+
+    def begin_greedy_episode(self) -> None:
+        """Note that the next acts without ``explore`` are of another episode: `evaluate` does."""
+        self._controller.begin_greedy_episode()
+
+    @explained
+    def act(
+        self, observation: Element, explore: bool = True, environment: int = 0, mask: Mask = None
+    ) -> Element:
+        """Return the action to take, an element of the action space.
+
+        Parameters
+        ----------
+        observation : element of the observation space
+        explore : bool
+            False: always a best action, and no effect on the agent's later learning. Several
+            threads may call it so at once; `learn` waits for them.
+        environment : int
+            In which environment, below `n_environments`.
+        mask : array_like, optional
+            1 for the discrete actions that are allowed, 0 for others: of a Discrete space shape
+            (n,), of others a tuple with the mask of each dimension.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an argument is not usable, such as an observation that holds NaN; see
+            ``missing``.
+        """
+        explore = flag("explore", explore)
+        self._check_environment(environment)
         variables = self._observations.vector("observation", observation)
-        return self._require_warm().values(variables, dimension)
+        allowed = self._actions.mask("mask", mask)
+        numbers = self._controller.act(variables, explore, environment, allowed)
+        return self._actions.elements(numbers)[0]
 
-    @property
-    def n_dimensions(self) -> int:
-        """Dimensions of an action."""
-        return len(self._action.low)
+    def flat_observation(self, observation: Element) -> NDArray[np.float64]:
+        """Return the observed variables as a vector, shape (n_variables,), in their own units.
 
-    def _dimension(self, dimension: int) -> int:
-        return whole("dimension", dimension, 0, self.n_dimensions - 1)
+        Missing readings are NaN. ValueError if the observation has another shape, or holds some
+        that the agent refuses.
+        """
+        vector: NDArray[np.float64] = self._observations.rows("observation", [observation])[0]
+        is_read = np.isfinite(vector)
+        if self.missing == "error":
+            require(is_read.all(), "observation", "be finite", vector)
+        return np.where(is_read, vector, np.nan)
 
-    def _facts(self) -> dict[str, object]:
-        inputs = "found in the warm-up" if self.is_warming_up else len(self.inputs)
-        return {
-            "observation": self.observation_space,
-            "action": self.action_space,
-            "inputs": inputs,
-            "seed": self.seed,
-        }
+    @explained
+    def learn(self, transition: Transition, environment: int = 0) -> None:
+        """Learn one transition; `train` runs a whole training.
+
+        Any action of the space can be learned, not only that of the last `act` (except by
+        `FuzzyQLearning`); of a ``Box`` the nearest one is. A terminated transition begins no
+        episode. With ``n_steps`` above 1 a transition waits for the next ones in its environment.
+        One that does not begin where the last one ended starts anew; `begin_episode` learns what
+        still waits.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an observation, the action, the reward (beyond +-1e300, for example) or
+            ``terminated`` is not usable, or there is no such environment; nothing is learned then.
+        OverflowError
+            If a weight would leave its range. Earlier transitions, or other dimensions of the
+            action, may have been learned: load a checkpoint.
+        """
+        self._check_environment(environment)
+        self._controller.learn(*self._parts_of(transition, environment))
+        self.warn_of_refused_reward()
+
+    def check(self, transition: Transition) -> None:
+        """Raise what `learn` would for a transition that cannot be learned; learn nothing."""
+        self._controller.check(*self._parts_of(transition, 0))
+
+    def _parts_of(self, transition: Transition, environment: int) -> tuple[Any, ...]:
+        """Return a transition as the core takes it; TypeError or ValueError if it is none."""
+        if not isinstance(transition, Transition):
+            raise TypeError(
+                f"transition must be a Transition, got {shown(transition)}: train(env, steps=...)"
+                " learns in an environment"
+            )
+        observation, action, reward, next_observation, terminated, next_mask = transition
+        return (
+            self._observations.vector("observation", observation),
+            self._actions.numbers(action),
+            reward_of(reward),
+            self._observations.vector("next_observation", next_observation),
+            flag("terminated", terminated),
+            environment,
+            self._actions.mask("next_mask", next_mask),
+        )
+
+    def warn_of_refused_reward(self) -> None:
+        """Warn once if a reward was too large to be learned, as the glitch of a sensor is."""
+        refused = self._controller.refused_reward
+        if refused is None or self._has_warned:
+            return
+        self._has_warned = True
+        reward, number = refused
+        warnings.warn(
+            f"reward {reward:g} of transition {number} is more than 65,536 times as large as all"
+            " recent ones: it was not learned. If such rewards are true and recur, they will be",
+            stacklevel=2,
+        )
+
+    def core_parts(self) -> CoreParts | None:
+        """Return the core and functions around it, unless `act` or `learn` has been replaced."""
+        functions = [getattr(method, "__func__", None) for method in (self.act, self.learn)]
+        actions = self._actions
+        if functions != [BaseAgent.act, BaseAgent.learn]:
+            return None
+        return CoreParts(self._controller, self._observations.rows, actions.elements, actions.mask)
 
     @property
     def scaling(self) -> Scaling | None:
@@ -310,19 +382,6 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
     def save(self, path: str | Path) -> None:
         """Write the whole state as one safetensors file; OSError if it cannot be written."""
         write_file(path_of("path", path), "agent", self.state(), self.description())
-
-    @classmethod
-    @explained
-    def load(cls, path: str | Path) -> Self:
-        """Read an agent that `save` wrote.
-
-        OSError if the file cannot be read; ValueError if it is damaged, of another format, or holds
-        another kind of agent.
-        """
-        agent: object = read_agent(path_of("path", path), "agent", "training")[0]
-        if not is_of_class(agent, cls):
-            raise ValueError(f"{path} holds a {type(agent).__name__}, not a {cls.__name__}")
-        return cast("Self", agent)
 
     def description(self) -> Description:
         """Return the settings, from which `rebuild` makes an agent like this one."""
@@ -350,50 +409,6 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
         """Return all that the agent remembers, as arrays by name."""
         return self._controller.state()
 
-    def _state_of(self, part: str) -> Arrays:
-        """Return the arrays of a part, such as ``"agent"``, by their names in it."""
-        arrays, prefix = self.state().items(), f"{part}."
-        return {name.removeprefix(prefix): a for name, a in arrays if name.startswith(prefix)}
-
-    def _restore(self, **parts: Mapping[str, Array]) -> None:
-        """Replace parts of the state; ValueError if they do not fit, and nothing changes."""
-        kept = {k: a for k, a in self.state().items() if k.partition(".")[0] not in parts}
-        new = {f"{part}.{name}": a for part, state in parts.items() for name, a in state.items()}
-        self._controller.restore(kept | new)
-
-    @classmethod
-    def rebuild(cls, description: Data, arrays: Mapping[str, Array]) -> Self:
-        """Make an agent from its `description` and `state`; ValueError if they do not fit."""
-        agent = cls.__new__(cls)
-        agent._observation = _core.ObservationConfig(**description["observation"])
-        agent._action = _core.ActionConfig(**description["action"])
-        if "observation_space" in description:
-            observations = space_of(description["observation_space"])
-            actions = space_of(description["action_space"])
-        else:  # it was made in C++
-            observations = observation_space_of(agent._observation)
-            actions = action_space_of(agent._action)
-            agent.has_bounds = False
-        agent._take_spaces(observations, actions)
-        agent._take_settings(
-            cls.approximator_type(**description["approximator"]),
-            cls.learning_type(**description["learning"]),
-            description["seed"],
-            description["warm_up_steps"],
-        )
-        agent._make(state=dict(arrays))
-        n_variables = Observations(observations).n_variables
-        if agent._controller.n_variables != n_variables:
-            raise ValueError(f"observation must be of {n_variables} variables")
-        if "action_space" in description and agent._action != Actions(actions).config:
-            raise ValueError(f"action must be of {agent.action_space}, got {agent._action}")
-        if "wrappers" in description:
-            agent.wrappers = read_statistics(description["wrappers"])
-        if "scaling" in description:
-            agent.scaling = Scaling.of_values(description["scaling"], n_variables)
-        agent._next_episode = whole("next_episode", description.get("next_episode", 0), 0, 2**53)
-        return agent
-
     def __init_subclass__(cls, **kwargs: Any) -> None:
         """Make the class known to files, by its name.
 
@@ -410,6 +425,3 @@ class BaseAgent(Displayed, abc.ABC, Generic[Approximator, Learning]):
                 f" of {known.__module__}.{known.__qualname__}"
             )
         CLASSES[cls.__name__] = cls
-
-    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        return type(self).rebuild, (self.description(), self.state())
