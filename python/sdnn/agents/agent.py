@@ -26,12 +26,11 @@ from sdnn.support.arguments import (
     whole,
 )
 from sdnn.support.display import Displayed
-from sdnn.support.progress import is_shown
 from sdnn.support.state_files import Arrays
 from sdnn.training.callbacks import ProgressBarCallback
 from sdnn.training.files import read_agent, read_statistics
 from sdnn.training.interfaces import explained
-from sdnn.training.training import Callback, Training, TrainingResult, listed
+from sdnn.training.training import Callback, Training, TrainingResult, listed, shows_bar
 
 if TYPE_CHECKING:
     from typing import Self
@@ -226,7 +225,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         """
         if progress is None or flag("progress", progress):
             bar = ProgressBarCallback("learning", seconds=0.0 if progress else None)
-            callbacks = [*listed(callbacks), *([bar] if is_shown() else [])]
+            callbacks = [*listed(callbacks), *([bar] if shows_bar() else [])]
         training = Training(
             self,
             env,

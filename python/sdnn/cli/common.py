@@ -15,7 +15,6 @@ import click
 
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
 from sdnn.support.arguments import advice
-from sdnn.support.progress import is_shown
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -191,9 +190,10 @@ def train_run(
 ) -> None:  # fmt: skip
     """Train a run, with a line of progress on a terminal; print the result and what comes next."""
     from sdnn.runs.run import resume_command
+    from sdnn.training.training import shows_bar
 
     callbacks = []
-    if is_shown():
+    if shows_bar():
         from sdnn.training.callbacks import ProgressBarCallback
 
         callbacks.append(ProgressBarCallback(run.spec.task, seconds=0.0))

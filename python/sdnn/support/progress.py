@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import time
 from collections.abc import Hashable
 from importlib import import_module
@@ -19,22 +17,6 @@ _NOTEBOOK_SECONDS = 0.25
 """Time between two changes of a notebook's output."""
 
 
-def is_shown() -> bool:
-    """Return whether bars are shown: in a notebook, and on a terminal that can move its cursor.
-
-    A log, a pipe and a captured standard error show none.
-    """
-    if sys.stderr is not None and sys.stderr.isatty():
-        return os.environ.get("TERM", "") not in ("dumb", "unknown")
-    return "IPython" in sys.modules and _console().is_jupyter
-
-
-def _console() -> Console:
-    from rich.console import Console
-
-    return Console(stderr=True)
-
-
 class ProgressBars:
     """Shows a bar for each task on a terminal or in a notebook, and nothing elsewhere.
 
@@ -42,6 +24,7 @@ class ProgressBars:
     """
 
     def __init__(self, console: Console | None = None) -> None:
+        from rich.console import Console
         from rich.progress import (
             BarColumn,
             Progress,
@@ -50,7 +33,7 @@ class ProgressBars:
             TimeRemainingColumn,
         )
 
-        console = _console() if console is None else console
+        console = Console(stderr=True) if console is None else console
         self._is_notebook = console.is_jupyter
         self._output: Any = None  # output of a notebook, where rich would need ipywidgets
         self._due = 0.0

@@ -1,7 +1,9 @@
-"""Episodes of a training, one in each of its environments, and how they are repeated."""
+"""Episodes of a training: steps of its environments, and how episodes are repeated."""
 
 from __future__ import annotations
 
+import copy
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,12 +11,14 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from sdnn.environments.types import AnyEnv, Array, Data, Element, Elements, Masks
+from sdnn.environments.types import AnyEnv, Array, Data, Element, Elements, Env, Info, Mask, Masks
+from sdnn.support.arguments import flag, has_methods, reward_of, shown
 from sdnn.training.files import SavedEpisode, Statistics, learning_wrappers, names_of, statistics_of
 from sdnn.training.interfaces import (
-    EachLearner,
     EnvironmentAdapter,
-    OneEnvironment,
+    ObservingLearner,
+    Options,
+    Seeds,
     UnusableStepError,
 )
 
@@ -25,8 +29,120 @@ _N_RECENT = 1024
 """Actions that are gathered before they become an array."""
 
 
+_SCALARS = (np.generic, int, float)
+
+_OLD_API = (
+    "; an environment of Gym before 0.26 can be wrapped:"
+    " shimmy.GymV21CompatibilityV0(env=env), from pip install shimmy"
+)
+
+
 class UnrepeatedEpisodeError(ValueError):
     """An environment does not repeat the episode in which a training was saved."""
+
+
+def require_single(name: str, env: object) -> None:
+    """Check that a value is one environment; TypeError that names the argument."""
+    has_methods(name, env, "an environment, as of gymnasium.make(id)", "reset", "step")
+    if isinstance(env, gym.vector.VectorEnv):
+        raise TypeError(
+            f"{name} must be a single environment, got a vector of them, {type(env).__name__}"
+        )
+
+
+def has_action_masks(env: object) -> bool:
+    """Return whether an environment, or a vector, tells which actions are allowed."""
+    return bool((getattr(env, "metadata", None) or {}).get("action_masks"))
+
+
+def mask_in(info: Info) -> Mask:
+    """Return the mask in an info; UnusableStepError if there is none."""
+    if "action_mask" not in info:
+        raise UnusableStepError(
+            "info must have 'action_mask', as metadata['action_masks'] of env is True,"
+            f" got {shown(sorted(map(str, info)))}"
+        )
+    mask: Mask = info["action_mask"]
+    return mask
+
+
+def reset_env(env: AnyEnv, seed: Any, options: Options) -> tuple[Element, Info]:
+    """Reset an environment, or a vector; return what is observed first, and the info.
+
+    UnusableStepError if it returns something else than an observation and a dictionary.
+    """
+    made = env.reset(seed=seed, options=options)
+    if not (isinstance(made, tuple | list) and len(made) == 2 and isinstance(made[1], Mapping)):
+        raise UnusableStepError(
+            f"env.reset must return (observation, info), info a dictionary, got {shown(made)}"
+            f"{_OLD_API}"
+        )
+    return made[0], made[1]
+
+
+def step_env(env: AnyEnv, action: Element) -> Sequence[Any]:
+    """Step an environment, or a vector; UnusableStepError if it does not return five values."""
+    made = env.step(action)
+    if not (isinstance(made, (tuple, list)) and len(made) == 5):
+        n = len(made) if isinstance(made, (tuple, list)) else 1
+        raise UnusableStepError(
+            "env.step must return five values, (observation, reward, terminated, truncated, info),"
+            f" got {n}{_OLD_API}"
+        )
+    return made
+
+
+def checked_outcome(reward: Any, terminated: object, truncated: object) -> tuple[float, bool, bool]:
+    """Return a finite float and bools; UnusableStepError for something else."""
+    try:
+        if type(reward) is not float:
+            reward = reward_of(reward)
+        if not math.isfinite(reward):
+            raise ValueError(f"reward must be finite, got {reward}")
+        if not type(terminated) is bool is type(truncated):
+            terminated, truncated = flag("terminated", terminated), flag("truncated", truncated)
+    except (TypeError, ValueError) as error:
+        raise UnusableStepError(str(error)) from error
+    return reward, terminated, truncated
+
+
+def copied(value: Element) -> Element:
+    """Copy what others may write to: environments may keep their state, or change an action."""
+    if type(value) is np.ndarray:
+        return value.copy()
+    return value if isinstance(value, _SCALARS) else copy.deepcopy(value)
+
+
+class OneEnvironment(EnvironmentAdapter):
+    """A single environment."""
+
+    n_environments = 1
+    can_repeat = True
+
+    def __init__(self, env: Env) -> None:
+        self._env = env
+        self.rewards, self.terminated, self.truncated = [0.0], [False], [False]
+        self.masks = [None] if has_action_masks(env) else None
+
+    def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
+        """Begin its episode."""
+        first, info = reset_env(self._env, seeds[0], options)
+        if self.masks is not None:
+            self.masks = [mask_in(info)]
+        return {0: first}
+
+    def take(self, action: Element) -> tuple[Element, float, bool, bool]:
+        """Take an action; return what a step gives but for the info."""
+        observation, reward, terminated, truncated, info = step_env(self._env, copied(action))
+        reward, terminated, truncated = checked_outcome(reward, terminated, truncated)
+        if self.masks is not None:
+            self.masks = [None if terminated else mask_in(info)]
+        return observation, reward, terminated, truncated
+
+    def step(self, actions: Elements) -> Elements:
+        """Take the only action."""
+        observation, self.rewards[0], self.terminated[0], self.truncated[0] = self.take(actions[0])
+        return observation[np.newaxis] if type(observation) is np.ndarray else [observation]
 
 
 def episode_seed(seed: int, kind: int, episode: int) -> int:
@@ -98,7 +214,7 @@ class Episodes:
         self,
         env: AnyEnv,
         adapter: EnvironmentAdapter,
-        learner: EachLearner,
+        learner: ObservingLearner,
         seed: int | None,
         first: int,
         options: Callable[[int], Data | None],
@@ -124,7 +240,7 @@ class Episodes:
 
     def leave(self) -> None:
         """Begin anew in every environment with the next step, with other seeds."""
-        self.adapter = adapter_for(self._env)
+        self.adapter = type(self.adapter)(self._env)
         self.present[:] = [None] * self.n_environments
         self.unlearned = []
 
@@ -322,12 +438,3 @@ class Episodes:
             self.observations = self._checked(self._learner.read, "observation", observations)
             self._read_masks()
             over = {i for i in self._environments if self.is_over(i)}
-
-
-def adapter_for(env: AnyEnv) -> EnvironmentAdapter:
-    """Return the adapter for an environment, or for a vector of them."""
-    if not isinstance(env, gym.vector.VectorEnv):
-        return OneEnvironment(env)
-    from sdnn.training.vectors import vector_adapter
-
-    return vector_adapter(env)

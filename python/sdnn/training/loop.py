@@ -1,4 +1,4 @@
-"""The training loop on one page: act, step, learn, evaluate.
+"""The training loop, and the learners in it: act, step, learn, evaluate.
 
 In each round the agent acts in all environments, these step together, and the agent learns the
 outcomes in the environments' order. The round pauses where an episode ends, an evaluation is due or
@@ -13,19 +13,144 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any, TypeAlias
 
-from sdnn.environments.types import Data, Info
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.environments.types import Array, Data, Element, Elements, Info, Mask, Masks
 from sdnn.support.arguments import require
 from sdnn.support.interrupts import Interrupts
-from sdnn.training.episodes import Episodes
+from sdnn.training.episodes import Episodes, checked_outcome, copied
 from sdnn.training.evaluation import evaluate
 from sdnn.training.files import share_statistics, statistics_of
-from sdnn.training.interfaces import EachLearner, UnusableStepError
+from sdnn.training.interfaces import (
+    CoreParts,
+    Learner,
+    ObservingLearner,
+    Transition,
+    UnusableStepError,
+)
 
 Row: TypeAlias = Mapping[str, Any]
 """An episode (``kind``, ``step``, ``episode``, ``return``, ``length``, ``terminated``, and with
 several environments ``environment``) or an evaluation (``kind``, ``step``, ``episode``,
 ``mean_return``, ``mean_length``, ``share_terminated``, and lists ``returns``, ``lengths``,
 ``terminated`` of its episodes). Steps and episodes are those learned until then."""
+
+
+class _EachLearner(ObservingLearner):
+    """A learner in all environments of a training: it acts and learns in one after the other."""
+
+    def __init__(self, learner: Any, n_environments: int) -> None:
+        self._learner = learner
+        self.progressing: Any = learner if hasattr(learner, "progress") else None
+        """The object whose ``progress`` follows that of the training."""
+        self.arguments: list[dict[str, int]] = [{}]
+        """Arguments that name an environment, where there are several."""
+        if n_environments > 1:
+            self.arguments = [{"environment": i} for i in range(n_environments)]
+
+    def begin_episode(self, environment: int) -> None:
+        self._learner.begin_episode(**self.arguments[environment])
+
+    def read(self, name: str, observations: Elements) -> Elements:
+        return [copied(observation) for observation in observations]
+
+    def flat(self, observation: Element) -> NDArray[np.float64]:
+        return np.asarray(self._learner.flat_observation(observation))
+
+    def masks(self, masks: list[Mask]) -> Masks:
+        return masks
+
+    def act(
+        self,
+        observations: Elements,
+        actions: Elements,
+        environments: list[int],
+        masks: Masks | None = None,
+    ) -> Elements:
+        """Return actions as `learn` takes them: new ones in these, the others as they were."""
+        chosen = list(actions)
+        for i in environments:
+            mask = {} if masks is None else {"mask": masks[i]}
+            chosen[i] = self._learner.act(observations[i], **self.arguments[i], **mask)
+        return chosen
+
+    def elements(self, actions: Elements) -> Elements:
+        return actions
+
+    def learn(
+        self,
+        observations: Elements,
+        actions: Elements,
+        rewards: list[float],
+        next_observations: Elements,
+        terminated: list[bool],
+        environments: list[int],
+        progress: list[float],
+        next_masks: Masks | None = None,
+    ) -> int:
+        """Learn steps in the first of these environments or more; return in how many.
+
+        ``progress`` is the learner's between two of them; it may be empty.
+        """
+        i = environments[0]
+        reward, terminates, _ = checked_outcome(rewards[i], terminated[i], False)
+        mask = None if next_masks is None else next_masks[i]
+        step = Transition(
+            observations[i], actions[i], reward, next_observations[i], terminates, mask
+        )
+        self._learner.learn(step, **self.arguments[i])
+        return 1
+
+
+class _CoreLearner(_EachLearner):
+    """An agent of the core, which acts or learns in all environments with one call."""
+
+    def __init__(self, learner: Learner, n_environments: int, parts: CoreParts) -> None:
+        super().__init__(learner, n_environments)
+        self.progressing = self._core = parts.core
+        self._read, self._elements, self._mask = parts.read, parts.elements, parts.mask
+        self._n_actions = sum(parts.core.n_actions)
+
+    def read(self, name: str, observations: Elements) -> NDArray[np.float64]:
+        return self._read(name, observations)
+
+    def flat(self, observation: Element) -> NDArray[np.float64]:
+        return np.array(observation)
+
+    def masks(self, masks: list[Mask]) -> NDArray[np.uint8]:
+        rows = np.ones((len(masks), self._n_actions), np.uint8)
+        for i, mask in enumerate(masks):
+            if (row := self._mask("action_mask", mask)) is not None:
+                rows[i] = row
+        return rows
+
+    def act(
+        self,
+        observations: Elements,
+        actions: Elements,
+        environments: list[int],
+        masks: Any = None,
+    ) -> NDArray[np.float64]:
+        chosen = self._core.act_each(observations, environments, masks)
+        if len(environments) < len(chosen):
+            for i in set(range(len(chosen))).difference(environments):
+                chosen[i] = np.ravel(actions[i])  # an element of the space after a replay
+        return chosen
+
+    def elements(self, actions: Any) -> Array:
+        return self._elements(actions)
+
+    def learn(self, *outcomes: Any) -> int:
+        return self._core.learn_each(*outcomes)
+
+
+def each_learner(learner: Learner, n_environments: int) -> _EachLearner:
+    """Return a learner in all environments; an agent of the core acts and learns in one call."""
+    core_parts: Callable[..., CoreParts | None] | None = getattr(type(learner), "core_parts", None)
+    if core_parts and (parts := core_parts(learner)):
+        return _CoreLearner(learner, n_environments, parts)
+    return _EachLearner(learner, n_environments)
 
 
 class TrainingLoop(abc.ABC):
@@ -54,7 +179,7 @@ class TrainingLoop(abc.ABC):
     """Whether an error left a step half done, which cannot be saved."""
 
     _episodes: Episodes
-    _learner: EachLearner
+    _learner: _EachLearner
     _listeners: Sequence[tuple[int, Any]]
     _stops = False
 

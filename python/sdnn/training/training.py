@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
+import os
+import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.environments.space_kinds import require_same_kind
-from sdnn.environments.types import Env, Info, VectorEnv
+from sdnn.environments.types import AnyEnv, Env, Info, VectorEnv
 from sdnn.support.arguments import flag, has_methods, path_of, require, shown, whole
 from sdnn.support.display import Displayed
-from sdnn.training.episodes import Episodes, adapter_for
+from sdnn.training.episodes import Episodes, OneEnvironment, require_single
 from sdnn.training.files import (
     SavedTraining,
     read_training,
@@ -23,8 +26,8 @@ from sdnn.training.files import (
     take_statistics,
     write_training,
 )
-from sdnn.training.interfaces import Learner, each_learner, explained, require_single
-from sdnn.training.loop import Row, TrainingLoop
+from sdnn.training.interfaces import EnvironmentAdapter, Learner, explained
+from sdnn.training.loop import Row, TrainingLoop, each_learner
 
 if TYPE_CHECKING:
     from typing import Self
@@ -97,6 +100,20 @@ def listed(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
     for callback in checked:
         has_methods("callbacks", callback, "callbacks", "on_start", "on_step", "on_row", "on_end")
     return checked
+
+
+def shows_bar() -> bool:
+    """Return whether trainings show a bar: in a notebook, or a terminal that can move its cursor.
+
+    A log, a pipe and a captured standard error show none.
+    """
+    if sys.stderr is not None and sys.stderr.isatty():
+        return os.environ.get("TERM", "") not in ("dumb", "unknown")
+    if "IPython" not in sys.modules:
+        return False
+    from rich.console import Console
+
+    return Console(stderr=True).is_jupyter
 
 
 class Training(TrainingLoop):
@@ -221,7 +238,7 @@ class Training(TrainingLoop):
         self.reset_options = reset_options
         self.evaluations = []
         self.rows = []
-        adapter = adapter_for(env)
+        adapter = _adapter_for(env)
         self._learner = each_learner(agent, adapter.n_environments)
         self._episodes = Episodes(
             env, adapter, self._learner, self.seed, first, self._options, self._unusable
@@ -367,3 +384,12 @@ def _optional(name: str, value: float | None) -> int | None:
     if isinstance(value, float) and value.is_integer():  # such as 1e5
         value = int(value)
     return None if value is None else whole(name, value, 1, 2**53)
+
+
+def _adapter_for(env: AnyEnv) -> EnvironmentAdapter:
+    """Return the adapter for an environment, or for a vector of them."""
+    if not isinstance(env, gym.vector.VectorEnv):
+        return OneEnvironment(env)
+    from sdnn.training.vectors import vector_adapter
+
+    return vector_adapter(env)

@@ -43,11 +43,11 @@ def imports(name):
 def test_one_loop_steps_environments_and_learns():
     steps, acts, learns = map(modules_with, map(calls, ("step", "act", "learn")))
     outside = {name for name in steps if not name.startswith("environments/")}
-    assert outside == {"training/loop", "training/episodes", "training/interfaces"}
+    assert outside == {"training/loop", "training/episodes"}
     agents = {"agents/agent", "agents/base", "agents/q_learning", "agents/fuzzy_q_learning"}
     logged = {"agents/datasets"}  # learns transitions of files, and steps no environment
-    assert learns - agents - logged == {"training/loop", "training/interfaces"}
-    assert acts - agents == {"training/loop", "training/interfaces", "training/evaluation"}
+    assert learns - agents - logged == {"training/loop"}
+    assert acts - agents == {"training/loop", "training/evaluation"}
 
 
 def test_one_store_knows_sqlite():
