@@ -13,7 +13,7 @@ import numpy as np
 
 from made_records import make_record
 from sdnn.runs import ResultStore, StoreError, TrialRows
-from sdnn.support.state_files import read_file, write_file
+from sdnn.support.files import read_file, write_file
 
 ROWS = [
     {"kind": "episode", "step": n, "episode": n, "return": 1.0, "length": 1, "terminated": True}

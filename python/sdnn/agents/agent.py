@@ -26,7 +26,7 @@ from sdnn.support.arguments import (
     whole,
 )
 from sdnn.support.display import Displayed
-from sdnn.support.state_files import Arrays
+from sdnn.support.files import Arrays
 from sdnn.training.callbacks import ProgressBarCallback
 from sdnn.training.files import read_agent, read_statistics
 from sdnn.training.interfaces import explained

@@ -49,7 +49,7 @@ from sdnn.support.arguments import (
     shown,
     whole,
 )
-from sdnn.support.state_files import Arrays, Description, write_file
+from sdnn.support.files import Arrays, Description, write_file
 from sdnn.training.files import CLASSES, Statistics
 from sdnn.training.interfaces import CoreParts, Transition, explained
 

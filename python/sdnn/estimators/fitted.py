@@ -18,7 +18,7 @@ from sdnn.coding.symbols import Categorical, present
 from sdnn.estimators.columns import Array, Codings, Floats, Ints, coding_entries
 from sdnn.estimators.network import InputCode, Network, code_bytes
 from sdnn.support.arguments import seed_of, whole
-from sdnn.support.state_files import Arrays, Description, read_file, write_file
+from sdnn.support.files import Arrays, Description, read_file, write_file
 
 MOST_BYTES_OF_NAMES = 2**26
 NAMES = ("classes_", "feature_names_in_")  # arrays whose type may be text

@@ -20,7 +20,7 @@ import numpy as np
 from sdnn.environments.spaces import Actions
 from sdnn.environments.types import Array, Data
 from sdnn.support.arguments import seed_of
-from sdnn.support.state_files import Arrays, Description, read_file, write_file
+from sdnn.support.files import Arrays, Description, read_file, write_file
 
 _STATISTICS = ("obs_rms", "return_rms")
 _MOMENTS = ("mean", "var", "count")

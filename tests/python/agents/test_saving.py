@@ -27,7 +27,7 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.support.state_files import read_file, write_file
+from sdnn.support.files import read_file, write_file
 from stopped_training import states_equal
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)

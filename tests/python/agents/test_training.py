@@ -31,7 +31,7 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.approximators import SDNNCConfig
-from sdnn.support.state_files import read_file, write_file
+from sdnn.support.files import read_file, write_file
 from stopped_training import Stop, goes_on_exactly, states_equal
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)

@@ -15,8 +15,8 @@ from checksums import with_checksum
 from refusals import refuses
 from sdnn import SDNNRegressor
 from sdnn.agents import SDNNQLearning, Training, load_agent
-from sdnn.support import state_files
-from sdnn.support.state_files import read_file, write_file
+from sdnn.support import files
+from sdnn.support.files import read_file, write_file
 
 KINDS = ("agent", "training", "estimator")
 ARRAYS = {
@@ -70,7 +70,7 @@ def test_the_file_is_one_of_safetensors(tmp_path):
     assert len(about.pop("checksum")) == 8
     assert about == {
         "kind": "estimator",
-        "format": state_files.FORMAT,
+        "format": files.FORMAT,
         "version": sdnn.__version__,
         "description": DESCRIPTION,
     }
@@ -152,5 +152,5 @@ def test_only_regular_files_are_read(tmp_path, monkeypatch):
             with pytest.raises(OSError, match=f"{name}"):
                 read_file(name, "agent")
     write_file(tmp_path / "file", "agent", ARRAYS, {})
-    monkeypatch.setattr(state_files, "MAX_BYTES", 100)
+    monkeypatch.setattr(files, "MAX_BYTES", 100)
     refuses("100", read_file, tmp_path / "file", "agent", error=OSError)

@@ -19,8 +19,7 @@ from sdnn.runs.curves import curves_of, write_curves
 from sdnn.runs.errors import RunError
 from sdnn.runs.run import tensorboard_in
 from sdnn.runs.store import STORE_NAME
-from sdnn.support.files import write_whole
-from sdnn.support.state_files import write_file
+from sdnn.support.files import write_file, write_whole
 
 RUN = RunSpec(
     environment=EnvironmentSpec(id="Pendulum-v1"),
@@ -306,9 +305,9 @@ def test_links_that_would_be_written_to_are_refused(tmp_path, name):
 TRUNCATED = """
 import sys
 from pathlib import Path
-from sdnn.support import state_files
+from sdnn.support import files
 
-path, real = Path(sys.argv[1]), state_files.os.fstat
+path, real = Path(sys.argv[1]), files.os.fstat
 
 def truncated(descriptor):
     status = real(descriptor)
@@ -316,9 +315,9 @@ def truncated(descriptor):
         file.truncate(status.st_size // 2)
     return status
 
-state_files.os.fstat = truncated
+files.os.fstat = truncated
 try:
-    state_files.read_file(path, "agent")
+    files.read_file(path, "agent")
 except ValueError as error:
     print(error)
 """

@@ -17,7 +17,7 @@ from sdnn.coding import (
     Symbolic,
     WithMissing,
 )
-from sdnn.support.state_files import read_file, write_file
+from sdnn.support.files import read_file, write_file
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (60, 3))

@@ -30,7 +30,7 @@ from sdnn.agents import (
 )
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.support.arguments import shown
-from sdnn.support.state_files import read_file, write_file
+from sdnn.support.files import read_file, write_file
 
 TYPED = (TypeError, ValueError, OverflowError, OSError)
 

@@ -28,7 +28,7 @@ from sdnn import libsdnn
 from sdnn.agents import JSONLines, SDNNQLearning, Training
 from sdnn.runs import Run
 from sdnn.runs.errors import RunError
-from sdnn.support.state_files import read_file, write_file
+from sdnn.support.files import read_file, write_file
 from sdnn.training.files import read_statistics
 
 MOST_SECONDS = 5.0

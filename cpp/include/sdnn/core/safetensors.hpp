@@ -1,5 +1,5 @@
 /// The file format of agents, trainings and estimators, which Python reads and writes too (see
-/// python/sdnn/support/state_files.py). Needs the library nlohmann/json.
+/// python/sdnn/support/files.py). Needs the library nlohmann/json.
 #pragma once
 
 #include <algorithm>
