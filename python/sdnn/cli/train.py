@@ -201,9 +201,6 @@ def _given(env_id: str | None, options: Options) -> Options:
             example = advice(name, (), KEYS_BY_NAME) or "such as learning.discount"
             raise click.UsageError(f"--set {name}: must be TABLE.NAME; {example}")
         give(f"--set {name}", name, value_of(text))
-    both = [by_option[key][0] for key in ("budget.steps", "budget.episodes") if key in values]
-    if len(both) == 2:
-        raise click.UsageError(f"{' and '.join(both)} must not be given together")
     return values
 
 

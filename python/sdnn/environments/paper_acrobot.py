@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.config import AcrobotConfig, GoalScheduleConfig, SensorConfig
 from sdnn.environments.acrobot import AcrobotSwingUpEnv
-from sdnn.environments.sensors import NoiseStream
+from sdnn.environments.sensors import STREAMS, NoiseStream
 from sdnn.environments.types import Array, Data, Element
-from sdnn.support.arguments import one_of, require, seed_of, whole
+from sdnn.support.arguments import choice, require, seed_of, whole
 
 
 class GoalSchedule:
@@ -153,8 +153,7 @@ class PaperAcrobotEnv(AcrobotSwingUpEnv):
         super().__init__(config=config, render_mode=render_mode, dtype="float64")
         self.schedule = GoalSchedule(_config("goal", GoalScheduleConfig, goal))
         self.sensors = _config("sensors", SensorConfig, sensors)
-        one_of("stream", stream, ("sensor_noise", "evaluation_sensor_noise"))
-        self._stream = _core.Stream.__members__[stream]
+        self._stream = choice("stream", stream, STREAMS)
         self._restart_noise(0)
         self._episode = 1
         self.observation_space = gym.spaces.Box(0.0, 1.0, (self.sensors.n_inputs,), np.float64)

@@ -20,6 +20,11 @@ Env = gym.Env[Observation, Element]
 SensorFunction = Callable[[Observation], float]
 Edge = Literal["wrap", "saturate"]
 NoiseStream = Literal["sensor_noise", "evaluation_sensor_noise"]
+STREAMS: dict[str, _core.Stream] = {
+    "sensor_noise": _core.Stream.sensor_noise,
+    "evaluation_sensor_noise": _core.Stream.evaluation_sensor_noise,
+}
+"""The core's random streams of noise, by name."""
 
 _NAMED: dict[str, SensorFunction] = {
     "energy": lambda s: _core.energy_sensor(s[2], s[3]),
@@ -145,8 +150,7 @@ class _RandomSensors(_Sensors):
 
     def __init__(self, env: Env, *, seed: int, stream: str, **arguments: Any) -> None:
         super().__init__(env, seed=seed, stream=stream, **arguments)
-        one_of("stream", stream, ("sensor_noise", "evaluation_sensor_noise"))
-        self._stream = _core.Stream.__members__[stream]
+        self._stream = choice("stream", stream, STREAMS)
 
     def reset(
         self, *, seed: int | None = None, options: Data | None = None

@@ -28,24 +28,19 @@ _ONE = 1 << 16  # of rates
 _MOST_TOLERANCE = 2**62  # in units: above any difference of values
 
 
-class QLambdaWriter(Writer):
+class QLambdaWriter(Writer[_core.LinearSDNN]):
     """Makes the header of an `SDNNQLambda` agent's greedy policy."""
 
     agent: SDNNQLambda
-    networks: list[_core.LinearSDNN]
-
-    def network(self) -> _core.LinearSDNN:
-        """Return the readout."""
-        return self.networks[0]
 
     def code(self) -> Code:
         """Return the code of its states."""
-        return Code(self.network(), self.n_inputs)
+        return Code(self.network, self.n_inputs)
 
     def columns(self) -> NDArray[np.intp]:
         """Return the places of the header's columns among those of the weights."""
         m = self.agent.approximator.n_pattern_units
-        n_groups = len(self.network().pairs)
+        n_groups = len(self.network.pairs)
         slots = np.arange(n_groups)[:, None] * (-(-m // 64) * 64) + np.arange(m)
         return slots.reshape(-1)
 
@@ -109,7 +104,7 @@ class QLambdaWriter(Writer):
         return self.write("sdnn_greedy_q_lambda.h", description, needs, defines, tables, **sizes)
 
 
-class QLambdaLearner(Learner, QLambdaWriter):
+class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
     """Makes the header of an `SDNNQLambda` agent that learns."""
 
     magic = 0x4C4E4453  # "SDNL"

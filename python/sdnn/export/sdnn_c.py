@@ -28,15 +28,10 @@ MOST_UNITS = 65535  # whose numbers fit 16 bits
 _BYTES_OF_NETWORK = 40  # a struct of eight pointers and two sizes, where pointers have 32 bits
 
 
-class SDNNCWriter(Writer):
+class SDNNCWriter(Writer[_core.SDNNC]):
     """Makes the header of an `SDNNQLearning` agent."""
 
     agent: SDNNQLearning
-    networks: list[_core.SDNNC]
-
-    def network(self) -> _core.SDNNC:
-        """Return the network of the first dimension."""
-        return self.networks[0]
 
     def require_small(self, n_units: int, n_columns: int) -> None:
         """Raise ValueError for more units or weights than a header can hold."""
@@ -128,7 +123,7 @@ _WORD = 2**64 - 1
 _ROUNDING = {"away": "AWAY", "half_up": "HALF_UP", "random": "AT_RANDOM"}
 
 
-class SDNNCLearner(Learner, SDNNCWriter):
+class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
     """Makes the header of an `SDNNQLearning` agent that learns."""
 
     magic = 0x434E4453  # "SDNC"
@@ -147,8 +142,8 @@ class SDNNCLearner(Learner, SDNNCWriter):
             )
         super().__init__(agent, name, fraction_bits)
         self._check_settings()
-        self.code = Code(self.network(), self.n_inputs)
-        self.used, self.first_units = self.units(self.network())
+        self.code = Code(self.network, self.n_inputs)
+        self.used, self.first_units = self.units(self.network)
         self.n_units = -(-self.used.size // 4) * 4
         self.require_small(self.n_units, self.code.n_columns)
         self._check_values()
@@ -179,7 +174,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
 
     def _check_values(self) -> None:
         """Raise ValueError for values that the header could not tell apart."""
-        network = self.network()
+        network = self.network
         low, high = network.output_range
         steps = np.diff(network.output_values()[network.u_low : network.u_high + 1])
         if max(abs(low), abs(high)) > _LARGEST or steps.min() <= 0:
@@ -190,7 +185,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
 
     def columns(self) -> NDArray[np.int32]:
         """Return the weights of the used units by columns, shape (n_used, n_columns)."""
-        columns = self.code.paired(self.network().weights()[self.used])
+        columns = self.code.paired(self.network.weights()[self.used])
         if np.abs(columns).max() > MOST_WEIGHT:
             raise ValueError(
                 "sums and differences of two weights must be -127 to 127 for an SDNNQLearning that"
@@ -201,7 +196,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
 
     def thresholds(self) -> NDArray[np.int32]:
         """Return the thresholds of the used units, filled up with zeros."""
-        thresholds: NDArray[np.int32] = self.network().thresholds()[self.used]
+        thresholds: NDArray[np.int32] = self.network.thresholds()[self.used]
         return np.pad(thresholds, (0, self.n_units - self.used.size))
 
     def fields(self) -> list[Field]:
@@ -280,7 +275,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
 
     def _is_new(self) -> bool:
         """Whether weights and thresholds are those that the header can draw."""
-        sizes, network = self.agent.approximator, self.network()
+        sizes, network = self.agent.approximator, self.network
         if sizes.initial_weights != "ternary":
             return False
         new = _core.SDNNC(sizes, self.agent.seed)
@@ -336,7 +331,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
 
     def _network_defines(self) -> Data:
         """Return the sizes of the network and the settings of its learning rule."""
-        sizes, learning, network = self.agent.approximator, self.agent.learning, self.network()
+        sizes, learning, network = self.agent.approximator, self.agent.learning, self.network
         return {
             "N_ACTIONS": network.n_actions,
             "N_UNITS": self.n_units,
@@ -363,7 +358,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
         first, last = np.r_[0, breaks + 1], np.r_[breaks, self.used.size - 1]
         ranges = np.stack([self.used[first], self.used[last] + 1], axis=1)
         tables.add("uint16_t", "used", ranges, "Hidden units in use: from, to.")
-        groups = [self.code.groups.index(pair) for pair in self.network().pairs]
+        groups = [self.code.groups.index(pair) for pair in self.network.pairs]
         about = "Groups of the pairs of inputs, in the order in which weights are drawn."
         tables.add("uint16_t", "groups", np.array(groups), about)
         seed = np.array(_seeded(self.agent.seed, _WEIGHTS_STREAM), np.uint64)
@@ -391,7 +386,7 @@ class SDNNCLearner(Learner, SDNNCWriter):
     def _stack_bytes(self) -> int:
         """Return the bytes of the largest arrays that are there at one time."""
         changes = 2 * self.code.column_bytes * self.code.most_columns + self.code.n_columns
-        return int(changes + 4 * self.network().n_actions + 8 * self.n_inputs)
+        return int(changes + 4 * self.network.n_actions + 8 * self.n_inputs)
 
 
 def _real(value: Any) -> str:

@@ -8,7 +8,7 @@ import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -45,7 +45,7 @@ _TIES = {"lowest": "LOWEST", "middle": "MIDDLE", "uniform": "DRAWN"}
 MOST_WEIGHTS = 2**26  # some hundred megabytes of text
 Field: TypeAlias = tuple[str, str] | tuple[str, str, tuple[int, ...]]
 """Name and type of a field of an image, and its shape."""
-Network: TypeAlias = _core.SDNNC | _core.LinearSDNN
+Network = TypeVar("Network", bound=_core.SDNNC | _core.LinearSDNN)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,12 +67,12 @@ class CHeader:
     n_words: int
 
 
-class Writer(ABC):
+class Writer(ABC, Generic[Network]):
     """Makes the header of one agent; subclasses have its kind of network."""
 
     def __init__(self, agent: ValueAgent[Any, Any], name: str, fraction_bits: int | None) -> None:
         self.agent, self.name = agent, name
-        self.networks = agent.networks  # RuntimeError while warming up
+        self.networks: list[Network] = agent.networks  # RuntimeError while warming up
         self.n_dimensions = agent.n_dimensions
         self.is_vector = self.n_dimensions > 1
         self.box = self._box()
@@ -87,9 +87,10 @@ class Writer(ABC):
 
     title: ClassVar[str] = "the greedy policy of a trained agent"
 
-    @abstractmethod
+    @property
     def network(self) -> Network:
-        """Return a network of the agent, which has the patterns of its inputs."""
+        """The network of the first dimension, which has the patterns of the inputs."""
+        return self.networks[0]
 
     @abstractmethod
     def header(self) -> CHeader:
@@ -99,7 +100,7 @@ class Writer(ABC):
         inputs = []
         for i, (kind, at) in enumerate(self.agent.inputs):
             low, high = (float(end[at[0]]) for end in self.agent.observation_range)
-            inputs.append(Input(kind, list(at), low, high, len(self.network().table(i))))
+            inputs.append(Input(kind, list(at), low, high, len(self.network.table(i))))
         return inputs
 
     def _box(self) -> Array | None:
@@ -152,7 +153,6 @@ class Writer(ABC):
     def fingerprint(self) -> int:
         """Return a number that agents of other settings or another seed do not have."""
         learning, approximator = self.agent.learning, self.agent.approximator
-        network = self.network()
         about = [
             str(approximator),
             str(learning),
@@ -162,7 +162,7 @@ class Writer(ABC):
                 (source.kind, list(source.at), source.low, source.high, source.n_bins)
                 for source in self.inputs
             ],
-            [zlib.crc32(network.permutation(*pair).tobytes()) for pair in network.pairs],
+            [zlib.crc32(self.network.permutation(*pair).tobytes()) for pair in self.network.pairs],
         ]
         return zlib.crc32(json.dumps(about).encode())
 
@@ -305,7 +305,7 @@ class Writer(ABC):
         return [f"Of several best actions it takes {choice}, {agent}."]
 
 
-class Learner(Writer):
+class Learner(Writer[Network]):
     """Makes the header of an agent that learns, and keeps what it has learned in an image.
 
     An image has fields of fixed sizes, one after the other, and a checksum. The core's state has

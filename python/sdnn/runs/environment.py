@@ -8,7 +8,7 @@ import sys
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Any, NamedTuple
 
 import gymnasium as gym
 import msgspec
@@ -28,7 +28,7 @@ from sdnn.environments import (
     UnitSensors,
 )
 from sdnn.environments.paper_acrobot import PAPER_ACROBOT
-from sdnn.environments.sensors import in_own_units
+from sdnn.environments.sensors import NoiseStream, in_own_units
 from sdnn.environments.space_kinds import flat_bounds
 from sdnn.environments.types import Array, Data, Env
 from sdnn.runs.errors import ConfigError, RunError
@@ -37,8 +37,6 @@ from sdnn.support.arguments import blamed, shown
 
 ALL = "all"
 """The key of the range of all variables that have no other."""
-
-Stream: TypeAlias = Literal["sensor_noise", "evaluation_sensor_noise"]
 
 
 class PaperSettings(NamedTuple):
@@ -171,7 +169,7 @@ class EnvironmentSpec(Settings, frozen=True):
         """Whether the agent's observations differ from the environment's."""
         return self.noise > 0.0 or self.redundant > 0
 
-    def make(self, stream: Stream = "sensor_noise", render_mode: str | None = None) -> Env:
+    def make(self, stream: NoiseStream = "sensor_noise", render_mode: str | None = None) -> Env:
         """Make the environment; every reset with a seed starts its noise, which is of a stream.
 
         ConfigError if there is no such environment, it cannot be made, or ranges are missing or
@@ -274,7 +272,7 @@ class EnvironmentSpec(Settings, frozen=True):
             low[int(key)], high[int(key)] = self.ranges[key]
         return low, high
 
-    def _bare(self, stream: Stream, render_mode: str | None) -> Env:
+    def _bare(self, stream: NoiseStream, render_mode: str | None) -> Env:
         options = {"disable_env_checker": True, **self.kwargs}
         if self.is_paper_acrobot:
             options["stream"] = stream

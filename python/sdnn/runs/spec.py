@@ -15,12 +15,12 @@ from sdnn.agents import Agent, Callback, StopTrainingOnRewardThreshold, Training
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.agents.registry import AGENTS, AgentEntry, agent_entry, label_of, split_label
 from sdnn.config import ProtocolConfig
+from sdnn.environments.sensors import NoiseStream
 from sdnn.environments.space_kinds import flat_bounds
 from sdnn.environments.types import Env
 from sdnn.runs.environment import (
     EnvironmentSpec,
     SeedFirstReset,
-    Stream,
     episode_option,
     takes_episode,
 )
@@ -292,7 +292,9 @@ class RunSpec(Settings, frozen=True):
                 )
             return TrainingTrial(training, environments.pop_all(), target)
 
-    def make_env(self, stream: Stream = "sensor_noise", *, render_mode: str | None = None) -> Env:
+    def make_env(
+        self, stream: NoiseStream = "sensor_noise", *, render_mode: str | None = None
+    ) -> Env:
         """Make an environment to learn in or, of the other stream of noise, to be evaluated in.
 
         Each reset with a seed starts the sensors' noise. Where episodes have no seeds, the first

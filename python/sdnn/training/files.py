@@ -6,7 +6,6 @@ Wrappers such as Gymnasium's NormalizeObservation have statistics in an attribut
 
 from __future__ import annotations
 
-import base64
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -30,11 +29,11 @@ _FEW = 1.0
 
 
 class _Numbers(msgspec.Struct, frozen=True):
-    """An array, its bytes as text: JSON has no NaN."""
+    """An array, whose bytes are text in JSON, which has no NaN."""
 
     dtype: Literal["<f4", "<f8"]
     shape: tuple[int, ...]
-    values: str
+    values: bytes
 
 
 class Statistics(msgspec.Struct, frozen=True):
@@ -149,14 +148,12 @@ def _fits(wrapper: object, learned: Statistics) -> bool:
 def _packed(value: object) -> _Numbers:
     array = np.asarray(value)
     array = array.astype("<f4" if array.dtype == np.float32 else "<f8")
-    text = base64.b64encode(array.tobytes()).decode()
-    return _Numbers("<f4" if array.itemsize == 4 else "<f8", array.shape, text)
+    return _Numbers("<f4" if array.itemsize == 4 else "<f8", array.shape, array.tobytes())
 
 
 def _unpacked(numbers: _Numbers) -> Array:
     """Return the array; ValueError if it has another number of values."""
-    values = np.frombuffer(base64.b64decode(numbers.values), numbers.dtype)
-    return values.reshape(numbers.shape).copy()
+    return np.frombuffer(numbers.values, numbers.dtype).reshape(numbers.shape).copy()
 
 
 @contextmanager

@@ -373,7 +373,10 @@ def test_several_environments_are_learned_in(invoke):
         (["Nothing-v0"], "ENV_ID: no environment 'Nothing-v0'"),
         (["CartPole-v1", "--agent", "fuzzy"], "ENV_ID: action_space must be a Box"),
         (["CartPole-v1", "--agent", "rbf", "--preset", "paper"], "--preset: must be omitted"),
-        (["CartPole-v1", "--steps", 5, "--episodes", 5], "--steps and --episodes"),
+        (
+            ["CartPole-v1", "--steps", 5, "--episodes", 5],
+            "--episodes: must not be given together with steps",
+        ),
         (["CartPole-v1", "--noise", 0.1], "--range 1: must be given"),
         (["CartPole-v1", "--redundant", 5000, "--range", "0:1"], "--redundant"),
         (
