@@ -34,8 +34,8 @@ from sdnn.runs.results import CaseResult
 from sdnn.runs.settings import Values, overridden
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
-from sdnn.runs.study import Comparison, Layer, Study, StudyCase, StudyVariant
-from sdnn.runs.study_file import KnownCase, StudyFile
+from sdnn.runs.study import Comparison, Layer, Setting, Study, StudyCase, StudyVariant
+from sdnn.runs.study_file import StudyFile
 from sdnn.runs.sweep import Addition
 from sdnn.runs.trial import ROW_HEADER, trial_rows
 from sdnn.support.arguments import one_of, whole
@@ -259,11 +259,17 @@ CHANCES_NOTE = (
 )
 
 
+def settings_of(case: Case) -> Layer:
+    """Return the settings of a case, which are those of its table in a study."""
+    settings = case.settings.items()
+    return {tuple(key.split(".")): Setting(value, ("cases", case.id)) for key, value in settings}
+
+
 class ClaimStudy(StudyFile):
     """A study that may name the paper's cases, and whose report has verdicts on its claims."""
 
-    known_cases: ClassVar[dict[str, KnownCase]] = {
-        case.id: KnownCase(case.title, case.settings) for case in PAPER_CASES.values()
+    known_cases: ClassVar[dict[str, StudyCase]] = {
+        case.id: StudyCase(case.id, case.title, settings_of(case)) for case in PAPER_CASES.values()
     }
 
     def completed(self, case: StudyCase, values: Values) -> Values:

@@ -12,7 +12,7 @@ from contextlib import suppress
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, NamedTuple, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 import msgspec
 from msgspec import Meta
@@ -101,13 +101,6 @@ class StudyTables(Settings, frozen=True):
     axes: _Table = msgspec.field(default_factory=dict)
 
 
-class KnownCase(NamedTuple):
-    """A case that studies may name: its title and settings, which a study cannot change."""
-
-    title: str
-    settings: Mapping[str, object]
-
-
 class StudyFile(Study):
     """A study, read from a file; modules that it imports are looked for beside it, too.
 
@@ -124,8 +117,8 @@ class StudyFile(Study):
         Ids of the variants to run; none: all. A ValueError if there is no variant of a name.
     """
 
-    known_cases: ClassVar[Mapping[str, KnownCase]] = {}
-    """Cases that the file may name, by their ids."""
+    known_cases: ClassVar[Mapping[str, StudyCase]] = {}
+    """Cases that the file may name, by their ids; it cannot change their settings."""
 
     def __init__(
         self,
@@ -305,20 +298,16 @@ class StudyFile(Study):
 
     def _read_case(self, case_id: str) -> StudyCase:
         where: KeyPath = ("cases", case_id)
-        table, known = dict(self.tables.cases.get(case_id, {})), self.known_cases.get(case_id)
-        default = known.title if known else case_id
-        title = checked(str, table.pop("title", default), dotted((*where, "title")))
-        settings = self._layer(where, table)
-        if known is None:
-            return StudyCase(case_id, title, settings, where)
-        fixed = {tuple(name.split(".")): value for name, value in known.settings.items()}
+        table = dict(self.tables.cases.get(case_id, {}))
+        known = self.known_cases.get(case_id, StudyCase(case_id, case_id))
+        title = checked(str, table.pop("title", known.title), dotted((*where, "title")))
+        settings, fixed = self._layer(where, table), known.settings
         for name, setting in settings.items():
-            if setting.value != fixed.get(name, setting.value):
-                texts = (f"{key} = {value}" for key, value in known.settings.items())
+            if name in fixed and setting.value != fixed[name].value:
+                texts = (f"{'.'.join(key)} = {value}" for key, (value, _) in fixed.items())
                 problem = f"is a case with {', '.join(texts)}: give another one another name"
                 raise self.file.error(setting.where, f"{case_id} {problem}")
-        fixed_settings = {name: Setting(value, where) for name, value in fixed.items()}
-        return StudyCase(case_id, title, fixed_settings | settings, where)
+        return StudyCase(case_id, title, fixed | settings, where)
 
     def _read_variants(self, cases: Sequence[StudyCase]) -> tuple[StudyVariant, ...]:
         variants: dict[str, StudyVariant] = {}
