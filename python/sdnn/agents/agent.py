@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import Any, Self, TypeAlias, cast
 
 import gymnasium as gym
 import numpy as np
@@ -31,9 +31,6 @@ from sdnn.training.callbacks import ProgressBarCallback
 from sdnn.training.files import read_agent, read_statistics
 from sdnn.training.interfaces import explained
 from sdnn.training.training import Callback, Training, TrainingResult, listed, shows_bar
-
-if TYPE_CHECKING:
-    from typing import Self
 
 
 class Agent(Displayed, BaseAgent[Approximator, Learning]):

@@ -28,7 +28,7 @@ from sdnn.runs.errors import ConfigError
 if TYPE_CHECKING:
     import gymnasium as gym
 
-    from sdnn.runs.run import AnyAgent
+    from sdnn.agents.agent import AnyAgent
 
 _MOST_ACTIONS = 2**16
 _LARGEST = 2**31  # of readings

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.core import RenderFrame
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
@@ -14,9 +15,6 @@ from sdnn.config import AcrobotConfig
 from sdnn.environments.picture import AcrobotMotion, AcrobotPicture
 from sdnn.environments.types import Array, Data
 from sdnn.support.arguments import array_of, choice, one_of, real, require
-
-if TYPE_CHECKING:
-    from gymnasium.core import RenderFrame
 
 _DTYPES: dict[str, type[np.float32] | type[np.float64]] = {
     "float32": np.float32,

@@ -7,13 +7,16 @@ window, backend or style of the user's session is touched.
 from __future__ import annotations
 
 from io import BytesIO
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from sdnn.support.interrupts import stay_interrupts
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    import matplotlib.axes
+    import matplotlib.figure
+
+Axes: TypeAlias = "matplotlib.axes.Axes"
+Figure: TypeAlias = "matplotlib.figure.Figure"
 
 COLORS = (
     "#1f5a96", "#c2542d", "#3c7d4b", "#7a5195", "#8a6d1d", "#4a4a4a",
@@ -24,9 +27,9 @@ INK, FAINT, GRID = "#2b2b2b", "#6f6f6f", "#e4e4e4"
 
 def new_figure(width: float, height: float) -> Figure:
     """Make a figure whose panels leave room for titles, legend and footer."""
-    from matplotlib.figure import Figure
+    import matplotlib.figure
 
-    return Figure(figsize=(width, height), layout="constrained")
+    return matplotlib.figure.Figure(figsize=(width, height), layout="constrained")
 
 
 def color_of(index: int) -> str:

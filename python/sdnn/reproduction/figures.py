@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sdnn.reports.plots import FAINT, INK, color_of, label, new_figure, style
+from sdnn.reports.plots import FAINT, INK, Axes, Figure, color_of, label, new_figure, style
 from sdnn.reproduction.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.reproduction.cost import SERIES, CostRecord
 from sdnn.runs.figures import SMOOTHED_TESTS, agent_colors, draw_steps
 from sdnn.runs.results import CaseResult
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MAX_STEPS = 50  # an episode's limit: the upper end of the steps axis
 LONG_EPISODES = 2_000  # learning episodes from which running medians lie over the curves

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from functools import reduce
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.reports.plots import color_of, new_figure
+from sdnn.reports.plots import Axes, Figure, color_of, new_figure
 from sdnn.runs.errors import RunError
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.run import Run
@@ -21,10 +21,6 @@ from sdnn.support.csv_files import csv_bytes
 from sdnn.support.files import write_whole
 from sdnn.support.interrupts import stay_interrupts
 from sdnn.training.loop import Row
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 WINDOW = 20
 """Episodes in the running median of the returns, or all so far where they are fewer."""

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.registry import labels, title_of
-from sdnn.reports.plots import FAINT, INK, color_of, label, new_figure, style
+from sdnn.reports.plots import FAINT, INK, Axes, Figure, color_of, label, new_figure, style
 from sdnn.reports.statistics import estimate_mean, running_median
 from sdnn.runs.results import CaseResult, MeasureName
 from sdnn.runs.study import Comparison, Measured
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 SMOOTHED_TESTS = 25
 """Test episodes in the running median of a long run, which lies over the thin median curve."""

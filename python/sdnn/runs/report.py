@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +16,8 @@ from sdnn.reports.statistics import CONFIDENCE, Estimate
 from sdnn.runs.engine import TrialsOutcome
 from sdnn.runs.errors import PlotUnavailableError
 from sdnn.runs.results import MEASURES, RETURN_MEASURES, CaseResult, MeasureName
+from sdnn.runs.trial import TrialRecord
 from sdnn.support import machine
-
-if TYPE_CHECKING:
-    from sdnn.runs.trial import TrialRecord
 
 PERCENT = f"{100 * CONFIDENCE:.0f} %"
 NOTE = (

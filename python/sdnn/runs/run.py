@@ -10,7 +10,7 @@ import weakref
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import Annotated, Self
 
 import gymnasium as gym
 import msgspec
@@ -18,7 +18,6 @@ from msgspec import Meta
 
 from sdnn._core import __version__
 from sdnn.agents import (
-    Agent,
     Callback,
     CheckpointCallback,
     SaveBestAgent,
@@ -29,6 +28,7 @@ from sdnn.agents import (
     evaluate,
     load_agent,
 )
+from sdnn.agents.agent import AnyAgent
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.environments.space_kinds import require_same_kind
 from sdnn.environments.types import Data, Env
@@ -52,11 +52,6 @@ from sdnn.support.interrupts import Interrupts
 from sdnn.support.machine import instruction_set
 from sdnn.training.loop import Row
 from sdnn.training.training import listed
-
-if TYPE_CHECKING:
-    from typing import Self
-
-AnyAgent: TypeAlias = Agent[Any, Any]
 
 CONFIG = "config.json"
 LOCK = ".lock"

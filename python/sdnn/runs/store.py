@@ -17,18 +17,15 @@ from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 import numpy as np
 
 from sdnn.runs.errors import StoreError
 from sdnn.runs.journal import BUSY_SECONDS, foreign_journal, has_rows, is_hot
-from sdnn.runs.trial import ROW, TrialKey, TrialRecord, TrialRows, config_hash as hash_of
+from sdnn.runs.trial import ROW, Hash, TrialKey, TrialRecord, TrialRows, config_hash as hash_of
 from sdnn.support.files import is_there, open_regular
-
-if TYPE_CHECKING:
-    from hashlib import _Hash as Hash
 
 Rows = TypeVar("Rows")
 

@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, TypeVar
+from typing import Any, Literal, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,8 +24,7 @@ from sdnn.agents import Evaluation, Scaling, StopTrainingOnRewardThreshold, Trai
 from sdnn.support.arguments import whole
 from sdnn.training.loop import Row
 
-if TYPE_CHECKING:
-    from hashlib import _Hash as Hash
+Hash: TypeAlias = "hashlib._Hash"
 
 ROW_HEADER = (
     "case", "agent", "trial", "seed", "config_hash", "version", "episode", "steps",

@@ -5,12 +5,10 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from types import FrameType
-from typing import TYPE_CHECKING, Self, TypeAlias
-
-if TYPE_CHECKING:
-    from concurrent.futures import ThreadPoolExecutor
+from typing import Self, TypeAlias
 
 Handler: TypeAlias = Callable[[int, FrameType | None], object] | int | None
 
@@ -69,8 +67,6 @@ def thread_pool(n_threads: int) -> Iterator[ThreadPoolExecutor]:
     crashes if it is in C++ when the interpreter exits (python/cpython#90882). A second Ctrl-C
     during the wait acts as usual, in case a thread hangs.
     """
-    from concurrent.futures import ThreadPoolExecutor
-
     pool = ThreadPoolExecutor(n_threads)
     try:
         yield pool

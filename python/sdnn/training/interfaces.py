@@ -5,17 +5,15 @@ from __future__ import annotations
 import abc
 import inspect
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sdnn._core import Controller
 from sdnn.config import fields_of
 from sdnn.environments.types import Array, Data, Element, Elements, Mask, Masks
 from sdnn.support.arguments import explains_names
-
-if TYPE_CHECKING:
-    from sdnn._core import Controller
 
 Seeds: TypeAlias = Mapping[int, int | None]
 Options: TypeAlias = Data | None

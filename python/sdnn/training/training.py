@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 import gymnasium as gym
 import numpy as np
@@ -28,9 +28,6 @@ from sdnn.training.files import (
 )
 from sdnn.training.interfaces import EnvironmentAdapter, Learner, explained
 from sdnn.training.loop import Row, TrainingLoop, each_learner
-
-if TYPE_CHECKING:
-    from typing import Self
 
 _SETTINGS = (
     "seed", "evaluate_every", "evaluate_every_episodes", "evaluation_episodes", "limit_bootstraps"
