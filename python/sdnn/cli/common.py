@@ -64,7 +64,7 @@ def explained_option(error: click.NoSuchOption) -> click.UsageError:
     context = error.ctx
     options = {} if context is None else {
         name.lstrip("-").replace("-", "_"): name
-        for parameter in context.command.params
+        for parameter in context.command.get_params(context)
         for name in (*parameter.opts, *parameter.secondary_opts)
         if name.startswith("--")
     }  # fmt: skip

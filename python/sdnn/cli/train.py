@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -29,26 +30,18 @@ from sdnn.support.arguments import advice
 class SpecCommand(click.Command):
     """A command with the options of `KEYS`, which are made when they are first needed."""
 
-    _made: list[click.Parameter] | None = None
-
-    @property
-    def params(self) -> list[click.Parameter]:
-        """All parameters; those of a specification come after the command's own."""
-        if self._made is None:
-            self._made = [*self._own, *_options()]
-        return self._made
-
-    @params.setter
-    def params(self, parameters: list[click.Parameter]) -> None:
-        self._own = parameters
-        self._made = None
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Return all parameters; those of a specification come before the option for help."""
+        *parameters, help_option = super().get_params(ctx)
+        return [*parameters, *_options(), help_option]
 
 
-def _options() -> Iterator[click.Option]:
+@functools.cache
+def _options() -> list[click.Option]:
     from sdnn.runs.settings import schemas_of
     from sdnn.runs.spec import RunSpec
 
-    schemas = schemas_of(RunSpec)
+    options, schemas = [], schemas_of(RunSpec)
     for key in KEYS:
         schema: dict[str, Any] = {"$ref": "RunSpec"}
         for name in key.split("."):
@@ -60,13 +53,15 @@ def _options() -> Iterator[click.Option]:
         kind = next(types, schema)
         is_flag, default = kind.get("type") == "boolean", schema.get("default")
         shown = "" if default is None or is_flag else f"  [default: {default}]"
-        yield click.Option(
+        option = click.Option(
             [option_of(key), key.replace(".", "_")],
             type=None if is_flag else _option_type(kind),
             is_flag=is_flag,
             default=None,
             help=schema["description"].replace("`", "") + shown,
         )
+        options.append(option)
+    return options
 
 
 def _option_type(kind: Mapping[str, Any]) -> click.ParamType[Any]:

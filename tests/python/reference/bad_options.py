@@ -11,7 +11,7 @@ import re
 import tempfile
 from pathlib import Path
 
-from click import Argument
+from click import Argument, Context
 from click.testing import CliRunner
 
 from sdnn.cli import main
@@ -70,8 +70,14 @@ def run_folder():
     return run
 
 
+def parameters_of(command):
+    """Return all parameters but the option for help."""
+    made = main.commands[command]
+    return [one for one in made.get_params(Context(made)) if one.name != "help"]
+
+
 def command_cells(command):
-    for parameter in main.commands[command].params:
+    for parameter in parameters_of(command):
         texts = {"a value": "5"} if getattr(parameter, "is_flag", False) else TEXTS
         for word, text in texts.items():
             name = parameter.opts[-1]
@@ -82,7 +88,7 @@ def arguments_of(command, parameter, text):
     """The good arguments and options, with the text in the place of one of them."""
     arguments, options = (list(words) for words in COMMANDS[command])
     if isinstance(parameter, Argument):
-        places = [one for one in main.commands[command].params if isinstance(one, Argument)]
+        places = [one for one in parameters_of(command) if isinstance(one, Argument)]
         arguments[places.index(parameter)] = text
     else:
         options.append(f"{parameter.opts[-1]}={text}")  # the last one counts
