@@ -9,12 +9,7 @@ from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.scaling import Scaling
-from sdnn.config import (
-    ActorCriticConfig,
-    FuzzyQLearningConfig,
-    QLambdaConfig,
-    QLearningConfig,
-)
+from sdnn.config import ActorCriticConfig, FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
 from sdnn.training.callbacks import (
     JSONLines,
     SaveBestAgent,

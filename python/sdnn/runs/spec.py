@@ -18,12 +18,7 @@ from sdnn.config import ProtocolConfig
 from sdnn.environments.sensors import NoiseStream
 from sdnn.environments.space_kinds import flat_bounds
 from sdnn.environments.types import Env
-from sdnn.runs.environment import (
-    EnvironmentSpec,
-    SeedFirstReset,
-    episode_option,
-    takes_episode,
-)
+from sdnn.runs.environment import EnvironmentSpec, SeedFirstReset, episode_option, takes_episode
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.settings import (
     DEFAULT_AGENT,

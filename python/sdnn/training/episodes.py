@@ -235,7 +235,7 @@ class Episodes:
 
     @property
     def learned_before(self) -> list[Statistics]:
-        """Steps and episodes learned before the present episode, or the next."""
+        """Statistics of the wrappers before the present episodes began, or as they are now."""
         return self.learned if any(self.present) else statistics_of(self.wrappers)
 
     def leave(self) -> None:

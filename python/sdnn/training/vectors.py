@@ -13,13 +13,7 @@ from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 from sdnn.environments.spaces import has_mask
 from sdnn.environments.types import Element, Elements, Info, Mask, VectorEnv
 from sdnn.support.arguments import array_of
-from sdnn.training.episodes import (
-    OneEnvironment,
-    has_action_masks,
-    mask_in,
-    reset_env,
-    step_env,
-)
+from sdnn.training.episodes import OneEnvironment, has_action_masks, mask_in, reset_env, step_env
 from sdnn.training.interfaces import EnvironmentAdapter, Options, Seeds, UnusableStepError
 
 
