@@ -12,7 +12,7 @@ FOOTPRINT = Path(__file__).parent / "reference" / "footprint.py"
 
 @pytest.mark.parametrize(
     ("command", "limit"),
-    [("train CartPole-v1 --steps 60", 22), ("reproduce a --quick", 29)],
+    [("train CartPole-v1 --steps 60", 22), ("reproduce a --quick", 28)],
     ids=["train", "reproduce"],
 )
 def test_a_command_runs_through_few_files(tmp_path, command, limit):

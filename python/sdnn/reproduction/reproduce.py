@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
+import sdnn.reproduction.cost as cost
 from sdnn.agents.registry import agent_entry, split_label, title_of
 from sdnn.environments.paper_acrobot import PAPER_ACROBOT
 from sdnn.reports.pages import Section, Table
 from sdnn.reports.plots import figure_bytes
-from sdnn.reproduction import cost
 from sdnn.reproduction.cases import (
     COST,
     EXPERIMENTS,

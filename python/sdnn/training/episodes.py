@@ -28,8 +28,8 @@ _LEARNING, EVALUATION = 0, 1
 _N_RECENT = 1024
 """Actions that are gathered before they become an array."""
 
-
 _SCALARS = (np.generic, int, float)
+"""Types of observations and actions that nobody can write to."""
 
 _OLD_API = (
     "; an environment of Gym before 0.26 can be wrapped:"
