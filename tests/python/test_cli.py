@@ -167,12 +167,6 @@ def test_report_covers_all_stored_trials(invoke, tmp_path, no_costs):
     assert len(rows) == 1 + 4 * 2 * 2 * 30
 
 
-def test_results_do_not_depend_on_jobs(invoke):
-    one = invoke("reproduce", "a", "--quick", "--jobs", 1, "--json", "--out", "one")
-    two = invoke("reproduce", "a", "--quick", "--jobs", 2, "--json", "--out", "two")
-    assert json.loads(one.stdout)["digest"] == json.loads(two.stdout)["digest"]
-
-
 def test_json_is_the_file(invoke, tmp_path):
     result = invoke("reproduce", "a", "--trials", 3, "--episodes", 1000, "--json", "--seed", 5)
     table = json.loads(result.stdout)

@@ -15,7 +15,6 @@ from sdnn.agents import (
     SDNNQLambda,
     Transition,
     evaluate,
-    load_agent,
 )
 from sdnn.approximators import LinearSDNNConfig
 from sdnn.export import c_header
@@ -111,37 +110,6 @@ def test_values_of_actions_and_epsilon_are_refused_with_what_there_is_instead():
         agent.epsilon = 0.1
     agent.epsilon = None
     assert agent.epsilon == 0
-
-
-@pytest.mark.parametrize("n_environments", [1, 3])
-def test_a_saved_agent_continues_to_the_bit(n_environments, tmp_path):
-    """Running ranges, the states of episodes and traces are saved, too."""
-    space = gym.spaces.Box(-np.inf, np.inf, (3,), np.float64)
-    agent = SDNNActorCritic(space, gym.spaces.Box(-1.0, 1.0, (2,)), seed=1)
-    agent.n_environments = n_environments
-    rng, observations = np.random.default_rng(1), np.zeros((n_environments, 3))
-    for step in range(300):
-        i = step % n_environments
-        if step == 150:
-            agent.save(tmp_path / "agent.safetensors")
-            same = load_agent(tmp_path / "agent.safetensors")
-        agents = [agent, same] if step >= 150 else [agent]
-        actions = [one.act(observations[i], environment=i) for one in agents]
-        next_observation = 5.0 + 3.0 * rng.normal(size=3)
-        transition = Transition(
-            observations[i], actions[0], rng.normal(), next_observation, rng.random() < 0.1
-        )
-        agent.learn(transition, environment=i)
-        if step >= 150:
-            np.testing.assert_array_equal(*actions)
-            same.learn(transition, environment=i)
-        observations[i] = next_observation
-    assert agent.state().keys() == same.state().keys()
-    for name, values in agent.state().items():
-        np.testing.assert_array_equal(same.state()[name], values)
-    low, high = agent.observation_range
-    np.testing.assert_allclose((low + high) / 2, 5.0, atol=0.7)
-    np.testing.assert_allclose(high - low, 2 * 2.5 * 3.0, rtol=0.2)
 
 
 def test_a_warm_up_finds_inputs_and_is_not_learned():

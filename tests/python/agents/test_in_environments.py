@@ -4,43 +4,10 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, Transition
+from sdnn.agents import SDNNQLearning, Transition
 from sdnn.approximators import SDNNCConfig
 
 SMALL = SDNNCConfig(n_pattern_units=40, n_hidden_units=120, n_active_units=30)
-
-
-def live(env, agent, n_steps):
-    """Acts and learns in any environment; returns the actions taken."""
-    observation, _ = env.reset(seed=1)
-    agent.begin_episode()
-    actions = []
-    for _ in range(n_steps):
-        action = agent.act(observation)
-        next_observation, reward, terminated, truncated, _ = env.step(action)
-        agent.learn(Transition(observation, action, float(reward), next_observation, terminated))
-        observation = next_observation
-        actions.append(np.asarray(action).tolist())
-        if terminated or truncated:
-            observation, _ = env.reset()
-            agent.begin_episode()
-    return actions
-
-
-@pytest.mark.parametrize(
-    ("kind", "options"),
-    [(SDNNQLearning, {"approximator": SMALL}), (FuzzyQLearning, {}), (RBFQLearning, {})],
-)
-def test_it_lives_in_pendulum(kind, options):
-    env = gym.make("Pendulum-v1")
-
-    def born(seed):
-        return kind(env.observation_space, env.action_space, seed=seed, **options)
-
-    first, second = (live(env, born(seed=3), 450) for _ in range(2))
-    assert first == second, "the same seeds live the same life"
-    assert len({tuple(action) for action in first}) > 20
-    assert first != live(env, born(seed=4), 450)
 
 
 def test_a_discrete_observation_is_a_symbol():

@@ -59,19 +59,6 @@ def test_weights_are_those_of_the_transcription(
         np.testing.assert_array_equal(readout.weights(), slow.weights)
 
 
-def test_a_full_step_corrects_the_whole_error_of_a_new_state():
-    agent = _core.BareAgent(
-        approximator=LinearSDNNConfig(n_inputs=2, n_actions=3),
-        n_actions=[3],
-        learning=QLambdaConfig(learning_rate=1.0, final_learning_rate=1.0),
-        seed=1,
-    )
-    agent.learn([0.3, 0.7], [1], 5.0, [0.4, 0.7], True)
-    (readout,) = agent.networks
-    np.testing.assert_allclose(readout.values([0.3, 0.7]), [0, 5, 0], rtol=1e-3)
-    assert 0 < readout.values([0.35, 0.7])[1] < 5  # a neighbour learns from it
-
-
 def test_listed_states_have_a_table(tmp_path):
     space = gym.spaces.Discrete(5, start=3)
     agent = SDNNQLambda(space, gym.spaces.Discrete(2), seed=1)

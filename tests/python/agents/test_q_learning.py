@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 import sdnn_q_learning as page
 
-from handed_over import transcribe
 from refusals import refuses
 from sdnn import _core
 from sdnn.agents import QLearningConfig, SDNNQLearning, Transition
@@ -25,15 +24,23 @@ def small_agent(actions=TORQUES, **options):
 # Against the page of NumPy.
 
 
-@pytest.mark.parametrize(("n_inputs", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
-def test_a_training_of_the_page_is_a_trial_of_the_core(n_inputs, noise):
+OTHER_RATES = {"learning_rate": 0.3, "discount": 0.99, "epsilon": 0.5, "n_greedy_steps": 3}
+
+
+@pytest.mark.parametrize(
+    ("n_inputs", "noise", "learning"),
+    [(4, 0.0, {}), (4, 0.02, {}), (4, 0.02, OTHER_RATES), (5, 0.02, {}), (6, 0.02, {})],
+)
+def test_a_training_of_the_page_is_a_trial_of_the_core(n_inputs, noise, learning):
     n_episodes = 15 if n_inputs == 4 else 8
-    settings = page.Settings(episodes=n_episodes, seed=7, n_inputs=n_inputs, noise=noise)
+    settings = page.Settings(
+        episodes=n_episodes, seed=7, n_inputs=n_inputs, noise=noise, **learning
+    )
     lines = []
     network = page.train(settings, lines.append).network
     trial = _core.AcrobotTrial(
         approximator=_core.SDNNCConfig(n_inputs=n_inputs),
-        learning=_core.QLearningConfig(),
+        learning=_core.QLearningConfig(**learning),
         acrobot=_core.AcrobotConfig(),
         goal=_core.GoalScheduleConfig(),
         sensors=_core.SensorConfig(n_sensors=n_inputs, noise=noise),
@@ -50,87 +57,6 @@ def test_a_training_of_the_page_is_a_trial_of_the_core(n_inputs, noise):
     assert np.array_equal(core.weights(), network.weights)
     assert np.array_equal(core.thresholds(), network.thresholds)
     assert np.abs(core.weights()).max() > 5, "something was learned"
-
-
-def learn_side_by_side(network, learning, n_steps, noise=0.0):
-    """The core and the page live through the same acrobot episodes; how often units changed."""
-    agent = _core.BareAgent(approximator=network, learning=learning, seed=4)
-    (core,) = agent.networks
-    names = ("learning_rate", "discount", "epsilon", "n_greedy_steps")
-    slow = transcribe(core, seed=4, **{n: getattr(learning, n) for n in names})
-    slow = page.QLearning(slow, slow.settings)
-    acrobot = _core.Acrobot(_core.AcrobotConfig())
-    sensors = _core.AcrobotSensors(_core.SensorConfig(noise=noise), 4, _core.Stream.sensor_noise)
-    n_corrected = n_random = 0
-    over = True
-    for step in range(n_steps):
-        if over:
-            acrobot.reset()
-            agent.begin_episode()
-            in_episode = 0
-            state = sensors.observe(acrobot.state())
-        expected = slow.network.values(state)
-        assert np.array_equal(core.values(state), expected), step
-        (action,) = map(int, agent.act(state))
-        assert slow.act(state, in_episode) == action
-        if expected[action] != expected.max():
-            n_random += 1
-            assert in_episode >= learning.n_greedy_steps, "the first steps are greedy"
-        torque = _core.action_value(action, core.n_actions, -10.0, 10.0)
-        reward, terminated, truncated = acrobot.step(torque, 0.05)
-        next_state = sensors.observe(acrobot.state())
-        agent.learn(state, [action], reward, next_state, terminated)
-        n_corrected += slow.learn(state, action, reward, next_state, terminated)
-        if step % 1000 == 0:
-            assert np.array_equal(core.weights(), slow.network.weights)
-        over = terminated or truncated
-        state = next_state
-        in_episode += 1
-    assert np.array_equal(core.weights(), slow.network.weights)
-    assert np.array_equal(core.thresholds(), slow.network.thresholds)
-    assert np.array_equal(core.potentials(state), slow.network.potentials(state))
-    return n_corrected, n_random
-
-
-@pytest.mark.parametrize("n_steps", [1200, pytest.param(5000, marks=pytest.mark.slow)])
-def test_learning_agrees_with_the_page(n_steps):
-    n_corrected, n_random = learn_side_by_side(
-        _core.SDNNCConfig(), _core.QLearningConfig(), n_steps
-    )
-    assert n_corrected > n_steps
-    assert 0.03 < n_random / n_steps < 0.1, "a tenth of the later steps"
-
-
-def test_learning_agrees_with_the_page_at_odd_sizes():
-    network = _core.SDNNCConfig(
-        n_pattern_units=37,
-        n_hidden_units=149,
-        n_active_units=45,
-        n_actions=7,
-        circular=[True, True, False, False],
-        lattice=8,
-        initial_weights="uniform",
-        initial_threshold=10.0,
-    )
-    learning = _core.QLearningConfig(learning_rate=0.3, discount=0.99, epsilon=0.5)
-    n_corrected, _ = learn_side_by_side(network, learning, 2000, noise=0.02)
-    assert n_corrected > 1500
-
-
-def test_one_transition_by_hand():
-    agent = small_agent(seed=1, learning=QLearningConfig(learning_rate=1.0))
-    state, next_observation = [0.1, 0.2, 0.3], [1.5, -1.0, 0.0]
-    for _ in range(200):
-        agent.learn(Transition(state, [-1.0], 10.0, next_observation, True))
-    # Terminated: Q becomes r = 10, at the nearest count: 15 + 10 * 26 / 40 = 21.5, rounded to 22.
-    line = page.Settings(u_low=2, u_high=28)
-    assert agent.q_values(state)[0] == page.g(22, line)
-    for _ in range(200):
-        agent.learn(Transition(next_observation, [3.0], 1.0, state, False))
-    # Otherwise r + 0.9 max Q(s'), whose windows may share units with those just corrected.
-    best = agent.q_values(state).max()
-    expected = page.g(page.g_inverse(1 + 0.9 * best, line), line)
-    assert agent.q_values(next_observation)[-1] == expected
 
 
 # The Python face.

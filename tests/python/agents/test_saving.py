@@ -20,6 +20,7 @@ from sdnn.agents import (
     FuzzyQLearningConfig,
     QLearningConfig,
     RBFQLearning,
+    SDNNActorCritic,
     SDNNQLambda,
     SDNNQLearning,
     Training,
@@ -85,6 +86,7 @@ KINDS = {
         PLANE, TORQUE, approximator=SMALL, tables=[np.sign(np.eye(20) - 0.5)] * 2
     ),
     "q-lambda": lambda: SDNNQLambda(UNBOUNDED, BUTTONS, warm_up_steps=60, seed=3),
+    "actor-critic": lambda: SDNNActorCritic(UNBOUNDED, TWO_TORQUES, seed=1),
     "rbf": lambda: RBFQLearning(
         PLANE, TORQUE, approximator=RBFNetworkConfig(n_actions=7), learning=GENERAL
     ),

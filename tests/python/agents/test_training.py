@@ -3,9 +3,7 @@
 import copy
 import functools
 import json
-import os
 import re
-import signal
 import tracemalloc
 from decimal import Decimal
 
@@ -458,13 +456,6 @@ def test_a_second_training_meets_other_episodes(tmp_path):
     assert again.seeds[:2] == again.seeds[2:], "as it was asked for"
 
 
-class Killed(CheckpointCallback):
-    """Has no time for a last checkpoint."""
-
-    def on_end(self, training):
-        pass
-
-
 def test_it_learns_the_corridor():
     agent = corridor_agent()
     result = agent.train(Corridor(), episodes=300)
@@ -474,19 +465,6 @@ def test_it_learns_the_corridor():
     assert found.terminated.all()
     assert set(found.lengths) <= {3, 4}, "from cell 0 or 1 straight to cell 4"
     assert found.mean_return == found.returns.mean() > 0.6
-
-
-def test_rows_are_those_of_the_episodes():
-    training = Training(corridor_agent(), Corridor(), steps=100)
-    result = training.run()
-    assert result.n_steps == 100
-    lengths = [row["length"] for row in result.rows]
-    assert result.n_episodes == len(lengths)
-    assert 100 - 8 < sum(lengths) <= 100
-    for row in result.rows:
-        reached = 1.0 - 0.1 * (row["length"] - 1)
-        assert row["return"] == pytest.approx(reached if row["terminated"] else -0.8)
-    assert [row["step"] for row in result.rows] == list(np.cumsum(lengths))
 
 
 def test_every_episode_has_a_seed_of_its_own():
@@ -656,29 +634,6 @@ def test_an_episode_without_an_end_takes_little_memory(tmp_path):
     assert states_equal(training.agent, again.agent)
 
 
-def test_another_goal_goes_further(tmp_path):
-    training = Training(corridor_agent(), Corridor(), steps=50)
-    training.run()
-    training.save(tmp_path / "t")
-    assert Training.load(tmp_path / "t", Corridor()).run().n_steps == 50
-    assert Training.load(tmp_path / "t", Corridor(), steps=80).run().n_steps == 80
-    assert Training.load(tmp_path / "t", Corridor(), episodes=40).run().n_episodes == 40
-
-
-def test_lines_of_a_resumed_training_are_those_of_a_whole_one(tmp_path):
-    path = tmp_path / "rows.jsonl"
-    Training(corridor_agent(), Corridor(), steps=120, callbacks=[JSONLines(path)]).run()
-    whole = path.read_text()
-    assert [json.loads(line)["kind"] for line in whole.splitlines()] == ["episode"] * len(
-        whole.splitlines()
-    )
-    callbacks = [JSONLines(path), Killed(tmp_path / "c", 60), Stop(90)]
-    Training(corridor_agent(), Corridor(), steps=120, callbacks=callbacks).run()
-    assert len(path.read_text()) < len(whole)
-    Training.load(tmp_path / "c", Corridor(), callbacks=[JSONLines(path)]).run()
-    assert path.read_text() == whole
-
-
 def test_evaluations_may_follow_episodes(tmp_path):
     def begun(*callbacks):
         return Training(
@@ -823,22 +778,6 @@ def test_a_result_has_the_rows_of_all_that_was_run():
     training.callbacks = ()
     result = training.run()
     assert len(result.returns) == result.n_episodes > 0
-
-
-def test_an_interrupt_reaches_the_caller_after_the_callbacks(tmp_path):
-    class Interrupt(Callback):
-        def on_step(self, training):
-            if training.n_steps == 30:
-                os.kill(os.getpid(), signal.SIGINT)
-
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    callbacks = [CheckpointCallback(tmp_path / "c", 1000), Interrupt()]
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            corridor_agent().train(Corridor(), steps=100, callbacks=callbacks)
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert Training.load(tmp_path / "c", Corridor()).n_steps == 30
 
 
 @pytest.mark.parametrize(

@@ -142,26 +142,6 @@ def test_code_books_of_two_inputs_are_independent():
     assert np.abs(off_diagonal).max() < 5 * 14.2
 
 
-states = st.lists(st.floats(0, 1), min_size=3, max_size=3)
-
-
-@settings(max_examples=25, deadline=None, derandomize=True)
-@given(
-    state=states, action=st.integers(0, 90), target=st.floats(allow_nan=False), n=st.integers(1, 8)
-)
-def test_a_correction_never_moves_the_value_away_from_the_target(state, action, target, n):
-    network = _core.SDNNC(_core.SDNNCConfig(**SMALL), 1)
-    line = page.Settings(u_low=2, u_high=28)
-    goal = page.g(page.g_inverse(target, line), line)
-    before = network.value(state, action)
-    assert before == 0.0
-    for _ in range(n):
-        network.update(state, action, target)
-        after = network.value(state, action)
-        assert min(before, goal) <= after <= max(before, goal)
-        before = after
-
-
 def test_c_scales_weights_and_changes_no_decision():
     small, large = (
         SDNNC(SDNNCConfig(**SMALL, learning_coefficient=c), seed=1) for c in (0.125, 8.0)

@@ -77,26 +77,6 @@ def test_the_file_is_one_of_safetensors(tmp_path):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_flipped_bit_and_every_cut_is_noticed(saved, kind, tmp_path):
-    content, read = saved[kind]
-    path = tmp_path / "damaged"
-    path.write_bytes(content)
-    read(path)
-    rng = np.random.default_rng(3)
-    header = 8 + int.from_bytes(content[:8], "little")
-    for place in np.concatenate([rng.integers(0, end, 100) for end in (60, header, len(content))]):
-        flipped = bytearray(content)
-        flipped[place] ^= 1 << int(rng.integers(8))
-        path.write_bytes(flipped)
-        refuses("damaged", read, path)
-    for length in [0, 7, 60, *rng.integers(0, len(content), 100)]:
-        path.write_bytes(content[:length])
-        refuses("damaged", read, path)
-    path.write_bytes(content + b"\0")
-    refuses("damaged", read, path)
-
-
-@pytest.mark.parametrize("kind", KINDS)
 def test_a_file_of_another_kind_is_refused(saved, kind, tmp_path):
     path = tmp_path / "other"
     path.write_bytes(saved[kind][0])

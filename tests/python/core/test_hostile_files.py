@@ -85,14 +85,6 @@ def test_no_flipped_bit_changes_the_rows_of_a_store(tmp_path):
     refuses("damaged", ResultStore, tmp_path, error=StoreError)
 
 
-def test_a_store_of_a_terabyte_is_refused(tmp_path):
-    path = make_store(tmp_path)
-    with path.open("rb+") as file:
-        file.truncate(2**40)  # which takes no room
-    with pytest.raises(StoreError, match=r"results\.sqlite"):
-        ResultStore(tmp_path)
-
-
 def crc_of(values):
     return zlib.crc32(repr(values).encode())
 

@@ -115,14 +115,6 @@ def test_several_labels_a_sample_are_learned_by_a_classifier_each():
     assert (model.predict(X) == both).mean() > 0.95
 
 
-def test_partial_fit_continues_after_fit():
-    model = SDNNClassifier(**GIVEN, max_iter=2, shuffle=False).fit(X, LABELS)
-    same(
-        model.partial_fit(X, LABELS),
-        SDNNClassifier(**GIVEN, max_iter=3, shuffle=False).fit(X, LABELS),
-    )
-
-
 def test_partial_fit_needs_ranges_for_a_single_sample_and_known_labels():
     refuses("minimum", SDNNRegressor(coding=UNIT).partial_fit, X[:1], Y[:1])
     model = SDNNClassifier(**GIVEN)
@@ -147,13 +139,6 @@ def test_one_sample_is_enough_where_every_column_is_given():
     refuses("ranges", model.fit, X[:1], Y[:1])
     model.set_params(coding=listed, output_range=None)
     refuses("output_range", model.fit, X[:1], Y[:1])
-
-
-def test_orders_follow_from_the_random_state():
-    first = SDNNRegressor(**REGRESSOR, max_iter=2).fit(X, Y)
-    same(first, SDNNRegressor(**REGRESSOR, max_iter=2).fit(X, Y))
-    unshuffled = SDNNRegressor(**REGRESSOR, max_iter=2, shuffle=False).fit(X, Y)
-    assert not np.array_equal(first.weights_, unshuffled.weights_)
 
 
 def test_several_outputs_are_networks_side_by_side():

@@ -8,8 +8,6 @@ over, or drawn from NumPy's generator where no agreement is asked for.
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 
 
@@ -148,44 +146,3 @@ class PerceptronTrainer(Trainer):
             pairs = class_pairs(self.n_classes)
             wanted = np.array([1 if i == label else -1 if j == label else 0 for i, j in pairs])
         return np.where((potentials > 0) == (wanted > 0), 0, wanted).astype(np.int32)
-
-
-def random_inverse_patterns(n_units, n_bins, n_flipped, seed):
-    """Each pattern flips ``n_flipped`` units of each sign of its neighbour."""
-    random = np.random.RandomState(seed % 2**32)
-    pattern = random.permutation(np.repeat([1, -1], n_units // 2))
-    patterns = [pattern]
-    for _ in range(n_bins - 1):
-        pattern = pattern.copy()
-        for units in (np.flatnonzero(pattern > 0), np.flatnonzero(pattern < 0)):
-            pattern[random.permutation(units)[:n_flipped]] *= -1
-        patterns.append(pattern)
-    return np.array(patterns, dtype=np.int8)
-
-
-def anchor_patterns(n_units, n_anchor_patterns, n_interpolated, circular, seed):
-    """Between neighbouring anchors the differing units flip in a random order."""
-    random = np.random.RandomState(seed % 2**32)
-    balanced = np.repeat([1, -1], n_units // 2)
-    anchors = [random.permutation(balanced) for _ in range(n_anchor_patterns)]
-    if circular:
-        anchors[-1] = anchors[0]
-    patterns = []
-    for one, other in itertools.pairwise(anchors):
-        differing = random.permutation(np.flatnonzero(one != other))
-        for j in range(n_interpolated + 1):
-            pattern = one.copy()
-            pattern[differing[: j * len(differing) // (n_interpolated + 1)]] *= -1
-            patterns.append(pattern)
-    return np.array(patterns, dtype=np.int8)
-
-
-def correlation_matrix_patterns(n_units, correlations, seed):
-    """Signs of correlated normal numbers: correlation 2/pi arcsin; only near the balanced ideal."""
-    random = np.random.RandomState(seed % 2**32)
-    covariance = np.sin(np.pi / 2 * np.asarray(correlations))
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0))
-    normal = root @ random.standard_normal((len(covariance), n_units))
-    ranks = np.argsort(np.argsort(normal, axis=1), axis=1)
-    return np.where(ranks >= n_units // 2, 1, -1).astype(np.int8)

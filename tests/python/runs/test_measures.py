@@ -19,39 +19,25 @@ def of_rows(name, steps, returns=None):
     return MEASURES[name][1](rows)
 
 
-def learned(steps):
-    return episodes_to_learn(episodes(steps), steps)
-
-
-def test_learned_at_the_first_test():
-    assert learned([10] * 10) == 10.0
-
-
-def test_measures_of_unlearned_tasks_are_infinite():
-    assert learned([50] * 100) == math.inf
-    assert learned([11] * 100) == math.inf
-
-
-def test_failed_tests_before_the_first_good_one_do_not_count():
-    # From the third test on: 6 good of the 10 that begin there is enough for the median, but
-    # the windows that begin at failed tests do not count although their medians are good.
-    assert learned([50] * 4 + [7] * 20) == 50.0
-
-
-def test_median_of_an_even_window_is_the_mean_of_the_middle_two():
-    # 5 good and 5 failed: median (7 + 50) / 2 = 28.5; 6 good and 4 failed: 7.
-    assert learned([7] * 5 + [50] * 5) == math.inf
-    assert learned([7] * 6 + [50] * 4) == 10.0
-    assert learned([7] + [50] * 4 + [7] * 5) == 10.0
-
-
-def test_lucky_test_does_not_count_and_relapse_does_not_undo():
-    assert learned([50, 3] + [50] * 8 + [6] * 10 + [50] * 80) == 110.0
-
-
-def test_window_cut_off_by_the_end_does_not_count():
-    assert learned([50] * 5 + [5] * 9) == math.inf
-    assert learned([5] * 9) == math.inf
+@pytest.mark.parametrize(
+    ("steps", "episode"),
+    [
+        pytest.param([10] * 10, 10.0, id="at the first test"),
+        pytest.param([50] * 100, math.inf, id="never"),
+        pytest.param([11] * 100, math.inf, id="never well enough"),
+        # Windows that begin at failed tests do not count although their medians are good.
+        pytest.param([50] * 4 + [7] * 20, 50.0, id="after failed tests"),
+        # The median of 5 good and 5 failed tests is (7 + 50) / 2 = 28.5, that of 6 and 4 is 7.
+        pytest.param([7] * 5 + [50] * 5, math.inf, id="half of a window"),
+        pytest.param([7] * 6 + [50] * 4, 10.0, id="more than half of a window"),
+        pytest.param([7] + [50] * 4 + [7] * 5, 10.0, id="more than half in any order"),
+        pytest.param([50, 3] + [50] * 8 + [6] * 10 + [50] * 80, 110.0, id="luck and a relapse"),
+        pytest.param([50] * 5 + [5] * 9, math.inf, id="a window that the end cuts off"),
+        pytest.param([5] * 9, math.inf, id="fewer tests than a window"),
+    ],
+)
+def test_learned_at_the_first_good_window_that_begins_with_a_good_test(steps, episode):
+    assert episodes_to_learn(episodes(steps), steps) == episode
 
 
 def test_final_measures_use_the_last_fifty_tests():
@@ -61,33 +47,26 @@ def test_final_measures_use_the_last_fifty_tests():
     assert of_rows("final_steps", [8, 9]) == 8.5
 
 
-def collapse(steps):
-    return episode_of_collapse(episodes(steps), steps)
-
-
-def test_collapse_is_the_end_of_the_last_mastered_run():
-    # 60 good tests, then failed ones. A run of 50 with 26 good tests has a median of 7, one with 25
-    # a median of 28.5: the last mastered run begins at test 35 and ends with test 84.
-    assert collapse([7] * 60 + [50] * 100) == 840.0
-
-
-def test_no_collapse_within_the_trial_is_infinite():
-    assert collapse([50] * 100 + [7] * 50) == math.inf
-    assert collapse([7] * 50) == math.inf
-
-
-def test_mended_relapse_is_no_collapse():
-    assert collapse([7] * 60 + [50] * 100 + [7] * 60) == math.inf
-    assert collapse([7] * 60 + [50] * 100 + [7] * 60 + [50] * 100) == 10.0 * (60 + 100 + 60 + 24)
-
-
-def test_lifetime_without_mastery_is_zero():
-    assert collapse([50] * 200) == 0.0
-    assert collapse([7, 50] * 100) == 0.0
+@pytest.mark.parametrize(
+    ("steps", "episode"),
+    [
+        # A run of 50 with 26 good tests has a median of 7, one with 25 a median of 28.5: the last
+        # mastered run begins at test 35 and ends with test 84.
+        pytest.param([7] * 60 + [50] * 100, 840.0, id="the end of the last mastered run"),
+        pytest.param([50] * 100 + [7] * 50, math.inf, id="none after late mastery"),
+        pytest.param([7] * 50, math.inf, id="none within the trial"),
+        pytest.param([7] * 60 + [50] * 100 + [7] * 60, math.inf, id="a relapse is no collapse"),
+        pytest.param([7] * 60 + [50] * 100 + [7] * 60 + [50] * 100, 2440.0, id="after a relapse"),
+        pytest.param([50] * 200, 0.0, id="never mastered"),
+        pytest.param([7, 50] * 100, 0.0, id="never mastered for a run"),
+    ],
+)
+def test_a_collapse_is_the_end_of_the_last_mastered_run(steps, episode):
+    assert episode_of_collapse(episodes(steps), steps) == episode
 
 
 def test_too_few_tests_for_a_run_say_nothing():
-    assert math.isnan(collapse([7] * 49))
+    assert math.isnan(episode_of_collapse(episodes([7] * 49), [7] * 49))
 
 
 def test_early_steps_are_those_of_the_first_episodes():
