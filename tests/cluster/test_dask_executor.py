@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 import sdnn
+from fake_trial import Recorder
 from sdnn.cli import main
 from sdnn.reproduction import EXPERIMENTS, plan_trials
 from sdnn.runs import (
@@ -30,29 +31,8 @@ from sdnn.runs import (
     WorkerLostError,
     run_trials,
 )
-from sdnn.runs.engine import Advanced, Failed, Finished, Noted
+from sdnn.runs.engine import Failed
 from sdnn.runs.trial import records_digest
-
-
-class Recorder:
-    def __init__(self, on_finished=None):
-        self.notes = []
-        self.events = []
-        self.on_finished = on_finished
-
-    def __call__(self, message):
-        match message:
-            case Noted(text):
-                self.notes.append(text)
-            case Advanced(planned, episode):
-                self.events.append(("advanced", planned.key, episode))
-            case Finished(planned, _):
-                self.events.append(("finished", planned.key))
-                if self.on_finished and self.count("finished") == 2:
-                    self.on_finished()
-
-    def count(self, name):
-        return sum(event[0] == name for event in self.events)
 
 
 def make_plan(n_trials=2, n_episodes=30):

@@ -9,7 +9,7 @@ import numpy as np
 
 from sdnn.reproduction import EXPERIMENTS, plan_trials
 from sdnn.runs import AGENTS, ResultStore, ThreadExecutor, run_trials
-from sdnn.runs.engine import Finished
+from sdnn.runs.engine import Advanced, Begun, Failed, Finished, Noted
 
 CASES = EXPERIMENTS[0].cases
 
@@ -55,6 +55,29 @@ class SlowTrial(FakeTrial):
     def advance(self, n):
         time.sleep(0.001)
         super().advance(1)
+
+
+class Recorder:
+    """An observer that notes what it hears; calls a function after the second finished trial."""
+
+    def __init__(self, on_finished=None):
+        self.events, self.notes, self.on_finished = [], [], on_finished
+
+    def __call__(self, message):
+        match message:
+            case Begun():
+                self.events.append(("begun", *message))
+            case Advanced(planned, episode):
+                self.events.append(("advanced", planned.key, episode))
+            case Finished(planned, _):
+                self.events.append(("finished", planned.key))
+                if self.on_finished and [name for name, *_ in self.events].count("finished") == 2:
+                    self.on_finished()
+            case Failed(planned, _):
+                self.events.append(("failed", planned.key))
+            case Noted(text):
+                self.events.append(("noted", text))
+                self.notes.append(text)
 
 
 def _say_stored(message):

@@ -30,7 +30,6 @@ MATRICES = {
     ],
     "core": [(core_cells.never_made_cells,), (core_cells.argument_cells,)],
     "classes": [
-        (public_cells.never_initialised_cells,),
         (public_cells.estimator_cells,),
         (public_cells.coding_cells,),
         (public_cells.environment_cells,),

@@ -1,9 +1,8 @@
-"""Cells about public classes: never initialised; bad values for estimators and environments."""
+"""Cells about public classes: bad values for estimators, codings, environments and functions."""
 
 import contextlib
 import importlib
 import inspect
-import pickle
 import re
 from functools import partial
 
@@ -66,43 +65,6 @@ LONG_WORK = {
 
 IN_OTHER_WORDS = {("random_state", "list of huge")}
 """Refused by NumPy, which repeats all of the value before it says why."""
-
-
-def public_classes():
-    for package in PACKAGES:
-        module = importlib.import_module(f"sdnn.{package}")
-        for name in module.__all__:
-            value = getattr(module, name)
-            if inspect.isclass(value) and value.__new__ is object.__new__:
-                yield value
-
-
-def never_initialised_cells():
-    """Whatever is done with an object that was made by ``__new__`` alone raises an Exception."""
-    for cls in public_classes():
-        for name in [*vars(cls), "__repr__", "__reduce__", "__eq__"]:
-            yield f"{cls.__qualname__}.__new__().{name}", _use_cell(cls, name)
-        yield f"pickle of {cls.__qualname__}", _use_cell(cls, None)
-
-
-def _use_cell(cls, name):
-    def run():
-        with contextlib.suppress(Exception):
-            one = cls.__new__(cls)
-            if name is None:
-                return pickle.loads(pickle.dumps(one)) and ""
-            member = getattr(one, name)
-            if callable(member) and name not in ("__init__", "__class__", "run"):
-                member(*[0] * _n_required(member))
-        return ""
-
-    return run
-
-
-def _n_required(function):
-    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    parameters = inspect.signature(function).parameters.values()
-    return sum(p.kind in kinds and p.default is p.empty for p in parameters)
 
 
 def estimator_cells():

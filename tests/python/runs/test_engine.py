@@ -12,7 +12,6 @@ from sdnn.reproduction import EXPERIMENTS, plan_trials
 from sdnn.runs import ResultStore, StoreError, WorkerLostError, run_trials
 from sdnn.runs.engine import (
     Advanced,
-    Begun,
     Failed,
     Finished,
     Noted,
@@ -22,24 +21,6 @@ from sdnn.runs.engine import (
     run_to_end,
     teams_of,
 )
-
-
-class Recorder:
-    def __init__(self):
-        self.events = []
-
-    def __call__(self, message):
-        match message:
-            case Begun():
-                self.events.append(("begun", *message))
-            case Advanced(planned, episode):
-                self.events.append(("advanced", planned.key, episode))
-            case Finished(planned, _):
-                self.events.append(("finished", planned.key))
-            case Failed(planned, _):
-                self.events.append(("failed", planned.key))
-            case Noted(text):
-                self.events.append(("noted", text))
 
 
 def test_jobs_do_not_change_the_content(tmp_path, run):
@@ -116,7 +97,7 @@ def test_other_settings_are_other_trials(tmp_path, run, change):
 
 
 def test_observer_hears_every_trial_from_the_calling_thread(tmp_path, run):
-    recorder = Recorder()
+    recorder = fake_trial.Recorder()
     run(tmp_path, fake_trial.make_plan(2), observer=recorder)
     assert recorder.events[0] == ("begun", 4, 0, 1200)
     for planned in fake_trial.make_plan(2):
@@ -136,7 +117,7 @@ def test_failing_trial_does_not_stop_the_others(tmp_path, run):
             raise RuntimeError("broken")
         return fake_trial.FakeTrial(seed=seed, **parts)
 
-    recorder = Recorder()
+    recorder = fake_trial.Recorder()
     outcome, _ = run(tmp_path, plan, make, observer=recorder)
     assert outcome.n_run == 5
     assert [(f.planned.key, str(f.error)) for f in outcome.failures] == [(plan[0].key, "broken")]
@@ -243,7 +224,7 @@ def test_an_executor_reports_and_the_engine_stores(tmp_path, run, record):
         lambda a, b: Failed(b, lost),
         lambda a, b: Finished(a, record),
     )
-    recorder = Recorder()
+    recorder = fake_trial.Recorder()
     outcome, _ = run(tmp_path, plan, executor=Scripted(*script), observer=recorder)
     assert (outcome.n_run, outcome.interrupted) == (1, False)
     assert [(f.planned.key, f.error) for f in outcome.failures] == [(plan[1].key, lost)]
