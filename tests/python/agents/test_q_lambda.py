@@ -126,32 +126,6 @@ def test_cartpole_is_learned_in_a_few_thousand_steps():
 
 
 @pytest.mark.parametrize(
-    "space",
-    [
-        gym.spaces.Box(-1.0, 1.0, (2,)),
-        gym.spaces.MultiDiscrete([2, 3]),
-        gym.spaces.MultiBinary(2),
-        gym.spaces.Discrete(4, start=2),
-    ],
-    ids=str,
-)
-def test_every_space_of_actions(space):
-    observations = gym.spaces.Dict(
-        {"x": gym.spaces.Box(-1.0, 1.0, (1,)), "k": gym.spaces.Discrete(3)}
-    )
-    agent = SDNNQLambda(observations, space, approximator=LinearSDNNConfig(action_window=2))
-    observations.seed(1)
-    observation = observations.sample()
-    for step in range(60):
-        action = agent.act(observation)
-        assert action in space
-        following = observations.sample()
-        agent.learn(Transition(observation, action, 1.0, following, step % 9 == 0))
-        observation = following
-    assert agent.act(observation, explore=False) in space
-
-
-@pytest.mark.parametrize(
     ("space", "is_searched"),
     [
         (gym.spaces.Box(-1, 1, (3,)), True),

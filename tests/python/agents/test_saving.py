@@ -23,7 +23,6 @@ from sdnn.agents import (
     SDNNActorCritic,
     SDNNQLambda,
     SDNNQLearning,
-    Training,
     Transition,
     load_agent,
 )
@@ -84,6 +83,12 @@ KINDS = {
     ),
     "sdnn, tables": lambda: SDNNQLearning(
         PLANE, TORQUE, approximator=SMALL, tables=[np.sign(np.eye(20) - 0.5)] * 2
+    ),
+    "sdnn, one circular variable": lambda: SDNNQLearning(
+        gym.spaces.Box(-1.0, 1.0, (1,)), TORQUE, approximator=SMALL, angles=[0]
+    ),
+    "sdnn, one angle pair": lambda: SDNNQLearning(
+        PLANE, TORQUE, approximator=SMALL, angle_pairs=[(1, 0)]
     ),
     "q-lambda": lambda: SDNNQLambda(UNBOUNDED, BUTTONS, warm_up_steps=60, seed=3),
     "actor-critic": lambda: SDNNActorCritic(UNBOUNDED, TWO_TORQUES, seed=1),
@@ -222,25 +227,6 @@ def test_classes_of_a_cell_that_runs_again_are_the_same(tmp_path):
         first.load(tmp_path / "agent")
 
 
-ONE_ANGLE = [{"angles": [0]}, {"angle_pairs": [(1, 0)]}]
-
-
-def one_angle(angle):
-    """An agent whose one angle is both inputs that its network needs."""
-    circle = gym.spaces.Box(-1.0, 1.0, (1 if "angles" in angle else 2,), dtype=np.float64)
-    return SDNNQLearning(circle, TORQUE, approximator=SMALL, learning=GENERAL, **angle)
-
-
-@pytest.mark.parametrize("angle", ONE_ANGLE)
-def test_an_agent_that_sees_one_angle_is_loaded_again_and_again(angle, tmp_path):
-    agent = again = lived(one_angle(angle), 0, 40)
-    for copied in range(3):
-        again.save(tmp_path / f"{copied}")
-        again = copy.deepcopy(load_agent(tmp_path / f"{copied}"))
-    assert (tmp_path / "0").read_bytes() == (tmp_path / "2").read_bytes()
-    same_state(lived(agent, 40, 60), lived(again, 40, 60))
-
-
 @pytest.mark.parametrize("n_steps", [40, 60])
 @pytest.mark.parametrize(
     "kind", ["sdnn", "sdnn, vector", "fuzzy", "sdnn, switches", "sdnn, warm-up"]
@@ -344,12 +330,3 @@ def test_the_files_that_both_languages_read_are_those_written_now(tmp_path):
             np.testing.assert_array_equal(first.weights_, second.weights_)
         else:
             same_state(load_agent(one), load_agent(other))
-
-
-def test_a_training_file_holds_an_agent_too(tmp_path):
-    env = gym.make("Pendulum-v1")
-    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL)
-    training = Training(agent, env, steps=20)
-    training.run()
-    training.save(tmp_path / "training")
-    same_state(load_agent(tmp_path / "training"), agent)

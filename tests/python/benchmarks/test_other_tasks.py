@@ -270,40 +270,6 @@ def test_tiles_of_pairs_tables_and_hashes(scripts):
     assert tiles.Table(5)(3).tolist() == [3]
 
 
-def test_swift_sarsa_is_true_online_where_step_sizes_are_fixed(scripts):
-    """Sutton and Barto (2018), section 12.5, with binary features; in all else SwiftTD differs."""
-    tiles = sys.modules["tile_coding"]
-    settings = tiles.SwiftConfig(
-        step_size=0.05, meta_step_size=0.0, largest_rate=1.0, step_size_decay=1.0,
-        trace_decay=0.9, smallest_trace=0.0,
-    )  # fmt: skip
-    spaces = gym.spaces.Box(0, 1, (1,)), gym.spaces.Discrete(2)
-    sizes = tiles.TilesConfig(n_bins=4, n_tilings=4)
-    agent = tiles.SwiftSarsa(*spaces, approximator=sizes, learning=settings, seed=1)
-    weights, random = np.zeros(agent.weights.size), np.random.default_rng(0)
-    for _ in range(3):
-        agent.begin_episode()
-        trace, old, before = np.zeros(weights.size), 0.0, None
-        for step in range(60):
-            active = (
-                random.choice(weights.size, 4, replace=False) if step < 59 else np.zeros(0, int)
-            )
-            reward = float(random.normal())
-            agent.step(active, reward)
-            x = np.zeros(weights.size)
-            x[active] = 1.0
-            if before is not None:
-                decayed = 0.99 * 0.9 * trace
-                trace = decayed + 0.05 * (1 - decayed @ before) * before
-                value, following = weights @ before, weights @ x
-                error = reward + 0.99 * following - value
-                weights += (error + value - old) * trace - 0.05 * (value - old) * before
-                old = following
-            before = x
-        assert np.allclose(agent.weights.ravel(), weights, atol=1e-12)
-        assert np.abs(weights).max() > 0.01
-
-
 @pytest.mark.parametrize(
     ("settings", "values"),
     [

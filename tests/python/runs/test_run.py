@@ -118,14 +118,6 @@ def test_a_run_stopped_at_any_step_resumes_exactly(whole, tmp_path, config):
     assert contents(run) == expected
 
 
-def test_in_several_environments_rows_say_which(whole):
-    run = whole(SEVERAL)
-    rows = [row for row in run.rows() if row["kind"] == "episode"]
-    assert {row["environment"] for row in rows} == {0, 1, 2}
-    assert 400 - 3 * max(row["length"] for row in rows) < sum(row["length"] for row in rows) <= 400
-    assert load_agent(run.folder / "agent.safetensors").n_environments == 3
-
-
 class FailAt(Callback):
     """An error in the midst of a step, when rows are written and learning is done."""
 
