@@ -156,7 +156,7 @@ def test_the_arm_learns_to_reach(tmp_path):
     assert numbers(r"at the end: ([.\d]+) m", printed)[0] < 0.3
 
 
-def test_the_model_that_goes_on_learning_follows_the_drift(tmp_path):
+def test_a_model_that_continues_to_learn_follows_the_drift(tmp_path):
     printed = run(FOLDER / "drifting_regression.py", tmp_path)
     r2, most = numbers(r"cross-validation: ([.\d]+); noise allows ([.\d]+)", printed)
     assert 0.9 < r2 < most

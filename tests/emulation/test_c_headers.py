@@ -86,7 +86,7 @@ def test_learning_compiles_where_int_has_16_bits(name, needs, tmp_path):
     run("clang", *options, "-fsyntax-only", tmp_path / "agent.c")
 
 
-def test_symbols_are_readings_of_one_and_zero(target, tmp_path):
+def test_symbols_are_coded_as_ones_and_zeros(target, tmp_path):
     check_symbols(target, tmp_path)
 
 
@@ -95,7 +95,7 @@ def test_the_integer_path_needs_no_library_and_no_floating_point(name, target, t
     check_integer_path(name, target, tmp_path)
 
 
-def test_flash_and_ram_are_as_the_header_says(needs, tmp_path):
+def test_flash_and_ram_are_those_stated_in_the_header(needs, tmp_path):
     target = TARGETS["arm"]
     needs(target.compiler)
     for number, agent in enumerate(agents().values()):

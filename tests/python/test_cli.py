@@ -227,7 +227,7 @@ def test_dry_run_counts_costs_too(invoke, no_costs):
     assert plan["costs"] == {"planned": 0, "stored": 0}
 
 
-def test_other_agents_have_files_of_their_own(invoke, tmp_path, no_costs):
+def test_results_of_other_agents_have_other_files(invoke, tmp_path, no_costs):
     invoke("reproduce", "a", "--quick", "--out", "out")
     before = {path.name: path.read_bytes() for path in (tmp_path / "out").glob("*-quick.*")}
     result = invoke(
@@ -365,7 +365,7 @@ def test_output_that_is_a_file(invoke, tmp_path):
 
 
 @pytest.mark.parametrize("options", [[], ["--dry-run"]])
-def test_damaged_result_file_is_one_clear_line(invoke, tmp_path, options):
+def test_a_damaged_result_file_is_reported_in_one_line(invoke, tmp_path, options):
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "results.sqlite").write_bytes(b"not a database")
     result = invoke("reproduce", "a", "--quick", *options)
@@ -375,7 +375,7 @@ def test_damaged_result_file_is_one_clear_line(invoke, tmp_path, options):
     assert str(Path("results/results.sqlite")) in result.stderr
 
 
-def test_missing_matplotlib_is_one_clear_line(invoke, tmp_path, monkeypatch):
+def test_a_missing_matplotlib_is_reported_in_one_line(invoke, tmp_path, monkeypatch):
     monkeypatch.setattr("sdnn.runs.report.find_spec", lambda name: None)
     result = invoke("reproduce", "a", "--quick")
     assert result.exit_code == 1

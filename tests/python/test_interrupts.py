@@ -112,7 +112,7 @@ def press_ctrl_c_in_other_code():
         raise ValueError("Invalid affine transformation matrix") from None
 
 
-def test_ctrl_c_stays_what_it_is_when_other_code_takes_it_for_another_error():
+def test_ctrl_c_that_other_code_converts_is_raised_as_ctrl_c():
     with pytest.raises(KeyboardInterrupt), stay_interrupts():
         press_ctrl_c_in_other_code()
     with pytest.raises(KeyboardInterrupt), stay_interrupts(), suppress(KeyboardInterrupt):
@@ -145,7 +145,7 @@ def test_other_threads_have_no_ctrl_c():
     assert entered == [signal.default_int_handler]
 
 
-def test_threads_of_a_pool_have_ended_after_a_ctrl_c_that_comes_while_they_are_waited_for():
+def test_ctrl_c_while_a_pool_ends_waits_for_its_threads():
     ended = []
 
     def work():

@@ -24,5 +24,5 @@ def test_executions_and_faults_are_counted_from_run_to_run(tmp_path, monkeypatch
     capfd.readouterr()
 
 
-def test_a_reader_reads_in_a_process_of_its_own(tmp_path, monkeypatch):
+def test_a_reader_reads_in_a_separate_process(tmp_path, monkeypatch):
     assert campaign.run_python("run", 60, 20, tmp_path, 5) == (20, [])

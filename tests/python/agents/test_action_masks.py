@@ -20,7 +20,7 @@ from sdnn.agents import (
 )
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.environments import ActionMasks
-from stopped_training import goes_on_exactly, states_equal
+from stopped_training import check_exact_resume, states_equal
 
 SMALL = SDNNCConfig(n_hidden_units=60, n_active_units=20, n_pattern_units=20)
 AGENTS = [SDNNQLambda, SDNNQLearning]
@@ -181,7 +181,7 @@ def test_a_training_is_resumed_exactly(kind, actions, unbounded, at, n, tmp_path
         agent = new_agent(kind, env, learning=learning)
         return Training(agent, env, steps=150, callbacks=callbacks)
 
-    goes_on_exactly(begun, own_env, tmp_path / "part", [at])
+    check_exact_resume(begun, own_env, tmp_path / "part", [at])
 
 
 def test_logged_masks_are_learned(tmp_path):

@@ -101,7 +101,7 @@ def test_an_action_is_known_in_other_forms(space, action, others):
         assert learns_alike(space, action, same)
 
 
-def test_what_is_done_to_an_action_does_not_change_the_next():
+def test_changing_a_returned_action_does_not_change_the_next():
     agent = agent_of(FLOATS, learning=QLearningConfig(tie_rule="lowest"))
     first = agent.act(HERE, explore=False)
     expected = first.copy()

@@ -101,7 +101,7 @@ def test_a_bandit_is_solved_by_probabilities_and_valued_by_its_mean():
     assert agent.act(zeros, explore=False) == 2
 
 
-def test_values_of_actions_and_epsilon_are_refused_with_what_there_is_instead():
+def test_action_values_and_epsilon_are_refused_with_their_alternatives():
     agent = SDNNActorCritic(gym.spaces.Box(-1.0, 1.0, (2,)), gym.spaces.Discrete(2), seed=1)
     assert not hasattr(agent, "q_values")
     with pytest.raises(AttributeError, match="action_probabilities"):
@@ -156,7 +156,7 @@ def test_environments_and_missing_readings_keep_their_traces():
     assert len(np.unique(np.abs(traces))) > 3, "of several steps"
 
 
-def test_what_learns_in_c_needs_ranges_that_stay():
+def test_export_with_learning_refuses_running_ranges():
     agent = SDNNQLambda(
         gym.spaces.Box(-1.0, 1.0, (2,)), gym.spaces.Discrete(2), seed=1, inputs="all",
         angle_pairs="none", observation_range="running",

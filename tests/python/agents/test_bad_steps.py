@@ -83,7 +83,7 @@ def bad_values(part):
 
 @pytest.mark.parametrize("use", [trained, evaluated])
 @pytest.mark.parametrize("part", PARTS)
-def test_what_is_no_reward_and_no_end_is_refused_with_its_step(part, use):
+def test_invalid_rewards_and_flags_are_refused_with_their_step(part, use):
     for word, value in bad_values(part).items():
         if part == "reward" and use is evaluated and word in ("1e308", "-1e308"):
             continue  # which add up to a finite number
@@ -108,7 +108,7 @@ def test_columns_of_a_vector_have_a_value_for_each_environment(part):
 
 
 @pytest.mark.parametrize("found", [None, {"a": 1}, np.array([0, "a"], object), np.zeros((1, 2))])
-def test_what_is_no_observation_is_refused_in_one_of_several_environments(found):
+def test_invalid_observations_of_a_vector_are_refused_with_their_step(found):
     bad = Point(lambda made: (found, *made[1:]))
     envs = gym.vector.SyncVectorEnv([Point, lambda: bad])
     with pytest.raises(UnusableStepError, match="in step 5: next_observation must"):

@@ -96,7 +96,7 @@ def test_names_from_habit_are_explained(trained, function):
         assert refused.value.argument == name
 
 
-def test_what_is_given_by_position(trained):
+def test_positional_arguments(trained):
     agent, env, _ = trained
     assert agent.train(env, 20).n_steps == 20
     envs = gym.make_vec("CartPole-v1", num_envs=2)
@@ -117,7 +117,7 @@ def test_a_seed_that_is_none_is_drawn_and_kept():
     assert first.seed != second.seed
 
 
-def test_what_is_shown(trained):
+def test_representations_show_spaces_steps_and_returns(trained):
     agent, env, result = trained
     found = evaluate(agent, env, episodes=3)
     assert "Discrete(2)" in repr(agent)

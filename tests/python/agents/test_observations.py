@@ -76,7 +76,7 @@ def test_a_range_is_known_by_both_its_ends():
     assert (made.low, made.high) == ((0.0, None, -1.0), (2.0, None, 2.0))
 
 
-def test_how_ranges_are_used_is_told():
+def test_the_learning_report_has_the_use_of_ranges():
     space = gym.spaces.Dict({"at": gym.spaces.Box(0, 1, (1,)), "room": gym.spaces.Discrete(3)})
     agent = sdnn_agent(space)
     for t in range(400):
@@ -125,7 +125,7 @@ def test_angles_are_inputs_that_wrap_around():
     assert inputs(space, angles=[1])[1] == ("circular", [1])
 
 
-def test_what_tells_a_symbol_is_no_angle():
+def test_variables_of_symbols_cannot_be_angles():
     refuses("angles", sdnn_agent, GEAR, angles=[1])
     refuses("angle_pairs", sdnn_agent, GEAR, angle_pairs=[(4, 5)])
 

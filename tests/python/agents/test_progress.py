@@ -33,7 +33,7 @@ def test_a_line_on_a_terminal_and_nothing_elsewhere(is_terminal, goal):
         assert text.getvalue() == ""
 
 
-def test_train_shows_it_where_it_is_asked_for(capsys):
+def test_train_shows_progress_on_request(capsys):
     env = gym.make("Pendulum-v1", max_episode_steps=40)
     agent = RBFQLearning(env.observation_space, env.action_space)
     assert agent.train(env, steps=100, progress=True).n_steps == 100

@@ -105,7 +105,7 @@ def test_the_scale_of_rewards_changes_nothing_but_the_scale_of_values(scale):
     np.testing.assert_array_equal(values(factor), values(1.0) * factor)
 
 
-def test_one_enormous_reward_costs_resolution_and_nothing_else():
+def test_an_outlier_among_rewards_only_reduces_the_resolution():
     agent = _core.BareAgent(
         approximator=LinearSDNNConfig(n_inputs=2),
         n_actions=[2],

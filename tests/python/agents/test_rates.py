@@ -20,7 +20,7 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
-from stopped_training import goes_on_exactly
+from stopped_training import check_exact_resume
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
 FALLING = {"learning_rate": 0.8, "final_learning_rate": 0.05, "epsilon": 0.5, "final_epsilon": 0.02}
@@ -69,7 +69,7 @@ def waves():
 
 @pytest.mark.parametrize("make", [Anneal, waves])
 @pytest.mark.parametrize("env_id", ["Pendulum-v1", "CartPole-v1"])
-def test_a_training_whose_rates_are_set_goes_on_exactly(make, env_id, tmp_path):
+def test_a_training_with_rates_set_by_callbacks_resumes_exactly(make, env_id, tmp_path):
     def begun(*callbacks):
         env = gym.make(env_id)
         agent = SDNNQLearning(
@@ -78,7 +78,7 @@ def test_a_training_whose_rates_are_set_goes_on_exactly(make, env_id, tmp_path):
         return Training(agent, env, steps=200, callbacks=[make(), *callbacks])
 
     cuts = (1, 30, 49, 50, 51, 120, 199)
-    whole = goes_on_exactly(
+    whole = check_exact_resume(
         begun, lambda: gym.make(env_id), tmp_path / "t", cuts, callbacks=[make()]
     )
     assert {"agent.learning_rate", "agent.epsilon"} <= whole.agent.state().keys()

@@ -68,7 +68,7 @@ def in_threads(*works):
 
 
 @pytest.mark.parametrize("kind", AGENTS)
-def test_threads_read_and_take_what_one_reads_and_takes_alone(kind):
+def test_concurrent_readers_get_the_values_and_actions_of_a_single_one(kind):
     # Without draws, whose order would be that of the threads.
     agent = AGENTS[kind](learning=AGENTS[kind]().learning.replace(tie_rule="middle"))
     for round_number in range(3):
@@ -80,7 +80,7 @@ def test_threads_read_and_take_what_one_reads_and_takes_alone(kind):
 
 
 @pytest.mark.parametrize("kind", AGENTS)
-def test_readers_change_nothing_of_what_is_learned_meanwhile(kind):
+def test_concurrent_readers_do_not_change_learning(kind):
     alone, watched = AGENTS[kind](), AGENTS[kind]()
     live(alone, 300, 7)
     done = threading.Event()

@@ -146,7 +146,7 @@ def same_state(first, second):
 
 @pytest.mark.parametrize(("n_environments", "n_cuts"), [(1, 100), (4, 24)])
 @pytest.mark.parametrize("kind", KINDS)
-def test_at_any_cut_a_saved_agent_goes_on_exactly(kind, n_environments, n_cuts, tmp_path):
+def test_an_agent_saved_at_any_step_continues_exactly(kind, n_environments, n_cuts, tmp_path):
     def new_agent():
         agent = KINDS[kind]()
         agent.n_environments = n_environments
@@ -231,7 +231,7 @@ def test_classes_of_a_cell_that_runs_again_are_the_same(tmp_path):
 @pytest.mark.parametrize(
     "kind", ["sdnn", "sdnn, vector", "fuzzy", "sdnn, switches", "sdnn, warm-up"]
 )
-def test_what_was_begun_in_cpp_is_read(kind, n_steps, tmp_path):
+def test_a_file_written_in_cpp_is_read(kind, n_steps, tmp_path):
     """C++ says all of an agent but Gymnasium's spaces."""
     agent = lived(KINDS[kind](), 0, n_steps)
     agent.save(tmp_path / "python")
@@ -247,7 +247,7 @@ def test_what_was_begun_in_cpp_is_read(kind, n_steps, tmp_path):
     assert states_equal(agent, again)
 
 
-def test_progress_is_what_the_core_says(tmp_path):
+def test_progress_is_read_from_the_state_of_the_core(tmp_path):
     """C++ keeps the description of the file it read, and writes the progress that it came to."""
     agent = SDNNQLearning(PLANE, TORQUE, approximator=SMALL, learning=FALLING)
     agent.save(tmp_path / "old")
@@ -297,7 +297,7 @@ def changed(path, to, change):
         (lambda d, a: d.update(scaling={"ranges": [[0, 1], [1, 1]], "redundant": 0}), "ranges"),
     ],
 )
-def test_what_does_not_fit_is_named(saved, tmp_path, change, message):
+def test_files_that_do_not_fit_are_refused_by_name(saved, tmp_path, change, message):
     path = changed(saved, tmp_path / "changed", change)
     refuses(message, load_agent, path)
 

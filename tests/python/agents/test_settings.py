@@ -116,7 +116,7 @@ def test_every_setting_has_an_effect(name, n_dimensions):
     assert without == listed.keys() & {field.name for _, field in fields}
 
 
-def test_what_belongs_to_the_progress_is_refused_where_nothing_follows_it():
+def test_settings_of_schedules_are_refused_without_a_schedule():
     def agent(**learning):
         space = gym.spaces.Box(-1.0, 1.0, (3,), np.float64)
         return SDNNQLambda(space, gym.spaces.Discrete(2), learning=QLambdaConfig(**learning))

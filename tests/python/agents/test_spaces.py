@@ -61,7 +61,7 @@ ACTED = [
     [("observation", *case) for case in OBSERVED] + [("action", *case) for case in ACTED],
     ids=str,
 )
-def test_what_an_agent_meets_is_possible_in_its_spaces(name, own, found, fits):
+def test_an_environment_must_fit_the_spaces_of_the_agent(name, own, found, fits):
     agent, env = (
         Spaces(space) if name == "observation" else Spaces(PLANE, space) for space in (own, found)
     )
@@ -78,7 +78,7 @@ def test_each_environment_of_a_vector_is_looked_at():
     refuses("observation_space", require_same_kind, gym.make("Pendulum-v1"), envs)
 
 
-def test_long_spaces_are_told_in_a_line():
+def test_long_spaces_are_shortened_in_messages():
     wide = Box(np.arange(40.0), np.arange(40.0) + 1, dtype=np.float64)
     with pytest.raises(ValueError, match="observation_space") as caught:
         require_same_kind(Spaces(wide), Spaces(PLANE))
@@ -104,7 +104,7 @@ class Colour(enum.Enum):
 
 
 @pytest.mark.parametrize("key", [("left", 0), 3, True, (("a", 1), "b"), ()])
-def test_keys_of_a_dict_come_back_from_a_file(key, tmp_path):
+def test_keys_of_a_dict_survive_a_file(key, tmp_path):
     space = Dict([(key, PLANE), ("other", Discrete(3))])
     agent = RBFQLearning(space, Discrete(2), seed=1)
     agent.save(tmp_path / "agent")
@@ -131,7 +131,7 @@ def test_batched_spaces_of_a_vector_are_refused_by_their_names(name, n):
     assert RBFQLearning(envs.single_observation_space, envs.single_action_space)
 
 
-def test_rows_that_are_no_environments_are_taken():
+def test_matrices_that_are_no_batches_are_accepted():
     for observations, actions in (
         (Box(-1.0, 1.0, (3, 2)), PLANE),
         (Box(-1.0, 1.0, (2, 2)), PLANE),
@@ -141,7 +141,7 @@ def test_rows_that_are_no_environments_are_taken():
         assert RBFQLearning(observations, actions).is_warming_up is False
 
 
-def test_what_is_recommended_for_actions_without_bounds_works():
+def test_the_remedy_for_unbounded_actions_works():
     class Unbounded(gym.Env):
         observation_space, action_space = PLANE, Box(-np.inf, np.inf, (2,))
 
@@ -152,7 +152,7 @@ def test_what_is_recommended_for_actions_without_bounds_works():
     assert RBFQLearning(bounded.observation_space, bounded.action_space)
 
 
-def test_pictures_are_refused_with_what_helps():
+def test_images_are_refused_with_a_remedy():
     for kind in (RBFQLearning, SDNNQLearning):
         with pytest.raises(ValueError, match="TransformObservation"):
             kind(Box(0, 1, (10, 10, 6), np.bool_), Discrete(6))

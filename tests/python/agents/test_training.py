@@ -30,7 +30,7 @@ from sdnn.agents import (
 )
 from sdnn.approximators import SDNNCConfig
 from sdnn.support.files import read_file, write_file
-from stopped_training import Stop, goes_on_exactly, states_equal
+from stopped_training import Stop, check_exact_resume, states_equal
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
 KINDS = {
@@ -106,7 +106,7 @@ def corridor_agent(**options):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_an_environment_does_to_its_arrays_spoils_nothing(kind):
+def test_environments_that_reuse_their_arrays_do_not_change_learning(kind):
     make, options = KINDS[kind]
     agents = []
     for is_careful in (True, False):
@@ -182,7 +182,7 @@ BROKEN = [
 
 
 @pytest.mark.parametrize(("given", "where", "problem"), BROKEN)
-def test_what_cannot_be_learned_or_evaluated_is_told_with_its_place(given, where, problem):
+def test_unusable_steps_are_reported_with_step_and_episode(given, where, problem):
     with pytest.raises(UnusableStepError, match=re.escape(problem)) as told:
         corridor_agent().train(Broken(**given), steps=40)
     step = 9 if where == "the reset" else 11
@@ -192,7 +192,7 @@ def test_what_cannot_be_learned_or_evaluated_is_told_with_its_place(given, where
     assert f"in {where} of greedy episode 1: " in str(told.value)
 
 
-def test_of_several_environments_the_one_is_told_that_cannot_be_learned_from():
+def test_unusable_steps_of_a_vector_name_the_environment():
     envs = gym.vector.SyncVectorEnv([Corridor, lambda: Broken(reward=np.nan)])
     with pytest.raises(UnusableStepError, match=r"environment 1\b.*\breward\b"):
         corridor_agent().train(envs, steps=40)
@@ -208,7 +208,7 @@ def test_a_reward_far_beyond_the_others_is_warned_of_once_and_not_learned():
     assert np.isfinite(agent.state()["agent.rules.values"]).all()
 
 
-def test_what_an_environment_raises_is_raised():
+def test_errors_of_an_environment_are_raised_unchanged():
     class Failing(Corridor):
         def step(self, action):
             raise ValueError("no current")
@@ -257,9 +257,7 @@ class FailsOnce(Careless):
         (("reset", 3), TimeoutError, 40),
     ],
 )
-def test_what_was_learned_before_an_environment_failed_is_kept(
-    kind, call, failure, n_learned, tmp_path
-):
+def test_learning_before_an_environment_fails_is_kept(kind, call, failure, n_learned, tmp_path):
     make, options = KINDS[kind]
     env = FailsOnce(call, failure)
     agent = make(env.observation_space, env.action_space, seed=3, **options)
@@ -319,7 +317,7 @@ def test_an_episode_of_a_file_may_have_no_actions(tmp_path):
 
 
 @pytest.mark.parametrize("has_own_resets", [False, True])
-def test_what_several_learned_before_one_failed_is_kept(has_own_resets, tmp_path):
+def test_learning_before_one_of_several_environments_fails_is_kept(has_own_resets, tmp_path):
     env = gym.vector.SyncVectorEnv([FailsOnce, functools.partial(FailsOnce, ("step", 33))])
     if has_own_resets:
         env = gym.wrappers.vector.NormalizeObservation(env)
@@ -344,7 +342,7 @@ def test_what_several_learned_before_one_failed_is_kept(has_own_resets, tmp_path
     assert states_equal(loaded.agent, agent) != has_own_resets
 
 
-def test_a_start_that_cannot_be_made_does_not_stop_a_training_for_ever(tmp_path):
+def test_a_start_that_fails_is_skipped_on_resuming(tmp_path):
     env = Corridor()
     corridor_agent().train(env, episodes=4, seed=7)
     bad = env.seeds[2:4]
@@ -367,7 +365,7 @@ def test_a_start_that_cannot_be_made_does_not_stop_a_training_for_ever(tmp_path)
 
 
 @pytest.mark.parametrize("n_envs", [1, 2])
-def test_stopped_after_a_failure_a_training_goes_on_exactly(n_envs, tmp_path):
+def test_a_training_stopped_after_a_failure_resumes_exactly(n_envs, tmp_path):
     make, options = KINDS["sdnn"]
     envs = [FailsOnce] * (n_envs - 1) + [functools.partial(FailsOnce, ("step", 33))]
 
@@ -389,7 +387,7 @@ def test_stopped_after_a_failure_a_training_goes_on_exactly(n_envs, tmp_path):
     assert whole.next_episode == cut.next_episode
 
 
-def test_where_an_evaluation_fails_it_is_made_first_thereafter(tmp_path):
+def test_a_failed_evaluation_is_repeated_first_on_resuming(tmp_path):
     path, rows = tmp_path / "checkpoint", tmp_path / "rows.jsonl"
     every = {"steps": 100, "evaluate_every": 25, "evaluation_episodes": 2}
     make, options = KINDS["sdnn"]
@@ -423,7 +421,7 @@ def test_where_an_evaluation_fails_it_is_made_first_thereafter(tmp_path):
     assert told(rows) == told(tmp_path / "whole")
 
 
-def test_evaluations_are_in_one_environment():
+def test_evaluation_refuses_vector_environments():
     several = gym.vector.SyncVectorEnv([Corridor] * 2)
     refuses("env", evaluate, corridor_agent(), several, error=TypeError)
     refuses(
@@ -467,7 +465,7 @@ def test_it_learns_the_corridor():
     assert found.mean_return == found.returns.mean() > 0.6
 
 
-def test_every_episode_has_a_seed_of_its_own():
+def test_every_episode_has_another_seed():
     env, other = Corridor(), Corridor()
     corridor_agent().train(env, episodes=30, seed=4)
     corridor_agent().train(other, episodes=30, seed=4)
@@ -494,7 +492,7 @@ def test_evaluations_change_nothing_that_is_learned(tmp_path):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_training_stopped_inside_an_episode_goes_on_exactly(kind, tmp_path):
+def test_a_training_stopped_inside_an_episode_resumes_exactly(kind, tmp_path):
     make, options = KINDS[kind]
 
     def env():
@@ -505,7 +503,7 @@ def test_a_training_stopped_inside_an_episode_goes_on_exactly(kind, tmp_path):
         return Training(agent, env(), steps=300, seed=9, callbacks=callbacks)
 
     cuts = np.random.default_rng(5).integers(1, 300, 12)
-    goes_on_exactly(begun, env, tmp_path / "t", cuts)
+    check_exact_resume(begun, env, tmp_path / "t", cuts)
 
 
 def test_an_unbounded_environment_is_warmed_up_and_learned(tmp_path):
@@ -519,13 +517,13 @@ def test_an_unbounded_environment_is_warmed_up_and_learned(tmp_path):
     assert young.is_warming_up
     refuses("observation_range", young.q_values, env.reset()[0], error=RuntimeError)
     cuts = (1, 150, 199, 200, 201, 350)
-    whole = goes_on_exactly(begun, lambda: env, tmp_path / "t", cuts)
+    whole = check_exact_resume(begun, lambda: env, tmp_path / "t", cuts)
     assert not whole.agent.is_warming_up
     assert whole.agent.learning_report()["n_corrections"] > 480
 
 
 @pytest.mark.parametrize("missing", ["hold", "code"])
-def test_a_training_goes_on_from_an_observation_that_is_missing(missing, tmp_path):
+def test_a_training_resumes_exactly_from_missing_observations(missing, tmp_path):
     class Echo(Corridor):
         """Nothing comes back from ahead where the corridor continues, as of a sonar."""
 
@@ -538,7 +536,7 @@ def test_a_training_goes_on_from_an_observation_that_is_missing(missing, tmp_pat
         agent = SDNNQLearning(Echo(), approximator=SMALL, observation_range=(0, 4), missing=missing)
         return Training(agent, Echo(), steps=60, callbacks=callbacks)
 
-    goes_on_exactly(begun, Echo, tmp_path / "t", range(1, 10))
+    check_exact_resume(begun, Echo, tmp_path / "t", range(1, 10))
 
 
 def test_an_environment_that_does_not_repeat_itself_is_refused(tmp_path):
@@ -587,7 +585,7 @@ def test_between_episodes_nothing_is_repeated_anyway(tmp_path):
     assert states_equal(one.agent, other.agent)
 
 
-def test_what_waits_is_learned_when_a_new_episode_begins(tmp_path):
+def test_pending_steps_are_learned_when_a_new_episode_begins(tmp_path):
     env = Corridor()
     learning = QLearningConfig(n_steps=3)
     Training(
@@ -648,7 +646,7 @@ def test_evaluations_may_follow_episodes(tmp_path):
     ends = {row["step"] for row in rows if row["kind"] == "episode"}
     assert {row["step"] for row in evaluations} <= ends
     cuts = (3, 20, 47, evaluations[2]["step"])
-    goes_on_exactly(begun, Corridor, tmp_path / "t", cuts, evaluation_env=Corridor())
+    check_exact_resume(begun, Corridor, tmp_path / "t", cuts, evaluation_env=Corridor())
 
 
 def test_without_a_seed_the_streams_of_environments_run_on(tmp_path):
@@ -734,7 +732,7 @@ def test_a_training_in_pieces_is_the_same_and_may_be_left_between_two():
     assert left.run().n_steps == 60
 
 
-def test_an_early_stop_waits_for_evaluations_in_a_row():
+def test_early_stopping_needs_several_evaluations_in_a_row():
     stop = StopTrainingOnRewardThreshold(mean_return=0.6, patience=2)
     result = corridor_agent().train(
         Corridor(), steps=20_000, callbacks=[stop], evaluate_every=200, evaluation_env=Corridor()

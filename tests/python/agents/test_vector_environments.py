@@ -22,7 +22,7 @@ from sdnn.agents import (
 )
 from sdnn.approximators import FuzzyRulesConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.training.episodes import episode_seed
-from stopped_training import Stop, goes_on_exactly, states_equal
+from stopped_training import Stop, check_exact_resume, states_equal
 
 AutoresetMode = gym.vector.AutoresetMode
 
@@ -176,7 +176,7 @@ def test_the_bits_do_not_depend_on_how_environments_are_run():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_training_stopped_anywhere_goes_on_exactly(kind, tmp_path):
+def test_a_training_stopped_at_any_step_resumes_exactly(kind, tmp_path):
     env, make = KINDS[kind]
     path = tmp_path / "training"
     whole = Training(make(), sync(3, env), steps=150, seed=9)
@@ -193,7 +193,7 @@ def test_a_training_stopped_anywhere_goes_on_exactly(kind, tmp_path):
         assert states_equal(whole.agent, second.agent)
 
 
-def test_a_training_goes_on_exactly_in_processes_and_many_times(tmp_path):
+def test_a_training_resumes_exactly_many_times_and_in_processes(tmp_path):
     whole = Training(sdnn_agent(), sync(4), steps=120, seed=1)
     rows = whole.run().rows
     path = tmp_path / "training"
@@ -208,7 +208,7 @@ def test_a_training_goes_on_exactly_in_processes_and_many_times(tmp_path):
     assert states_equal(whole.agent, training.agent)
 
 
-def test_the_fast_acrobots_have_the_bits_of_single_ones_and_go_on_exactly(tmp_path):
+def test_batched_acrobots_have_the_bits_of_single_ones_and_resume_exactly(tmp_path):
     def agent():
         env = gym.make("sdnn/AcrobotSwingUp-v0")
         return sdnn_agent(env, approximator=SMALL)
@@ -219,7 +219,7 @@ def test_the_fast_acrobots_have_the_bits_of_single_ones_and_go_on_exactly(tmp_pa
     def begun(*callbacks):
         return Training(agent(), acrobots(), steps=400, callbacks=callbacks)
 
-    whole = goes_on_exactly(begun, acrobots, tmp_path / "t", (100, 302, 355))
+    whole = check_exact_resume(begun, acrobots, tmp_path / "t", (100, 302, 355))
     slow = Training(agent(), acrobots("sync"), steps=400)
     slow.run()
     assert states_equal(whole.agent, slow.agent)
@@ -292,7 +292,7 @@ def test_a_warm_up_may_have_had_more_environments_than_there_are_now():
     assert agent.n_environments == 2
 
 
-def test_a_fuzzy_warm_up_ends_where_all_actions_are_its_own_or_learned():
+def test_a_fuzzy_warm_up_ends_once_no_action_of_others_is_pending():
     agent = fuzzy_agent(Unbounded(), warm_up_steps=10)
     agent.n_environments = 3
     seen = np.zeros(2)
@@ -401,7 +401,7 @@ def test_cart_poles_that_gymnasium_makes_by_itself_are_learned():
     "make",
     [lambda: Opaque(2, "NEXT_STEP"), lambda: AsyncVectorEnv([Walk] * 2, shared_memory=False)],
 )
-def test_what_cannot_be_repeated_goes_on_with_new_episodes_only(make, tmp_path):
+def test_vectors_that_cannot_repeat_episodes_resume_with_new_ones_only(make, tmp_path):
     vector = make()
     checkpoints = CheckpointCallback(tmp_path / "t", 1000)
     training = Training(sdnn_agent(), vector, steps=20, callbacks=[checkpoints])
@@ -452,7 +452,7 @@ def test_a_callback_with_an_interval_is_called_after_its_multiples_only():
     assert states_equal(plain, watched)
 
 
-def test_what_a_subclass_does_when_it_learns_is_done_in_a_training():
+def test_a_training_calls_the_learn_method_of_a_subclass():
     class Doubled(RBFQLearning):
         def learn(self, transition, environment=0):
             super().learn(transition._replace(reward=2 * transition.reward), environment)

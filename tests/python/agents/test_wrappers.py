@@ -60,7 +60,7 @@ def agent_for(env):
 
 @pytest.mark.parametrize("wrappers", WRAPPERS.values(), ids=WRAPPERS)
 @pytest.mark.parametrize("cut", [60, 61, 95, 119])
-def test_a_training_through_wrappers_goes_on_exactly(wrappers, cut, tmp_path):
+def test_a_training_with_wrappers_resumes_exactly(wrappers, cut, tmp_path):
     given = {"steps": 200, "evaluate_every": 50, "evaluation_episodes": 1}
     env = wrapped(*wrappers)
     whole = Training(agent_for(env), env, evaluation_env=wrapped(*wrappers), **given)
@@ -87,7 +87,7 @@ def test_a_training_through_wrappers_goes_on_exactly(wrappers, cut, tmp_path):
     assert whole.agent.wrappers == resumed.agent.wrappers != []
 
 
-def test_an_agent_that_is_loaded_observes_what_it_was_trained_with(tmp_path):
+def test_a_loaded_agent_is_evaluated_with_the_statistics_of_its_training(tmp_path):
     env = wrapped(NormalizeObservation)
     agent = agent_for(env)
     agent.train(env, steps=300)
@@ -112,7 +112,7 @@ def test_an_evaluation_changes_no_statistics():
         assert all(flags)
 
 
-def test_wrappers_that_have_seen_nothing_are_warned_of_by_name():
+def test_wrappers_without_statistics_cause_a_warning():
     env = wrapped(NormalizeObservation)
     with pytest.warns(RuntimeWarning, match="NormalizeObservation"):
         evaluate(agent_for(env), env, 1)

@@ -102,7 +102,7 @@ def test_every_agent_learns_on_the_engine(scripts, monkeypatch):
     assert len(tried) == 10
 
 
-def test_a_trial_runs_in_a_process_of_its_own_and_once(scripts, tmp_path):
+def test_a_trial_runs_once_and_in_a_separate_process(scripts, tmp_path):
     studies, file = scripts.studies, tmp_path / "study.toml"
     file.write_text(
         """
@@ -198,7 +198,7 @@ def test_a_process_that_dies_is_reported(scripts, tmp_path, capsys):
     assert list(measured.measured("squares", tmp_path)) == [("x", 3)]
 
 
-def test_only_chooses_by_words(scripts):
+def test_only_selects_trials_by_words(scripts):
     key = ("SDNN, small", "CartPole", 3)
     assert scripts.measured.is_wanted(key, given(EVIDENCE, "CartPole", "3"))
     assert not scripts.measured.is_wanted(key, given(EVIDENCE, "Cart"))

@@ -252,7 +252,7 @@ def test_errors_of_codings_with_missing_values(coding, column, message):
     refuses(message, coding.fit, column, 8)
 
 
-def test_unknown_categories_may_stay_an_error():
+def test_unknown_categories_can_be_refused():
     strict = WithMissing(base=Symbolic(), unknown="error").fit(LETTERS, 8)
     refuses("categories", strict.bins, np.array(["z"]))
 

@@ -53,7 +53,7 @@ COLUMNS = {"different": RANDOM.lognormal(0, 2, 30), "equal": np.full(30, 3.5)}
         WithMissing(base=RandomInverse(spacing="quantile")),
     ],
 )
-def test_learned_codings_are_taken_as_they_are(coding, column):
+def test_fitted_codings_are_not_fitted_again(coding, column):
     learned = coding.fit(COLUMNS[column], 400)
     one = kernel.AnalyticKernel([learned, learned], n_units=400)
     assert one.codings == (learned, learned)

@@ -71,7 +71,7 @@ WORDS = [("symbolic", [0])]
 
 
 @pytest.mark.parametrize("kind", [SDNNRegressor, SDNNKernelRidge])
-def test_lists_of_words_and_numbers_have_the_bits_of_tables(kind):
+def test_lists_of_words_and_numbers_give_the_bits_of_tables(kind):
     options = SMALL if kind is SDNNRegressor else {}
     listed = kind(WORDS, **options).fit(LISTED, TARGETS)
     other = kind(WORDS, **options).fit(TABLE[["color", "size"]].to_numpy(), TARGETS)
@@ -90,7 +90,7 @@ def test_numbers_in_lists_with_words_stay_numbers():
 
 
 @pytest.mark.parametrize("missing", [float("nan"), np.nan, None])
-def test_missing_values_in_lists_of_words_are_seen(missing):
+def test_missing_values_in_lists_of_words_are_recognized(missing):
     gaps = [[missing, size] if size > 8 else [color, size] for color, size in LISTED]
     refuses("missing", SDNNRegressor(WORDS, **SMALL).fit, gaps, TARGETS)
     model = SDNNRegressor([(WithMissing(base=Symbolic()), [0])], **SMALL).fit(gaps, TARGETS)
@@ -106,7 +106,7 @@ def test_unknown_categories_and_missing_values_are_refused():
     refuses("infinity", model.partial_fit, TABLE.assign(size=np.inf), TARGETS)
 
 
-def test_missing_values_and_unknown_categories_can_have_patterns_of_their_own(tmp_path):
+def test_missing_values_and_unknown_categories_can_have_separate_patterns(tmp_path):
     coding = [("with-missing", ["hour", "size"]), (WithMissing(base=Symbolic()), "color")]
     holes = TABLE.copy()
     holes.loc[::5, "size"] = np.nan

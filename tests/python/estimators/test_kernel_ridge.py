@@ -170,7 +170,7 @@ def test_noise_is_penalized_where_the_network_learns_it():
     assert ridge > network + 0.05
 
 
-def test_tables_and_searches_are_taken():
+def test_tables_and_searches_are_accepted():
     frame = pd.DataFrame({"hour": 24 * X[:, 0], "kind": np.where(X[:, 1] > 0.5, "u", "v")})
     model = SDNNKernelRidge([(Circular(period=24.0), ["hour"]), ("symbolic", ["kind"])])
     grid = {"alpha": [0.01, 0.1], "pairs": ["all", [("hour", "kind")]]}

@@ -141,7 +141,7 @@ def test_every_parameter_is_checked_and_named(kind):
             refuses(name, kind(**{name: bad}).learn_one, X[0], 1, **options)
 
 
-def test_subclasses_may_have_parameters_and_defaults_of_their_own():
+def test_subclasses_can_add_parameters_and_change_defaults():
     @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
     class Mine(SDNNRegressor):
         correction_share: float = 0.5
@@ -224,7 +224,7 @@ def test_it_works_where_scikit_learn_puts_it(estimator):
     )
 
 
-def test_progress_is_shown_when_asked_for(estimator, capsys):
+def test_progress_is_shown_on_request(estimator, capsys):
     estimator.set_params(verbose=1).fit(X, targets_of(estimator))
     assert "training" in capsys.readouterr().out
     estimator.set_params(verbose=0).fit(X, targets_of(estimator))

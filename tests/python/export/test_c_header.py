@@ -68,7 +68,7 @@ def test_the_tolerance_of_ties_is_in_units_of_values(reward, tie_tolerance, expe
     assert f"#define POLICY_TIE_TOLERANCE INT64_C({expected})\n" in c_header(agent, "policy").text
 
 
-def test_symbols_are_readings_of_one_and_zero(target, tmp_path):
+def test_symbols_are_coded_as_ones_and_zeros(target, tmp_path):
     check_symbols(target, tmp_path)
 
 
@@ -112,7 +112,7 @@ def test_the_angle_of_a_pair_is_in_the_agents_bin(needs, tmp_path):
     np.testing.assert_array_equal(bins_in_c, np.column_stack([expected, expected]))
 
 
-def test_what_the_library_refuses_is_defined(needs, tmp_path):
+def test_values_that_the_library_refuses_have_defined_results(needs, tmp_path):
     """NaN is the lowest; an angle of NaN or infinity is 0. Conversions of NaN would be caught."""
     caught = ("-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all")
     needs("clang", options=caught)
@@ -291,7 +291,7 @@ def test_the_file_is_whole_or_not_there(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["one.h"]
 
 
-def test_what_cannot_be_exported_is_refused():
+def test_agents_that_cannot_be_exported_are_refused():
     for kind in (RBFQLearning, FuzzyQLearning):
         agent = kind(box(1.0, 1.0), box(1.0))
         refuses("agent", c_header, agent, "policy", error=TypeError)

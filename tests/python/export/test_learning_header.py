@@ -196,7 +196,7 @@ def test_cpp_takes_it_as_functions_and_as_a_class(compiler, make, act, needs, tm
 
 
 @pytest.mark.parametrize("name", LEARNERS)
-def test_memory_is_as_the_header_says(name, target, tmp_path):
+def test_memory_is_that_stated_in_the_header(name, target, tmp_path):
     header = c_header(LEARNERS[name](), "agent", learning=True)
     (tmp_path / "agent.h").write_text(header.text)
     source = '#include "agent.h"\n#include <stdio.h>\nint main(void)'
@@ -205,7 +205,7 @@ def test_memory_is_as_the_header_says(name, target, tmp_path):
 
 
 @pytest.mark.parametrize("make", [discrete, network])
-def test_what_is_no_image_of_the_agent_changes_nothing(make):
+def test_images_of_other_agents_are_refused_and_change_nothing(make):
     agent, other = make(), make()
     live(agent, lines_of(agent, 300, 1, 16), 16)
     image = save_image(agent)

@@ -58,14 +58,14 @@ def test_a_network_may_have_few_units():
     assert agent.approximator.n_active_units == 3
 
 
-def test_an_agent_keeps_what_is_given():
+def test_given_settings_are_kept():
     config = LinearSDNNConfig(n_pattern_units=100, averaging_interval=0)
     agent = new_agent(SPACE, TWO, approximator=config, angles=[1], seed=5)
     assert (agent.approximator.n_pattern_units, agent.seed) == (100, 5)
     assert [(kind, list(at)) for kind, at in agent.inputs] == [("variable", [0]), ("circular", [1])]
 
 
-def test_what_does_not_fit_or_has_no_range_is_refused():
+def test_agents_that_do_not_fit_or_lack_ranges_are_refused():
     refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=1000)
     refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=1.5)
     refuses("ram_bytes", new_agent, SPACE, TWO, kind="sdnn-c", ram_bytes=5000)
@@ -127,7 +127,7 @@ def test_actions_are_numbers_or_ranges(actions, space, export, tmp_path):
     assert (tmp_path / "agent.h").read_text() == c_header(agent, "agent", learning=True).text
 
 
-def test_the_help_has_a_command_in_lines_of_its_own(invoke):
+def test_the_help_shows_a_command_on_separate_lines(invoke):
     told = invoke("export", "--help").stdout
     assert "\n  sdnn export --new --range -2.4:2.4 --range -3:3 --range -0.21:0.21\n" in told
 
@@ -158,7 +158,7 @@ def test_the_help_has_a_command_in_lines_of_its_own(invoke):
         *(((*GIVEN, "--actions", one), "--ram") for one in ("65536",)),
     ],
 )  # fmt: skip
-def test_bad_words_are_refused_by_their_option(words, named, export, tmp_path):
+def test_bad_values_are_refused_by_their_option(words, named, export, tmp_path):
     done = export("--new", *words)
     assert done.exit_code == 2, done.output
     assert named in done.stderr

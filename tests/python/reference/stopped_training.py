@@ -28,7 +28,7 @@ def states_equal(one, other):
     )
 
 
-def goes_on_exactly(begun, env, path, cuts, **options):
+def check_exact_resume(begun, env, path, cuts, **options):
     """Check that trainings of ``begun(*callbacks)`` that stop at a cut end as the whole one does.
 
     ``env()`` is the environment that a stopped one is loaded with. Returns the whole one.

@@ -106,7 +106,7 @@ def test_a_case_fits_the_network_to_the_sensors():
     refuses("'fuzzy'", case_spec, experiment.cases[1], "fuzzy")
 
 
-def test_a_case_gives_every_agent_its_own_settings():
+def test_a_case_has_settings_for_every_agent():
     (experiment,) = select_experiments("b")
     spec = case_spec(experiment.cases[2], "fuzzy")
     assert spec.core_settings()["approximator"] == FuzzyRulesConfig(n_inputs=5)

@@ -135,7 +135,7 @@ def test_a_colour_stands_for_an_agent_in_every_figure(tmp_path, run, collected):
     assert len(two) == 2
 
 
-def test_any_two_agents_of_a_figure_have_colors_of_their_own():
+def test_any_two_agents_of_a_figure_have_different_colors():
     for pair in itertools.combinations(AGENTS, 2):
         assert len(set(agent_colors(pair).values())) == 2
 

@@ -160,7 +160,7 @@ def test_the_reference_results_are_of_the_papers_settings():
 
 
 @pytest.mark.parametrize("agent", ["sdnn-c", "fuzzy"])
-def test_a_reference_result_is_what_running_it_gives(tmp_path, agent):
+def test_running_a_trial_again_gives_its_reference_result(tmp_path, agent):
     kept = next(one for one in reference_results() if (one.case_id, one.agent) == ("s4", agent))
     plan = plan_trials([CASES["s4"]], 1, kept.root_seed)
     own = [planned for planned in plan if planned.key.agent == agent]

@@ -95,7 +95,7 @@ budget.episodes = 3000
 """
 
 
-def test_what_only_lasts_longer_does_not_differ(study):
+def test_variants_that_only_last_longer_do_not_differ(study):
     mine = study(LENGTHS)
     runs = {
         ("s4", "short"): ((100, 4),), ("s4", "long"): ((300, 4),),

@@ -222,7 +222,7 @@ def test_errors_of_export_name_the_problem(invoke, tmp_path):
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_several_runs_are_drawn_where_one_is(invoke, tmp_path):
+def test_several_runs_are_drawn_in_one_figure(invoke, tmp_path):
     for seed in (1, 2):
         assert invoke("train", DRIFTING, *SHORT, "--seed", seed).exit_code == 0
     folders = sorted((tmp_path / "runs").iterdir())
@@ -231,7 +231,7 @@ def test_several_runs_are_drawn_where_one_is(invoke, tmp_path):
     assert {(one["kind"], one["n_runs"], one["run"]) for one in drawn} == {("evaluation", "2", "")}
 
 
-def test_plot_names_what_a_figure_omits(invoke, tmp_path):
+def test_plot_names_runs_that_a_figure_omits(invoke, tmp_path):
     for seed in (1, 2):
         short = SHORT if seed == 1 else ("--dry-run", *SHORT)
         values = invoke("train", DRIFTING, *short, "--seed", seed, "--out", f"run{seed}").stdout
@@ -546,7 +546,7 @@ class StrongerEnv(drifting_env.DriftingEnv):
         (StrongerEnv, "action_space, Box(-1.0, 1.0, (1,), float32), got"),
     ],
 )
-def test_an_environment_that_differs_now_is_one_line(invoke, monkeypatch, kind, words):
+def test_a_changed_environment_is_reported_in_one_line(invoke, monkeypatch, kind, words):
     short = (*SHORT, "--env-arg", "max_episode_steps=5")  # ends with an episode
     assert invoke("train", DRIFTING, *short, "--out", "one").exit_code == 0
     monkeypatch.setattr(gym.registry["tests/Drifting-v0"], "entry_point", kind)
@@ -576,7 +576,7 @@ def test_an_unusable_reward_is_reported_with_its_step_and_checkpoint(invoke):
     assert "sdnn resume two" in result.stderr
 
 
-def test_a_broken_evaluation_is_one_line(invoke, monkeypatch):
+def test_an_unusable_evaluation_is_reported_in_one_line(invoke, monkeypatch):
     assert invoke("train", BROKEN, *SHORT, "--out", "one").exit_code == 0
     config = json.loads(Path("one/config.json").read_text())
     config["environment"]["kwargs"] = {"at": 3}
@@ -647,7 +647,7 @@ def test_an_error_of_an_environment_is_reported_unchanged(invoke, kind):
     assert Training.load(run.folder / "checkpoint.safetensors", env).n_steps == 249
 
 
-def test_an_output_that_cannot_be_written_is_one_line(invoke, tmp_path):
+def test_an_output_that_cannot_be_written_is_reported_in_one_line(invoke, tmp_path):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
     command = f"{sys.executable} -m sdnn resume one --json"
     for out, errors in (("> /dev/full", "Error: [Errno 28] No space left"), ("| true", "")):

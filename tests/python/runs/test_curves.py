@@ -167,7 +167,7 @@ def test_only_runs_that_differ_in_their_seeds_are_put_together(tmp_path):
     assert len({(group.task, group.agent) for group in groups}) == len(groups)
 
 
-def test_names_say_in_what_runs_differ(tmp_path):
+def test_names_state_the_differences_between_runs(tmp_path):
     long = run_spec(CONFIG, steps=600)
     short = run_spec(CONFIG, steps=300)
     goals = {

@@ -27,7 +27,7 @@ def test_redundant_variables_are_means_of_neighbours_in_a_circle():
 
 
 @pytest.mark.parametrize("redundant", [1, 5])
-def test_the_words_for_what_is_scaled_are_true(redundant):
+def test_the_description_of_scaled_observations_is_exact(redundant):
     environment = EnvironmentSpec(
         id="tests/Drifting-v0", ranges={"all": (-0.3, 0.4), "1": (-4.0, 4.0)}, redundant=redundant
     )

@@ -24,7 +24,7 @@ def filled(folder, n_trials=20):
         return store.path, records_digest(store.load())
 
 
-def test_stored_trial_comes_back_exactly(tmp_path):
+def test_a_stored_trial_is_loaded_exactly(tmp_path):
     with ResultStore(tmp_path / "new" / "folder") as store:
         store.add(make_record())
     with ResultStore(tmp_path / "new" / "folder") as store:

@@ -95,7 +95,7 @@ def test_later_layers_override_earlier_ones(study):
     assert [variant.title for variant in found.variants] == ["the b", "a", "c"]  # reference first
 
 
-def test_arrays_words_and_numbers_reach_the_configuration(study):
+def test_arrays_texts_and_numbers_reach_the_configuration(study):
     found = study(
         PAPER
         + """
