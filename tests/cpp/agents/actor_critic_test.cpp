@@ -14,7 +14,6 @@
 #include "sdnn/approximators/detail/state_wiring.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/core/state.hpp"
-#include "states.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -137,17 +136,6 @@ TEST(ActorCritic, EveryInstructionSetGivesTheSameBits) {
     states.push_back(core::state_of(agent));
   });
   for (const core::State& state : states) EXPECT_EQ(state, states.front());
-}
-
-TEST(ActorCritic, ALifeCanBeCutAnywhere) {
-  ActorCritic whole = actor_critic_of({}, {3, 2}), first = actor_critic_of({}, {3, 2});
-  live(whole, 150, 3);
-  live(first, 150, 3);
-  ActorCritic second = actor_critic_of({}, {3, 2});
-  core::restore(second, core::state_of(first));
-  live(whole, 100, 4);
-  live(second, 100, 4);
-  EXPECT_EQ(core::state_of(whole), core::state_of(second));
 }
 
 TEST(ActorCritic, RefusedTransitionsChangeNothing) {

@@ -84,28 +84,6 @@ TEST(NStepBuffer, EachIsAskedOnceAndOnlyThoseThatWait) {
   EXPECT_FALSE(steps.each_is([](const NStepBuffer::Step& step) { return step.reward < 4.0; }));
 }
 
-TEST(NStepBuffer, AreRestoredInTheMiddleOfTheRing) {
-  NStepBuffer steps(4, 1, 2);
-  for (int i = 0; i < 4; ++i) add(steps, i);
-  for (int i = 4; i < 7; ++i) {
-    steps.take_oldest();
-    add(steps, i);
-  }
-  steps.take_oldest();  // 4, 5, 6 wait; the oldest is at place 0 of the ring, now at place 1
-  steps.take_oldest();
-  NStepBuffer other(4, 1, 2);
-  add(other, 9);
-  core::restore(other, core::state_of(steps));
-  EXPECT_EQ(other.size(), 2U);
-  EXPECT_EQ(other.return_of_oldest(64.0, 0.5), steps.return_of_oldest(64.0, 0.5));
-  for (int i = 7; i < 9; ++i) {
-    add(steps, i);
-    add(other, i);
-  }
-  EXPECT_EQ(core::state_of(other), core::state_of(steps));
-  for (int i = 5; i < 9; ++i) expect_oldest(other, i);
-}
-
 TEST(NStepBuffer, RefuseWhatCannotWait) {
   NStepBuffer steps(3, 1, 2);
   for (int i = 0; i < 2; ++i) add(steps, i);

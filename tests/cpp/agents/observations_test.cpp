@@ -180,21 +180,6 @@ TEST(Observations, FindNoisyAnglesButNotPositions) {
   EXPECT_EQ(n_inputs(few), 2U);
 }
 
-TEST(Observations, ContinueFromTheirState) {
-  ObservationConfig config = unbounded(2);
-  config.find_angle_pairs = true;
-  Observations first(config, true, 1), second = first;
-  first.fit(Numbers{1.0, 0.0, 0.0, 1.0, -1.0, 0.0});
-  EXPECT_EQ(first.n_inputs(), 1U);
-  core::restore(second, core::state_of(first));
-  EXPECT_EQ(low_of(second), low_of(first));
-  EXPECT_EQ(kinds_of(second), kinds_of(first));
-  const auto good = core::state_of(first);
-  testing::expect_refused(first, testing::with_number(good, "low", 9.0), "state: low must be");
-  testing::expect_refused(first, testing::with_number(good, "angle_pairs", 7),
-                          "state: angle_pairs");
-}
-
 TEST(Observations, KeepSomeInputsAndAddOthersAtTheEnd) {
   ObservationConfig config = unbounded(5);
   config.relevant_only = true;

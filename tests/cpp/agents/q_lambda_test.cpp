@@ -66,31 +66,6 @@ TEST(QLambda, OneStepTargetsByHand) {
   EXPECT_NEAR(q(agent, a, 0), 5.0, 0.5);
 }
 
-TEST(QLambda, ALimitBootstrapsFromTheBestValueATerminalStateDoesNot) {
-  const QLambdaConfig config{.discount = 1.0, .trace_decay = 0.0, .final_learning_rate = {}};
-  const State a{0.1, 0.1}, b{0.9, 0.9};
-  for (const bool terminated : {false, true}) {
-    QLambda agent = agent_of(config);
-    agent.learn(b, Indices{1}, 4.0, b, true);
-    agent.learn(a, Indices{0}, 1.0, b, terminated);
-    agent.begin_episode();
-    EXPECT_NEAR(q(agent, a, 0), terminated ? 1.0 : 5.0, 0.5);
-  }
-}
-
-TEST(QLambda, ATraceCarriesARewardBack) {
-  const State a{0.1, 0.1}, b{0.5, 0.5}, c{0.9, 0.9};
-  const auto value_of_first = [&](double trace_decay) {
-    QLambda agent = agent_of({.trace_decay = trace_decay, .final_learning_rate = {}});
-    agent.learn(a, Indices{0}, 0.0, b, false);
-    agent.learn(b, Indices{1}, 0.0, c, false);
-    agent.learn(c, Indices{2}, 1.0, c, true);
-    return q(agent, a, 0);
-  };
-  EXPECT_NEAR(value_of_first(0.0), 0.0, 0.05);
-  EXPECT_NEAR(value_of_first(0.9), 0.99 * 0.99 * 0.9 * 0.9, 0.15);
-}
-
 TEST(QLambda, RatesHaveGoneHalfOfTheWayAfterScheduleSteps) {
   QLambda agent = agent_of({.learning_rate = 1.0,
                             .policy = {.epsilon = 0.5, .n_greedy_steps = 0},
@@ -193,19 +168,6 @@ TEST(QLambda, LearnsTheSameOnEveryInstructionSet) {
       learned.emplace_back(weights.begin(), weights.end());
     });
     for (const auto& weights : learned) EXPECT_EQ(weights, learned.front());
-  }
-}
-
-TEST(QLambda, ItsStateResumesExactly) {
-  for (const int n_steps : {0, 1, 57, 200}) {
-    QLambda agent = agent_of({.max_action_repeat = 5}, {3, 2}, 3);
-    live(agent, n_steps, 3);
-    QLambda other = agent_of({.max_action_repeat = 5}, {3, 2}, 3);
-    core::restore(other, core::state_of(agent));
-    EXPECT_EQ(core::state_of(other), core::state_of(agent));
-    live(agent, 100, 4);
-    live(other, 100, 4);
-    EXPECT_EQ(core::state_of(other), core::state_of(agent));
   }
 }
 

@@ -9,7 +9,6 @@
 #include <set>
 #include <vector>
 
-#include "agents/lives.hpp"
 #include "agents/small_q_learning.hpp"
 #include "sdnn/core/random.hpp"
 #include "states.hpp"
@@ -30,17 +29,6 @@ TEST(QLearning, EquationOneByHand) {
   EXPECT_DOUBLE_EQ(q(0, 1), 3.8125);
   EXPECT_EQ(q(0, 0), 0.0);
   EXPECT_EQ(q(1, 1), 0.0);
-}
-
-TEST(QLearning, ATerminatedTransitionDoesNotBootstrapATruncatedOneDoes) {
-  LookupTable table(1, 5, 2);
-  table.update(cell(2), 1, 20.0);
-  Agent terminated(table, {}, 1);
-  Agent truncated(table, {}, 1);
-  terminated.learn(cell(1), 0, 1.0, cell(2), true);
-  truncated.learn(cell(1), 0, 1.0, cell(2), false);
-  EXPECT_EQ(terminated.network().value(cell(1), 0), 0.5);
-  EXPECT_EQ(truncated.network().value(cell(1), 0), 9.5);  // 0.5 * (1 + 0.9 * 20)
 }
 
 // The next state's value is taken before the correction, also when it is the same state.
@@ -110,9 +98,6 @@ TEST(QLearning, WhatCouldNotBeLearnedLaterIsRefusedAtOnce) {
   EXPECT_THROW(agent.learn(cell(0), 0, 1.0, Position{1.5}, false), std::invalid_argument);
   agent.begin_episode();
   EXPECT_EQ(agent.network(), LookupTable(1, 5, 2));
-  for (const int bad : {0, -1, 1001}) {
-    EXPECT_THROW(Agent(LookupTable(1, 5, 2), {.n_steps = bad}, 1), std::invalid_argument);
-  }
 }
 
 /// A corridor of five cells; action 1 goes right, 0 left (not past the ends). Leaving cell 3 to the
@@ -143,24 +128,6 @@ TEST(QLearning, ASmallDecisionProcessIsSolvedExactly) {
   }
 }
 
-TEST(QLearning, ByActingItFindsTheValuesOfTheSmallProcess) {
-  Agent agent(LookupTable(1, 5, 2), {.policy = {.epsilon = 0.5, .n_greedy_steps = 0}}, 9);
-  for (int episode = 0; episode < 2000; ++episode) {
-    agent.begin_episode();
-    for (int s = 0; !Corridor::is_goal(s);) {
-      const std::size_t action = agent.act(cell(s));
-      const int next = Corridor::next(s, action);
-      agent.learn(cell(s), action, Corridor::is_goal(next) ? 1.0 : 0.0, cell(next),
-                  Corridor::is_goal(next));
-      s = next;
-    }
-  }
-  for (int s = 0; s < 4; ++s) {
-    EXPECT_NEAR(agent.network().value(cell(s), 1), std::pow(0.9, 3 - s), 1e-9);
-    EXPECT_EQ(agent.act(cell(s), false), 1U);
-  }
-}
-
 TEST(QLearning, StepsAreCountedFromTheBeginningOfAnEpisode) {
   LookupTable table(1, 5, 3);
   table.update(cell(0), 2, 1.0);
@@ -172,27 +139,6 @@ TEST(QLearning, StepsAreCountedFromTheBeginningOfAnEpisode) {
     for (int step = 4; step < 8; ++step) others += agent.act(cell(0)) != 2;
   }
   EXPECT_GT(others, 90);  // of 200, two thirds are expected
-}
-
-TEST(QLearning, EvaluationDoesNotDisturbLearning) {
-  Agent alone(LookupTable(1, 5, 2), {.policy = {.epsilon = 0.3, .n_greedy_steps = 1}}, 6);
-  Agent evaluated = alone;
-  core::Random world(1, core::Stream::weights);
-  for (int episode = 0; episode < 100; ++episode) {
-    alone.begin_episode();
-    evaluated.begin_episode();
-    for (int step = 0; step < 6; ++step) {
-      for (int i = 0; i < episode % 3; ++i) (void)evaluated.act(cell(i % 5), false);
-      const Position state = cell(static_cast<int>(world.below(5)));
-      const Position next = cell(static_cast<int>(world.below(5)));
-      const std::size_t action = alone.act(state);
-      ASSERT_EQ(action, evaluated.act(state));
-      const double reward = world.uniform() < 0.1 ? 1.0 : 0.0;
-      alone.learn(state, action, reward, next, false);
-      evaluated.learn(state, action, reward, next, false);
-    }
-  }
-  EXPECT_EQ(alone.network(), evaluated.network());
 }
 
 TEST(QLearning, ABadTransitionLeavesTheWholeStateAsItWas) {
@@ -287,7 +233,6 @@ TEST(QLearning, TheFirstStepsOfALifeAreRandom) {
     agent.begin_episode();  // ends what may be kept
     for (int i = 0; i < 20; ++i) EXPECT_EQ(agent.act(cell(0)), 5U);
   }
-  EXPECT_EQ(message({.start_steps = -1}), "start_steps must be in [0, 1073741824], got -1");
 }
 
 TEST(QLearning, ABadStateIsNoneOfTheFirstSteps) {
@@ -355,26 +300,6 @@ TEST(QLearning, GreedyActionsFollowTheAverageWhereThereIsOne) {
     }
   }
   EXPECT_GT(n_other, 0);
-}
-
-TEST(QLearning, BestActionIsThatOfActWithoutExploring) {
-  approximators::SDNNCConfig config = network();
-  config.averaging_interval = 5;
-  OneDimension<QLearning<SDNNC>> agent(SDNNC(config, 3), {.policy = {.tie_rule = TieRule::lowest}},
-                                       3);
-  testing::World<decltype(agent)> world(agent.n_inputs(), 7);
-  for (int t = 0; t < 300; ++t) world.tick(agent);
-  auto workspace = agent.workspace();
-  core::Random ties(1, core::Stream::ties), random(5, core::Stream::sensor_noise);
-  std::vector<double> state(agent.n_inputs());
-  std::set<std::size_t> taken;
-  for (int i = 0; i < 100; ++i) {
-    for (double& x : state) x = random.uniform();
-    const std::size_t action = agent.best_action(state, workspace, ties);
-    EXPECT_EQ(action, agent.act(state, false));
-    taken.insert(action);
-  }
-  EXPECT_GT(taken.size(), 1U);
 }
 
 // Two dimensions, of 2 and 3 actions: Q_0 = 2 and Q_1 = 6 for action (1, 2), whose mean is 4.

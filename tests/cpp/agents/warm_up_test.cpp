@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "sdnn/core/pcg64.hpp"
-#include "states.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -114,19 +113,6 @@ TEST(WarmUp, WaitsForWhatWasActedWhereOnlyOwnActionsAreLearned) {
   EXPECT_FALSE(warm_up.is_over());
   learn(warm_up, 1, waits);
   EXPECT_TRUE(warm_up.is_over());
-}
-
-TEST(WarmUp, ContinuesFromItsState) {
-  WarmUp whole(2, 1, 100, 3, true);
-  whole.set_n_environments(2);
-  for (int t = 0; t < 20; ++t) step(whole, static_cast<std::size_t>(t % 2));
-  WarmUp again(2, 1, 100, 9, true);
-  core::restore(again, core::state_of(whole));
-  for (int t = 0; t < 20; ++t) {
-    for (WarmUp* const one : {&whole, &again}) step(*one, 1);
-  }
-  EXPECT_EQ(core::state_of(whole), core::state_of(again));
-  testing::expect_that_damage_is_refused(whole);
 }
 
 }  // namespace
