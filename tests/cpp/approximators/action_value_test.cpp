@@ -14,7 +14,6 @@
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
 #include "sdnn/core/random.hpp"
-#include "threads.hpp"
 
 namespace sdnn::approximators {
 namespace {
@@ -50,21 +49,6 @@ static_assert(!ActionValue<NotConst>);
 static_assert(!ActionValue<double>);
 static_assert(CountedActionValue<SDNNC>);
 static_assert(!CountedActionValue<RBFNetwork>);
-
-TEST(ActionValue, ALookupTableReturnsWhatItWasCorrectedTo) {
-  testing::LookupTable q(2, 3, 4);
-  const std::array<double, 2> state = {0.5, 1.0};
-  const std::array<double, 2> same_cell = {0.34, 0.67};
-  const std::array<double, 2> other_cell = {0.33, 1.0};
-  q.update(state, 2, 7.25);
-  std::array<double, 4> row{};
-  q.values(same_cell, row);
-  EXPECT_EQ(row, (std::array<double, 4>{0.0, 0.0, 7.25, 0.0}));
-  EXPECT_EQ(q.value(same_cell, 2), 7.25);
-  EXPECT_EQ(q.value(other_cell, 2), 0.0);
-  q.update(state, 2, 1.25, 0.25);  // 3/4 of 7.25 and 1/4 of 1.25
-  EXPECT_EQ(q.value(state, 2), 5.75);
-}
 
 SDNNCConfig small_network() {
   return {.n_inputs = 2,
@@ -109,33 +93,6 @@ std::vector<std::array<double, 2>> some_states(std::size_t n) {
   return states;
 }
 
-/// Q(s, a) of all states and actions, in one workspace.
-template <ActionValue Q>
-std::vector<double> all_values(const Q& q, const std::vector<std::array<double, 2>>& states) {
-  auto workspace = q.workspace();
-  std::vector<double> all, row(q.n_actions());
-  for (const auto& state : states) {
-    q.values(state, workspace, row);
-    all.insert(all.end(), row.begin(), row.end());
-    EXPECT_EQ(q.value(state, workspace, 1), row[1]);
-  }
-  return all;
-}
-
-// Each thread reads the values that a single reader would read between the updates.
-template <ActionValue Q>
-void expect_that_threads_may_read(Q q) {
-  const auto states = some_states(60);
-  auto workspace = q.workspace();
-  for (int round = 0; round < 3; ++round) {
-    for (const auto& state : states) q.update(state, workspace, 1, 7.0 - round, 0.5);
-    const Q alone = q;
-    const auto expected = all_values(alone, states);
-    const auto read = testing::in_threads(4, [&](std::size_t) { return all_values(q, states); });
-    for (const auto& values : read) ASSERT_EQ(values, expected);
-  }
-}
-
 // Workspaces that were not used for an update, or for thousands, and those of a copy.
 template <ActionValue Q>
 void expect_that_workspaces_follow(Q q) {
@@ -164,12 +121,6 @@ void expect_that_workspaces_follow(Q q) {
   expect_fresh(copy, workspace_of_both, states[0]);
 }
 
-TEST(ActionValue, ManyThreadsMayReadAModel) {
-  expect_that_threads_may_read(SDNNC(small_network(), 3));
-  expect_that_threads_may_read(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
-  expect_that_threads_may_read(RBFNetwork({.n_inputs = 2, .n_bases = 3, .n_actions = 5}));
-}
-
 TEST(ActionValue, AnyNumberOfWorkspacesFollowsAModel) {
   expect_that_workspaces_follow(SDNNC(small_network(), 3));
   expect_that_workspaces_follow(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
@@ -185,32 +136,6 @@ TEST(ActionValueDeathTest, ForeignWorkspacesOfAnotherSizeAreRefused) {
   EXPECT_DEATH(network.values(some_states(1)[0], foreign, row), "fits");
 }
 #endif
-
-// The average is rounded once, by the thread that asks first.
-TEST(ActionValue, ManyThreadsMayReadAnAverage) {
-  SDNNCConfig config = small_network();
-  config.averaging_interval = 5;
-  SDNNC network(config, 3);
-  auto workspace = network.workspace();
-  const auto states = some_states(40);
-  const auto averages = [&](const SDNNC& read) {
-    auto own = read.workspace();
-    std::vector<double> all, row(5);
-    for (const auto& state : states) {
-      read.averaged_values(state, own, row);
-      all.insert(all.end(), row.begin(), row.end());
-    }
-    return all;
-  };
-  for (int round = 0; round < 3; ++round) {
-    for (const auto& state : states) network.update(state, workspace, 1, 9.0 - round);
-    const SDNNC alone = network;
-    const auto expected = averages(alone);
-    for (const auto& values :
-         testing::in_threads(4, [&](std::size_t) { return averages(network); }))
-      ASSERT_EQ(values, expected);
-  }
-}
 
 // A correction at a rate is one at rate 1 towards (1 - rate) Q + rate target: the same bits.
 template <ActionValue Q>

@@ -110,33 +110,28 @@ TEST(FuzzyRules, FiringAllocatesNothing) {
   EXPECT_EQ(fired.size(), 64U);
 }
 
-template <class Error>
 std::string refusal(const FuzzyRulesConfig& config) {
-  return testing::message_of<Error>([&] { FuzzyRules rules(config); });
+  return testing::message_of<std::length_error>([&] { FuzzyRules rules(config); });
 }
 
 TEST(FuzzyRules, TooLargeATableIsRefusedBeforeMemoryIsAskedFor) {
   EXPECT_EQ(
-      refusal<std::length_error>({.n_inputs = 9}),
+      refusal({.n_inputs = 9}),
       "n_sets or n_inputs must be smaller: a table of 9^9 = 387420489 rules needs 32543321076 "
       "bytes, but max_table_bytes is "
       "1073741824");
-  EXPECT_EQ(refusal<std::length_error>({.n_inputs = 2, .max_table_bytes = 81 * 84 - 1}),
+  EXPECT_EQ(refusal({.n_inputs = 2, .max_table_bytes = 81 * 84 - 1}),
             "n_sets or n_inputs must be smaller: a table of 9^2 = 81 rules needs 6804 bytes, but "
             "max_table_bytes is 6803");
-  EXPECT_EQ(refusal<std::length_error>({.n_inputs = 2, .max_table_bytes = 81 * 84}), "no error");
+  EXPECT_EQ(refusal({.n_inputs = 2, .max_table_bytes = 81 * 84}), "no error");
 }
 
-TEST(FuzzyRules, NamesWhatIsImpossible) {
-  using Error = std::invalid_argument;
-  EXPECT_EQ(refusal<Error>({.n_inputs = 0}), "n_inputs must be in [1, 62], got 0");
-  EXPECT_EQ(refusal<Error>({.n_sets = 1}), "n_sets must be in [2, 1048576], got 1");
-  EXPECT_EQ(refusal<Error>({.n_actions = 0}), "n_actions must be in [1, 1048576], got 0");
+TEST(FuzzyRules, ABadStateFiresNothing) {
   const FuzzyRules rules({.n_inputs = 2});
   FiredRules fired = fire(rules, {0.3, 0.4});
   const auto before = fired.rules;
   for (const auto& bad : {std::vector<double>{0.5}, {0.5, 1.1}, {std::nan(""), 0.0}}) {
-    EXPECT_THROW(rules.fire(bad, fired), Error);
+    EXPECT_THROW(rules.fire(bad, fired), std::invalid_argument);
     EXPECT_EQ(fired.rules, before);
   }
 }

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <vector>
 
 #include "allocation_count.hpp"
@@ -40,45 +39,6 @@ TEST(SDNNC, AveragingDoesNotTouchLearning) {
   const State state = random_state(3, random);
   EXPECT_EQ(averaged_values(network, state), values(network, state));  // as there is none
   EXPECT_NE(averaged_values(averaging_one, state), values(network, state));
-}
-
-TEST(SDNNC, AveragedValuesAreThoseOfTheAveragedWeights) {
-  Network network(averaging(), 5), other(small(), 5);
-  core::Random random(1, core::Stream::weights);
-  const std::size_t n_columns = network.state_code().n_columns();
-  for (int t = 0; t < 300; ++t) {
-    const State state = random_state(3, random);
-    EXPECT_EQ(network.has_average(), t >= 7);
-    network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
-    if (t % 20 != 8) continue;
-    std::vector<std::int32_t> weights, thresholds;
-    for (std::size_t unit = 0; unit < 200; ++unit) {
-      thresholds.push_back(network.averaged_threshold(unit));
-      for (std::size_t j = 0; j < n_columns; ++j) {
-        weights.push_back(network.averaged_weight(unit, j));
-      }
-    }
-    other.set_parameters(weights, thresholds);
-    for (int i = 0; i < 5; ++i) {
-      const State asked = random_state(3, random);
-      ASSERT_EQ(averaged_values(network, asked), values(other, asked)) << t;
-    }
-  }
-}
-
-// Random targets from -5 to 15: the value is the last one, that of the average near their median.
-TEST(SDNNC, TheAverageStillsWhatSwings) {
-  Network network(averaging(), 5);
-  core::Random random(2, core::Stream::weights);
-  const State state = {0.2, 0.7, 0.4};
-  double furthest = 0.0;
-  for (int t = 0; t < 6000; ++t) {
-    network.update(state, 30, 20.0 * random.uniform() - 5.0);
-    if (t < 1000 || t % 50 != 0) continue;
-    furthest = std::max(furthest, std::abs(network.value(state, 30) - 5.0));
-    ASSERT_LT(std::abs(averaged_values(network, state)[30] - 5.0), 5.0) << t;
-  }
-  EXPECT_GT(furthest, 9.0);
 }
 
 TEST(SDNNC, OtherParametersBeginAnotherAverage) {

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
-#include <vector>
 
 #include "sdnn/core/state.hpp"
 #include "states.hpp"
@@ -82,25 +81,6 @@ TEST(WeightAverage, ForgetsAndBeginsAnew) {
   EXPECT_EQ(average.n_snapshots(), 0U);
   average.note(110, layer);
   EXPECT_EQ(steps_of(average, 0, 0), 9);
-}
-
-TEST(WeightAverage, GoesOnFromItsState) {
-  HiddenLayer layer(70, 3);
-  WeightAverage whole(layer, 3);
-  const auto live = [&layer](WeightAverage& average, std::uint64_t from, std::uint64_t to) {
-    for (std::uint64_t n = from; n < to; ++n) {
-      layer.set_weight(n % 70, n % 3, static_cast<std::int32_t>(n % 300) - 150);
-      average.note(n, layer);
-    }
-  };
-  live(whole, 1, 500);
-  WeightAverage resumed(layer, 3);
-  core::restore(resumed, core::state_of(whole));
-  HiddenLayer same = layer;
-  live(whole, 500, 900);
-  layer = same;
-  live(resumed, 500, 900);
-  EXPECT_EQ(core::state_of(resumed), core::state_of(whole));
 }
 
 TEST(WeightAverage, RefusesAStateThatDoesNotFit) {
