@@ -169,64 +169,6 @@ TEST(AcrobotBatch, RejectsBadArgumentsBeforeAnythingMoves) {
   EXPECT_THROW(AcrobotBatch(config, 1), std::invalid_argument);
 }
 
-TEST(AcrobotBatch, EndsEpisodesOneByOne) {
-  const AcrobotConfig config{.max_decisions = 2};
-  AcrobotBatch batch(config, 2);
-  EXPECT_EQ(batch.size(), 2u);
-  batch.set_state(0, {2.0, 0.0, 2.0, 0.0});
-  Step step(2);
-  step.of(batch);
-  EXPECT_TRUE(step.terminated[0]);
-  EXPECT_EQ(step.rewards[0], 10.0);
-  EXPECT_FALSE(step.terminated[1] || step.truncated[1]);
-  EXPECT_THROW(step.of(batch), std::logic_error);
-  batch.reset(0);
-  EXPECT_EQ(batch.state(0), AcrobotState::Zero());
-  step.of(batch);
-  EXPECT_FALSE(step.truncated[0]);
-  EXPECT_TRUE(step.truncated[1]);
-  batch.reset();
-  EXPECT_EQ(batch.decisions(0), 0);
-  EXPECT_EQ(batch.decisions(1), 0);
-}
-
-TEST(AcrobotBatch, ResetsThoseOfAMask) {
-  AcrobotBatch batch({}, 3);
-  Step step(3);
-  step.torques.assign(3, 10.0);
-  step.of(batch);
-  const AcrobotState moved = batch.state(0);
-  EXPECT_NE(moved, AcrobotState::Zero());
-  batch.reset(std::vector<std::uint8_t>{0, 1, 0});
-  EXPECT_EQ(batch.state(0), moved);
-  EXPECT_EQ(batch.state(1), AcrobotState::Zero());
-  EXPECT_EQ(batch.decisions(1), 0);
-  EXPECT_EQ(batch.decisions(2), 1);
-  EXPECT_THROW(batch.reset(std::vector<std::uint8_t>{0, 1}), std::invalid_argument);
-}
-
-TEST(AcrobotBatch, WritesRowsOfWhatSingleCallsGive) {
-  AcrobotBatch batch({}, 3);
-  Step step(3);
-  step.torques = {10.0, 0.0, -7.0};
-  step.of(batch);
-  std::vector<double> states(12), observations(12), heights(3);
-  batch.states(states);
-  batch.observations(observations);
-  batch.tip_heights(heights);
-  for (std::size_t i = 0; i < 3; ++i) {
-    const AcrobotState state = batch.state(i);
-    EXPECT_EQ(AcrobotState(&states[4 * i]), state);
-    EXPECT_EQ(AcrobotState(&observations[4 * i]), basic_observation(state));
-    EXPECT_EQ(heights[i], batch.tip_height(i));
-  }
-  EXPECT_EQ(heights[1], -2.0);
-  EXPECT_THROW(batch.tip_heights(states), std::invalid_argument);
-  states.push_back(0.0);
-  EXPECT_THROW(batch.states(states), std::invalid_argument);
-  EXPECT_THROW(batch.observations(states), std::invalid_argument);
-}
-
 TEST(AcrobotBatch, AStepAllocatesNothing) {
   AcrobotBatch batch({}, 21);
   Step step(21);

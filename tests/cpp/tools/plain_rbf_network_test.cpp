@@ -3,11 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
-#include <stdexcept>
 #include <vector>
 
 #include "allocation_count.hpp"
@@ -28,22 +25,6 @@ static_assert(agents::Agent<agents::QLearning<PlainRBFNetwork>>);
 
 using Plain = testing::WithWorkspace<PlainRBFNetwork>;
 using Factored = testing::WithWorkspace<RBFNetwork>;
-
-// d = 1, two bases at 0 and 1; a step at x = 1/2 for the middle of three actions has all four
-// joint bases 1/4: each weight becomes 1/2 of 8 of 1/4 = 1, so Q = 1 everywhere.
-TEST(PlainRBFNetwork, OneGradientStepByHand) {
-  Plain network({.n_inputs = 1, .n_bases = 2, .n_actions = 3, .gradient_rate = 0.5});
-  EXPECT_EQ(network.n_inputs(), 1U);
-  EXPECT_EQ(network.n_actions(), 3U);
-  const std::vector<double> state = {0.5}, other = {0.2};
-  network.update(state, 1, 8.0);
-  std::vector<double> out(3);
-  network.values(other, out);
-  for (std::size_t action = 0; action < 3; ++action) {
-    EXPECT_NEAR(out[action], 1.0, 1e-15);
-    EXPECT_NEAR(network.value(other, action), 1.0, 1e-15);
-  }
-}
 
 TEST(PlainRBFNetwork, GivesAndLearnsWhatTheFactoredOneDoes) {
   const RBFNetworkConfig config = {.n_inputs = 3, .n_actions = 17};
@@ -112,30 +93,6 @@ TEST(PlainRBFNetwork, ValuesAllocateNothing) {
   const std::size_t before = testing::allocation_count();
   network.values(state, out);
   EXPECT_EQ(testing::allocation_count(), before);
-}
-
-// The bits are the same with every compiler and optimization level.
-TEST(PlainRBFNetwork, KeepsItsBits) {
-  Plain network = taught({.width = 1.0}, 200);
-  std::uint64_t digest = 0;
-  for (const double w : network.network().weights()) {
-    digest = digest * 31 + std::bit_cast<std::uint64_t>(w);
-  }
-  std::vector<double> out(601);
-  network.values(std::vector<double>{0.3, 0.1, 0.7, 0.5}, out);
-  for (const double q : out) digest = digest * 31 + std::bit_cast<std::uint64_t>(q);
-  EXPECT_EQ(digest, 9187274102790421898U);
-}
-
-TEST(PlainRBFNetwork, RefusesWhatTheFactoredOneRefuses) {
-  EXPECT_THROW(PlainRBFNetwork({.n_bases = 1}), std::invalid_argument);
-  Plain network({.n_inputs = 2, .n_actions = 3});
-  const std::vector<double> good = {0.1, 0.2}, bad = {0.1, 1.2};
-  std::vector<double> out(3), short_out(2);
-  EXPECT_THROW(network.values(bad, out), std::invalid_argument);
-  EXPECT_THROW(network.values(good, short_out), std::invalid_argument);
-  EXPECT_THROW((void)network.value(good, 3), std::invalid_argument);
-  EXPECT_THROW(network.update(bad, 0, 1.0), std::invalid_argument);
 }
 
 }  // namespace

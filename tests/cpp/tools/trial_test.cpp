@@ -209,23 +209,6 @@ TEST(AcrobotTrial, TestEpisodesDoNotChangeWhatIsLearned) {
   }
 }
 
-TEST(AcrobotTrial, EpisodesAreCountedAndTestedWhenDue) {
-  auto run = table_trial({.protocol = {.episodes = 25, .evaluate_every_episodes = 10}});
-  EXPECT_EQ(run.episode(), 0);
-  EXPECT_FALSE(run.finished());
-  run.advance(9);
-  EXPECT_EQ(run.episode(), 9);
-  EXPECT_TRUE(run.rows().empty());
-  run.advance(1);
-  ASSERT_EQ(run.rows().size(), 1U);
-  EXPECT_EQ(run.rows()[0].episode, 10);
-  run.advance(100);
-  EXPECT_EQ(run.episode(), 25);
-  EXPECT_TRUE(run.finished());
-  ASSERT_EQ(run.rows().size(), 2U);
-  EXPECT_EQ(run.rows()[1].episode, 20);
-}
-
 TEST(AcrobotTrial, AnUnsolvedTestEpisodeCountsAllItsDecisions) {
   auto run = table_trial({.acrobot = {.goal_height = 2.5}, .protocol = {.episodes = 20}});
   run.advance(20);
@@ -328,14 +311,8 @@ TEST(AcrobotTrial, AnEpisodeMeetsNoMemoryForTheFirstTime) {
 
 TEST(AcrobotTrial, NamesWhatIsImpossible) {
   using testing::message_of;
-  EXPECT_EQ(message_of([] { table_trial({.protocol = {.episodes = 0}}); }),
-            "episodes must be in [1, 1073741824], got 0");
-  EXPECT_EQ(message_of([] { table_trial({.protocol = {.evaluate_every_episodes = 0}}); }),
-            "evaluate_every_episodes must be in [1, 1073741824], got 0");
   EXPECT_EQ(message_of([] { trial(LookupTable(5, 2, 3), {}); }),
             "n_inputs must be the number of inputs of the sensors, 4, got 5");
-  EXPECT_EQ(message_of([] { trial(LookupTable(4, 2, 3), {.sensors = {.n_sensors = 7}}); }),
-            "n_sensors must be in [4, 6], got 7");
   EXPECT_EQ(message_of([] { table_trial({}).advance(-1); }),
             "n_episodes must be in [0, 1073741824], got -1");
   auto one = table_trial({}), other = table_trial({.acrobot = {.gravity = 1.6}});

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "sdnn/core/random.hpp"
-
 namespace sdnn::environments {
 namespace {
 
@@ -34,32 +32,6 @@ TEST(AcrobotDynamicsForms, StopsAtTheGoalAndSaysSo) {
   EXPECT_FALSE(dynamics.integrate<One>(still, 0.0, 9.0, 15.0, false));
   EXPECT_EQ(still, (One::State{2.0, 0.0, 2.0, 0.0}));
 }
-
-#if SDNN_LANES
-TEST(AcrobotDynamicsForms, KeepTheirBits) {
-  for (const auto goal_test : {GoalTest::every_step, GoalTest::decision_instant}) {
-    const AcrobotConfig config{.goal_test = goal_test};
-    const AcrobotDynamics dynamics(config);
-    core::Random random(3, core::Stream::exploration);
-    int n_goals = 0;
-    for (int i = 0; i < 2000; ++i) {
-      One::State one;
-      for (double& value : one) value = 6.0 * random.uniform() - 3.0;
-      PairedForm::State paired{core::Lanes<2>::load(one.data()),
-                               core::Lanes<2>::load(one.data() + 2)};
-      const double torque = 20.0 * random.uniform() - 10.0, limit = 15.0 * random.uniform();
-      const bool goal = dynamics.integrate<One>(one, torque, limit, limit, true);
-      EXPECT_EQ(goal, (dynamics.integrate<PairedForm>(paired, torque, limit, limit, true)));
-      One::State other;
-      paired[0].store(other.data());
-      paired[1].store(other.data() + 2);
-      ASSERT_EQ(one, other);
-      n_goals += goal;
-    }
-    EXPECT_GT(n_goals, 10);
-  }
-}
-#endif
 
 }  // namespace
 }  // namespace sdnn::environments
