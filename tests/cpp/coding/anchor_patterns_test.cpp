@@ -12,12 +12,6 @@ PatternTable paper_table(std::uint64_t seed, AnchorConfig config = {.n_units = 2
   return anchor_patterns(config, random);
 }
 
-TEST(AnchorPatterns, ThePaperHas360PatternsOf200Units) {
-  const PatternTable table = paper_table(1);
-  EXPECT_EQ(table.n_bins(), 360U);
-  EXPECT_EQ(table.n_units(), 200U);
-}
-
 TEST(AnchorPatterns, AnchorsAreBalancedAndEveryPatternNearlySo) {
   const PatternTable table = paper_table(2);
   for (std::size_t anchor = 0; anchor < 8; ++anchor) {
@@ -54,14 +48,6 @@ TEST(AnchorPatterns, NeighboursDifferByNearlyEqualPortions) {
       }
     }
   }
-}
-
-TEST(AnchorPatterns, ACircularBookEndsNextToItsBeginning) {
-  const PatternTable straight = paper_table(4);
-  const PatternTable circular = paper_table(4, {.n_units = 200, .circular = true});
-  EXPECT_LE(circular[359].distance(circular[0]), 4U);
-  EXPECT_GT(straight[359].distance(straight[0]), 60U);
-  EXPECT_EQ(straight[100], circular[100]);  // only the last segment differs
 }
 
 TEST(AnchorPatterns, NamesWhatIsImpossible) {

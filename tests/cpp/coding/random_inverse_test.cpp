@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <stdexcept>
 
 namespace {
@@ -27,19 +26,6 @@ TEST(RandomInverse, NeighboursDifferInTheAskedNumberOfEachSign) {
     if (bin > 0) {
       EXPECT_EQ(product(table, bin - 1, bin), 40 - 2 * 6) << bin;
     }
-  }
-}
-
-TEST(RandomInverse, CorrelationFallsExponentially) {
-  core::Random random(5, core::Stream::code_books);
-  const auto table = coding::random_inverse_patterns({2000, 401, 5}, random);
-  for (const std::size_t distance : {10U, 50U, 100U}) {
-    double sum = 0.0;
-    std::size_t n = 0;
-    for (std::size_t bin = 0; bin + distance < table.n_bins(); bin += 7, ++n) {
-      sum += product(table, bin, bin + distance) / 2000.0;
-    }
-    EXPECT_NEAR(sum / static_cast<double>(n), std::pow(0.99, static_cast<double>(distance)), 0.05);
   }
 }
 

@@ -76,24 +76,6 @@ TEST(Random, BelowIsUniformAndBounded) {
   for (int i = 0; i < 100; ++i) EXPECT_LT(random.below(huge), huge);
 }
 
-TEST(Random, NormalHasTheMomentsOfTheStandardNormal) {
-  Random random(5, Stream::sensor_noise);
-  constexpr int kDraws = 200000;
-  std::array<double, 4> moments{};
-  for (int i = 0; i < kDraws; ++i) {
-    const double z = random.normal();
-    moments[0] += z / kDraws;
-    moments[1] += z * z / kDraws;
-    moments[2] += z * z * z / kDraws;
-    moments[3] += z * z * z * z / kDraws;
-  }
-  const double root = std::sqrt(static_cast<double>(kDraws));  // five standard errors each
-  EXPECT_NEAR(moments[0], 0.0, 5 * 1.0 / root);
-  EXPECT_NEAR(moments[1], 1.0, 5 * std::sqrt(2.0) / root);
-  EXPECT_NEAR(moments[2], 0.0, 5 * std::sqrt(15.0) / root);
-  EXPECT_NEAR(moments[3], 3.0, 5 * std::sqrt(96.0) / root);
-}
-
 TEST(Random, NormalConsumesOneDraw) {
   Random normal(6, Stream::sensor_noise), bits(6, Stream::sensor_noise);
   for (int i = 0; i < 1000; ++i) {

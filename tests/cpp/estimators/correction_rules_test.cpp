@@ -8,8 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "sdnn/core/random.hpp"
-
 namespace {
 
 using namespace sdnn;
@@ -61,36 +59,6 @@ TEST(PDeltaRule, TellsFarUnitsApart) {
   EXPECT_EQ(apply(rule, 0, {-far, 1 - far, -far}), (Pairs{{1, 1}}));
   EXPECT_EQ(apply(rule, 1, {-far, 1 - far, -far}), (Pairs{{0, 1}, {1, 1}}));
   EXPECT_EQ(apply(rule, 0, {far, far, 7}), (Pairs{{0, -1}, {2, -1}}));
-}
-
-TEST(PDeltaRule, AgreesWithSorting) {
-  core::Random random(1, core::Stream::exploration);
-  for (int trial = 0; trial < 500; ++trial) {
-    const std::size_t n = 1 + random.below(120);
-    const double target = random.uniform() * static_cast<double>(n);
-    std::vector<std::int32_t> potentials(n);
-    for (auto& p : potentials) p = static_cast<std::int32_t>(random.below(21)) - 10;
-    const auto n_firing =
-        std::count_if(potentials.begin(), potentials.end(), [](auto p) { return p > 0; });
-    const auto deficit =
-        static_cast<std::int32_t>(std::floor(target + 0.5)) - static_cast<std::int32_t>(n_firing);
-    Pairs ranked;
-    for (std::uint32_t i = 0; i < n; ++i) {
-      if ((potentials[i] > 0) == (deficit < 0)) {
-        ranked.emplace_back(static_cast<std::uint32_t>(std::abs(potentials[i])),
-                            static_cast<std::int32_t>(i));
-      }
-    }
-    std::sort(ranked.begin(), ranked.end());
-    Pairs expected;
-    for (int k = 0; k < std::abs(deficit); ++k) {
-      expected.emplace_back(static_cast<std::uint32_t>(ranked[static_cast<std::size_t>(k)].second),
-                            deficit > 0 ? 1 : -1);
-    }
-    std::sort(expected.begin(), expected.end());
-    estimators::PDeltaRule rule(n, std::vector<double>{target}, 1);
-    ASSERT_EQ(apply(rule, 0, potentials), expected) << trial;
-  }
 }
 
 TEST(ClassScheme, NamesGoBothWaysAndCountUnits) {

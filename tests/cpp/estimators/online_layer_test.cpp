@@ -7,7 +7,6 @@
 #include <memory>
 #include <span>
 #include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "estimators/problems.hpp"
@@ -75,26 +74,6 @@ TEST(OnlineLayer, HasTheBitsOfPlainTraining) {
       expect_plain_bits(testing::random_problem(seed));
     }
   });
-}
-
-TEST(OnlineLayer, ClassifiersHaveTheSameBits) {
-  Problem problem = testing::random_problem(5);
-  problem.n_units = 6;
-  const std::size_t n_inputs = problem.code->n_inputs();
-  std::vector<std::int32_t> labels(problem.bins.size() / n_inputs);
-  for (std::size_t t = 0; t < labels.size(); ++t) labels[t] = static_cast<std::int32_t>(t * t % 4);
-  std::vector<std::int32_t> order(labels.size());
-  for (std::size_t t = 0; t < order.size(); ++t) order[t] = static_cast<std::int32_t>(t);
-  const estimators::PerceptronRule rule(6, labels, 4, estimators::ClassScheme::one_vs_one);
-  const auto plain_layer = testing::layer_for(problem);
-  const auto layer = testing::layer_for(problem);
-  estimators::PerceptronTrainer plain(plain_layer, problem.bins, rule, TrainingForm::plain);
-  plain.present(order);
-  OnlineLayer online(layer);
-  auto own_rule = rule;
-  online.present(problem.bins, own_rule);
-  online.synchronize();
-  EXPECT_EQ(testing::bits_of(*layer), testing::bits_of(*plain_layer));
 }
 
 TEST(OnlineLayer, ChangesNothingWhenItIsStopped) {

@@ -12,34 +12,6 @@ namespace {
 
 using estimators::TrainingForm;
 
-TEST(Trainer, ClassifiersHaveTheSameBitsInAllForms) {
-  for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    auto problem = testing::random_problem(seed);
-    const std::size_t n_classes = 2 + seed % 11;
-    const auto scheme =
-        seed % 2 == 0 ? estimators::ClassScheme::one_vs_one : estimators::ClassScheme::one_vs_rest;
-    problem.n_units = estimators::n_units_for(scheme, n_classes);
-    const std::size_t n_samples = problem.bins.size() / problem.code->n_inputs();
-    std::vector<std::int32_t> labels;
-    for (std::size_t t = 0; t < n_samples; ++t) {
-      labels.push_back(static_cast<std::int32_t>(t * t % n_classes));
-    }
-    std::vector<std::vector<std::int32_t>> bits;
-    for (const auto form : {TrainingForm::plain, TrainingForm::dual, TrainingForm::block}) {
-      const auto layer = testing::layer_for(problem);
-      estimators::PerceptronTrainer trainer(
-          layer, problem.bins,
-          estimators::PerceptronRule(problem.n_units, labels, n_classes, scheme), form,
-          std::size_t{1} << 30, 1);
-      for (const auto& order : problem.orders) trainer.present(order);
-      trainer.synchronize();
-      bits.push_back(testing::bits_of(*layer));
-    }
-    ASSERT_EQ(bits[0], bits[1]) << seed;
-    ASSERT_EQ(bits[0], bits[2]) << seed;
-  }
-}
-
 TEST(Trainer, StopsBeforeAPotentialOverflows) {
   auto problem = testing::random_problem(2);
   std::fill(problem.targets.begin(), problem.targets.end(), 0.0);  // a silent unit stays as it is

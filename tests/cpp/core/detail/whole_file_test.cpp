@@ -84,22 +84,6 @@ TEST(WholeFile, IsWrittenUnderAnotherNameEachTime) {
   EXPECT_EQ(names.size(), 20U);
 }
 
-TEST(WholeFile, SaysWhatCannotBeWritten) {
-  const testing::Folder folder;
-  const auto missing = folder / "missing";
-  const auto path = missing / "file";
-  EXPECT_EQ(testing::runtime_error_of([&] { WholeFile file(path); }),
-            path.string() + ": cannot be written: No such file or directory");
-  std::filesystem::create_directories(missing / "inside");
-  EXPECT_EQ(testing::runtime_error_of([&] {
-              WholeFile file(missing);
-              write(file, "text");
-              file.finish();
-            }).rfind(missing.string() + ": cannot be written: ", 0),
-            0U);
-  EXPECT_EQ(folder.n_files(), 1U);
-}
-
 TEST(RegularFile, IsReadInParts) {
   const testing::Folder folder;
   testing::write_content(folder / "file", "one, two");
