@@ -138,7 +138,7 @@ TEST(AgentFile, WhatBelongsToATrainingIsKept) {
   EXPECT_TRUE(later.tensors.contains("agent.action_value.weights"));
 }
 
-TEST(AgentFile, SaysWhatDoesNotFit) {
+TEST(AgentFile, NamesTheFieldThatDoesNotFit) {
   const testing::Folder folder;
   const auto path = folder / "agent";
   AgentFile lived{Controller(small())};

@@ -20,16 +20,6 @@ static_assert(Agent<QLearning<approximators::RBFNetwork>>);
 static_assert(Agent<FuzzyQLearning>);
 static_assert(!Agent<approximators::RBFNetwork>);
 
-TEST(Agent, DiscreteActionsCutTheRangeEvenly) {
-  const testing::OneDimension<QLearning<testing::LookupTable>> agent(testing::LookupTable(1, 2, 5),
-                                                                     {}, 1);
-  const std::vector<double> expected = {-1.0, -0.5, 0.0, 0.5, 1.0};
-  for (std::size_t action = 0; action < 5; ++action) {
-    EXPECT_EQ(agent.normalized_action(action), expected[action]);
-  }
-  EXPECT_EQ(agent.n_inputs(), 1U);
-}
-
 // Episodes are the caller's: only begin_episode starts the greedy first steps anew.
 template <Agent A>
 void expect_that_learning_begins_no_episode(A agent) {

@@ -313,7 +313,7 @@ TEST(Controller, TakesAllowedActionsOnly) {
                std::invalid_argument);
 }
 
-TEST(Controller, TakesRatesOverFromItsWarmUp) {
+TEST(Controller, KeepsTheRatesOfItsWarmUp) {
   Controller controller(with_warm_up(rbf_config()));
   controller.set_epsilon(0.75);
   controller.set_progress(0.5);
@@ -346,7 +346,7 @@ TEST(Controller, RefusesStatesThatDoNotFit) {
 }
 
 // A state may ask for no more memory than it has arrays.
-TEST(Controller, ComparesSizesBeforeMemoryIsAskedFor) {
+TEST(Controller, ComparesSizesBeforeItAllocatesMemory) {
   const auto error_of = [](const ControllerConfig& config, const core::State& state) {
     return testing::message_of([&] { (void)Controller::restored(config, state); });
   };

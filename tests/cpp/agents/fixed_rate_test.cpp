@@ -37,7 +37,7 @@ TEST(FixedRate, TicksDoNotDrift) {
   EXPECT_EQ(rate.worst_lateness(), 0.0);
 }
 
-TEST(FixedRate, AfterAMissItGoesOnWithTheNextTickToCome) {
+TEST(FixedRate, AfterAMissItContinuesWithTheNextTick) {
   HandClock clock;
   FixedRate rate = clock.rate(4.0);
   EXPECT_EQ(rate.wait(), 0);

@@ -136,7 +136,7 @@ TEST(FuzzyQLearning, TracesThatWouldNotFadeAreRefused) {
             "trace_decay must be at most 0.99 / discount, got 1");
 }
 
-TEST(FuzzyQLearning, TooManyTracesAreRefusedBeforeMemoryIsAskedFor) {
+TEST(FuzzyQLearning, TooManyTracesAreRefusedBeforeMemoryIsAllocated) {
   const FuzzyRules rules({.n_inputs = 16, .n_sets = 2, .n_actions = 2});
   EXPECT_THROW(Fuzzy(rules, {.discount = 1.0, .trace_decay = 0.99}, 1), std::length_error);
   EXPECT_EQ(Fuzzy(rules, {}, 1).n_inputs(), 16U);
@@ -189,7 +189,7 @@ TEST(FuzzyQLearning, ALifeCanBeCutAnywhere) {
 
 // Where two environments fire different rules, each goes as if it were alone, but for what is
 // drawn.
-TEST(FuzzyQLearning, EachEnvironmentHasAnActAndTracesOfItsOwn) {
+TEST(FuzzyQLearning, EachEnvironmentHasItsLastActionAndTraces) {
   const FuzzyQLearningConfig config{.trace_decay = 0.5, .policy = kGreedy};
   const FuzzyRules rules({.n_inputs = 2, .n_sets = 4, .n_actions = 3});
   Fuzzy both(rules, config, 1), low(rules, config, 1), high(rules, config, 1);
@@ -290,7 +290,7 @@ FuzzyQLearning agent_of_two() {
   return {std::vector<FuzzyRules>{small_rules(), small_rules()}, kTraced, 1};
 }
 
-TEST(FuzzyQLearning, OfVectorsEachDimensionLearnsAsAnAgentOfItsOwn) {
+TEST(FuzzyQLearning, WithVectorsEachDimensionLearnsAsASeparateAgent) {
   FuzzyQLearning both = agent_of_two();
   Fuzzy first = part(1), second = part(seed_of_dimension(1, 1));
   EXPECT_EQ(both.n_dimensions(), 2U);
@@ -317,24 +317,9 @@ TEST(FuzzyQLearning, OfVectorsEachDimensionLearnsAsAnAgentOfItsOwn) {
   EXPECT_EQ(core::state_of(both.dimensions()[1]), core::state_of(second));
 }
 
-TEST(FuzzyQLearning, OfVectorsALifeCanBeCutAnywhere) {
+TEST(FuzzyQLearning, WithVectorsALifeCanBeCutAnywhere) {
   testing::expect_that_a_life_can_be_cut(agent_of_two);
   testing::expect_that_a_life_can_be_cut(agent_of_two, 3);
-}
-
-TEST(FuzzyQLearning, OfVectorsABadTransitionTeachesNothing) {
-  FuzzyQLearning agent = agent_of_two();
-  const Numbers state = {0.2, 0.9};
-  const Numbers action = testing::copied(agent.act(state));
-  const core::State before = core::state_of(agent);
-  for (const Numbers& bad :
-       {Numbers{action[0]}, Numbers{action[0], 0.123}, Numbers{0.123, action[1]}, Numbers{}}) {
-    EXPECT_THROW(agent.learn(state, bad, 1.0, state, false), std::invalid_argument);
-  }
-  EXPECT_THROW(agent.learn(Numbers{0.2, 0.8}, action, 1.0, state, false), std::invalid_argument);
-  EXPECT_THROW(agent.learn(state, action, 1.0, Numbers{0.2, 1.1}, false), std::invalid_argument);
-  EXPECT_THROW(agent.learn(state, action, 1.0, state, false, 1), std::invalid_argument);
-  EXPECT_EQ(core::state_of(agent), before);
 }
 
 TEST(FuzzyQLearning, NeedsRulesOfTheSameInputs) {

@@ -71,7 +71,7 @@ TEST(NStepBuffer, KnowWhereTheNewestLed) {
   EXPECT_TRUE(steps.is_continued_by(Numbers{0.26}));
 }
 
-TEST(NStepBuffer, EachIsAskedOnceAndOnlyThoseThatWait) {
+TEST(NStepBuffer, VisitsEachPendingStepOnce) {
   NStepBuffer steps(3, 1, 2);
   for (int i = 0; i < 3; ++i) add(steps, i);
   steps.take_oldest();

@@ -206,7 +206,7 @@ TEST(QLambda, EndsMakeRandomActionsShorter) {
   }
 }
 
-TEST(QLambda, EnvironmentsHaveTracesOfTheirOwn) {
+TEST(QLambda, EnvironmentsHaveSeparateTraces) {
   QLambda together = agent_of({});
   together.set_n_environments(2);
   const State a{0.1, 0.1}, b{0.5, 0.5};

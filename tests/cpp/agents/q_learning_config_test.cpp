@@ -136,21 +136,6 @@ TEST(QLearning, RatesThatAreSetStayWhateverTheProgress) {
   }
   EXPECT_THROW(agent.set_learning_rate(0.0), std::invalid_argument);
   EXPECT_EQ(agent.epsilon(), 1.0);
-  auto saved = rbf_agent();
-  EXPECT_FALSE(core::state_of(saved).contains("learning_rate"));
-  saved.set_learning_rate(0.75);
-  saved.set_epsilon(0.5);
-  const core::State good = core::state_of(saved);
-  for (const double bad : {0.0, 1.1, testing::kNaN}) {
-    testing::expect_refused(saved, testing::with_number(good, "learning_rate", bad),
-                            "state: learning_rate must be in (0, 1]");
-  }
-  testing::expect_refused(saved, testing::with_number(good, "epsilon", -0.1),
-                          "state: epsilon must be in [0, 1]");
-  auto other = rbf_agent();
-  core::restore(other, good);
-  EXPECT_EQ(other.learning_rate(), 0.75);
-  EXPECT_EQ(other.epsilon(), 0.5);
 }
 
 }  // namespace

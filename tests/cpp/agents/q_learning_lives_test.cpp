@@ -24,9 +24,9 @@ TEST(QLearning, ALifeCanBeCutAnywhere) {
   testing::expect_that_a_life_can_be_cut(vector_agent, 3);
 }
 
-// Repeats OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown, while another environment goes
+// Repeats ATransitionOfSeveralStepsIsLearnedOnceWhenTheyAreKnown, while another environment goes
 // its way.
-TEST(QLearning, EachEnvironmentHasStepsThatWait) {
+TEST(QLearning, EachEnvironmentHasPendingSteps) {
   LookupTable table(2, 5, 2);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
   agent.set_n_environments(2);
@@ -55,7 +55,7 @@ TEST(QLearning, EachEnvironmentHasStepsThatWait) {
   EXPECT_EQ(q(1, 0), 2.0);
 }
 
-TEST(QLearning, WhatWaitsOfEnvironmentsThatAreNoMoreIsLearned) {
+TEST(QLearning, PendingStepsOfRemovedEnvironmentsAreLearned) {
   Agent agent(LookupTable(1, 5, 2), {.learning_rate = 1.0, .n_steps = 5}, 1);
   agent.set_n_environments(3);
   agent.learn(cell(2), 1, 4.0, cell(3), false, 2);
@@ -84,19 +84,6 @@ TEST(QLearning, AnyOneOfSeveralEnvironmentsIsLikeTheOnlyOne) {
     EXPECT_NE(state.at(before + "n_step_buffer.next_state"),
               state.at("environment.1.n_step_buffer.next_state"));
   }
-}
-
-TEST(QLearning, RefusesEnvironmentsThatAreNone) {
-  Agent agent(LookupTable(1, 5, 2), {}, 1);
-  agent.set_n_environments(2);
-  EXPECT_THROW((void)agent.act(cell(0), true, 2), std::invalid_argument);
-  EXPECT_THROW((void)agent.act(cell(0), false, 2), std::invalid_argument);
-  EXPECT_THROW(agent.begin_episode(2), std::invalid_argument);
-  EXPECT_THROW(agent.learn(cell(0), 0, 1.0, cell(1), false, 2), std::invalid_argument);
-  EXPECT_THROW(agent.set_n_environments(0), std::invalid_argument);
-  EXPECT_THROW(agent.set_n_environments((1U << 20U) + 1U), std::invalid_argument);
-  EXPECT_EQ(agent.n_environments(), 2U);
-  EXPECT_EQ(agent.network(), LookupTable(1, 5, 2));
 }
 
 TEST(QLearning, RefusesAStateOfEnvironmentsThatDoesNotFit) {

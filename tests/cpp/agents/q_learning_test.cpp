@@ -41,7 +41,7 @@ TEST(QLearning, ATransitionToItselfUsesTheOldValue) {
 }
 
 // Rewards 1, 2, 4, then the goal with 8; gamma = 1/2, alpha = 1: every number is exact.
-TEST(QLearning, OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown) {
+TEST(QLearning, ATransitionOfSeveralStepsIsLearnedOnceWhenTheyAreKnown) {
   LookupTable table(1, 5, 2);
   table.update(cell(2), 1, 16.0);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
@@ -62,7 +62,7 @@ TEST(QLearning, OfSeveralStepsATransitionIsLearnedOnceWhenTheyAreKnown) {
   EXPECT_EQ(agent.network(), learned);
 }
 
-TEST(QLearning, WhatWaitsAtTheTimeLimitIsLearnedWhenTheNextEpisodeBegins) {
+TEST(QLearning, PendingStepsAtATimeLimitAreLearnedWhenTheNextEpisodeBegins) {
   LookupTable table(1, 5, 2);
   table.update(cell(2), 1, 16.0);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 5}, 1);
@@ -92,7 +92,7 @@ TEST(QLearning, ATransitionFromElsewhereBeginsAnew) {
   EXPECT_EQ(q(3), 8.0);
 }
 
-TEST(QLearning, WhatCouldNotBeLearnedLaterIsRefusedAtOnce) {
+TEST(QLearning, TransitionsThatCouldNotBeLearnedLaterAreRefusedAtOnce) {
   Agent agent(LookupTable(1, 5, 2), {.n_steps = 3}, 1);
   EXPECT_THROW(agent.learn(Position{1.5}, 0, 1.0, cell(1), false), std::invalid_argument);
   EXPECT_THROW(agent.learn(cell(0), 0, 1.0, Position{1.5}, false), std::invalid_argument);

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -116,7 +115,7 @@ TEST(ReturnRange, IsKnownFromTheFirstOfRareRewards) {
   expect_range(one.range, 0.0, 1.25);
 }
 
-TEST(ReturnRange, EnvironmentsHaveRewardsOfTheirOwn) {
+TEST(ReturnRange, EnvironmentsHaveSeparateRewards) {
   ReturnRange range(1.0);
   ReturnRange::Rewards one = range.no_rewards(), other = range.no_rewards();
   EXPECT_TRUE(range.note(8.0, false, one));

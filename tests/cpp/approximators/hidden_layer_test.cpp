@@ -41,27 +41,6 @@ TEST(HiddenLayer, PotentialsAndCorrectionByHand) {
   EXPECT_EQ(p.threshold(1), 3);
 }
 
-// A column that is half of a sum of two inputs: both weights move by the step, their sum by two.
-TEST(HiddenLayer, DoubleColumnsMoveByTwiceTheStep) {
-  HiddenLayer p(70, 4, 2);
-  const Input x{.plus = {0, 3}, .minus = {1, 2}};
-  for (const auto& units : {std::vector<std::uint32_t>{5}, {5, 6}, {5, 69}}) p.update(units, x, 3);
-  p.update(std::vector<std::uint32_t>{6}, x, -64);
-  const auto row = [&](std::size_t unit) {
-    std::vector<std::int32_t> weights;
-    for (std::size_t j = 0; j < 4; ++j) weights.push_back(p.weight(unit, j));
-    return weights;
-  };
-  EXPECT_EQ(row(5), (std::vector<std::int32_t>{18, -18, -9, 9}));
-  EXPECT_EQ(row(6), (std::vector<std::int32_t>{-122, 122, 61, -61}));
-  EXPECT_EQ(row(69), (std::vector<std::int32_t>{6, -6, -3, 3}));
-  EXPECT_EQ(p.threshold(5), -9);
-  p.update(std::vector<std::uint32_t>{6, 7}, x, -64);  // the one needs a high byte, the other not
-  EXPECT_EQ(row(6), (std::vector<std::int32_t>{-250, 250, 125, -125}));
-  EXPECT_EQ(row(7), (std::vector<std::int32_t>{-128, 128, 64, -64}));
-  EXPECT_THROW(HiddenLayer(1, 3, 4), std::invalid_argument);
-}
-
 // Random problems of many shapes, with weights on both sides of one byte, against plain sums.
 TEST(HiddenLayer, EqualsPlainSumsOnRandomProblems) {
   core::Random random(11, core::Stream::weights);
@@ -270,6 +249,7 @@ TEST(HiddenLayer, AddingToAColumnIsSettingItsWeights) {
 TEST(HiddenLayer, NamesWhatIsImpossible) {
   EXPECT_THROW(HiddenLayer(0, 1), std::invalid_argument);
   EXPECT_THROW(HiddenLayer(1, 0), std::invalid_argument);
+  EXPECT_THROW(HiddenLayer(1, 3, 4), std::invalid_argument);
   HiddenLayer p(1, 1);
   EXPECT_THROW(p.set_weight(0, 0, 40000), std::invalid_argument);
   EXPECT_THROW(p.set_threshold(0, INT32_MAX), std::invalid_argument);

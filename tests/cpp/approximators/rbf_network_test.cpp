@@ -60,14 +60,6 @@ TEST(RBFNetwork, OneGradientStepByHand) {
   }
 }
 
-TEST(RBFNetwork, StartsAtZeroForEveryAction) {
-  UsedRBF network({});
-  EXPECT_EQ(network.n_joint_bases(), 1024U);
-  std::vector<double> out(601, 1.0);
-  network.values(std::vector<double>{0.1, 0.9, 0.0, 1.0}, out);
-  for (const double value : out) EXPECT_EQ(value, 0.0);
-}
-
 // Normalized bases: equal weights give that weight everywhere.
 TEST(RBFNetwork, TheBasesSumToOne) {
   for (const double width : {0.1, 1.0, 100.0}) {
@@ -153,7 +145,7 @@ std::string refusal_of_network(const RBFNetworkConfig& config) {
   return testing::message_of<std::length_error>([&] { UsedRBF network(config); });
 }
 
-TEST(RBFNetwork, TooManyBasesAreRefusedBeforeMemoryIsAskedFor) {
+TEST(RBFNetwork, TooManyBasesAreRefusedBeforeMemoryIsAllocated) {
   EXPECT_EQ(refusal_of_network({.n_inputs = 13}),
             "n_bases or n_inputs must be smaller: a table of 4^14 = 268435456 joint bases needs "
             "2147483648 bytes, but "

@@ -26,26 +26,6 @@ TEST(SDNNC, ThePapersSizesFollowFromTheDefaults) {
   EXPECT_EQ(Network({.n_inputs = 6}, 1).state_code().n_columns(), 6000U);
 }
 
-// Any coding's patterns will do: here angles, symbols and a chain, with as many bins as each has.
-TEST(SDNNC, LearnsOverPatternsOfAnyCoding) {
-  core::Random random(3, core::Stream::code_books);
-  std::vector<coding::PatternTable> tables;
-  tables.push_back(coding::anchor_patterns({.n_units = 50, .circular = true}, random));
-  tables.push_back(coding::anchor_patterns(
-      {.n_units = 50, .n_anchor_patterns = 5, .n_interpolated = 0}, random));
-  tables.push_back(coding::random_inverse_patterns({50, 100, 1}, random));
-  Network network(small(), tables, 7);
-  EXPECT_EQ(network.state_code().table(1).n_bins(), 4U);
-  for (int i = 0; i < 60; ++i) {
-    const State state = random_state(3, random);
-    network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
-    ASSERT_EQ(values(network, state), values_by_masks(network, state));
-  }
-  EXPECT_EQ(values(network, {0.1, 0.0, 0.5}), values(network, {0.1, 0.24, 0.5}));  // one symbol
-  EXPECT_THROW(Network({.n_inputs = 4}, tables, 7), std::invalid_argument);
-  EXPECT_THROW(Network({.n_inputs = 3}, tables, 7), std::invalid_argument);  // 200 units
-}
-
 TEST(SDNNC, PairsOfInputsAreAnEvenShareOfAll) {
   const SDNNCConfig sizes{
       .n_inputs = 7, .n_pattern_units = 20, .n_hidden_units = 60, .n_active_units = 20};
@@ -86,25 +66,6 @@ TEST(SDNNC, PairsOfInputsAreAnEvenShareOfAll) {
   expect_equal_parameters(Network(config, 7), Network(sizes, 7));
 }
 
-TEST(SDNNC, SymbolsHavePatternsOfTheirOwn) {
-  SDNNCConfig config = small();
-  config.n_symbols = {4, 0, 7};
-  Network network(config, 7);
-  const coding::StateCode& code = network.state_code();
-  EXPECT_EQ(code.table(0).n_bins(), 4U);
-  EXPECT_EQ(code.table(1), Network(small(), 7).state_code().table(1));  // a number is as it was
-  EXPECT_EQ(code.table(2).n_bins(), 7U);
-  core::Random random(3, core::Stream::code_books);
-  for (int i = 0; i < 60; ++i) {
-    const auto symbol = static_cast<double>(random.below(4));
-    const State state = {(symbol + 0.5) / 4.0, random.uniform(), random.uniform()};
-    network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
-    ASSERT_EQ(values(network, state), values_by_masks(network, state));
-    const State same = {(symbol + 0.9) / 4.0, state[1], state[2]};
-    ASSERT_EQ(values(network, same), values(network, state));
-  }
-}
-
 std::string message(const SDNNCConfig& config) {
   return testing::message_of([&] { Network(config, 1); });
 }
@@ -113,7 +74,7 @@ void expect_named(const SDNNCConfig& config, const std::string& name) {
   EXPECT_EQ(message(config).rfind(name + " must be ", 0), 0U) << message(config);
 }
 
-TEST(SDNNC, TooLargeANetworkIsRefusedBeforeMemoryIsAskedFor) {
+TEST(SDNNC, TooLargeANetworkIsRefusedBeforeMemoryIsAllocated) {
   const auto refusal = [](const SDNNCConfig& config) {
     return testing::message_of<std::length_error>([&] { Network(config, 1); });
   };
