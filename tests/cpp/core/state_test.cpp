@@ -138,7 +138,7 @@ TEST(State, HasNothingOfWhatIsMissing) {
   testing::expect_refused(other, bad, "state: other.10.value must not be there");
 }
 
-TEST(StateReader, NamesTheTensorOfWhatCouldNotBeTaken) {
+TEST(StateReader, NamesTheTensorThatCouldNotBeRestored) {
   const State state;
   StateReader reader(state);
   reader.prefix = "net.";

@@ -48,14 +48,6 @@ TEST(AcrobotSensors, HeightIsTheNormalizedTipHeight) {
   }
 }
 
-TEST(AcrobotSensors, FewerSensorsSeeTheSame) {
-  const AcrobotState state{0.3, -2.0, 4.0, -6.0};
-  const auto six = observe({6, 0.0}, state);
-  for (int n = 4; n < 6; ++n) {
-    EXPECT_EQ(observe({n, 0.0}, state), std::vector<double>(six.begin(), six.begin() + n));
-  }
-}
-
 TEST(AcrobotSensors, AnglesNeverReachOne) {
   const double below_pi = std::nextafter(kPi, 0.0);
   const auto seen = observe({4, 0.0}, {below_pi, below_pi, 0.0, 0.0});

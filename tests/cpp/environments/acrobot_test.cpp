@@ -160,7 +160,7 @@ TEST(AcrobotTask, EndsAtTheInstantTheGoalIsReached) {
   EXPECT_NO_THROW(acrobot.step(0.0, 1.0));
 }
 
-TEST(AcrobotTask, LooksForTheGoalOnlyAtDecisionsIfAsked) {
+TEST(AcrobotTask, CanTestTheGoalAtDecisionsOnly) {
   const AcrobotConfig config{.goal_test = GoalTest::decision_instant};
   Acrobot acrobot(config);
   acrobot.set_state({2.0, 0.0, 2.0, 0.0});
@@ -215,7 +215,7 @@ TEST(AcrobotTask, RejectsBadArguments) {
             "torque must be in [-10, 10], got nan");
 }
 
-TEST(AcrobotTask, SaysWhenTheSpeedBreaksTheIntegration) {
+TEST(AcrobotTask, RefusesSpeedsThatBreakTheIntegration) {
   Acrobot acrobot;
   acrobot.set_state({0.0, 0.0, 1e300, 0.0});
   EXPECT_THROW(acrobot.step(0.0, 1.0), std::overflow_error);

@@ -53,7 +53,7 @@ TEST(PDeltaRule, CorrectsAShareOfTheDeficit) {
   EXPECT_EQ(apply(rule, 4, potentials), (Pairs{{3, -1}}));
 }
 
-TEST(PDeltaRule, TellsFarUnitsApart) {
+TEST(PDeltaRule, DistinguishesDistantUnits) {
   const std::int32_t far = 2000000000;
   estimators::PDeltaRule rule(3, std::vector<double>{1.0, 2.0}, 1);
   EXPECT_EQ(apply(rule, 0, {-far, 1 - far, -far}), (Pairs{{1, 1}}));

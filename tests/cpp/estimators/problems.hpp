@@ -86,6 +86,17 @@ inline estimators::PDeltaTrainer trainer_for(const Problem& problem,
           n_threads};
 }
 
+/// The problem with other samples, of which there are `n_samples`.
+inline Problem with_samples(Problem problem, std::size_t n_samples, std::uint64_t seed) {
+  core::Random random(seed, core::Stream::exploration);
+  const std::size_t n_bins = problem.code->n_bins(0);
+  problem.bins.resize(n_samples * problem.code->n_inputs());
+  for (auto& bin : problem.bins) bin = static_cast<std::int32_t>(random.below(n_bins));
+  problem.targets.resize(n_samples * problem.n_groups);
+  for (double& target : problem.targets) target = random.uniform() * 9.0;
+  return problem;
+}
+
 /// All thresholds and weights.
 inline std::vector<std::int32_t> bits_of(const estimators::ParallelPerceptron& layer) {
   std::vector<std::int32_t> bits(layer.thresholds().begin(), layer.thresholds().end());

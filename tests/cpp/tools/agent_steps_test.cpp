@@ -6,24 +6,17 @@
 #include <string>
 #include <vector>
 
-#include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_learning.hpp"
-#include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
-#include "tools/plain_rbf_network.hpp"
 #include "tools/timings.hpp"
 
 namespace sdnn::tools {
 namespace {
 
-using agents::FuzzyQLearning;
 using agents::QLearning;
-using approximators::FuzzyRules;
-using approximators::RBFNetwork;
-using approximators::RBFNetworkConfig;
 using approximators::SDNNC;
 
-/// Writes down what it is asked; its action is the number of acts before.
+/// An agent that records all calls; its action is the number of acts before.
 class Witness {
  public:
   struct Learned {
@@ -78,23 +71,6 @@ TEST(TimeAgentSteps, ImpossibleNumbersAndNoRepetitionsLeaveTheAgentAlone) {
   EXPECT_THROW(time_agent_steps(witness, kMaxRepetitions + 1, 1), std::invalid_argument);
   EXPECT_TRUE(time_agent_steps(witness, 0, 1).empty());
   EXPECT_EQ(witness.calls, "");
-}
-
-template <class Agent>
-void expect_times(Agent agent) {
-  const Times times = time_agent_steps(agent, 20, 1);
-  EXPECT_EQ(times.size(), 20U);
-  for (const auto time : times) EXPECT_GT(time, 0);
-}
-
-TEST(TimeAgentSteps, TimesEveryAgent) {
-  const RBFNetworkConfig rbf = {.n_inputs = 2, .n_actions = 21};
-  expect_times(QLearning<SDNNC>(
-      SDNNC({.n_inputs = 2, .n_pattern_units = 40, .n_hidden_units = 100, .n_active_units = 30}, 1),
-      {}, 1));
-  expect_times(FuzzyQLearning(FuzzyRules({.n_inputs = 2}), {}, 1));
-  expect_times(QLearning<RBFNetwork>(RBFNetwork(rbf), {}, 1));
-  expect_times(QLearning<PlainRBFNetwork>(PlainRBFNetwork(rbf), {}, 1));
 }
 
 // Otherwise the memory of potentials would be what is timed.

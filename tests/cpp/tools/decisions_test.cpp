@@ -30,7 +30,7 @@ TEST(TimeDecisions, OneTimePerDecisionAndTheTrialIsTheSame) {
   EXPECT_THROW(time_decisions(timed, -1), std::invalid_argument);
 }
 
-TEST(AcrobotDecisions, GoesOnThroughAllEpisodes) {
+TEST(AcrobotDecisions, ContinuesThroughAllEpisodes) {
   AcrobotDecisions decisions({}, 1);
   EXPECT_EQ(decisions.n_integration_steps(), 50);
   EXPECT_EQ(decisions.run(120).size(), 120U);

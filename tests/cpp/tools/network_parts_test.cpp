@@ -15,26 +15,7 @@ SDNNC small_network() {
                1);
 }
 
-int n_different_weights(const SDNNC& a, const SDNNC& b) {
-  int n = 0;
-  for (std::size_t i = 0; i < a.hidden_layer().n_units(); ++i) {
-    for (std::size_t j = 0; j < a.hidden_layer().n_columns(); ++j) {
-      n += a.hidden_layer().weight(i, j) != b.hidden_layer().weight(i, j);
-    }
-  }
-  return n;
-}
-
-TEST(NetworkParts, OneTimePerRepetition) {
-  NetworkParts parts(small_network(), 1);
-  EXPECT_EQ(parts.time_values(5).size(), 5U);
-  EXPECT_EQ(parts.time_remembered_values(4).size(), 4U);
-  EXPECT_EQ(parts.time_selections(3, 10, 6).size(), 3U);
-  EXPECT_EQ(n_different_weights(parts.network(), small_network()), 0);
-  EXPECT_EQ(parts.time_corrections(2, 6).size(), 2U);
-}
-
-TEST(NetworkParts, ACorrectionCorrectsAsManyUnitsAsAsked) {
+TEST(NetworkParts, ACorrectionCorrectsTheRequestedNumberOfUnits) {
   NetworkParts parts(small_network(), 1);
   parts.time_corrections(1, 6);
   int n_changed = 0;

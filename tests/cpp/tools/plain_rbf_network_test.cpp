@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <vector>
 
-#include "allocation_count.hpp"
 #include "approximators/with_workspace.hpp"
 #include "sdnn/agents/agent.hpp"
 #include "sdnn/agents/q_learning.hpp"
@@ -84,15 +83,6 @@ TEST(PlainRBFNetwork, AgreesWithTheFactoredOneAtEverySize) {
       }
     }
   }
-}
-
-TEST(PlainRBFNetwork, ValuesAllocateNothing) {
-  Plain network({.n_inputs = 3});
-  const std::vector<double> state = {0.1, 0.2, 0.3};
-  std::vector<double> out(601);
-  const std::size_t before = testing::allocation_count();
-  network.values(state, out);
-  EXPECT_EQ(testing::allocation_count(), before);
 }
 
 }  // namespace

@@ -27,18 +27,8 @@ TEST(BlockTraining,
 }
 
 TEST(BlockTraining, HasThemOverSeveralLargeBlocks) {
-  auto problem = testing::random_problem(12);
-  core::Random random(12, core::Stream::exploration);
-  const std::size_t n_bins = problem.code->n_bins(0);
-  problem.bins.clear();
-  problem.targets.clear();
-  for (std::size_t i = 0; i < 1300 * problem.code->n_inputs(); ++i) {
-    problem.bins.push_back(static_cast<std::int32_t>(random.below(n_bins)));
-  }
-  for (std::size_t i = 0; i < 1300 * problem.n_groups; ++i) {
-    problem.targets.push_back(random.uniform() * 9.0);
-  }
-  problem = testing::in_data_order(problem, 4, false);
+  const auto problem = testing::in_data_order(
+      testing::with_samples(testing::random_problem(12), 1300, 12), 4, false);
   for (const std::size_t limit :
        {std::size_t{1} << 30, std::size_t{3} << 20}) {  // with plans, without
     const auto one = testing::layer_for(problem);

@@ -26,19 +26,7 @@ TEST(DualTraining, HasThemInDataOrder) {  // where corrections wait for each oth
 }
 
 TEST(DualTraining, HasThemOverManyWindows) {
-  auto problem = testing::random_problem(11);
-  core::Random random(11, core::Stream::exploration);
-  const std::size_t n_inputs = problem.code->n_inputs();
-  const std::size_t n_bins = problem.code->n_bins(0);
-  const std::size_t n_samples = 1500;
-  problem.bins.clear();
-  problem.targets.clear();
-  for (std::size_t i = 0; i < n_samples * n_inputs; ++i) {
-    problem.bins.push_back(static_cast<std::int32_t>(random.below(n_bins)));
-  }
-  for (std::size_t i = 0; i < n_samples * problem.n_groups; ++i) {
-    problem.targets.push_back(random.uniform() * 9.0);
-  }
+  const auto problem = testing::with_samples(testing::random_problem(11), 1500, 11);
   testing::compare_with_plain(testing::in_data_order(problem, 4, false),
                               estimators::TrainingForm::dual, 2,
                               [](bool same) { ASSERT_TRUE(same); });
