@@ -26,7 +26,6 @@ from sdnn.runs import (
     PlannedTrial,
     ResultStore,
     RunSpec,
-    StoreError,
     TrialKey,
     WorkerLostError,
     run_trials,
@@ -127,15 +126,6 @@ def test_a_trial_that_raises_fails_and_the_others_are_done(pair, tmp_path):
     (failure,) = outcome.failures
     assert failure.planned == plan[0]
     assert "seed" in str(failure.error)
-
-
-def test_an_unwritable_store_ends_the_run(pair, tmp_path):
-    class Full(ResultStore):
-        def add(self, record, *, is_exact=True):
-            raise StoreError("disk full")
-
-    with Full(tmp_path) as store, pytest.raises(StoreError, match="disk full"):
-        run_trials(make_plan(4), store, executor=DaskExecutor(str(pair.file)))
 
 
 def test_an_agent_that_workers_do_not_know_is_named(pair, tmp_path, monkeypatch):

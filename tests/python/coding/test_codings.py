@@ -107,14 +107,6 @@ def test_a_period_away_is_the_same_bin_also_where_bins_meet(period):
         np.testing.assert_array_equal(coding.bins(edges + turns * period), np.arange(360))
 
 
-@settings(max_examples=100, deadline=None)
-@given(st.floats(-1e6, 1e6), st.integers(-5, 5))
-def test_a_period_away_is_the_same_angle(angle, turns):
-    circle = Circular(period=360.0, n_anchor_patterns=9, n_interpolated=44)
-    a, b = circle.bins(np.array([angle, angle + 360 * turns]))
-    assert min((a - b) % 360, (b - a) % 360) <= 1
-
-
 @pytest.mark.filterwarnings("ignore::sdnn.coding.CoarseCodeWarning")
 @settings(max_examples=100, deadline=None)
 @given(st.integers(1, 4000), st.floats(0.01, 3))

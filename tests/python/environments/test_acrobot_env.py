@@ -104,19 +104,6 @@ def test_equals_the_core_bit_for_bit():
     assert n_ends == 40
 
 
-def test_observations_are_in_the_space():
-    env = AcrobotSwingUpEnv()
-    env.reset()
-    for _ in range(5):
-        env.reset()
-        ended = False
-        while not ended:  # always along the motion: as fast as it gets
-            share = 1.0 if env._acrobot.state()[3] >= 0.0 else -1.0
-            observation, _, terminated, truncated, _ = env.step([share])
-            assert env.observation_space.contains(observation)
-            ended = terminated or truncated
-
-
 def test_truncates_by_itself_after_50_decisions():
     env = gym.make(ID)
     env.reset()

@@ -1,8 +1,5 @@
 """Many acrobots at once: the same as so many single ones."""
 
-import threading
-import time
-
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -174,28 +171,6 @@ def test_bad_arguments():
     assert envs.goal_tolerance.tolist() == [1.0, 1.0]
     with pytest.raises(gym.error.ResetNeeded):
         envs.step(np.zeros((2, 1)))
-
-
-def test_steps_without_the_global_lock():
-    config = AcrobotConfig(integration_step=1e-4)
-    batch = _core.AcrobotBatch(config, 400)
-    done = threading.Event()
-
-    def step():
-        batch.step(np.zeros(400), np.zeros(400), np.ones(400, bool))
-        done.set()
-
-    thread = threading.Thread(target=step)
-    longest = 0.0
-    before = time.perf_counter()
-    start = before
-    thread.start()
-    while not done.is_set():
-        time.sleep(0.0)
-        now = time.perf_counter()
-        longest, before = max(longest, now - before), now
-    thread.join()
-    assert longest < 0.8 * (time.perf_counter() - start)
 
 
 def test_works_under_gymnasiums_vector_wrappers():
