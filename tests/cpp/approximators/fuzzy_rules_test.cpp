@@ -75,20 +75,6 @@ TEST(FuzzyRules, AgreesWithTheTrianglesOfAllRules) {
   }
 }
 
-TEST(FuzzyRules, ValuesStartAtZeroAndEachHasItsPlace) {
-  FuzzyRules rules({.n_inputs = 2, .n_sets = 3, .n_actions = 4});
-  EXPECT_EQ(rules.table().size(), 36U);
-  EXPECT_EQ(rules.table().rows(), 9);
-  EXPECT_TRUE((rules.table() == 0.0F).all());
-  rules.set_value(5, 2, 1.5F);
-  EXPECT_EQ(rules.value(5, 2), 1.5F);
-  EXPECT_EQ(rules.table()(5, 2), 1.5F);
-  EXPECT_EQ(rules.values(5)[2], 1.5F);
-  rules.table()(5, 3) = 2.5F;
-  EXPECT_EQ(rules.values(5)[3], 2.5F);
-  EXPECT_EQ(rules.table().sum(), 4.0F);
-}
-
 std::string refusal(const FuzzyRulesConfig& config) {
   return testing::message_of<std::length_error>([&] { FuzzyRules rules(config); });
 }

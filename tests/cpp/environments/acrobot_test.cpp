@@ -70,13 +70,6 @@ TEST(AcrobotDynamics, GainsTheWorkOfTheTorque) {
   EXPECT_NEAR(acrobot.energy() - before, 7.0 * (acrobot.state()[1] - angle), 1e-12);
 }
 
-TEST(AcrobotDynamics, RestsWhereItHangs) {
-  Acrobot acrobot;
-  acrobot.step(0.0, 1.0);
-  EXPECT_EQ(acrobot.state(), AcrobotState::Zero());
-  EXPECT_EQ(acrobot.tip_height(), -2.0);
-}
-
 TEST(AcrobotDynamics, MirrorsWithTheTorque) {
   Acrobot left, right;
   for (const double torque : {3.0, -10.0, 7.5, 0.25}) {

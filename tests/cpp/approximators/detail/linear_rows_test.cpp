@@ -120,29 +120,5 @@ TEST(LinearRows, ATraceEndsAtZeroAndIsNeverBeyondItsLimit) {
   EXPECT_EQ(traces, (std::vector<std::int32_t>{0, 0}));
 }
 
-TEST(LinearRows, AStepIsTheSameOnEveryInstructionSet) {
-  for (const std::size_t n : {64U, 320U}) {
-    for (std::uint64_t seed = 0; seed < 20; ++seed) {
-      core::Random random(seed, core::Stream::rounding);
-      const RowStep step{.decay = static_cast<std::int32_t>(random.below(kDecayOne + 1)),
-                         .gain = static_cast<std::int32_t>(random.below(2 * kTraceOne)) - kTraceOne,
-                         .replace = random.below(2) == 1 ? -1 : 0,
-                         .step = static_cast<std::int32_t>(random.below(1 << 14)) - (1 << 13),
-                         .shift = 1 + static_cast<std::int32_t>(random.below(12)),
-                         .correction = static_cast<std::int32_t>(random.below(1 << 20))};
-      const Rows start = random_rows(n, seed);
-      Rows expected = start;
-      detail::learn_row_portable(expected.weights.data(), expected.traces.data(), expected.code(),
-                                 n, step);
-      testing::on_every_instruction_set([&](auto name) {
-        Rows rows = start;
-        learn_row(rows.weights.data(), rows.traces.data(), rows.code(), n, step);
-        EXPECT_EQ(rows.weights, expected.weights) << name;
-        EXPECT_EQ(rows.traces, expected.traces) << name;
-      });
-    }
-  }
-}
-
 }  // namespace
 }  // namespace sdnn::approximators
