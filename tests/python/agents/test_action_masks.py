@@ -105,18 +105,16 @@ def test_vectors_of_every_mode_learn_the_same(actions, mode):
     assert states_equal(trained(1, mode), single)
 
 
-def test_vectors_that_reset_themselves_take_allowed_actions(monkeypatch):
+class Opaque(gym.vector.SyncVectorEnv):
+    """A vector whose environments are not stepped one by one."""
+
+
+@pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP"])
+def test_vectors_that_reset_themselves_take_allowed_actions(mode, monkeypatch):
     monkeypatch.setattr("sdnn.training.vectors._resets_each", lambda env: False)
-
-    def own(mode):
-        return gym.vector.SyncVectorEnv(
-            [new_env] * 3, autoreset_mode=gym.vector.AutoresetMode[mode]
-        )
-
-    for mode in ("NEXT_STEP", "SAME_STEP"):
-        env = own(mode)
-        agent = new_agent(SDNNQLambda, env)
-        assert agent.train(env, steps=200).n_steps == 200
+    env = Opaque([new_env] * 3, autoreset_mode=gym.vector.AutoresetMode[mode])
+    agent = new_agent(SDNNQLambda, env)
+    assert agent.train(env, steps=200).n_steps == 200
 
 
 @pytest.mark.parametrize("kind", AGENTS)

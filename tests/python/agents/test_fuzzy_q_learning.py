@@ -27,3 +27,12 @@ def test_the_configurations_are_those_used():
     assert agent.approximator == FuzzyRulesConfig(n_inputs=3, n_sets=5)
     assert agent.learning == FuzzyQLearningConfig()
     assert agent.n_rules == 125
+
+
+def test_a_rule_that_fires_alone_learns_the_error_of_its_action():
+    agent = FuzzyQLearning(OBSERVATIONS, TORQUES, seed=2)
+    centre = [0.0, 0.0, 0.0]  # of set 4 of 9 in each of the three dimensions
+    agent.learn(Transition(centre, agent.act(centre), 1.0, centre, terminated=True))
+    values = agent.rule_values(4 * 81 + 4 * 9 + 4)
+    assert sorted(values.tolist())[-2:] == [0.0, 0.5]  # half of the error of 1
+    assert agent.value(centre) == 0.5
