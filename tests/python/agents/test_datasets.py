@@ -14,7 +14,6 @@ from sdnn.approximators import LinearSDNNConfig
 from stopped_training import states_equal
 
 PLACE = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
-PARTS = gym.spaces.Dict({"at": PLACE, "gear": gym.spaces.Discrete(3)})
 BUTTONS = gym.spaces.Discrete(3)
 SMALL = LinearSDNNConfig(n_pattern_units=20, n_anchor_patterns=4, n_interpolated=6)
 

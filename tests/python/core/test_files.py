@@ -98,6 +98,8 @@ def test_files_of_other_programs_and_versions_are_refused(tmp_path):
         sdnn.__version__.encode(), b"9.9.9"
     )
     assert len(newer) == len(content)
+    path.write_bytes(newer)  # with the checksum of the former content
+    refuses("damaged", read_file, path, "agent")
     path.write_bytes(with_checksum(newer))
     refuses("9.9.9", read_file, path, "agent")
 

@@ -1,13 +1,10 @@
-"""Every agent in a loop of acting and learning that is written in Python."""
+"""Discrete observations of any size, and observations of many variables."""
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
 from sdnn.agents import SDNNQLearning, Transition
-from sdnn.approximators import SDNNCConfig
-
-SMALL = SDNNCConfig(n_pattern_units=40, n_hidden_units=120, n_active_units=30)
 
 
 def test_a_discrete_observation_is_a_symbol():
