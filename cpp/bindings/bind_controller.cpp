@@ -331,5 +331,18 @@ void bind_controller(py::module_& module) {
   def_transition(
       type, "check", "Raises what learn would; changes nothing",
       [](const Controller& self, const auto&... transition) { self.check(transition...); });
+  type.def("end_warm_up_of_teacher", &Controller::end_warm_up_of_teacher,
+           "Ends a warm-up in which a teacher acted; ranges reach beyond its path")
+      .def(
+          "imitate",
+          [](Controller& self, const ArrayArgument<double>& observation,
+             const ArrayArgument<double>& action, double value, double margin) {
+            require_warm(self);
+            bindings::wait_for_readers(self);
+            self.imitate(bindings::flat(observation), bindings::flat(action), value, margin);
+          },
+          py::arg("observation"), py::arg("action"), py::arg("value"), py::arg("margin"),
+          "Learns that a teacher chose an action whose return is `value`; values of others become "
+          "lower by `margin` at least");
   bindings::def_state(type);
 }

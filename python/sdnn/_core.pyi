@@ -1895,6 +1895,14 @@ class Controller:
         """
         Raises what learn would; changes nothing
         """
+    def end_warm_up_of_teacher(self) -> None:
+        """
+        Ends a warm-up in which a teacher acted; ranges reach beyond its path
+        """
+    def imitate(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], value: typing.SupportsFloat | typing.SupportsIndex, margin: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Learns that a teacher chose an action whose return is `value`; values of others become lower by `margin` at least
+        """
     def learn(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0, next_mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> None:
         ...
     def learn_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], actions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rewards: list, next_observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: list, environments: list, progress: list, next_masks: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> int:

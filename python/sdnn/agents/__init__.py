@@ -6,6 +6,7 @@ from sdnn.agents.base import Preset
 from sdnn.agents.datasets import learn_from
 from sdnn.agents.fixed_rate import FixedRate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
+from sdnn.agents.imitation import imitate
 from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.scaling import Scaling
@@ -52,6 +53,7 @@ __all__ = [
     "UnrepeatedEpisodeError",
     "UnusableStepError",
     "evaluate",
+    "imitate",
     "learn_from",
     "load_agent",
 ]

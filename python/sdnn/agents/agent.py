@@ -29,7 +29,7 @@ from sdnn.support.display import Displayed
 from sdnn.support.files import Arrays
 from sdnn.training.callbacks import ProgressBarCallback
 from sdnn.training.files import read_agent, read_statistics
-from sdnn.training.interfaces import explained
+from sdnn.training.interfaces import Transition, explained
 from sdnn.training.training import Callback, Training, TrainingResult, listed, shows_bar
 
 
@@ -115,6 +115,27 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
 
     def _dimension(self, dimension: int) -> int:
         return whole("dimension", dimension, 0, self.n_dimensions - 1)
+
+    def _imitate_step(self, transition: Transition, value: float, margin: float) -> None:
+        """Learn that a teacher chose an action and that its return was `value`; see `imitate`.
+
+        With Q(lambda) the values of other actions become lower by `margin` at least, in the unit of
+        the rewards. RuntimeError while the agent is warming up; ValueError as `learn` does, and for
+        agents without a linear readout.
+        """
+        observation, action, *_ = self._parts_of(transition, 0)
+        self._require_warm().imitate(observation, action, value, margin)
+
+    @property
+    def _n_warm_up_steps_left(self) -> int:
+        """Number of transitions until the warm-up is over; 0 without one."""
+        if not self.is_warming_up:
+            return 0
+        return self._warm_up_steps - len(self.state()["warm_up.rewards"])
+
+    def _end_warm_up_of_teacher(self) -> None:
+        """End a warm-up in which a teacher acted; ranges become three times as wide and more."""
+        self._controller.end_warm_up_of_teacher()
 
     def _require_warm(self) -> _core.Controller:
         """Return the controller; RuntimeError while it is warming up."""

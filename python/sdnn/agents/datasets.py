@@ -382,13 +382,13 @@ def learn_from(agent: AnyAgent, dataset: Dataset, *, epochs: int = 1) -> int:
     require(learns_any, "agent", expected, agent, TypeError)
     epochs = whole("epochs", epochs, 1, 2**31)
     read = reader_of(dataset)
-    n = _checked_length(agent, read())
+    n = checked_length(agent, read())
     if n == 0:
         return 0
     for _ in range(epochs):
         agent.begin_episode()
         for logged in read():
-            transition = _with_action(agent, logged.transition)
+            transition = with_action(agent, logged.transition)
             agent.learn(transition)
             if logged.truncated or transition.terminated:
                 agent.begin_episode()
@@ -396,12 +396,12 @@ def learn_from(agent: AnyAgent, dataset: Dataset, *, epochs: int = 1) -> int:
     return n * epochs
 
 
-def _checked_length(agent: AnyAgent, log: Iterator[Logged]) -> int:
+def checked_length(agent: AnyAgent, log: Iterator[Logged]) -> int:
     """Return the number of transitions; the error of one that cannot be learned has its place."""
     n = n_episodes = 0
     for place, transition, truncated in log:
         try:
-            agent.check(_with_action(agent, transition))
+            agent.check(with_action(agent, transition))
         except (TypeError, ValueError) as error:
             episode = "" if place.startswith("episode") else f"episode {n_episodes}, "
             raise type(error)(f"dataset, {episode}{place}: {error}") from error
@@ -410,7 +410,7 @@ def _checked_length(agent: AnyAgent, log: Iterator[Logged]) -> int:
     return n
 
 
-def _with_action(agent: AnyAgent, transition: Transition) -> Transition:
+def with_action(agent: AnyAgent, transition: Transition) -> Transition:
     """Return a transition whose action, if it is a whole number in a float or an array, is one."""
     if not isinstance(agent.action_space, gym.spaces.Discrete) or type(transition.action) is int:
         return transition

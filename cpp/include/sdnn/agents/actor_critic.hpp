@@ -164,6 +164,28 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     episode.mask.assign(next_mask.begin(), next_mask.end());
   }
 
+  /// Learns that a teacher chose an action in a state, and that its return was `value`: the critic
+  /// by its error, the actor by a step along the gradient of log pi(action | state). Ends the
+  /// episode of environment 0. Throws as `learn` does.
+  void imitate(std::span<const double> state, Action action, double value,
+               double /*margin*/ = 0.0) {
+    require_transition(state, action, value, state, {});
+    begin_episode();
+    Episode& episode = episodes_.of(0);
+    critic().read_next(state, episode.present);
+    ++n_learned_;
+    apply_rates();
+    td_.fit_unit(value, episodes_);
+    const std::int64_t sum =
+        td_.in_range(episodes_, [&] { return critic().sum(episode.present, kOnlyAction); });
+    td_.correct(episode, episodes_, kOnlyAction, {critic().units_of(value) - sum, 0}, rate_, false);
+    actor_.read(episode.present.code(), workspace_.actor);
+    actor_.allow({}, workspace_.actor);
+    actor_.learn(episode.present.code(), workspace_.actor, action, episode.actor_trace,
+                 {.error = Policy::kErrorOne, .rate = kOne, .entropy = 0, .decay = 0});
+    end(episode);
+  }
+
   /// Makes the unit of values smaller where it is larger than it has to be; see QLambda.
   void refine_unit(std::int32_t size_in_window, std::int32_t size) {
     td_.refine_unit(size_in_window, size, episodes_);

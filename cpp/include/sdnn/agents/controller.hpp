@@ -283,18 +283,16 @@ class Controller : public WithRates<Controller> {
   /// Throws what learn would for a transition that cannot be learned; changes nothing.
   void check(std::span<const double> observation, std::span<const double> action, double reward,
              std::span<const double> next_observation, bool terminated, std::size_t environment,
-             ActionMask next_mask) const {
-    actions_.require_mask("next_mask", terminated ? ActionMask() : next_mask);
-    core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
-    require_environment(environment);
-    observations_.require_readings("observation", observation);
-    actions_.require_action(action);
-    observations_.require_readings("next_observation", next_observation);
-    if (is_warming_up()) return;
-    std::vector<double> state(observations_.n_inputs());
-    observations_.scale(observation, state);
-    observations_.scale(next_observation, state, "next_observation");
-  }
+             ActionMask next_mask) const;
+
+  /// Ends a warm-up in which a teacher acted, after some transitions. As the agent itself will
+  /// leave the teacher's path, ranges reach twice the width of what was observed beyond it.
+  void end_warm_up_of_teacher();
+  /// Learns an action that a teacher chose, and its return; see QLambda::imitate. Requires that the
+  /// warm-up is over. Throws std::invalid_argument for numbers that have no state and for agents
+  /// without a linear readout; then nothing has changed.
+  void imitate(std::span<const double> observation, std::span<const double> action, double value,
+               double margin);
 
   /// The state that the agent has for an observation. Valid until the next call. Throws as act.
   std::span<const double> state_of(std::span<const double> observation) {
@@ -331,7 +329,7 @@ class Controller : public WithRates<Controller> {
 
   WarmUp new_warm_up() const;
   void fit(const core::StateReader* reader = nullptr);
-  void end_warm_up();
+  void end_warm_up(double headroom = Observations::kHeadroom);
   std::size_t n_first_inputs() const noexcept;
   void watch();
   void add_inputs();
@@ -447,4 +445,5 @@ class Controller : public WithRates<Controller> {
 
 }  // namespace sdnn::agents
 
+#include "sdnn/agents/detail/controller_imitation.hpp"
 #include "sdnn/agents/detail/controller_warm_up.hpp"

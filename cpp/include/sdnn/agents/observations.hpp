@@ -34,6 +34,8 @@ namespace sdnn::agents {
 /// be found. Running ranges are those of RunningRanges, and change with each observation.
 class Observations {
  public:
+  static constexpr double kHeadroom = 0.25;
+
   /// Symbols are inputs of their own where the approximator codes symbols; it gets `least_inputs`
   /// inputs at least, the last one repeated. With Missing::code `n_bins` are those of each input
   /// that is no symbol, or of all. Throws std::invalid_argument naming the field.
@@ -153,25 +155,10 @@ class Observations {
 
   /// Takes unknown ranges and pairs from the readings that are not missing. Shape:
   /// (n, n_variables), row by row: the first half what was observed before steps, the second what
-  /// was observed after them. A variable without any has the range of one that is always 0. Throws
+  /// was observed after them. On each side of what was observed there is `headroom` times its
+  /// width. A variable without any reading has the range of one that is always 0. Throws
   /// std::invalid_argument where there is no range, and then nothing has changed.
-  void fit(std::span<const double> seen) {
-    const auto pairs = config_.find_angle_pairs ? pairs_in(seen) : config_.angle_pairs;
-    for (std::size_t i = 0; running_ && i < seen.size() / 2; i += n_variables()) {
-      running_->note(seen.subspan(i, n_variables()));
-    }
-    Ranges ranges = fixed_ranges(pairs);
-    const bool narrows = config_.narrowed && inputs_with(pairs).size() <= kFewInputs;
-    for (std::size_t i = 0; i < n_variables(); ++i) {
-      if (is_unknown(ranges.low[i])) {
-        std::tie(ranges.low[i], ranges.high[i]) =
-            fitted_range(detail::column(seen, n_variables(), i), i);
-      } else if (narrows && roles_[i] == Role::number && !is_one_of(pairs, i)) {
-        narrow(ranges, i, detail::column(seen, n_variables(), i));
-      }
-    }
-    take(ranges, pairs);
-  }
+  void fit(std::span<const double> seen, double headroom = kHeadroom);
 
   /// Leaves out the other inputs, or, of those that were left out, adds some at the end. Shape: one
   /// for each input that there is. Requires that it is fitted, and that one is kept.
@@ -255,7 +242,6 @@ class Observations {
   };
   using Pairs = std::vector<std::vector<int>>;
 
-  static constexpr double kHeadroom = 0.25;
   static constexpr double kMuchWider = 2.0;
   static constexpr double kRounding = 1e-6;  // relative, of single precision and some more
   static constexpr std::size_t kFewInputs = 4;
@@ -326,38 +312,12 @@ class Observations {
     });
   }
 
-  static void narrow(Ranges& ranges, std::size_t i, const std::vector<double>& seen) {
-    const auto [least, most] = std::ranges::minmax(seen);
-    const double rounding = kRounding * std::max(std::abs(least), std::abs(most));
-    if (!(most - least > rounding)) return;
-    const auto [low, high] = widened(least, most);
-    const bool is_much_wider = ranges.high[i] - ranges.low[i] > kMuchWider * (high - low);
-    const bool is_within = least >= ranges.low[i] && most <= ranges.high[i];
-    if (!is_much_wider || !is_within) return;
-    ranges.low[i] = std::max(low, ranges.low[i]);
-    ranges.high[i] = std::min(high, ranges.high[i]);
-  }
-
-  static std::pair<double, double> widened(double low, double high) noexcept {
-    low = std::clamp(low, -kLargest, kLargest);
-    high = std::clamp(high, -kLargest, kLargest);
-    const double width = high > low ? high - low : std::max(std::abs(high), 1.0);
-    return {low - kHeadroom * width, high + kHeadroom * width};
-  }
-
-  /// Adaptive ranges leave out rare observations; a variable that hardly moves has its
-  /// fixed range.
-  std::pair<double, double> fitted_range(std::vector<double> seen, std::size_t i) const {
-    std::ranges::sort(seen);
-    auto [low, high] = widened(seen.front(), seen.back());
-    if (!config_.adaptive) return {low, high};
-    const std::size_t n_rare = seen.size() / kRare;
-    const double first = seen[n_rare], last = seen[seen.size() - 1 - n_rare];
-    if (const auto bounds = fixed_range(i)) std::tie(low, high) = *bounds;
-    if (!(last > first)) return {low, high};
-    const auto [wide_low, wide_high] = widened(first, last);
-    return {std::max(wide_low, std::min(low, first)), std::min(wide_high, std::max(high, last))};
-  }
+  static void narrow(Ranges& ranges, std::size_t i, const std::vector<double>& seen,
+                     double headroom);
+  static std::pair<double, double> widened(double low, double high, double headroom) noexcept;
+  /// Adaptive ranges leave out rare observations; a variable that hardly moves has its fixed range.
+  std::pair<double, double> fitted_range(std::vector<double> seen, std::size_t i,
+                                         double headroom) const;
 
   /// Takes the ranges as they are now.
   void follow() {
@@ -448,3 +408,5 @@ class Observations {
 };
 
 }  // namespace sdnn::agents
+
+#include "sdnn/agents/detail/fitted_ranges.hpp"

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "sdnn/agents/action_mask.hpp"
+#include "sdnn/agents/detail/imitation.hpp"
 #include "sdnn/agents/detail/linear_td.hpp"
 #include "sdnn/agents/detail/q_lambda_episode.hpp"
 #include "sdnn/agents/episodes.hpp"
@@ -159,6 +160,30 @@ class QLambda : public IndexAgent<QLambda> {
     }
   }
 
+  /// Learns that a teacher chose an action in a state, and that its return was `value`. The values
+  /// of all actions move by the error of the action's value; and where the best other action of a
+  /// dimension is less than `margin` below the teacher's, both move apart by equal parts. Thus
+  /// errors of the returns leave the order of actions as it is. Ends the episode of environment 0.
+  /// Throws as `learn` does, also for a margin that is not above 0.
+  void imitate(std::span<const double> state, Action action, double value, double margin) {
+    require_transition(state, action, value, state, {});
+    core::require_in_range("margin", margin, std::numeric_limits<double>::min(), kLargestReward);
+    begin_episode();
+    Episode& episode = episodes_.of(0);
+    readout().read_next(state, episode.present);
+    td_.fit_unit(value, episodes_);
+    td_.fit_unit(margin, episodes_);
+    ++n_learned_;
+    apply_rates();
+    std::vector<std::int64_t> errors(readout().n_rows());
+    const std::int64_t sum =
+        td_.in_range(episodes_, [&] { return readout().sum(episode.present, action); });
+    std::ranges::fill(errors, readout().units_of(value) - sum);
+    td_.move_rows(episode, episodes_, errors, rate_);
+    detail::separate(readout(), episode.present, action, readout().units_of(margin), errors);
+    td_.move_rows(episode, episodes_, errors, kSeparationRate);
+  }
+
   /// Makes the unit of values smaller where it is larger than it has to be; see LinearTD. Sizes of
   /// rewards are those of RewardScale, the last window's and the recent one.
   void refine_unit(std::int32_t size_in_window, std::int32_t size) {
@@ -207,6 +232,7 @@ class QLambda : public IndexAgent<QLambda> {
   static constexpr double kMostTolerance = 0x1p62;  ///< in units: above any difference of values
   static constexpr std::int64_t kMostLearned = std::int64_t{1} << 45;
   static constexpr std::int32_t kOne = Readout::kRateOne;
+  static constexpr std::int32_t kSeparationRate = kOne / 10;
 
   using Episode = detail::QLambdaEpisode;
 

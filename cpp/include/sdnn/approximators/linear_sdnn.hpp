@@ -319,15 +319,14 @@ class LinearSDNN {
         used |= use.weights;
       }
     }
-    while (used >= kLargestWeight) {
-      double_unit();
-      used >>= 1;
-      // Halves are rounded up, so the largest weight may still be too large.
-      if (std::ranges::find(weights_, kLargestWeight) != weights_.end()) used |= kLargestWeight;
-    }
+    shrink_weights(used);
     if (config_.averaging_interval > 0) note_step();
     return exponent_.value_or(0) - exponent;
   }
+
+  /// Moves the weights of each row by rate / n times its error along the code, where n is as in
+  /// `learn`. Returns the number of doublings of the unit. Shape: errors (n_rows,), in units.
+  int move_rows(const Code& code, std::span<const std::int64_t> errors, std::int32_t rate);
 
   /// Copies the weights of a readout with fewer inputs, such that Q(s, a) does not depend on the
   /// added inputs. Both have equal numbers of actions and units, the same first inputs, and all
@@ -411,6 +410,8 @@ class LinearSDNN {
     }
   }
 
+  /// Doubles the unit until all weights are in their range; `used` has the bits that they use.
+  void shrink_weights(std::int32_t used) noexcept;
   /// Moves the average towards the weights by 1 / 2^k of the way, about 3 / (n + 3) after n steps.
   void note_step() noexcept {
     if (++n_steps_ % config_.averaging_interval != 0) return;
@@ -442,3 +443,5 @@ class LinearSDNN {
 };
 
 }  // namespace sdnn::approximators
+
+#include "sdnn/approximators/detail/linear_moves.hpp"

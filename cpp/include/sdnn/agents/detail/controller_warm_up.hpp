@@ -83,9 +83,9 @@ inline void Controller::fit(const core::StateReader* reader) {
   next_state_.resize(state_.size());
 }
 
-inline void Controller::end_warm_up() {
+inline void Controller::end_warm_up(double headroom) {
   Observations fitted = observations_;
-  fitted.fit(warm_up_->seen());
+  fitted.fit(warm_up_->seen(), headroom);
   if (fitted.has_choice()) {
     fitted.keep(Relevance(detail::experience_of(fitted, *warm_up_, n_dimensions()))
                     .inputs(fitted.required()));

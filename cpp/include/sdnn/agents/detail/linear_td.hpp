@@ -86,6 +86,12 @@ class LinearTD {
     halve_old_values(n_doubled, episodes);
   }
 
+  /// Moves rows of weights along the code of the present state; see LinearSDNN::move_rows.
+  void move_rows(Episode& episode, Episodes<Episode>& episodes,
+                 std::span<const std::int64_t> errors, std::int32_t rate) {
+    halve_old_values(readout_.move_rows(episode.present.code(), errors, rate), episodes);
+  }
+
   /// Makes the unit of values smaller where it is larger than it has to be: while no weight needs
   /// its 8 upper bits; and where recent rewards have so few bits that values 1,024 times those they
   /// could sum up to would fit. Then weights of larger values are clipped. Sizes of rewards are

@@ -1,0 +1,59 @@
+/// Moves of whole rows of a linear readout, as imitation makes them, and the range of its weights.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <span>
+#include <vector>
+
+#include "sdnn/approximators/detail/linear_rows.hpp"
+#include "sdnn/approximators/linear_sdnn.hpp"
+
+namespace sdnn::approximators {
+
+inline void LinearSDNN::shrink_weights(std::int32_t used) noexcept {
+  while (used >= kLargestWeight) {
+    double_unit();
+    used >>= 1;
+    // Halves are rounded up, so the largest weight may still be too large.
+    if (std::ranges::find(weights_, kLargestWeight) != weights_.end()) used |= kLargestWeight;
+  }
+}
+
+inline int LinearSDNN::move_rows(const Code& code, std::span<const std::int64_t> errors,
+                                 std::int32_t rate) {
+  assert(errors.size() == n_rows());
+  const std::int64_t part = (std::int64_t{rate} << 12) / n_weights_of(code);  // 2^28 for 1
+  const std::int32_t exponent = exponent_.value_or(0);
+  std::vector<std::int64_t> steps(errors.begin(), errors.end());
+  std::int64_t largest = 0;
+  for (std::int64_t& step : steps) {
+    step = scaled(std::clamp(step, -kLargestError, kLargestError), part, 28);
+    largest = std::max(largest, std::abs(step));
+  }
+  for (; largest >= kLargestWeight; largest = halved(largest)) {
+    double_unit();
+    for (std::int64_t& step : steps) step = halved(step);
+  }
+  ++version_;
+  std::int32_t used = 0;
+  const CodeMasks masks = code.masks();
+  for (std::size_t row = 0; row < n_rows_; ++row) {
+    const auto step = static_cast<std::int32_t>(steps[row]);
+    if (step == 0) continue;
+    std::int32_t* const weights = &weights_[row * n_slots()];
+    for (std::size_t j = 0; j < n_slots(); ++j) {
+      weights[j] += times_code(step, masks.active[j], masks.negative[j]);
+      used |= weights[j] ^ (weights[j] >> 31);
+    }
+    versions_[row] = version_;
+  }
+  shrink_weights(used);
+  if (config_.averaging_interval > 0) note_step();
+  return exponent_.value_or(0) - exponent;
+}
+
+}  // namespace sdnn::approximators

@@ -1,0 +1,142 @@
+"""Imitation: an agent takes over the policy of a teacher from a log, before it learns itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
+from typing import TypeAlias
+
+from sdnn.agents.actor_critic import SDNNActorCritic
+from sdnn.agents.datasets import Dataset, Logged, checked_length, reader_of, with_action
+from sdnn.agents.q_lambda import SDNNQLambda
+from sdnn.support.arguments import is_of_class, require, whole
+from sdnn.training.interfaces import Transition, explained
+
+LinearAgent: TypeAlias = SDNNQLambda | SDNNActorCritic
+Steps: TypeAlias = Sequence[Transition]
+
+_MOST_STEPS = 10_000
+"""The most steps of an episode that are in memory at once."""
+
+
+@explained
+def imitate(agent: SDNNQLambda | SDNNActorCritic, dataset: Dataset, *, epochs: int = 10) -> int:
+    """Take over the policy of a teacher from a log. The agent can then learn on from there.
+
+    `learn_from` learns how good the logged actions were; `imitate` learns to choose them, which
+    takes far fewer transitions where the teacher is good. The values that the agent needs to learn
+    on are those of the teacher's returns, which continue by the agent's estimate where an episode
+    was cut off.
+
+    Parameters
+    ----------
+    agent : SDNNQLambda or SDNNActorCritic
+        With any actions; of a ``Box`` the nearest action of the agent counts. In a warm-up it takes
+        its ranges from the log: three times as wide as what the first transitions show, and more,
+        as the agent will leave the teacher's path.
+    dataset : path, mapping, table, MinariDataset or iterable
+        Logged transitions in any form that `learn_from` reads. Some random actions in them
+        help: they show how the teacher recovers.
+    epochs : int
+        How often the dataset is imitated. Each transition counts for the schedules of the rates.
+
+    Returns
+    -------
+    int
+        Number of transitions imitated, in all epochs.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument or a transition is not usable; names episode and row, and nothing is
+        learned.
+    OSError
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> import gymnasium as gym
+    >>> from sdnn.agents import SDNNQLambda, Transition, imitate
+    >>> agent = SDNNQLambda(gym.spaces.Box(0, 1, (2,)), gym.spaces.Discrete(4), inputs="all")
+    >>> imitate(agent, [Transition([0.2, 0.4], 3, 1.0, [0.3, 0.5], True)])
+    10
+    >>> int(agent.act([0.2, 0.4], explore=False))
+    3
+    """
+    is_linear = is_of_class(agent, SDNNQLambda) or is_of_class(agent, SDNNActorCritic)
+    expected = "be an SDNNQLambda or SDNNActorCritic (learn_from is for others, too)"
+    require(is_linear, "agent", expected, agent, TypeError)
+    epochs = whole("epochs", epochs, 1, 2**31)
+    read = reader_of(dataset)
+    n = checked_length(agent, read())
+    if n == 0:
+        return 0
+    if agent.is_warming_up:
+        _end_warm_up(agent, read())
+    margin = _margin(agent, read)
+    for _ in range(epochs):
+        for steps, terminated in _episodes(agent, read()):
+            value = 0.0 if terminated else _value(agent, steps[-1])
+            agent.begin_episode()
+            for transition, target in zip(steps, _returns(agent, steps, value), strict=True):
+                agent._imitate_step(transition, target, margin)
+    agent.begin_episode()
+    return n * epochs
+
+
+def _end_warm_up(agent: LinearAgent, log: Iterator[Logged]) -> None:
+    """Learn all transitions, or those that a warm-up needs except the last one, and end it."""
+    agent.begin_episode()
+    for logged in islice(log, max(1, agent._n_warm_up_steps_left - 1)):
+        transition = with_action(agent, logged.transition)
+        agent.learn(transition)
+        if logged.truncated or transition.terminated:
+            agent.begin_episode()
+    if agent.is_warming_up:
+        agent._end_warm_up_of_teacher()
+
+
+def _episodes(agent: LinearAgent, log: Iterator[Logged]) -> Iterator[tuple[Steps, bool]]:
+    """Yield the steps of each episode, of long ones in parts, and whether it terminated there."""
+    steps: list[Transition] = []
+    for logged in log:
+        steps.append(with_action(agent, logged.transition))
+        terminated = steps[-1].terminated
+        if terminated or logged.truncated or len(steps) == _MOST_STEPS:
+            yield steps, terminated
+            steps = []
+    if steps:
+        yield steps, False
+
+
+def _returns(agent: LinearAgent, steps: Steps, value: float) -> list[float]:
+    """Return the discounted return from each step on; `value` is that after the last one."""
+    discount = agent.learning.discount
+    returns = []
+    for transition in reversed(steps):
+        value = float(transition.reward) + discount * value
+        returns.append(value)
+    return returns[::-1]
+
+
+def _value(agent: LinearAgent, last: Transition) -> float:
+    """Return the agent's estimate of the value after a step."""
+    if isinstance(agent, SDNNActorCritic):
+        return agent.value(last.next_observation)
+    values = [agent.q_values(last.next_observation, d) for d in range(agent.n_dimensions)]
+    return float(sum(part.max() for part in values))
+
+
+def _margin(agent: LinearAgent, read: Callable[[], Iterator[Logged]]) -> float:
+    """Return the root mean square of the returns, or 1 where all are 0.
+
+    It is the margin by which other actions are worse at least. A smaller margin would let the noise
+    of later learning undo what was imitated.
+    """
+    total, n = 0.0, 0
+    for steps, _ in _episodes(agent, read()):
+        returns = _returns(agent, steps, 0.0)
+        total, n = total + sum(value * value for value in returns), n + len(returns)
+    size = math.sqrt(total / n)
+    return size if size > 0.0 else 1.0

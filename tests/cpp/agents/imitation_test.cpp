@@ -1,0 +1,210 @@
+#include "sdnn/agents/detail/imitation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <variant>
+#include <vector>
+
+#include "instruction_sets.hpp"
+#include "sdnn/agents/actor_critic.hpp"
+#include "sdnn/agents/controller.hpp"
+#include "sdnn/agents/detail/make_actor_critic.hpp"
+#include "sdnn/agents/q_lambda.hpp"
+#include "sdnn/approximators/detail/state_wiring.hpp"
+#include "sdnn/core/random.hpp"
+#include "sdnn/core/state.hpp"
+#include "states.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+using approximators::LinearSDNN;
+using approximators::LinearSDNNConfig;
+using Indices = std::vector<std::size_t>;
+using State = std::vector<double>;
+
+const State kState{0.1, 0.1};
+
+QLambda q_lambda_of(const Indices& n_actions = {3}, int window = 1,
+                    const QLambdaConfig& config = {.final_learning_rate = {}}) {
+  return {
+      LinearSDNN(
+          {.n_inputs = 2, .n_pattern_units = 40, .action_window = window, .averaging_interval = 3},
+          n_actions, 1),
+      config, 1};
+}
+
+ActorCritic actor_critic_of(const Indices& n_actions = {3}) {
+  const LinearSDNNConfig network{.n_inputs = 2, .n_pattern_units = 40};
+  const ActorCriticConfig config{.learning_rate = 1.0, .final_learning_rate = {}};
+  return detail::make_actor_critic(network, config, n_actions,
+                                   approximators::code_books_of(network, 1),
+                                   detail::thermometers_of(network, config), 1);
+}
+
+template <class Agent>
+std::vector<double> values(const Agent& agent, const State& state, std::size_t d = 0) {
+  auto workspace = agent.workspace();
+  const auto row = agent.values(state, workspace, d);
+  return {row.begin(), row.end()};
+}
+
+// alpha = 1: all values become 8, then a tenth of the missing margin of 1 parts two of them.
+TEST(Imitation, MovesAllValuesToTheReturnAndTwoApart) {
+  QLambda agent = q_lambda_of();
+  agent.imitate(kState, Indices{2}, 8.0, 1.0);
+  const std::vector<double> q = values(agent, kState);
+  EXPECT_NEAR(q[0], 8.0 - 0.05, 1e-3);
+  EXPECT_NEAR(q[1], 8.0, 1e-3);
+  EXPECT_NEAR(q[2], 8.0 + 0.05, 1e-3);
+  EXPECT_EQ(agent.n_learned(), 1);
+}
+
+TEST(Imitation, LeavesValuesThatAreFarEnoughApart) {
+  QLambda agent = q_lambda_of();
+  for (int i = 0; i < 200; ++i) agent.imitate(kState, Indices{2}, 8.0, 1.0);
+  const std::vector<double> apart = values(agent, kState);
+  EXPECT_NEAR(apart[2], 8.0, 0.01);
+  EXPECT_NEAR(apart[0], 7.0, 0.01);
+  EXPECT_NEAR(apart[1], 7.0, 0.01);
+  agent.imitate(kState, Indices{2}, 20.0, 0.25);  // the values move together
+  const std::vector<double> moved = values(agent, kState);
+  for (std::size_t a = 0; a < 3; ++a) EXPECT_NEAR(moved[a] - apart[a], 12.0, 0.02);
+}
+
+// Q is the sum of the dimensions' parts, each of which has the margin.
+TEST(Imitation, OrdersTheActionsOfEachDimension) {
+  for (const int window : {1, 2}) {
+    QLambda agent = q_lambda_of({4, 1, 3}, window);
+    for (int i = 0; i < 300; ++i) agent.imitate(kState, Indices{1, 0, 2}, -3.0, 0.5);
+    EXPECT_EQ(Indices(agent.act(kState, false).begin(), agent.act(kState, false).end()),
+              (Indices{1, 0, 2}));
+    double sum = 0.0;
+    const Indices action{1, 0, 2};
+    for (std::size_t d = 0; d < 3; ++d) {
+      const std::vector<double> part = values(agent, kState, d);
+      sum += part[action[d]];
+      for (std::size_t a = 0; a < part.size(); ++a) {
+        if (a == action[d]) continue;
+        EXPECT_LT(part[a], part[action[d]] - 0.5 + 0.02) << window;
+      }
+    }
+    EXPECT_NEAR(sum, -3.0, 0.05);
+  }
+}
+
+TEST(Imitation, LearnsValuesOfAnySize) {
+  for (const double scale : {1e-200, 1.0, 1e200}) {
+    QLambda agent = q_lambda_of();
+    agent.imitate(kState, Indices{0}, scale, 0.1 * scale);
+    agent.imitate(kState, Indices{0}, 1e6 * scale, 0.1 * scale);
+    EXPECT_NEAR(values(agent, kState)[0] / (1e6 * scale), 1.0, 1e-3) << scale;
+  }
+}
+
+TEST(Imitation, EndsTheEpisode) {
+  const QLambdaConfig sarsa{.discount = 0.5,
+                            .trace_decay = 0.0,
+                            .bootstrap = Bootstrap::sarsa,
+                            .final_learning_rate = {}};
+  QLambda agent = q_lambda_of({3}, 1, sarsa);
+  agent.learn(kState, Indices{0}, 4.0, State{0.9, 0.9}, false);
+  EXPECT_EQ(values(agent, kState)[0], 0.0);  // pending
+  agent.imitate(State{0.9, 0.2}, Indices{1}, 0.0, 1e-3);
+  EXPECT_NEAR(values(agent, kState)[0], 4.0, 0.5);
+}
+
+// A fresh policy is even: a step of 1 moves preferences by 1 - 1/3 and by -1/3.
+TEST(Imitation, OfAnActorIsAStepOfItsLogProbability) {
+  ActorCritic agent = actor_critic_of();
+  agent.imitate(kState, Indices{1}, 5.0);
+  const double up = std::exp(2.0 / 3.0), down = std::exp(-1.0 / 3.0);
+  const std::vector<double> p = values(agent, kState);
+  EXPECT_NEAR(p[1], up / (up + 2.0 * down), 1e-3);
+  EXPECT_NEAR(p[0], down / (up + 2.0 * down), 1e-3);
+  EXPECT_NEAR(agent.value(kState), 5.0, 1e-3);
+}
+
+TEST(Imitation, GivesTheSameBitsOnEveryInstructionSetAndAfterASave) {
+  const auto live = [](auto& agent, std::uint64_t seed) {
+    core::Random random(seed, core::Stream::useless_inputs);
+    for (int i = 0; i < 100; ++i) {
+      const State state{random.uniform(), random.uniform()};
+      agent.imitate(state, Indices{random.below(std::size_t{3}), random.below(std::size_t{5})},
+                    100.0 * random.normal(), 1.0);
+      const auto action = agent.act(state);
+      agent.learn(state, action, random.normal(), State{0.5, 0.5}, false);
+    }
+  };
+  const auto expect_equal = [&live](const auto& make) {
+    std::vector<core::State> states;
+    testing::on_every_instruction_set([&](const auto&) {
+      auto agent = make();
+      live(agent, 1);
+      auto other = make();
+      core::restore(other, core::state_of(agent));
+      live(agent, 2);
+      live(other, 2);
+      states.push_back(core::state_of(agent));
+      EXPECT_EQ(states.back(), core::state_of(other));
+    });
+    for (const core::State& state : states) EXPECT_EQ(state, states.front());
+  };
+  expect_equal([] { return q_lambda_of({3, 5}, 2); });
+  expect_equal([] { return actor_critic_of({3, 5}); });
+}
+
+TEST(Imitation, RefusesWhatCannotBeImitated) {
+  QLambda agent = q_lambda_of();
+  agent.imitate(kState, Indices{0}, 1.0, 1.0);
+  const core::State before = core::state_of(agent);
+  EXPECT_THROW(agent.imitate(State{0.1, 1.1}, Indices{0}, 1.0, 1.0), std::invalid_argument);
+  EXPECT_THROW(agent.imitate(kState, Indices{3}, 1.0, 1.0), std::invalid_argument);
+  EXPECT_THROW(agent.imitate(kState, Indices{0}, testing::kNaN, 1.0), std::invalid_argument);
+  EXPECT_THROW(agent.imitate(kState, Indices{0}, 1.0, 0.0), std::invalid_argument);
+  EXPECT_THROW(agent.imitate(kState, Indices{0}, 1.0, testing::kNaN), std::invalid_argument);
+  EXPECT_EQ(core::state_of(agent), before);
+}
+
+ControllerConfig config_of(AnyApproximatorConfig approximator, AnyLearningConfig learning) {
+  return {.approximator = approximator,
+          .learning = learning,
+          .seed = 3,
+          .observation = {.low = {-10.0, -testing::kInfinity}, .high = {10.0, testing::kInfinity}},
+          .action = {.low = {-1.0}, .high = {1.0}},
+          .warm_up_steps = 30};
+}
+
+// The second variable was in [2, 4]: its range is twice that width more at each end.
+TEST(Imitation, RangesOfAWarmUpReachBeyondATeacher) {
+  const LinearSDNNConfig small{.n_pattern_units = 20, .averaging_interval = 0};
+  Controller agent(config_of(small, QLambdaConfig{}));
+  EXPECT_THROW(agent.end_warm_up_of_teacher(), std::invalid_argument);
+  agent.learn(State{0.0, 2.0}, State{1.0}, 1.0, State{0.0, 3.0}, false);
+  agent.learn(State{0.0, 3.0}, State{1.0}, 1.0, State{0.0, 4.0}, true);
+  agent.end_warm_up_of_teacher();
+  ASSERT_FALSE(agent.is_warming_up());
+  EXPECT_EQ(agent.observations().low()[1], -2.0);
+  EXPECT_EQ(agent.observations().high()[1], 8.0);
+  EXPECT_EQ(agent.observations().low()[0], -10.0);
+  for (int i = 0; i < 30; ++i) agent.imitate(State{0.0, 3.0}, State{-0.9}, 1.0, 0.5);
+  EXPECT_EQ(agent.act(State{0.0, 3.0}, false).front(), -1.0);  // the nearest action
+  EXPECT_THROW(agent.imitate(State{0.0}, State{1.0}, 1.0, 1.0), std::invalid_argument);
+  EXPECT_THROW(agent.imitate(State{0.0, 3.0}, State{1.0}, 1e301, 1.0), std::invalid_argument);
+  EXPECT_THROW(agent.end_warm_up_of_teacher(), std::invalid_argument);
+}
+
+TEST(Imitation, NeedsALinearReadout) {
+  ControllerConfig config =
+      config_of(approximators::RBFNetworkConfig{.n_bases = 3}, QLearningConfig{});
+  config.observation = {.low = {-1.0, -1.0}, .high = {1.0, 1.0}};
+  Controller agent(config);
+  EXPECT_THROW(agent.imitate(State{0.0, 0.0}, State{1.0}, 1.0, 1.0), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sdnn::agents

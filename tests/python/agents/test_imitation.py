@@ -1,0 +1,231 @@
+"""Imitation of a teacher: the policy is taken from a log, and learning continues from there."""
+
+import copy
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from q_lambda_transcription import SMALL, Code, QLambda, life
+from refusals import refuses
+from sdnn.agents import (
+    FuzzyQLearning,
+    QLambdaConfig,
+    RBFQLearning,
+    SDNNActorCritic,
+    SDNNQLambda,
+    Transition,
+    evaluate,
+    imitate,
+)
+from sdnn.approximators import LinearSDNNConfig
+from stopped_training import states_equal
+
+SQUARE = gym.spaces.Box(0.0, 1.0, (2,), np.float64)
+KNOWN = {"inputs": "all", "angle_pairs": "none", "observation_range": (0.0, 1.0)}
+
+
+def cartpole_log(n_rows, seed=1, noise=0.05):
+    """Transitions of a hand-written controller, some of whose actions are random."""
+    env, rng, rows = gym.make("CartPole-v1"), np.random.default_rng(seed), []
+    observation, _ = env.reset(seed=seed)
+    for _ in range(n_rows):
+        push = int(observation @ [0.1, 0.3, 3.0, 1.0] > 0.0)
+        action = int(rng.integers(2)) if rng.random() < noise else push
+        after, reward, terminated, truncated, _ = env.step(action)
+        rows.append((observation, action, reward, after, terminated, truncated))
+        observation = env.reset()[0] if terminated or truncated else after
+    return rows
+
+
+@pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
+def test_a_policy_is_taken_over_and_kept(agent_class):
+    env = gym.make("CartPole-v1")
+    agent = agent_class(env, seed=1)
+    assert imitate(agent, cartpole_log(3000), epochs=5) == 15_000
+    assert evaluate(agent, env, episodes=10, seed=3).mean_return > 450
+    agent.train(env, steps=2000, seed=4)
+    assert evaluate(agent, env, episodes=10, seed=3).mean_return > 400
+
+
+ACTIONS = [
+    gym.spaces.Discrete(4),
+    gym.spaces.MultiDiscrete([3, 2]),
+    gym.spaces.Box(-1.0, 1.0, (2,), np.float64),
+]
+
+
+@pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
+@pytest.mark.parametrize("space", ACTIONS, ids=lambda space: type(space).__name__)
+@pytest.mark.parametrize("reward", [0.0, 1e-9, -1000.0])
+def test_every_space_of_actions_and_any_reward(agent_class, space, reward):
+    rng = np.random.default_rng(1)
+    space.seed(1)
+    choices = [space.sample() for _ in range(2)]
+    if isinstance(space, gym.spaces.Box):
+        choices = [np.array([-1.0, 1.0]), np.array([0.0, -1.0])]
+    points = rng.uniform(size=(300, 2))
+    actions = [choices[int(x > 0.5)] for x, _ in points]
+    log = [
+        Transition(point, action, reward, point, False)
+        for point, action in zip(points, actions, strict=True)
+    ]
+    agent = agent_class(SQUARE, space, seed=1, **KNOWN)
+    imitate(agent, log)
+    is_clear = abs(points[:, 0] - 0.5) > 0.1
+    equal = [
+        np.array_equal(agent.act(point, explore=False), action)
+        for point, action in zip(points[is_clear], np.array(actions)[is_clear], strict=True)
+    ]
+    assert np.mean(equal) > 0.95
+
+
+def value_of(agent, observation):
+    if isinstance(agent, SDNNActorCritic):
+        return agent.value(observation)
+    return agent.q_values(observation).max()
+
+
+@pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
+def test_values_are_the_returns_of_the_teacher(agent_class):
+    """Two steps to a reward of 8 with a discount of 1/2; a cut episode continues by estimates."""
+    a, b = [0.2, 0.2], [0.8, 0.8]
+    learning = agent_class.learning_type(discount=0.5)
+    push = gym.spaces.Discrete(2)
+    agent, other = (agent_class(SQUARE, push, learning=learning, **KNOWN) for _ in range(2))
+    ended = [Transition(a, 0, 0.0, b, False), Transition(b, 1, 8.0, b, True)]
+    imitate(agent, ended, epochs=200)
+    assert [value_of(agent, x) for x in (b, a)] == pytest.approx([8.0, 4.0], abs=0.2)
+    imitate(other, [(b, 1, 3.0, b, False, True)], epochs=400)  # v = 3 + v / 2
+    assert value_of(other, b) == pytest.approx(6.0, abs=0.2)
+
+
+@pytest.mark.parametrize("n_rows", [1, 2, 40, 300])
+def test_ranges_come_from_the_log_where_they_are_not_known(n_rows):
+    space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
+    agent = SDNNQLambda(space, gym.spaces.Discrete(2), warm_up_steps=200, seed=1)
+    points = np.random.default_rng(1).uniform(2.0, 4.0, (n_rows, 2))
+    points[0], points[-1] = 2.0, 4.0
+    rows = [Transition(point, int(point[0] > 3.0), 0.0, point, True) for point in points]
+    assert imitate(agent, rows, epochs=3) == 3 * n_rows
+    low, high = agent.observation_range
+    if n_rows == 40:
+        np.testing.assert_allclose(low, -2.0)
+        np.testing.assert_allclose(high, 8.0)
+    assert agent.act([4.0, 4.0], explore=False) == 1
+
+
+def test_a_started_warm_up_is_continued():
+    agent = SDNNQLambda(gym.make("CartPole-v1"), warm_up_steps=100, seed=1)
+    rows = cartpole_log(300)
+    for row in rows[:99]:
+        agent.learn(Transition(*row[:5]))
+    assert agent._n_warm_up_steps_left == 1
+    imitate(agent, rows, epochs=1)
+    assert not agent.is_warming_up
+
+
+@pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
+def test_forms_of_logs_and_files_of_agents_make_no_difference(agent_class, tmp_path):
+    rows = cartpole_log(400)
+    names = (
+        "observations", "actions", "rewards", "next_observations", "terminations", "truncations",
+    )  # fmt: skip
+    columns = dict(zip(names, map(np.array, zip(*rows, strict=True)), strict=True))
+    agent, other = (agent_class(gym.make("CartPole-v1"), seed=1) for _ in range(2))
+    imitate(agent, rows, epochs=1)
+    imitate(agent, rows, epochs=1)
+    imitate(other, columns, epochs=1)
+    other.save(tmp_path / "agent.safetensors")
+    other = agent_class.load(tmp_path / "agent.safetensors")
+    imitate(other, columns, epochs=1)
+    assert states_equal(agent, other)
+
+
+def imitated(slow, x, action, value, margin):
+    """`QLambda::imitate` in NumPy."""
+    slow.fit_unit(value)
+    slow.fit_unit(margin)
+    slow.n_learned += 1
+    s = slow.settings
+    rate = max(1, slow.scheduled(s.learning_rate, s.final_learning_rate))
+    while abs(slow.value(x, action)) >= 2**33:
+        slow.double_unit()
+    error = slow.units_of(value) - slow.value(x, action)
+    move(slow, x, np.full(len(slow.weights), error), rate, action)
+    errors = np.zeros(len(slow.weights), np.int64)
+    for d, part in enumerate(slow.sums(x, slow.weights)):
+        others = np.delete(np.arange(len(part)), action[d])
+        if len(others) == 0:
+            continue
+        best = others[np.argmax(part[others])]
+        error = int(part[best]) + slow.units_of(margin) - int(part[action[d]])
+        if error > 0:
+            half = error * len(action) // 2
+            rows = slow.first_rows[d] + np.arange(slow.window)
+            np.add.at(errors, rows + action[d], half)
+            np.add.at(errors, rows + best, -half)
+    move(slow, x, errors, 2**16 // 10, action)
+
+
+def move(slow, x, errors, rate, action):
+    """`LinearSDNN::move_rows` in NumPy."""
+    part = (rate << 12) // max(1, np.count_nonzero(x) * len(slow.rows(action)))
+    steps = [((int(np.clip(e, 1 - 2**34, 2**34 - 1)) * part + 2**27) >> 28) for e in errors]
+    largest = max(map(abs, steps))
+    while largest >= 2**23:
+        slow.double_unit()
+        steps, largest = [(step + 1) >> 1 for step in steps], (largest + 1) >> 1
+    slow.weights += np.outer(np.array(steps, np.int64), x)
+    used = int(np.bitwise_or.reduce(slow.weights ^ slow.weights >> 63, None))
+    while used >= 2**23:
+        slow.double_unit()
+        used = used >> 1 | int(np.any(slow.weights == 2**23)) << 23
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    n_actions=st.integers(2, 4),
+    n_dimensions=st.integers(1, 2),
+    window=st.integers(1, 3),
+    scale=st.sampled_from([1.0, 100.0, 1e6, 1e-40]),
+)
+@settings(max_examples=30, deadline=None)
+def test_weights_are_those_of_the_transcription(seed, n_actions, n_dimensions, window, scale):
+    learning = {"schedule_steps": 7, "bootstrap": "q_learning", "traces": "dutch"}
+    agent = SDNNQLambda(
+        SQUARE,
+        gym.spaces.Box(0.0, 1.0, (n_dimensions,), np.float64),
+        approximator=LinearSDNNConfig(**SMALL, action_window=window, n_actions=n_actions),
+        learning=QLambdaConfig(schedule_steps=7),
+        seed=seed,
+        **KNOWN,
+    )
+    sizes = [n_actions] * n_dimensions
+    slow, margin = QLambda(Code(agent.readout.code, 2), sizes, window, learning), 0.1 * scale
+    for state, action, value, _, _ in life(seed, 25, sizes, scale):
+        torques = np.array(action) / (n_actions - 1)
+        agent._imitate_step(Transition(state, torques, 0.0, state, True), value, margin)
+        imitated(slow, slow.code(state), action, value, margin)
+        assert agent.readout.exponent == slow.exponent
+        np.testing.assert_array_equal(agent.readout.weights(), slow.weights)
+
+
+def test_what_cannot_be_imitated():
+    push = gym.spaces.Discrete(2)
+    agent = SDNNQLambda(SQUARE, push, seed=1, **KNOWN)
+    row = Transition([0.1, 0.1], 1, 0.0, [0.2, 0.2], True)
+    assert imitate(agent, []) == 0
+    unchanged = copy.deepcopy(agent)
+    bad = [row, row._replace(action=2)]
+    error = refuses("action", imitate, agent, bad)
+    assert "episode 1, transition 1" in str(error)
+    refuses("epochs", imitate, agent, [row], epochs=0)
+    refuses("agent", imitate, RBFQLearning(SQUARE, push), [row], error=TypeError)
+    torque = gym.spaces.Box(-1.0, 1.0, (1,))
+    refuses("agent", imitate, FuzzyQLearning(SQUARE, torque), [row], error=TypeError)
+    refuses("dataset", imitate, agent, 7, error=TypeError)
+    assert states_equal(agent, unchanged)
+    with pytest.raises(RuntimeError, match="warming up"):
+        SDNNQLambda(SQUARE, push, warm_up_steps=9)._imitate_step(row, 0.0, 1.0)
