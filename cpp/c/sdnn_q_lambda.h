@@ -18,6 +18,7 @@ typedef int64_t sdnn_score;
 #define SDNN_TRACE_ONE 4096
 #define SDNN_MOST_SNAPSHOTS 3072
 #define SDNN_MOST_ENDED 20
+#define SDNN_MOST_RANDOM (UINT32_C(1) << 30)
 #define SDNN_AVERAGES (SDNN_AVERAGING_INTERVAL > 0)
 #define SDNN_N_WEIGHTS (UINT32_C(1) * SDNN_N_ROWS * SDNN_N_COLUMNS)
 #define SDNN_N_AVERAGED (SDNN_AVERAGES * SDNN_N_WEIGHTS)
@@ -338,12 +339,18 @@ static inline void sdnn_begin_episode(sdnn_agent* agent) {
   if (agent->is_pending) sdnn_finish_at_end(agent);
 }
 
+/* Whether rewards came and all were 0: random actions that last reach further than random ties. */
+static inline int sdnn_lacks_rewards(const sdnn_agent* agent) {
+  return SDNN_SEARCHES && agent->n_learned > 0 && !agent->has_exponent && agent->epsilon > 0;
+}
+
 /* Whether the next action is a random one, which is in agent->kept then. */
 static inline int sdnn_explores(sdnn_agent* agent) {
   const uint32_t step = agent->step++;
-  const int at_random = agent->n_random_left > 0;
+  const int at_random =
+      agent->n_random_left > 0 || (sdnn_lacks_rewards(agent) && sdnn_may_explore(step));
   uint32_t d;
-  if (at_random) --agent->n_random_left;
+  if (agent->n_random_left > 0) --agent->n_random_left;
   if (agent->n_kept > 0) {
     --agent->n_kept;
     return 1;
@@ -356,7 +363,10 @@ static inline int sdnn_explores(sdnn_agent* agent) {
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     agent->kept[d] = (uint32_t)sdnn_below(&agent->randoms[SDNN_EXPLORATION], sdnn_n_actions[d]);
   }
-  if (SDNN_MAX_ACTION_REPEAT > 1) {
+  if (SDNN_SEARCHES && at_random && SDNN_START_STEPS == 0) {
+    agent->n_kept = (uint32_t)sdnn_below(&agent->randoms[SDNN_REPETITIONS],
+                                         (uint64_t)SDNN_MAX_ACTION_REPEAT / 2);
+  } else if (SDNN_MAX_ACTION_REPEAT > 1) {
     const uint32_t most = (uint32_t)SDNN_MAX_ACTION_REPEAT >> agent->n_ended;
     const uint32_t least = SDNN_MAX_ACTION_REPEAT < 5 ? SDNN_MAX_ACTION_REPEAT : 5;
     agent->n_kept =
@@ -441,13 +451,19 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) agent->action[d] = limited[d];
   agent->reward = reward;
   agent->is_pending = 1;
+  if (reward != 0 && sdnn_lacks_rewards(agent)) { /* search for more in twice as many steps */
+    agent->n_random_left =
+        agent->n_learned < SDNN_MOST_RANDOM / 2 ? 2 * (uint32_t)agent->n_learned : SDNN_MOST_RANDOM;
+  }
   sdnn_fit_unit(agent, reward);
   ++agent->n_learned;
   sdnn_apply_rates(agent);
   if (terminated) {
     sdnn_correct(agent, 0);
     sdnn_end(agent);
-    if (agent->n_ended < SDNN_MOST_ENDED) ++agent->n_ended;
+    if ((SDNN_START_STEPS > 0 || agent->n_random_left == 0) && agent->n_ended < SDNN_MOST_ENDED) {
+      ++agent->n_ended;
+    }
   } else if (!SDNN_IS_SARSA) {
     sdnn_correct_by_best(agent);
   }
@@ -526,7 +542,7 @@ static inline int sdnn_load(sdnn_agent* agent, const uint8_t* image) {
   uint32_t j;
   if (!sdnn_is_image(image, SDNN_IMAGE_BYTES, image + 60) ||
       (exponent != INT32_MIN && (exponent < -1100 || exponent > 1100)) ||
-      sdnn_get(image + 12, 4) > SDNN_MOST_SNAPSHOTS || sdnn_get(image + 16, 4) > SDNN_START_STEPS ||
+      sdnn_get(image + 12, 4) > SDNN_MOST_SNAPSHOTS || sdnn_get(image + 16, 4) > SDNN_MOST_RANDOM ||
       sdnn_get(image + 20, 4) > SDNN_MOST_ENDED || sdnn_get(image + 24, 8) > UINT64_C(1) << 45 ||
       sdnn_get(image + 32, 8) >> 62 || !sdnn_is_scale(image + 40)) {
     return 0;

@@ -98,7 +98,8 @@ class QLambda:
         # (4) All numbers are integers. Weights and values count units of 2^exponent, traces units
         #     of 2^-12. The first reward sets the exponent.
         self.exponent = None
-        self.n_learned = self.n_corrections = self.n_snapshots = self.n_terminated = 0
+        self.n_learned = self.n_corrections = self.n_snapshots = 0
+        self.n_terminated = self.n_random_left = 0
         self.ties, self.greedy_ties, self.exploration, self.repetitions = (
             Random(s.seed, stream) for stream in (TIES, GREEDY_TIES, EXPLORATION, REPETITIONS)
         )
@@ -130,19 +131,35 @@ class QLambda:
         end = self.n_learned + self.settings.schedule_steps
         return first + (2 * (last - first) * self.n_learned + end) // (2 * end)
 
+    def epsilon(self):
+        return self.scheduled(self.settings.epsilon, 0.0) / 2**16
+
+    def lacks_rewards(self):
+        has_only_zeros = self.n_learned > 0 and self.exponent is None
+        return has_only_zeros and self.settings.max_action_repeat > 1 and self.epsilon() > 0
+
     def act(self, state, explore=True):
         s = self.settings
-        if explore and self.n_kept > 0:
-            self.n_kept -= 1
-            return self.random_action
-        if explore and self.exploration.uniform() < self.scheduled(s.epsilon, 0.0) / 2**16:
-            # (6) A random action is kept for at least k steps with probability 1 / k. Each episode
-            #     that terminates halves the longest duration, down to 5 steps.
-            self.random_action = [self.exploration.below(int(n)) for n in np.diff(self.first_rows)]
-            longest = max(s.max_action_repeat >> self.n_terminated, min(5, s.max_action_repeat))
-            self.n_kept = int(min(1 / (1 - self.repetitions.uniform()), longest)) - 1
-            return self.random_action
-        # (7) Without exploration, actions follow an average of the weights.
+        if explore:
+            # (6) While all rewards were 0, values have no order: the agent searches by random
+            #     actions that last, and for twice as many steps after the first reward, too.
+            must_explore = self.n_random_left > 0 or self.lacks_rewards()
+            self.n_random_left = max(self.n_random_left - 1, 0)
+            if self.n_kept > 0:
+                self.n_kept -= 1
+                return self.random_action
+            if must_explore or self.exploration.uniform() < self.epsilon():
+                # (7) A random action is kept for at least k steps with probability 1 / k. Each
+                #     episode that terminates halves the longest duration, down to 5 steps.
+                n_actions = np.diff(self.first_rows)
+                self.random_action = [self.exploration.below(int(n)) for n in n_actions]
+                longest = max(s.max_action_repeat >> self.n_terminated, min(5, s.max_action_repeat))
+                if must_explore:
+                    self.n_kept = self.repetitions.below(s.max_action_repeat // 2)
+                else:
+                    self.n_kept = int(min(1 / (1 - self.repetitions.uniform()), longest)) - 1
+                return self.random_action
+        # (8) Without exploration, actions follow an average of the weights.
         weights = self.average if not explore and self.n_snapshots > 0 else self.weights
         ties = self.ties if explore else self.greedy_ties
         best = [np.flatnonzero(part == part.max()) for part in self.sums(self.code(state), weights)]
@@ -155,6 +172,8 @@ class QLambda:
             follows = np.array_equal(self.next_state, state)
             if not follows or self.value(x, action) < self.best_value(x):
                 self.end_trace()
+        if reward != 0.0 and self.lacks_rewards():
+            self.n_random_left = 2 * self.n_learned
         self.fit_unit(reward)
         self.n_learned += 1
         while not terminated and abs(self.best_value(next_x)) >= 2**33:
@@ -163,7 +182,7 @@ class QLambda:
         self.next_state = next_state
         if terminated:
             self.end_trace()
-            self.n_terminated += 1
+            self.n_terminated += self.n_random_left == 0
 
     def correct(self, x, action, reward, next_value):
         """Algorithm 2, with Q' the best value of the next state."""
@@ -174,7 +193,7 @@ class QLambda:
         value = self.value(x, action)  # the textbook's Q; old_value is its Q_old
         target = self.units_of(reward) + rounded(next_value * round(s.discount * 2**15), 15)
         drift, self.old_value = value - self.old_value, next_value
-        # (8) Alpha is divided by the number of weights that have a part in Q(s, a): a step of 1
+        # (9) Alpha is divided by the number of weights that have a part in Q(s, a): a step of 1
         #     corrects the whole error of a new state, and no step overshoots.
         n_weights = max(1, np.count_nonzero(x) * len(rows))
         rate = (max(1, self.scheduled(s.learning_rate, s.final_learning_rate)) << 12) // n_weights
@@ -211,7 +230,7 @@ class QLambda:
             self.average += rounded(self.weights - self.average, n_bits)
             self.n_snapshots = min(self.n_snapshots + 1, 3 * 2**10)
 
-    # (9) The unit follows the rewards: the first one has 31 bits. It doubles where a weight would
+    # (10) The unit follows the rewards: the first one has 31 bits. It doubles where a weight would
     #     need more than 23 bits, or a value more than 33.
 
     def units_of(self, reward):

@@ -185,7 +185,10 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
     def _learning_rule(self) -> Data:
         learning, discount = self.agent.learning, round(self.agent.learning.discount * 32768)
         number, exponent = self.tolerance()
+        n_symbols = self.agent.approximator.n_symbols
+        has_symbols_only = len(n_symbols) > 0 and all(n_symbols)
         return {
+            "SEARCHES": int(learning.max_action_repeat > 1 and not has_symbols_only),
             "IS_DUTCH": int(learning.traces == "dutch"),
             "IS_SARSA": int(learning.bootstrap == "sarsa"),
             "AVERAGING_INTERVAL": self.agent.approximator.averaging_interval,

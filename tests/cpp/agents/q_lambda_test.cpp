@@ -174,7 +174,7 @@ TEST(QLambda, LearnsTheSameOnEveryInstructionSet) {
 /// Steps that the longest one lasted after so many ends.
 int longest_action(QLambda agent, int n_ended) {
   const State state{0.5, 0.5};
-  for (int i = 0; i < n_ended; ++i) agent.learn(state, Indices{0, 0}, 0.0, state, true);
+  for (int i = 0; i < n_ended; ++i) agent.learn(state, Indices{0, 0}, 1.0, state, true);
   agent.set_epsilon(1.0);
   Indices last;
   int longest = 0, n = 0;
@@ -198,12 +198,31 @@ TEST(QLambda, EndsMakeRandomActionsShorter) {
   EXPECT_EQ(longest_action(agent(100), 40), 5);
   EXPECT_EQ(longest_action(agent(3), 7), 3);
   QLambda ended = agent(100);
-  for (int i = 0; i < 40; ++i) ended.learn({{0.5, 0.5}}, Indices{0, 0}, 0.0, {{0.5, 0.5}}, true);
+  for (int i = 0; i < 40; ++i) ended.learn({{0.5, 0.5}}, Indices{0, 0}, 1.0, {{0.5, 0.5}}, true);
   const core::State good = core::state_of(ended);
   for (const int bad : {-1, 21}) {
     testing::expect_refused(ended, testing::with_number(good, "n_ended", bad),
                             "state: n_ended must be in [0, 20]");
   }
+}
+
+// Ten rewards of 0, then one of 1: twenty more steps are random, each action for 1 to 5 of them.
+TEST(QLambda, SearchesWhileAllRewardsAreZeroAndTwiceAsLongAfterwards) {
+  const State state{0.5, 0.5};
+  QLambda agent = agent_of({.max_action_repeat = 10}, {200, 200});
+  for (int i = 0; i < 10; ++i) agent.learn(state, Indices{0, 0}, 0.0, state, i % 3 == 2);
+  agent.learn(state, Indices{0, 0}, 1.0, state, true);
+  EXPECT_EQ(testing::number_of<std::int32_t>(core::state_of(agent), "n_random_left"), 20);
+  Indices last;
+  int run = 0;
+  for (int i = 0; i < 20; ++i) {
+    const auto span = agent.act(state);
+    const Indices action(span.begin(), span.end());
+    run = action == last ? run + 1 : 1;
+    last = action;
+    EXPECT_LE(run, 5);
+  }
+  EXPECT_FALSE(core::state_of(agent).contains("n_random_left"));
 }
 
 TEST(QLambda, EnvironmentsHaveSeparateTraces) {

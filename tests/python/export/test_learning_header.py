@@ -57,6 +57,20 @@ def test_a_trained_agent_continues_in_c(make, target, tmp_path):
     assert image == save_image(agent)
 
 
+def test_it_searches_for_a_first_reward_as_the_agent(target, tmp_path):
+    """Rewards are 0 at first; then most are, while the search goes on and ends."""
+    agent = discrete()
+    header, command = build(tmp_path, agent, target, *SANITIZED)
+    lines = lines_of(agent, 1500, 5, header.fraction_bits)
+    n_rewards = (lines.shape[1] - 3) // 2 + 1
+    lines[:300, n_rewards] = 0
+    lines[300:, n_rewards] *= np.arange(len(lines) - 300) % 20 == 0
+    nothing = save_image(agent)
+    came, image = lived(command, nothing, lines, agent.n_dimensions)
+    assert came == live(agent, lines, header.fraction_bits)
+    assert image == save_image(agent)
+
+
 def test_any_readings_and_rewards_are_defined(target, tmp_path):
     """Ends of the numbers' range, and every kind of line in any order."""
     for make in (discrete, sarsa, network, small_steps):

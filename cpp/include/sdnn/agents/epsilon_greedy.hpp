@@ -100,10 +100,13 @@ class EpsilonGreedy {
     archive.part("evaluation_ties", self.evaluation_ties_);
   }
 
-  /// Whether step number `step` (from 0) of an episode is to take a random action: drawn anew.
+  /// Whether step number `step` (from 0) of an episode may take a random action.
+  bool may_explore(int step) const noexcept {
+    return step >= config_.n_greedy_steps && config_.epsilon > 0.0;
+  }
+  /// Whether step number `step` of an episode is to take a random action: drawn anew.
   bool explores(int step) noexcept {
-    return step >= config_.n_greedy_steps && config_.epsilon > 0.0 &&
-           exploration_.uniform() < config_.epsilon;
+    return may_explore(step) && exploration_.uniform() < config_.epsilon;
   }
   /// Any of `n_actions` actions, with the same probability. Requires n_actions > 0.
   std::size_t random_action(std::size_t n_actions) noexcept {

@@ -29,6 +29,10 @@ namespace sdnn::agents {
 /// Who reports ends has shorter ones: each halves m, down to five. Where no episode terminates, an
 /// end that is hard to reach may be what matters; where many do, long actions only cut them short.
 ///
+/// While no action is known to be better than another, and for a while after the first reward other
+/// than 0, an agent searches: all actions are random, and last for any number of steps up to half
+/// of m with the same probability. A rare reward mostly takes many steps in one direction.
+///
 /// In its first start_steps steps an agent takes random actions only: a rare success is found
 /// before the greedy ones have learned to do nothing. Source: the start_steps of Achiam, J. (2018),
 /// Spinning up in deep reinforcement learning, kept for some steps as above.
@@ -53,19 +57,31 @@ class Exploration {
         repetitions_(seed, core::Stream::repetitions),
         max_action_repeat_(config.max_action_repeat),
         start_steps_(config.start_steps),
+        most_random_left_(searches(config) ? 1 << 30 : config.start_steps),
         n_random_left_(config.start_steps) {}
 
   EpsilonGreedy& policy() noexcept { return policy_; }
   const EpsilonGreedy& policy() const noexcept { return policy_; }
 
-  /// An episode terminated: from now on random actions are kept for half as long at most.
-  void note_end() noexcept { n_ended_ = std::min(n_ended_ + 1, kMostEnded); }
+  /// An episode terminated: from now on random actions are kept for half as long at most. In a
+  /// search for more rewards ends are what is searched for, and change nothing.
+  void note_end() noexcept {
+    if (start_steps_ == 0 && n_random_left_ > 0) return;
+    n_ended_ = std::min(n_ended_ + 1, kMostEnded);
+  }
+  /// The first reward other than 0 came after so many steps: twice as many will be random, too, in
+  /// search of more.
+  void note_first_reward(std::int64_t n_steps) noexcept {
+    n_random_left_ = static_cast<int>(std::min<std::int64_t>(2 * n_steps, most_random_left_));
+  }
 
   /// Whether the next step is random: then episode.kept is the action, an allowed one of
   /// n_actions(d) in each dimension d; else a best one is to be taken. An action that is no more
   /// allowed is not kept.
+  /// `lacks_order`: no action is known to be better than another, so that each step is random.
   template <class NActions>
-  bool takes_random_action(Episode& episode, const NActions& n_actions, ActionMask mask = {}) {
+  bool takes_random_action(Episode& episode, const NActions& n_actions, ActionMask mask = {},
+                           bool lacks_order = false) {
     ActionMask left = mask;
     for (std::size_t d = 0; d < episode.kept.size() && !left.empty(); ++d) {
       if (!allows(take_part(left, n_actions(d)), episode.kept[d])) episode.n_kept = 0;
@@ -73,7 +89,8 @@ class Exploration {
     const int step = episode.step++;
     const bool at_random = n_random_left_ > 0;
     if (at_random) --n_random_left_;
-    if (episode.n_kept == 0 && !at_random && !policy_.explores(step)) return false;
+    const bool must_explore = at_random || (lacks_order && policy_.may_explore(step));
+    if (episode.n_kept == 0 && !must_explore && !policy_.explores(step)) return false;
     if (episode.n_kept > 0) {
       --episode.n_kept;
       return true;
@@ -84,7 +101,10 @@ class Exploration {
         return policy_.random_action(n_allowed);
       });
     }
-    if (max_action_repeat_ > 1) {
+    if (max_action_repeat_ > 1 && must_explore && start_steps_ == 0) {  // it searches
+      episode.n_kept =
+          static_cast<int>(repetitions_.below(static_cast<std::uint64_t>(max_action_repeat_ / 2)));
+    } else if (max_action_repeat_ > 1) {
       const double drawn = 1.0 - repetitions_.uniform();  // in (0, 1]
       const double most = longest();
       episode.n_kept = static_cast<int>(std::min(1.0 / drawn, most)) - 1;
@@ -104,8 +124,10 @@ class Exploration {
     archive.number("n_ended", n_ended);
     if constexpr (Archive::kReads) {
       self.n_random_left_ = n_random_left.value_or(0);
-      archive.expect(self.n_random_left_ >= 0 && self.n_random_left_ <= self.start_steps_,
-                     "n_random_left", "in [0, start_steps]");
+      archive.expect(
+          self.n_random_left_ >= 0 && self.n_random_left_ <= self.most_random_left_,
+          "n_random_left",
+          self.most_random_left_ == self.start_steps_ ? "in [0, start_steps]" : "in [0, 2^30]");
       self.n_ended_ = n_ended.value_or(0);
       archive.expect(self.n_ended_ >= 0 && self.n_ended_ <= kMostEnded, "n_ended", "in [0, 20]");
     }
@@ -133,6 +155,12 @@ class Exploration {
   static constexpr int kShort = 5;
   static constexpr int kMostEnded = 20;  // beyond any max_action_repeat
 
+  /// Whether an agent searches for first rewards; see QLambda.
+  template <class Config>
+  static constexpr bool searches(const Config&) noexcept {
+    return requires(Config config) { config.traces; };
+  }
+
   /// Steps that a random action may last now.
   int longest() const noexcept {
     return std::max(max_action_repeat_ >> n_ended_, std::min(kShort, max_action_repeat_));
@@ -141,9 +169,10 @@ class Exploration {
   EpsilonGreedy policy_;
   core::Random repetitions_;
   int max_action_repeat_;
-  [[maybe_unused]] int start_steps_;  ///< which only templates read
-  int n_random_left_;                 ///< steps that will still be random
-  int n_ended_ = 0;                   ///< episodes that terminated, kMostEnded at most
+  int start_steps_;
+  int most_random_left_;
+  int n_random_left_;  ///< steps that will still be random
+  int n_ended_ = 0;    ///< episodes that terminated, kMostEnded at most
 };
 
 /// The largest size of rewards: sums of some, and steps to them, stay finite.
@@ -216,7 +245,10 @@ class IndexAgent : public WithRates<Agent> {
   /// Returns the action of act in a step of learning.
   Action explore(std::span<const double> state, auto& episode, ActionMask mask) {
     Agent& own = agent();
-    if (own.exploration_.takes_random_action(episode.exploration, n_actions_of(), mask)) {
+    bool lacks_order = false;
+    if constexpr (requires { own.lacks_rewards(); }) lacks_order = own.lacks_rewards();
+    if (own.exploration_.takes_random_action(episode.exploration, n_actions_of(), mask,
+                                             lacks_order)) {
       return episode.exploration.kept;
     }
     own.read_to_explore(state, episode);

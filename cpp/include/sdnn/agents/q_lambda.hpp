@@ -95,9 +95,7 @@ class QLambda : public IndexAgent<QLambda> {
   /// Where epsilon goes with schedule_steps: by default to 0. Symbols tell nothing of each other:
   /// where states have nothing else, epsilon stays, so that all of them are tried for good.
   double final_epsilon() const {
-    const std::vector<int>& n_symbols = readout().config().n_symbols;
-    const bool is_symbol = !n_symbols.empty() && std::ranges::find(n_symbols, 0) == n_symbols.end();
-    return config_.final_epsilon.value_or(is_symbol ? config_.policy.epsilon : 0.0);
+    return config_.final_epsilon.value_or(has_symbols_only() ? config_.policy.epsilon : 0.0);
   }
 
   /// Ends the trace, and learns the transition that still waits of an episode that did not
@@ -148,6 +146,7 @@ class QLambda : public IndexAgent<QLambda> {
     episode.next_state.assign(next_state.begin(), next_state.end());
     episode.next_mask.assign(next_mask.begin(), next_mask.end());
     episode.waits = true;
+    if (reward != 0.0 && lacks_rewards()) exploration_.note_first_reward(n_learned_);
     td_.fit_unit(reward, episodes_);
     ++n_learned_;
     apply_rates();
@@ -228,6 +227,18 @@ class QLambda : public IndexAgent<QLambda> {
  private:
   friend class WithRates<QLambda>;
   friend class IndexAgent<QLambda>;
+
+  /// Whether there were rewards and all of them were 0, and with them all values. Random actions
+  /// that last reach further than random ties, so a first reward comes sooner; symbols are in no
+  /// direction.
+  bool lacks_rewards() const noexcept {
+    const bool may_search = config_.max_action_repeat > 1 && epsilon() > 0.0;
+    return may_search && n_learned_ > 0 && !readout().exponent() && !has_symbols_only();
+  }
+  bool has_symbols_only() const noexcept {
+    const std::vector<int>& n_symbols = readout().config().n_symbols;
+    return !n_symbols.empty() && std::ranges::find(n_symbols, 0) == n_symbols.end();
+  }
 
   static constexpr double kMostTolerance = 0x1p62;  ///< in units: above any difference of values
   static constexpr std::int64_t kMostLearned = std::int64_t{1} << 45;

@@ -1,0 +1,118 @@
+"""Sparse rewards: without any the agent searches by random actions that last."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import sdnn_q_lambda as page
+
+from sdnn.agents import QLambdaConfig, SDNNQLambda, Transition, evaluate
+from stopped_training import states_equal
+
+SQUARE = gym.spaces.Box(0.0, 1.0, (2,), np.float64)
+KNOWN = {"inputs": "all", "angle_pairs": "none", "observation_range": (0.0, 1.0)}
+HERE = [0.5, 0.5]
+
+
+def new_agent(**learning):
+    actions = gym.spaces.Discrete(4)
+    return SDNNQLambda(SQUARE, actions, learning=QLambdaConfig(**learning), seed=1, **KNOWN)
+
+
+def live(agent, rewards):
+    """Act in one state; return the actions."""
+    actions = []
+    for reward in rewards:
+        actions.append(int(agent.act(HERE)))
+        agent.learn(Transition(HERE, actions[-1], reward, HERE, False))
+    return actions
+
+
+def longest_run(actions):
+    changes = np.flatnonzero(np.diff(actions))
+    return max(np.diff(np.concatenate([[-1], changes, [len(actions) - 1]])))
+
+
+def n_random_left(agent):
+    return int(agent.state().get("agent.n_random_left", 0))
+
+
+def test_actions_last_while_all_rewards_were_0():
+    assert longest_run(live(new_agent(), [0.0] * 1000)) >= 40
+    assert longest_run(live(new_agent(max_action_repeat=20), [0.0] * 1000)) < 40
+    for learning in ({"max_action_repeat": 1}, {"epsilon": 0.0}):
+        assert longest_run(live(new_agent(**learning), [0.0] * 1000)) < 15
+
+
+def test_symbols_are_not_searched():
+    agent = SDNNQLambda(gym.spaces.Discrete(5), gym.spaces.Discrete(4), seed=1)
+    actions = []
+    for _ in range(500):
+        actions.append(int(agent.act(2)))
+        agent.learn(Transition(2, actions[-1], 0.0, 2, False))
+    assert longest_run(actions) < 15
+
+
+@pytest.mark.parametrize(("n_zeros", "n_left"), [(0, 0), (1, 2), (50, 100)])
+def test_the_search_goes_on_for_twice_as_long(n_zeros, n_left):
+    agent = new_agent()
+    live(agent, [0.0] * n_zeros + [1.0])
+    assert n_random_left(agent) == n_left
+    live(agent, [1.0] * n_left)
+    assert n_random_left(agent) == 0
+
+
+def test_ends_within_the_search_leave_the_length_of_random_actions():
+    agent = new_agent()
+    live(agent, [0.0] * 10)
+    agent.learn(Transition(HERE, 0, 1.0, HERE, True))
+    assert "agent.n_ended" not in agent.state()
+    live(agent, [1.0] * 20)
+    agent.learn(Transition(HERE, 0, 1.0, HERE, True))
+    assert int(agent.state()["agent.n_ended"]) == 1
+
+
+@pytest.mark.parametrize("n_steps", [30, 80])
+def test_a_search_resumes_exactly(n_steps, tmp_path):
+    rewards = [0.0] * 60 + [1.0] + [0.0] * 200
+    whole, part = new_agent(), new_agent()
+    live(whole, rewards)
+    live(part, rewards[:n_steps])
+    part.save(tmp_path / "agent.safetensors")
+    part = SDNNQLambda.load(tmp_path / "agent.safetensors")
+    live(part, rewards[n_steps:])
+    assert states_equal(whole, part)
+
+
+def test_the_page_searches_alike():
+    """The transcription in NumPy draws the same actions and learns the same weights."""
+    settings = page.Settings(seed=1, n_anchor_patterns=9, n_interpolated=44)
+    slow = page.new_agent(2, [4], settings)
+    agent = new_agent()
+    rng = np.random.default_rng(1)
+    state = rng.random(2)
+    for step in range(160):
+        action, next_state = slow.act(state), rng.random(2)
+        assert int(agent.act(state)) == action[0]
+        reward, terminated = float(step in (40, 70)), step in (20, 70, 150)
+        slow.learn(state, action, reward, next_state, terminated)
+        agent.learn(Transition(state, action[0], reward, next_state, terminated))
+        state = rng.random(2) if terminated else next_state
+        if terminated:
+            slow.begin_episode()
+            agent.begin_episode()
+    np.testing.assert_array_equal(agent.readout.weights(), slow.weights)
+
+
+class RewardAtGoal(gym.Wrapper):
+    """A reward of 1 where an episode terminates, else 0."""
+
+    def step(self, action):
+        observation, _, terminated, truncated, info = self.env.step(action)
+        return observation, float(terminated), terminated, truncated, info
+
+
+def test_mountain_car_with_a_reward_at_the_goal_alone():
+    env = RewardAtGoal(gym.make("MountainCar-v0"))
+    agent = SDNNQLambda(env, seed=1003)
+    agent.train(env, steps=40_000, seed=1003)
+    assert evaluate(agent, env, episodes=10, seed=7).mean_return > 0.8
