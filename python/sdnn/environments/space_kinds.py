@@ -287,7 +287,8 @@ def _other_bounds(space: Any, other_space: Any, part: str = "") -> Iterator[str]
     types = [np.dtype(box.dtype) for box in (space, other_space)]
     rounding = max(_ROUNDING, *(np.finfo(t).eps for t in types if t.kind == "f"), 0.0)
     size = np.where(np.isfinite(bounds), np.abs(bounds), 0.0).max(axis=1, keepdims=True)
-    is_alike = (bounds == other) | np.isclose(bounds, other, rtol=0.0, atol=rounding * size)
+    with np.errstate(invalid="ignore", over="ignore"):  # of two infinite bounds
+        is_alike = (bounds == other) | (np.abs(bounds - other) <= rounding * size)
     for i in np.flatnonzero(~is_alike.all(axis=1)):
         variable = f"variable {i}{part and f' of {part}'}"
         ranges = [f"{low:.6g} to {high:.6g}" for low, high in (other[i], bounds[i])]
