@@ -54,12 +54,11 @@ def targets_of(estimator):
 def test_check_estimator_finds_nothing(made):
     results = check_estimator(made, on_skip=None, on_fail=None)
     other = {r["check_name"]: r["status"] for r in results if r["status"] != "passed"}
-    # The first asks for an environment variable that is read when SciPy is imported. The second
-    # cannot hold where the order of samples matters; scikit-learn's Perceptron fails it too.
-    assert other == {
-        "check_array_api_input": "skipped",
-        "check_sample_weight_equivalence_on_dense_data": "failed",
-    }
+    # The first, of newer versions, asks for an environment variable that is read when SciPy is
+    # imported. The second cannot hold where the order of samples matters; scikit-learn's
+    # Perceptron fails it too.
+    assert other.pop("check_array_api_input", "skipped") == "skipped"
+    assert other == {"check_sample_weight_equivalence_on_dense_data": "failed"}
     assert len(results) > 45
 
 
