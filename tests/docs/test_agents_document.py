@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import click
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -29,7 +30,8 @@ AGENTS = {
 
 
 def test_the_options_exist():
-    options = {o for c in main.commands.values() for p in c.params for o in p.opts}
+    commands = main.commands.values()
+    options = {o for c in commands for p in c.get_params(click.Context(c)) for o in p.opts}
     for page in ("agents", "choosing-settings", "command-line", "robots", "training"):
         text = (DOCS / "how-to" / f"{page}.md").read_text()
         assert set(re.findall(r"--[a-z][a-z-]*", text)) <= options | {"--help"}, page

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import click
 import gymnasium as gym
 
 from sdnn.agents import SDNNQLearning
@@ -13,7 +14,8 @@ TEXT = (Path(__file__).parents[2] / "docs" / "how-to" / "small-processors.md").r
 
 
 def test_the_names_and_options_exist():
-    options = {o for c in main.commands.values() for p in c.params for o in p.opts}
+    commands = main.commands.values()
+    options = {o for c in commands for p in c.get_params(click.Context(c)) for o in p.opts}
     ours = re.sub(r"`python bench[^`]*`", "", TEXT)
     assert set(re.findall(r"--[a-z][a-z-]*", ours)) <= options
     env = gym.make("CartPole-v1")
