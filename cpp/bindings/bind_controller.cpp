@@ -70,10 +70,10 @@ void require_warm(const Controller& controller) {
 std::span<const double> best_action(Controller& controller, std::span<const double> observation,
                                     std::size_t environment, agents::ActionMask mask) {
   const Controller& read = controller;
-  const auto variables = bindings::copied(controller.hold(observation, environment));
+  const auto state = bindings::copied(controller.prepare(observation, environment));
   auto& workspace = bindings::workspace_of(read);
-  read_without_gil(controller, [&] { read.read(variables, workspace); });
-  return controller.best_of(workspace, mask);  // which draws, and so needs the lock
+  read_without_gil(controller, [&] { read.read(state, workspace); });
+  return controller.best_of(workspace, environment, mask);  // which draws, and so needs the lock
 }
 
 /// The values of all actions of a dimension. Other threads run meanwhile, as in best_action.
@@ -194,6 +194,13 @@ void bind_controller(py::module_& module) {
       .def_property_readonly("approximator", &Controller::approximator)
       .def_property_readonly("is_warming_up", &Controller::is_warming_up)
       .def_property_readonly("n_variables", &Controller::n_variables)
+      .def_property_readonly(
+          "history",
+          [](const Controller& self) {
+            const auto kind = static_cast<std::size_t>(self.history().kind());
+            return std::string(words_of(agents::History())[kind]);
+          },
+          "The part of earlier observations in states; 'none' during the warm-up")
       .def_property_readonly("n_actions",
                              [](const Controller& self) { return self.actions().n_actions(); })
       .def_property_readonly(

@@ -1726,6 +1726,8 @@ class ObservationConfig:
         Variables that are never left out.
     missing : {'error', 'hold', 'code'}
         Whether readings that are NaN or infinite are refused, the last reading is used instead, or each input has a pattern for them.
+    history : {'none', 'differences', 'averages', 'observer', 'auto'}
+        Whether states have nothing of earlier observations, differences from the last one, running averages, estimates of an observer in place of the inputs, or what the warm-up finds.
     
     Raises
     ------
@@ -1738,7 +1740,7 @@ class ObservationConfig:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., narrowed: bool = ..., running: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., relevant_only: bool = ..., inputs: collections.abc.Sequence[int] = ..., missing: typing.Literal['error', 'hold', 'code'] = ...) -> None:
+    def __init__(self, *, low: collections.abc.Sequence[float | None] = ..., high: collections.abc.Sequence[float | None] = ..., adaptive: bool = ..., narrowed: bool = ..., running: bool = ..., angles: collections.abc.Sequence[int] = ..., angle_pairs: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., find_angle_pairs: bool = ..., symbols: collections.abc.Sequence[collections.abc.Sequence[int]] = ..., relevant_only: bool = ..., inputs: collections.abc.Sequence[int] = ..., missing: typing.Literal['error', 'hold', 'code'] = ..., history: typing.Literal['none', 'differences', 'averages', 'observer', 'auto'] = ...) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
@@ -1774,6 +1776,11 @@ class ObservationConfig:
     def high(self) -> tuple[float | None, ...]:
         """
         Highest value of each variable; none: not known.
+        """
+    @property
+    def history(self) -> typing.Literal['none', 'differences', 'averages', 'observer', 'auto']:
+        """
+        Whether states have nothing of earlier observations, differences from the last one, running averages, estimates of an observer in place of the inputs, or what the warm-up finds.
         """
     @property
     def inputs(self) -> tuple[int, ...]:
@@ -1946,6 +1953,11 @@ class Controller:
     def final_epsilon(self) -> float | None:
         """
         Where epsilon goes with schedule_steps; None without Q(lambda)
+        """
+    @property
+    def history(self) -> str:
+        """
+        The part of earlier observations in states; 'none' during the warm-up
         """
     @property
     def inputs(self) -> list[tuple[str, list[int]]]:

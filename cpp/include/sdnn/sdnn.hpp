@@ -15,6 +15,7 @@
 #include "sdnn/agents/fixed_rate.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/fuzzy_q_learning_config.hpp"
+#include "sdnn/agents/history.hpp"
 #include "sdnn/agents/last_readings.hpp"
 #include "sdnn/agents/latest_transitions.hpp"
 #include "sdnn/agents/n_step_buffer.hpp"

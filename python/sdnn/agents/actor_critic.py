@@ -25,7 +25,7 @@ class SDNNActorCritic(ValueAgent[LinearSDNNConfig, ActorCriticConfig]):
     Parameters
     ----------
     observation_space, action_space, seed, tables, observation_range, angles, angle_pairs, inputs, \
-warm_up_steps, missing
+warm_up_steps, missing, history
         See `Agent`; ``observation_range`` is ``"running"`` by default, so there is no warm-up
         unless inputs are to be found. Inputs that are left out stay out.
     approximator : LinearSDNNConfig, optional

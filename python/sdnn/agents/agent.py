@@ -78,6 +78,13 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         variable's last reading in its environment's episode replaces them (before the first one,
         the middle of its range, of a symbol the first one), or each input has a pattern for them
         (SDNN agents only; an angle is missing if one of its pair is).
+    history : {"none", "differences", "averages", "observer", "auto"}
+        The part of earlier observations in states. ``"differences"``: the change of each input in
+        the last step, as a further input, for tasks whose observations lack velocities.
+        ``"averages"``: two running averages of each input, as further inputs. ``"observer"``: an
+        estimate in place of each input, for noisy sensors, from a model that is fitted in the
+        warm-up (at most 16 inputs). ``"auto"``: what the warm-up finds useful, or nothing. Needs a
+        warm-up. Observations must then be those of one episode, in order.
 
     Raises
     ------

@@ -28,6 +28,7 @@ from sdnn.environments.space_kinds import (
 from sdnn.environments.spaces import (
     Actions,
     AnglePairs,
+    History,
     Inputs,
     Missing,
     Observations,
@@ -121,6 +122,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         inputs: Inputs | None = None,
         warm_up_steps: int = WARM_UP.default,
         missing: Missing = "error",
+        history: History = "none",
     ) -> None:
         chosen = choice("preset", self.default_preset if preset is None else preset, self.presets)
         made_of = () if tables is None else pattern_tables(tables)
@@ -143,6 +145,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             chosen.angle_pairs if angle_pairs is None else angle_pairs,
             chosen.inputs if inputs is None else inputs,
             missing=missing,
+            history=history,
             narrows=self.narrows_ranges,
         )
         self._action = self._actions.config
@@ -213,6 +216,16 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
     def missing(self) -> str:
         """The treatment of missing readings: ``"error"``, ``"hold"`` or ``"code"``."""
         return self._observation.missing
+
+    @property
+    def history(self) -> str:
+        """The part of earlier observations in states.
+
+        With ``history="auto"`` that which the warm-up found; ``"auto"`` until it is over.
+        """
+        if self.is_warming_up:
+            return self._observation.history
+        return self._controller.history
 
     @property
     def progress(self) -> float:

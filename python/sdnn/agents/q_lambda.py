@@ -21,7 +21,8 @@ class SDNNQLambda(ValueAgent[LinearSDNNConfig, QLambdaConfig]):
 
     Parameters
     ----------
-    observation_space, action_space, seed, tables, observation_range, angles, warm_up_steps, missing
+    observation_space, action_space, seed, tables, observation_range, angles, warm_up_steps,
+    missing, history
         See `Agent`.
     angle_pairs, inputs
         See `Agent`; by default ``"find"`` and ``"relevant"``, with the preset ``"paper"``

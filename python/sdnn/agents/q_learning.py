@@ -128,7 +128,7 @@ class SDNNQLearning(ValueAgent[SDNNCConfig, QLearningConfig]):
     Parameters
     ----------
     observation_space, action_space, seed, tables, observation_range, angles, angle_pairs, inputs, \
-warm_up_steps, missing
+warm_up_steps, missing, history
         See `Agent`.
     approximator : SDNNCConfig, optional
         ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces.

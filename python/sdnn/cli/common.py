@@ -31,8 +31,8 @@ KEYS = (
     "agent.name", "agent.preset", "budget.steps", "budget.episodes", "budget.target_return", "seed",
     "protocol.n_envs", "protocol.evaluate_every", "protocol.evaluate_every_episodes",
     "protocol.evaluation_episodes", "environment.noise", "environment.redundant",
-    "agent.angle_pairs", "agent.inputs", "agent.missing", "output.checkpoint_every",
-    "output.keep_best", "output.tensorboard",
+    "agent.angle_pairs", "agent.inputs", "agent.missing", "agent.history",
+    "output.checkpoint_every", "output.keep_best", "output.tensorboard",
 )  # fmt: skip
 """Settings with an option of their own; ``--set KEY=VALUE`` sets any."""
 

@@ -26,6 +26,9 @@ Ranges: TypeAlias = Literal["adaptive", "running"] | tuple[ArrayLike, ArrayLike]
 Missing: TypeAlias = Literal["error", "hold", "code"]
 """The treatment of missing readings."""
 
+History: TypeAlias = Literal["none", "differences", "averages", "observer", "auto"]
+"""The part of earlier observations in states."""
+
 _MANY_VARIABLES = 16
 
 
@@ -59,6 +62,7 @@ class Observations:
         inputs: Inputs,
         *,
         missing: Missing = "error",
+        history: History = "none",
         narrows: bool = False,
     ) -> _core.ObservationConfig:
         """Return the core's settings for these arguments of `sdnn.agents.Agent`."""
@@ -88,6 +92,7 @@ class Observations:
             relevant_only=is_list or inputs == "relevant",
             inputs=() if isinstance(inputs, str) else inputs,
             missing=missing,
+            history=history,
         )
 
     def vector(self, name: str, observation: Element) -> Array:

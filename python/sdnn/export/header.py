@@ -110,10 +110,13 @@ def c_header(
 def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool) -> Any:
     """Return the writer of an agent's header, a `Learner` if it learns; TypeError for others.
 
-    ValueError for an agent that takes missing readings, or would learn with running ranges.
+    ValueError for an agent that takes missing readings, has a history, or would learn with running
+    ranges.
     """
     expected = "have missing='error': a C header has no other treatment of missing readings"
     require(getattr(agent, "missing", "error") == "error", "agent", expected, agent)
+    expected = "have history='none': states of a C header are those of single observations"
+    require(getattr(agent, "history", "none") == "none", "agent", expected, agent)
     expected = "have ranges of observations that stay, not running ones, to learn in C"
     is_running = learns and getattr(agent, "has_running_ranges", False)
     require(not is_running, "agent", expected, agent)

@@ -312,6 +312,14 @@ class AgentSpec(Settings, frozen=True):
             "and `sdnn-c`)."
         ),
     ] = "error"
+    history: Annotated[
+        Literal["none", "differences", "averages", "observer", "auto"],
+        doc(
+            "What states have of earlier observations: `none`; `differences` from the last one, "
+            "for tasks whose observations lack velocities; running `averages`; estimates of an "
+            "`observer` in place of the inputs, for noisy sensors; `auto`, what the warm-up finds."
+        ),
+    ] = "none"
 
 
 class ProtocolSpec(Settings, frozen=True):

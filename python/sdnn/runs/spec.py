@@ -47,7 +47,9 @@ DEFAULT_STEPS, DEFAULT_INTERVAL = 200_000, 10_000
 _ALWAYS = ("id", "name", "preset", "steps", "episodes")
 """Settings that are written also where they are the default."""
 
-_OPTIONAL = ("observation_range", "angles", "angle_pairs", "inputs", "warm_up_steps", "missing")
+_OPTIONAL = (
+    "observation_range", "angles", "angle_pairs", "inputs", "warm_up_steps", "missing", "history",
+)  # fmt: skip
 """Settings of `AgentSpec` that are arguments of an agent where they are not the default."""
 
 
@@ -405,6 +407,8 @@ class RunSpec(Settings, frozen=True):
         """
         values = self.full_values()
         del values["seed"], values["output"], values["agent"]["preset"]
+        if self.agent.history == "none":  # as before there was any other
+            del values["agent"]["history"]
         if version := self.entry.version:
             values["agent"]["version"] = version
         return canonical_json(values)

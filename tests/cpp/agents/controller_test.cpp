@@ -177,8 +177,8 @@ TEST(Controller, IsReadByManyThreads) {
     core::Random places(7, core::Stream::weights);
     for (int t = 0; t < 50; ++t) {
       const Numbers seen{1.0, 0.0, 16.0 * places.uniform() - 8.0, 10.0 + 4.0 * places.uniform()};
-      controller.read(seen, workspace);
-      EXPECT_TRUE(std::ranges::equal(controller.best_of(workspace), same.act(seen, false)));
+      controller.read(controller.prepare(seen, 0), workspace);
+      EXPECT_TRUE(std::ranges::equal(controller.best_of(workspace, 0), same.act(seen, false)));
     }
     EXPECT_EQ(core::state_of(controller), core::state_of(same));
   }

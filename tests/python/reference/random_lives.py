@@ -261,6 +261,9 @@ def _missing_cell(agent_class, missing, space, entry):
     return run
 
 
+HISTORIES = ["none", "none", "auto", "auto", "differences", "averages", "observer"]
+
+
 def soak_cells(first, n):
     """Random lives with the numbers ``first`` to ``first + n - 1``."""
     for number in range(first, first + n):
@@ -286,12 +289,12 @@ def _soak_cell(number):
         env = envs[0]
         if n_environments > 1:
             env = gym.vector.SyncVectorEnv([lambda made=made: made for made in envs])
+        n_steps = int(random.choice([300, 900, 3000], p=[0.5, 0.45, 0.05]))
+        if settings["missing"] != "code":
+            is_grid = agent_class in (RBFQLearning, FuzzyQLearning)  # with few inputs
+            histories = ["none", "observer"] if is_grid else HISTORIES
+            settings["history"] = str(random.choice(histories))
         agent = agent_class(space, actions, seed=number, **settings)
-        return live(
-            agent,
-            env,
-            settings["warm_up_steps"],
-            int(random.choice([300, 900, 3000], p=[0.5, 0.45, 0.05])),
-        )
+        return live(agent, env, settings["warm_up_steps"], n_steps)
 
     return run

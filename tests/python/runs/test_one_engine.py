@@ -45,7 +45,7 @@ def test_one_loop_steps_environments_and_learns():
     outside = {name for name in steps if not name.startswith("environments/")}
     assert outside == {"training/loop", "training/episodes"}
     agents = {"agents/agent", "agents/base", "agents/q_learning", "agents/fuzzy_q_learning"}
-    logged = {"agents/datasets"}  # learns transitions of files, and steps no environment
+    logged = {"agents/datasets", "agents/imitation"}  # learn from files, without environments
     assert learns - agents - logged == {"training/loop"}
     assert acts - agents == {"training/loop", "training/evaluation"}
 

@@ -22,6 +22,7 @@
 #include "sdnn/agents/detail/taken_actions.hpp"
 #include "sdnn/agents/exploration.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
+#include "sdnn/agents/history.hpp"
 #include "sdnn/agents/last_readings.hpp"
 #include "sdnn/agents/latest_transitions.hpp"
 #include "sdnn/agents/observations.hpp"
@@ -86,6 +87,8 @@ class Controller : public WithRates<Controller> {
   const AnyApproximatorConfig& approximator() const noexcept { return approximator_; }
   const Observations& observations() const noexcept { return observations_; }
   const Actions& actions() const noexcept { return actions_; }
+  /// The part of earlier observations in states; none during the warm-up.
+  const HistoryFilter& history() const noexcept { return last_states_.history(); }
   std::size_t n_variables() const noexcept { return observations_.n_variables(); }
   std::size_t n_dimensions() const noexcept { return actions_.n_dimensions(); }
 
@@ -137,6 +140,7 @@ class Controller : public WithRates<Controller> {
   void begin_greedy_episode(std::size_t environment = 0) {
     require_environment(environment);
     readings_.forget_greedy(environment);
+    last_states_.forget_greedy(environment);
   }
 
   /// The action to take; without `explore` a best one. The span is valid until the next act.
@@ -150,15 +154,7 @@ class Controller : public WithRates<Controller> {
     actions_.require_mask("mask", mask);
     const auto held = readings_.filled(observation, environment, !explore, held_);
     if (warm_up_) {
-      observations_.require_readings("observation", observation);
-      const auto draw = [&](core::Pcg64& random, std::vector<double>& action) {
-        actions_.draw(random, action, mask);
-      };
-      const auto is_allowed = [&](const std::vector<double>& action) {
-        return actions_.allows_drawn(action, mask);
-      };
-      const std::vector<double> drawn = warm_up_->act(draw, is_allowed, explore, environment);
-      actions_.take(std::span(drawn), action_, indices_);
+      act_at_random(observation, explore, environment, mask);
       readings_.note(held_, environment, !explore);
       return action_;
     }
@@ -168,6 +164,8 @@ class Controller : public WithRates<Controller> {
           actions_.take(agent.act(state_, explore, environment, mask), action_, indices_);
         },
         *agent_);
+    last_states_.keep(observations_, environment, explore);
+    last_states_.note_action(environment, action_, explore);
     if (explore && !is_fuzzy(approximator_)) {
       taken_.note(environment, action_, indices_);
     }
@@ -192,7 +190,7 @@ class Controller : public WithRates<Controller> {
   std::span<const double> best_action(std::span<const double> observation, Workspace& workspace,
                                       core::Random& ties, ActionMask mask = {}) const {
     actions_.require_mask("mask", mask);
-    observations_.scale(readings_.filled(observation, 0, true, workspace.held), workspace.state);
+    find_state(observation, workspace);
     std::visit(
         [&](const auto& agent) {
           actions_.take(agent.best_action(workspace.state, part_of(workspace, agent), ties, mask),
@@ -202,23 +200,21 @@ class Controller : public WithRates<Controller> {
     return workspace.action;
   }
 
-  /// The observation with missing readings as act without `explore` has them, which it notes. Valid
-  /// until the next call.
-  std::span<const double> hold(std::span<const double> observation, std::size_t environment) {
+  /// The three steps of act without `explore`: `prepare` gives the state of an observation, and
+  /// notes it; `read` takes the time and is for many threads; `best_of` gives the action, of those
+  /// that `mask` allows, for the state that was read last. Valid until the next call.
+  std::span<const double> prepare(std::span<const double> observation, std::size_t environment) {
     const auto held = readings_.filled(observation, environment, true, held_);
-    if (held.size() == n_variables()) readings_.note(held_, environment, true);
-    return held;
+    last_states_.read(observations_, environment, held, state_, false);
+    last_states_.keep(observations_, environment, false);
+    readings_.note(held_, environment, true);
+    return state_;
   }
-
-  /// The two steps of act without `explore`: `read` takes the time and is for many threads;
-  /// `best_of` gives the action, of those that `mask` allows, for the observation that was read
-  /// last. With Missing::hold it is what `hold` returned.
-  void read(std::span<const double> observation, Workspace& workspace) const {
-    observations_.scale(observation, workspace.state);
-    std::visit([&](const auto& agent) { agent.read(workspace.state, part_of(workspace, agent)); },
-               *agent_);
+  void read(std::span<const double> state, Workspace& workspace) const {
+    std::visit([&](const auto& agent) { agent.read(state, part_of(workspace, agent)); }, *agent_);
   }
-  std::span<const double> best_of(Workspace& workspace, ActionMask mask = {}) {
+  std::span<const double> best_of(Workspace& workspace, std::size_t environment,
+                                  ActionMask mask = {}) {
     actions_.require_mask("mask", mask);
     std::visit(
         [&](auto& agent) {
@@ -226,6 +222,7 @@ class Controller : public WithRates<Controller> {
                         workspace.indices);
         },
         *agent_);
+    last_states_.note_action(environment, workspace.action, false);
     return workspace.action;
   }
 
@@ -234,7 +231,7 @@ class Controller : public WithRates<Controller> {
   /// warm-up is over and d < n_dimensions(). Missing readings as in best_action; throws as act.
   std::span<const double> values(std::span<const double> observation, Workspace& workspace,
                                  std::size_t d) const {
-    observations_.scale(readings_.filled(observation, 0, true, workspace.held), workspace.state);
+    find_state(observation, workspace);
     return std::visit(
         [&](const auto& agent) {
           return agent.values(workspace.state, part_of(workspace, agent), d, true);
@@ -259,19 +256,13 @@ class Controller : public WithRates<Controller> {
     require_environment(environment);
     const auto held = readings_.filled(observation, next_observation, environment);
     if (warm_up_) {
-      observations_.require_readings("observation", observation);
-      actions_.require_action(action);
-      observations_.require_readings("next_observation", next_observation);
-      warm_up_->learn({false, environment, observation, action, reward, next_observation,
-                       terminated, next_mask});
-      readings_.note_step(environment);
-      if (warm_up_->is_over()) end_warm_up();
+      remember({false, environment, observation, action, reward, next_observation, terminated,
+                next_mask});
       return;
     }
-    last_states_.read(observations_, environment, held.observation, state_);
+    last_states_.start(observations_, environment, held.observation, state_);
     find_indices(action, environment);
-    last_states_.follow(observations_, environment, held.observation, held.next_observation,
-                        next_state_);
+    last_states_.follow(observations_, environment, action, held.next_observation, next_state_);
     learn_scaled(reward, terminated, environment, next_mask);
     readings_.note_step(environment);
     notes_.note(observation);
@@ -296,7 +287,7 @@ class Controller : public WithRates<Controller> {
 
   /// The state that the agent has for an observation. Valid until the next call. Throws as act.
   std::span<const double> state_of(std::span<const double> observation) {
-    observations_.scale(readings_.filled(observation, 0, true, held_), state_);
+    last_states_.peek(observations_, 0, readings_.filled(observation, 0, true, held_), state_);
     return state_;
   }
 
@@ -329,6 +320,9 @@ class Controller : public WithRates<Controller> {
 
   WarmUp new_warm_up() const;
   void fit(const core::StateReader* reader = nullptr);
+  void act_at_random(std::span<const double> observation, bool explore, std::size_t environment,
+                     ActionMask mask);
+  void remember(const WarmUp::Step& step);
   void end_warm_up(double headroom = Observations::kHeadroom);
   std::size_t n_first_inputs() const noexcept;
   void watch();
@@ -365,6 +359,11 @@ class Controller : public WithRates<Controller> {
   template <class Agent>
   static typename Agent::Workspace& part_of(Workspace& workspace, const Agent&) {
     return std::get<typename Agent::Workspace>(workspace.agent);
+  }
+
+  void find_state(std::span<const double> observation, Workspace& workspace) const {
+    last_states_.peek(observations_, 0, readings_.filled(observation, 0, true, workspace.held),
+                      workspace.state);
   }
 
   void require_environment(std::size_t environment) const {
@@ -438,7 +437,7 @@ class Controller : public WithRates<Controller> {
   std::vector<double> held_, state_, next_state_, action_;
   std::vector<std::size_t> indices_;
   detail::TakenActions taken_;
-  detail::LastStates last_states_{0, 0};  ///< where ranges are running
+  detail::LastStates last_states_;
   RewardScale reward_scale_;
   core::Identity identity_;
 };

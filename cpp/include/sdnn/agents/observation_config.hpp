@@ -1,7 +1,9 @@
 /// The settings of observed variables.
 #pragma once
 
+#include <array>
 #include <optional>
+#include <string_view>
 #include <tuple>
 #include <vector>
 
@@ -9,6 +11,18 @@
 #include "sdnn/core/config_fields.hpp"
 
 namespace sdnn::agents {
+
+/// Selects what states have of the observations before the present one.
+enum class History {
+  none,         ///< nothing
+  differences,  ///< the difference of each input from the last observation, a further input
+  averages,     ///< two running averages of each input, further inputs
+  observer,     ///< estimates in place of the inputs; see detail::Observer
+  automatic,    ///< what the transitions of the warm-up call for
+};
+constexpr std::array<std::string_view, 5> words_of(History) noexcept {
+  return {"none", "differences", "averages", "observer", "auto"};
+}
 
 /// The observed variables of a task.
 struct ObservationConfig {
@@ -24,6 +38,7 @@ struct ObservationConfig {
   bool relevant_only = false;
   std::vector<int> inputs = {};
   Missing missing = Missing::error;
+  History history = History::none;
 
   static constexpr auto fields() noexcept {
     return std::tuple(
@@ -52,7 +67,11 @@ struct ObservationConfig {
         core::field("inputs", &ObservationConfig::inputs, "Variables that are never left out."),
         core::field("missing", &ObservationConfig::missing,
                     "Whether readings that are NaN or infinite are refused, the last reading is "
-                    "used instead, or each input has a pattern for them."));
+                    "used instead, or each input has a pattern for them."),
+        core::field("history", &ObservationConfig::history,
+                    "Whether states have nothing of earlier observations, differences from the "
+                    "last one, running averages, estimates of an observer in place of the inputs, "
+                    "or what the warm-up finds."));
   }
   bool operator==(const ObservationConfig&) const = default;
 };

@@ -86,8 +86,9 @@ class ObservationScale {
   /// Shapes: observation (n_observed,), state (n_inputs,). Throws std::invalid_argument naming the
   /// number of the observation, called `name`, that has no state: with Missing::error all must be
   /// finite.
+  /// With `is_wide` variables are clipped to [-1, 2].
   void operator()(std::span<const double> observation, std::span<double> state,
-                  const char* name = "observation") const {
+                  const char* name = "observation", bool is_wide = false) const {
     core::require_size(name, observation.size(), n_observed(), "numbers");
     if (missing_ == Missing::error) {
       require_present(name, observation);
@@ -98,6 +99,7 @@ class ObservationScale {
                                              : value_or_middle(inputs_[k], observation);
       }
     }
+    for (double& x : state.first(is_wide ? 0 : n_inputs())) x = x > 0.0 ? std::min(x, 1.0) : 0.0;
   }
 
   /// Throws std::invalid_argument naming the first missing reading.
@@ -139,10 +141,10 @@ class ObservationScale {
 
   double coded(std::size_t k, std::span<const double> observation) const noexcept {
     const std::size_t n = n_bins_[k];
-    const std::size_t bin =
-        is_missing(inputs_[k], observation)
-            ? n
-            : static_cast<std::size_t>(coding::bin_of(value(inputs_[k], observation), n));
+    const std::size_t bin = is_missing(inputs_[k], observation)
+                                ? n
+                                : static_cast<std::size_t>(coding::bin_of(
+                                      std::clamp(value(inputs_[k], observation), 0.0, 1.0), n));
     return (static_cast<double>(bin) + 0.5) / static_cast<double>(n + 1);
   }
 
@@ -174,7 +176,7 @@ class ObservationScale {
       return (static_cast<double>(k) + 0.5) / static_cast<double>(input.second);
     }
     const double u = (observation[i] - low_[i]) / (high_[i] - low_[i]);
-    if (input.kind == ObservedKind::variable) return u > 0.0 ? std::min(u, 1.0) : 0.0;
+    if (input.kind == ObservedKind::variable) return u > -1.0 ? std::min(u, 2.0) : -1.0;
     return std::isfinite(u) ? u - std::floor(u) : 0.0;  // beyond the range of numbers
   }
 

@@ -44,6 +44,8 @@ class Observations {
       : config_(std::move(config)), least_inputs_(least_inputs), n_bins_(std::move(n_bins)) {
     core::require(!codes_missing() || (codes_symbols && !n_bins_.empty()), "missing",
                   "'error' or 'hold': these agents have no patterns of inputs", "code");
+    core::require(!codes_missing() || config_.history == History::none, "history",
+                  "'none' with missing='code'", "another one");
     core::require(!config_.low.empty(), "observation.low", "of one variable at least", 0);
     core::require(config_.high.size() == n_variables(), "observation.high",
                   "as long as observation.low", config_.high.size());
@@ -64,8 +66,8 @@ class Observations {
     for (const int variable : config_.inputs) require_variable("inputs", variable);
     if (config_.running) running_.emplace(n_variables());
     const Ranges fixed = fixed_ranges(config_.angle_pairs);
-    needs_fit_ =
-        may_find_pairs() || may_leave_out_inputs() || std::ranges::any_of(fixed.low, is_unknown);
+    needs_fit_ = may_find_pairs() || may_leave_out_inputs(config_.angle_pairs) ||
+                 config_.history != History::none || std::ranges::any_of(fixed.low, is_unknown);
     if (!needs_fit_) take(fixed, config_.angle_pairs);
   }
 
@@ -81,9 +83,7 @@ class Observations {
   std::span<const ObservedInput> inputs() const noexcept { return inputs_; }
   std::size_t n_inputs() const noexcept { return inputs_.size(); }
   /// Whether inputs are to be chosen by relevance: never from one, which is given twice, or two.
-  bool has_choice() const {
-    return config_.relevant_only && inputs_with(pairs_).size() > kAlwaysKept;
-  }
+  bool has_choice() const { return may_leave_out_inputs(pairs_); }
   /// Which inputs are angles.
   std::vector<bool> circular() const {
     std::vector<bool> circular;
@@ -119,8 +119,8 @@ class Observations {
   /// Shapes: observation (n_variables,), state (n_inputs,). Throws std::invalid_argument naming the
   /// number of the observation, called `name`, that has no state. Requires that it is fitted.
   void scale(std::span<const double> observation, std::span<double> state,
-             const char* name = "observation") const {
-    (*scale_)(observation, state, name);
+             const char* name = "observation", bool is_wide = false) const {
+    (*scale_)(observation, state, name, is_wide);
   }
 
   /// Whether ranges change.
@@ -333,8 +333,8 @@ class Observations {
     return config_.find_angle_pairs &&
            std::ranges::adjacent_find(roles_, are_numbers) != roles_.end();
   }
-  bool may_leave_out_inputs() const {
-    return config_.relevant_only && inputs_with(config_.angle_pairs).size() > kAlwaysKept;
+  bool may_leave_out_inputs(const Pairs& pairs) const {
+    return config_.relevant_only && inputs_with(pairs).size() > kAlwaysKept;
   }
 
   Pairs pairs_in(std::span<const double> seen) const {

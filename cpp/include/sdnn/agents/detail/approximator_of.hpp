@@ -12,6 +12,7 @@
 #include "sdnn/agents/actions.hpp"
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller_config.hpp"
+#include "sdnn/agents/history.hpp"
 #include "sdnn/agents/observations.hpp"
 #include "sdnn/approximators/detail/state_wiring.hpp"
 #include "sdnn/approximators/linear_sdnn_config.hpp"
@@ -76,18 +77,18 @@ inline std::vector<coding::PatternTable> tables_of(const ControllerConfig& confi
 /// std::invalid_argument for tables that do not fit its symbols.
 inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
                                              const Observations& observations,
-                                             const Actions& actions,
+                                             const HistoryFilter& history, const Actions& actions,
                                              const std::vector<coding::PatternTable>& tables) {
   const auto fill_in_sizes = [&](auto& own) {
-    own.n_inputs = static_cast<int>(observations.n_inputs());
+    own.n_inputs = static_cast<int>(history.n_inputs());
     if (config.action.discrete && actions.n_dimensions() == 1 && !is_fuzzy(config.approximator)) {
       own.n_actions = static_cast<int>(actions.n_actions().front());
     }
   };
   const auto fill_in_code = [&](auto& own) {
     if constexpr (requires { own.circular; }) {
-      const auto circular = observations.circular();
-      const auto n_symbols = observations.n_symbols();
+      const auto circular = history.is_none() ? observations.circular() : history.circular();
+      const auto n_symbols = history.is_none() ? observations.n_symbols() : history.n_symbols();
       const auto has = [](const auto& list) {
         return std::ranges::any_of(list, [](auto one) { return one != 0; });
       };
@@ -99,7 +100,7 @@ inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
           own.n_pattern_units = static_cast<int>(observations.n_states());
         }
         auto first = own;  // inputs that are added have as many units
-        first.n_inputs = static_cast<int>(observations.n_first_inputs());
+        if (history.is_none()) first.n_inputs = static_cast<int>(observations.n_first_inputs());
         own.n_pattern_units = approximators::with_pattern_units(first).n_pattern_units;
       }
       for (std::size_t i = 0; i < std::min(tables.size(), n_symbols.size()); ++i) {

@@ -44,7 +44,7 @@ inline void Controller::imitate(std::span<const double> observation, std::span<c
   for (std::size_t d = 0; d < action.size(); ++d) {
     indices.push_back(actions_.index_of(action[d], d));
   }
-  observations_.scale(held, state_);
+  last_states_.read(observations_, 0, held, state_, true);
   std::visit(
       [&](auto& agent) {
         if constexpr (requires { agent.imitate(state_, indices, value, margin); }) {
@@ -55,6 +55,10 @@ inline void Controller::imitate(std::span<const double> observation, std::span<c
       },
       *agent_);
   if (observations_.is_running()) observations_.note(observation);
+  if (!history().is_none()) {
+    last_states_.keep(observations_, 0, true);
+    last_states_.note_action(0, action, true);
+  }
   readings_.note(held_, 0, false);
 }
 

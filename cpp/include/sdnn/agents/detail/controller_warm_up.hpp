@@ -67,7 +67,8 @@ inline WarmUp Controller::new_warm_up() const {
 
 /// Makes the agent: all ranges are known. Of a state that is read, sizes are compared first.
 inline void Controller::fit(const core::StateReader* reader) {
-  approximator_ = detail::approximator_of(config_, observations_, actions_, tables_);
+  last_states_.restart(observations_, n_dimensions());
+  approximator_ = detail::approximator_of(config_, observations_, history(), actions_, tables_);
   const auto tables = detail::tables_of(config_, observations_, approximator_, tables_);
   if (reader != nullptr) {
     expect_sizes(*reader, approximator_, config_.learning, actions_.n_actions(), !tables.empty());
@@ -78,17 +79,47 @@ inline void Controller::fit(const core::StateReader* reader) {
     if (n_dimensions() == 1) sdnn->n_actions = static_cast<int>(actions_.n_actions().front());
   }
   apply_rates([this](auto& agent) { agent.set_rates(rates_); });
-  last_states_ = {n_variables(), observations_.n_inputs()};
-  state_.resize(observations_.n_inputs());
+  state_.resize(history().n_inputs());
   next_state_.resize(state_.size());
+}
+
+/// Takes a random action.
+inline void Controller::act_at_random(std::span<const double> observation, bool explore,
+                                      std::size_t environment, ActionMask mask) {
+  observations_.require_readings("observation", observation);
+  const auto draw = [&](core::Pcg64& random, std::vector<double>& action) {
+    actions_.draw(random, action, mask);
+  };
+  const auto is_allowed = [&](const std::vector<double>& action) {
+    return actions_.allows_drawn(action, mask);
+  };
+  const std::vector<double> drawn = warm_up_->act(draw, is_allowed, explore, environment);
+  actions_.take(std::span(drawn), action_, indices_);
+}
+
+/// Remembers a transition until the warm-up is over.
+inline void Controller::remember(const WarmUp::Step& step) {
+  observations_.require_readings("observation", step.observation);
+  actions_.require_action(step.action);
+  observations_.require_readings("next_observation", step.next_observation);
+  warm_up_->learn(step);
+  readings_.note_step(step.environment);
+  if (warm_up_->is_over()) end_warm_up();
 }
 
 inline void Controller::end_warm_up(double headroom) {
   Observations fitted = observations_;
   fitted.fit(warm_up_->seen(), headroom);
-  if (fitted.has_choice()) {
-    fitted.keep(Relevance(detail::experience_of(fitted, *warm_up_, n_dimensions()))
-                    .inputs(fitted.required()));
+  History history = config_.observation.history;
+  if (const bool has_choice = fitted.has_choice(); has_choice || history != History::none) {
+    auto experience = detail::experience_of(fitted, *warm_up_, n_dimensions());
+    if (history != History::none) last_states_ = {history, experience, fitted};
+    if (has_choice) {
+      fitted.keep(this->history().relevant(experience, fitted.required()));
+      experience = detail::experience_of(fitted, *warm_up_, n_dimensions());
+      history = this->history().kind();
+      if (history != History::none) last_states_ = {history, experience, fitted};
+    }
   }
   observations_ = std::move(fitted);
   fit();
@@ -117,8 +148,9 @@ inline void Controller::watch() {
   latest_.reset();
   const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&approximator_);
   const auto kept = observations_.kept_inputs();
-  if (linear == nullptr || !std::holds_alternative<QLambdaConfig>(config_.learning) ||
-      linear->max_pairs != 0 || !tables_.empty() || std::ranges::find(kept, false) == kept.end()) {
+  if (config_.observation.history != History::none || linear == nullptr ||
+      !std::holds_alternative<QLambdaConfig>(config_.learning) || linear->max_pairs != 0 ||
+      !tables_.empty() || std::ranges::find(kept, false) == kept.end()) {
     return;
   }
   latest_.emplace(new_warm_up(), static_cast<std::size_t>(config_.warm_up_steps));
@@ -147,8 +179,9 @@ inline void Controller::replay(const WarmUp::Step& step, LastReadings& readings)
   }
   const auto held = readings.filled(step.observation, step.next_observation, step.environment);
   readings.note_step(step.environment);
-  observations_.scale(held.observation, state_);
-  observations_.scale(held.next_observation, next_state_, "next_observation");
+  last_states_.start(observations_, step.environment, held.observation, state_);
+  last_states_.follow(observations_, step.environment, step.action, held.next_observation,
+                      next_state_, true);
   for (std::size_t d = 0; d < n_dimensions(); ++d) {
     indices_[d] = actions_.index_of(step.action[d], d);
   }
@@ -202,6 +235,10 @@ void Controller::serialize(Self& self, Archive& archive) {
     archive.part("warm_up", *self.warm_up_);
   } else {
     archive.part("observations", self.observations_);
+    if (self.config_.observation.history != History::none) {
+      detail::LastStates::serialize_history(self.last_states_, self.observations_,
+                                            self.n_dimensions(), archive);
+    }
     if constexpr (Archive::kReads) {
       self.fit(&archive);
       self.watch();
@@ -211,7 +248,7 @@ void Controller::serialize(Self& self, Archive& archive) {
     archive.part("reward_scale", self.reward_scale_);
   }
   archive.part("taken", self.taken_);
-  if (self.observations_.is_running() && !is_warming_up) {
+  if (!is_warming_up && (self.observations_.is_running() || !self.history().is_none())) {
     archive.part("last_states", self.last_states_);
   }
   if (self.readings_.is_held()) archive.part("readings", self.readings_);

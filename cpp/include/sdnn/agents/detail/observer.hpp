@@ -1,0 +1,392 @@
+/// Estimates of what noisy sensors observe, from a model of how observations follow each other.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/agents/detail/least_squares.hpp"
+#include "sdnn/agents/relevance.hpp"
+#include "sdnn/core/detail/interruption.hpp"
+#include "sdnn/core/elementary.hpp"
+
+namespace sdnn::agents::detail {
+
+/// Predicts the change of each input, by least squares from the inputs, of angles the cosine and
+/// the sine, and the action; and moves each estimate from its prediction towards what was observed
+/// by a constant part, the gain: the one of eight with the smallest errors of prediction in the
+/// experience, so it is 1 where sensors are exact.
+///
+/// Estimates are in coordinates of the model: an angle in radians; of other inputs, standard
+/// deviations from the mean.
+///
+/// Source: Luenberger, D. (1964), for observers of constant gain; the model is fitted to the
+/// estimates of the model before, as in Ljung, L., Soderstrom, T. (1983), pseudo-linear regression.
+class Observer {
+ public:
+  static constexpr std::size_t kMostInputs = 16;
+  static constexpr std::size_t kFewestTransitions = 100;
+
+  Observer() = default;
+  /// Requires inputs and transitions within the limits above.
+  explicit Observer(const RandomExperience& experience) : circular_(experience.circular) {
+    find_scale(experience);
+    find_actions(experience);
+    const Series series = coordinates_of(experience);
+    std::vector<double> estimates = series.observed;
+    double least = 0.0;
+    for (int round = 0; round < kRounds; ++round) {
+      Observer next = *this;
+      next.fit_weights(series, estimates);
+      for (const double gain : kGains) {
+        next.gain_ = gain;
+        const double error = next.log_error(series);
+        if (round == 0 && gain == 1.0) log_error_without_ = error;
+        if ((round > 0 || gain < 1.0) && error >= least) continue;
+        least = error;
+        next.log_error_without_ = log_error_without_;
+        *this = next;
+      }
+      estimates = estimates_of(series);
+    }
+    log_error_ = least;
+    find_range(estimates);
+  }
+
+  std::size_t n_inputs() const noexcept { return circular_.size(); }
+  double gain() const noexcept { return gain_; }
+  /// By how much the mean logarithm of squared errors of prediction falls by estimates.
+  double improvement() const noexcept {
+    return (log_error_without_ - log_error_) / static_cast<double>(n_inputs());
+  }
+
+  /// The estimates of an episode's first state. Shapes: (n_inputs,).
+  void begin(std::span<const double> state, std::span<double> estimates) const noexcept {
+    for (std::size_t i = 0; i < n_inputs(); ++i) estimates[i] = coordinate(state[i], i);
+  }
+  /// Moves estimates to the next state, after an action. Shapes: (n_dimensions,), (n_inputs,).
+  void follow(std::span<const double> action, std::span<const double> state,
+              std::span<double> estimates) const {
+    std::vector<double> features;
+    predict(action, estimates, features);
+    for (std::size_t i = 0; i < n_inputs(); ++i) {
+      estimates[i] += gain_ * difference(coordinate(state[i], i), estimates[i], i);
+    }
+  }
+  /// The state, in [0, 1], that estimates stand for. Shapes: (n_inputs,).
+  void state_of(std::span<const double> estimates, std::span<double> state) const noexcept {
+    for (std::size_t i = 0; i < n_inputs(); ++i) {
+      if (circular_[i]) {
+        const double turns = estimates[i] / core::kTwoPi;
+        state[i] = turns - std::floor(turns);
+      } else {
+        state[i] = std::clamp((estimates[i] - low_[i]) / (high_[i] - low_[i]), 0.0, 1.0);
+      }
+    }
+  }
+
+  /// The share of the changes of inputs that their last changes explain beyond the present state
+  /// and action: of the input with the largest one, in the second half of the experience.
+  double share_of_last_changes(const RandomExperience& experience) const {
+    const Series series = coordinates_of(experience);
+    std::vector<double> with, without, changes, features;
+    for (std::size_t t = 1; t < series.size(); ++t) {
+      if (series.begins[t]) continue;
+      const auto state = series.row(series.observed, t);
+      find_features(series.actions_at(t), state, features);
+      without.insert(without.end(), features.begin(), features.end());
+      with.insert(with.end(), features.begin(), features.end());
+      const auto last = series.row(series.observed, t - 1), next = series.row(series.next, t);
+      for (std::size_t i = 0; i < n_inputs(); ++i) {
+        with.push_back(difference(state[i], last[i], i));
+        changes.push_back(difference(next[i], state[i], i));
+      }
+    }
+    if (changes.size() < kFewestTransitions * n_inputs()) return 0.0;
+    const auto before = explained(without, changes), after = explained(with, changes);
+    double most = 0.0;
+    for (std::size_t i = 0; i < n_inputs(); ++i) {
+      most = std::max(most, after[i] - std::max(before[i], 0.0));
+    }
+    return most;
+  }
+
+  /// Lists what was fitted; see core/state.hpp. Inputs that are angles are those of the task.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    archive.numbers("means", self.means_);
+    archive.numbers("deviations", self.deviations_);
+    archive.numbers("n_levels", self.n_levels_);
+    archive.numbers("levels", self.levels_);
+    archive.numbers("weights", self.weights_);
+    archive.number("gain", self.gain_);
+    archive.numbers("low", self.low_);
+    archive.numbers("high", self.high_);
+    if constexpr (Archive::kReads) self.check(archive);
+  }
+  /// Takes which inputs are angles, and the number of dimensions of actions, before it is read.
+  Observer(std::vector<bool> circular, std::size_t n_dimensions)
+      : circular_(std::move(circular)), n_levels_(n_dimensions) {}
+
+ private:
+  /// The experience in coordinates of the model.
+  struct Series {
+    std::size_t n_inputs, n_dimensions;
+    std::vector<double> observed = {}, next = {};  ///< (n, n_inputs)
+    std::vector<double> actions = {};              ///< (n, n_dimensions)
+    std::vector<bool> begins = {};  ///< (n,): whether a transition is its episode's first
+
+    std::size_t size() const noexcept { return begins.size(); }
+    std::span<const double> row(const std::vector<double>& rows, std::size_t t) const {
+      return std::span(rows).subspan(t * n_inputs, n_inputs);
+    }
+    std::span<const double> actions_at(std::size_t t) const {
+      return std::span(actions).subspan(t * n_dimensions, n_dimensions);
+    }
+  };
+
+  static constexpr double kGains[] = {1.0, 0.7, 0.5, 0.35, 0.25, 0.175, 0.125, 0.09};
+  static constexpr int kRounds = 3;
+  static constexpr std::size_t kMostTransitions = 20'000;
+  static constexpr std::size_t kMostLevels = 8;
+  static constexpr double kFarthest = 6.0;  // in deviations
+  static constexpr double kLargestChange = 3.0;
+  static constexpr double kLeastError = 1e-6;
+  static constexpr double kHeadroom = 0.25;
+  static constexpr double kLeastWidth = 1e-3;
+  static constexpr double kLeastDeviation = 1e-9;
+
+  double coordinate(double x, std::size_t i) const noexcept {
+    return circular_[i] ? core::kTwoPi * x : (x - means_[i]) / deviations_[i];
+  }
+  /// The first coordinate minus the second; of angles the shorter way.
+  double difference(double first, double second, std::size_t i) const noexcept {
+    const double change = first - second;
+    return circular_[i] ? change - core::kTwoPi * std::round(change / core::kTwoPi) : change;
+  }
+
+  void find_scale(const RandomExperience& experience) {
+    const auto n = static_cast<double>(experience.size());
+    means_.assign(n_inputs(), 0.0);
+    deviations_.assign(n_inputs(), 0.0);
+    for (std::size_t k = 0; k < experience.states.size(); ++k) {
+      means_[k % n_inputs()] += experience.states[k] / n;
+    }
+    for (std::size_t k = 0; k < experience.states.size(); ++k) {
+      const double x = experience.states[k] - means_[k % n_inputs()];
+      deviations_[k % n_inputs()] += x * x / n;
+    }
+    for (double& deviation : deviations_) {
+      deviation = deviation > kLeastDeviation * kLeastDeviation ? std::sqrt(deviation) : 1.0;
+    }
+  }
+
+  /// Estimates vary less than what noisy sensors observe: a quarter of their range is added at
+  /// each end.
+  void find_range(const std::vector<double>& estimates) {
+    low_.assign(n_inputs(), kFarthest);
+    high_.assign(n_inputs(), -kFarthest);
+    for (std::size_t k = 0; k < estimates.size(); ++k) {
+      const std::size_t i = k % n_inputs();
+      low_[i] = std::min(low_[i], estimates[k]);
+      high_[i] = std::max(high_[i], estimates[k]);
+    }
+    for (std::size_t i = 0; i < n_inputs(); ++i) {
+      const double width = std::max(high_[i] - low_[i], kLeastWidth);
+      low_[i] -= kHeadroom * width;
+      high_[i] += kHeadroom * width;
+    }
+  }
+
+  /// Few different actions are told apart; more are numbers.
+  void find_actions(const RandomExperience& experience) {
+    for (const std::vector<double>& actions : experience.actions) {
+      std::vector<double> levels = actions;
+      std::ranges::sort(levels);
+      const auto repeated = std::ranges::unique(levels);
+      levels.erase(repeated.begin(), repeated.end());
+      if (levels.size() > kMostLevels) levels = {(levels.front() + levels.back()) / 2.0};
+      n_levels_.push_back(static_cast<std::int32_t>(levels.size()));
+      levels_.insert(levels_.end(), levels.begin(), levels.end());
+      if (levels.size() == 1) continue;
+      levels_.pop_back();  // the last one follows from the others
+      --n_levels_.back();
+    }
+  }
+
+  Series coordinates_of(const RandomExperience& experience) const {
+    const std::size_t n = std::min(experience.size(), kMostTransitions);
+    Series series{n_inputs(), experience.actions.size()};
+    for (std::size_t k = 0; k < n * n_inputs(); ++k) {
+      series.observed.push_back(coordinate(experience.states[k], k % n_inputs()));
+      series.next.push_back(coordinate(experience.next_states[k], k % n_inputs()));
+    }
+    for (std::size_t t = 0; t < n; ++t) {
+      for (const auto& actions : experience.actions) series.actions.push_back(actions[t]);
+      series.begins.push_back(t == 0 || experience.ends[t - 1]);
+    }
+    return series;
+  }
+
+  std::size_t n_features() const noexcept {
+    const auto n_angles = static_cast<std::size_t>(std::ranges::count(circular_, true));
+    return 1 + n_inputs() + n_angles + levels_.size();
+  }
+
+  void find_features(std::span<const double> action, std::span<const double> estimates,
+                     std::vector<double>& features) const {
+    features.assign(1, 1.0);
+    for (std::size_t i = 0; i < n_inputs(); ++i) {
+      if (circular_[i]) {
+        const core::SinCos turn = core::sin_cos(estimates[i]);
+        features.push_back(turn.cos);
+        features.push_back(turn.sin);
+      } else {
+        features.push_back(estimates[i]);
+      }
+    }
+    for (std::size_t d = 0, first = 0; d < n_levels_.size(); ++d) {
+      const auto n = static_cast<std::size_t>(n_levels_[d]);
+      for (std::size_t k = first; k < first + n; ++k) {
+        features.push_back(n == 1 ? action[d] - levels_[k] : (action[d] == levels_[k] ? 1.0 : 0.0));
+      }
+      first += n;
+    }
+  }
+  /// Moves estimates to what is expected after an action.
+  void predict(std::span<const double> action, std::span<double> estimates,
+               std::vector<double>& features) const {
+    find_features(action, estimates, features);
+    for (std::size_t i = 0; i < n_inputs(); ++i) {
+      double change = 0.0;
+      for (std::size_t k = 0; k < features.size(); ++k) {
+        change += weights_[k * n_inputs() + i] * features[k];
+      }
+      estimates[i] += std::clamp(change, -kLargestChange, kLargestChange);
+      if (circular_[i]) {
+        estimates[i] -= core::kTwoPi * std::round(estimates[i] / core::kTwoPi);
+      } else {
+        estimates[i] = std::clamp(estimates[i], -kFarthest, kFarthest);
+      }
+    }
+  }
+
+  void fit_weights(const Series& series, const std::vector<double>& estimates) {
+    std::vector<double> features, changes, row;
+    for (std::size_t t = 0; t < series.size(); ++t) {
+      const auto estimate = series.row(estimates, t), next = series.row(series.next, t);
+      find_features(series.actions_at(t), estimate, row);
+      features.insert(features.end(), row.begin(), row.end());
+      for (std::size_t i = 0; i < n_inputs(); ++i) {
+        changes.push_back(difference(next[i], estimate[i], i));
+      }
+    }
+    weights_ = least_squares(features, changes, series.size());
+  }
+
+  /// Calls `with(estimates)` before every transition, and then `error(i, difference)` for the error
+  /// of each prediction.
+  void run(const Series& series, const auto& with, const auto& error) const {
+    std::vector<double> estimates(n_inputs()), features;
+    for (std::size_t t = 0; t < series.size(); ++t) {
+      core::interruption_point();
+      if (series.begins[t]) std::ranges::copy(series.row(series.observed, t), estimates.begin());
+      with(estimates);
+      predict(series.actions_at(t), estimates, features);
+      const auto next = series.row(series.next, t);
+      for (std::size_t i = 0; i < n_inputs(); ++i) {
+        const double surprise = difference(next[i], estimates[i], i);
+        error(i, surprise);
+        estimates[i] += gain_ * surprise;
+      }
+    }
+  }
+  std::vector<double> estimates_of(const Series& series) const {
+    std::vector<double> rows;
+    run(
+        series,
+        [&](const auto& estimates) { rows.insert(rows.end(), estimates.begin(), estimates.end()); },
+        [](std::size_t, double) {});
+    return rows;
+  }
+  double log_error(const Series& series) const {
+    std::vector<double> squares(n_inputs());
+    run(
+        series, [](const auto&) {},
+        [&](std::size_t i, double surprise) { squares[i] += surprise * surprise; });
+    double sum = 0.0;
+    for (const double square : squares) {
+      sum += core::log(square / static_cast<double>(series.size()) + kLeastError);
+    }
+    return sum;
+  }
+
+  /// For each input the share of squared changes that features explain, fitted to the first half
+  /// of the transitions, in the second.
+  std::vector<double> explained(const std::vector<double>& features,
+                                const std::vector<double>& changes) const {
+    const std::size_t n = changes.size() / n_inputs(), width = features.size() / n, half = n / 2;
+    const auto weights =
+        least_squares({features.begin(), features.begin() + offset(half * width)},
+                      {changes.begin(), changes.begin() + offset(half * n_inputs())}, half);
+    std::vector<double> errors(n_inputs()), squares(n_inputs()), shares;
+    for (std::size_t t = half; t < n; ++t) {
+      for (std::size_t i = 0; i < n_inputs(); ++i) {
+        double error = changes[t * n_inputs() + i];
+        squares[i] += error * error;
+        for (std::size_t k = 0; k < width; ++k) {
+          error -= weights[k * n_inputs() + i] * features[t * width + k];
+        }
+        errors[i] += error * error;
+      }
+    }
+    for (std::size_t i = 0; i < n_inputs(); ++i) {
+      shares.push_back(squares[i] > 0.0 ? 1.0 - errors[i] / squares[i] : 0.0);
+    }
+    return shares;
+  }
+  static std::ptrdiff_t offset(std::size_t n) noexcept { return static_cast<std::ptrdiff_t>(n); }
+
+  void check(const auto& archive) const {
+    const auto are_finite = [](const std::vector<double>& values) {
+      return std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
+    };
+    const auto is_positive = [](double x) { return x > 0.0; };
+    archive.expect(means_.size() == n_inputs() && are_finite(means_), "means",
+                   "a finite number for each input");
+    archive.expect(deviations_.size() == n_inputs() && are_finite(deviations_) &&
+                       std::ranges::all_of(deviations_, is_positive),
+                   "deviations", "a positive number for each input");
+    std::size_t n = 0;
+    for (const std::int32_t levels : n_levels_) {
+      archive.expect(levels >= 1 && levels < static_cast<std::int32_t>(kMostLevels), "n_levels",
+                     "in [1, 7]");
+      n += static_cast<std::size_t>(levels);
+    }
+    archive.expect(levels_.size() == n && are_finite(levels_), "levels", "finite, n_levels in all");
+    archive.expect(weights_.size() == n_features() * n_inputs() && are_finite(weights_), "weights",
+                   "a finite number for each feature and input");
+    archive.expect(low_.size() == n_inputs() && are_finite(low_), "low",
+                   "a finite number for each input");
+    archive.expect(high_.size() == n_inputs() && are_finite(high_) &&
+                       std::ranges::equal(low_, high_, std::less<>()),
+                   "high", "for each input a finite number above low");
+    archive.expect(gain_ > 0.0 && gain_ <= 1.0, "gain", "in (0, 1]");
+  }
+
+  std::vector<bool> circular_;
+  std::vector<double> means_, deviations_;   ///< of states
+  std::vector<std::int32_t> n_levels_ = {};  ///< of each dimension; 1: an action is a number
+  std::vector<double> levels_ = {};   ///< actions that are told apart, or from which numbers count
+  std::vector<double> weights_ = {};  ///< (n_features, n_inputs)
+  double gain_ = 1.0;
+  std::vector<double> low_ = {}, high_ = {};  ///< of estimates
+  double log_error_ = 0.0, log_error_without_ = 0.0;
+};
+
+}  // namespace sdnn::agents::detail

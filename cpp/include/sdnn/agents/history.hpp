@@ -1,0 +1,293 @@
+/// States that have something of an episode's earlier observations.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/agents/detail/observer.hpp"
+#include "sdnn/agents/observation_config.hpp"
+#include "sdnn/agents/relevance.hpp"
+
+namespace sdnn::agents {
+
+/// From the inputs of single observations to states: either is in [0, 1].
+///
+/// With `automatic`, estimates of an observer replace the inputs where they lower the errors of
+/// prediction by a tenth, as with noisy sensors; else differences are added where they explain a
+/// further 15 % of an input's changes, as where velocities are not observed. Symbols have no
+/// history; an agent has none where the experience is too small, or the inputs are too many.
+class HistoryFilter {
+ public:
+  /// Without any history, for observations of `n` inputs.
+  explicit HistoryFilter(std::size_t n = 0) : circular_(n), n_symbols_(n) {}
+  /// Fitted to transitions. Shapes: (n_inputs,); 0: the input is a number.
+  HistoryFilter(History history, const RandomExperience& experience, std::vector<int> n_symbols,
+                std::size_t n_dimensions)
+      : circular_(experience.circular),
+        n_symbols_(std::move(n_symbols)),
+        n_dimensions_(n_dimensions) {
+    const RandomExperience numbers = numbers_of(experience);
+    const bool fits_observer = numbers.n_inputs > 0 &&
+                               numbers.n_inputs <= detail::Observer::kMostInputs &&
+                               numbers.size() >= detail::Observer::kFewestTransitions;
+    kind_ = history == History::automatic ? History::none : history;
+    if (fits_observer && (history == History::automatic || history == History::observer)) {
+      observer_ = detail::Observer(numbers);
+      if (history == History::automatic) kind_ = found_kind(numbers);
+    } else if (history == History::observer) {
+      kind_ = History::none;
+    }
+    if (kind_ != History::observer) observer_ = {};
+    if (kind_ == History::differences) find_largest_differences(experience);
+  }
+
+  History kind() const noexcept { return kind_; }
+  /// Whether states are the inputs of single observations.
+  bool is_none() const noexcept { return kind_ == History::none; }
+  /// Numbers of the observations' inputs and of those of states.
+  std::size_t n_observed() const noexcept { return circular_.size(); }
+  std::size_t n_inputs() const {
+    return n_observed() + n_added() * static_cast<std::size_t>(n_numbers());
+  }
+  /// Which inputs of states are angles, and how many symbols each may be. Shapes: (n_inputs,).
+  std::vector<bool> circular() const {
+    return extended<bool>(
+        circular_, [this](std::size_t i) { return kind_ == History::averages && circular_[i]; });
+  }
+  std::vector<int> n_symbols() const {
+    return extended<int>(n_symbols_, [](std::size_t) { return 0; });
+  }
+  /// The gain of the observer, or 1.
+  double gain() const noexcept { return observer_.gain(); }
+
+  /// The part of an episode that is remembered; empty before its first observation.
+  using Memory = std::vector<double>;
+
+  /// Begins an episode with its first observation's inputs, which may be beyond [0, 1] unless there
+  /// is no history. Shapes: (n_observed,), (n_inputs,).
+  void begin(std::span<const double> inputs, Memory& memory, std::span<double> state) const {
+    if (is_none()) {
+      std::ranges::copy(inputs, state.begin());
+      return;
+    }
+    memory.assign(inputs.begin(), inputs.end());
+    if (kind_ == History::averages) memory.insert(memory.end(), inputs.begin(), inputs.end());
+    if (kind_ == History::observer) {
+      const auto numbers = numbers_in(inputs);
+      memory.assign(observer_.n_inputs(), 0.0);
+      observer_.begin(numbers, memory);
+    }
+    find_state(inputs, inputs, memory, state);
+  }
+  /// Continues it with the inputs of the next observation, after an action. Shapes as before;
+  /// action (n_dimensions,).
+  void follow(std::span<const double> action, std::span<const double> inputs, Memory& memory,
+              std::span<double> state) const {
+    if (is_none()) {
+      std::ranges::copy(inputs, state.begin());
+      return;
+    }
+    const Memory last = memory;
+    if (kind_ == History::differences) memory.assign(inputs.begin(), inputs.end());
+    if (kind_ == History::observer) {
+      observer_.follow(action, numbers_in(inputs), memory);
+    }
+    for (std::size_t k = 0; kind_ == History::averages && k < memory.size(); ++k) {
+      const std::size_t i = k % n_observed();
+      const double rate = k < n_observed() ? kFastRate : kSlowRate;
+      const double average = memory[k] + rate * difference(inputs[i], memory[k], i);
+      memory[k] = circular_[i] ? average - std::floor(average) : average;
+    }
+    find_state(inputs, last, memory, state);
+  }
+
+  /// For each of the observation's inputs whether it matters, as its estimate or a difference does;
+  /// see Relevance. Shapes: (n_observed,).
+  std::vector<bool> relevant(const RandomExperience& experience,
+                             const std::vector<bool>& required) const {
+    if (is_none()) return Relevance(experience).inputs(required);
+    RandomExperience states = experience;
+    states.n_inputs = n_inputs();
+    states.circular = circular();
+    states.states.clear();
+    states.next_states.clear();
+    Memory memory;
+    std::vector<double> state(n_inputs());
+    const auto append = [&state](std::vector<double>& rows) {
+      rows.insert(rows.end(), state.begin(), state.end());
+    };
+    for (std::size_t t = 0; t < experience.size(); ++t) {
+      const auto row = [&](const std::vector<double>& rows) {
+        return std::span(rows).subspan(t * n_observed(), n_observed());
+      };
+      std::vector<double> action;
+      for (const auto& actions : experience.actions) action.push_back(actions[t]);
+      if (t == 0 || experience.ends[t - 1]) begin(row(experience.states), memory, state);
+      append(states.states);
+      follow(action, row(experience.next_states), memory, state);
+      append(states.next_states);
+    }
+    std::vector<std::size_t> origins;
+    for (std::size_t k = 0; k <= n_added(); ++k) {
+      for (std::size_t i = 0; i < n_observed(); ++i) {
+        if (k == 0 || is_number(i)) origins.push_back(i);
+      }
+    }
+    std::vector<bool> required_states, kept(n_observed());
+    for (const std::size_t i : origins) required_states.push_back(required[i]);
+    const std::vector<bool> kept_states = Relevance(states).inputs(required_states);
+    for (std::size_t k = 0; k < origins.size(); ++k) {
+      if (kept_states[k]) kept[origins[k]] = true;
+    }
+    return kept;
+  }
+
+  /// Whether a memory that was read can be continued.
+  bool fits(const Memory& memory) const {
+    const std::size_t n = kind_ == History::averages   ? 2 * n_observed()
+                          : kind_ == History::observer ? observer_.n_inputs()
+                                                       : n_observed();
+    return (is_none() && memory.empty()) ||
+           (!is_none() && memory.size() == n &&
+            std::ranges::all_of(memory, [](double x) { return std::isfinite(x); }));
+  }
+
+  /// Lists what was fitted; see core/state.hpp. What it reads into has the task's inputs.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    auto kind = static_cast<std::int32_t>(self.kind_);
+    archive.number("kind", kind);
+    if constexpr (Archive::kReads) {
+      archive.expect(kind >= 0 && kind < static_cast<std::int32_t>(History::automatic), "kind",
+                     "in [0, 3]");
+      self.kind_ = static_cast<History>(kind);
+      if (self.kind_ == History::observer) {
+        const RandomExperience shape =
+            self.numbers_of({.n_inputs = self.n_observed(), .circular = self.circular_});
+        archive.expect(shape.n_inputs > 0, "kind", "one for symbols");
+        self.observer_ = detail::Observer(shape.circular, self.n_dimensions_);
+      }
+    }
+    if (self.kind_ == History::differences) {
+      archive.fixed("largest", {self.n_observed()}, self.largest_);
+      if constexpr (Archive::kReads) {
+        archive.expect(
+            std::ranges::all_of(self.largest_, [](double x) { return x > 0.0 && x <= 2.0; }),
+            "largest", "in (0, 2]");
+      }
+    }
+    if (self.kind_ == History::observer) archive.part("observer", self.observer_);
+  }
+  /// Takes the inputs of the task before the rest is read.
+  HistoryFilter(std::vector<bool> circular, std::vector<int> n_symbols, std::size_t n_dimensions)
+      : circular_(std::move(circular)),
+        n_symbols_(std::move(n_symbols)),
+        n_dimensions_(n_dimensions),
+        largest_(circular_.size(), 1.0) {}
+
+ private:
+  static constexpr double kLeastImprovement = 0.1;  // of the observer
+  static constexpr double kLeastShare = 0.15;       // of changes, explained by differences
+  static constexpr double kFastRate = 0.5, kSlowRate = 0.2;
+  static constexpr double kHeadroom = 1.5;
+  static constexpr double kLeastDifference = 1e-9;
+
+  bool is_number(std::size_t i) const noexcept { return n_symbols_[i] == 0; }
+  std::size_t n_numbers() const {
+    return static_cast<std::size_t>(std::ranges::count(n_symbols_, 0));
+  }
+  std::size_t n_added() const noexcept {
+    return kind_ == History::differences ? 1 : kind_ == History::averages ? 2 : 0;
+  }
+
+  /// The values of the observation's inputs, then those of the inputs that are added.
+  template <class T>
+  std::vector<T> extended(const std::vector<T>& values, const auto& added) const {
+    std::vector<T> all = values;
+    for (std::size_t k = 0; k < n_added(); ++k) {
+      for (std::size_t i = 0; i < n_observed(); ++i) {
+        if (is_number(i)) all.push_back(added(i));
+      }
+    }
+    return all;
+  }
+
+  std::vector<double> numbers_in(std::span<const double> inputs) const {
+    std::vector<double> numbers;
+    for (std::size_t i = 0; i < inputs.size(); ++i) {
+      if (is_number(i % n_observed())) numbers.push_back(inputs[i]);
+    }
+    return numbers;
+  }
+  /// The experience without inputs that are symbols.
+  RandomExperience numbers_of(RandomExperience experience) const {
+    experience.circular.clear();
+    for (std::size_t i = 0; i < n_observed(); ++i) {
+      if (is_number(i)) experience.circular.push_back(circular_[i]);
+    }
+    experience.n_inputs = experience.circular.size();
+    experience.states = numbers_in(experience.states);
+    experience.next_states = numbers_in(experience.next_states);
+    return experience;
+  }
+
+  History found_kind(const RandomExperience& numbers) const {
+    if (observer_.gain() < 1.0 && observer_.improvement() >= kLeastImprovement) {
+      return History::observer;
+    }
+    return observer_.share_of_last_changes(numbers) >= kLeastShare ? History::differences
+                                                                   : History::none;
+  }
+
+  /// The first value minus the second; of angles the shorter way.
+  double difference(double first, double second, std::size_t i) const noexcept {
+    const double change = first - second;
+    return circular_[i] ? change - std::round(change) : change;
+  }
+  void find_largest_differences(const RandomExperience& experience) {
+    largest_.assign(n_observed(), kLeastDifference);
+    for (std::size_t k = 0; k < experience.states.size(); ++k) {
+      const std::size_t i = k % n_observed();
+      const double change = difference(experience.next_states[k], experience.states[k], i);
+      largest_[i] = std::max(largest_[i], kHeadroom * std::abs(change));
+    }
+  }
+
+  void find_state(std::span<const double> inputs, std::span<const double> last,
+                  const Memory& memory, std::span<double> state) const {
+    const auto clipped = [](double x) { return std::clamp(x, 0.0, 1.0); };
+    std::ranges::transform(inputs, state.begin(), clipped);
+    std::size_t next = n_observed();
+    if (kind_ == History::observer) {
+      std::vector<double> estimates(observer_.n_inputs());
+      observer_.state_of(memory, estimates);
+      for (std::size_t i = 0, k = 0; i < n_observed(); ++i) {
+        if (is_number(i)) state[i] = estimates[k++];
+      }
+    } else if (kind_ == History::differences) {
+      for (std::size_t i = 0; i < n_observed(); ++i) {
+        if (!is_number(i)) continue;
+        const double part = difference(inputs[i], last[i], i) / largest_[i];
+        state[next++] = (std::clamp(part, -1.0, 1.0) + 1.0) / 2.0;
+      }
+    } else {
+      for (std::size_t k = 0; k < memory.size(); ++k) {
+        if (is_number(k % n_observed())) state[next++] = clipped(memory[k]);
+      }
+    }
+  }
+
+  std::vector<bool> circular_;  ///< of the observation's inputs
+  std::vector<int> n_symbols_;
+  std::size_t n_dimensions_ = 0;  ///< of actions
+  History kind_ = History::none;
+  std::vector<double> largest_ = {};  ///< differences, in which a state's input is 1
+  detail::Observer observer_ = {};
+};
+
+}  // namespace sdnn::agents

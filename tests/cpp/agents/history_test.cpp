@@ -1,0 +1,251 @@
+#include "sdnn/agents/history.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdnn/agents/controller.hpp"
+#include "sdnn/agents/detail/least_squares.hpp"
+#include "sdnn/core/random.hpp"
+#include "sdnn/core/state.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+using Numbers = std::vector<double>;
+
+/// A mass on a line with springs, pushed by random actions that last: inputs are the position, and
+/// the velocity unless it is hidden, with noise. `exact` are the inputs without noise.
+struct Mass {
+  RandomExperience experience;
+  std::vector<double> exact = {};
+};
+Mass pushed_mass(std::size_t n, double noise, bool is_velocity_hidden, std::uint64_t seed = 1) {
+  core::Random random(seed, core::Stream::sensor_noise);
+  const std::size_t n_inputs = is_velocity_hidden ? 1 : 2;
+  Mass mass{{.n_inputs = n_inputs, .circular = std::vector<bool>(n_inputs)}};
+  mass.experience.actions.resize(1);
+  double position = 0.1, velocity = 0.0, action = 0.0;
+  const auto inputs = [&] {
+    Numbers exact{0.5 + position};
+    if (!is_velocity_hidden) exact.push_back(0.5 + 3.0 * velocity);
+    return exact;
+  };
+  const auto sensed = [&](Numbers values) {
+    for (double& x : values) x = std::clamp(x + noise * random.normal(), 0.0, 1.0);
+    return values;
+  };
+  const auto append = [](Numbers& rows, const Numbers& row) {
+    rows.insert(rows.end(), row.begin(), row.end());
+  };
+  Numbers last = sensed(inputs());
+  for (std::size_t t = 0; t < n; ++t) {
+    append(mass.experience.states, last);
+    if (random.below(5) == 0) action = static_cast<double>(random.below(3)) - 1.0;
+    velocity += 0.01 * action - 0.1 * position - 0.05 * velocity;
+    position += velocity;
+    last = sensed(inputs());
+    append(mass.experience.next_states, last);
+    append(mass.exact, inputs());
+    mass.experience.actions[0].push_back(action);
+    mass.experience.rewards.push_back(0.0);
+    mass.experience.ends.push_back(false);
+  }
+  return mass;
+}
+
+HistoryFilter fitted(History history, const RandomExperience& experience) {
+  return {history, experience, std::vector<int>(experience.n_inputs), 1};
+}
+
+TEST(LeastSquares, FindsTheWeightsOfALine) {
+  Numbers features, targets;
+  for (int t = 0; t < 20; ++t) {
+    const double a = 0.1 * t, b = t % 3;
+    features.insert(features.end(), {1.0, a, b});
+    targets.insert(targets.end(), {2.0 + 3.0 * a - b, 5.0 * b});
+  }
+  const Numbers weights = detail::least_squares(features, targets, 20);
+  const Numbers expected{2.0, 0.0, 3.0, 0.0, -1.0, 5.0};
+  for (std::size_t k = 0; k < expected.size(); ++k) EXPECT_NEAR(weights[k], expected[k], 1e-4);
+}
+
+TEST(History, NoneLeavesStatesAsTheyAre) {
+  const HistoryFilter none(2);
+  EXPECT_TRUE(none.is_none());
+  HistoryFilter::Memory memory;
+  Numbers state(2);
+  none.begin(Numbers{0.25, 0.75}, memory, state);
+  EXPECT_EQ(state, (Numbers{0.25, 0.75}));
+  EXPECT_TRUE(memory.empty());
+}
+
+// Changes in the experience: 0.2 of the number and, the shorter way, 0.1 of the angle; a symbol.
+TEST(History, DifferencesAreInputsBehindThoseOfTheObservation) {
+  const RandomExperience experience{.n_inputs = 3,
+                                    .states = {0.5, 0.95, 0.25},
+                                    .next_states = {0.7, 0.05, 0.75},
+                                    .circular = {false, true, false},
+                                    .rewards = {0.0},
+                                    .ends = {false},
+                                    .actions = {{0.0}}};
+  const HistoryFilter filter(History::differences, experience, {0, 0, 2}, 1);
+  EXPECT_EQ(filter.n_inputs(), 5);
+  EXPECT_EQ(filter.circular(), (std::vector<bool>{false, true, false, false, false}));
+  EXPECT_EQ(filter.n_symbols(), (std::vector<int>{0, 0, 2, 0, 0}));
+  HistoryFilter::Memory memory;
+  Numbers state(5);
+  filter.begin(Numbers{0.4, 0.98, 0.25}, memory, state);
+  EXPECT_EQ(state, (Numbers{0.4, 0.98, 0.25, 0.5, 0.5}));
+  filter.follow(Numbers{0.0}, Numbers{0.55, 0.01, 0.75}, memory, state);
+  EXPECT_DOUBLE_EQ(state[3], 0.5 + 0.15 / 0.3 / 2.0);  // one and a half times 0.2 is the largest
+  EXPECT_NEAR(state[4], 0.5 + 0.03 / 0.15 / 2.0, 1e-12);
+  filter.follow(Numbers{0.0}, Numbers{0.0, 0.01, 0.75}, memory, state);
+  EXPECT_DOUBLE_EQ(state[3], 0.0);  // beyond the largest one
+}
+
+TEST(History, AveragesMoveByAHalfAndAFifth) {
+  const RandomExperience experience{.n_inputs = 2, .circular = {false, true}};
+  const HistoryFilter filter(History::averages, experience, {0, 0}, 1);
+  EXPECT_EQ(filter.circular(), (std::vector<bool>{false, true, false, true, false, true}));
+  HistoryFilter::Memory memory;
+  Numbers state(6);
+  filter.begin(Numbers{0.2, 0.9}, memory, state);
+  filter.follow(Numbers{0.0}, Numbers{0.6, 0.1}, memory, state);
+  const Numbers expected{0.6, 0.1, 0.4, 0.0, 0.28, 0.94};
+  for (std::size_t k = 0; k < 6; ++k) {
+    const double distance = std::abs(state[k] - expected[k]);
+    EXPECT_LT(std::min(distance, 1.0 - distance), 1e-12) << k;
+  }
+}
+
+TEST(History, AutoFindsWhatTheTaskNeeds) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const auto kind = [seed](double noise, bool is_velocity_hidden) {
+      const Mass mass = pushed_mass(1000, noise, is_velocity_hidden, seed);
+      return fitted(History::automatic, mass.experience).kind();
+    };
+    EXPECT_EQ(kind(0.0, false), History::none) << seed;
+    EXPECT_EQ(kind(0.0, true), History::differences) << seed;
+    EXPECT_EQ(kind(0.05, false), History::observer) << seed;
+  }
+  EXPECT_EQ(fitted(History::automatic, pushed_mass(50, 0.05, false).experience).kind(),
+            History::none);  // too few transitions
+}
+
+TEST(History, AnObserverIsNearerToTheStateThanItsSensors) {
+  const Mass learned = pushed_mass(1000, 0.05, false, 1), other = pushed_mass(1000, 0.05, false, 2);
+  const HistoryFilter filter = fitted(History::observer, learned.experience);
+  EXPECT_LT(filter.gain(), 1.0);
+  HistoryFilter::Memory memory;
+  Numbers state(2);
+  const auto row = [](const Numbers& rows, std::size_t t) {
+    return std::span(rows).subspan(2 * t, 2);
+  };
+  double of_estimates = 0.0, of_sensors = 0.0;
+  filter.begin(row(other.experience.states, 0), memory, state);
+  for (std::size_t t = 0; t < 1000; ++t) {
+    const auto sensed = row(other.experience.next_states, t), exact = row(other.exact, t);
+    filter.follow(Numbers{other.experience.actions[0][t]}, sensed, memory, state);
+    for (std::size_t i = 0; i < 2; ++i) {
+      of_estimates += (state[i] - exact[i]) * (state[i] - exact[i]);
+      of_sensors += (sensed[i] - exact[i]) * (sensed[i] - exact[i]);
+    }
+  }
+  EXPECT_LT(of_estimates, 0.6 * of_sensors);
+}
+
+/// An agent that pushes the mass; each action lasts a step.
+ControllerConfig config_of(History history, bool is_running = false) {
+  return {.approximator = approximators::LinearSDNNConfig{.n_actions = 3},
+          .learning = QLambdaConfig{},
+          .seed = 3,
+          .observation = {.low = {0.0, 0.0},
+                          .high = {1.0, 1.0},
+                          .running = is_running,
+                          .history = history},
+          .action = {.low = {0.0}, .high = {2.0}, .discrete = true},
+          .warm_up_steps = 200};
+}
+
+/// Lives on in noisy observations of the mass; returns the actions.
+Numbers lived(Controller& controller, core::Random& random, int n_steps) {
+  Numbers actions, observation{0.5, 0.5};
+  controller.begin_episode();
+  for (int t = 0; t < n_steps; ++t) {
+    if (t % 7 == 3) actions.push_back(controller.act(observation, false)[0]);
+    const Numbers action{controller.act(observation)[0]};
+    Numbers next = observation;
+    for (double& x : next) x = std::clamp(x + 0.1 * random.normal() + 0.02 * action[0], 0.0, 1.0);
+    const bool ends = random.below(40) == 0;
+    controller.learn(observation, action, -std::abs(next[0] - 0.5), next, ends);
+    observation = next;
+    if (ends) controller.begin_episode();
+    actions.push_back(action[0]);
+  }
+  return actions;
+}
+
+TEST(History, ALifeWithHistoryCanBeCutAnywhere) {
+  for (const History history :
+       {History::differences, History::averages, History::observer, History::automatic}) {
+    for (const bool is_running : {false, true}) {
+      const ControllerConfig config = config_of(history, is_running);
+      Controller whole(config);
+      core::Random random(5, core::Stream::weights);
+      for (int part = 0; part < 8; ++part) {
+        (void)lived(whole, random, 50 + part);
+        Controller other = Controller::restored(config, core::state_of(whole));
+        ASSERT_EQ(core::state_of(other), core::state_of(whole));
+        core::Random same = random;
+        ASSERT_EQ(lived(other, same, 30), lived(whole, random, 30));
+        ASSERT_EQ(core::state_of(other), core::state_of(whole));
+      }
+    }
+  }
+}
+
+// The transitions of an agent, read by another one that never acts.
+TEST(History, ALogTeachesWhatActingDoes) {
+  Controller actor(config_of(History::differences)), reader(config_of(History::differences));
+  core::Random random(5, core::Stream::weights);
+  Numbers observation{0.5, 0.5};
+  actor.begin_episode();
+  reader.begin_episode();
+  for (int t = 0; t < 600; ++t) {
+    const Numbers action{actor.act(observation)[0]};
+    const Numbers next{random.uniform(), random.uniform()};
+    for (Controller* const agent : {&actor, &reader}) {
+      agent->learn(observation, action, next[0], next, false);
+    }
+    observation = next;
+  }
+  const auto weights = [](const Controller& agent) {
+    return core::state_of(std::get<QLambda>(agent.agent())).at("action_value.weights");
+  };
+  EXPECT_EQ(weights(actor), weights(reader));
+}
+
+TEST(History, GreedyEpisodesHaveAMemoryApart) {
+  Controller controller(config_of(History::differences));
+  core::Random random(5, core::Stream::weights);
+  (void)lived(controller, random, 300);
+  Controller same = controller;
+  controller.begin_greedy_episode();
+  (void)controller.act(Numbers{0.1, 0.9}, false);
+  (void)controller.act(Numbers{0.3, 0.9}, false);
+  const Numbers state(controller.state_of(Numbers{0.5, 0.9}).begin(),
+                      controller.state_of(Numbers{0.5, 0.9}).end());
+  EXPECT_GT(state[2], 0.5);  // it would have moved up from 0.3
+  EXPECT_EQ(state[3], 0.5);
+  core::Random other = random;
+  EXPECT_EQ(lived(controller, random, 50), lived(same, other, 50));
+}
+
+}  // namespace
+}  // namespace sdnn::agents
