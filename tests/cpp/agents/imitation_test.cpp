@@ -38,7 +38,7 @@ QLambda q_lambda_of(const Indices& n_actions = {3}, int window = 1,
       config, 1};
 }
 
-ActorCritic actor_critic_of(const Indices& n_actions = {3}) {
+ActorCritic imitating_actor_critic(const Indices& n_actions = {3}) {
   const LinearSDNNConfig network{.n_inputs = 2, .n_pattern_units = 40};
   const ActorCriticConfig config{.learning_rate = 1.0, .final_learning_rate = {}};
   return detail::make_actor_critic(network, config, n_actions,
@@ -120,7 +120,7 @@ TEST(Imitation, EndsTheEpisode) {
 
 // A fresh policy is even: a step of 1 moves preferences by 1 - 1/3 and by -1/3.
 TEST(Imitation, OfAnActorIsAStepOfItsLogProbability) {
-  ActorCritic agent = actor_critic_of();
+  ActorCritic agent = imitating_actor_critic();
   agent.imitate(kState, Indices{1}, 5.0);
   const double up = std::exp(2.0 / 3.0), down = std::exp(-1.0 / 3.0);
   const std::vector<double> p = values(agent, kState);
@@ -155,7 +155,7 @@ TEST(Imitation, GivesTheSameBitsOnEveryInstructionSetAndAfterASave) {
     for (const core::State& state : states) EXPECT_EQ(state, states.front());
   };
   expect_equal([] { return q_lambda_of({3, 5}, 2); });
-  expect_equal([] { return actor_critic_of({3, 5}); });
+  expect_equal([] { return imitating_actor_critic({3, 5}); });
 }
 
 TEST(Imitation, RefusesWhatCannotBeImitated) {
