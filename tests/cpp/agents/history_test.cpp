@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "sdnn/agents/controller.hpp"
@@ -208,6 +209,29 @@ TEST(History, ALifeWithHistoryCanBeCutAnywhere) {
       }
     }
   }
+}
+
+TEST(History, StatesThatDoNotFitAreRefused) {
+  const ControllerConfig config = config_of(History::observer);
+  Controller controller(config);
+  core::Random random(5, core::Stream::weights);
+  (void)lived(controller, random, 250);
+  const core::State state = core::state_of(controller);
+  ASSERT_NO_THROW((void)Controller::restored(config, state));
+  for (const auto& [name, tensor] : state) {
+    if (!name.starts_with("history.") && !name.starts_with("last_states.")) continue;
+    core::State shorter = state;
+    core::Tensor& part = shorter.at(name);
+    if (part.shape.size() != 1 || part.shape[0] == 0) continue;
+    part.bytes.resize(part.bytes.size() / part.shape[0] * (part.shape[0] - 1));
+    --part.shape[0];
+    EXPECT_THROW((void)Controller::restored(config, shorter), std::invalid_argument) << name;
+  }
+  core::State more = state;
+  core::Tensor& levels = more.at("history.observer.n_levels");
+  levels.bytes.insert(levels.bytes.end(), levels.bytes.begin(), levels.bytes.end());
+  levels.shape[0] *= 2;
+  EXPECT_THROW((void)Controller::restored(config, more), std::invalid_argument);
 }
 
 // The transitions of an agent, read by another one that never acts.

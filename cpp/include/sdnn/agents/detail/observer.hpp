@@ -83,9 +83,9 @@ class Observer {
     for (std::size_t i = 0; i < n_inputs(); ++i) {
       if (circular_[i]) {
         const double turns = estimates[i] / core::kTwoPi;
-        state[i] = turns - std::floor(turns);
+        state[i] = within(turns - std::floor(turns), 0.0, 1.0);
       } else {
-        state[i] = std::clamp((estimates[i] - low_[i]) / (high_[i] - low_[i]), 0.0, 1.0);
+        state[i] = within((estimates[i] - low_[i]) / (high_[i] - low_[i]), 0.0, 1.0);
       }
     }
   }
@@ -121,7 +121,11 @@ class Observer {
   static void serialize(Self& self, Archive& archive) {
     archive.numbers("means", self.means_);
     archive.numbers("deviations", self.deviations_);
+    const std::size_t n_dimensions = self.n_levels_.size();
     archive.numbers("n_levels", self.n_levels_);
+    if constexpr (Archive::kReads) {
+      archive.expect(self.n_levels_.size() == n_dimensions, "n_levels", "one for each dimension");
+    }
     archive.numbers("levels", self.levels_);
     archive.numbers("weights", self.weights_);
     archive.number("gain", self.gain_);
@@ -161,6 +165,10 @@ class Observer {
   static constexpr double kLeastWidth = 1e-3;
   static constexpr double kLeastDeviation = 1e-9;
 
+  /// The nearest number between two; the first of them for NaN, which files can lead to.
+  static double within(double x, double low, double high) noexcept {
+    return x > low ? std::min(x, high) : low;
+  }
   double coordinate(double x, std::size_t i) const noexcept {
     return circular_[i] ? core::kTwoPi * x : (x - means_[i]) / deviations_[i];
   }
@@ -267,11 +275,11 @@ class Observer {
       for (std::size_t k = 0; k < features.size(); ++k) {
         change += weights_[k * n_inputs() + i] * features[k];
       }
-      estimates[i] += std::clamp(change, -kLargestChange, kLargestChange);
+      estimates[i] += within(change, -kLargestChange, kLargestChange);
       if (circular_[i]) {
         estimates[i] -= core::kTwoPi * std::round(estimates[i] / core::kTwoPi);
       } else {
-        estimates[i] = std::clamp(estimates[i], -kFarthest, kFarthest);
+        estimates[i] = within(estimates[i], -kFarthest, kFarthest);
       }
     }
   }
