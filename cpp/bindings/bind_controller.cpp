@@ -84,7 +84,12 @@ py::array_t<double> values(Controller& controller, const ArrayArgument<double>& 
   const auto variables = bindings::copied(bindings::flat(observation));
   auto& workspace = bindings::workspace_of(std::as_const(controller));
   std::span<const double> row;
-  read_without_gil(controller, [&] { row = controller.values(variables, workspace, dimension); });
+  const auto read = [&] { row = controller.values(variables, workspace, dimension); };
+  if (controller.history().is_none()) {
+    read_without_gil(controller, read);
+  } else {
+    read();  // what other threads may change meanwhile: the memory of episodes
+  }
   return array_of(row);
 }
 

@@ -347,17 +347,17 @@ static inline int sdnn_lacks_rewards(const sdnn_agent* agent) {
 /* Whether the next action is a random one, which is in agent->kept then. */
 static inline int sdnn_explores(sdnn_agent* agent) {
   const uint32_t step = agent->step++;
-  const int at_random =
-      agent->n_random_left > 0 || (sdnn_lacks_rewards(agent) && sdnn_may_explore(step));
+  const int may_explore = sdnn_may_explore(step) && agent->epsilon > 0;
+  const int is_left = agent->n_random_left > 0 && (SDNN_START_STEPS > 0 || may_explore);
+  const int at_random = is_left || (sdnn_lacks_rewards(agent) && may_explore);
   uint32_t d;
-  if (agent->n_random_left > 0) --agent->n_random_left;
+  if (is_left) --agent->n_random_left;
   if (agent->n_kept > 0) {
     --agent->n_kept;
     return 1;
   }
-  if (!at_random &&
-      !(sdnn_may_explore(step) && agent->epsilon > 0 &&
-        sdnn_bits(&agent->randoms[SDNN_EXPLORATION]) >> 11 < (uint64_t)agent->epsilon << 37)) {
+  if (!at_random && !(may_explore && sdnn_bits(&agent->randoms[SDNN_EXPLORATION]) >> 11 <
+                                         (uint64_t)agent->epsilon << 37)) {
     return 0;
   }
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
@@ -451,7 +451,8 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) agent->action[d] = limited[d];
   agent->reward = reward;
   agent->is_pending = 1;
-  if (reward != 0 && sdnn_lacks_rewards(agent)) { /* search for more in twice as many steps */
+  if (SDNN_START_STEPS == 0 && reward != 0 &&
+      sdnn_lacks_rewards(agent)) { /* search for more in twice as many steps */
     agent->n_random_left =
         agent->n_learned < SDNN_MOST_RANDOM / 2 ? 2 * (uint32_t)agent->n_learned : SDNN_MOST_RANDOM;
   }

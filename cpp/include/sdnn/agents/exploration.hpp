@@ -72,6 +72,7 @@ class Exploration {
   /// The first reward other than 0 came after so many steps: twice as many will be random, too, in
   /// search of more.
   void note_first_reward(std::int64_t n_steps) noexcept {
+    if (start_steps_ > 0) return;  // the first steps are random in any case
     n_random_left_ = static_cast<int>(std::min<std::int64_t>(2 * n_steps, most_random_left_));
   }
 
@@ -87,7 +88,7 @@ class Exploration {
       if (!allows(take_part(left, n_actions(d)), episode.kept[d])) episode.n_kept = 0;
     }
     const int step = episode.step++;
-    const bool at_random = n_random_left_ > 0;
+    const bool at_random = n_random_left_ > 0 && (start_steps_ > 0 || policy_.may_explore(step));
     if (at_random) --n_random_left_;
     const bool must_explore = at_random || (lacks_order && policy_.may_explore(step));
     if (episode.n_kept == 0 && !must_explore && !policy_.explores(step)) return false;

@@ -65,12 +65,18 @@ class LastStates {
       (is_learned ? kept.learned : *kept.greedy).action.assign(action.begin(), action.end());
     }
   }
-  /// Finds the state of an observation, in the order of greedy episodes, and keeps nothing.
+  /// Finds the state of an observation, in the order of greedy episodes, and keeps nothing: of the
+  /// last one as it is, of another one that of the next step.
   void peek(const Observations& observations, std::size_t environment,
             std::span<const double> observation, std::span<double> state) const {
     if (history_.is_none()) return observations.scale(observation, state);
+    const Last* const kept = last(environment, true);
     Last next;
-    find(observations, last(environment, true), observation, next);
+    if (kept != nullptr && is_observation_of(*kept, observation)) {
+      next.state = kept->state;
+    } else {
+      find(observations, kept, observation, next);
+    }
     std::ranges::copy(next.state, state.begin());
   }
 

@@ -364,12 +364,12 @@ class Observer {
     const auto are_finite = [](const std::vector<double>& values) {
       return std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
     };
-    const auto is_positive = [](double x) { return x > 0.0; };
-    archive.expect(means_.size() == n_inputs() && are_finite(means_), "means",
-                   "a finite number for each input");
-    archive.expect(deviations_.size() == n_inputs() && are_finite(deviations_) &&
-                       std::ranges::all_of(deviations_, is_positive),
-                   "deviations", "a positive number for each input");
+    const auto is_near = [](double x) { return x >= -1.0 && x <= 2.0; };
+    const auto is_wide = [](double x) { return x >= kLeastDeviation / 2.0 && x <= 2.0; };
+    archive.expect(means_.size() == n_inputs() && std::ranges::all_of(means_, is_near), "means",
+                   "in [-1, 2] for each input");
+    archive.expect(deviations_.size() == n_inputs() && std::ranges::all_of(deviations_, is_wide),
+                   "deviations", "in [5e-10, 2] for each input");
     std::size_t n = 0;
     for (const std::int32_t levels : n_levels_) {
       archive.expect(levels >= 1 && levels < static_cast<std::int32_t>(kMostLevels), "n_levels",
