@@ -16,6 +16,14 @@
 
 namespace sdnn::agents::detail {
 
+/// A state of an episode, and what belongs to it.
+struct LastState {
+  std::vector<double> observation = {}, state = {};
+  bool is_noted = false;  ///< whether ranges have followed it
+  HistoryFilter::Memory memory = {};
+  std::vector<double> action = {};  ///< in that state; empty: none yet
+};
+
 /// In each environment the last observation and its state, which is the next transition's first: it
 /// stays as it was where ranges change, so that traces go on, and it holds what a history
 /// remembers.
@@ -70,8 +78,8 @@ class LastStates {
   void peek(const Observations& observations, std::size_t environment,
             std::span<const double> observation, std::span<double> state) const {
     if (history_.is_none()) return observations.scale(observation, state);
-    const Last* const kept = last(environment, true);
-    Last next;
+    const LastState* const kept = last(environment, true);
+    LastState next;
     if (kept != nullptr && is_observation_of(*kept, observation)) {
       next.state = kept->state;
     } else {
@@ -85,7 +93,7 @@ class LastStates {
   void start(const Observations& observations, std::size_t environment,
              std::span<const double> observation, std::span<double> state) {
     if (!remembers(observations)) return observations.scale(observation, state);
-    const Last* const before = last(environment, false);
+    const LastState* const before = last(environment, false);
     if (before != nullptr && is_observation_of(*before, observation)) {
       first_ = *before;
     } else {
@@ -136,8 +144,8 @@ class LastStates {
     }
     for (std::size_t i = 0; i < self.last_.size(); ++i) {
       archive.within(std::to_string(i), [&] {
-        auto& [learned, greedy] = self.last_[i];
-        self.list(learned, archive);
+        auto& greedy = self.last_[i].greedy;
+        self.list(self.last_[i].learned, archive);
         if (self.history_.is_none()) return;
         bool is_greedy = greedy.has_value();
         archive.number("is_greedy", is_greedy);
@@ -160,15 +168,9 @@ class LastStates {
   }
 
  private:
-  struct Last {
-    std::vector<double> observation = {}, state = {};
-    bool is_noted = false;  ///< whether ranges have followed it
-    HistoryFilter::Memory memory = {};
-    std::vector<double> action = {};  ///< in that state; empty: none yet
-  };
   struct Environment {
-    Last learned = {};
-    std::optional<Last> greedy = {};
+    LastState learned;
+    std::optional<LastState> greedy;
   };
 
   static constexpr std::uint64_t kMostEnvironments = 1 << 14;
@@ -182,14 +184,14 @@ class LastStates {
     return last_[environment];
   }
   /// The last state of an episode that goes on, or null.
-  const Last* last(std::size_t environment, bool is_greedy) const {
+  const LastState* last(std::size_t environment, bool is_greedy) const {
     if (environment >= last_.size()) return nullptr;
     const Environment& kept = last_[environment];
-    const Last& last = is_greedy && kept.greedy ? *kept.greedy : kept.learned;
+    const LastState& last = is_greedy && kept.greedy ? *kept.greedy : kept.learned;
     return last.state.empty() ? nullptr : &last;
   }
   /// Whether this is the observation of a state; missing readings are alike.
-  static bool is_observation_of(const Last& last, std::span<const double> observation) {
+  static bool is_observation_of(const LastState& last, std::span<const double> observation) {
     const auto are_alike = [](double x, double y) {
       return x == y || (!std::isfinite(x) && !std::isfinite(y));
     };
@@ -198,8 +200,8 @@ class LastStates {
 
   /// The state of an observation that comes after the last one: of the next step if the agent has
   /// acted there, else of the same one or, unless they are equal, of an episode that begins.
-  void find(const Observations& observations, const Last* last, std::span<const double> observation,
-            Last& next) const {
+  void find(const Observations& observations, const LastState* last,
+            std::span<const double> observation, LastState& next) const {
     const bool is_same = last != nullptr && is_observation_of(*last, observation);
     if (last != nullptr && !last->action.empty()) {
       continue_with(observations, *last, last->action, observation, next, "observation");
@@ -210,15 +212,15 @@ class LastStates {
     }
   }
   void begin(const Observations& observations, std::span<const double> observation,
-             Last& first) const {
+             LastState& first) const {
     std::vector<double> inputs(history_.n_observed());
     observations.scale(observation, inputs, "observation", !history_.is_none());
     first = {{observation.begin(), observation.end()}, std::vector<double>(history_.n_inputs())};
     history_.begin(inputs, first.memory, first.state);
   }
-  void continue_with(const Observations& observations, const Last& before,
+  void continue_with(const Observations& observations, const LastState& before,
                      std::span<const double> action, std::span<const double> observation,
-                     Last& next, const char* name) const {
+                     LastState& next, const char* name) const {
     std::vector<double> inputs(history_.n_observed());
     observations.scale(observation, inputs, name, !history_.is_none());
     next = {{observation.begin(), observation.end()}, std::vector<double>(history_.n_inputs())};
@@ -251,7 +253,7 @@ class LastStates {
   std::size_t n_variables_ = 0, n_dimensions_ = 0;
   HistoryFilter history_;
   std::vector<Environment> last_;
-  Last first_, next_;  ///< of the transition or the state that is being found
+  LastState first_, next_;  ///< of the transition or the state that is being found
 };
 
 }  // namespace sdnn::agents::detail

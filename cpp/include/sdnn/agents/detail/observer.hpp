@@ -216,8 +216,7 @@ class Observer {
     for (const std::vector<double>& actions : experience.actions) {
       std::vector<double> levels = actions;
       std::ranges::sort(levels);
-      const auto repeated = std::ranges::unique(levels);
-      levels.erase(repeated.begin(), repeated.end());
+      levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
       if (levels.size() > kMostLevels) levels = {(levels.front() + levels.back()) / 2.0};
       n_levels_.push_back(static_cast<std::int32_t>(levels.size()));
       levels_.insert(levels_.end(), levels.begin(), levels.end());
