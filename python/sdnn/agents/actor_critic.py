@@ -19,8 +19,9 @@ class SDNNActorCritic(ValueAgent[LinearSDNNConfig, ActorCriticConfig]):
     Both are linear in the SDNN code, with thermometers of single inputs beside it, and all that is
     learned are integers. TD errors count in units of their running root mean square, so no scale of
     rewards has to be known. In each dimension of a ``Box`` the policy chooses among
-    ``approximator.n_actions`` actions, which cut it evenly, 5 by the preset. Learning is on-policy:
-    transitions of another policy, as in a log, teach the critic rather than the actor.
+    ``approximator.n_actions`` actions, which cut it evenly, 5 by the preset; a greedy action is the
+    mean of the most probable one and its neighbours. Learning is on-policy: transitions of another
+    policy, as in a log, teach the critic rather than the actor.
 
     Parameters
     ----------

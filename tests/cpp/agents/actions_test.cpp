@@ -31,6 +31,15 @@ TEST(Actions, OfABoxCutItsRangesEvenly) {
   EXPECT_EQ(Actions({.low = {-2.0}, .high = {2.0}}, 1).index_of(1.0, 0), 0U);
 }
 
+TEST(Actions, OfABoxMayLieBetweenTwoIndices) {
+  const Actions actions({.low = {-2.0}, .high = {2.0}}, 5);
+  EXPECT_EQ(actions.beside_index(1, 0.25, 0), -0.75);
+  EXPECT_EQ(actions.beside_index(4, -0.5, 0), 1.5);
+  EXPECT_EQ(Actions({.low = {-2.0}, .high = {2.0}}, 1).beside_index(0, 0.0, 0), -2.0);
+  const Actions discrete({.low = {3.0}, .high = {7.0}, .discrete = true}, 5);
+  EXPECT_EQ(discrete.beside_index(1, 0.25, 0), 4.0);
+}
+
 TEST(Actions, OfANumberAreThePlaceInTheRange) {
   const Actions actions({.low = {-2.0, 0.0}, .high = {6.0, 1.0}}, 0);
   EXPECT_EQ(actions.of_normalized(-1.0, 0), -2.0);

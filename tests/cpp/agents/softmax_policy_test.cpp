@@ -99,5 +99,14 @@ TEST(Thermometers, UnitsAreAboveTheThresholdsBelowTheBin) {
   EXPECT_EQ(active, std::vector<std::int32_t>(3, 0));
 }
 
+TEST(SoftmaxPolicy, TheMeanOfAnActionAndItsNeighboursIsWeightedByProbabilities) {
+  const SoftmaxPolicy policy({3, 2}, 64);
+  auto workspace = policy.workspace();
+  const std::uint32_t weights[] = {1, 4, 3, 2, 1};
+  for (std::size_t row = 0; row < 5; ++row) workspace.terms[row].weight = weights[row];
+  EXPECT_EQ(policy.mean_offset(workspace, 0, 1), 0.25);               // (3 - 1) / (1 + 4 + 3)
+  EXPECT_EQ(policy.mean_offset(workspace, 1, 0), 21845.0 / 65536.0);  // 1 / (2 + 1), below the end
+}
+
 }  // namespace
 }  // namespace sdnn::agents::detail

@@ -101,6 +101,25 @@ def test_a_bandit_is_solved_by_probabilities_and_valued_by_its_mean():
     assert agent.act(zeros, explore=False) == 2
 
 
+def test_greedy_actions_of_a_box_are_the_mean_of_the_best_one_and_its_neighbours():
+    box = gym.spaces.Box(np.array([-1.0, 0.0]), np.array([1.0, 8.0]), dtype=np.float64)
+    agent = SDNNActorCritic(gym.spaces.Box(-1, 1, (2,)), box, seed=2, **STILL)
+    observation = np.array([0.2, -0.4], np.float32)
+    for step in range(40):
+        action = agent.act(observation)
+        reward = -abs(action[0] - 0.3) - abs(action[1] - 7.0)
+        agent.learn(Transition(observation, action, reward, observation, terminated=step % 2 == 0))
+    expected = []
+    for dimension, actions in enumerate((np.linspace(-1.0, 1.0, 5), np.linspace(0.0, 8.0, 5))):
+        p = agent.action_probabilities(observation, dimension)
+        near = slice(max(p.argmax() - 1, 0), p.argmax() + 2)
+        expected.append(p[near] @ actions[near] / p[near].sum())
+        assert not np.isclose(expected[-1], actions).any()
+    action = agent.act(observation, explore=False)
+    np.testing.assert_allclose(action, expected, atol=1e-4)
+    agent.learn(Transition(observation, action, 0.0, observation, terminated=True))
+
+
 def test_action_values_and_epsilon_are_refused_with_their_alternatives():
     agent = SDNNActorCritic(gym.spaces.Box(-1.0, 1.0, (2,)), gym.spaces.Discrete(2), seed=1)
     assert not hasattr(agent, "q_values")

@@ -86,6 +86,14 @@ class Actions {
     if (config_.discrete) return config_.low[d] + static_cast<double>(index);
     return rounded(coding::action_value(index, n_actions_[d], config_.low[d], config_.high[d]), d);
   }
+  /// The action of a box that lies `offset` times the distance of neighbours beyond that with an
+  /// index; of discrete actions the one with the index.
+  double beside_index(std::size_t index, double offset, std::size_t d) const noexcept {
+    if (config_.discrete || n_actions_[d] == 1) return of_index(index, d);
+    const double part =
+        (static_cast<double>(index) + offset) / static_cast<double>(n_actions_[d] - 1);
+    return rounded(config_.low[d] + (config_.high[d] - config_.low[d]) * part, d);
+  }
   /// The action of a number in [-1, 1] in dimension d.
   double of_normalized(double action, std::size_t d) const noexcept {
     const double low = config_.low[d], high = config_.high[d];

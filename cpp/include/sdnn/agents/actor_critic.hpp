@@ -130,6 +130,15 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     actor_.read(workspace.critic.code(), workspace.actor);
   }
 
+  /// Returns how far beyond a most probable action the mean of it and its neighbours lies, for the
+  /// state that was read last into the workspace, or by act; see SoftmaxPolicy.
+  double mean_offset(const Workspace& workspace, std::size_t d, std::size_t action) const {
+    return actor_.mean_offset(workspace.actor, d, action);
+  }
+  double mean_offset(std::size_t d, std::size_t action) const {
+    return mean_offset(workspace_, d, action);
+  }
+
   /// Learns one transition. One that does not begin where the last one ended begins traces anew.
   /// Throws std::invalid_argument for a reward that is not finite or beyond +- 1e300 or an
   /// environment that is none; then nothing has been learned.

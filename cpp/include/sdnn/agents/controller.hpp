@@ -18,6 +18,7 @@
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller_config.hpp"
 #include "sdnn/agents/detail/approximator_of.hpp"
+#include "sdnn/agents/detail/greedy_action.hpp"
 #include "sdnn/agents/detail/last_states.hpp"
 #include "sdnn/agents/detail/taken_actions.hpp"
 #include "sdnn/agents/exploration.hpp"
@@ -162,13 +163,12 @@ class Controller : public WithRates<Controller> {
     std::visit(
         [&](auto& agent) {
           actions_.take(agent.act(state_, explore, environment, mask), action_, indices_);
+          if (!explore) detail::move_to_mean(actions_, agent, action_, indices_);
         },
         *agent_);
     last_states_.keep(observations_, environment, explore);
     last_states_.note_action(environment, action_, explore);
-    if (explore && !is_fuzzy(approximator_)) {
-      taken_.note(environment, action_, indices_);
-    }
+    if (explore && !is_fuzzy(approximator_)) taken_.note(environment, action_, indices_);
     readings_.note(held_, environment, !explore);
     return action_;
   }
@@ -193,8 +193,9 @@ class Controller : public WithRates<Controller> {
     find_state(observation, workspace);
     std::visit(
         [&](const auto& agent) {
-          actions_.take(agent.best_action(workspace.state, part_of(workspace, agent), ties, mask),
-                        workspace.action, workspace.indices);
+          auto& part = part_of(workspace, agent);
+          detail::take_greedy(actions_, agent, agent.best_action(workspace.state, part, ties, mask),
+                              workspace, part);
         },
         *agent_);
     return workspace.action;
@@ -218,8 +219,8 @@ class Controller : public WithRates<Controller> {
     actions_.require_mask("mask", mask);
     std::visit(
         [&](auto& agent) {
-          actions_.take(agent.best_of(part_of(workspace, agent), mask), workspace.action,
-                        workspace.indices);
+          auto& part = part_of(workspace, agent);
+          detail::take_greedy(actions_, agent, agent.best_of(part, mask), workspace, part);
         },
         *agent_);
     last_states_.note_action(environment, workspace.action, false);

@@ -107,6 +107,16 @@ class SoftmaxPolicy {
     }
   }
 
+  /// Returns how far beyond an action the mean of it and its neighbours lies, weighted by their
+  /// probabilities: a multiple of 2^-16 in [-0.5, 0.5] for a most probable action.
+  double mean_offset(const Workspace& workspace, std::size_t d, std::size_t action) const {
+    const auto dimension = terms(workspace, d);
+    const std::int64_t below = action > 0 ? dimension[action - 1].weight : 0;
+    const std::int64_t above = action + 1 < dimension.size() ? dimension[action + 1].weight : 0;
+    const std::int64_t sum = below + dimension[action].weight + above;
+    return static_cast<double>((above - below) * (1 << 16) / sum) / (1 << 16);
+  }
+
   /// Decays the trace, adds the gradient of log pi(action | s) to it, and moves the weights along
   /// the trace by rate / n times the error, and along the gradient of the entropy, where n is the
   /// number of columns of the code that are not 0. Requires that `read` has read the code, and
