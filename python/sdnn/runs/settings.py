@@ -82,8 +82,8 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 msgspec.structs.force_setattr(self, name, made)
 
     def replace(self: AnySettings, **changes: object) -> AnySettings:
-        """Return a copy with other values of some fields."""
-        return msgspec.structs.replace(self, **changes)
+        """Return a copy with other values of some fields, checked as a new one."""
+        return type(self)(**{**msgspec.structs.asdict(self), **changes})
 
 
 @functools.cache

@@ -51,6 +51,22 @@ def test_a_specification_survives_json_and_pickle(spec):
     assert pickle.loads(pickle.dumps(spec)) == spec
 
 
+def test_replaced_settings_are_checked_and_filled_in_as_new_ones_are():
+    spec = RunSpec(environment=CART_POLE)
+    for settings, changes in (
+        (spec, {"seed": -1}),
+        (spec, {"budget": {"steps": 0}}),
+        (spec.budget, {"steps": 0}),
+        (spec.environment, {"ranges": {"none": (0.0, 1.0)}}),
+    ):
+        with pytest.raises(ConfigError):
+            settings.replace(**changes)
+    assert spec.replace(agent="q-lambda").agent == spec.agent
+    assert spec.agent.preset == "general"
+    with pytest.raises(TypeError, match="sed"):
+        spec.replace(sed=1)
+
+
 def test_missing_settings_are_filled_in():
     spec = RunSpec(environment=CART_POLE)
     assert (spec.agent.preset, spec.label) == ("general", "q-lambda-general")
