@@ -69,6 +69,17 @@ def checked_knots(knots: object, low: float, high: float) -> Knots:
     )
 
 
+def _interpolated(
+    values: NDArray[np.float64], knots: NDArray[np.float64], levels: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the levels of values between knots, linearly interpolated."""
+    positions = np.interp(values, knots, levels)
+    is_infinite = np.isinf(positions)
+    if is_infinite.any():  # between subnormal knots, where the slope overflows
+        positions[is_infinite] = levels[np.searchsorted(knots, values[is_infinite])]
+    return positions
+
+
 class Ranged(Coding):
     """Coding of numbers within a range, given or learned."""
 
@@ -91,7 +102,7 @@ class Ranged(Coding):
         if not low / 2 < high / 2:  # a column with a single value, or values next to 0
             positions = np.zeros(len(values))
         elif self.knots is not None:
-            positions = np.interp(values, *np.array(self.knots).T)
+            positions = _interpolated(values, *np.array(self.knots).T)
         else:  # halves, so that the width of the widest range is still a number
             positions = (np.clip(values, low, high) / 2 - low / 2) / (high / 2 - low / 2)
         # Bins are equal half-open parts of [0, 1]; the last one includes 1.

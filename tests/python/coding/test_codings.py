@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from refusals import refuses
 from sdnn.coding import (
@@ -84,11 +84,20 @@ def test_quantile_bins_hold_equal_shares():
     assert len(coding.knots) <= MAX_KNOTS
 
 
+def test_a_value_between_subnormal_knots_has_the_bin_of_the_next_knot():
+    """The slope between the knots is 0.5 / 1e-323, which is beyond all floats."""
+    coding = RandomInverse(spacing="quantile", n_bins=4).fit(np.array([-5e-324, 5e-324, 1.0]), 400)
+    assert coding.bins(np.array([-1.0, -5e-324, 0.0, 5e-324, 0.5, 1.0])).tolist() == [
+        0, 0, 2, 2, 3, 3,
+    ]  # fmt: skip
+
+
 @settings(max_examples=100, deadline=None)
 @given(
     st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=30),
     st.sampled_from(["even", "quantile", "anchor"]),
 )
+@example([1.0, 5e-324, -5e-324], "quantile")
 def test_bins_never_leave_the_table_and_keep_the_order(values, kind):
     column = np.array(values)
     coding = Anchor() if kind == "anchor" else RandomInverse(spacing=kind)
