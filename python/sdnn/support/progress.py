@@ -51,12 +51,14 @@ class ProgressBars:
         self._tasks: dict[Hashable, TaskID] = {}
 
     def __enter__(self) -> Self:
-        self._progress.start()
+        if not self._progress.disable:
+            self._progress.start()
         self._draw()
         return self
 
     def __exit__(self, *_error: object) -> None:
-        self._progress.stop()
+        if not self._progress.disable:  # else rich 14.2 and older print an empty line
+            self._progress.stop()
         self._due = 0.0
         self._draw()
 
