@@ -439,7 +439,7 @@ def test_command_line_starts_without_heavy_imports(arguments):
         f"try: main({arguments})\n"
         "except SystemExit: pass\n"
         "heavy = {'numpy', 'gymnasium', 'matplotlib', 'rich', 'PIL', 'sqlite3', 'safetensors'}\n"
-        "heavy |= {'sdnn.agents', 'sdnn.runs.run', 'sdnn.runs.engine'}\n"
+        "heavy |= {'filelock', 'sdnn.agents', 'sdnn.runs.run', 'sdnn.runs.engine'}\n"
         # The options of train are fields of a specification, which knows agents.
         f"if {arguments[0]!r} == 'train': heavy -= {{'numpy', 'gymnasium', 'sdnn.agents'}}\n"
         "print('loaded:', sorted(heavy & set(sys.modules)))"

@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
 import numpy as np
-from filelock import lock_descriptor
 from numpy.typing import NDArray
 
 from sdnn._core import __version__
@@ -166,8 +165,10 @@ def lock(descriptor: int) -> bool | None:
     Returns whether it is locked now: False if another process holds it, None where files cannot be
     locked.
     """
+    import filelock  # which reads much more than locking files needs
+
     try:
-        return lock_descriptor(descriptor, blocking=False)
+        return filelock.lock_descriptor(descriptor, blocking=False)
     except OSError:  # not in this folder
         return None
 

@@ -268,9 +268,7 @@ def test_two_processes_do_not_train_one_run(tmp_path, monkeypatch):
     assert b"process" in other.stderr
     assert not run.rows()
     assert run.train(steps=20).n_steps == 20
-    monkeypatch.setattr(
-        "sdnn.support.files.lock_descriptor", _no_locks
-    )  # as in some folders of networks
+    monkeypatch.setattr("filelock.lock_descriptor", _no_locks)  # as in some network folders
     assert run.train(steps=40).n_steps == 40
 
 
