@@ -49,6 +49,10 @@ class FailAtCall:
             work()
         except InjectedError:
             return True
+        except TypeError:  # by which NumPy 2.0 replaces any error while it compares rows
+            if self.n_calls < self.n:
+                raise
+            return True
         finally:
             sys.setprofile(None)
             gc.enable()

@@ -127,7 +127,8 @@ def test_export_writes_an_agent_that_learns(invoke):
 def test_an_agent_that_needs_masks_is_not_exported(invoke, tmp_path):
     words = ("--agent", "q-lambda", "--steps", 60, "--evaluate-every", 0, "--out", "one")
     masks = ("--set", "environment.action_masks=true")
-    assert invoke("train", "Taxi-v4", *words, *masks).exit_code == 0
+    taxi = "Taxi-v4" if "Taxi-v4" in gym.registry else "Taxi-v3"  # before Gymnasium 1.3
+    assert invoke("train", taxi, *words, *masks).exit_code == 0
     done = invoke("export", "one", "--c-header", "a.h")
     assert (done.exit_code, done.stdout) == (1, "")
     assert "one was trained with environment.action_masks" in done.stderr
