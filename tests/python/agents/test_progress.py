@@ -1,5 +1,6 @@
-"""The line of progress of a training."""
+"""The progress bar of a training."""
 
+import sys
 from io import StringIO
 
 import gymnasium as gym
@@ -12,7 +13,7 @@ from sdnn.training.callbacks import ProgressBarCallback
 
 @pytest.mark.parametrize("is_terminal", [True, False])
 @pytest.mark.parametrize("goal", [{"steps": 200}, {"episodes": 5}])
-def test_a_line_on_a_terminal_and_nothing_elsewhere(is_terminal, goal):
+def test_the_progress_bar_is_shown_on_terminals_only(is_terminal, goal):
     env = gym.make("Pendulum-v1", max_episode_steps=40)
     agent = RBFQLearning(env.observation_space, env.action_space)
     text = StringIO()
@@ -33,14 +34,19 @@ def test_a_line_on_a_terminal_and_nothing_elsewhere(is_terminal, goal):
         assert text.getvalue() == ""
 
 
-def test_train_shows_progress_on_request(capsys):
-    env = gym.make("Pendulum-v1", max_episode_steps=40)
-    agent = RBFQLearning(env.observation_space, env.action_space)
-    assert agent.train(env, steps=100, progress=True).n_steps == 100
-    assert capsys.readouterr().out == ""
+def test_train_with_progress_shows_a_bar_on_a_terminal_only(capsys, monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    for is_terminal in (False, True):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)  # noqa: B023
+        env = gym.make("Pendulum-v1")
+        RBFQLearning(env).train(env, steps=100, progress=True)
+        output = capsys.readouterr()
+        assert output.out == ""
+        assert ("learning" in output.err) == is_terminal
+        assert (output.err == "") != is_terminal
 
 
-def test_a_notebook_shows_it_where_a_training_is_long():
+def test_a_notebook_shows_the_progress_of_long_trainings_only():
     nbclient, nbformat = map(pytest.importorskip, ("nbclient", "nbformat"))
     source = """import gymnasium as gym
 from sdnn import agents; from sdnn.training import callbacks

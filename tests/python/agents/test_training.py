@@ -1,4 +1,4 @@
-"""The loop over an environment: its rows, its ends, and going on exactly."""
+"""Training loops over single environments: rows, failures, evaluations, and exact resuming."""
 
 import copy
 import functools
@@ -33,7 +33,7 @@ from sdnn.support.files import read_file, write_file
 from stopped_training import Stop, check_exact_resume, states_equal
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
-KINDS = {
+AGENT_TYPES = {
     "sdnn": (SDNNQLearning, {"approximator": SMALL}),
     "rbf": (RBFQLearning, {}),
     "fuzzy": (FuzzyQLearning, {}),
@@ -41,7 +41,10 @@ KINDS = {
 
 
 class Corridor(gym.Env):
-    """Five cells; the right end terminates with 1, every step costs 0.1, eight steps truncate."""
+    """Five cells, begun in cell 0 or 1; cell 4 ends the episode with reward 1, others cost 0.1.
+
+    Episodes are truncated after eight steps.
+    """
 
     observation_space = gym.spaces.Box(0.0, 4.0, (1,), dtype=np.float64)
     action_space = gym.spaces.Discrete(2)
@@ -54,23 +57,23 @@ class Corridor(gym.Env):
         super().reset(seed=seed)
         self.seeds.append(seed)
         self._at, self._steps = int(self.np_random.integers(2)), 0
-        return self._seen(), {}
+        return self._observation(), {}
 
     def step(self, action):
         self._at = max(0, self._at + (1 if action else -1))
         self._steps += 1
-        ends = self._at == 4
-        return self._seen(), 1.0 if ends else -0.1, ends, self._steps == 8, {}
+        terminated = self._at == 4
+        return self._observation(), 1.0 if terminated else -0.1, terminated, self._steps == 8, {}
 
-    def _seen(self):
+    def _observation(self):
         shift = np.random.default_rng().uniform(0, 0.1) if self._is_random else 0.0
         return np.array([self._at + shift])
 
 
 class Careless(gym.Env):
-    """A point on a line, drawn to the middle; tells its own array, and changes the action it gets.
+    """A point on a line that is rewarded in the middle.
 
-    With ``is_careful`` neither.
+    It returns its state without a copy, and changes the action in place; not with ``is_careful``.
     """
 
     observation_space = gym.spaces.Box(-1.0, 1.0, (2,), dtype=np.float64)
@@ -84,7 +87,7 @@ class Careless(gym.Env):
         super().reset(seed=seed)
         self._state[:] = self.np_random.uniform(-1.0, 1.0, 2)
         self._steps = 0
-        return self._seen(), {}
+        return self._observation(), {}
 
     def step(self, action):
         force = action.copy() if self._is_careful else action
@@ -92,9 +95,9 @@ class Careless(gym.Env):
         self._state[:] = np.clip(self._state + np.append(force, 0.0), -1.0, 1.0)
         self._steps += 1
         reward = np.array([-abs(self._state[0])])
-        return self._seen(), reward, np.bool_(False), self._steps == 20, {}
+        return self._observation(), reward, np.bool_(False), self._steps == 20, {}
 
-    def _seen(self):
+    def _observation(self):
         return self._state.copy() if self._is_careful else self._state
 
 
@@ -105,9 +108,9 @@ def corridor_agent(**options):
     )
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_environments_that_reuse_their_arrays_do_not_change_learning(kind):
-    make, options = KINDS[kind]
+@pytest.mark.parametrize("agent_type", AGENT_TYPES)
+def test_environments_that_modify_arrays_in_place_do_not_change_learning(agent_type):
+    make, options = AGENT_TYPES[agent_type]
     agents = []
     for is_careful in (True, False):
         env = Careless(is_careful)
@@ -116,10 +119,8 @@ def test_environments_that_reuse_their_arrays_do_not_change_learning(kind):
     assert states_equal(*agents)
 
 
-def test_an_environment_that_does_not_fit_is_refused():
+def test_environments_with_other_spaces_are_refused():
     agent = corridor_agent()
-    env = Corridor()
-    refuses("evaluation_env", agent.train, env, steps=10, evaluate_every=5, evaluation_env=env)
     for name, space in (
         ("observation_space", gym.spaces.Box(0.0, 4.0, (2,), dtype=np.float64)),
         ("action_space", gym.spaces.Discrete(3)),
@@ -130,75 +131,94 @@ def test_an_environment_that_does_not_fit_is_refused():
         refuses("env", evaluate, agent, other)
 
 
-def test_an_evaluation_that_seems_not_to_end_is_warned_of():
+def test_the_environment_of_a_training_cannot_be_that_of_its_evaluations():
+    env = Corridor()
+    refuses(
+        "evaluation_env",
+        corridor_agent().train,
+        env,
+        steps=10,
+        evaluate_every=5,
+        evaluation_env=env,
+    )
+
+
+def test_an_evaluation_warns_of_an_episode_of_more_than_100_000_steps():
     class Endless(Corridor):
         def step(self, action):
             self._steps += 1
             return np.zeros(1), 0.0, self._steps == 100_001, False, {}
 
-    class Stays:
+    class NullAgent:
         def act(self, observation, explore=True):
             return 0
 
     with pytest.warns(RuntimeWarning, match="max_episode_steps"):
-        assert evaluate(Stays(), Endless(), 1).lengths.tolist() == [100_001]
+        assert evaluate(NullAgent(), Endless(), 1).lengths.tolist() == [100_001]
 
 
 @pytest.mark.parametrize("reward", [np.float32(1), np.array([1]), Decimal(1), True, np.array(1.0)])
-def test_rewards_of_other_kinds_are_numbers_too(reward):
-    class Kind(Corridor):
+def test_rewards_may_be_scalars_of_any_numeric_type(reward):
+    class ConstantReward(Corridor):
         def step(self, action):
             return super().step(action)[0], reward, False, self._steps == 8, {}
 
-    assert corridor_agent().train(Kind(), episodes=2).returns.tolist() == [8.0, 8.0]
-    assert evaluate(corridor_agent(), Kind(), 1).mean_return == 8.0
+    # Eight steps with a reward of 1.
+    assert corridor_agent().train(ConstantReward(), episodes=2).returns.tolist() == [8.0, 8.0]
+    assert evaluate(corridor_agent(), ConstantReward(), 1).mean_return == 8.0
 
 
 class Broken(Corridor):
-    """Gives something else at a step, or by its second reset, than a corridor does."""
+    """A corridor whose 11th step or second reset returns the values that are passed.
 
-    def __init__(self, at=11, **given):
+    Its episodes have eight steps: both are of the second episode, number 1.
+    """
+
+    def __init__(self, **replaced):
         super().__init__()
-        self._at_step, self._given, self._n_steps, self._n_resets = at, given, 0, 0
+        self._replaced, self._n_steps, self._n_resets = replaced, 0, 0
 
     def reset(self, *, seed=None, options=None):
-        seen, told = super().reset(seed=seed)
+        observation, info = super().reset(seed=seed)
         self._n_resets += 1
-        return (self._given.get("first", seen) if self._n_resets == 2 else seen), told
+        if self._n_resets == 2:
+            observation = self._replaced.get("first_observation", observation)
+        return observation, info
 
     def step(self, action):
-        seen, *_ = super().step(0)
+        observation, *_ = super().step(0)
         self._n_steps += 1
-        given = self._given if self._n_steps == self._at_step else {}
-        return given.get("seen", seen), given.get("reward", 1.0), False, self._steps == 8, {}
+        replaced = self._replaced if self._n_steps == 11 else {}
+        observation = replaced.get("observation", observation)
+        return observation, replaced.get("reward", 1.0), False, self._steps == 8, {}
 
 
-BROKEN = [
-    ({"reward": np.nan}, "step 3", "got nan"),
-    ({"seen": np.array([np.nan])}, "step 3", "observation[0] must be finite"),
-    ({"seen": np.zeros(2)}, "step 3", "observation"),
-    ({"first": np.array([np.nan])}, "the reset", "observation[0] must be finite"),
-]
+@pytest.mark.parametrize(
+    ("replaced", "step", "where", "problem"),
+    [
+        ({"reward": np.nan}, 11, "step 3", "got nan"),
+        ({"observation": np.array([np.nan])}, 11, "step 3", "observation[0] must be finite"),
+        ({"observation": np.zeros(2)}, 11, "step 3", "observation"),
+        ({"first_observation": np.array([np.nan])}, 9, "the reset", "observation[0] must be fin"),
+    ],
+    ids=["reward", "NaN", "shape", "reset"],
+)
+def test_errors_of_unusable_steps_name_step_and_episode(replaced, step, where, problem):
+    with pytest.raises(UnusableStepError, match=re.escape(problem)) as error:
+        corridor_agent().train(Broken(**replaced), steps=40)
+    assert f"in step {step} ({where} of episode 1): " in str(error.value)
+    with pytest.raises(UnusableStepError, match=re.escape(problem)) as error:
+        evaluate(corridor_agent(), Broken(**replaced))
+    assert f"in {where} of greedy episode 1: " in str(error.value)
 
 
-@pytest.mark.parametrize(("given", "where", "problem"), BROKEN)
-def test_unusable_steps_are_reported_with_step_and_episode(given, where, problem):
-    with pytest.raises(UnusableStepError, match=re.escape(problem)) as told:
-        corridor_agent().train(Broken(**given), steps=40)
-    step = 9 if where == "the reset" else 11
-    assert f"in step {step} ({where} of episode 1): " in str(told.value)
-    with pytest.raises(UnusableStepError, match=re.escape(problem)) as told:
-        evaluate(corridor_agent(), Broken(**given))
-    assert f"in {where} of greedy episode 1: " in str(told.value)
-
-
-def test_unusable_steps_of_a_vector_name_the_environment():
+def test_errors_of_unusable_steps_name_the_environment_of_a_vector():
     envs = gym.vector.SyncVectorEnv([Corridor, lambda: Broken(reward=np.nan)])
     with pytest.raises(UnusableStepError, match=r"environment 1\b.*\breward\b"):
         corridor_agent().train(envs, steps=40)
 
 
-def test_a_reward_far_beyond_the_others_is_warned_of_once_and_not_learned():
+def test_a_reward_of_1e300_causes_one_warning_and_is_not_learned():
     env = Broken(reward=1e300)
     env.action_space = gym.spaces.Box(-1.0, 1.0, (1,))
     agent = FuzzyQLearning(env.observation_space, env.action_space)
@@ -214,13 +234,13 @@ def test_errors_of_an_environment_are_raised_unchanged():
             raise ValueError("no current")
 
     for use in (lambda agent, env: agent.train(env, steps=9), evaluate):
-        with pytest.raises(ValueError, match=r"^no current$") as told:
+        with pytest.raises(ValueError, match=r"^no current$") as error:
             use(corridor_agent(), Failing())
-        assert not isinstance(told.value, UnusableStepError)
+        assert not isinstance(error.value, UnusableStepError)
 
 
 class FailsOnce(Careless):
-    """Careful, but one of its calls fails: by an error, or by what cannot be learned."""
+    """A careful point; one call of its step or reset fails, by an error or by a reward of NaN."""
 
     def __init__(self, call=("step", None), failure=TimeoutError):
         super().__init__(is_careful=True)
@@ -232,8 +252,8 @@ class FailsOnce(Careless):
         return super().reset(**options)
 
     def step(self, action):
-        seen, reward, *ends = super().step(action)
-        return seen, self._fail("step") or float(reward[0]), *ends
+        observation, reward, *others = super().step(action)
+        return observation, self._fail("step") or float(reward[0]), *others
 
     def _fail(self, name):
         if self._left[name] is None:
@@ -246,7 +266,7 @@ class FailsOnce(Careless):
         return None
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("agent_type", AGENT_TYPES)
 @pytest.mark.parametrize(
     ("call", "failure", "n_learned"),
     [
@@ -257,8 +277,10 @@ class FailsOnce(Careless):
         (("reset", 3), TimeoutError, 40),
     ],
 )
-def test_learning_before_an_environment_fails_is_kept(kind, call, failure, n_learned, tmp_path):
-    make, options = KINDS[kind]
+def test_steps_before_a_failure_of_the_environment_are_kept_and_the_training_continues(
+    agent_type, call, failure, n_learned, tmp_path
+):
+    make, options = AGENT_TYPES[agent_type]
     env = FailsOnce(call, failure)
     agent = make(env.observation_space, env.action_space, seed=3, **options)
     path, rows = tmp_path / "checkpoint", JSONLines(tmp_path / "rows.jsonl")
@@ -271,17 +293,22 @@ def test_learning_before_an_environment_fails_is_kept(kind, call, failure, n_lea
     loaded = Training.load(path, FailsOnce())
     assert loaded.n_steps == training.n_steps == n_learned
     assert states_equal(loaded.agent, agent)
-    for one in (loaded, training):
-        one.run()
-        assert (one.n_steps, one.n_episodes) == (100, 4 if n_learned == 32 else 5)
+    # Episodes have 20 steps. A failure at step 33 leaves one whole episode, 12 steps of an
+    # abandoned one, and 68 steps for three more; other failures leave five whole ones.
+    for continued in (loaded, training):
+        continued.run()
+        assert (continued.n_steps, continued.n_episodes) == (100, 4 if n_learned == 32 else 5)
     assert states_equal(loaded.agent, agent)
-    told = [json.loads(line) for line in rows.path.read_text().splitlines()]
-    assert [row["episode"] for row in told] == list(range(training.n_episodes))
-    assert {row["length"] for row in told} == {20}
+    lines = [json.loads(line) for line in rows.path.read_text().splitlines()]
+    assert [row["episode"] for row in lines] == list(range(training.n_episodes))
+    assert {row["length"] for row in lines} == {20}
 
 
 def change_actions(path, change):
-    """Save a training in its third step, and change the actions of its episode in the file."""
+    """Save a training in its third step, and change the actions of its episode in the file.
+
+    Returns the name of their array in the file, and the environment.
+    """
     env = Corridor()
     agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL, seed=3)
     Training(agent, env, episodes=9, callbacks=[Stop(3, path)]).run()
@@ -302,14 +329,15 @@ def change_actions(path, change):
         lambda actions: actions.astype(np.uint64),
         lambda actions: actions[0],
     ],
+    ids=["too large", "too small", "two dimensions", "float", "unsigned", "scalar"],
 )
-def test_an_environment_gets_no_actions_that_it_does_not_have_from_a_file(change, tmp_path):
+def test_invalid_actions_in_a_checkpoint_are_refused_by_name(change, tmp_path):
     path = tmp_path / "checkpoint"
     name, env = change_actions(path, change)
     refuses(name, Training.load, path, env)
 
 
-def test_an_episode_of_a_file_may_have_no_actions(tmp_path):
+def test_a_checkpoint_without_its_actions_cannot_repeat_the_episode(tmp_path):
     path = tmp_path / "checkpoint"
     _, env = change_actions(path, lambda actions: actions[:0])
     with pytest.raises(UnrepeatedEpisodeError):  # the first observation is not the fourth
@@ -317,11 +345,13 @@ def test_an_episode_of_a_file_may_have_no_actions(tmp_path):
 
 
 @pytest.mark.parametrize("has_own_resets", [False, True])
-def test_learning_before_one_of_several_environments_fails_is_kept(has_own_resets, tmp_path):
+def test_steps_before_a_failure_in_a_vector_are_kept_and_the_training_continues(
+    has_own_resets, tmp_path
+):
     env = gym.vector.SyncVectorEnv([FailsOnce, functools.partial(FailsOnce, ("step", 33))])
     if has_own_resets:
         env = gym.wrappers.vector.NormalizeObservation(env)
-    make, options = KINDS["sdnn"]
+    make, options = AGENT_TYPES["sdnn"]
     agent = make(env.single_observation_space, env.single_action_space, seed=3, **options)
     path = tmp_path / "checkpoint"
     training = Training(agent, env, steps=200, callbacks=[CheckpointCallback(path, every=1000)])
@@ -334,7 +364,7 @@ def test_learning_before_one_of_several_environments_fails_is_kept(has_own_reset
             careful, np.asarray, env.observation_space, space
         )
     loaded = Training.load(path, careful, repeat_episodes=not has_own_resets)
-    assert loaded.n_steps == training.n_steps == 64
+    assert loaded.n_steps == training.n_steps == 64, "32 steps of two environments before step 33"
     training.run()
     loaded.run()
     assert training.n_steps == loaded.n_steps == 200
@@ -342,7 +372,7 @@ def test_learning_before_one_of_several_environments_fails_is_kept(has_own_reset
     assert states_equal(loaded.agent, agent) != has_own_resets
 
 
-def test_a_start_that_fails_is_skipped_on_resuming(tmp_path):
+def test_resuming_skips_an_episode_whose_reset_failed(tmp_path):
     env = Corridor()
     corridor_agent().train(env, episodes=4, seed=7)
     bad = env.seeds[2:4]
@@ -366,7 +396,7 @@ def test_a_start_that_fails_is_skipped_on_resuming(tmp_path):
 
 @pytest.mark.parametrize("n_envs", [1, 2])
 def test_a_training_stopped_after_a_failure_resumes_exactly(n_envs, tmp_path):
-    make, options = KINDS["sdnn"]
+    make, options = AGENT_TYPES["sdnn"]
     envs = [FailsOnce] * (n_envs - 1) + [functools.partial(FailsOnce, ("step", 33))]
 
     def finished(stop):
@@ -387,10 +417,10 @@ def test_a_training_stopped_after_a_failure_resumes_exactly(n_envs, tmp_path):
     assert whole.next_episode == cut.next_episode
 
 
-def test_a_failed_evaluation_is_repeated_first_on_resuming(tmp_path):
+def test_resuming_first_repeats_a_failed_evaluation(tmp_path):
     path, rows = tmp_path / "checkpoint", tmp_path / "rows.jsonl"
     every = {"steps": 100, "evaluate_every": 25, "evaluation_episodes": 2}
-    make, options = KINDS["sdnn"]
+    make, options = AGENT_TYPES["sdnn"]
 
     def training(evaluation_env, name):
         agent = make(FailsOnce.observation_space, FailsOnce.action_space, seed=3, **options)
@@ -409,16 +439,16 @@ def test_a_failed_evaluation_is_repeated_first_on_resuming(tmp_path):
     with pytest.raises(TimeoutError):
         loaded.run()
     assert loaded.n_steps == 50
-    for one in (loaded, cut):
-        one.run()
-        assert one.evaluations == whole.evaluations
-        assert states_equal(one.agent, whole.agent)
+    for continued in (loaded, cut):
+        continued.run()
+        assert continued.evaluations == whole.evaluations
+        assert states_equal(continued.agent, whole.agent)
 
-    def told(place):
-        lines = [json.loads(line) for line in place.read_text().splitlines()]
+    def rows_without_times(path):
+        lines = [json.loads(line) for line in path.read_text().splitlines()]
         return [{k: v for k, v in line.items() if k != "seconds"} for line in lines]
 
-    assert told(rows) == told(tmp_path / "whole")
+    assert rows_without_times(rows) == rows_without_times(tmp_path / "whole")
 
 
 def test_evaluation_refuses_vector_environments():
@@ -435,37 +465,40 @@ def test_evaluation_refuses_vector_environments():
     )
 
 
-def test_a_second_training_meets_other_episodes(tmp_path):
+def test_further_trainings_of_an_agent_and_its_copies_continue_the_episode_seeds(tmp_path):
     env, agent = Corridor(), corridor_agent()
     agent.train(env, episodes=3)
     agent.save(tmp_path / "agent")
-    for one in (agent, load_agent(tmp_path / "agent"), copy.deepcopy(agent)):
-        one.train(env, steps=20)
+    for continued in (agent, load_agent(tmp_path / "agent"), copy.deepcopy(agent)):
+        continued.train(env, steps=20)
     n = (len(env.seeds) - 3) // 3
-    first = env.seeds[3 : 3 + n]
-    assert env.seeds[3:] == 3 * first
-    assert len({*env.seeds[:3], *first}) == 3 + n
-    one_go = Corridor()
-    corridor_agent().train(one_go, episodes=5)
-    assert one_go.seeds == env.seeds[:5]
-    again = Corridor()
+    second = env.seeds[3 : 3 + n]
+    assert env.seeds[3:] == 3 * second
+    assert len({*env.seeds[:3], *second}) == 3 + n, "no seed occurs twice"
+    whole = Corridor()
+    corridor_agent().train(whole, episodes=5)
+    assert whole.seeds == env.seeds[:5]
+
+
+def test_trainings_with_the_same_seed_have_the_same_episode_seeds():
+    env, agent = Corridor(), corridor_agent()
     for _ in range(2):
-        agent.train(again, episodes=2, seed=4)
-    assert again.seeds[:2] == again.seeds[2:], "as it was asked for"
+        agent.train(env, episodes=2, seed=4)
+    assert env.seeds[:2] == env.seeds[2:]
 
 
-def test_it_learns_the_corridor():
+def test_sdnn_q_learning_learns_the_shortest_way_through_a_corridor():
     agent = corridor_agent()
     result = agent.train(Corridor(), episodes=300)
     assert result.is_finished
     assert (result.n_episodes, len(result.returns)) == (300, 300)
-    found = evaluate(agent, Corridor(), 20, seed=3)
-    assert found.terminated.all()
-    assert set(found.lengths) <= {3, 4}, "from cell 0 or 1 straight to cell 4"
-    assert found.mean_return == found.returns.mean() > 0.6
+    evaluation = evaluate(agent, Corridor(), 20, seed=3)
+    assert evaluation.terminated.all()
+    assert set(evaluation.lengths) <= {3, 4}, "from cell 0 or 1 straight to cell 4"
+    assert evaluation.mean_return == evaluation.returns.mean() > 0.6, "1 minus 0.1 for each step"
 
 
-def test_every_episode_has_another_seed():
+def test_episode_seeds_are_unique_reproducible_and_apart_from_those_of_evaluations():
     env, other = Corridor(), Corridor()
     corridor_agent().train(env, episodes=30, seed=4)
     corridor_agent().train(other, episodes=30, seed=4)
@@ -476,24 +509,24 @@ def test_every_episode_has_another_seed():
     assert not set(third.seeds) & set(env.seeds)
 
 
-def test_evaluations_change_nothing_that_is_learned(tmp_path):
+def test_evaluations_do_not_change_what_is_learned(tmp_path):
     plain = Training(corridor_agent(), Corridor(), steps=300)
     tested = Training(
         corridor_agent(), Corridor(), steps=300, evaluate_every=50, evaluation_env=Corridor()
     )
     plain.run()
     result = tested.run()
-    one, other = plain.agent.state(), tested.agent.state()
-    differ = {name for name in one if not np.array_equal(one[name], other[name])}
+    expected, state = plain.agent.state(), tested.agent.state()
+    differ = {name for name in state if not np.array_equal(state[name], expected[name])}
     assert differ <= {"agent.policy.evaluation_ties.words"}
     assert result.evaluations[:, 0].tolist() == [50, 100, 150, 200, 250, 300]
     rows = [row for row in result.rows if row["kind"] == "evaluation"]
     assert all(row["mean_return"] == np.mean(row["returns"]) for row in rows)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_training_stopped_inside_an_episode_resumes_exactly(kind, tmp_path):
-    make, options = KINDS[kind]
+@pytest.mark.parametrize("agent_type", AGENT_TYPES)
+def test_a_training_stopped_inside_an_episode_resumes_exactly(agent_type, tmp_path):
+    make, options = AGENT_TYPES[agent_type]
 
     def env():
         return gym.make("Pendulum-v1", max_episode_steps=40)
@@ -506,7 +539,7 @@ def test_a_training_stopped_inside_an_episode_resumes_exactly(kind, tmp_path):
     check_exact_resume(begun, env, tmp_path / "t", cuts)
 
 
-def test_an_unbounded_environment_is_warmed_up_and_learned(tmp_path):
+def test_a_training_stopped_before_or_after_the_end_of_its_warm_up_resumes_exactly(tmp_path):
     env = gym.make("CartPole-v1")
 
     def begun(*callbacks):
@@ -523,13 +556,13 @@ def test_an_unbounded_environment_is_warmed_up_and_learned(tmp_path):
 
 
 @pytest.mark.parametrize("missing", ["hold", "code"])
-def test_a_training_resumes_exactly_from_missing_observations(missing, tmp_path):
+def test_a_training_with_missing_observations_resumes_exactly(missing, tmp_path):
     class Echo(Corridor):
         """Nothing comes back from ahead where the corridor continues, as of a sonar."""
 
         observation_space = gym.spaces.Box(0.0, np.inf, (1,), dtype=np.float64)
 
-        def _seen(self):
+        def _observation(self):
             return np.array([np.inf if self._at == 1 else self._at])
 
     def begun(*callbacks):
@@ -539,13 +572,13 @@ def test_a_training_resumes_exactly_from_missing_observations(missing, tmp_path)
     check_exact_resume(begun, Echo, tmp_path / "t", range(1, 10))
 
 
-def test_an_environment_that_does_not_repeat_itself_is_refused(tmp_path):
+def test_resuming_refuses_an_environment_that_does_not_reproduce_its_episode(tmp_path):
     env = Corridor(is_random=True)
     Training(corridor_agent(), env, steps=500, callbacks=[Stop(20, tmp_path / "t")]).run()
     refuses("env", Training.load, tmp_path / "t", env, error=UnrepeatedEpisodeError)
 
 
-def test_a_training_that_repeats_no_episode_abandons_the_unfinished_one(tmp_path):
+def test_resuming_without_repeating_abandons_the_unfinished_episode(tmp_path):
     env = Corridor(is_random=True)
     first = corridor_agent()
     path = tmp_path / "rows.jsonl"
@@ -569,7 +602,7 @@ def test_a_training_that_repeats_no_episode_abandons_the_unfinished_one(tmp_path
     assert rows[-1]["step"] == learned + unfinished, "the steps of what was left count"
 
 
-def test_between_episodes_nothing_is_repeated_anyway(tmp_path):
+def test_repeat_episodes_makes_no_difference_between_two_episodes(tmp_path):
     class StopBetween(Callback):
         def on_row(self, training, row):
             if row["episode"] == 5:
@@ -578,14 +611,14 @@ def test_between_episodes_nothing_is_repeated_anyway(tmp_path):
     training = Training(corridor_agent(), Corridor(), steps=200, callbacks=[StopBetween()])
     training.run()
     training.save(tmp_path / "t")
-    one, other = (
+    repeating, abandoning = (
         Training.load(tmp_path / "t", Corridor(), repeat_episodes=does) for does in (True, False)
     )
-    assert one.run().n_steps == other.run().n_steps == 200
-    assert states_equal(one.agent, other.agent)
+    assert repeating.run().n_steps == abandoning.run().n_steps == 200
+    assert states_equal(repeating.agent, abandoning.agent)
 
 
-def test_pending_steps_are_learned_when_a_new_episode_begins(tmp_path):
+def test_n_step_transitions_of_an_abandoned_episode_are_learned_on_resuming(tmp_path):
     env = Corridor()
     learning = QLearningConfig(n_steps=3)
     Training(
@@ -603,11 +636,11 @@ def test_pending_steps_are_learned_when_a_new_episode_begins(tmp_path):
     assert states_equal(with_training.agent, by_hand)
 
 
-def test_an_episode_without_an_end_takes_little_memory(tmp_path):
+def test_an_endless_episode_takes_less_than_32_bytes_per_step(tmp_path):
     class Endless(Corridor):
         def step(self, action):
             self._at = int(np.clip(self._at + (1 if action else -1), 0, 4))
-            return self._seen(), float(self._at == 2), False, False, {}
+            return self._observation(), float(self._at == 2), False, False, {}
 
     class Watch(Callback):
         def __init__(self):
@@ -632,7 +665,7 @@ def test_an_episode_without_an_end_takes_little_memory(tmp_path):
     assert states_equal(training.agent, again.agent)
 
 
-def test_evaluations_may_follow_episodes(tmp_path):
+def test_evaluations_every_5_episodes_come_at_their_ends_and_resume_exactly(tmp_path):
     def begun(*callbacks):
         return Training(
             corridor_agent(), Corridor(), episodes=30, evaluate_every_episodes=5,
@@ -649,39 +682,43 @@ def test_evaluations_may_follow_episodes(tmp_path):
     check_exact_resume(begun, Corridor, tmp_path / "t", cuts, evaluation_env=Corridor())
 
 
-def test_without_a_seed_the_streams_of_environments_run_on(tmp_path):
+def test_with_seed_none_no_reset_has_a_seed_and_no_episode_can_be_repeated(tmp_path):
     env, tested = Corridor(), Corridor()
     training = Training(
         corridor_agent(), env, episodes=6, seed=None, evaluate_every_episodes=2,
         evaluation_env=tested, callbacks=[Stop(7, tmp_path / "t")],
     )  # fmt: skip
+    training.run()  # stops within an episode
     training.run()
-    training.run()
+    # Six episodes, and ten of an evaluation after each second of them.
     assert (env.seeds, tested.seeds) == ([None] * 6, [None] * 30)
     refuses("repeat_episodes", Training.load, tmp_path / "t", Corridor(), evaluation_env=Corridor())
-    other = Training.load(
+    loaded = Training.load(
         tmp_path / "t", Corridor(), evaluation_env=Corridor(), repeat_episodes=False
     )
-    assert other.run().n_episodes == 6
+    assert loaded.run().n_episodes == 6
 
 
-def test_options_of_resets_follow_the_episodes():
-    class Told(Corridor):
+def test_reset_options_depend_on_the_number_of_the_episode():
+    class Recorder(Corridor):
         def __init__(self):
             super().__init__()
-            self.told = []
+            self.numbers = []
 
         def reset(self, *, seed=None, options=None):
-            self.told.append(options["number"])
+            self.numbers.append(options["number"])
             return super().reset(seed=seed)
 
-    env, tested = Told(), Told()
+    env, tested = Recorder(), Recorder()
     training = Training(
         corridor_agent(), env, episodes=4, evaluate_every_episodes=2, evaluation_env=tested,
         evaluation_episodes=1, reset_options=lambda episode: {"number": episode},
     )  # fmt: skip
     training.run()
-    assert (env.told, tested.told) == ([1, 2, 3, 4], [2, 4])
+    assert (env.numbers, tested.numbers) == ([1, 2, 3, 4], [2, 4])
+
+
+def test_reset_options_are_refused_with_a_vector():
     refuses(
         "reset_options",
         Training,
@@ -692,10 +729,10 @@ def test_options_of_resets_follow_the_episodes():
     )
 
 
-def test_a_time_limit_may_count_as_an_end():
-    class Note:
+def test_without_limit_bootstraps_a_truncation_is_learned_as_a_termination():
+    class RecordingAgent:
         def __init__(self):
-            self.ends = []
+            self.terminated = []
 
         def begin_episode(self):
             pass
@@ -704,35 +741,38 @@ def test_a_time_limit_may_count_as_an_end():
             return 0
 
         def learn(self, transition):
-            self.ends.append(transition.terminated)
+            self.terminated.append(transition.terminated)
 
-    agents = Note(), Note()
+    agents = RecordingAgent(), RecordingAgent()
     for agent, bootstraps in zip(agents, (True, False), strict=True):
         Training(agent, Corridor(), episodes=1, limit_bootstraps=bootstraps).run()
-    assert agents[0].ends == [False] * 8
-    assert agents[1].ends == [False] * 7 + [True]
+    assert agents[0].terminated == [False] * 8
+    assert agents[1].terminated == [False] * 7 + [True]
 
 
-def test_a_training_in_pieces_is_the_same_and_may_be_left_between_two():
+def test_a_training_in_pieces_learns_the_same_as_a_whole_one():
     whole, pieces = (Training(corridor_agent(), Corridor(), steps=60) for _ in range(2))
     whole.run()
     assert sum(1 for _ in pieces.pieces(0.0)) == 60
     assert states_equal(whole.agent, pieces.agent)
-    ended = []
 
-    class Note(Callback):
+
+def test_closing_the_generator_of_pieces_ends_the_callbacks_and_the_training_can_continue():
+    n_steps_at_end = []
+
+    class AtEnd(Callback):
         def on_end(self, training):
-            ended.append(training.n_steps)
+            n_steps_at_end.append(training.n_steps)
 
-    left = Training(corridor_agent(), Corridor(), steps=60, callbacks=[Note()])
-    generator = left.pieces(0.0)
+    training = Training(corridor_agent(), Corridor(), steps=60, callbacks=[AtEnd()])
+    generator = training.pieces(0.0)
     next(generator)
     generator.close()
-    assert (ended, left.n_steps) == ([1], 1)
-    assert left.run().n_steps == 60
+    assert (n_steps_at_end, training.n_steps) == ([1], 1)
+    assert training.run().n_steps == 60
 
 
-def test_early_stopping_needs_several_evaluations_in_a_row():
+def test_a_reward_threshold_with_patience_2_stops_after_two_good_evaluations():
     stop = StopTrainingOnRewardThreshold(mean_return=0.6, patience=2)
     result = corridor_agent().train(
         Corridor(), steps=20_000, callbacks=[stop], evaluate_every=200, evaluation_env=Corridor()
@@ -742,7 +782,7 @@ def test_early_stopping_needs_several_evaluations_in_a_row():
 
 
 @pytest.mark.parametrize("cut", [15, 20, 25, 29])
-def test_an_early_stop_counts_the_evaluations_before_a_training_was_loaded(tmp_path, cut):
+def test_patience_counts_evaluations_from_before_a_training_was_loaded(tmp_path, cut):
     def training(goal, agent):
         stop = StopTrainingOnRewardThreshold(mean_return=-1e9, patience=3)
         return Training(
@@ -752,7 +792,7 @@ def test_an_early_stop_counts_the_evaluations_before_a_training_was_loaded(tmp_p
 
     whole = training(100, corridor_agent())
     whole.run()
-    assert whole.n_steps == 30
+    assert whole.n_steps == 30, "the third evaluation, one every 10 steps"
     first = training(100, corridor_agent())
     first.callbacks += (Stop(cut, tmp_path / "c"),)
     first.run()
@@ -769,7 +809,7 @@ def test_an_early_stop_counts_the_evaluations_before_a_training_was_loaded(tmp_p
     assert len(result.evaluations) == 3 - cut // 10
 
 
-def test_a_result_has_the_rows_of_all_that_was_run():
+def test_the_result_of_a_continued_training_has_all_of_its_episodes():
     training = Training(corridor_agent(), Corridor(), steps=300)
     training.callbacks = (Stop(100),)
     training.run()
@@ -788,5 +828,5 @@ def test_a_result_has_the_rows_of_all_that_was_run():
         ({"steps": 10, "evaluate_every": 5, "evaluate_every_episodes": 5}, "evaluate_every"),
     ],
 )
-def test_impossible_trainings_are_named(options, message):
+def test_missing_or_conflicting_goals_and_evaluations_are_refused(options, message):
     refuses(message, Training, corridor_agent(), Corridor(), **options)

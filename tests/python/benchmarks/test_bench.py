@@ -1,4 +1,4 @@
-"""Measurements and how they are stored; never how quick anything is."""
+"""Benchmarks: how times are measured, stored and shown; no test compares speeds."""
 
 import importlib.util
 import json
@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture(scope="module")
 def quick():
-    """The results of one quick run of the command."""
+    """The results of a quick run of the command."""
     done = CliRunner().invoke(main, ["bench", "--quick", "--json"], catch_exceptions=False)
     assert done.exit_code == 0
     assert done.stderr == ""
@@ -42,7 +42,7 @@ def script(name):
 def yardsticks():
     with pytest.MonkeyPatch.context() as patch:
         for name in ("OPENBLAS_NUM", "MKL_NUM", "OMP_NUM", "BLIS_NUM", "VECLIB_MAXIMUM"):
-            patch.setenv(f"{name}_THREADS", "1")  # as it was at the end
+            patch.setenv(f"{name}_THREADS", "1")  # the script sets them, too
         return script("yardsticks")
 
 
@@ -50,17 +50,17 @@ def yardsticks():
 def with_yardsticks(quick, yardsticks):
     """The results of a quick run of the script, which runs the command's measurements."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(yardsticks, "run_benchmarks", lambda *, quick: given)
-        given = quick
+        measured = quick
+        patch.setattr(yardsticks, "run_benchmarks", lambda *, quick: measured)
         return yardsticks.measure(quick=True)
 
 
 def check_like(value, stored, path):
-    """``value`` has the fields of a stored run, and its numbers are positive and finite."""
+    """Check that ``value`` has the fields of a stored run, and positive and finite numbers."""
     assert type(value) is type(stored), path
     if isinstance(value, list):
-        for number, one in enumerate(value):
-            check_like(one, stored[0], (*path, number))
+        for number, item in enumerate(value):
+            check_like(item, stored[0], (*path, number))
     elif isinstance(value, dict):
         if path[-1:] not in BY_NAME:
             assert value.keys() == stored.keys(), path
@@ -78,22 +78,30 @@ BY_NAME = {("caches",), ("values",), ("ratio_to_dense",)}
 """Measurements with a field for each cache or instruction set."""
 
 
-def test_quick_run_has_all_fields(quick, with_yardsticks):
+def test_a_quick_run_has_the_fields_of_the_stored_run(with_yardsticks):
     check_like(with_yardsticks, script("performance_tables").stored("performance"), ())
+
+
+def test_a_quick_run_states_the_version_and_the_instruction_sets(quick):
     assert quick["quick"] is True
     assert quick["sdnn"] == _core.__version__
     levels = list(available_instruction_sets())
     assert quick["instruction_sets"] == levels
     assert quick["best_instruction_set"] == levels[-1]
     assert quick["instruction_set"] == instruction_set()
-    assert [network["n_inputs"] for network in quick["networks"]] == [4, 6]
-    assert [network["n_columns"] for network in quick["networks"]] == [2400, 6000]
+
+
+def test_a_quick_run_measures_the_networks_and_trials_of_the_paper(quick, with_yardsticks):
+    # Each input has 200 pattern units for each of its partners: 4 * 3 * 200, and 6 * 5 * 200.
+    sizes = [(network["n_inputs"], network["n_columns"]) for network in quick["networks"]]
+    assert sizes == [(4, 2400), (6, 6000)]
+    levels = list(available_instruction_sets())
     for network in with_yardsticks["networks"]:
         assert (network["n_hidden_units"], network["n_actions"]) == (900, 601)
         for name in ("values", "ratio_to_dense"):
             assert list(network[name]) == levels
         assert set(network["dense"]) == {"numpy", "core"}
-    assert quick["acrobot"]["n_integration_steps"] == 50
+    assert quick["acrobot"]["n_integration_steps"] == 50  # 1 s in steps of 0.02 s
     assert [(d["n_inputs"], d["noise"]) for d in quick["decisions"]] == [
         (4, 0.0),
         (4, 0.02),
@@ -104,9 +112,11 @@ def test_quick_run_has_all_fields(quick, with_yardsticks):
         assert decisions["max"] <= decisions["max_of_all_runs"]
 
 
-def test_tables_are_on_the_screen_and_in_markdown(quick, with_yardsticks, monkeypatch):
-    monkeypatch.setattr("sdnn.benchmarks.run_benchmarks", lambda *, quick: given)
-    given = quick
+def test_the_command_and_the_page_show_every_table_and_warn_of_quick_runs(
+    quick, with_yardsticks, monkeypatch
+):
+    measured = quick
+    monkeypatch.setattr("sdnn.benchmarks.run_benchmarks", lambda *, quick: measured)
     done = CliRunner().invoke(main, ["bench", "--quick"], catch_exceptions=False)
     assert done.exit_code == 0
     page = script("performance_tables")
@@ -122,7 +132,7 @@ def test_tables_are_on_the_screen_and_in_markdown(quick, with_yardsticks, monkey
     assert report.QUICK_WARNING not in page.to_markdown({**with_yardsticks, "quick": False})
 
 
-def test_turns_alternate_and_drop_their_cold_repetitions():
+def test_measurements_alternate_and_omit_cold_repetitions():
     calls = []
 
     def recorded(name):
@@ -140,7 +150,7 @@ def test_turns_alternate_and_drop_their_cold_repetitions():
     assert times["a"].tolist() == kept + kept
 
 
-def test_times_of_the_core_are_nanoseconds_per_repetition():
+def test_the_core_returns_a_time_for_each_repetition():
     trial = measurements._short_trial(4, 0.0, 5)
     times = _core.time_decisions(trial, 3)
     assert times.dtype == np.int64
@@ -150,13 +160,13 @@ def test_times_of_the_core_are_nanoseconds_per_repetition():
     assert _core.DenseProduct(5, 7, 1).run(0).size == 0
 
 
-def test_machines_that_tell_nothing(tmp_path, monkeypatch, yardsticks):
+def test_unknown_processors_and_caches_are_no_error(tmp_path, monkeypatch, yardsticks):
     monkeypatch.setattr("sdnn.support.machine._PROCESSOR_FILE", tmp_path / "none")
     assert measurements.describe_machine()["processor"]
     assert yardsticks.caches(tmp_path / "none") == {}
 
 
-def test_caches_are_read(tmp_path, yardsticks):
+def test_caches_of_data_are_read_in_bytes(tmp_path, yardsticks):
     for index, (level, kind, size) in enumerate(
         [("1", "Data", "32K"), ("1", "Instruction", "64K"), ("3", "Unified", "8M")]
     ):
@@ -167,7 +177,7 @@ def test_caches_are_read(tmp_path, yardsticks):
     assert yardsticks.caches(tmp_path) == {"L1d": 32 * 2**10, "L3": 8 * 2**20}
 
 
-def test_the_page_shows_the_stored_run():
+def test_the_performance_page_shows_the_stored_run():
     module = script("performance_tables")
     text = module.PAGE.read_text()
     assert module.stored("performance")["quick"] is False

@@ -20,8 +20,8 @@ from sdnn.environments.picture import AcrobotMotion
 ID = "sdnn/AcrobotSwingUp-v0"
 
 
-class Impatient:
-    """A clock that only counts."""
+class FakeClock:
+    """A clock that does not wait, and records the rates."""
 
     ticks: ClassVar[list[float]] = []
 
@@ -32,7 +32,7 @@ class Impatient:
 @pytest.fixture(autouse=True)
 def no_screen(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    monkeypatch.setattr(pygame.time, "Clock", Impatient)
+    monkeypatch.setattr(pygame.time, "Clock", FakeClock)
 
 
 def shares(n, seed=0):
@@ -41,7 +41,7 @@ def shares(n, seed=0):
 
 @pytest.mark.parametrize("render_mode", [None, "rgb_array", "rgb_array_list", "human"])
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
-def test_check_env(render_mode, dtype):
+def test_gymnasiums_check_env_finds_no_fault(render_mode, dtype):
     env = gym.make(ID, render_mode=render_mode, dtype=dtype)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -53,7 +53,7 @@ def test_check_env(render_mode, dtype):
     ("imports", "prefix"),
     [("import sdnn.environments", ""), ("import gymnasium", "sdnn.environments:")],
 )
-def test_importing_the_environments_makes_them_known(imports, prefix):
+def test_importing_the_environments_registers_them(imports, prefix):
     code = (
         f"{imports}, gymnasium\n"
         f"assert gymnasium.make({prefix + ID!r}).observation_space.shape == (4,)\n"
@@ -71,7 +71,7 @@ def test_a_missing_gymnasium_is_named():
     assert "gymnasium" in done.stderr.splitlines()[-1]
 
 
-def test_spaces():
+def test_the_spaces_are_unit_boxes_of_the_chosen_dtype():
     env = AcrobotSwingUpEnv()
     assert env.observation_space == gym.spaces.Box(0.0, 1.0, (4,), np.float32)
     assert env.action_space == gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -80,11 +80,11 @@ def test_spaces():
     assert env.action_space == gym.spaces.Box(-1.0, 1.0, (1,), np.float64)
 
 
-def test_equals_the_core_bit_for_bit():
+def test_the_environment_has_the_bits_of_the_core():
     env = AcrobotSwingUpEnv(dtype="float64")
     core = _core.Acrobot(AcrobotConfig())
     sensors = _core.AcrobotSensors(_core.SensorConfig(), 1, _core.Stream.sensor_noise)
-    n_ends = 0
+    n_finished = 0
     for episode in range(1, 41):
         tolerance = 1.0 / episode
         observation, info = env.reset(options={"goal_tolerance": tolerance})
@@ -99,27 +99,26 @@ def test_equals_the_core_bit_for_bit():
             assert info["tip_height"] == core.tip_height()
             assert info["is_success"] == result[1]
             if result[1] or result[2]:
-                n_ends += 1
+                n_finished += 1
                 break
-    assert n_ends == 40
+    assert n_finished == 40
 
 
-def test_truncates_by_itself_after_50_decisions():
+def test_an_episode_is_truncated_after_50_decisions_and_needs_a_reset():
     env = gym.make(ID)
     env.reset()
-    ends = [env.step(np.zeros(1, np.float32))[2:4] for _ in range(50)]
-    assert ends[:49] == [(False, False)] * 49
-    assert ends[49] == (False, True)
+    flags = [env.step(np.zeros(1, np.float32))[2:4] for _ in range(50)]
+    assert flags == [(False, False)] * 49 + [(False, True)]
     refuses("reset", env.step, np.zeros(1, np.float32), error=RuntimeError)
 
 
 def tolerances(env, **reset):
-    """Settings from the next reset of an environment on, and in the episode that begins."""
+    """Reset: return the goal tolerance of the environment before it, and that of the episode."""
     before = env.goal_tolerance
     return before, env.reset(**reset)[1]["goal_tolerance"]
 
 
-def test_no_reset_moves_the_task():
+def test_a_reset_without_the_option_keeps_the_goal_tolerance():
     env = AcrobotSwingUpEnv()
     assert env.goal_tolerance == 1.0
     for reset in ({}, {"seed": 5}, {"options": {}}, {"seed": 5, "options": None}):
@@ -128,27 +127,27 @@ def test_no_reset_moves_the_task():
     assert [tolerances(env) for _ in range(3)] == [(0.25, 0.25)] * 3
 
 
-def test_a_goal_tolerance_holds_until_another_is_given():
+def test_a_goal_tolerance_holds_from_the_next_reset_on():
     env = AcrobotSwingUpEnv(goal_tolerance=0.5)
     assert tolerances(env, options={"goal_tolerance": 0.01}) == (0.5, 0.01)
     assert tolerances(env, seed=1) == (0.01, 0.01)
     env.goal_tolerance = 0.1
-    assert env.step([0.0])[4]["goal_tolerance"] == 0.01, "the episode under way keeps its own"
+    assert env.step([0.0])[4]["goal_tolerance"] == 0.01, "the current episode keeps its tolerance"
     assert tolerances(env) == (0.1, 0.1)
 
 
-def test_the_goal_tolerance_is_that_of_the_dynamics():
-    """The tip passes the goal at 0.615 and 1.097 rad/s: at 0.0653 of 3 pi, 0.0699 of 5 pi."""
-    ends = []
+def test_the_goal_tolerance_is_a_share_of_the_speed_limits():
+    # The tip passes the goal at 0.615 and 1.097 rad/s: at 0.0653 of 3 pi and 0.0699 of 5 pi rad/s.
+    terminated = []
     for tolerance in (0.0, 0.0695, 0.0703, np.inf):
         env = AcrobotSwingUpEnv(goal_tolerance=tolerance)
         env.reset()
         env._acrobot.set_state([2.0, 0.0, 2.0, 0.0])
-        ends.append(env.step([0.0])[2])
-    assert ends == [False, False, True, True]
+        terminated.append(env.step([0.0])[2])
+    assert terminated == [False, False, True, True]
 
 
-def test_bad_arguments():
+def test_bad_actions_and_reset_options_are_refused_by_name():
     env = AcrobotSwingUpEnv()
     with pytest.raises(gym.error.ResetNeeded):
         env.step([0.0])
@@ -164,7 +163,7 @@ def test_bad_arguments():
     assert env.goal_tolerance == 1.0
 
 
-def test_frames_show_the_state():
+def test_frames_change_with_the_state_and_show_the_torque():
     env = AcrobotSwingUpEnv(render_mode="rgb_array")
     env.reset()
     hanging = env.render()
@@ -186,31 +185,31 @@ def test_frames_show_the_state():
     env.close()
 
 
-def test_human_mode_draws_by_itself_in_real_time_and_returns_nothing(monkeypatch):
-    monkeypatch.setattr(Impatient, "ticks", [])
+def test_human_mode_draws_25_frames_per_second_and_render_returns_none(monkeypatch):
+    monkeypatch.setattr(FakeClock, "ticks", [])
     env = AcrobotSwingUpEnv(render_mode="human")
     env.reset()
     env.step([1.0])
-    assert Impatient.ticks == 26 * [25]
+    assert FakeClock.ticks == 26 * [25]  # the reset's frame, and 25 of the decision
     assert env.render() is None
     env.close()
 
 
-def test_a_list_of_pictures_has_the_movement_between_decisions():
+def test_rgb_array_list_has_25_frames_per_decision():
     whole, parts = AcrobotSwingUpEnv(render_mode="rgb_array"), []
     env = AcrobotSwingUpEnv(render_mode="rgb_array_list")
     assert env.metadata["render_fps"] == 25
     assert whole.metadata["render_fps"] == 4
-    for one in (whole, env):
-        one.reset()
+    for environment in (whole, env):
+        environment.reset()
     for torque in (1.0, -1.0):
         parts += env.render()
         np.testing.assert_array_equal(parts[-1], whole.render())
         assert env.render() == []
-        for one in (whole, env):
-            one.step([torque])
+        for environment in (whole, env):
+            environment.step([torque])
     parts += env.render()
-    assert len(parts) == 51
+    assert len(parts) == 51  # the reset's, and 25 of each decision
     steps = [(a != b).any(axis=2).mean() for a, b in itertools.pairwise(parts)]
     assert min(steps) > 0.0  # every picture differs from the one before
     env.step([0.0])
@@ -221,7 +220,7 @@ def test_a_list_of_pictures_has_the_movement_between_decisions():
     whole.close()
 
 
-def test_a_list_of_pictures_ends_with_the_goal():
+def test_rgb_array_list_ends_at_the_goal():
     env = AcrobotSwingUpEnv(render_mode="rgb_array_list", goal_tolerance=1e6)
     rng = np.random.default_rng(0)
     env.reset()
@@ -247,7 +246,7 @@ def test_a_list_of_pictures_ends_with_the_goal():
     ("interval", "step", "n_pictures", "rate"),
     [(1.0, 0.02, 25, 25), (0.5, 0.02, 25, 50), (0.5, 0.05, 10, 20), (0.02, 0.02, 1, 50)],
 )
-def test_pictures_divide_the_decision_interval(interval, step, n_pictures, rate):
+def test_frames_divide_the_decision_interval_evenly(interval, step, n_pictures, rate):
     config = AcrobotConfig(decision_interval=interval, integration_step=step)
     env = AcrobotSwingUpEnv(config=config, render_mode="rgb_array_list")
     env.reset()
@@ -258,7 +257,7 @@ def test_pictures_divide_the_decision_interval(interval, step, n_pictures, rate)
     env.close()
 
 
-def test_states_between_decisions_are_on_the_way_of_the_acrobot():
+def test_states_between_decisions_are_those_of_shorter_decisions():
     config = AcrobotConfig()
     acrobot = _core.Acrobot(config)
     acrobot.step(3.0, 0.0)

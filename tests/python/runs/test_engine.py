@@ -7,7 +7,6 @@ import pytest
 from rich.console import Console
 
 import fake_trial
-from refusals import refuses
 from sdnn.reproduction import EXPERIMENTS, plan_trials
 from sdnn.runs import ResultStore, StoreError, WorkerLostError, run_trials
 from sdnn.runs.engine import (
@@ -23,7 +22,7 @@ from sdnn.runs.engine import (
 )
 
 
-def test_jobs_do_not_change_the_content(tmp_path, run):
+def test_the_number_of_jobs_does_not_change_the_stored_rows(tmp_path, run):
     digests = {run(tmp_path / str(jobs), executor=ThreadExecutor(jobs))[1] for jobs in (1, 2, 5)}
     assert len(digests) == 1
 
@@ -33,30 +32,31 @@ def plan_of_small_agents(n_trials, n_episodes):
     return plan_trials(cases, n_trials, 0, n_episodes)
 
 
-def test_teams_are_of_one_agent_and_leave_no_thread_idle():
+def test_teams_have_one_agent_each_and_shrink_as_jobs_increase():
     plan = plan_of_small_agents(3, 40)
     teams = teams_of(plan, 2)
-    assert {one for team in teams for one in team} == set(plan)
+    assert {planned for team in teams for planned in team} == set(plan)
     assert sorted(map(len, teams)) == [1] * 12 + [6] * 4
     assert [plan.index(team[0]) for team in teams] == sorted(plan.index(t[0]) for t in teams)
-    assert all(len({one.key.agent for one in team}) == 1 for team in teams)
+    assert all(len({planned.key.agent for planned in team}) == 1 for team in teams)
     assert max(map(len, teams_of(plan, 1))) == 8
     assert max(map(len, teams_of(plan, 12))) == 1
 
 
-def test_trials_in_teams_have_the_rows_of_each_by_itself(tmp_path):
+def test_trials_run_in_teams_have_the_rows_of_trials_run_alone(tmp_path):
     plan = plan_of_small_agents(1, 60)
     with ResultStore(tmp_path) as store:
         assert run_trials(plan, store, executor=ThreadExecutor(1)).n_run == len(plan)
         records = {record.key: record for record in store.load()}
-    for one in plan:
-        *_, (_, alone) = run_to_end(one)
-        assert records[one.key].rows.digest() == alone.rows.digest()
-        assert records[one.key].n_decisions == alone.n_decisions
-        assert records[one.key].seconds > 0
+    for planned in plan:
+        *_, (_, alone) = run_to_end(planned)
+        record = records[planned.key]
+        assert record.rows.digest() == alone.rows.digest()
+        assert record.n_decisions == alone.n_decisions
+        assert record.seconds > 0
 
 
-def test_a_failure_in_a_batch_affects_its_trial_alone(tmp_path, monkeypatch):
+def test_a_trial_that_fails_in_a_team_does_not_affect_the_others(tmp_path, monkeypatch):
     plan = plan_of_small_agents(1, 20)
     spec = plan[0].spec
     kwargs = spec.environment.kwargs
@@ -90,13 +90,13 @@ def test_stored_trials_are_not_run_again(tmp_path, run):
 
 
 @pytest.mark.parametrize("change", [{"root_seed": 1}, {"n_episodes": 310}])
-def test_other_settings_are_other_trials(tmp_path, run, change):
+def test_trials_of_another_seed_or_length_are_run_again(tmp_path, run, change):
     run(tmp_path, fake_trial.make_plan())
     outcome, _ = run(tmp_path, fake_trial.make_plan(**change))
     assert outcome.n_run == 6
 
 
-def test_observer_hears_every_trial_from_the_calling_thread(tmp_path, run):
+def test_the_observer_receives_begin_progress_and_end_of_every_trial(tmp_path, run):
     recorder = fake_trial.Recorder()
     run(tmp_path, fake_trial.make_plan(2), observer=recorder)
     assert recorder.events[0] == ("begun", 4, 0, 1200)
@@ -109,7 +109,7 @@ def test_observer_hears_every_trial_from_the_calling_thread(tmp_path, run):
         assert episodes[-1] == 300
 
 
-def test_failing_trial_does_not_stop_the_others(tmp_path, run):
+def test_a_failing_trial_does_not_stop_the_others_and_is_run_again(tmp_path, run):
     plan = fake_trial.make_plan()
 
     def make(*, seed, **parts):
@@ -125,20 +125,20 @@ def test_failing_trial_does_not_stop_the_others(tmp_path, run):
     assert run(tmp_path, plan)[0].n_run == 1
 
 
-@pytest.mark.parametrize("kind", [SystemExit, KeyboardInterrupt, GeneratorExit])
-def test_a_thread_that_ends_silently_is_a_failure(tmp_path, run, kind):
+@pytest.mark.parametrize("exception", [SystemExit, KeyboardInterrupt, GeneratorExit])
+def test_a_trial_that_raises_an_exit_or_interrupt_fails(tmp_path, run, exception):
     class Leaving(fake_trial.FakeTrial):
         def __init__(self, **_parts):
-            raise kind("left")
+            raise exception("left")
 
     outcome, _ = run(tmp_path, None, Leaving)
     assert outcome.n_run == 0
     assert not outcome.interrupted
-    assert {str(f.error) for f in outcome.failures} == {f"the trial raised {kind('left')!r}"}
+    assert {str(f.error) for f in outcome.failures} == {f"the trial raised {exception('left')!r}"}
 
 
-def test_interruption_keeps_finished_trials(tmp_path, run):
-    """Ctrl-C comes while the second trial runs: it is given up, the first stays stored."""
+def test_ctrl_c_keeps_finished_trials_and_the_next_run_resumes(tmp_path, run):
+    # Ctrl-C comes while the second trial runs: it is abandoned, the first stays stored.
     made = []
     before = signal.getsignal(signal.SIGINT)
 
@@ -167,7 +167,7 @@ def test_interruption_keeps_finished_trials(tmp_path, run):
     assert digest == run(tmp_path / "whole")[1]
 
 
-def test_unwritable_store_stops_the_run(tmp_path, use_trial):
+def test_an_error_of_the_store_stops_the_run(tmp_path, use_trial):
     from sdnn.runs import run_trials
 
     class Full(ResultStore):
@@ -187,12 +187,8 @@ def test_unwritable_store_stops_the_run(tmp_path, use_trial):
     assert len(made) < 20
 
 
-def test_jobs_must_be_positive():
-    refuses("jobs", ThreadExecutor, 0)
-
-
 class Scripted:
-    """Executors that report given events about the trials in their order."""
+    """An executor that only reports: each part of its script makes a message of the plan."""
 
     def __init__(self, *script):
         self.script = script
@@ -213,30 +209,57 @@ def record(tmp_path, run):
         return store.load([fake_trial.make_plan(1)[0].key])[0]
 
 
-def test_an_executor_reports_and_the_engine_stores(tmp_path, run, record):
+def noted(first, second):
+    return Noted("a note")
+
+
+def begun(first, second):
+    return Advanced(first, 0)
+
+
+def advanced(first, second):
+    return Advanced(first, 100)
+
+
+def failed(first, second):
+    return Failed(second, LOST)
+
+
+LOST = WorkerLostError("a lost worker")
+
+
+@pytest.fixture
+def restarting(record):
+    """An executor whose first trial starts again and finishes, and whose second trial fails."""
+
+    def finished(first, second):
+        return Finished(first, record)
+
+    return Scripted(noted, begun, advanced, begun, failed, finished)
+
+
+def test_observers_receive_the_reports_of_an_executor_in_order(tmp_path, run, restarting):
     plan = fake_trial.make_plan(1)
-    lost = WorkerLostError("gone")
-    script = (
-        lambda a, b: Noted("hear"),
-        lambda a, b: Advanced(a, 0),
-        lambda a, b: Advanced(a, 100),
-        lambda a, b: Advanced(a, 0),
-        lambda a, b: Failed(b, lost),
-        lambda a, b: Finished(a, record),
-    )
     recorder = fake_trial.Recorder()
-    outcome, _ = run(tmp_path, plan, executor=Scripted(*script), observer=recorder)
+    outcome, _ = run(tmp_path, plan, executor=restarting, observer=recorder)
     assert (outcome.n_run, outcome.interrupted) == (1, False)
-    assert [(f.planned.key, f.error) for f in outcome.failures] == [(plan[1].key, lost)]
+    assert [(f.planned.key, f.error) for f in outcome.failures] == [(plan[1].key, LOST)]
     first, second = (planned.key for planned in plan)
     assert recorder.events[1:] == [
-        ("noted", "hear"), ("advanced", first, 0), ("advanced", first, 100), ("advanced", first, 0),
-        ("failed", second), ("finished", first),
-    ]  # fmt: skip
+        ("noted", "a note"),
+        ("advanced", first, 0),
+        ("advanced", first, 100),
+        ("advanced", first, 0),
+        ("failed", second),
+        ("finished", first),
+    ]
+
+
+def test_progress_bars_show_notes_and_the_trials_that_are_left(tmp_path, run, restarting):
     text = io.StringIO()
     with TrialBars(Console(file=text, force_terminal=True, width=80)) as observer:
-        run(tmp_path / "shown", plan, executor=Scripted(*script), observer=observer)
-    assert "hear" in text.getvalue()
+        run(tmp_path, fake_trial.make_plan(1), executor=restarting, observer=observer)
+    assert "a note" in text.getvalue()
     assert "all (0 to go)" in text.getvalue()
 
 
@@ -244,10 +267,15 @@ def test_an_executor_is_closed_when_the_store_fails(tmp_path, run, record, monke
     def full(store, record, *, is_exact=True):
         raise StoreError("disk full")
 
-    executor = Scripted(lambda a, b: Finished(a, record), lambda a, b: pytest.fail("asked again"))
+    executor = Scripted(
+        lambda first, _: Finished(first, record), lambda *_: pytest.fail("resumed after an error")
+    )
     monkeypatch.setattr(ResultStore, "add", full)
     with pytest.raises(StoreError, match="disk full"):
         run(tmp_path, fake_trial.make_plan(1), executor=executor)
     assert executor.closed
-    nobody = Scripted(lambda: pytest.fail("asked without need"))
-    assert run(tmp_path, [], executor=nobody)[0].n_planned == 0
+
+
+def test_an_empty_plan_runs_no_executor(tmp_path, run):
+    executor = Scripted(lambda: pytest.fail("was run"))
+    assert run(tmp_path, [], executor=executor)[0].n_planned == 0

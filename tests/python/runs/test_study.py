@@ -1,4 +1,4 @@
-"""From a study file to configurations and trials, and what is said about wrong files."""
+"""Study files: the configurations and trials that they plan, and errors in files."""
 
 import re
 import sys
@@ -22,22 +22,23 @@ def configs(study):
     return {pair: combination.spec for pair, combination in study.combinations.items()}
 
 
-def test_a_study_of_nothing_is_the_paper_and_shares_its_trials(study):
-    found = study(PAPER)
+def test_a_study_without_variants_plans_the_trials_of_the_paper(study):
+    loaded = study(PAPER)
     cases = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
-    assert configs(found) == {
+    assert configs(loaded) == {
         (case_id, "base"): case_spec(cases[case_id], "sdnn-c")
         for case_id in ("s4", "s4-noise", "s6")
     }
     paper = {p.key for p in plan_trials(cases.values(), 2, 3)}
-    assert {p.key for p in found.plan()} < paper
-    assert found.title == "mine"
-    assert found.reference == "base"
+    assert {p.key for p in loaded.plan()} < paper
+    assert loaded.title == "mine"
+    assert loaded.reference == "base"
 
 
-def test_the_first_trials_of_all_come_first(study):
-    found = study(PAPER + '[axes]\n"learning.discount" = [0.5, 0.7]\n')
-    plan = found.plan()
+def test_trial_0_of_every_case_and_variant_is_planned_before_trial_1(study):
+    loaded = study(PAPER + '[axes]\n"learning.discount" = [0.5, 0.7]\n')
+    plan = loaded.plan()
+    # Three cases with the base and two variants each.
     assert [p.key.trial for p in plan] == 9 * [0] + 9 * [1]
     assert [p.key.case_id for p in plan[:9]] == 3 * ["s4"] + 3 * ["s4-noise"] + 3 * ["s6"]
     seeds = {(p.key.case_id, p.key.trial): p.key.seed for p in plan}
@@ -45,12 +46,12 @@ def test_the_first_trials_of_all_come_first(study):
     assert len(set(seeds.values())) == 6
 
 
-def test_later_layers_override_earlier_ones(study):
-    found = study(
+def test_settings_of_variants_override_cases_agents_and_base(study):
+    loaded = study(
         """
         [study]
         reference = "b"
-        cases = ["s4", "own"]
+        cases = ["s4", "custom"]
         [base]
         learning.discount = 0.1
         learning.epsilon = 0.11
@@ -60,8 +61,8 @@ def test_later_layers_override_earlier_ones(study):
         learning.learning_rate = 0.22
         [agents.rbf]
         learning.discount = 0.25
-        [cases.own]
-        title = "my own"
+        [cases.custom]
+        title = "custom"
         environment = { id = "sdnn/PaperAcrobot-v0", kwargs.sensors.n_sensors = 5 }
         agent = "sdnn-c-paper"
         learning = { discount = 0.3, n_greedy_steps = 3 }
@@ -69,7 +70,7 @@ def test_later_layers_override_earlier_ones(study):
         [variants.b]
         title = "the b"
         learning.discount = 0.4
-        [variants.b.cases.own]
+        [variants.b.cases.custom]
         learning.discount = 0.5
         [variants.c]
         agent = "rbf"
@@ -77,26 +78,26 @@ def test_later_layers_override_earlier_ones(study):
     )
     values = {
         pair: (c.learning.discount, c.learning.learning_rate, c.learning.n_greedy_steps)
-        for pair, c in configs(found).items()
+        for pair, c in configs(loaded).items()
     }
     assert values == {
         ("s4", "b"): (0.4, 0.22, 10),
         ("s4", "a"): (0.2, 0.22, 10),
         ("s4", "c"): (0.25, 0.5, 10),
-        ("own", "b"): (0.5, 0.22, 3),
-        ("own", "a"): (0.3, 0.22, 3),
-        ("own", "c"): (0.3, 0.5, 3),
+        ("custom", "b"): (0.5, 0.22, 3),
+        ("custom", "a"): (0.3, 0.22, 3),
+        ("custom", "c"): (0.3, 0.5, 3),
     }
-    assert {c.learning.epsilon for c in configs(found).values()} == {0.11}
-    tasks = {p[0]: c.environment.paper_settings() for p, c in configs(found).items()}
-    assert {name: task.sensors.n_sensors for name, task in tasks.items()} == {"s4": 4, "own": 5}
+    assert {c.learning.epsilon for c in configs(loaded).values()} == {0.11}
+    tasks = {p[0]: c.environment.paper_settings() for p, c in configs(loaded).items()}
+    assert {name: task.sensors.n_sensors for name, task in tasks.items()} == {"s4": 4, "custom": 5}
     assert {task.acrobot.max_torque for task in tasks.values()} == {5.0}
-    assert [case.title for case in found.cases] == ["Case I: 4 inputs, no noise", "my own"]
-    assert [variant.title for variant in found.variants] == ["the b", "a", "c"]  # reference first
+    assert [case.title for case in loaded.cases] == ["Case I: 4 inputs, no noise", "custom"]
+    assert [variant.title for variant in loaded.variants] == ["the b", "a", "c"]  # reference first
 
 
-def test_arrays_texts_and_numbers_reach_the_configuration(study):
-    found = study(
+def test_arrays_texts_and_numbers_of_a_study_file_reach_the_configuration(study):
+    loaded = study(
         PAPER
         + """
         [variants.x]
@@ -107,7 +108,7 @@ def test_arrays_texts_and_numbers_reach_the_configuration(study):
         approximator.circular = [true, true, false, false]
         """
     )
-    config = configs(found)["s4", "x"]
+    config = configs(loaded)["s4", "x"]
     expected = paper_spec(
         approximator={
             "circular": (True, True, False, False), "initial_threshold": 10.0, "u_low": 7
@@ -116,11 +117,11 @@ def test_arrays_texts_and_numbers_reach_the_configuration(study):
     )  # fmt: skip
     assert config == expected
     assert config.config_hash == expected.config_hash
-    assert configs(found)["s6", "x"].approximator.circular == ()
+    assert configs(loaded)["s6", "x"].approximator.circular == ()
 
 
 def test_axes_vary_one_key_at_a_time(study):
-    found = study(
+    loaded = study(
         PAPER
         + """
         [axes]
@@ -130,20 +131,21 @@ def test_axes_vary_one_key_at_a_time(study):
         environment.kwargs.goal.scale = [50]
         """
     )
-    assert [variant.id for variant in found.variants] == [
+    assert [variant.id for variant in loaded.variants] == [
         "base", "tie_rule=uniform", "tie_rule=middle",
         "circular=[true, true, false, false, false, false]", "noise=0.01", "scale=50",
     ]  # fmt: skip
-    of_s6 = {variant: c for (case, variant), c in configs(found).items() if case == "s6"}
+    of_s6 = {variant: c for (case, variant), c in configs(loaded).items() if case == "s6"}
     assert of_s6["tie_rule=middle"].learning.tie_rule == "middle"
     assert of_s6["noise=0.01"].environment.paper_settings().sensors.noise == 0.01
     assert of_s6["scale=50"].environment.paper_settings().goal.scale == 50.0
-    assert found.copies() == {"tie_rule=uniform": "base"}
-    assert len(found.plan()) == 2 * 3 * 5  # what is the same is run once
+    assert loaded.copies() == {"tie_rule=uniform": "base"}
+    # Two trials of three cases; tie_rule=uniform repeats the base, five of six variants run.
+    assert len(loaded.plan()) == 2 * 3 * 5
 
 
 def test_axes_combine_to_a_product(study):
-    found = study(
+    loaded = study(
         PAPER
         + """
         [axes]
@@ -154,42 +156,42 @@ def test_axes_combine_to_a_product(study):
         [variants.paper]
         """
     )
-    assert [variant.id for variant in found.variants] == [
+    assert [variant.id for variant in loaded.variants] == [
         "paper",
         "agent=sdnn-c, scale=50, integration_step=0.02",
         "agent=sdnn-c, scale=100, integration_step=0.02",
         "agent=fuzzy, scale=50, integration_step=0.02",
         "agent=fuzzy, scale=100, integration_step=0.02",
     ]
-    assert found.reference == "paper"
-    last = configs(found)["s4", "agent=fuzzy, scale=100, integration_step=0.02"]
-    assert last == configs(found)["s4", "paper"].replace(
+    assert loaded.reference == "paper"
+    last = configs(loaded)["s4", "agent=fuzzy, scale=100, integration_step=0.02"]
+    assert last == configs(loaded)["s4", "paper"].replace(
         agent=last.agent, approximator=last.approximator, learning=last.learning
     )
     assert last.agent.name == "fuzzy"
 
 
-def test_axes_of_the_same_last_word_have_whole_names(study):
+def test_variants_of_axes_are_named_by_the_last_part_of_their_key(study):
     text = PAPER + "[axes]\nlearning.epsilon = [0.2]\nenvironment.kwargs.goal.floor = [0.02]\n"
-    found = study(text + "[variants.other]\nagent = 'fuzzy'\n")
-    assert [v.id for v in found.variants] == ["base", "other", "epsilon=0.2", "floor=0.02"]
+    loaded = study(text + "[variants.other]\nagent = 'fuzzy'\n")
+    assert [v.id for v in loaded.variants] == ["base", "other", "epsilon=0.2", "floor=0.02"]
     text = "[base]\nenvironment.id = 'Pendulum-v1'\n[axes]\n"
     text += "environment.noise = [0.1]\nenvironment.kwargs.g = [5.0]\n"
-    found = study(text)
-    assert [v.id for v in found.variants] == ["base", "noise=0.1", "g=5.0"]
-    assert configs(found)["Pendulum-v1", "g=5.0"].environment.kwargs == {"g": 5.0}
+    loaded = study(text)
+    assert [v.id for v in loaded.variants] == ["base", "noise=0.1", "g=5.0"]
+    assert configs(loaded)["Pendulum-v1", "g=5.0"].environment.kwargs == {"g": 5.0}
 
 
-def test_each_environment_is_a_case(study):
-    found = study(
+def test_without_cases_the_base_environment_is_the_only_case(study):
+    loaded = study(
         """
         [base]
         environment = "Pendulum-v1"
         budget.episodes = 20
-protocol.evaluate_every_episodes = 10
+        protocol.evaluate_every_episodes = 10
         """
     )
-    config = configs(found)["Pendulum-v1", "base"]
+    config = configs(loaded)["Pendulum-v1", "base"]
     assert config.environment.id == "Pendulum-v1"
     assert (config.budget.episodes, config.protocol.evaluate_every_episodes) == (20, 10)
     assert config.label == "q-lambda-general"
@@ -198,8 +200,8 @@ protocol.evaluate_every_episodes = 10
 RANGES = "environment.ranges.1 = [-4, 4]\nenvironment.ranges.3 = [-4, 4]\n"
 
 
-def test_both_kinds_of_tasks_fit_into_one_study(study):
-    found = study(
+def test_a_study_may_mix_the_papers_acrobot_with_other_environments(study):
+    loaded = study(
         """
         [cases.s4]
         [cases.cart]
@@ -208,34 +210,34 @@ def test_both_kinds_of_tasks_fit_into_one_study(study):
         environment.ranges.3 = [-4, 4]
         """
     )
-    assert configs(found)["s4", "base"].environment.is_paper_acrobot
-    cart = configs(found)["cart", "base"]
+    assert configs(loaded)["s4", "base"].environment.is_paper_acrobot
+    cart = configs(loaded)["cart", "base"]
     assert cart.environment.ranges == {"1": (-4.0, 4.0), "3": (-4.0, 4.0)}
-    found.check()
+    loaded.check()
 
 
-def test_options_override_the_file(study):
-    found = study(PAPER, n_trials=1, seed=9)
-    assert (found.n_trials, found.seed) == (1, 9)
-    assert len(found.plan()) == 3
+def test_options_override_the_number_of_trials_and_the_seed_of_the_file(study):
+    loaded = study(PAPER, n_trials=1, seed=9)
+    assert (loaded.n_trials, loaded.seed) == (1, 9)
+    assert len(loaded.plan()) == 3
 
 
-def test_some_variants_only(study):
+def test_only_selects_variants_and_refuses_unknown_ones(study):
     text = PAPER + "[axes]\nlearning.discount = [0.5, 0.7]\n"
-    found = study(text, only=["discount=0.5"])
-    assert {p.spec.learning.discount for p in found.plan()} == {0.5}
-    assert len(found.combinations) == 9
+    loaded = study(text, only=["discount=0.5"])
+    assert {p.spec.learning.discount for p in loaded.plan()} == {0.5}
+    assert len(loaded.combinations) == 9
     with pytest.raises(ValueError, match=r"discount=0\.6.*discount=0\.[57]"):
         study(text, only=["discount=0.6"])
 
 
-def test_a_variant_runs_only_in_its_cases(study):
+def test_a_variant_with_only_runs_in_the_listed_cases(study):
     text = PAPER + "[variants.a]\n[variants.b]\nonly = ['s6']\nlearning.discount = 0.5\n"
-    found = study(text)
-    assert set(configs(found)) == {("s4", "a"), ("s4-noise", "a"), ("s6", "a"), ("s6", "b")}
-    assert len(found.plan()) == 8
+    loaded = study(text)
+    assert set(configs(loaded)) == {("s4", "a"), ("s4-noise", "a"), ("s6", "a"), ("s6", "b")}
+    assert len(loaded.plan()) == 8  # two trials of four pairs
     assert {p.key.case_id for p in study(text, only=["b"]).plan()} == {"s6"}
-    assert found.copies() == {}
+    assert loaded.copies() == {}
 
 
 PLUGIN = """
@@ -249,10 +251,10 @@ register(AgentEntry(id="plugged", title="Plugged", approximator=RBFNetworkConfig
 """
 
 
-def test_modules_beside_the_file_may_register_agents(study, tmp_path):
+def test_imported_modules_beside_a_study_file_may_register_agents(study, tmp_path):
     (tmp_path / "my_plugged_agents.py").write_text(PLUGIN)
     try:
-        found = study(
+        loaded = study(
             """
             [study]
             imports = ["my_plugged_agents"]
@@ -261,12 +263,12 @@ def test_modules_beside_the_file_may_register_agents(study, tmp_path):
             agent = "plugged"
             approximator.n_bases = 3
             budget.episodes = 2
-protocol.evaluate_every_episodes = 2
+            protocol.evaluate_every_episodes = 2
             """
         )
-        config = configs(found)["s4", "base"]
+        config = configs(loaded)["s4", "base"]
         assert (config.agent.name, config.approximator.n_bases) == ("plugged", 3)
-        found.check()
+        loaded.check()
     finally:
         AGENTS.pop("plugged", None)
         sys.modules.pop("my_plugged_agents", None)
@@ -291,7 +293,7 @@ register(AgentEntry(id="strict", title="Strict", approximator=Strict,
 
 
 @pytest.mark.parametrize("error", ["ValueError('size is small')", "AssertionError", "TypeError"])
-def test_errors_of_registered_settings_name_file_and_line(study, tmp_path, error):
+def test_errors_of_registered_configurations_name_file_and_line(study, tmp_path, error):
     (tmp_path / "strict_agents.py").write_text(STRICT.replace("ERROR", error))
     text = "[study]\nimports = ['strict_agents']\ncases = ['s4']\n[base]\nagent = 'strict'\n"
     try:
@@ -329,7 +331,7 @@ PRODUCT = "[cases.s4]\n[axes]\ncombine = 'product'\n" + "".join(
         ("[base]\n" + 99 * "a." + "a = 1", 0, "must be TOML: a key must have"),
     ],
 )
-def test_errors_name_file_line_and_key(study, tmp_path, text, line, message):
+def test_errors_in_a_study_file_name_file_line_and_key(study, tmp_path, text, line, message):
     with pytest.raises(ConfigError) as caught:
         study(text)
     place = f"{tmp_path / 'mine.toml'}:{line or ''}".rstrip(":")
@@ -337,18 +339,18 @@ def test_errors_name_file_line_and_key(study, tmp_path, text, line, message):
 
 
 @pytest.mark.parametrize(("text", "line", "message"), [*wrong_studies("unusable.txt")])
-def test_errors_of_the_core_are_raised_before_any_trial(study, tmp_path, text, line, message):
+def test_check_raises_errors_of_the_core_with_file_and_line(study, tmp_path, text, line, message):
     with pytest.raises(ConfigError) as caught:
         study(text).check()
     assert str(caught.value).startswith(f"{tmp_path / 'mine.toml'}:{line}: {message}")
 
 
-def test_only_trials_that_are_not_stored_are_checked(study, monkeypatch):
+def test_check_skips_trials_that_are_stored(study, monkeypatch):
     text = "[cases.s4]\n[variants.a]\nenvironment.kwargs.acrobot.integration_step = 0.3\n"
-    found = study(text, n_trials=2)
-    found.check(stored=found.keys("s4", "a"))
+    loaded = study(text, n_trials=2)
+    loaded.check(stored=loaded.keys("s4", "a"))
     with pytest.raises(ConfigError):
-        found.check(stored=found.keys("s4", "a")[:1])
+        loaded.check(stored=loaded.keys("s4", "a")[:1])
 
 
 @pytest.mark.parametrize(
@@ -359,7 +361,7 @@ def test_only_trials_that_are_not_stored_are_checked(study, monkeypatch):
         ("budget.target_return = 40.0", "budget.target_return"),
     ],
 )
-def test_trials_that_could_not_be_compared_are_refused(study, settings, key):
+def test_settings_that_make_trials_incomparable_are_refused(study, settings, key):
     refuses(
         key,
         study(f"[base]\nenvironment.id = 'CartPole-v1'\n{RANGES}{settings}\n").check,

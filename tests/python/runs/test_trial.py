@@ -1,4 +1,4 @@
-"""Trainings against the compiled trials, and the registry that chooses between them."""
+"""Trials in Python and in C++, and the registry of agents."""
 
 from dataclasses import dataclass, replace
 
@@ -38,7 +38,7 @@ def columns(trial):
 
 
 def python_trial(spec, monkeypatch):
-    """The trial the same agent has when it has none in C++."""
+    """Make the trial that the agent has where it has none in C++."""
     entry = replace(AGENTS[spec.agent.name], core_trial=None)
     monkeypatch.setitem(AGENTS, spec.agent.name, entry)
     trial = spec.make_trial(SEED)
@@ -60,7 +60,7 @@ def python_trial(spec, monkeypatch):
     ],
 )
 @pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
-def test_it_reproduces_the_compiled_trial_bit_for_bit(agent, n_sensors, noise, monkeypatch):
+def test_a_trial_in_python_has_the_bits_of_the_compiled_trial(agent, n_sensors, noise, monkeypatch):
     spec = spec_of(agent, n_sensors, noise)
     core = spec.make_trial(SEED)
     assert type(core).__module__ == _core.__name__
@@ -80,7 +80,7 @@ def test_it_reproduces_the_compiled_trial_bit_for_bit(agent, n_sensors, noise, m
     assert TrialRows.of_tests(**rows).digest() == TrialRows.of_tests(**expected).digest()
 
 
-def test_the_settings_of_the_task_reach_it(monkeypatch):
+def test_a_trial_in_python_uses_all_settings_of_task_and_protocol(monkeypatch):
     spec = spec_of("fuzzy")
     kwargs = {
         "acrobot": {"max_decisions": 3, "penalty": -1.0},
@@ -102,7 +102,7 @@ def test_the_settings_of_the_task_reach_it(monkeypatch):
     assert columns(trial)["steps"].max() == 3
 
 
-def test_before_its_first_test_it_has_no_rows(monkeypatch):
+def test_a_trial_has_no_rows_before_its_first_evaluation(monkeypatch):
     trial = python_trial(spec_of("fuzzy"), monkeypatch)
     trial.advance(4)
     assert {name: column.size for name, column in columns(trial).items()} == {
@@ -110,7 +110,7 @@ def test_before_its_first_test_it_has_no_rows(monkeypatch):
     }  # fmt: skip
 
 
-def test_episodes_cannot_be_taken_back(monkeypatch):
+def test_a_negative_number_of_episodes_is_refused(monkeypatch):
     spec = spec_of("rbf")
     for trial in (spec.make_trial(SEED), python_trial(spec, monkeypatch)):
         refuses("n_episodes", trial.advance, -1)
@@ -125,14 +125,14 @@ def entry_of(agent_id):
     return AgentEntry(id=agent_id, title="", approximator=Nothing, learning=Nothing, agent=object)
 
 
-def test_an_agent_may_have_other_settings_than_the_defaults():
+def test_the_settings_of_a_preset_are_those_of_the_agents_class():
     spec = spec_of("sdnn-c-robust")
     assert spec.approximator == SDNNQLearning.presets["robust"].approximator
     assert spec.learning == SDNNQLearning.presets["robust"].learning
     assert spec_of("sdnn-c").learning == SDNNQLearning.presets["paper"].learning
 
 
-def test_asking_a_trials_agent_for_values_changes_nothing_that_follows():
+def test_computing_action_values_does_not_change_the_rows_of_a_trial():
     asked, alone = (spec_of("sdnn-c", noise=0.02).make_trial(SEED) for _ in range(2))
     for _ in range(60):
         asked.advance(1)
@@ -143,14 +143,14 @@ def test_asking_a_trials_agent_for_values_changes_nothing_that_follows():
         np.testing.assert_array_equal(asked.test_rows()[name], column)
 
 
-def test_ids_are_registered_once():
+def test_duplicate_and_invalid_ids_are_not_registered():
     before = dict(AGENTS)
     refuses("fuzzy", register, entry_of("fuzzy"))
     refuses("id", register, entry_of("../x"))
     assert before == AGENTS
 
 
-def test_agents_are_looked_up_by_word():
+def test_agents_have_labels_titles_and_entries():
     words = ["sdnn-c", "fuzzy", "rbf", "q-lambda", "actor-critic"]
     words += ["sdnn-c-general", "sdnn-c-robust"]
     words += ["sdnn-c-small", "q-lambda-general", "actor-critic-general"]
@@ -164,7 +164,7 @@ def test_agents_are_looked_up_by_word():
     refuses("dqn", agent_entry, "dqn")
 
 
-def test_a_registered_dataclass_is_the_configuration_of_its_agent(monkeypatch):
+def test_a_registered_dataclass_is_the_default_configuration_of_its_agent(monkeypatch):
     monkeypatch.setitem(AGENTS, "new", entry_of("new"))
     spec = spec_of("new", 5)
     assert spec.approximator == Nothing()
@@ -172,24 +172,38 @@ def test_a_registered_dataclass_is_the_configuration_of_its_agent(monkeypatch):
     assert len(spec.config_hash) == 16
 
 
-def test_a_specification_that_cpp_does_not_know_is_a_training():
-    environment = EnvironmentSpec(id="MountainCar-v0", kwargs={"max_episode_steps": 30}, noise=0.01)
-    for protocol, budget, expected in (
+CAR = EnvironmentSpec(id="MountainCar-v0", kwargs={"max_episode_steps": 30}, noise=0.01)
+
+
+def finished_trial(protocol, budget):
+    """Run a trial of a Gymnasium environment to its end, which may be early."""
+    trial = RunSpec(environment=CAR, protocol=protocol, budget=budget).make_trial(SEED)
+    for _ in trial.training.pieces(0.0):
+        pass
+    assert trial.finished
+    return trial
+
+
+@pytest.mark.parametrize(
+    ("protocol", "budget", "episodes"),
+    [
+        # After 40 and 80 steps, of which 30 and 60 belong to finished episodes.
         (ProtocolSpec(evaluate_every=40, evaluation_episodes=3), BudgetSpec(steps=90), [1, 2]),
         (ProtocolSpec(evaluate_every_episodes=2), BudgetSpec(episodes=4), [2, 4]),
         (ProtocolSpec(evaluate_every=0, n_envs=2), BudgetSpec(steps=90), []),
-    ):
-        spec = RunSpec(environment=environment, protocol=protocol, budget=budget)
-        trial = spec.make_trial(SEED)
-        for _ in trial.training.pieces(0.0):
-            pass
-        assert (trial.finished, trial.reason, trial.done) == (True, "done", spec.length)
-        assert trial.rows().episode.tolist() == expected
-        trial.close()
-    target = BudgetSpec(steps=500, target_return=-1000.0)
-    trial = RunSpec(
-        environment=environment, protocol=ProtocolSpec(evaluate_every=40), budget=target
-    ).make_trial(SEED)
-    for _ in trial.training.pieces(0.0):
-        pass
-    assert (trial.finished, trial.reason, trial.done) == (True, "target", 40)
+    ],
+    ids=["steps", "episodes", "no evaluation"],
+)
+def test_a_trial_of_a_gymnasium_environment_is_evaluated_by_its_protocol(
+    protocol, budget, episodes
+):
+    trial = finished_trial(protocol, budget)
+    assert (trial.reason, trial.done) == ("done", budget.steps or budget.episodes)
+    assert trial.rows().episode.tolist() == episodes
+    trial.close()
+
+
+def test_a_trial_ends_at_the_first_evaluation_that_reaches_the_target_return():
+    budget = BudgetSpec(steps=500, target_return=-1000.0)  # below every return of 30 steps
+    trial = finished_trial(ProtocolSpec(evaluate_every=40), budget)
+    assert (trial.reason, trial.done) == ("target", 40)
