@@ -1,4 +1,4 @@
-"""Goals for the tasks of study.toml, and two tasks of our own with two torques."""
+"""Goals for the tasks of study.toml, two tasks with two torques and one with a one-hot vector."""
 
 from __future__ import annotations
 
@@ -31,6 +31,8 @@ TASKS = {
     # Solved is what comes near the best of some hundred proportional controllers: -13.6 and -23.6.
     "Reaching": Task(-20.0, -112.2),
     "Wheels": Task(-30.0, -92.7),
+    # The shortest path is 18 steps long.
+    "Cells": Task(-30.0, -259.7),
     # 2 below the optimum, .05 below the optimum, and the mark of a policy that delivers everywhere.
     "CliffWalking": Task(-17.0, -5042.0),
     "FrozenLake": Task(0.69, 0.014),
@@ -163,5 +165,37 @@ class WheelsEnv(gym.Env):
         return np.array(seen, np.float32)
 
 
+class CellsEnv(gym.Env):
+    """A square of 10 x 10 cells: walk from one corner to the opposite one.
+
+    The observation is the cell as 100 binary variables, one of which is 1. An action walks to the
+    next cell in one of four directions, or stays at the border; each step's reward is -1.
+    """
+
+    SIZE = 10
+    MOVES = ((1, 0), (-1, 0), (0, 1), (0, -1))
+
+    action_space = gym.spaces.Discrete(len(MOVES))
+    observation_space = gym.spaces.MultiBinary(SIZE * SIZE)
+
+    def reset(self, *, seed=None, options=None):
+        """Begin in the first cell."""
+        super().reset(seed=seed)
+        self._cell = np.zeros(2, int)
+        return self._observation(), {}
+
+    def step(self, action):
+        """Walk."""
+        self._cell = np.clip(self._cell + self.MOVES[action], 0, self.SIZE - 1)
+        is_last = bool((self._cell == self.SIZE - 1).all())
+        return self._observation(), -1.0, is_last, False, {}
+
+    def _observation(self):
+        observation = np.zeros(self.SIZE * self.SIZE, np.int8)
+        observation[self.SIZE * self._cell[1] + self._cell[0]] = 1
+        return observation
+
+
 gym.register("bench/Reaching-v0", entry_point=ReachingEnv, max_episode_steps=60)
 gym.register("bench/Wheels-v0", entry_point=WheelsEnv, max_episode_steps=60)
+gym.register("bench/Cells-v0", entry_point=CellsEnv, max_episode_steps=300)

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
+#include "sdnn/agents/detail/binary_groups.hpp"
 #include "sdnn/core/random.hpp"
 
 namespace sdnn::agents {
@@ -107,6 +109,159 @@ TEST(Relevance, FindsInputsThatMatterOnlyTogether) {
     n_noise_kept += static_cast<int>(std::ranges::count(kept, true)) - 2;
   }
   EXPECT_LE(n_noise_kept, 2);  // of 40
+}
+
+TEST(Relevance, OfManyNoiseInputsHardlyAnyIsKept) {
+  int n_noise_kept = 0;
+  for (const std::size_t n_noise : {30U, 100U, 300U}) {
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      const std::vector<bool> kept = relevant(pushed_mass(1000, n_noise, 0.0, false, seed));
+      EXPECT_TRUE(kept[0] && kept[1]) << n_noise << ' ' << seed;
+      n_noise_kept += static_cast<int>(std::ranges::count(kept, true)) - 2;
+    }
+  }
+  EXPECT_LE(n_noise_kept, 2);  // of 1,290; 40 without regard to the number of comparisons
+}
+
+/// The experience with its inputs in another order.
+RandomExperience permuted(const RandomExperience& experience,
+                          const std::vector<std::size_t>& order) {
+  RandomExperience result = experience;
+  for (std::size_t k = 0; k < experience.states.size(); ++k) {
+    const std::size_t i = k % order.size();
+    result.states[k] = experience.states[k - i + order[i]];
+    result.next_states[k] = experience.next_states[k - i + order[i]];
+  }
+  return result;
+}
+
+TEST(Relevance, ThePermutationOfInputsPermutesTheChoice) {
+  for (const std::size_t n_noise : {5U, 40U}) {
+    const RandomExperience experience = pushed_mass(600, n_noise, 0.9, true, 4);
+    const std::vector<bool> kept = relevant(experience);
+    core::Random random(2, core::Stream::useless_inputs);
+    std::vector<std::size_t> order(experience.n_inputs);
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    for (std::size_t i = order.size() - 1; i > 0; --i) {
+      std::swap(order[i], order[random.below(i + 1)]);
+    }
+    const std::vector<bool> kept_of_permuted = relevant(permuted(experience, order));
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      EXPECT_EQ(kept_of_permuted[i], kept[order[i]]) << n_noise << ' ' << i;
+    }
+  }
+}
+
+/// A walk over cells on a line, which actions move, with the cell as the first `n_cells` inputs,
+/// and as many cells behind them over which something else walks by itself.
+RandomExperience two_walks(std::size_t n, std::size_t n_cells, std::uint64_t seed) {
+  core::Random random(seed, core::Stream::useless_inputs);
+  RandomExperience experience{.n_inputs = 2 * n_cells, .circular = std::vector<bool>(2 * n_cells)};
+  experience.actions.resize(1);
+  std::size_t cell = 0, other = 0;
+  const auto note = [&](std::vector<double>& rows) {
+    for (std::size_t i = 0; i < n_cells; ++i) rows.push_back(i == cell ? 1.0 : 0.0);
+    for (std::size_t i = 0; i < n_cells; ++i) rows.push_back(i == other ? 1.0 : 0.0);
+  };
+  for (std::size_t t = 0; t < n; ++t) {
+    note(experience.states);
+    const auto action = static_cast<double>(random.below(2));
+    if (action > 0.0 && cell + 1 < n_cells) ++cell;
+    if (action == 0.0 && cell > 0) --cell;
+    other = random.below(n_cells);
+    note(experience.next_states);
+    experience.actions[0].push_back(action);
+    experience.rewards.push_back(-1.0);
+    experience.ends.push_back(false);
+  }
+  return experience;
+}
+
+TEST(Relevance, KeepsOrLeavesOutOneHotVectorsAsAWhole) {
+  for (const std::size_t n_cells : {5U, 40U}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      std::vector<bool> expected(n_cells, true);
+      expected.resize(2 * n_cells, false);
+      EXPECT_EQ(relevant(two_walks(1000, n_cells, seed)), expected) << n_cells << ' ' << seed;
+    }
+  }
+}
+
+TEST(Relevance, TwoBinaryInputsAreJudgedByThemselves) {
+  // Actions set the first input, chance the second; the third is the reward.
+  int n_kept_by_chance = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    core::Random random(seed, core::Stream::useless_inputs);
+    RandomExperience experience{.n_inputs = 3, .circular = std::vector<bool>(3)};
+    experience.actions.resize(1);
+    std::vector<double> state(3, 0.0);
+    for (int t = 0; t < 1000; ++t) {
+      experience.states.insert(experience.states.end(), state.begin(), state.end());
+      experience.rewards.push_back(state[2]);
+      const auto action = static_cast<double>(random.below(2));
+      state = {action, random.below(2) == 0 ? 0.2 : 0.8, random.uniform()};
+      experience.next_states.insert(experience.next_states.end(), state.begin(), state.end());
+      experience.actions[0].push_back(action);
+      experience.ends.push_back(false);
+    }
+    const std::vector<bool> kept = relevant(experience);
+    EXPECT_TRUE(kept[0] && kept[2]) << seed;
+    n_kept_by_chance += kept[1] ? 1 : 0;
+  }
+  EXPECT_LE(n_kept_by_chance, 3);
+}
+
+TEST(BinaryGroups, ActionsSteerWhatTheyDecide) {
+  // From each of two symbols action 0 leads to symbol 1, action 1 to symbol 2.
+  const detail::BinaryGroup group{.symbols = {1, 1, 2, 2}, .next_symbols = {1, 2, 1, 2}};
+  const std::vector<std::uint8_t> actions{0, 1, 0, 1};
+  // With the action: 4 groups of 1^2 / 1. Without it: 2 groups of (1^2 + 1^2) / 2.
+  EXPECT_EQ(detail::steering(group, actions, 0), 2.0);
+  // One step later each action is the other one, which tells as much; of equal actions nothing.
+  EXPECT_EQ(detail::steering(group, actions, 1), 2.0);
+  EXPECT_EQ(detail::steering(group, std::vector<std::uint8_t>(4), 0), 0.0);
+  // Actions 0, 0, 1, 1 follow from the symbols: 4 groups become the same 2.
+  EXPECT_EQ(detail::steering(group, std::vector<std::uint8_t>{0, 0, 1, 1}, 0), 0.0);
+}
+
+using Groups = std::vector<std::vector<std::size_t>>;
+
+Groups groups_of(const std::vector<double>& states, const std::vector<double>& next_states,
+                 std::size_t n_inputs) {
+  Groups groups;
+  for (const auto& group : detail::binary_groups(states, next_states, n_inputs)) {
+    groups.push_back(group.inputs);
+  }
+  return groups;
+}
+
+TEST(BinaryGroups, HoldInputsThatAreNeverOnTogether) {
+  // Input 3 is a number; inputs 0, 2 and 4 are one-hot, as are 1, 5 and 6.
+  const std::vector<double> states{1, 1, 0, 0.3, 0, 0, 0,  //
+                                   0, 0, 1, 0.5, 0, 1, 0,  //
+                                   0, 0, 0, 0.7, 1, 0, 1};
+  const std::vector<double> next_states{0, 1, 1, 0.5, 0, 0, 0,  //
+                                        1, 0, 0, 0.5, 0, 0, 1,  //
+                                        1, 0, 0, 0.5, 0, 1, 0};
+  EXPECT_EQ(groups_of(states, next_states, 7), (Groups{{0, 2, 4}, {1, 5, 6}}));
+}
+
+TEST(BinaryGroups, HoldAllThatAreOnTogetherInTheLastOne) {
+  const std::vector<double> states{0.2, 0.2, 0.2, 0.1,  //
+                                   0.2, 0.2, 0.2, 0.2,  //
+                                   0.8, 0.8, 0.8, 0.3};
+  EXPECT_EQ(groups_of(states, states, 4), (Groups{{0, 1, 2}}));
+  // Two binary inputs are no group.
+  EXPECT_EQ(groups_of(std::vector{0.0, 0.0, 0.5, 1.0, 1.0, 0.7},
+                      std::vector{0.0, 1.0, 0.9, 1.0, 0.0, 0.8}, 3),
+            Groups());
+}
+
+TEST(BinaryGroups, HoldConstantsAtAnEndOfTheirRange) {
+  // The second was never on, the third never left the middle, the last was always on.
+  const std::vector<double> states{1, 0, 0.5, 0, 0, 1,  //
+                                   0, 0, 0.5, 1, 0, 1};
+  EXPECT_EQ(groups_of(states, states, 6), (Groups{{0, 1, 3, 4}}));
 }
 
 TEST(Relevance, AnAngleThatPassesItsEndHasMovedLittle) {

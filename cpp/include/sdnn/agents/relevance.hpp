@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "sdnn/agents/detail/binary_groups.hpp"
 #include "sdnn/core/detail/floating_point.hpp"
 #include "sdnn/core/detail/interruption.hpp"
 
@@ -40,6 +41,14 @@ struct RandomExperience {
 /// against each other when one is shifted in time, by 40 different lengths: 1.5 times the largest
 /// of these must be exceeded, of pairs twice. Shifts leave each series as it is, so slow noise,
 /// which seems to depend on everything, is compared with itself.
+///
+/// There are about n^2 comparisons of n inputs, and of many inputs some exceed that by chance. With
+/// more than 24 inputs the cube root of F, which is nearly normal, must also lie sqrt(2 log(10
+/// n^2)) standard deviations above its mean over the shifts, and rest on 8 values.
+///
+/// Three binary inputs or more form groups (see detail::binary_groups), which matter as a whole if
+/// one input does. As a group has many chances, its inputs need that evidence among few inputs,
+/// too.
 class Relevance {
  public:
   /// With more `caution` than 1 as many times more evidence is needed: for who looks often.
@@ -53,36 +62,69 @@ class Relevance {
     const std::size_t n = experience_.size();
     std::vector<bool> matters(n_inputs);
     if (n < kLeast) return std::vector<bool>(n_inputs, true);
-    std::vector<std::vector<std::uint8_t>> bins, bins_of_actions;
+    std::vector<Bins> bins, bins_of_actions;
     std::vector<std::vector<double>> changes;
     for (std::size_t i = 0; i < n_inputs; ++i) {
       bins.push_back(binned(column(experience_.states, i)));
       changes.push_back(changes_of(i));
     }
     for (const auto& actions : experience_.actions) bins_of_actions.push_back(binned(actions));
-    const std::vector<std::vector<double>> outcomes{experience_.rewards, sums_of_rewards()};
-    std::vector<std::size_t> found;
-    for (std::size_t i = 0; i < n_inputs; ++i) {
-      matters[i] =
-          known[i] ||
-          std::ranges::any_of(outcomes, [&](const auto& one) { return depends(one, bins[i]); }) ||
-          std::ranges::any_of(bins_of_actions,
-                              [&](const auto& actions) { return depends(changes[i], actions); });
-      if (matters[i]) found.push_back(i);
+    std::vector<std::vector<std::size_t>> group_of(n_inputs);  // empty: the input alone
+    const auto groups =
+        detail::binary_groups(experience_.states, experience_.next_states, n_inputs);
+    for (const auto& group : groups) {
+      for (const std::size_t i : group.inputs) {
+        group_of[i] = group.inputs;
+        bins[i] = halves(column(experience_.states, i));
+      }
     }
-    while (!found.empty()) {
-      const std::size_t moved = found.back();
-      found.pop_back();
+    const auto is_strict = [&](std::size_t i) {
+      return n_inputs > kMostWithoutChance || !group_of[i].empty();
+    };
+    const std::vector<std::vector<double>> outcomes{experience_.rewards, sums_of_rewards()};
+    std::vector<std::size_t> pending;
+    const auto add = [&](std::size_t i) {
+      for (const std::size_t member : group_of[i].empty() ? std::vector{i} : group_of[i]) {
+        matters[member] = true;
+        pending.push_back(member);
+      }
+    };
+    for (std::size_t i = 0; i < n_inputs; ++i) {
+      core::interruption_point();
+      if (matters[i]) continue;
+      const auto decides = [&](const auto& values) {
+        return depends(values, bins[i], is_strict(i));
+      };
+      const auto changes_it = [&](const Bins& actions) {
+        return depends(changes[i], actions, is_strict(i));
+      };
+      if (known[i] || std::ranges::any_of(outcomes, decides) ||
+          std::ranges::any_of(bins_of_actions, changes_it)) {
+        add(i);
+      }
+    }
+    for (const auto& group : groups) {
+      const auto steers = [&](const Bins& actions) { return are_moved(group, actions); };
+      if (!matters[group.inputs.front()] && std::ranges::any_of(bins_of_actions, steers)) {
+        add(group.inputs.front());
+      }
+    }
+    while (!pending.empty()) {
+      const std::size_t moved = pending.back();
+      pending.pop_back();
       for (std::size_t i = 0; i < n_inputs; ++i) {
         core::interruption_point();
-        if (matters[i] || !depends(changes[moved], bins[i])) continue;
-        matters[i] = true;
-        found.push_back(i);
+        const bool needs_more = is_strict(i) || is_strict(moved);
+        if (!matters[i] && depends(changes[moved], bins[i], needs_more)) add(i);
       }
     }
     if (n_inputs <= kMostInPairs) {
       const std::vector<bool> alone = matters;
-      for (const auto& one : outcomes) find_pairs(one, bins, alone, matters);
+      for (const auto& one : outcomes) find_pairs(one, bins, alone, is_strict, matters);
+      for (const auto& group : groups) {
+        const bool any = std::ranges::any_of(group.inputs, [&](auto i) { return matters[i]; });
+        for (const std::size_t i : group.inputs) matters[i] = any;
+      }
     }
     if (std::ranges::count(matters, true) < 2) matters.assign(n_inputs, true);
     return matters;
@@ -90,6 +132,8 @@ class Relevance {
 
  private:
   static constexpr std::size_t kLeast = 100;  // fewer say nothing
+  static constexpr std::size_t kMostWithoutChance = 24;
+  static constexpr std::size_t kLeastDeciding = 8;
   static constexpr std::size_t kBins = 8;
   static constexpr std::size_t kMostBins = 16;     // of a pair
   static constexpr std::size_t kMostInPairs = 64;  // time grows as their square
@@ -98,6 +142,8 @@ class Relevance {
   static constexpr double kDiscount = 0.95;
   static constexpr double kFactor = 1.5;
   static constexpr double kFactorOfPairs = 2.0;  // there are more of them
+
+  using Bins = std::vector<std::uint8_t>;
 
   std::vector<double> column(const std::vector<double>& rows, std::size_t i) const {
     std::vector<double> values;
@@ -145,7 +191,13 @@ class Relevance {
     return bins;
   }
 
-  using Bins = std::vector<std::uint8_t>;
+  /// Two bins of a binary input, however rare its larger value is.
+  static Bins halves(const std::vector<double>& values) {
+    const double low = std::ranges::min(values);
+    Bins bins;
+    for (const double value : values) bins.push_back(value > low ? kBins - 1 : 0);
+    return bins;
+  }
 
   /// Between the bins' means and within the bins; 0 where nothing varies. Bin t + shift, with bin t
   /// of `beside` where it is given, belongs to value t.
@@ -180,7 +232,8 @@ class Relevance {
 
   /// Adds the inputs that matter together with another one.
   void find_pairs(const std::vector<double>& outcomes, std::vector<Bins> bins,
-                  const std::vector<bool>& alone, std::vector<bool>& matters) const {
+                  const std::vector<bool>& alone, const auto& is_strict,
+                  std::vector<bool>& matters) const {
     for (Bins& of_input : bins) {
       for (std::uint8_t& bin : of_input) bin /= 2;
     }
@@ -188,9 +241,8 @@ class Relevance {
       const std::vector<double> beyond = without_means(outcomes, bins[i]);
       for (std::size_t j = 0; j < bins.size(); ++j) {
         core::interruption_point();
-        if (j == i || alone[j] || (j < i && !alone[i]) || !depends(beyond, bins[j], &bins[i])) {
-          continue;
-        }
+        if (j == i || alone[j] || (j < i && !alone[i])) continue;
+        if (!depends(beyond, bins[j], is_strict(i) || is_strict(j), &bins[i])) continue;
         matters[i] = matters[j] = true;
       }
     }
@@ -208,16 +260,69 @@ class Relevance {
     return values;
   }
 
-  bool depends(const std::vector<double>& values, const Bins& bins,
+  static double n_different(const Bins& bins) {
+    bool is_used[kMostBins] = {};
+    for (const std::uint8_t bin : bins) is_used[bin] = true;
+    return static_cast<double>(std::ranges::count(is_used, true));
+  }
+
+  /// The number of values that are not the usual one, in bins that are not the fullest one: a few
+  /// coincidences of rare events make any statistic large.
+  static std::size_t n_deciding(const std::vector<double>& values, const Bins& bins) {
+    std::size_t counts[kMostBins] = {};
+    for (const std::uint8_t bin : bins) ++counts[bin];
+    const auto fullest = std::ranges::max_element(counts) - counts;
+    std::vector<double> sorted = values;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::ranges::nth_element(sorted, middle);
+    std::size_t n = 0;
+    for (std::size_t t = 0; t < values.size(); ++t) {
+      if (bins[t] != fullest && values[t] != *middle) ++n;
+    }
+    return n;
+  }
+
+  /// Whether the values differ between bins by more than chance, by more evidence if `is_strict`.
+  bool depends(const std::vector<double>& values, const Bins& bins, bool is_strict,
                const Bins* beside = nullptr) const {
     const double factor = caution_ * (beside == nullptr ? kFactor : kFactorOfPairs);
     const double statistic = f_statistic(values, bins, 0, beside);
     if (!(statistic > 0.0)) return false;
+    std::vector<double> by_chance;
     for (std::size_t k = 1; k <= kShifts; ++k) {
       const std::size_t shift = k * values.size() / (kShifts + 1);
-      if (statistic <= factor * f_statistic(values, bins, shift, beside)) return false;
+      by_chance.push_back(f_statistic(values, bins, shift, beside));
+      if (statistic <= factor * by_chance.back()) return false;
     }
-    return true;
+    if (!is_strict) return true;
+    for (double& x : by_chance) x = std::cbrt(x);
+    return n_deciding(values, bins) >= kLeastDeciding &&
+           stands_out(std::cbrt(statistic / caution_), by_chance,
+                      2.0 / (9.0 * (n_different(bins) - 1.0)));
+  }
+
+  /// Whether actions decide which input of a one-hot vector is on next, given that which is.
+  bool are_moved(const detail::BinaryGroup& group, const Bins& actions) const {
+    if (group.symbols.empty()) return false;
+    std::vector<double> by_chance;
+    for (std::size_t k = 1; k <= kShifts; ++k) {
+      const std::size_t shift = k * actions.size() / (kShifts + 1);
+      by_chance.push_back(detail::steering(group, actions, shift));
+    }
+    return stands_out(detail::steering(group, actions, 0) / caution_, by_chance, 0.0);
+  }
+
+  /// Whether a normal number is too large for one of n^2 that came by chance. Those of the shifted
+  /// series show mean and variance, which are at least 1 - `variance` and `variance`, if it is not
+  /// 0: those of the cube root of F with independent values.
+  bool stands_out(double statistic, const std::vector<double>& by_chance, double variance) const {
+    double mean = 0.0, square = 0.0;
+    for (const double x : by_chance) mean += x / kShifts;
+    for (const double x : by_chance) square += (x - mean) * (x - mean) / kShifts;
+    const auto n_inputs = static_cast<double>(experience_.n_inputs);
+    const double margin = std::sqrt(2.0 * std::log(10.0 * n_inputs * n_inputs));
+    if (variance > 0.0) mean = std::max(mean, 1.0 - variance);
+    return statistic > mean + margin * std::sqrt(std::max(square, variance));
   }
 
   const RandomExperience& experience_;

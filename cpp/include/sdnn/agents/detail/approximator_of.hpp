@@ -73,6 +73,14 @@ inline std::vector<coding::PatternTable> tables_of(const ControllerConfig& confi
       approximator);
 }
 
+/// The most pairs where the number is not set, so that a step of a linear readout stays short: all
+/// pairs of 32 inputs, and a share of them if inputs were chosen and more remain. 0: all.
+inline int most_pairs(const ControllerConfig& config, std::int64_t n_inputs) noexcept {
+  constexpr int kMost = 1024;
+  const bool is_chosen = is_linear(config.approximator) && config.observation.relevant_only;
+  return is_chosen && n_inputs * (n_inputs - 1) > kMost ? kMost : 0;
+}
+
 /// The approximator with the sizes, circles and symbols of a task whose ranges are known. Throws
 /// std::invalid_argument for tables that do not fit its symbols.
 inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
@@ -101,6 +109,8 @@ inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
         }
         auto first = own;  // inputs that are added have as many units
         if (history.is_none()) first.n_inputs = static_cast<int>(observations.n_first_inputs());
+        if (own.max_pairs == 0)
+          own.max_pairs = first.max_pairs = most_pairs(config, first.n_inputs);
         own.n_pattern_units = approximators::with_pattern_units(first).n_pattern_units;
       }
       for (std::size_t i = 0; i < std::min(tables.size(), n_symbols.size()); ++i) {
