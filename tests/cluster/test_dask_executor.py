@@ -46,7 +46,7 @@ def run(folder, plan, cluster=None, observer=None, timeout=60.0):
         return outcome, records_digest(store.load())
 
 
-def test_rows_are_those_of_a_local_run(pair, tmp_path):
+def test_rows_of_a_cluster_are_those_of_a_local_run(pair, tmp_path):
     recorder, plan = Recorder(), make_plan(3)
     outcome, digest = run(tmp_path / "cluster", plan, pair, recorder)
     assert outcome.n_run == 6
@@ -59,7 +59,7 @@ def test_rows_are_those_of_a_local_run(pair, tmp_path):
     assert (again.n_reused, again.n_run) == (6, 0)
 
 
-def test_two_drivers_may_run_the_same_trials(pair, tmp_path):
+def test_two_drivers_of_the_same_trials_get_the_same_rows(pair, tmp_path):
     plan, digests = make_plan(4, 500), {}
 
     def drive(name):
@@ -73,7 +73,7 @@ def test_two_drivers_may_run_the_same_trials(pair, tmp_path):
     assert digests["a"] == digests["b"] == run(tmp_path / "here", plan)[1]
 
 
-def test_the_command_prints_the_same_table(pair, tmp_path, monkeypatch):
+def test_reproduce_on_a_cluster_prints_the_digest_of_a_local_run(pair, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     arguments = ["reproduce", "a", "--trials", "1", "--episodes", "10", "--json"]
     dask = ["--executor", "dask", "--scheduler", str(pair.file)]
@@ -84,7 +84,7 @@ def test_the_command_prints_the_same_table(pair, tmp_path, monkeypatch):
     assert json.loads(there.stdout)["digest"] == json.loads(here.stdout)["digest"]
 
 
-def test_a_gymnasium_environment_runs_there_too(pair, tmp_path):
+def test_trials_of_gymnasium_environments_have_the_rows_of_a_local_run(pair, tmp_path):
     env = EnvironmentSpec(id="Pendulum-v1", kwargs={"max_episode_steps": 20})
     spec = RunSpec(environment=env, budget=BudgetSpec(episodes=2))
     plan = [
@@ -97,7 +97,7 @@ def test_a_gymnasium_environment_runs_there_too(pair, tmp_path):
     assert digest == run(tmp_path / "here", plan)[1]
 
 
-def test_a_long_trial_reports_its_progress(pair, tmp_path):
+def test_long_trials_report_progress_and_free_their_workers_when_interrupted(pair, tmp_path):
     stop = threading.Event()
     plan = make_plan(1, 10_000_000)
     messages = []
@@ -118,7 +118,7 @@ def test_a_long_trial_reports_its_progress(pair, tmp_path):
     assert time.monotonic() - begin < 20
 
 
-def test_a_trial_that_raises_fails_and_the_others_are_done(pair, tmp_path):
+def test_a_failing_trial_does_not_stop_the_others(pair, tmp_path):
     plan = list(make_plan(2))
     plan[0] = PlannedTrial(plan[0].key._replace(seed=-1), plan[0].spec)
     outcome, _ = run(tmp_path, plan, pair)
@@ -128,7 +128,7 @@ def test_a_trial_that_raises_fails_and_the_others_are_done(pair, tmp_path):
     assert "seed" in str(failure.error)
 
 
-def test_an_agent_that_workers_do_not_know_is_named(pair, tmp_path, monkeypatch):
+def test_an_agent_unknown_to_workers_is_refused_by_name(pair, tmp_path, monkeypatch):
     entry = replace(AGENTS["sdnn-c"], id="mine", core_trial=None)
     monkeypatch.setitem(AGENTS, "mine", entry)
     plan = []
@@ -159,7 +159,7 @@ UNFIT = {
 }
 
 
-def test_workers_that_do_not_fit_get_no_trials(cluster, tmp_path):
+def test_workers_with_other_code_get_no_trials(cluster, tmp_path):
     """Where there are only such workers the run fails; beside them a fitting one runs all."""
     for code in UNFIT.values():
         cluster.add_worker(code)
@@ -200,7 +200,7 @@ AGENTS["sdnn-c"] = replace(AGENTS["sdnn-c"], core_trial=Poison)
 
 
 @pytest.mark.parametrize("allowed_failures", ["1", "10"])  # or till all workers were lost
-def test_a_trial_that_kills_its_workers_fails_and_the_others_are_done(
+def test_a_trial_that_kills_its_workers_does_not_stop_the_others(
     cluster, tmp_path, monkeypatch, allowed_failures
 ):
     cluster.kill(cluster.scheduler)
@@ -219,7 +219,7 @@ def test_a_trial_that_kills_its_workers_fails_and_the_others_are_done(
 
 
 @pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGSTOP])
-def test_workers_may_be_killed_or_frozen(cluster, tmp_path, way):
+def test_killed_or_frozen_workers_do_not_change_the_rows(cluster, tmp_path, way):
     plan = make_plan(4, 600)
     hurt = []
 
@@ -236,7 +236,7 @@ def test_workers_may_be_killed_or_frozen(cluster, tmp_path, way):
     assert digest == run(tmp_path / "here", plan)[1]
 
 
-def test_after_a_lost_scheduler_the_same_command_continues(cluster, tmp_path):
+def test_a_command_continues_after_a_lost_scheduler(cluster, tmp_path):
     arguments = ["a", "--trials", "3", "--episodes", "600", "--json"]
     command = [sys.executable, "-m", "sdnn", "reproduce", *arguments]
     command += ["--out", str(tmp_path / "out"), "--executor", "dask"]
@@ -270,6 +270,6 @@ def wait_for_rows(folder):
     raise AssertionError("no trial was stored")
 
 
-def test_no_worker_is_a_clear_error_in_time(cluster, tmp_path):
+def test_a_cluster_without_workers_is_refused_after_the_timeout(cluster, tmp_path):
     with pytest.raises(ClusterError, match="worker"):
         run(tmp_path / "out", make_plan(1), cluster, timeout=2.0)

@@ -29,7 +29,7 @@ AGENTS = {
 }
 
 
-def test_the_options_exist():
+def test_options_named_by_the_guides_exist():
     commands = main.commands.values()
     options = {o for c in commands for p in c.get_params(click.Context(c)) for o in p.opts}
     for page in ("agents", "choosing-settings", "command-line", "robots", "training"):
@@ -37,7 +37,7 @@ def test_the_options_exist():
         assert set(re.findall(r"--[a-z][a-z-]*", text)) <= options | {"--help"}, page
 
 
-def test_the_table_of_presets_is_right():
+def test_the_table_of_presets_has_the_values_of_the_presets():
     text = (DOCS / "reference/agents/sdnn-c.md").read_text()
     name, cell = r"`(\w+)\.(\w+)`(?:, `q_high`)?", r"(.*?)"
     rows = re.findall(rf"^\| {name} \| {cell} \| {cell} \| {cell} \|", text, re.MULTILINE)
@@ -73,7 +73,7 @@ def rows_of(text, first_cell):
 
 
 @pytest.mark.parametrize("agent_id", AGENTS)
-def test_an_agent_page_is_short_and_in_order(agent_id):
+def test_an_agent_page_has_its_sections_in_order_and_at_most_400_words(agent_id):
     before, parameters = page_of(agent_id).split("## Parameters")
     assert sum(len(line.split()) for line in before.splitlines() if line[:1] != "|") <= 400
     titles = ["Can I use it?", "Example", "Notes", "Results"]
@@ -92,7 +92,7 @@ SPACES = {
 
 
 @pytest.mark.parametrize("agent_id", AGENTS)
-def test_an_agent_takes_the_spaces_that_its_page_lists(agent_id):
+def test_an_agent_accepts_exactly_the_spaces_that_its_page_lists(agent_id):
     rows = rows_of(page_of(agent_id), "space")
     assert [name for row in rows for name in row["space"].split(", ")] == list(SPACES)
     for row in rows:
@@ -106,7 +106,7 @@ def test_an_agent_takes_the_spaces_that_its_page_lists(agent_id):
 
 
 @pytest.mark.parametrize("agent_id", AGENTS)
-def test_an_agent_has_the_features_that_its_page_lists(agent_id, tmp_path):
+def test_an_agent_has_exactly_the_features_that_its_page_lists(agent_id, tmp_path):
     features = {row["feature"]: row[""] for row in rows_of(page_of(agent_id), "feature")}
     known = {"observation_range": (-1, 1), "inputs": "all", "angle_pairs": "none", "seed": 1}
     agent = AGENTS[agent_id](SPACES["Box"], SPACES["Box"], **known)
@@ -139,7 +139,7 @@ def test_an_agent_has_the_features_that_its_page_lists(agent_id, tmp_path):
     assert has("exact resume")
 
 
-def test_results_on_agent_pages_are_those_of_the_evidence():
+def test_results_on_agent_pages_equal_the_benchmarks():
     evidence = (DOCS / "evidence" / "benchmarks.md").read_text()
     at_the_end = evidence.split("<!-- table: at the end -->")[1].split("<!-- end of table -->")[0]
     measured = {row["task"]: row for row in rows_of(at_the_end, "task")}

@@ -1,4 +1,4 @@
-"""The examples run as they are, and say what is true; their notebooks are the same."""
+"""The examples run and reach their stated results; their notebooks have the same cells."""
 
 import os
 import re
@@ -46,13 +46,13 @@ def numbers(pattern, printed):
     return [float(number) for number in match.groups()]
 
 
-def test_the_page_learns_with_the_settings_of_its_options(tmp_path):
+def test_the_transcription_of_sdnn_c_runs_with_its_options(tmp_path):
     options = ["--episodes", "3", "--n-inputs", "5", "--noise", "0.02"]
     lines = run(PAGE, tmp_path, *options).splitlines()
     assert [line.split(":")[0] for line in lines] == ["episode 1", "episode 2", "episode 3"]
 
 
-def test_the_page_of_q_lambda_trains_from_the_command_line(tmp_path):
+def test_the_transcription_of_q_lambda_runs_with_its_options(tmp_path):
     options = ["--env-id", "MountainCarContinuous-v0", "--steps", "1000"]
     assert run(Q_LAMBDA, tmp_path, *options).startswith("step 999: return -")
 
@@ -97,7 +97,7 @@ def trained_as_on_page(page, agent_class, env_id, n_steps):
 @pytest.mark.parametrize(
     ("env_id", "n_steps"), [("CartPole-v1", 3000), ("Pendulum-v1", 600), ("Acrobot-v1", 600)]
 )
-def test_the_page_of_q_lambda_has_the_weights_of_the_library(env_id, n_steps):
+def test_the_transcription_of_q_lambda_has_the_weights_of_the_library(env_id, n_steps):
     page, agent = trained_as_on_page(sdnn_q_lambda, SDNNQLambda, env_id, n_steps)
     state = agent.state()
     for name, numbers in (("weights", page.weights), ("averaged_weights", page.average)):
@@ -109,7 +109,7 @@ def test_the_page_of_q_lambda_has_the_weights_of_the_library(env_id, n_steps):
 @pytest.mark.parametrize(
     ("env_id", "n_steps"), [("CartPole-v1", 2000), ("Pendulum-v1", 500), ("Acrobot-v1", 400)]
 )
-def test_the_page_of_the_actor_critic_has_the_weights_of_the_library(env_id, n_steps):
+def test_the_transcription_of_the_actor_critic_has_the_weights_of_the_library(env_id, n_steps):
     page, agent = trained_as_on_page(sdnn_actor_critic, SDNNActorCritic, env_id, n_steps)
     state = agent.state()
     np.testing.assert_array_equal(state["agent.actor.weights"], page.weights)
@@ -118,7 +118,7 @@ def test_the_page_of_the_actor_critic_has_the_weights_of_the_library(env_id, n_s
     assert np.abs(page.weights).max() > 2**12, "something was learned"
 
 
-def test_cited_sections_of_the_method_are_there():
+def test_cited_sections_of_the_method_exist():
     root = FOLDER.parents[1]
     method = (root / "docs" / "explanation" / "method.md").read_text("utf-8")
     sections = set(re.findall(r"^#+ ([\d.]*\d)", method, re.MULTILINE))
@@ -130,33 +130,33 @@ def test_cited_sections_of_the_method_are_there():
     assert cited <= sections
 
 
-def test_the_acrobot_is_solved(tmp_path):
+def test_the_acrobot_example_solves_80_percent_of_episodes(tmp_path):
     solved, of = numbers(r"in the last (20): (\d+)", run(FOLDER / "acrobot.py", tmp_path))[::-1]
     assert solved >= 0.8 * of
 
 
-def test_the_agent_beats_the_rule_in_the_own_environment(tmp_path):
+def test_the_custom_environment_example_beats_its_rule(tmp_path):
     printed = run(FOLDER / "own_environment.py", tmp_path)
     (agent,) = numbers(r"agent: return ([-.\d]+)", printed)
     (rule,) = numbers(r"jetty: return ([-.\d]+)", printed)
     assert agent > rule
 
 
-def test_robust_keeps_what_the_papers_settings_lose_in_noise(tmp_path):
+def test_the_noise_example_solves_more_with_robust_than_with_paper(tmp_path):
     printed = run(FOLDER / "noisy_sensors.py", tmp_path)
     shares = re.findall(r"(paper|robust), seed \d: solved (\d+)%", printed)
     of = {preset: [int(s) for name, s in shares if name == preset] for preset in dict(shares)}
     assert min(of["robust"]) > max(of["paper"])
 
 
-def test_the_arm_learns_to_reach(tmp_path):
+def test_the_arm_example_reduces_its_distance_to_a_third(tmp_path):
     printed = run(FOLDER / "two_torques.py", tmp_path)
     before, after = numbers(r"before: ([.\d]+) m, after: ([.\d]+) m", printed)
     assert after < before / 3
     assert numbers(r"at the end: ([.\d]+) m", printed)[0] < 0.3
 
 
-def test_a_model_that_continues_to_learn_follows_the_drift(tmp_path):
+def test_the_drift_example_follows_the_drift_online(tmp_path):
     printed = run(FOLDER / "drifting_regression.py", tmp_path)
     r2, most = numbers(r"cross-validation: ([.\d]+); noise allows ([.\d]+)", printed)
     assert 0.9 < r2 < most
@@ -166,7 +166,7 @@ def test_a_model_that_continues_to_learn_follows_the_drift(tmp_path):
     assert online < 1.5 * before
 
 
-def test_cpp_gives_the_same_actions(tmp_path, cmake, skip_unless_ci):
+def test_the_cpp_example_gives_the_actions_of_python(tmp_path, cmake, skip_unless_ci):
     if shutil.which("cmake") is None and not Path(sys.executable).with_name("cmake").exists():
         skip_unless_ci("needs cmake")
     include = [Path("/usr/include"), Path("/usr/local/include")]
@@ -185,7 +185,7 @@ def test_every_example_is_tested_and_listed():
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
-def test_notebooks_are_their_scripts(script):
+def test_notebooks_have_the_cells_of_their_scripts(script):
     pytest.importorskip("jupytext")
     notebook = runpy.run_path(str(MAKER))["notebook_of"](script)
     pieces = re.split(r"^# %%(.*)\n", script.read_text(), flags=re.MULTILINE)
@@ -200,7 +200,7 @@ def test_notebooks_are_their_scripts(script):
     assert cells[0][1].startswith("# ")
 
 
-def test_the_command_makes_and_runs_notebooks(tmp_path):
+def test_make_notebooks_converts_and_executes_scripts(tmp_path):
     pytest.importorskip("nbclient")
     nbformat = pytest.importorskip("nbformat")
     maker = runpy.run_path(str(MAKER))

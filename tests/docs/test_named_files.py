@@ -4,7 +4,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 
 
-def test_the_documents_name_files_that_are_there():
+def test_files_named_by_the_documents_exist():
     folders = [ROOT / name for name in ("cpp", "python", "bench", "tests", "docs")]
     there = {f"/{path.as_posix()}" for folder in folders for path in folder.rglob("*.*")}
     pages = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]

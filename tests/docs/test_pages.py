@@ -29,7 +29,7 @@ def run(page, *options):
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", PAGES)
-def test_the_blocks_of_a_page_run(name, skip_unless_ci):
+def test_the_code_blocks_of_a_page_run(name, skip_unless_ci):
     lacking = set(re.findall(r"left out, (needs .*)", run(PAGES[name])))
     if lacking:
         skip_unless_ci(f"all but some blocks ran: {'; '.join(sorted(lacking))}")
@@ -40,11 +40,11 @@ def test_the_blocks_of_a_page_run(name, skip_unless_ci):
 @pytest.mark.parametrize(
     "name", [n for n, p in PAGES.items() if any(b.mark == "weekly" for b in run_page.blocks(p))]
 )
-def test_the_long_blocks_of_a_page_run(name):
+def test_the_weekly_code_blocks_of_a_page_run(name):
     run(PAGES[name], "--weekly")
 
 
-def test_most_blocks_run_at_every_change():
+def test_two_thirds_of_the_code_blocks_run_at_every_change():
     counts = run_page.count()
     assert counts["run"] + counts["needs"] > 2 * (counts["weekly"] + counts["not run"])
     assert set(counts) == {"run", "needs", "weekly", "not run"}
@@ -59,14 +59,14 @@ def test_most_blocks_run_at_every_change():
         ("<!-- sometimes: rain -->\n```sh\nls\n```\n", "no mark is called 'sometimes'"),
     ],
 )
-def test_an_unknown_block_is_an_error(text, message, tmp_path):
+def test_unknown_languages_and_marks_of_blocks_are_refused(text, message, tmp_path):
     page = tmp_path / "page.md"
     page.write_text(text)
     with pytest.raises(ValueError, match=message):
         run_page.blocks(page)
 
 
-def test_a_block_that_fails_is_named(tmp_path):
+def test_the_error_of_a_failing_block_names_it(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("Text.\n\n```python\nx = 1\n```\n\n```python\nassert x == 2\n```\n")
     with pytest.raises(AssertionError, match=r"page\.md from line 8"):

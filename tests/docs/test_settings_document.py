@@ -14,14 +14,14 @@ from sdnn.runs.config_file import PAPER_ARGUMENTS, core_parts, spec_schema
 SCRIPT = Path(__file__).parents[2] / "docs" / "write_settings.py"
 
 
-def test_the_page_is_that_of_the_declarations():
+def test_the_settings_page_is_up_to_date():
     spec = importlib.util.spec_from_file_location("write_settings", SCRIPT)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     assert module.PAGE.read_text("utf-8") == module.page(), "run docs/write_settings.py"
 
 
-def test_the_schema_has_every_setting_and_is_printed():
+def test_the_printed_json_schema_has_every_setting():
     schema = spec_schema()
     parts = [config for configs in core_parts().values() for config in configs]
     for config in (*parts, *PAPER_ARGUMENTS.values()):
@@ -31,7 +31,7 @@ def test_the_schema_has_every_setting_and_is_printed():
     assert json.loads(printed.stdout) == json.loads(json.dumps(schema))
 
 
-def test_the_schema_tells_good_files_from_bad_ones():
+def test_the_json_schema_accepts_valid_and_rejects_invalid_files():
     jsonschema = pytest.importorskip("jsonschema")
     schema = json.loads(json.dumps(spec_schema()))
     jsonschema.validate({"environment": "CartPole-v1", "budget": {"steps": 5}}, schema)

@@ -34,7 +34,7 @@ def pages(site):
     return {p.relative_to(site).as_posix(): p.read_text("utf-8") for p in site.rglob("*.html")}
 
 
-def test_every_document_is_a_page(site):
+def test_every_document_is_in_the_navigation(site):
     paths = set(pages(site))
     for document in (ROOT / "docs").rglob("*.md"):
         place = document.relative_to(ROOT / "docs")
@@ -43,7 +43,7 @@ def test_every_document_is_a_page(site):
     assert "index.html" in paths
 
 
-def test_every_link_within_the_site_leads_somewhere(site):
+def test_every_internal_link_of_the_site_resolves(site):
     for name, text in pages(site).items():
         if name == "404.html":
             continue
@@ -63,7 +63,7 @@ def test_the_reference_has_every_public_name(site):
             assert text.count(entry) == 1, f"{package}.{name} has no entry, or several"
 
 
-def test_the_cpp_reference_is_made_without_a_warning(tmp_path, skip_unless_ci):
+def test_doxygen_builds_the_cpp_reference_without_warnings(tmp_path, skip_unless_ci):
     if shutil.which("doxygen") is None:
         skip_unless_ci("needs doxygen")
     text = (ROOT / "docs/site/Doxyfile").read_text() + f'\nOUTPUT_DIRECTORY = "{tmp_path}"\n'

@@ -13,7 +13,7 @@ from sdnn.export import c_header
 TEXT = (Path(__file__).parents[2] / "docs" / "how-to" / "small-processors.md").read_text()
 
 
-def test_the_names_and_options_exist():
+def test_names_and_options_on_the_page_of_small_processors_exist():
     commands = main.commands.values()
     options = {o for c in commands for p in c.get_params(click.Context(c)) for o in p.opts}
     ours = re.sub(r"`python bench[^`]*`", "", TEXT)

@@ -12,11 +12,11 @@ STUDIES = sorted((ROOT / "docs" / "studies").glob("*.toml"))
 
 
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.stem)
-def test_the_studies_can_be_run(path):
+def test_documented_studies_have_valid_settings(path):
     ClaimStudy(path).check()
 
 
 @pytest.mark.parametrize("name", ["tie-rules", "pendulum"])
-def test_the_page_shows_the_studies_as_they_are(name):
+def test_the_page_shows_the_study_files_unchanged(name):
     text = (ROOT / "docs" / "studies" / f"{name}.toml").read_text()
     assert text.partition("[study]")[2] in PAGE

@@ -67,7 +67,7 @@ def first_lines(lines):
     return runs
 
 
-def test_texts_avoid_the_expressions_of_the_list():
+def test_texts_avoid_the_listed_expressions():
     violations = []
     for path in {*pages(), *sources()} - {Path(__file__)}:
         text = path.read_text("utf-8")
@@ -80,13 +80,13 @@ def test_texts_avoid_the_expressions_of_the_list():
     assert sorted(violations) == []
 
 
-def test_the_list_finds_what_it_names():
+def test_each_listed_expression_matches_its_example():
     examples = ("The agent goes on learning.", "Three rivals", "as they\n    // come", "is told")
     for example in examples:
         assert any(pattern.search(example) for pattern, _ in expressions()), example
 
 
-def test_comments_are_sentences_that_need_no_other():
+def test_comments_do_not_open_with_fragments():
     violations = [
         f"{path.relative_to(ROOT)}:{line}: {text.splitlines()[0]}"
         for path in sources()
@@ -111,7 +111,7 @@ def n_words(page):
     return sum(len(line.split()) for line in lines if not line.startswith("|"))
 
 
-def test_the_documents_are_short():
+def test_documents_keep_their_limits_of_words():
     lengths = {
         page.relative_to(ROOT).as_posix(): n_words(page)
         for page in pages()

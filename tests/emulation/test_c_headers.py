@@ -28,14 +28,16 @@ def target(request, needs):
 
 
 @pytest.mark.parametrize("name", AGENTS)
-def test_the_actions_are_the_agents(name, target, tmp_path):
+def test_actions_on_other_processors_are_those_of_the_agent(name, target, tmp_path):
     check_all_actions(name, target, tmp_path)
 
 
 @pytest.mark.parametrize("n_steps", [1000, pytest.param(100_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", LEARNERS)
 @pytest.mark.parametrize("kind", [*TARGETS, *BARE_TARGETS])
-def test_it_learns_as_the_agent(kind, name, n_steps, needs, tmp_path):
+def test_learning_on_other_processors_has_the_bits_of_the_agent(
+    kind, name, n_steps, needs, tmp_path
+):
     target = (TARGETS | BARE_TARGETS)[kind]
     linker = ["ld.lld"] if kind in BARE_TARGETS else []
     needs(*filter(None, (target.compiler, target.runner)), *linker)
@@ -44,7 +46,7 @@ def test_it_learns_as_the_agent(kind, name, n_steps, needs, tmp_path):
 
 @pytest.mark.parametrize("name", LEARNERS)
 @pytest.mark.parametrize("kind", ["thumbv6m-none-eabi", "thumbv7em-none-eabi", "riscv32-none-elf"])
-def test_learning_compiles_for_microcontrollers(name, kind, needs, tmp_path):
+def test_learning_compiles_for_microcontrollers_with_few_library_calls(name, kind, needs, tmp_path):
     """At most a multiplication and shifts of 64 bits are called from the compiler's library."""
     needs("clang", "nm")
     (tmp_path / "agent.h").write_text(c_header(LEARNERS[name](), "agent", learning=True).text)
@@ -86,7 +88,7 @@ def test_learning_compiles_where_int_has_16_bits(name, needs, tmp_path):
     run("clang", *options, "-fsyntax-only", tmp_path / "agent.c")
 
 
-def test_symbols_are_coded_as_ones_and_zeros(target, tmp_path):
+def test_discrete_observations_are_one_hot_on_other_processors(target, tmp_path):
     check_symbols(target, tmp_path)
 
 
@@ -95,7 +97,7 @@ def test_the_integer_path_needs_no_library_and_no_floating_point(name, target, t
     check_integer_path(name, target, tmp_path)
 
 
-def test_flash_and_ram_are_those_stated_in_the_header(needs, tmp_path):
+def test_the_header_states_flash_and_ram_of_the_compiled_policy(needs, tmp_path):
     target = TARGETS["arm"]
     needs(target.compiler)
     for number, agent in enumerate(agents().values()):

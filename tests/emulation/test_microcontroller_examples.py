@@ -106,7 +106,7 @@ def folder(tmp_path):
 
 
 @pytest.mark.parametrize("target", ["thumbv6m-none-eabi", "thumbv7em-none-eabi"])
-def test_they_compile_for_small_processors(target, needs, folder):
+def test_the_sketches_compile_for_small_processors(target, needs, folder):
     needs("clang", "clang++")
     options = (*WARNINGS, f"--target={target}", "-ffreestanding", f"-I{folder}", "-c")
     done = ("-o", folder / "done.o")
@@ -114,7 +114,7 @@ def test_they_compile_for_small_processors(target, needs, folder):
     run("clang", *options, "-std=gnu11", EXAMPLES / "zephyr" / "src" / "main.c", *done)
 
 
-def test_the_sketch_learns(needs, folder):
+def test_the_arduino_sketch_learns_with_a_simulated_pole(needs, folder):
     needs("g++")
     (folder / "sketch.cpp").write_bytes(SKETCH.read_bytes())
     (folder / "pole.cpp").write_text(POLE)

@@ -63,7 +63,7 @@ def compile_program(request, tmp_path, skip_unless_ci):
         (EXACT, None),
     ],
 )
-def test_options_that_change_results_are_refused(options, said, compile_program):
+def test_compiler_options_that_change_results_are_refused(options, said, compile_program):
     source = '#include "sdnn/core/random.hpp"\nint main() {}\n'
     compiled = compile_program(source, "-fsyntax-only", *options)
     assert (compiled.returncode == 0) == (said is None), compiled.stderr
@@ -71,7 +71,7 @@ def test_options_that_change_results_are_refused(options, said, compile_program)
 
 
 @pytest.mark.timeout(300)
-def test_errors_reach_a_program_without_exceptions(compile_program, tmp_path):
+def test_a_program_without_exceptions_receives_errors_by_its_handler(compile_program, tmp_path):
     options = ("-O0", "-fno-exceptions", "-fno-rtti", "-Wall", "-Wextra", "-Werror")
     compiled = compile_program(WITHOUT_EXCEPTIONS, *options, *EXACT)
     assert compiled.returncode == 0, compiled.stderr

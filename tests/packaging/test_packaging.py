@@ -58,9 +58,7 @@ def rows_of_trial():
     ]
 
 
-def test_the_cpp_example_builds_against_an_installed_prefix(
-    cmake, configure, tmp_path, skip_unless_ci
-):
+def test_the_cpp_example_runs_with_an_installed_prefix(cmake, configure, tmp_path, skip_unless_ci):
     prefix = tmp_path / "prefix"
     for done in (
         configure(ROOT, tmp_path / "library", f"-DCMAKE_INSTALL_PREFIX={prefix}"),
@@ -91,7 +89,7 @@ def pkg_config_flags(prefix):
     return set(subprocess.check_output(command, env=env, text=True).split())
 
 
-def test_the_cpp_example_builds_against_the_installed_package(cmake, configure, tmp_path):
+def test_the_cpp_example_runs_with_the_installed_python_package(cmake, configure, tmp_path):
     command = [sys.executable, "-m", "sdnn", "--cmakedir"]
     folder = subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
     assert (Path(folder) / "sdnnConfig.cmake").is_file()
@@ -103,7 +101,7 @@ def test_the_cpp_example_builds_against_the_installed_package(cmake, configure, 
     assert Path(found).resolve() == Path(folder).resolve()
 
 
-def test_a_missing_json_library_is_named_to_those_who_need_it(configure, tmp_path):
+def test_a_missing_json_library_is_an_error_for_saved_agents_only(configure, tmp_path):
     (tmp_path / "main.cpp").write_text("int main() {}\n")
     for target, fits in (("sdnn::sdnn", True), ("sdnn::saved_agent", False)):
         (tmp_path / "CMakeLists.txt").write_text(
@@ -117,7 +115,7 @@ def test_a_missing_json_library_is_named_to_those_who_need_it(configure, tmp_pat
         assert ("apt install nlohmann-json3-dev" in done.stderr) != fits
 
 
-def test_eigen_is_found_in_the_python_that_the_shell_would_start(
+def test_cmake_finds_eigen_in_the_python_on_the_path(
     configure, skip_unless_ci, tmp_path, monkeypatch
 ):
     site = Path(sysconfig.get_path("purelib"))
@@ -137,7 +135,7 @@ def test_eigen_is_found_in_the_python_that_the_shell_would_start(
 
 
 @pytest.mark.parametrize("required", [False, True])
-def test_without_eigen_sdnn_is_not_found(required, configure, tmp_path):
+def test_find_package_fails_without_eigen(required, configure, tmp_path):
     config = (ROOT / "cmake" / "sdnnConfig.cmake.in").read_text().replace("@PACKAGE_INIT@", "")
     (tmp_path / "sdnnConfig.cmake").write_text(config)
     for name in ("FindEigenAnyway.cmake", "AgentFiles.cmake"):
@@ -154,7 +152,7 @@ def test_without_eigen_sdnn_is_not_found(required, configure, tmp_path):
     assert ("sdnn needs Eigen >= 3.4" if required else "found: 0") in said
 
 
-def test_no_build_is_tied_to_the_machine_it_ran_on():
+def test_no_build_file_has_options_for_a_processor():
     rooms = [ROOT / name for name in ("cpp", "cmake", "tests", "bench", "docs", "python")]
     builds = [ROOT / "CMakeLists.txt", ROOT / "pyproject.toml"]
     for pattern in ("CMakeLists.txt", "*.cmake*"):
@@ -167,7 +165,7 @@ def test_no_build_is_tied_to_the_machine_it_ran_on():
 # The Python package.
 
 
-def test_the_version_is_that_of_the_build_files():
+def test_the_version_of_the_package_is_that_of_cmake():
     text = (ROOT / "CMakeLists.txt").read_text()
     assert sdnn.__version__ == re.search(r"project\(sdnn VERSION ([0-9.]+)", text)[1]
 
@@ -240,13 +238,13 @@ def names_in(sdist):
     return {name.partition("/")[2] for name in names}
 
 
-def test_the_source_distribution_holds_nothing_but_sources(sdist):
+def test_the_source_distribution_has_listed_files_only(sdist):
     rule = re.compile("|".join(f"(?:{pattern})" for pattern in SHIPPED))
     strangers = [name for name in sorted(names_in(sdist)) if not rule.fullmatch(name)]
     assert strangers == []
 
 
-def test_the_source_distribution_holds_everything_a_build_needs(sdist):
+def test_the_source_distribution_has_all_files_that_a_build_needs(sdist):
     needed = {
         path.relative_to(ROOT).as_posix()
         for pattern in NEEDED

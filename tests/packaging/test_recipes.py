@@ -56,7 +56,7 @@ def include_folder(target, configure, folder):
     return re.search(r"found: ([^;\n]+)", done.stdout)[1]
 
 
-def test_a_program_is_built_with_conan(conan, cmake, configure, tmp_path):
+def test_the_cpp_example_builds_with_conan(conan, cmake, configure, tmp_path):
     for name, version, target in (
         ("eigen", "3.4.0", "Eigen3::Eigen"),
         ("nlohmann_json", "3.11.3", "nlohmann_json::nlohmann_json"),
@@ -80,12 +80,12 @@ def test_a_program_is_built_with_conan(conan, cmake, configure, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_conan_refuses_older_standards(conan):
+def test_the_conan_recipe_refuses_cpp_17(conan):
     with pytest.raises(AssertionError, match="cppstd"):
         conan("create", ROOT, "-s:a", "compiler.cppstd=17")
 
 
-def test_the_port_of_vcpkg_has_the_version_and_the_dependencies():
+def test_the_vcpkg_port_has_the_version_and_dependencies():
     port = ROOT / "cmake" / "vcpkg" / "sdnn"
     manifest = json.loads((port / "vcpkg.json").read_text())
     assert f"VERSION {manifest['version']} " in (ROOT / "CMakeLists.txt").read_text()

@@ -33,7 +33,7 @@ def includes(header):
     return [Path(name) for name in re.findall(r'^#include "sdnn/(.+)"', text, re.MULTILINE)]
 
 
-def test_includes_point_down():
+def test_headers_include_lower_layers_only():
     wrong = [
         f"{header} includes {included}"
         for header in headers()
@@ -45,12 +45,12 @@ def test_includes_point_down():
     assert wrong == []
 
 
-def test_the_umbrella_includes_what_is_public():
+def test_the_umbrella_header_includes_every_public_header():
     public = {header.as_posix() for header in headers() if "detail" not in header.parts}
     assert {path.as_posix() for path in includes("sdnn.hpp")} == public - NOT_IN_UMBRELLA
 
 
-def test_headers_with_floating_point_refuse_options_that_change_results():
+def test_headers_with_floating_point_include_the_check_of_compiler_options():
     guard = Path("core/detail/floating_point.hpp")
 
     def reached(header, seen):
@@ -92,13 +92,13 @@ def arrows_between_children(graph, package):
     return arrows
 
 
-def test_the_packages_are_few_and_import_few_others(imports):
+def test_the_package_graph_has_few_packages_and_imports(imports):
     arrows = arrows_between_children(imports, "sdnn")
     assert len(arrows) <= 18
     assert sum(map(len, arrows.values())) <= 55
 
 
-def test_siblings_import_each_other_in_no_circle(imports):
+def test_packages_do_not_import_each_other_in_circles(imports):
     packages = [module for module in imports.modules if imports.find_children(module)]
     assert len(packages) > 10
     for package in packages:
@@ -107,7 +107,7 @@ def test_siblings_import_each_other_in_no_circle(imports):
 
 
 @pytest.mark.parametrize("pattern", ["python/sdnn/**/*.py", "cpp/**/*.[ch]pp"])
-def test_source_files_are_short(pattern):
+def test_source_files_have_at_most_450_lines(pattern):
     lengths = {path: len(path.read_text("utf-8").splitlines()) for path in ROOT.glob(pattern)}
     assert len(lengths) > 50
     assert {path.name for path, n_lines in lengths.items() if n_lines > 450} == set()

@@ -1,4 +1,4 @@
-"""Bad values of every argument, setting, option and file: refused by name, or taken and at work.
+"""Bad values of every argument, setting, option and file are refused by name, or work.
 
 This is a sample; ``nox -s robustness`` tries all.
 """
@@ -17,7 +17,7 @@ EVERY = {"agents": 41, "core": 41, "classes": 41, "commands": 29, "files": 47}
 
 
 @pytest.mark.parametrize("matrix", MATRICES)
-def test_bad_values_are_refused_by_name_or_work(matrix, monkeypatch):
+def test_a_sample_of_bad_values_is_refused_by_name_or_accepted(matrix, monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     monkeypatch.setenv("MPLBACKEND", "Agg")
     n_cells, failed = failures(sample_cells, matrix, EVERY[matrix])
@@ -36,17 +36,17 @@ def test_crashes_and_hangs_are_failed_cells(monkeypatch):
     assert failed[5:] == ["last: was last"]
 
 
-def test_a_new_parameter_is_covered_by_itself():
+def test_every_constructor_parameter_has_cells_of_the_matrix():
     cells = [name for name, _ in bad_inputs.constructor_cells("SDNNQLearning")]
     for parameter in bad_inputs.parameters_of(bad_inputs.SDNNQLearning.__init__):
         assert sum(f"({parameter}=" in name for name in cells) >= len(bad_inputs.BAD)
 
 
-def test_every_command_has_its_row():
+def test_every_command_has_a_row_of_the_matrix():
     assert set(main.commands) == set(bad_options.COMMANDS) | bad_options.LEFT_OUT
 
 
-def test_good_arguments_are_known_of_everything_that_takes_some():
+def test_every_class_of_the_core_has_valid_arguments_in_the_matrix():
     configs = {cls.__name__ for cls in core_cells.CLASSES if cls.__name__.endswith("Config")}
     classes = {cls.__name__ for cls in core_cells.CLASSES}
     assert classes - configs <= set(core_cells.GOOD)

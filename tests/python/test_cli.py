@@ -28,7 +28,7 @@ def invoke(invoke):
     return partial(invoke, trial=FakeTrial)
 
 
-def test_help_and_version(invoke):
+def test_help_lists_commands_and_version_the_environment(invoke):
     said = invoke("--help").stdout
     assert all(re.search(rf"^  {name} .*\w\.$", said, re.MULTILINE) for name in main.commands)
     version, compiler, *others = invoke("--version").stdout.splitlines()
@@ -52,7 +52,9 @@ def test_help_and_version(invoke):
         (["learn"], "learn"),
     ],
 )
-def test_wrong_usage_is_exit_code_2(invoke, tmp_path, arguments, words):
+def test_bad_arguments_of_reproduce_exit_with_2_and_write_nothing(
+    invoke, tmp_path, arguments, words
+):
     result = invoke(*arguments)
     assert result.exit_code == 2
     assert words in result.stderr
@@ -60,7 +62,7 @@ def test_wrong_usage_is_exit_code_2(invoke, tmp_path, arguments, words):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_quick_run_writes_marked_files_and_one_summary_line(invoke, tmp_path):
+def test_a_quick_reproduction_writes_marked_files_and_a_summary(invoke, tmp_path):
     result = invoke("reproduce", "a", "--quick", "--out", "out")
     assert result.exit_code == 0
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
@@ -95,11 +97,11 @@ def test_quick_run_writes_marked_files_and_one_summary_line(invoke, tmp_path):
         ({"presets": ("robust", "general"), "quick": True}, "-robust-general-quick"),
     ],
 )
-def test_requests_of_other_results_have_other_names(options, mark):
+def test_file_names_state_deviations_from_the_paper(options, mark):
     assert PaperStudy("a", **options).file_name("table.json") == f"table{mark}.json"
 
 
-def test_a_smaller_run_leaves_the_files_of_a_full_one(invoke, tmp_path):
+def test_smaller_reproductions_do_not_overwrite_the_files_of_the_full_one(invoke, tmp_path):
     invoke("reproduce", "a", "--trials", 10, "--out", "out", "--episodes", 15_000)
     files = [path for path in (tmp_path / "out").iterdir() if path.suffix != ".sqlite"]
     before = {path: path.read_bytes() for path in files}
@@ -120,7 +122,7 @@ def test_a_smaller_run_leaves_the_files_of_a_full_one(invoke, tmp_path):
     }
 
 
-def test_the_most_episodes_make_a_trial():
+def test_a_trial_of_the_most_episodes_is_accepted_and_of_more_refused():
     planned = PaperStudy("a", n_trials=1, n_episodes=MOST_EPISODES).plan()[0]
     planned.spec.make_trial(planned.key.seed)
     with pytest.raises(ValueError, match="episodes"):
@@ -143,19 +145,19 @@ def no_costs(monkeypatch):
     return asked
 
 
-def test_all_is_the_default_and_reuses_what_is_stored(invoke, tmp_path, no_costs):
+def test_reproduce_without_arguments_runs_everything_that_is_not_stored(invoke, tmp_path, no_costs):
     invoke("reproduce", "a", "--quick", "--out", "out")
     assert no_costs == []
     result = invoke("reproduce", "--quick", "--out", "out")
     assert re.search(r"\b18 of 18 .* out \(14 ", result.stdout.splitlines()[-1])
-    assert len(no_costs) == 3 * 7 + 4
+    assert len(no_costs) == 3 * 7 + 4  # three series of 2 to 8 inputs, one of 2 to 5
     names = {p.name for p in (tmp_path / "out").iterdir()}
     assert names >= {"experiment-b-quick.svg", "cost-quick.png", "cost-quick.csv"}
     assert "(0 " in invoke("reproduce", "--quick", "--out", "out").stdout
     assert len(no_costs) == 3 * 7 + 4
 
 
-def test_report_covers_all_stored_trials(invoke, tmp_path, no_costs):
+def test_a_report_covers_all_stored_trials(invoke, tmp_path, no_costs):
     invoke("reproduce", "b", "--quick")
     table = json.loads(invoke("reproduce", "cost", "--quick", "--json").stdout)
     assert [experiment["id"] for experiment in table["experiments"]] == ["b"]
@@ -164,10 +166,10 @@ def test_report_covers_all_stored_trials(invoke, tmp_path, no_costs):
     page = (tmp_path / "results" / "report-quick.html").read_text()
     assert "Case IV" in page
     rows = (tmp_path / "results" / "results-quick.csv").read_text().splitlines()
-    assert len(rows) == 1 + 4 * 2 * 2 * 30
+    assert len(rows) == 1 + 4 * 2 * 2 * 30  # cases, agents, trials, evaluations
 
 
-def test_json_is_the_file(invoke, tmp_path):
+def test_the_json_output_is_the_written_table(invoke, tmp_path):
     result = invoke("reproduce", "a", "--trials", 3, "--episodes", 1000, "--json", "--seed", 5)
     table = json.loads(result.stdout)
     name = "table-3-trials-1000-episodes-seed-5.json"
@@ -179,7 +181,7 @@ def test_json_is_the_file(invoke, tmp_path):
     assert [case["last_episode"] for case in experiment["cases"]] == [1000, 1000]
 
 
-def test_dry_run_makes_nothing_and_counts_what_is_stored(invoke, tmp_path):
+def test_dry_run_counts_stored_trials_and_writes_nothing(invoke, tmp_path):
     result = invoke("reproduce", "a", "--dry-run")
     assert result.exit_code == 0
     lines = result.stdout.splitlines()
@@ -215,7 +217,7 @@ def test_dry_run_opens_the_store_for_reading_only(invoke, tmp_path, monkeypatch)
     assert sorted((tmp_path / "results").iterdir()) == files
 
 
-def test_dry_run_counts_costs_too(invoke, no_costs):
+def test_dry_run_counts_measurements_of_costs(invoke, no_costs):
     line = "cost of a step: {} measurements, {} of them stored in results"
     assert invoke("reproduce", "cost", "--dry-run").stdout.splitlines() == [line.format(28, 0)]
     assert invoke("reproduce", "--dry-run").stdout.splitlines()[-1] == line.format(28, 0)
@@ -227,7 +229,7 @@ def test_dry_run_counts_costs_too(invoke, no_costs):
     assert plan["costs"] == {"planned": 0, "stored": 0}
 
 
-def test_results_of_other_agents_have_other_files(invoke, tmp_path, no_costs):
+def test_results_of_other_agents_are_written_to_separate_files(invoke, tmp_path, no_costs):
     invoke("reproduce", "a", "--quick", "--out", "out")
     before = {path.name: path.read_bytes() for path in (tmp_path / "out").glob("*-quick.*")}
     result = invoke(
@@ -253,7 +255,7 @@ def test_results_of_other_agents_have_other_files(invoke, tmp_path, no_costs):
     assert [claim["number"] for claim in table["claims"]] == [3]
 
 
-def test_a_preset_is_drawn_beside_the_papers_agents(invoke, tmp_path, no_costs):
+def test_a_preset_is_run_beside_the_papers_agents(invoke, tmp_path, no_costs):
     result = invoke("reproduce", "a", "--quick", "--out", "out", "--preset", "robust", "--json")
     table = json.loads(result.stdout)
     assert [(case["case"], case["agent"]) for case in table["experiments"][0]["cases"]] == [
@@ -265,7 +267,7 @@ def test_a_preset_is_drawn_beside_the_papers_agents(invoke, tmp_path, no_costs):
     assert "robust" not in again.stdout
 
 
-def test_costs_of_other_agents(invoke, no_costs):
+def test_costs_are_measured_for_the_selected_agent_only(invoke, no_costs):
     dry = invoke("reproduce", "cost", "--agent", "rbf", "--dry-run")
     assert re.findall(r"\d+", dry.stdout) == ["14", "0"]
     table = json.loads(invoke("reproduce", "cost", "--agent", "rbf", "--quick", "--json").stdout)
@@ -319,7 +321,7 @@ def pumping():
     del AGENTS["pumping"]
 
 
-def test_a_new_agent_is_one_class_and_one_entry(pumping, tmp_path, invoke):
+def test_a_registered_agent_class_is_reproduced_with_figures_and_reports(pumping, tmp_path, invoke):
     call = partial(invoke, "reproduce", trial=None)
     done = call("b", "--quick", "--agent", "pumping")
     assert done.exit_code == 0
@@ -356,7 +358,7 @@ def test_a_new_agent_is_one_class_and_one_entry(pumping, tmp_path, invoke):
     assert "agents whose cost is measured are sdnn-c, fuzzy, rbf, got pumping" in refused.stderr
 
 
-def test_output_that_is_a_file(invoke, tmp_path):
+def test_an_output_folder_that_is_a_file_is_refused(invoke, tmp_path):
     (tmp_path / "out").write_text("mine")
     result = invoke("reproduce", "a", "--quick", "--out", "out")
     assert result.exit_code == 2
@@ -383,7 +385,7 @@ def test_a_missing_matplotlib_is_reported_in_one_line(invoke, tmp_path, monkeypa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_failing_trials_are_exit_code_1(invoke, tmp_path):
+def test_failing_trials_exit_with_1_and_write_no_report(invoke, tmp_path):
     class Raising(FakeTrial):
         def __init__(self, *, sensors, **parts):
             super().__init__(**parts)
@@ -402,7 +404,7 @@ def test_failing_trials_are_exit_code_1(invoke, tmp_path):
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_gives_its_exit_code_and_the_command_resumes(invoke, number, code):
+def test_signals_give_their_exit_code_and_the_next_command_resumes(invoke, number, code):
     class Interrupting(FakeTrial):
         """Interrupts the run when it starts, and never ends by itself."""
 
@@ -416,14 +418,14 @@ def test_a_signal_gives_its_exit_code_and_the_command_resumes(invoke, number, co
     assert invoke("reproduce", "a", "--quick").exit_code == 0
 
 
-def test_wrong_usage_of_the_module_shows_no_traceback(tmp_path):
+def test_bad_options_of_the_module_show_no_traceback(tmp_path):
     wrong = python("-m", "sdnn", "reproduce", "a", "--trials", "0", cwd=tmp_path)
     assert wrong.returncode == 2
     assert "Traceback" not in wrong.stderr
 
 
 @pytest.mark.parametrize("words", [["train", "CartPole-v1"], ["reproduce"], ["--version"]])
-def test_a_wrong_instruction_set_is_named_by_its_variable(tmp_path, monkeypatch, words):
+def test_an_unknown_instruction_set_is_reported_with_its_variable(tmp_path, monkeypatch, words):
     monkeypatch.setenv("SDNN_INSTRUCTION_SET", "sse9")
     done = python("-m", "sdnn", *words, cwd=tmp_path)
     assert done.returncode == 1
@@ -447,8 +449,8 @@ def test_command_line_starts_without_heavy_imports(arguments):
     assert python("-c", code).stdout.splitlines()[-1] == "loaded: []"
 
 
-def test_real_quick_run(tmp_path):
-    """The whole way with the trial in C++; ten episodes, so nothing is learned."""
+def test_a_reproduction_of_ten_episodes_runs_in_a_separate_process(tmp_path):
+    # Compiled trials; nothing is learned in ten episodes, one evaluation.
     out = tmp_path / "out"
     command = ("-m", "sdnn", "reproduce", "a", "--trials", "1", "--episodes", "10", "--json")
     done = python(*command, "--out", str(out))
@@ -462,7 +464,7 @@ def test_real_quick_run(tmp_path):
     assert all(case["n_decisions"] > 0 for case in experiment["cases"])
 
 
-def test_ctrl_c_before_anything_has_begun_has_its_exit_code(monkeypatch):
+def test_ctrl_c_in_a_command_exits_with_130(monkeypatch):
     def interrupted(**_):
         raise KeyboardInterrupt
 

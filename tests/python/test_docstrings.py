@@ -21,7 +21,7 @@ MODULES = [
 
 
 @pytest.mark.parametrize("name", MODULES)
-def test_examples_in_docstrings_run(name, tmp_path, monkeypatch):
+def test_examples_in_docstrings_are_correct(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     importlib.import_module(name)
     if name == "sdnn.environments.masks" and "Taxi-v4" not in gym.registry:

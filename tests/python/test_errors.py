@@ -32,7 +32,7 @@ def error_classes():
 
 
 @pytest.mark.parametrize("copied", [copy.copy, lambda error: pickle.loads(pickle.dumps(error))])
-def test_errors_can_be_passed_between_processes(copied):
+def test_errors_equal_their_copies_and_pickles(copied):
     """An error that cannot be unpickled would end a pool of processes, and its message be lost."""
     kinds = error_classes()
     assert {"ConfigError", "StoreError", "UnusableStepError"} <= {kind.__name__ for kind in kinds}

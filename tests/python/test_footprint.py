@@ -15,7 +15,7 @@ FOOTPRINT = Path(__file__).parent / "reference" / "footprint.py"
     [("train CartPole-v1 --steps 60", 22), ("reproduce a --quick", 28)],
     ids=["train", "reproduce"],
 )
-def test_a_command_runs_through_few_files(tmp_path, command, limit):
+def test_a_command_executes_few_files_of_the_package(tmp_path, command, limit):
     words = [sys.executable, FOOTPRINT, *command.split(), "--out", tmp_path / "out"]
     done = subprocess.run(words, capture_output=True, text=True, check=True)
     files = json.loads(done.stderr.splitlines()[-1])

@@ -20,7 +20,7 @@ def usual_handler():
     signal.signal(signal.SIGINT, before)
 
 
-def test_the_first_signal_asks_and_the_second_interrupts():
+def test_the_first_signal_calls_back_and_the_second_interrupts():
     asked = []
     with Interrupts(lambda: asked.append(1)) as interrupts:
         assert interrupts.received is None
@@ -31,7 +31,7 @@ def test_the_first_signal_asks_and_the_second_interrupts():
     assert asked == [1]
 
 
-def test_handlers_of_others_and_other_threads_are_left_alone():
+def test_custom_handlers_and_other_threads_keep_their_handlers():
     came = []
     mine = lambda number, frame: came.append(number)  # noqa: E731
     before = signal.signal(signal.SIGTERM, mine)
@@ -75,7 +75,7 @@ class Count(Callback):
 
 
 @pytest.mark.parametrize(("times", "saved_at"), [(1, 47), (2, 30)])
-def test_an_interrupted_training_resumes_exactly(tmp_path, times, saved_at):
+def test_a_training_interrupted_by_ctrl_c_resumes_exactly(tmp_path, times, saved_at):
     def make(env, name):
         agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)
         return Training(agent, env, steps=120, seed=2, callbacks=callbacks(name))
@@ -112,7 +112,7 @@ def press_ctrl_c_in_other_code():
         raise ValueError("Invalid affine transformation matrix") from None
 
 
-def test_ctrl_c_that_other_code_converts_is_raised_as_ctrl_c():
+def test_ctrl_c_converted_to_another_error_is_raised_as_keyboard_interrupt():
     with pytest.raises(KeyboardInterrupt), stay_interrupts():
         press_ctrl_c_in_other_code()
     with pytest.raises(KeyboardInterrupt), stay_interrupts(), suppress(KeyboardInterrupt):
@@ -121,7 +121,7 @@ def test_ctrl_c_that_other_code_converts_is_raised_as_ctrl_c():
         press_ctrl_c()
 
 
-def test_errors_and_ctrl_c_that_somebody_else_handled_are_left_alone():
+def test_unrelated_errors_and_handled_ctrl_c_are_not_changed():
     with pytest.raises(ValueError, match="own"), stay_interrupts():
         raise ValueError("of its own")
     asked = []
@@ -132,7 +132,7 @@ def test_errors_and_ctrl_c_that_somebody_else_handled_are_left_alone():
         pass
 
 
-def test_other_threads_have_no_ctrl_c():
+def test_in_other_threads_the_handler_of_ctrl_c_is_not_replaced():
     entered = []
 
     def enter():
@@ -145,7 +145,7 @@ def test_other_threads_have_no_ctrl_c():
     assert entered == [signal.default_int_handler]
 
 
-def test_ctrl_c_while_a_pool_ends_waits_for_its_threads():
+def test_ctrl_c_at_the_end_of_a_pool_waits_for_its_threads():
     ended = []
 
     def work():

@@ -73,7 +73,7 @@ CELLS = {
 
 
 @pytest.mark.parametrize("name", [*TAKERS, *LISTS, *CELLS])
-def test_other_pairs_are_refused(name):
+def test_values_that_numpy_would_convert_silently_are_refused(name):
     shapes = {"a column", "a row"} if name in LISTS else set()
     if name in CELLS:
         shapes = {"a column", "a row", "three", "objects"}
@@ -100,13 +100,13 @@ BOOLS = {"True": True, "True of NumPy": np.True_, "an array": np.array(True)}
 
 
 @pytest.mark.parametrize("kind", [int, float])
-def test_settings_are_numbers_of_their_kind(kind):
+def test_texts_dates_and_bools_are_refused_as_numbers(kind):
     for word, value in {**NUMBERS, **BOOLS, "not finite": np.nan}.items():
         with pytest.raises(Exception, match="must be"):
             assert checked(kind, value, "key") is None, word
 
 
-def test_fields_of_runs_are_of_their_type():
+def test_settings_of_wrong_types_are_refused_with_their_table():
     for given in (
         {"environment": 5}, {"agent": 5}, {"budget": 5}, {"budget": {"target_return": np.nan}},
         {"budget": {"target_return": "abc"}}, {"output": {"tensorboard": "yes"}},
@@ -116,7 +116,7 @@ def test_fields_of_runs_are_of_their_type():
             RunSpec(**{"environment": "CartPole-v1"} | given)
 
 
-def test_seeds_of_trials_are_whole_numbers():
+def test_seeds_of_trials_must_be_integers():
     for value in (*NUMBERS.values(), *BOOLS.values(), 0.5, 1.0, [1]):
         with pytest.raises(ValueError, match="root_seed"):
             trial_seed(value, "s4", 0)

@@ -23,7 +23,7 @@ LEAST = {
 
 
 @pytest.mark.parametrize("row", ROWS, ids=name_of)
-def test_bad_values_are_refused_by_name_or_work(row, monkeypatch):
+def test_all_bad_values_are_refused_by_name_or_accepted(row, monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     monkeypatch.setenv("MPLBACKEND", "Agg")
     make_cells, *arguments = row

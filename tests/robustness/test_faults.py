@@ -1,4 +1,4 @@
-"""Every call of the system fails in turn: errors name the file, which is old or new as a whole."""
+"""Each system call fails in turn: errors name the file, which has its old or its new content."""
 
 import errno
 import os
@@ -60,7 +60,9 @@ def faults(tmp_path_factory):
         ("run in progress", MEMORY, 1000),
     ],
 )
-def test_writers_in_python(faults, tmp_path, action, errors, n_least):
+def test_a_python_writer_leaves_the_old_or_new_file_at_every_failing_call(
+    faults, tmp_path, action, errors, n_least
+):
     for error in errors:
         (tmp_path / str(error)).mkdir()
     path = os.pathsep.join([*(p for p in sys.path if p), str(ROOT / "tests/python/reference")])
@@ -75,7 +77,7 @@ def test_writers_in_python(faults, tmp_path, action, errors, n_least):
 
 
 @pytest.mark.parametrize("error", [*SYSTEM, *MEMORY])
-def test_the_writer_in_cpp(faults, tmp_path, error):
+def test_the_cpp_writer_leaves_the_old_or_new_file_at_every_failing_call(faults, tmp_path, error):
     source, program, folder = tmp_path / "writer.cpp", tmp_path / "writer", tmp_path / "folder"
     source.write_text(CPP_WRITER)
     compiled("c++", "-std=c++20", f"-I{ROOT / 'cpp/include'}", source, "-o", program)

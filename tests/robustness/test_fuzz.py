@@ -9,7 +9,7 @@ sys.path.append(str(Path(__file__).parents[1] / "fuzz"))
 import campaign
 
 
-def test_executions_and_faults_are_counted_from_run_to_run(tmp_path, monkeypatch, capfd):
+def test_the_fuzz_campaign_adds_executions_and_faults_of_its_runs(tmp_path, monkeypatch, capfd):
     def failures(_make_cells, name, first, n):
         return n, [f"{name}, mutation {first}: was wrong"] * (first == 0)
 
@@ -24,5 +24,5 @@ def test_executions_and_faults_are_counted_from_run_to_run(tmp_path, monkeypatch
     capfd.readouterr()
 
 
-def test_a_reader_reads_in_a_separate_process(tmp_path, monkeypatch):
+def test_the_fuzz_campaign_runs_20_mutations_without_faults(tmp_path, monkeypatch):
     assert campaign.run_python("run", 60, 20, tmp_path, 5) == (20, [])

@@ -27,7 +27,7 @@ def module():
     return module
 
 
-def test_a_killed_command_resumes_to_the_same_rows(module):
+def test_a_killed_reproduction_resumes_to_the_same_rows(module):
     line = module.kill_and_resume(["reproduce", "a", "--trials", "2", "--episodes", "30"], 4, 1)
     assert "the same rows" in line
 
@@ -38,7 +38,7 @@ def test_a_killed_sweep_resumes_to_the_same_rows(module, tmp_path):
     assert "the same rows" in line
 
 
-def test_a_full_disk_is_reported_and_the_command_resumes(module, tmp_path):
+def test_a_full_disk_is_reported_without_traceback_and_the_command_resumes(module, tmp_path):
     arguments = ["reproduce", "a", "--trials", "1", "--episodes", "20"]
     whole, full = tmp_path / "whole", tmp_path / "full"
     module.run(whole, arguments)

@@ -1,4 +1,4 @@
-"""Actions that are not allowed are neither taken nor bootstrapped from."""
+"""Action masks: masked actions are neither taken nor bootstrapped from."""
 
 import json
 
@@ -8,8 +8,6 @@ import pytest
 
 from sdnn.agents import (
     FuzzyQLearning,
-    QLambdaConfig,
-    QLearningConfig,
     SDNNQLambda,
     SDNNQLearning,
     Training,
@@ -28,7 +26,7 @@ SPACES = {"discrete": gym.spaces.Discrete(5, start=-1), "several": gym.spaces.Mu
 
 
 class Masked(gym.Env):
-    """A walk in which a random half of the actions is allowed; it stops whoever takes another."""
+    """A walk in which a random half of the actions is allowed; others fail an assertion."""
 
     def __init__(self, actions="discrete", unbounded=False):
         bound = np.inf if unbounded else 1.0
@@ -90,13 +88,13 @@ def test_only_allowed_actions_are_taken(kind, actions, unbounded):
 
 @pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP", "DISABLED"])
 @pytest.mark.parametrize("actions", SPACES)
-def test_vectors_of_every_mode_learn_the_same(actions, mode):
+def test_masked_vectors_of_every_autoreset_mode_learn_the_same(actions, mode):
     def trained(n, mode):
-        own = gym.vector.SyncVectorEnv(
+        envs = gym.vector.SyncVectorEnv(
             [lambda: new_env(actions)] * n, autoreset_mode=gym.vector.AutoresetMode[mode]
         )
-        agent = new_agent(SDNNQLambda, own)
-        agent.train(own, steps=200)
+        agent = new_agent(SDNNQLambda, envs)
+        agent.train(envs, steps=200)
         return agent
 
     assert states_equal(trained(3, mode), trained(3, "NEXT_STEP"))
@@ -110,7 +108,7 @@ class Opaque(gym.vector.SyncVectorEnv):
 
 
 @pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP"])
-def test_vectors_that_reset_themselves_take_allowed_actions(mode, monkeypatch):
+def test_masked_vectors_without_separate_resets_take_allowed_actions(mode, monkeypatch):
     monkeypatch.setattr("sdnn.training.vectors._resets_each", lambda env: False)
     env = Opaque([new_env] * 3, autoreset_mode=gym.vector.AutoresetMode[mode])
     agent = new_agent(SDNNQLambda, env)
@@ -118,7 +116,7 @@ def test_vectors_that_reset_themselves_take_allowed_actions(mode, monkeypatch):
 
 
 @pytest.mark.parametrize("kind", AGENTS)
-def test_a_mask_that_allows_all_changes_nothing(kind):
+def test_a_mask_that_allows_every_action_changes_nothing(kind):
     env = Masked()
     one, other = new_agent(kind, env), new_agent(kind, env)
     random = np.random.default_rng(1)
@@ -136,9 +134,10 @@ def test_a_mask_that_allows_all_changes_nothing(kind):
 @pytest.mark.parametrize("kind", AGENTS)
 def test_targets_bootstrap_from_allowed_actions_only(kind):
     here, after = np.array([-0.9, -0.9]), np.array([0.9, 0.9])
-    own = {SDNNQLambda: QLambdaConfig, SDNNQLearning: QLearningConfig}[kind]
     settings = {"value_range": "fixed"} if kind is SDNNQLearning else {"schedule_steps": 0}
-    learning = own(discount=0.5, learning_rate=1.0, final_learning_rate=None, **settings)
+    learning = kind.learning_type(
+        discount=0.5, learning_rate=1.0, final_learning_rate=None, **settings
+    )
     agent = new_agent(kind, Masked(), learning=learning)
     for _ in range(30):
         for action, value in ((-1, 0.0), (0, 8.0), (1, 2.0), (2, 0.0), (3, 0.0)):
@@ -154,7 +153,7 @@ def test_targets_bootstrap_from_allowed_actions_only(kind):
             other.begin_episode()
         return other.q_values(here)[1], other.q_values(after)
 
-    step = 1.2 if kind is SDNNQLearning else 0.05  # of SDNN-C with few units
+    step = 1.2 if kind is SDNNQLearning else 0.05  # SDNN-C with few units has coarse values
     value, then = learned(None)
     assert value == pytest.approx(0.5 * then.max(), abs=step)
     value, then = learned([0, 0, 1, 0, 0])
@@ -165,24 +164,24 @@ def test_targets_bootstrap_from_allowed_actions_only(kind):
 @pytest.mark.parametrize("actions", SPACES)
 @pytest.mark.parametrize("kind", AGENTS)
 @pytest.mark.parametrize(("at", "n"), [(33, None), (100, None), (20, 3)])
-def test_a_training_is_resumed_exactly(kind, actions, unbounded, at, n, tmp_path):
+def test_a_training_with_masks_resumes_exactly(kind, actions, unbounded, at, n, tmp_path):
     more = {"n_steps": 3} if kind is SDNNQLearning else {"bootstrap": "sarsa"}
-    learning = {SDNNQLambda: QLambdaConfig, SDNNQLearning: QLearningConfig}[kind](**more)
+    learning = kind.learning_type(**more)
 
-    def own_env():
+    def masked_env():
         if n is None:
             return new_env(actions, unbounded)
         return gym.vector.SyncVectorEnv([lambda: new_env(actions, unbounded)] * n)
 
     def begun(*callbacks):
-        env = own_env()
+        env = masked_env()
         agent = new_agent(kind, env, learning=learning)
         return Training(agent, env, steps=150, callbacks=callbacks)
 
-    check_exact_resume(begun, own_env, tmp_path / "part", [at])
+    check_exact_resume(begun, masked_env, tmp_path / "part", [at])
 
 
-def test_logged_masks_are_learned(tmp_path):
+def test_masks_in_a_log_file_are_learned(tmp_path):
     agents = [new_agent(SDNNQLambda, Masked()) for _ in range(2)]
     steps = [Transition([0.1, 0.2], 1, 1.0, [0.3, 0.4], False, [1, 0, 0, 1, 0])] * 3
     learn_from(agents[0], steps)
@@ -202,7 +201,7 @@ BAD_MASKS = {
 
 
 @pytest.mark.parametrize("actions", SPACES)
-def test_masks_that_do_not_fit_are_refused(actions):
+def test_masks_of_wrong_size_or_type_are_refused(actions):
     agent, same = (new_agent(SDNNQLambda, Masked(actions)) for _ in range(2))
     action = same.act([0.0, 0.0], explore=False)
     for mask in BAD_MASKS[actions]:
@@ -214,7 +213,7 @@ def test_masks_that_do_not_fit_are_refused(actions):
     assert states_equal(agent, same)
 
 
-def test_forms_of_a_mask():
+def test_a_mask_of_several_dimensions_may_be_parts_or_a_flat_array():
     agent = new_agent(SDNNQLambda, Masked("several"))
     parts = [0, 1, 0], [0, 0, 0, 1]
     for mask in (
@@ -225,18 +224,22 @@ def test_forms_of_a_mask():
     ):
         np.testing.assert_array_equal(agent.act([0.0, 0.0], mask=mask), [1, 3])
         np.testing.assert_array_equal(agent.predict([0.0, 0.0], action_masks=mask)[0], [1, 3])
-    found = agent.predict(np.zeros((2, 2)), action_masks=[parts, ([1, 0, 0], [1, 0, 0, 0])])[0]
-    np.testing.assert_array_equal(found, [[1, 3], [0, 0]])
+    masks = [parts, ([1, 0, 0], [1, 0, 0, 0])]
+    actions, _ = agent.predict(np.zeros((2, 2)), action_masks=masks)
+    np.testing.assert_array_equal(actions, [[1, 3], [0, 0]])
     with pytest.raises(ValueError, match=r"^action_masks "):
         agent.predict(np.zeros((2, 2)), action_masks=[parts])
 
 
-def test_boxes_have_no_masks():
+def test_continuous_actions_refuse_masks():
     spaces = gym.spaces.Box(-1, 1, (2,)), gym.spaces.Box(-1, 1, (1,))
     for kind in (SDNNQLambda, FuzzyQLearning):
         agent = kind(*spaces)
         with pytest.raises(ValueError, match=r"^mask must be None"):
             agent.act(np.zeros(2), mask=[1, 0, 1])
+
+
+def test_the_wrapper_of_masks_refuses_continuous_actions_and_masks_that_are_no_functions():
     with pytest.raises(ValueError, match=r"^env must have discrete actions"):
         ActionMasks(gym.make("Pendulum-v1"))
     with pytest.raises(TypeError, match=r"^mask must be a function"):
@@ -251,16 +254,16 @@ class Forgetful(gym.Wrapper):
         self.n = 0
 
     def step(self, action):
-        *seen, info = self.env.step(action)
+        *results, info = self.env.step(action)
         self.n += 1
-        return (*seen, {} if self.n % 5 == 4 else info)
+        return (*results, {} if self.n % 5 == 4 else info)
 
 
 def forgetful():
     return Forgetful(new_env())
 
 
-def test_masks_of_environments_that_do_not_fit_are_named():
+def test_missing_or_misshapen_masks_of_environments_are_unusable_steps():
     env = ActionMasks(gym.make("CartPole-v1"))  # has none
     agent = SDNNQLambda(env.observation_space, env.action_space)
     with pytest.raises(UnusableStepError, match="action_mask"):

@@ -1,4 +1,4 @@
-"""Actions of spaces as numbers, and back."""
+"""The finite sets of actions of spaces, and their conversion to elements."""
 
 import gymnasium as gym
 import numpy as np
@@ -25,7 +25,7 @@ def weights(agent):
 
 
 def learned(space, action):
-    """The learned value of an action."""
+    """Return the weights after learning a transition with an action."""
     agent = agent_of(space)
     agent.learn(Transition(HERE, action, -5.0, HERE, True))
     return weights(agent)
@@ -36,21 +36,21 @@ def learns_alike(space, action, same):
     return all(np.array_equal(one[name], other[name]) for name in one)
 
 
-def test_every_dimension_of_a_box_is_cut_evenly():
+def test_each_dimension_of_a_box_has_evenly_spaced_actions():
     agent = agent_of(FLOATS)
     assert agent.n_actions == [5, 5]
     assert np.allclose(agent.actions_of(1), np.linspace(0, 0.1, 5))
     assert all(agent.act(HERE, explore=explore) in FLOATS for explore in [True, False] * 20)
 
 
-def test_whole_numbers_of_a_box_are_the_nearest():
+def test_actions_of_an_integer_box_are_rounded_to_the_nearest_integer():
     agent = agent_of(gym.spaces.Box(0, 255, (1,), np.uint8))
-    assert agent.actions.tolist() == [0, 64, 128, 191, 255]
+    assert agent.actions.tolist() == [0, 64, 128, 191, 255]  # multiples of 63.75
     assert agent_of(gym.spaces.Box(0, 1, (1,), np.int64)).actions.tolist() == [0, 0, 1, 1, 1]
 
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64, np.uint8, np.int64])
-def test_actions_have_the_type_and_shape_of_the_space(dtype):
+def test_actions_have_the_dtype_and_shape_of_the_space(dtype):
     space = gym.spaces.Box(0, 7, (2, 3), dtype)
     for agent in (agent_of(space), FuzzyQLearning(PLANE, space)):
         for _ in range(10):
@@ -69,7 +69,9 @@ def test_actions_have_the_type_and_shape_of_the_space(dtype):
         (gym.spaces.MultiBinary(3), [2, 2, 2], [1.0, 0.0, 1.0], [1, 0, 1]),
     ],
 )
-def test_whole_numbers_keep_their_meaning(space, n_actions, numbers, element):
+def test_elements_of_discrete_spaces_are_converted_to_numbers_and_back(
+    space, n_actions, numbers, element
+):
     actions = Actions(space)
     made = actions.elements(np.array([numbers], np.float64))[0]
     assert made in space
@@ -80,7 +82,7 @@ def test_whole_numbers_keep_their_meaning(space, n_actions, numbers, element):
     assert agent.act(HERE) in space
 
 
-def test_the_nearest_action_is_learned():
+def test_an_action_between_two_is_learned_as_the_nearest():
     assert learns_alike(FLOATS, [0.5, 0.05], [0.4, 0.06])
     assert not learns_alike(FLOATS, [0.5, 0.05], [0.2, 0.05])
 
@@ -96,12 +98,12 @@ def test_the_nearest_action_is_learned():
         ),
     ],
 )
-def test_an_action_is_known_in_other_forms(space, action, others):
+def test_an_action_is_learned_from_lists_arrays_and_scalars_alike(space, action, others):
     for same in others:
         assert learns_alike(space, action, same)
 
 
-def test_changing_a_returned_action_does_not_change_the_next():
+def test_modifying_a_returned_action_does_not_change_the_next():
     agent = agent_of(FLOATS, learning=QLearningConfig(tie_rule="lowest"))
     first = agent.act(HERE, explore=False)
     expected = first.copy()

@@ -1,4 +1,4 @@
-"""The actor-critic: equal to its transcription, and what users meet."""
+"""The actor-critic: its NumPy transcription, learning, and refusals."""
 
 import gymnasium as gym
 import numpy as np
@@ -42,7 +42,7 @@ class Code(page.CodeWithThermometers):
     scale=st.sampled_from([1.0, 100.0, 1e6, 1e-40]),
 )
 @settings(max_examples=40, deadline=None)
-def test_weights_are_those_of_the_transcription(
+def test_weights_are_those_of_the_numpy_transcription(
     seed, n_actions, trace_decay, discount, rate, entropy, scale
 ):
     learning = {
@@ -72,21 +72,21 @@ def test_weights_are_those_of_the_transcription(
         np.testing.assert_array_equal(critic.weights(), slow.critic.weights)
 
 
-def test_continuous_control_is_learned_without_a_warm_up():
+def test_an_agent_of_a_bounded_space_acts_without_a_warm_up():
     env = gym.make("sdnn.environments:sdnn/AcrobotSwingUp-v0")
     agent = SDNNActorCritic(env, seed=1)
     assert not agent.is_warming_up
     assert agent.act(env.reset(seed=1)[0]) in env.action_space
 
 
-def test_cartpole_is_learned_in_a_few_thousand_steps():
+def test_cartpole_is_balanced_for_300_steps_after_20_000_steps():
     env = gym.make("CartPole-v1")
     agent = SDNNActorCritic(env, seed=1)
     agent.train(env, steps=20_000, seed=1)
     assert evaluate(agent, gym.make("CartPole-v1"), episodes=10, seed=7).mean_return > 300
 
 
-def test_a_bandit_is_solved_by_probabilities_and_valued_by_its_mean():
+def test_in_a_bandit_the_best_arm_becomes_probable_and_the_value_its_mean_reward():
     space, arms = gym.spaces.Box(-1.0, 1.0, (2,), np.float64), gym.spaces.Discrete(3, start=1)
     agent = SDNNActorCritic(space, arms, seed=1, **STILL)
     zeros = np.zeros(2)
@@ -120,7 +120,7 @@ def test_greedy_actions_of_a_box_are_the_mean_of_the_best_one_and_its_neighbours
     agent.learn(Transition(observation, action, 0.0, observation, terminated=True))
 
 
-def test_action_values_and_epsilon_are_refused_with_their_alternatives():
+def test_q_values_and_epsilon_are_refused_with_their_alternatives():
     agent = SDNNActorCritic(gym.spaces.Box(-1.0, 1.0, (2,)), gym.spaces.Discrete(2), seed=1)
     assert not hasattr(agent, "q_values")
     with pytest.raises(AttributeError, match="action_probabilities"):
@@ -131,7 +131,7 @@ def test_action_values_and_epsilon_are_refused_with_their_alternatives():
     assert agent.epsilon == 0
 
 
-def test_a_warm_up_finds_inputs_and_is_not_learned():
+def test_a_warm_up_selects_inputs_but_does_not_change_probabilities():
     space = gym.spaces.Box(-np.inf, np.inf, (3,), np.float64)
     agent = SDNNActorCritic(
         space, gym.spaces.Discrete(2), seed=1, inputs="relevant", warm_up_steps=300
@@ -146,8 +146,8 @@ def test_a_warm_up_finds_inputs_and_is_not_learned():
     np.testing.assert_allclose(agent.action_probabilities(observation), 0.5)
 
 
-def test_running_ranges_follow_first_observations_of_episodes_too():
-    """The ends of one-step episodes are all alike; their beginnings tell what to do."""
+def test_running_ranges_include_the_first_observations_of_episodes():
+    # Episodes have one step; all end in the same observation.
     space = gym.spaces.Box(-np.inf, np.inf, (1,), np.float64)
     agent = SDNNActorCritic(space, gym.spaces.Discrete(2), seed=1)
     rng, rewards = np.random.default_rng(1), []
@@ -160,7 +160,7 @@ def test_running_ranges_follow_first_observations_of_episodes_too():
     assert np.mean(rewards[-300:]) > 0.7
 
 
-def test_environments_and_missing_readings_keep_their_traces():
+def test_traces_survive_alternating_environments_with_missing_readings():
     space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
     agent = SDNNActorCritic(space, gym.spaces.Discrete(2), seed=1, missing="code")
     agent.n_environments = 2
@@ -172,7 +172,7 @@ def test_environments_and_missing_readings_keep_their_traces():
         agent.learn(Transition(observations[i], action, 1.0, following, False), environment=i)
         observations[i] = following
     traces = agent.state()["agent.trace.values"]
-    assert len(np.unique(np.abs(traces))) > 3, "of several steps"
+    assert len(np.unique(np.abs(traces))) > 3, "traces of several steps differ in size"
 
 
 def test_export_with_learning_refuses_running_ranges():
@@ -183,7 +183,7 @@ def test_export_with_learning_refuses_running_ranges():
     refuses("agent", c_header, agent, "robot", learning=True)
 
 
-def test_a_constant_variable_needs_no_range():
+def test_a_space_with_a_constant_variable_is_accepted():
     space = gym.spaces.Box(np.array([0.0, 1.0]), np.array([1.0, 1.0]), dtype=np.float64)
     agent = SDNNActorCritic(space, gym.spaces.Discrete(2), seed=1)
     agent.act(np.array([0.5, 1.0]))

@@ -20,7 +20,7 @@ NUMBERS = {"-1", "0", "0.5", "2**20", "2**31", "2**63", "-2**63", "True", "0-d",
 
 
 class Point(gym.Env):
-    """Stays where it is for four steps; its third step, or its reset, is what a test gives."""
+    """A point that rests for four steps; a test may change the results of step 3 and of reset."""
 
     observation_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
     action_space = gym.spaces.Discrete(2)
@@ -40,7 +40,7 @@ class Point(gym.Env):
 
 
 class Points(gym.vector.VectorEnv):
-    """Two points that never end; each step is what a test makes of it."""
+    """Two points without ends of episodes; a test may replace columns of their results."""
 
     metadata = {"autoreset_mode": "Disabled"}  # noqa: RUF012
     num_envs = 2
@@ -83,7 +83,7 @@ def bad_values(part):
 
 @pytest.mark.parametrize("use", [trained, evaluated])
 @pytest.mark.parametrize("part", PARTS)
-def test_invalid_rewards_and_flags_are_refused_with_their_step(part, use):
+def test_invalid_rewards_and_flags_are_refused_with_the_number_of_the_step(part, use):
     for word, value in bad_values(part).items():
         if part == "reward" and use is evaluated and word in ("1e308", "-1e308"):
             continue  # which add up to a finite number
@@ -92,14 +92,14 @@ def test_invalid_rewards_and_flags_are_refused_with_their_step(part, use):
 
 
 @pytest.mark.parametrize("part", PARTS[1:])
-def test_bools_of_numpy_end_an_episode_as_those_of_python(part):
+def test_numpy_bools_end_an_episode_like_python_bools(part):
     for use in (trained, evaluated):
         assert use(Point(with_value(part, np.True_))) is not None
     assert evaluated(Point(with_value(part, np.True_))).lengths.tolist() == [3, 3]
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_columns_of_a_vector_have_a_value_for_each_environment(part):
+def test_rewards_and_flags_of_a_vector_need_a_valid_value_for_each_environment(part):
     for word, value in bad_values(part).items():
         for given in (value, [value] * 3 if word == "0-d" else [value] * 2):
             with pytest.raises(UnusableStepError, match=rf"\b{part}\b"):
@@ -107,16 +107,19 @@ def test_columns_of_a_vector_have_a_value_for_each_environment(part):
     assert trained(Points(**{part: [False, False]})).n_steps == 20
 
 
-@pytest.mark.parametrize("found", [None, {"a": 1}, np.array([0, "a"], object), np.zeros((1, 2))])
-def test_invalid_observations_of_a_vector_are_refused_with_their_step(found):
-    bad = Point(lambda made: (found, *made[1:]))
+@pytest.mark.parametrize(
+    "observation", [None, {"a": 1}, np.array([0, "a"], object), np.zeros((1, 2))]
+)
+def test_invalid_observations_of_a_vector_are_refused_with_the_number_of_the_step(observation):
+    bad = Point(lambda results: (observation, *results[1:]))
     envs = gym.vector.SyncVectorEnv([Point, lambda: bad])
+    # Two environments have learned two steps each; number 5 is the first of the third pair.
     with pytest.raises(UnusableStepError, match="in step 5: next_observation must"):
         trained(envs)
 
 
 @pytest.mark.parametrize("use", [trained, evaluated])
-def test_the_old_interface_is_named(use):
+def test_results_of_another_length_or_form_are_refused(use):
     for n in (1, 4, 6):
         with pytest.raises(UnusableStepError, match=rf"\b{n}\b"):
             use(Point(lambda made, n=n: (made * 2)[:n]))

@@ -24,7 +24,7 @@ def new_agent(space=PLACE, **options):
 
 
 def logged(seed=1, n_episodes=4, length=10):
-    """Episodes as Minari has them; the last one was cut off."""
+    """Yield episodes in the form of Minari; all are terminated, but the last is truncated."""
     rng = np.random.default_rng(seed)
     for number in range(n_episodes):
         ends = np.arange(length) == length - 1
@@ -39,31 +39,31 @@ def logged(seed=1, n_episodes=4, length=10):
 
 def transitions():
     """Return the log as transitions, and whether each was the last of a truncated episode."""
-    for one in logged():
-        for t, reward in enumerate(one.rewards):
-            here, after = one.observations[t], one.observations[t + 1]
-            terminated = bool(one.terminations[t])
-            found = Transition(here, int(one.actions[t]), float(reward), after, terminated)
-            yield found, bool(one.truncations[t])
+    for episode in logged():
+        for t, reward in enumerate(episode.rewards):
+            here, after = episode.observations[t], episode.observations[t + 1]
+            action, terminated = int(episode.actions[t]), bool(episode.terminations[t])
+            transition = Transition(here, action, float(reward), after, terminated)
+            yield transition, bool(episode.truncations[t])
 
 
 def arrays():
-    columns = zip(*(one[:5] for one, _ in transitions()), strict=True)
+    columns = zip(*(transition[:5] for transition, _ in transitions()), strict=True)
     names = ("observations", "actions", "rewards", "next_observations", "terminations")
-    found = {name: np.array(column) for name, column in zip(names, columns, strict=True)}
-    return found | {"truncations": np.array([cut for _, cut in transitions()])}
+    log = {name: np.array(column) for name, column in zip(names, columns, strict=True)}
+    return log | {"truncations": np.array([truncated for _, truncated in transitions()])}
 
 
 def lines(path):
     with path.open("w") as file:
-        for one, cut in transitions():
-            values = {name: np.asarray(value).tolist() for name, value in one._asdict().items()}
-            file.write(json.dumps(values | ({"truncated": cut} if cut else {})) + "\n")
+        for transition, truncated in transitions():
+            row = {name: np.asarray(value).tolist() for name, value in transition._asdict().items()}
+            file.write(json.dumps(row | ({"truncated": True} if truncated else {})) + "\n")
     return path
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_a_dataset_of_minari(tmp_path, monkeypatch):
+def test_a_minari_dataset_is_learned_like_its_arrays(tmp_path, monkeypatch):
     minari = pytest.importorskip("minari")
     pytest.importorskip("h5py")
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
@@ -85,7 +85,7 @@ def test_a_dataset_of_minari(tmp_path, monkeypatch):
     assert states_equal(agent, other)
 
 
-def test_observations_of_parts_and_a_warm_up_from_the_data(tmp_path):
+def test_logs_of_dict_observations_are_learned_and_end_a_warm_up(tmp_path):
     rng = np.random.default_rng(1)
     wide = gym.spaces.Dict({"at": gym.spaces.Box(-np.inf, np.inf, (1,)), "gear": BUTTONS})
     path = tmp_path / "log.jsonl"
@@ -115,17 +115,17 @@ def test_observations_of_parts_and_a_warm_up_from_the_data(tmp_path):
 @pytest.mark.parametrize(
     "line", ["", "7", "{}", "[" * 9999, '{"observation": [0, 0]}', "nonsense", "\x00", "NaN"]
 )
-def test_lines_that_are_no_transition_are_named(tmp_path, line):
+def test_lines_that_are_no_transition_are_refused_with_their_number(tmp_path, line):
     path = lines(tmp_path / "log.jsonl")
     path.write_text(path.read_text() + line + "\n")
     agent = new_agent()
-    error = refuses("41", learn_from, agent, path)
+    error = refuses("41", learn_from, agent, path)  # after the 40 lines of the log
     assert "line" in str(error)
     assert states_equal(agent, new_agent())  # nothing is learned
 
 
-def test_rows_without_next_observations_follow_each_other():
-    """The last step of an episode that was cut off is not learned."""
+def test_without_next_observations_the_next_row_has_them():
+    # Of the 40 transitions, the last of the truncated episode has no next observation.
     columns = arrays()
     following = {name: v for name, v in columns.items() if name != "next_observations"}
     agent, other = new_agent(), new_agent()
@@ -134,18 +134,18 @@ def test_rows_without_next_observations_follow_each_other():
     assert np.array_equal(agent.readout.weights(), other.readout.weights())
 
 
-def test_a_long_line_is_not_read_whole(tmp_path):
+def test_a_line_of_two_megabytes_is_refused(tmp_path):
     path = tmp_path / "log.jsonl"
     path.write_bytes(b" " * 2**21)
     refuses("line", learn_from, new_agent(), path)
 
 
-def test_a_dataset_without_transitions_ends_at_once():
+def test_many_epochs_of_an_empty_dataset_end_at_once():
     agent = SDNNQLambda(gym.spaces.Box(0.0, 1.0, (2,)), gym.spaces.Discrete(2))
     assert learn_from(agent, (), epochs=2**31) == 0
 
 
-def test_arguments_that_cannot_be_used():
+def test_wrong_agents_datasets_and_columns_are_refused():
     good = arrays()
     refuses("agent", learn_from, "agent", [], error=TypeError)
     torque = gym.spaces.Box(-1.0, 1.0, (1,))
@@ -163,7 +163,7 @@ def test_arguments_that_cannot_be_used():
 
 @settings(max_examples=20, deadline=None)
 @given(cuts=st.lists(st.booleans(), min_size=1, max_size=30), epochs=st.integers(1, 3))
-def test_truncated_episodes_are_learned_as_episodes_that_begin_anew(cuts, epochs):
+def test_truncations_begin_new_episodes(cuts, epochs):
     rng = np.random.default_rng(len(cuts))
     n = len(cuts)
     states = rng.uniform(-1, 1, (n + 1, 2))

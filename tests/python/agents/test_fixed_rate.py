@@ -1,4 +1,4 @@
-"""Loops at a fixed rate; the rules of the ticks are tested in C++."""
+"""Loops at a fixed rate in Python; the rules of ticks are tested in C++."""
 
 import time
 
@@ -7,7 +7,7 @@ import pytest
 from sdnn.agents import FixedRate
 
 
-def test_an_interrupted_sleep_ends_the_wait():
+def test_ctrl_c_during_a_sleep_ends_the_loop():
     def sleep(seconds):
         raise KeyboardInterrupt
 
@@ -17,7 +17,7 @@ def test_an_interrupted_sleep_ends_the_wait():
         next(rate)
 
 
-def test_it_keeps_time_by_the_real_clock():
+def test_ten_periods_of_200_hz_take_at_least_50_ms():
     began = time.monotonic()
     for tick in FixedRate(200.0):
         if tick >= 10:

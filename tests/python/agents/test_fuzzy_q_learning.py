@@ -11,7 +11,7 @@ OBSERVATIONS = gym.spaces.Box(-2.0, 2.0, (3,), np.float64)
 TORQUES = gym.spaces.Box(-1.0, 3.0, (1,), np.float32)
 
 
-def test_a_changed_array_is_not_the_action_taken():
+def test_fuzzy_q_learning_refuses_an_action_that_was_modified():
     agent = FuzzyQLearning(OBSERVATIONS, TORQUES, seed=2)
     here = [0.1, 0.2, 0.3]
     action = agent.act(here)
@@ -22,14 +22,14 @@ def test_a_changed_array_is_not_the_action_taken():
     assert agent.value(here) > 0.0
 
 
-def test_the_configurations_are_those_used():
+def test_a_fuzzy_agent_exposes_its_configurations_and_number_of_rules():
     agent = FuzzyQLearning(OBSERVATIONS, TORQUES, approximator=FuzzyRulesConfig(n_sets=5))
     assert agent.approximator == FuzzyRulesConfig(n_inputs=3, n_sets=5)
     assert agent.learning == FuzzyQLearningConfig()
-    assert agent.n_rules == 125
+    assert agent.n_rules == 125  # 5 sets for each of 3 inputs
 
 
-def test_a_rule_that_fires_alone_learns_the_error_of_its_action():
+def test_a_rule_that_fires_alone_learns_half_of_its_error():
     agent = FuzzyQLearning(OBSERVATIONS, TORQUES, seed=2)
     centre = [0.0, 0.0, 0.0]  # of set 4 of 9 in each of the three dimensions
     agent.learn(Transition(centre, agent.act(centre), 1.0, centre, terminated=True))

@@ -1,4 +1,4 @@
-"""Users of Stable-Baselines3 find what they look for; agents and results show what they are."""
+"""Conventions of Stable-Baselines3, callbacks, and representations of agents and results."""
 
 import inspect
 import re
@@ -30,7 +30,7 @@ def trained():
     return agent, env, agent.train(env, steps=1.5e3)
 
 
-def test_predict_takes_one_observation_or_several(trained):
+def test_predict_accepts_one_observation_or_a_batch(trained):
     agent, env, _ = trained
     several = np.stack([env.reset(seed=n)[0] for n in range(5)])
     actions, state = agent.predict(several, None, np.ones(5, bool), deterministic=True)
@@ -42,7 +42,7 @@ def test_predict_takes_one_observation_or_several(trained):
     refuses("observation", agent.predict, several[:0])
 
 
-def test_predict_of_listed_states_and_of_boxes():
+def test_predict_accepts_batches_of_discrete_and_box_observations():
     lake = gym.make("FrozenLake-v1")
     agent = SDNNQLambda(lake.observation_space, lake.action_space)
     assert agent.predict(np.array([0, 3, 5]))[0].shape == (3,)
@@ -54,7 +54,7 @@ def test_predict_of_listed_states_and_of_boxes():
 
 
 @pytest.mark.parametrize("kind", [gym.spaces.Dict, gym.spaces.Tuple])
-def test_predict_takes_batches_of_observations_in_parts(kind):
+def test_predict_accepts_batches_of_dict_and_tuple_observations(kind):
     parts = gym.spaces.Box(-1, 1, (2,)), gym.spaces.Discrete(3)
     space = kind(dict(zip("ab", parts, strict=True))) if kind is gym.spaces.Dict else kind(parts)
     agent = SDNNQLambda(space, gym.spaces.Discrete(9), inputs="all", angle_pairs="none")
@@ -89,52 +89,53 @@ CALLS = {
 
 
 @pytest.mark.parametrize("function", CALLS, ids=lambda call: call.__qualname__)
-def test_names_from_habit_are_explained(trained, function):
+def test_arguments_of_other_libraries_are_refused_with_the_right_name(trained, function):
     for name, hint in CALLS[function].items():
         with pytest.raises(TypeError, match=f"^{name} .*{re.escape(hint)}") as refused:
             function(*trained[:1], **{name: 1})
         assert refused.value.argument == name
 
 
-def test_positional_arguments(trained):
+def test_constructors_accept_environments_and_train_accepts_positional_steps(trained):
     agent, env, _ = trained
     assert agent.train(env, 20).n_steps == 20
     envs = gym.make_vec("CartPole-v1", num_envs=2)
     expected = SDNNQLambda(env.observation_space, env.action_space).description()
-    assert [SDNNQLambda(given).description() for given in (env, envs)] == [expected] * 2
+    for source in (env, envs):
+        assert SDNNQLambda(source).description() == expected
     refuses("gymnasium.make", SDNNQLambda, "CartPole-v1", error=TypeError)
     refuses("SDNNQLambda", SDNNQLambda, error=TypeError)
     refuses("action_space", SDNNQLambda, env.observation_space, error=TypeError)
     refuses("steps", agent.learn, 200, error=TypeError)
-    assert trained[2].n_steps == 1500  # of a whole float
+    assert trained[2].n_steps == 1500  # from 1.5e3, a whole float
     refuses("steps", agent.train, env, steps=1500.5)
     assert "observation_space" in inspect.signature(SDNNQLambda).parameters
 
 
-def test_a_seed_that_is_none_is_drawn_and_kept():
+def test_seed_none_draws_a_different_seed_for_each_agent():
     env = gym.make("CartPole-v1")
     first, second = (SDNNQLambda(env.observation_space, env.action_space, seed=None) for _ in "ab")
     assert first.seed != second.seed
 
 
-def test_representations_show_spaces_steps_and_returns(trained):
+def test_representations_show_spaces_steps_and_returns_and_escape_html(trained):
     agent, env, result = trained
-    found = evaluate(agent, env, episodes=3)
+    evaluation = evaluate(agent, env, episodes=3)
     assert "Discrete(2)" in repr(agent)
     assert "steps 1500" in repr(result)
-    assert f"{found.mean_return:.5g}" in repr(found)
-    for one in (agent, result, found):
-        assert one._repr_html_().count("<tr>") == len(one._facts())
-    assert (
-        "&lt;"
-        in type("Odd", (type(found),), {"_facts": lambda self: {"a": "<b>"}})(
-            **vars(found)
-        )._repr_html_()
-    )
+    assert f"{evaluation.mean_return:.5g}" in repr(evaluation)
+    for shown in (agent, result, evaluation):
+        assert shown._repr_html_().count("<tr>") == len(shown._facts())
+
+    class Unescaped(type(evaluation)):
+        def _facts(self):
+            return {"a": "<b>"}
+
+    assert "&lt;" in Unescaped(**vars(evaluation))._repr_html_()
 
 
 class Means(Callback):
-    """Gives evaluations that are known."""
+    """Replaces the mean returns of evaluations."""
 
     def __init__(self, means):
         self.means = iter(means)
@@ -159,7 +160,7 @@ def run(tmp_path, means, *callbacks):
     return training
 
 
-def test_the_agent_of_the_best_evaluation_is_kept(tmp_path):
+def test_save_best_agent_saves_at_each_better_evaluation(tmp_path):
     path = tmp_path / "best.safetensors"
 
     class Note(Callback):
@@ -178,7 +179,7 @@ def test_the_agent_of_the_best_evaluation_is_kept(tmp_path):
     assert isinstance(load_agent(path), SDNNQLambda)
 
 
-def test_a_training_without_improvement_stops(tmp_path):
+def test_two_evaluations_without_improvement_stop_a_training(tmp_path):
     stop = StopTrainingOnNoImprovement(max_evaluations=2)
     assert run(tmp_path, [1.0, 3.0, 2.0, 3.0, 9.0, 9.0], stop).n_steps == 40
     assert run(tmp_path, [1.0, 3.0, 2.0, 4.0, 3.0, 5.0], stop).n_steps == 60
@@ -186,7 +187,7 @@ def test_a_training_without_improvement_stops(tmp_path):
 
 
 @pytest.mark.parametrize("interval", [0, -1, 2.5, None])
-def test_a_step_interval_is_at_least_one(trained, interval):
+def test_step_intervals_below_1_and_fractions_are_refused(trained, interval):
     class Odd(Callback):
         step_interval = interval
 
@@ -197,10 +198,10 @@ def test_a_step_interval_is_at_least_one(trained, interval):
     refuses("step_interval", agent.train, env, steps=5, callbacks=[Odd()])
 
 
-def test_methods_that_are_replaced_are_called_in_trainings():
+def test_a_training_calls_methods_replaced_on_the_instance():
     env = gym.make("CartPole-v1")
     agent = SDNNQLambda(env.observation_space, env.action_space)
-    seen, learn = [], agent.learn
-    agent.learn = lambda transition: (seen.append(transition), learn(transition))
+    transitions, learn = [], agent.learn
+    agent.learn = lambda transition: (transitions.append(transition), learn(transition))
     agent.train(env, steps=5)
-    assert len(seen) == 5
+    assert len(transitions) == 5

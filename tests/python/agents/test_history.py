@@ -1,4 +1,4 @@
-"""States that have something of earlier observations."""
+"""States that include earlier observations."""
 
 import gymnasium as gym
 import numpy as np
@@ -8,7 +8,7 @@ from sdnn.agents import SDNNActorCritic, SDNNQLambda, Transition, evaluate, load
 from sdnn.export import c_header
 
 RANDOM_STEPS = 1100
-"""Some more than a warm-up has."""
+"""More than the steps of a warm-up."""
 
 
 def exact():
@@ -36,7 +36,7 @@ def noisy():
 @pytest.mark.parametrize(
     ("task", "history"), [(exact, "none"), (positions, "differences"), (noisy, "observer")]
 )
-def test_auto_finds_the_history_that_a_task_needs(agent_class, task, history):
+def test_history_auto_selects_what_a_task_needs(agent_class, task, history):
     agent = agent_class(task(), seed=1, history="auto")
     assert agent.history == "auto"
     agent.train(task(), steps=RANDOM_STEPS, seed=1)
@@ -46,7 +46,7 @@ def test_auto_finds_the_history_that_a_task_needs(agent_class, task, history):
 
 
 @pytest.mark.parametrize("history", ["differences", "averages", "observer"])
-def test_a_loaded_agent_continues_with_what_it_remembers(history, tmp_path):
+def test_a_loaded_agent_with_a_history_acts_and_learns_as_the_saved_one(history, tmp_path):
     agent = SDNNQLambda(positions(), seed=1, history=history)
     agent.train(positions(), steps=RANDOM_STEPS, seed=1)
     agent.save(tmp_path / "agent.safetensors")
@@ -68,7 +68,7 @@ def test_a_loaded_agent_continues_with_what_it_remembers(history, tmp_path):
     assert all(np.array_equal(a, same.state()[name]) for name, a in agent.state().items())
 
 
-def test_evaluations_leave_the_memory_of_the_learned_episode():
+def test_evaluations_do_not_change_the_history_of_the_current_episode():
     agents = [SDNNQLambda(positions(), seed=1, history="differences") for _ in range(2)]
     for agent in agents:
         agent.train(positions(), steps=RANDOM_STEPS, seed=1)
@@ -79,7 +79,7 @@ def test_evaluations_leave_the_memory_of_the_learned_episode():
     assert agents[0].act(observation) == agents[1].act(observation)
 
 
-def test_several_environments_have_a_memory_each():
+def test_environments_of_a_vector_have_separate_histories():
     envs = gym.vector.SyncVectorEnv([positions] * 3)
     agent = SDNNQLambda(positions(), seed=1, history="differences")
     agent.train(envs, steps=3000, seed=1)
@@ -89,7 +89,7 @@ def test_several_environments_have_a_memory_each():
     }  # fmt: skip
 
 
-def test_agents_with_a_history_have_no_header_in_c():
+def test_export_refuses_agents_with_a_history():
     agent = SDNNQLambda(positions(), seed=1, history="differences")
     agent.train(positions(), steps=RANDOM_STEPS, seed=1)
     with pytest.raises(ValueError, match="history='none'"):

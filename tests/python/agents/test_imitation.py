@@ -1,4 +1,4 @@
-"""Imitation of a teacher: the policy is taken from a log, and learning continues from there."""
+"""Imitation of a teacher from a log of transitions."""
 
 import copy
 
@@ -40,7 +40,7 @@ def cartpole_log(n_rows, seed=1, noise=0.05):
 
 
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
-def test_a_policy_is_taken_over_and_kept(agent_class):
+def test_imitation_balances_cartpole_and_learning_keeps_it_balanced(agent_class):
     env = gym.make("CartPole-v1")
     agent = agent_class(env, seed=1)
     assert imitate(agent, cartpole_log(3000), epochs=5) == 15_000
@@ -59,7 +59,7 @@ ACTIONS = [
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
 @pytest.mark.parametrize("space", ACTIONS, ids=lambda space: type(space).__name__)
 @pytest.mark.parametrize("reward", [0.0, 1e-9, -1000.0])
-def test_every_space_of_actions_and_any_reward(agent_class, space, reward):
+def test_actions_of_any_space_are_imitated_at_any_size_of_rewards(agent_class, space, reward):
     rng = np.random.default_rng(1)
     space.seed(1)
     choices = [space.sample() for _ in range(2)]
@@ -88,8 +88,8 @@ def value_of(agent, observation):
 
 
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
-def test_values_are_the_returns_of_the_teacher(agent_class):
-    """Two steps to a reward of 8 with a discount of 1/2; a cut episode continues by estimates."""
+def test_values_after_imitation_are_the_returns_of_the_teacher(agent_class):
+    # Two steps to a reward of 8 with a discount of 1/2; a truncated episode bootstraps.
     a, b = [0.2, 0.2], [0.8, 0.8]
     learning = agent_class.learning_type(discount=0.5)
     push = gym.spaces.Discrete(2)
@@ -102,7 +102,7 @@ def test_values_are_the_returns_of_the_teacher(agent_class):
 
 
 @pytest.mark.parametrize("n_rows", [1, 2, 40, 300])
-def test_ranges_come_from_the_log_where_they_are_not_known(n_rows):
+def test_unknown_ranges_are_fitted_to_the_log(n_rows):
     space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
     agent = SDNNQLambda(space, gym.spaces.Discrete(2), warm_up_steps=200, seed=1)
     points = np.random.default_rng(1).uniform(2.0, 4.0, (n_rows, 2))
@@ -110,13 +110,13 @@ def test_ranges_come_from_the_log_where_they_are_not_known(n_rows):
     rows = [Transition(point, int(point[0] > 3.0), 0.0, point, True) for point in points]
     assert imitate(agent, rows, epochs=3) == 3 * n_rows
     low, high = agent.observation_range
-    if n_rows == 40:
+    if n_rows == 40:  # few: the range of 2 to 4 is widened by twice its width at both ends
         np.testing.assert_allclose(low, -2.0)
         np.testing.assert_allclose(high, 8.0)
     assert agent.act([4.0, 4.0], explore=False) == 1
 
 
-def test_a_started_warm_up_is_continued():
+def test_imitation_ends_a_warm_up_that_has_begun():
     agent = SDNNQLambda(gym.make("CartPole-v1"), warm_up_steps=100, seed=1)
     rows = cartpole_log(300)
     for row in rows[:99]:
@@ -127,7 +127,7 @@ def test_a_started_warm_up_is_continued():
 
 
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
-def test_forms_of_logs_and_files_of_agents_make_no_difference(agent_class, tmp_path):
+def test_imitation_of_rows_columns_and_a_loaded_agent_have_the_same_bits(agent_class, tmp_path):
     rows = cartpole_log(400)
     names = (
         "observations", "actions", "rewards", "next_observations", "terminations", "truncations",
@@ -192,7 +192,9 @@ def move(slow, x, errors, rate, action):
     scale=st.sampled_from([1.0, 100.0, 1e6, 1e-40]),
 )
 @settings(max_examples=30, deadline=None)
-def test_weights_are_those_of_the_transcription(seed, n_actions, n_dimensions, window, scale):
+def test_weights_after_imitation_are_those_of_the_numpy_transcription(
+    seed, n_actions, n_dimensions, window, scale
+):
     learning = {"schedule_steps": 7, "bootstrap": "q_learning", "traces": "dutch"}
     agent = SDNNQLambda(
         SQUARE,
@@ -212,7 +214,7 @@ def test_weights_are_those_of_the_transcription(seed, n_actions, n_dimensions, w
         np.testing.assert_array_equal(agent.readout.weights(), slow.weights)
 
 
-def test_what_cannot_be_imitated():
+def test_wrong_agents_actions_and_datasets_are_refused_and_change_nothing():
     push = gym.spaces.Discrete(2)
     agent = SDNNQLambda(SQUARE, push, seed=1, **KNOWN)
     row = Transition([0.1, 0.1], 1, 0.0, [0.2, 0.2], True)

@@ -7,8 +7,8 @@ import pytest
 from sdnn.agents import SDNNQLearning, Transition
 
 
-def test_a_discrete_observation_is_a_symbol():
-    """The right action in a room has nothing to do with the next room."""
+def test_actions_of_40_unrelated_rooms_are_learned_exactly():
+    # Each room has a random right action: neighbours do not help.
     right = np.random.default_rng(1).integers(0, 4, 40)
     agent = SDNNQLearning(gym.spaces.Discrete(40), gym.spaces.Discrete(4), seed=1)
     assert agent.approximator.n_inputs == 2
@@ -22,8 +22,8 @@ def test_a_discrete_observation_is_a_symbol():
     assert [agent.act(room, explore=False) for room in range(40)] == right.tolist()
 
 
-def test_a_large_discrete_space_costs_no_more_than_its_patterns():
-    """Flattened it has 500 variables, whose pairs no memory would hold."""
+def test_an_agent_of_500_discrete_states_takes_less_than_10_mb():
+    # Flattened, the space would have 500 variables with 124,750 pairs.
     agent = SDNNQLearning(gym.spaces.Discrete(500), gym.spaces.Discrete(6), seed=1)
     n_bytes = sum(array.nbytes for array in agent.state().values())
     assert n_bytes < 10e6
@@ -32,17 +32,17 @@ def test_a_large_discrete_space_costs_no_more_than_its_patterns():
     assert agent.act(499, explore=False) == 3
 
 
-def test_of_many_variables_only_some_pairs_are_formed():
-    """All 870 pairs of 30 variables would need two gigabytes with `general`."""
+def test_of_30_variables_30_pairs_are_formed_and_the_relevant_one_is_learned():
+    # All 870 ordered pairs of 30 variables would need two gigabytes with `general`.
     space = gym.spaces.Box(-1.0, 1.0, (30,), dtype=np.float64)
     agent = SDNNQLearning(space, gym.spaces.Discrete(2), preset="small", seed=1)
     assert agent.approximator.n_pairs == 30
     random = np.random.default_rng(1)
     for step in range(2000):
         agent.progress = step / 2000
-        seen = random.uniform(-1, 1, 30)
-        action = agent.act(seen)
-        agent.learn(Transition(seen, action, float(action == (seen[5] > 0)), seen, True))
-    seen = random.uniform(-1, 1, (300, 30))
-    greedy = [agent.act(one, explore=False) for one in seen]
-    assert np.mean(greedy == (seen[:, 5] > 0)) > 0.9
+        x = random.uniform(-1, 1, 30)
+        action = agent.act(x)
+        agent.learn(Transition(x, action, float(action == (x[5] > 0)), x, True))
+    observations = random.uniform(-1, 1, (300, 30))
+    greedy = [agent.act(x, explore=False) for x in observations]
+    assert np.mean(greedy == (observations[:, 5] > 0)) > 0.9

@@ -1,4 +1,4 @@
-"""Missing readings: refused, replaced by the last ones, or coded."""
+"""Missing readings: refused, held at their last value, or coded."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -36,7 +36,7 @@ def state(agent, observation):
 
 
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNQLearning, RBFQLearning])
-def test_held_readings_are_the_last_of_their_variable_environment_and_episode(agent_class):
+def test_hold_repeats_the_last_reading_of_the_variable_environment_and_episode(agent_class):
     agent = agent_of(agent_class, "hold")
     agent.n_environments = 2
     never, last = state(agent, LOST), state(agent, READ | {"a": np.array([0.0, 0.5])})
@@ -60,7 +60,7 @@ def test_held_readings_are_the_last_of_their_variable_environment_and_episode(ag
 
 
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNQLearning])
-def test_coded_readings_have_a_pattern_that_nothing_else_has(agent_class):
+def test_code_gives_missing_readings_a_separate_pattern(agent_class):
     plain, agent = agent_of(agent_class, "error"), agent_of(agent_class, "code")
     core, plain_core = agent.networks[0], plain.networks[0]
     for i in range(4):
@@ -75,7 +75,7 @@ def test_coded_readings_have_a_pattern_that_nothing_else_has(agent_class):
     assert agent.q_values(READ).min() < -0.8
 
 
-def test_an_angle_is_missing_if_one_of_its_pair_is():
+def test_an_angle_is_missing_if_either_of_its_pair_is():
     space = gym.spaces.Box(-1.0, 1.0, (3,))
     agent = agent_of(SDNNQLambda, "code", space, angle_pairs=[(0, 1)])
     states = [state(agent, x) for x in ([np.nan, 1, 0], [0, np.inf, 0], [np.nan, np.nan, 0])]
@@ -85,7 +85,7 @@ def test_an_angle_is_missing_if_one_of_its_pair_is():
     assert state(agent, [1.0, np.nan, 0.0])[0] == 0.625
 
 
-def test_refusals_name_the_remedy():
+def test_missing_readings_and_unsupported_modes_are_refused_with_a_remedy():
     for bad in (LOST, READ | {"a": np.array([0.0, np.inf])}):
         refuses("observation", agent_of(SDNNQLambda, "error").act, bad)
     for agent_class in (RBFQLearning, FuzzyQLearning):
@@ -96,7 +96,7 @@ def test_refusals_name_the_remedy():
 
 
 @pytest.mark.parametrize("missing", ["hold", "code"])
-def test_ranges_and_angles_are_found_among_the_readings_that_are_there(missing):
+def test_warm_ups_fit_ranges_and_angles_to_the_readings_that_are_present(missing):
     space, random = gym.spaces.Box(-np.inf, np.inf, (4,), np.float64), np.random.default_rng(3)
     options = {"missing": missing, "inputs": "all", "warm_up_steps": 400, "seed": 1}
     agents = [SDNNQLambda(space, BOX, **options) for _ in range(2)]
@@ -111,7 +111,7 @@ def test_ranges_and_angles_are_found_among_the_readings_that_are_there(missing):
     assert part.observation_range[0][3] == -0.25  # of a variable that was never read
 
 
-def test_greedy_episodes_begin_without_readings():
+def test_evaluations_begin_episodes_with_the_middle_of_unread_ranges():
     class Silent(gym.Wrapper):
         def reset(self, **options):
             return np.full(4, np.nan, np.float32), super().reset(**options)[1]

@@ -1,4 +1,4 @@
-"""Observations of any space as vectors of variables, and what is known of their ranges."""
+"""Observations of any space as vectors of inputs with ranges."""
 
 import gymnasium as gym
 import numpy as np
@@ -28,7 +28,7 @@ def inputs(space, **options):
     return sdnn_agent(space, **options).inputs
 
 
-def test_bounds_are_the_ranges_unless_others_are_given():
+def test_ranges_are_the_bounds_of_the_space_unless_others_are_set():
     agent = sdnn_agent(BOX)
     assert not agent.is_warming_up
     assert [end.tolist() for end in agent.observation_range] == [[-1.0, 0.0], [3.0, 10.0]]
@@ -36,7 +36,7 @@ def test_bounds_are_the_ranges_unless_others_are_given():
     assert [end.tolist() for end in agent.observation_range] == [[0.0, 0.0], [2.0, 4.0]]
 
 
-def test_the_warm_up_finds_ranges_and_pairs():
+def test_a_warm_up_fits_ranges_and_finds_angle_pairs():
     agent = RBFQLearning(UNBOUNDED, BUTTONS, angle_pairs="find", warm_up_steps=40)
     with pytest.raises(RuntimeError, match="warm"):
         _ = agent.observation_range
@@ -48,13 +48,13 @@ def test_the_warm_up_finds_ranges_and_pairs():
     assert agent.inputs == [("angle", [0, 1]), ("variable", [2])]
 
 
-def test_the_largest_float_means_infinity():
+def test_a_bound_at_the_largest_float_is_unbounded():
     limit = np.finfo(np.float32).max
     assert config(gym.spaces.Box(-limit, limit, (2,))).low == (None, None)
 
 
 @pytest.mark.parametrize("dtype", [np.int32, np.int64])
-def test_infinity_in_whole_numbers_is_infinity(dtype):
+def test_infinite_bounds_of_integer_boxes_are_unbounded(dtype):
     box = gym.spaces.Box
     parts = {"up": box(0, np.inf, (1,), dtype), "all": box(-np.inf, np.inf, (2,), dtype)}
     space = gym.spaces.Dict({**parts, "byte": box(0, 255, (1,), np.uint8)})
@@ -68,7 +68,7 @@ def test_infinity_in_whole_numbers_is_infinity(dtype):
     assert (low, high) == ([0.0], [np.inf])
 
 
-def test_a_range_is_known_by_both_its_ends():
+def test_lower_and_upper_bounds_are_unknown_separately():
     half = gym.spaces.Box(np.array([-np.inf, 0.0]), np.array([1.0, 1.0]), dtype=np.float64)
     made = config(half)
     assert (made.low, made.high) == ((None, 0.0), (None, 1.0))
@@ -76,7 +76,7 @@ def test_a_range_is_known_by_both_its_ends():
     assert (made.low, made.high) == ((0.0, None, -1.0), (2.0, None, 2.0))
 
 
-def test_the_learning_report_has_the_use_of_ranges():
+def test_the_learning_report_shows_the_shares_of_ranges_in_use():
     space = gym.spaces.Dict({"at": gym.spaces.Box(0, 1, (1,)), "room": gym.spaces.Discrete(3)})
     agent = sdnn_agent(space)
     for t in range(400):
@@ -97,7 +97,7 @@ GEAR = gym.spaces.Dict(
 )
 
 
-def test_each_discrete_is_one_input_of_a_network_that_codes_symbols():
+def test_each_discrete_part_is_one_symbol_input_where_symbols_are_coded():
     agent = SDNNQLearning(GEAR, BUTTONS, approximator=SMALL)
     assert agent.inputs == [  # Gymnasium sorts the names of a Dict
         ("symbol", [0, 3]),
@@ -112,12 +112,12 @@ def test_each_discrete_is_one_input_of_a_network_that_codes_symbols():
     assert RBFQLearning(small, BUTTONS).inputs == [("variable", [i]) for i in range(5)]
 
 
-def test_one_input_is_repeated_where_two_are_needed():
+def test_a_single_input_is_repeated_where_two_are_needed():
     assert inputs(gym.spaces.Discrete(4)) == [("symbol", [0, 4])] * 2
     assert inputs(gym.spaces.Box(0, 1, (1,))) == [("variable", [0])] * 2
 
 
-def test_angles_are_inputs_that_wrap_around():
+def test_angle_pairs_and_angles_are_circular_inputs():
     space = gym.spaces.Box(-1.0, 1.0, (3,), dtype=np.float64)
     agent = sdnn_agent(space, angle_pairs=[(0, 1)])
     assert agent.inputs == [("angle", [0, 1]), ("variable", [2])]
@@ -125,7 +125,7 @@ def test_angles_are_inputs_that_wrap_around():
     assert inputs(space, angles=[1])[1] == ("circular", [1])
 
 
-def test_variables_of_symbols_cannot_be_angles():
+def test_variables_of_discrete_spaces_cannot_be_angles():
     refuses("angles", sdnn_agent, GEAR, angles=[1])
     refuses("angle_pairs", sdnn_agent, GEAR, angle_pairs=[(4, 5)])
 
@@ -140,7 +140,7 @@ def test_variables_of_symbols_cannot_be_angles():
         gym.spaces.Box(0, 1, (2, 2)),
     ],
 )
-def test_spaces_are_flattened_as_gymnasium_does(space):
+def test_observations_are_flattened_like_gymnasiums_flatten(space):
     observations = Observations(space)
     space.seed(1)
     for _ in range(20):
@@ -149,7 +149,7 @@ def test_spaces_are_flattened_as_gymnasium_does(space):
         assert np.array_equal(vector.reshape(-1), gym.spaces.flatten(space, element))
 
 
-def test_a_space_without_a_range_names_a_remedy():
+def test_a_variable_with_equal_bounds_is_refused():
     constant = gym.spaces.Box(np.array([0.0, 1.0]), np.array([1.0, 1.0]), dtype=np.float64)
     refuses("observation_space", config, constant)
 
@@ -170,7 +170,7 @@ def test_a_space_without_a_range_names_a_remedy():
         (gym.spaces.Discrete(3), "one"),
     ],
 )
-def test_elements_of_other_spaces_are_refused_by_name(space, observation):
+def test_observations_of_another_space_are_refused_by_name(space, observation):
     refuses("next_observation", Observations(space).vector, "next_observation", observation)
 
 
@@ -187,7 +187,7 @@ class _Distracted(gym.ObservationWrapper):
         return np.concatenate([observation, self._noise])
 
 
-def test_irrelevant_inputs_are_left_out_and_stay_so(tmp_path):
+def test_irrelevant_inputs_are_left_out_also_after_loading(tmp_path):
     env = _Distracted(gym.make("CartPole-v1"), 6)
     agent = SDNNQLearning(
         env.observation_space, env.action_space, preset="small", seed=1, inputs="relevant"
@@ -204,7 +204,7 @@ def test_irrelevant_inputs_are_left_out_and_stay_so(tmp_path):
     np.testing.assert_array_equal(loaded.q_values(observation), agent.q_values(observation))
 
 
-def test_listed_inputs_are_kept_whatever_the_evidence():
+def test_listed_inputs_are_kept_although_irrelevant():
     env = _Distracted(gym.make("CartPole-v1"), 6)
     agent = sdnn_agent(env.observation_space, inputs=[9, 6])
     agent.train(env, steps=1001, seed=1)
@@ -213,7 +213,7 @@ def test_listed_inputs_are_kept_whatever_the_evidence():
     assert len(kept) <= 7
 
 
-def test_any_variable_of_a_symbol_or_an_angle_keeps_it():
+def test_listing_a_variable_keeps_its_whole_symbol_or_angle():
     space = gym.spaces.Tuple([gym.spaces.Discrete(3)] + [gym.spaces.Box(-1, 1, (1,))] * 3)
     agent = sdnn_agent(space, angle_pairs=[(3, 4)], inputs=[1, 4], warm_up_steps=100)
     rng = np.random.default_rng(1)

@@ -1,4 +1,4 @@
-"""Q(lambda) with a linear readout: equal to its transcription, and what users meet."""
+"""Q(lambda) with a linear readout: its NumPy transcription, learning, and inputs."""
 
 import copy
 
@@ -25,7 +25,7 @@ from sdnn.approximators import LinearSDNNConfig
     scale=st.sampled_from([1.0, 100.0, 1e6, 1e-40]),
 )
 @settings(max_examples=60, deadline=None)
-def test_weights_are_those_of_the_transcription(
+def test_weights_are_those_of_the_numpy_transcription(
     seed, n_actions, window, bootstrap, traces, trace_decay, discount, learning_rate, scale
 ):
     learning = {
@@ -59,7 +59,7 @@ def test_weights_are_those_of_the_transcription(
         np.testing.assert_array_equal(readout.weights(), slow.weights)
 
 
-def test_listed_states_have_a_table(tmp_path):
+def test_a_few_discrete_states_have_exact_independent_values(tmp_path):
     space = gym.spaces.Discrete(5, start=3)
     agent = SDNNQLambda(space, gym.spaces.Discrete(2), seed=1)
     for state, reward in ((3, 2.0), (7, -5.0)):
@@ -72,7 +72,7 @@ def test_listed_states_have_a_table(tmp_path):
 
 
 @pytest.mark.parametrize(("n_states", "n_units"), [(1, 0), (2000, 0), (5, 40)])
-def test_too_many_states_or_given_units_have_patterns(n_states, n_units):
+def test_many_discrete_states_or_explicit_units_are_coded_as_patterns(n_states, n_units):
     agent = SDNNQLambda(
         gym.spaces.Discrete(n_states), gym.spaces.Discrete(2), seed=1,
         approximator=LinearSDNNConfig(n_pattern_units=n_units),
@@ -85,14 +85,14 @@ def test_too_many_states_or_given_units_have_patterns(n_states, n_units):
 @pytest.mark.parametrize(
     ("n_inputs", "n_units"), [(1, 768), (2, 768), (3, 512), (4, 256), (8, 256), (11, 128), (17, 64)]
 )
-def test_units_are_enough_for_patterns_to_differ_but_fewer_where_inputs_are_many(n_inputs, n_units):
+def test_the_default_number_of_pattern_units_falls_with_the_inputs(n_inputs, n_units):
     space = gym.spaces.Box(-1.0, 1.0, (n_inputs,), np.float64)
     agent = SDNNQLambda(space, gym.spaces.Discrete(2), inputs="all", angle_pairs="none")
     assert agent.approximator.n_pattern_units == n_units
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])
-def test_the_scale_of_rewards_changes_nothing_but_the_scale_of_values(scale):
+def test_values_scale_exactly_with_rewards(scale):
     def values(scale):
         agent = _core.BareAgent(
             approximator=LinearSDNNConfig(**SMALL), n_actions=[3], learning=QLambdaConfig(), seed=1
@@ -105,7 +105,7 @@ def test_the_scale_of_rewards_changes_nothing_but_the_scale_of_values(scale):
     np.testing.assert_array_equal(values(factor), values(1.0) * factor)
 
 
-def test_an_outlier_among_rewards_only_reduces_the_resolution():
+def test_values_recover_from_an_outlier_reward_within_their_resolution():
     agent = _core.BareAgent(
         approximator=LinearSDNNConfig(n_inputs=2),
         n_actions=[2],
@@ -118,7 +118,7 @@ def test_an_outlier_among_rewards_only_reduces_the_resolution():
     assert agent.networks[0].values([0.1, 0.1])[0] == pytest.approx(1.0, abs=0.5)
 
 
-def test_cartpole_is_learned_in_a_few_thousand_steps():
+def test_cartpole_is_balanced_for_300_steps_after_20_000_steps():
     env = gym.make("CartPole-v1")
     agent = SDNNQLambda(env.observation_space, env.action_space, seed=1)
     agent.train(env, steps=20_000, seed=1)
@@ -135,12 +135,12 @@ def test_cartpole_is_learned_in_a_few_thousand_steps():
         (gym.spaces.MultiDiscrete([3, 4, 5]), True),
     ],
 )
-def test_a_warm_up_is_only_where_there_is_a_choice(space, is_searched):
+def test_a_warm_up_takes_place_only_where_inputs_can_be_chosen(space, is_searched):
     assert SDNNQLambda(space, gym.spaces.Discrete(2)).is_warming_up == is_searched
     assert not SDNNQLambda(space, gym.spaces.Discrete(2), preset="paper").is_warming_up
 
 
-def test_angles_are_found_by_default():
+def test_the_angle_of_pendulum_is_found_by_default():
     env = gym.make("Pendulum-v1")
     agent = SDNNQLambda(env.observation_space, env.action_space, seed=1)
     agent.train(env, steps=1001, seed=1)
@@ -148,7 +148,9 @@ def test_angles_are_found_by_default():
 
 
 def changing_task(seed, n_steps):
-    """Transitions of a place that actions move, noise, and a number that matters from step 400."""
+    """Yield transitions of a position that actions move, three noise variables, and a last
+    variable that is rewarded from step 400 on.
+    """
     rng = np.random.default_rng(seed)
     observation = rng.random(5)
     for t in range(n_steps):
@@ -161,7 +163,7 @@ def changing_task(seed, n_steps):
 
 
 @pytest.mark.parametrize("inputs", [[2], [1, 3]])
-def test_inputs_that_matter_later_are_added(inputs, tmp_path):
+def test_inputs_that_become_relevant_later_are_added(inputs, tmp_path):
     unit, three = gym.spaces.Box(0.0, 1.0, (5,), np.float64), gym.spaces.Discrete(3)
     agent = SDNNQLambda(unit, three, angle_pairs="none", inputs=inputs, warm_up_steps=400, seed=2)
     same = copy.deepcopy(agent)
@@ -169,7 +171,7 @@ def test_inputs_that_matter_later_are_added(inputs, tmp_path):
     for t, transition in enumerate(changing_task(1, 1700)):
         agent.learn(transition)
         same.learn(transition)
-        if t % 170 == 20:  # while it warms up, while transitions are remembered, and not
+        if t % 170 == 20:  # during the warm-up, while transitions are remembered, and later
             same.save(tmp_path / "agent.safetensors")
             same = load_agent(tmp_path / "agent.safetensors")
         if not agent.is_warming_up and len(agent.inputs) not in numbers:
@@ -188,7 +190,7 @@ def test_inputs_that_matter_later_are_added(inputs, tmp_path):
     assert not np.array_equal(agent.q_values(probe), agent.q_values([0.3, 0.3, 0.3, 0.3, 0.9]))
 
 
-def test_a_network_keeps_the_inputs_of_its_warm_up():
+def test_a_network_without_linear_readout_keeps_the_inputs_of_its_warm_up():
     unit, three = gym.spaces.Box(0.0, 1.0, (5,), np.float64), gym.spaces.Discrete(3)
     agent = RBFQLearning(unit, three, inputs=[2], warm_up_steps=400)
     for t, transition in enumerate(changing_task(1, 850)):
@@ -199,7 +201,7 @@ def test_a_network_keeps_the_inputs_of_its_warm_up():
     assert 4 in agent.learning_report()["left_out"]
 
 
-def test_a_glitch_of_the_reward_is_not_learned_and_the_unit_is_reported():
+def test_an_outlier_reward_is_not_learned_and_keeps_the_reported_unit():
     agent, same = (SDNNQLambda(gym.spaces.Discrete(2), gym.spaces.Discrete(2)) for _ in range(2))
     assert agent.learning_report()["value_unit"] is None
     for step in range(3000):

@@ -21,9 +21,6 @@ def small_agent(actions=TORQUES, **options):
     return SDNNQLearning(OBSERVATIONS, actions, approximator=SMALL, **options)
 
 
-# Against the page of NumPy.
-
-
 OTHER_RATES = {"learning_rate": 0.3, "discount": 0.99, "epsilon": 0.5, "n_greedy_steps": 3}
 
 
@@ -31,7 +28,7 @@ OTHER_RATES = {"learning_rate": 0.3, "discount": 0.99, "epsilon": 0.5, "n_greedy
     ("n_inputs", "noise", "learning"),
     [(4, 0.0, {}), (4, 0.02, {}), (4, 0.02, OTHER_RATES), (5, 0.02, {}), (6, 0.02, {})],
 )
-def test_a_training_of_the_page_is_a_trial_of_the_core(n_inputs, noise, learning):
+def test_the_numpy_transcription_and_the_core_learn_the_same_trial(n_inputs, noise, learning):
     n_episodes = 15 if n_inputs == 4 else 8
     settings = page.Settings(
         episodes=n_episodes, seed=7, n_inputs=n_inputs, noise=noise, **learning
@@ -62,7 +59,7 @@ def test_a_training_of_the_page_is_a_trial_of_the_core(n_inputs, noise, learning
 # The Python face.
 
 
-def test_the_configurations_are_those_used():
+def test_the_number_of_actions_follows_from_space_and_window():
     agent = small_agent()
     assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=91)
     assert agent.learning == SDNNQLearning.presets["general"].learning
@@ -71,7 +68,7 @@ def test_the_configurations_are_those_used():
     assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=4)
 
 
-def test_a_preset_is_used_where_nothing_is_given():
+def test_presets_are_used_unless_settings_are_passed():
     general = SDNNQLearning(OBSERVATIONS, TORQUES)
     assert (general.n_actions, general.learning.discount) == (5, 0.99)
     robust = SDNNQLearning(OBSERVATIONS, TORQUES, preset="robust")
@@ -89,7 +86,7 @@ def test_a_preset_is_used_where_nothing_is_given():
     refuses("preset", SDNNQLearning, OBSERVATIONS, TORQUES, preset="best")
 
 
-def test_a_discrete_space_has_one_window_per_action():
+def test_an_agent_of_a_discrete_space_learns_and_takes_its_best_action():
     agent = small_agent(BUTTONS, seed=2, learning=QLearningConfig(tie_rule="lowest"))
     assert agent.n_actions == 4
     assert agent.actions.tolist() == [2, 3, 4, 5]
@@ -102,7 +99,7 @@ def test_a_discrete_space_has_one_window_per_action():
     assert action in BUTTONS
 
 
-def test_observations_are_scaled_by_the_bounds_and_saturate():
+def test_observations_are_scaled_by_the_bounds_and_clipped():
     agent = small_agent()
     agent.learn(Transition([2.0, -2.0, 0.0], [3.0], 10.0, [0.0, 0.0, 0.0], True))
     inside = agent.q_values([2.0, -2.0, 0.0])
@@ -114,7 +111,7 @@ def test_observations_are_scaled_by_the_bounds_and_saturate():
 
 
 @pytest.mark.parametrize("action", [1, 6, 2.7, np.nan, "left", None, [2, 3]])
-def test_actions_that_a_discrete_space_lacks_are_named_and_teach_nothing(action):
+def test_actions_outside_a_discrete_space_are_refused_and_not_learned(action):
     agent = small_agent(BUTTONS)
     good = [0.0, 0.0, 0.0]
     before = agent.networks[0].weights()
@@ -122,7 +119,7 @@ def test_actions_that_a_discrete_space_lacks_are_named_and_teach_nothing(action)
     assert np.array_equal(agent.networks[0].weights(), before)
 
 
-def test_an_agent_takes_patterns_of_any_coding():
+def test_an_agent_generalizes_by_the_patterns_it_is_given():
     tables = [Circular().patterns(40, seed=number) for number in range(3)]
     agent = small_agent(tables=tables)
     np.testing.assert_array_equal(agent.networks[0].table(2), tables[2])
@@ -135,7 +132,7 @@ def test_an_agent_takes_patterns_of_any_coding():
     refuses("tables", small_agent, tables=tables[:2])
 
 
-def test_tables_have_a_row_for_each_symbol():
+def test_tables_need_a_row_for_each_symbol():
     rooms = gym.spaces.MultiDiscrete([3, 4])
 
     def agent_with(*n_rows):

@@ -36,7 +36,7 @@ def new_agent(space=PLANE, **learning):
 
 
 @pytest.mark.parametrize("space", [PLANE, UNBOUNDED], ids=["born", "warming up"])
-def test_rates_that_are_set_stay_and_are_saved(space, tmp_path):
+def test_rates_set_by_hand_stay_until_set_to_none_and_are_saved(space, tmp_path):
     agent = new_agent(space, **FALLING)
     agent.learning_rate, agent.epsilon = 0.25, 0
     agent.progress = 1.0
@@ -84,7 +84,7 @@ def test_a_training_with_rates_set_by_callbacks_resumes_exactly(make, env_id, tm
     assert {"agent.learning_rate", "agent.epsilon"} <= whole.agent.state().keys()
 
 
-def test_a_schedule_gives_the_rates_of_every_step():
+def test_a_schedule_sets_the_rates_before_every_step():
     seen = []
 
     class Note(Callback):
@@ -106,7 +106,7 @@ def test_a_schedule_gives_the_rates_of_every_step():
         assert epsilon == 1 - progress
 
 
-def test_impossible_schedule_callbacks_are_named():
+def test_schedules_with_bad_functions_or_unsuitable_agents_are_refused():
     refuses("epsilon", Schedule, epsilon=0.1, error=TypeError)
     env = gym.make("Pendulum-v1")
     agent = FuzzyQLearning(env.observation_space, env.action_space)

@@ -68,7 +68,7 @@ def in_threads(*works):
 
 
 @pytest.mark.parametrize("kind", AGENTS)
-def test_concurrent_readers_get_the_values_and_actions_of_a_single_one(kind):
+def test_concurrent_readers_get_the_bits_of_a_single_reader(kind):
     # Without draws, whose order would be that of the threads.
     agent = AGENTS[kind](learning=AGENTS[kind]().learning.replace(tie_rule="middle"))
     for round_number in range(3):

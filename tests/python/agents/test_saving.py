@@ -166,7 +166,7 @@ def test_an_agent_saved_at_any_step_continues_exactly(kind, n_environments, n_cu
         same_state(whole, again)
 
 
-def test_a_copy_shares_nothing():
+def test_learning_does_not_change_earlier_copies():
     agent = lived(KINDS["sdnn"](), 0, 40)
     for copied in (copy.deepcopy(agent), copy.copy(agent)):
         before = copied.state()
@@ -175,14 +175,14 @@ def test_a_copy_shares_nothing():
             assert np.array_equal(array, before[name]), name
 
 
-def test_the_class_is_that_of_the_file(tmp_path):
+def test_load_agent_returns_the_class_that_was_saved(tmp_path):
     KINDS["rbf"]().save(tmp_path / "agent")
     assert type(load_agent(tmp_path / "agent")) is RBFQLearning
     assert isinstance(RBFQLearning.load(tmp_path / "agent"), RBFQLearning)
     refuses("RBFQLearning", SDNNQLearning.load, tmp_path / "agent")
 
 
-def test_an_agent_of_ones_own_class_is_pickled_with_it(tmp_path, monkeypatch):
+def test_a_subclass_of_an_imported_module_can_be_unpickled(tmp_path, monkeypatch):
     (tmp_path / "docking.py").write_text(
         "from sdnn.agents import RBFQLearning\nclass Docker(RBFQLearning):\n    pass\n"
     )
@@ -198,7 +198,7 @@ def test_an_agent_of_ones_own_class_is_pickled_with_it(tmp_path, monkeypatch):
     assert type(pickle.loads(told.stdout)).__name__ == "Docker"
 
 
-def test_actions_keep_their_type(tmp_path):
+def test_actions_keep_the_dtype_of_a_discrete_space(tmp_path):
     if "dtype" not in inspect.signature(gym.spaces.Discrete).parameters:
         pytest.skip("Discrete has one type in this version of Gymnasium")
     buttons = gym.spaces.Discrete(3, start=1, dtype=np.int32)
@@ -209,7 +209,7 @@ def test_actions_keep_their_type(tmp_path):
         assert again.act(np.zeros(2)).dtype == np.int32
 
 
-def test_two_classes_of_agents_cannot_have_one_name():
+def test_a_second_class_of_the_same_name_is_refused_except_in_main():
     refuses("RBFQLearning", type, "RBFQLearning", (SDNNQLearning,), {}, error=TypeError)
     for module in ("__main__", "__main__", "script"):  # a notebook's cell, a script imported too
         again = type("DefinedAgain", (RBFQLearning,), {"__module__": module})
@@ -218,7 +218,7 @@ def test_two_classes_of_agents_cannot_have_one_name():
     assert type(copy.deepcopy(agent)) is again
 
 
-def test_classes_of_a_cell_that_runs_again_are_the_same(tmp_path):
+def test_an_unchanged_class_that_is_defined_again_replaces_the_first(tmp_path):
     first, second = (type("MineAgain", (RBFQLearning,), {}) for _ in range(2))
     second(PLANE, TORQUE).save(tmp_path / "agent")
     assert type(first.load(tmp_path / "agent")) is second
@@ -231,7 +231,7 @@ def test_classes_of_a_cell_that_runs_again_are_the_same(tmp_path):
 @pytest.mark.parametrize(
     "kind", ["sdnn", "sdnn, vector", "fuzzy", "sdnn, switches", "sdnn, warm-up"]
 )
-def test_a_file_written_in_cpp_is_read(kind, n_steps, tmp_path):
+def test_a_file_without_gymnasium_spaces_is_read(kind, n_steps, tmp_path):
     """C++ says all of an agent but Gymnasium's spaces."""
     agent = lived(KINDS[kind](), 0, n_steps)
     agent.save(tmp_path / "python")
@@ -247,7 +247,7 @@ def test_a_file_written_in_cpp_is_read(kind, n_steps, tmp_path):
     assert states_equal(agent, again)
 
 
-def test_progress_is_read_from_the_state_of_the_core(tmp_path):
+def test_progress_is_read_from_the_arrays_of_the_file(tmp_path):
     """C++ keeps the description of the file it read, and writes the progress that it came to."""
     agent = SDNNQLearning(PLANE, TORQUE, approximator=SMALL, learning=FALLING)
     agent.save(tmp_path / "old")
@@ -297,12 +297,14 @@ def changed(path, to, change):
         (lambda d, a: d.update(scaling={"ranges": [[0, 1], [1, 1]], "redundant": 0}), "ranges"),
     ],
 )
-def test_files_that_do_not_fit_are_refused_by_name(saved, tmp_path, change, message):
+def test_inconsistent_files_are_refused_with_the_name_of_the_field(
+    saved, tmp_path, change, message
+):
     path = changed(saved, tmp_path / "changed", change)
     refuses(message, load_agent, path)
 
 
-def test_a_file_is_whole_or_not_there(saved, tmp_path):
+def test_a_failed_save_keeps_the_old_file(saved, tmp_path):
     agent = load_agent(saved)
     path = tmp_path / "no folder" / "agent"
     refuses("agent", agent.save, path, error=FileNotFoundError)
@@ -314,7 +316,7 @@ def test_a_file_is_whole_or_not_there(saved, tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["agent"]
 
 
-def test_the_files_that_both_languages_read_are_those_written_now(tmp_path):
+def test_the_files_read_by_tests_in_cpp_are_up_to_date(tmp_path):
     agent_files.write(tmp_path)
     names, again = (
         sorted(path.relative_to(folder) for path in folder.rglob("*.*"))

@@ -90,7 +90,7 @@ def life(entry, n_dimensions, approximator, learning):
 
 @pytest.mark.parametrize("n_dimensions", [1, 2])
 @pytest.mark.parametrize("name", AGENTS)
-def test_every_setting_has_an_effect(name, n_dimensions):
+def test_every_setting_changes_what_an_agent_does_unless_listed(name, n_dimensions):
     entry = AGENTS[name]
     approximator, learning = FIRST.get(name, ({}, {}))
     parts = {
@@ -116,7 +116,7 @@ def test_every_setting_has_an_effect(name, n_dimensions):
     assert without == listed.keys() & {field.name for _, field in fields}
 
 
-def test_settings_of_schedules_are_refused_without_a_schedule():
+def test_settings_of_schedules_are_refused_without_schedule_steps():
     def agent(**learning):
         space = gym.spaces.Box(-1.0, 1.0, (3,), np.float64)
         return SDNNQLambda(space, gym.spaces.Discrete(2), learning=QLambdaConfig(**learning))

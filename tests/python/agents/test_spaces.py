@@ -1,4 +1,4 @@
-"""Whether an environment is one that an agent was made for."""
+"""Spaces: which environments fit an agent, and which spaces are accepted."""
 
 import enum
 
@@ -61,7 +61,7 @@ ACTED = [
     [("observation", *case) for case in OBSERVED] + [("action", *case) for case in ACTED],
     ids=str,
 )
-def test_an_environment_must_fit_the_spaces_of_the_agent(name, own, found, fits):
+def test_environments_are_accepted_if_their_spaces_fit_the_agents(name, own, found, fits):
     agent, env = (
         Spaces(space) if name == "observation" else Spaces(PLANE, space) for space in (own, found)
     )
@@ -71,21 +71,21 @@ def test_an_environment_must_fit_the_spaces_of_the_agent(name, own, found, fits)
     refuses("env", require_same_kind, agent, env)
 
 
-def test_each_environment_of_a_vector_is_looked_at():
+def test_spaces_of_a_vector_are_compared_for_a_single_environment():
     envs = gym.make_vec("CartPole-v1", num_envs=2, vectorization_mode="sync")
     env = gym.make("CartPole-v1")
     require_same_kind(env, envs)
     refuses("observation_space", require_same_kind, gym.make("Pendulum-v1"), envs)
 
 
-def test_long_spaces_are_shortened_in_messages():
+def test_messages_about_large_spaces_are_single_lines():
     wide = Box(np.arange(40.0), np.arange(40.0) + 1, dtype=np.float64)
     with pytest.raises(ValueError, match="observation_space") as caught:
         require_same_kind(Spaces(wide), Spaces(PLANE))
     assert "\n" not in str(caught.value)
 
 
-def test_other_bounds_are_named_and_can_be_overruled(tmp_path):
+def test_other_bounds_are_named_and_can_be_accepted_by_setting_the_space(tmp_path):
     agent = RBFQLearning(Tuple((Discrete(2), Box(-1, 1, (9,)))), Discrete(2))
     high = np.array([1, 57.3] + [1] * 7, np.float32)
     env = Spaces(Tuple((Discrete(2), Box(-high, high))), Discrete(2))
@@ -104,7 +104,7 @@ class Colour(enum.Enum):
 
 
 @pytest.mark.parametrize("key", [("left", 0), 3, True, (("a", 1), "b"), ()])
-def test_keys_of_a_dict_survive_a_file(key, tmp_path):
+def test_keys_of_dict_spaces_are_saved_with_their_types(key, tmp_path):
     space = Dict([(key, PLANE), ("other", Discrete(3))])
     agent = RBFQLearning(space, Discrete(2), seed=1)
     agent.save(tmp_path / "agent")
@@ -117,21 +117,21 @@ def test_keys_of_a_dict_survive_a_file(key, tmp_path):
 @pytest.mark.parametrize(
     "key", [None, 0.5, b"a", Colour.RED, np.int64(3), np.str_("a"), frozenset(), ("a", 0.5)]
 )
-def test_other_keys_are_refused_before_anything_is_learned(key):
+def test_dict_keys_that_cannot_be_saved_are_refused_by_the_constructor(key):
     with pytest.raises(TypeError, match=r"observation_space.*\bkey\b"):
         RBFQLearning(Dict([(key, PLANE)]), Discrete(2))
 
 
 @pytest.mark.parametrize("name", ["CartPole-v1", "Pendulum-v1", "MountainCarContinuous-v0"])
 @pytest.mark.parametrize("n", [1, 3])
-def test_batched_spaces_of_a_vector_are_refused_by_their_names(name, n):
+def test_batched_spaces_of_a_vector_are_refused_with_the_single_ones(name, n):
     envs = gym.make_vec(name, num_envs=n)
     with pytest.raises(ValueError, match="single_observation_space"):
         RBFQLearning(envs.observation_space, envs.action_space)
     assert RBFQLearning(envs.single_observation_space, envs.single_action_space)
 
 
-def test_matrices_that_are_no_batches_are_accepted():
+def test_matrix_shaped_spaces_that_are_no_batches_are_accepted():
     for observations, actions in (
         (Box(-1.0, 1.0, (3, 2)), PLANE),
         (Box(-1.0, 1.0, (2, 2)), PLANE),
@@ -141,7 +141,7 @@ def test_matrices_that_are_no_batches_are_accepted():
         assert RBFQLearning(observations, actions).is_warming_up is False
 
 
-def test_the_remedy_for_unbounded_actions_works():
+def test_unbounded_actions_are_refused_with_a_remedy_that_works():
     class Unbounded(gym.Env):
         observation_space, action_space = PLANE, Box(-np.inf, np.inf, (2,))
 
@@ -159,7 +159,7 @@ def test_images_are_refused_with_a_remedy():
 
 
 @pytest.mark.parametrize("kind", [RBFQLearning, SDNNQLearning, FuzzyQLearning])
-def test_a_memory_limit_is_for_all_networks_of_an_agent(kind):
+def test_max_table_bytes_limits_the_sum_of_all_networks(kind):
     def fits(n_dimensions, limit):
         approximator = kind.approximator_type(max_table_bytes=limit)
         try:
@@ -177,6 +177,6 @@ def test_a_memory_limit_is_for_all_networks_of_an_agent(kind):
         assert not fits(n, n * low - 1)
 
 
-def test_bounds_in_a_file_that_their_type_cannot_hold_are_refused():
+def test_bounds_in_a_file_beyond_their_dtype_are_refused():
     data = {"dtype": "<f4", "shape": [1], "box": [[-1.0], [1e300]]}
     refuses("box", space_of, data)

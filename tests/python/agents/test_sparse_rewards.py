@@ -1,4 +1,4 @@
-"""Sparse rewards: without any the agent searches by random actions that last."""
+"""Sparse rewards: until the first one the agent searches with repeated random actions."""
 
 import gymnasium as gym
 import numpy as np
@@ -36,14 +36,14 @@ def n_random_left(agent):
     return int(agent.state().get("agent.n_random_left", 0))
 
 
-def test_actions_last_while_all_rewards_were_0():
+def test_random_actions_are_repeated_while_all_rewards_were_zero():
     assert longest_run(live(new_agent(), [0.0] * 1000)) >= 40
     assert longest_run(live(new_agent(max_action_repeat=20), [0.0] * 1000)) < 40
     for learning in ({"max_action_repeat": 1}, {"epsilon": 0.0}):
         assert longest_run(live(new_agent(**learning), [0.0] * 1000)) < 15
 
 
-def test_symbols_are_not_searched():
+def test_random_actions_are_not_repeated_in_discrete_spaces():
     agent = SDNNQLambda(gym.spaces.Discrete(5), gym.spaces.Discrete(4), seed=1)
     actions = []
     for _ in range(500):
@@ -53,7 +53,7 @@ def test_symbols_are_not_searched():
 
 
 @pytest.mark.parametrize(("n_zeros", "n_left"), [(0, 0), (1, 2), (50, 100)])
-def test_the_search_goes_on_for_twice_as_long(n_zeros, n_left):
+def test_after_the_first_reward_the_search_continues_for_twice_its_length(n_zeros, n_left):
     agent = new_agent()
     live(agent, [0.0] * n_zeros + [1.0])
     assert n_random_left(agent) == n_left
@@ -61,7 +61,7 @@ def test_the_search_goes_on_for_twice_as_long(n_zeros, n_left):
     assert n_random_left(agent) == 0
 
 
-def test_ends_within_the_search_leave_the_length_of_random_actions():
+def test_ends_of_episodes_are_counted_only_after_the_search():
     agent = new_agent()
     live(agent, [0.0] * 10)
     agent.learn(Transition(HERE, 0, 1.0, HERE, True))
@@ -83,8 +83,7 @@ def test_a_search_resumes_exactly(n_steps, tmp_path):
     assert states_equal(whole, part)
 
 
-def test_the_page_searches_alike():
-    """The transcription in NumPy draws the same actions and learns the same weights."""
+def test_the_numpy_transcription_searches_with_the_same_actions_and_weights():
     settings = page.Settings(seed=1, n_anchor_patterns=9, n_interpolated=44)
     slow = page.new_agent(2, [4], settings)
     agent = new_agent()
@@ -111,7 +110,7 @@ class RewardAtGoal(gym.Wrapper):
         return observation, float(terminated), terminated, truncated, info
 
 
-def test_mountain_car_with_a_reward_at_the_goal_alone():
+def test_mountain_car_is_learned_with_a_reward_at_the_goal_only():
     env = RewardAtGoal(gym.make("MountainCar-v0"))
     agent = SDNNQLambda(env, seed=1003)
     agent.train(env, steps=40_000, seed=1003)

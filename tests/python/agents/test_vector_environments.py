@@ -47,7 +47,7 @@ class Walk(gym.Env):
         super().reset(seed=seed)
         self._at, self._steps = self.np_random.uniform(-0.5, 0.5), 0
         self._limit = int(self.np_random.integers(3, 16))
-        return self._seen(), {}
+        return self._observation(), {}
 
     def step(self, action):
         assert self._steps < self._limit, "the episode is over"
@@ -55,9 +55,15 @@ class Walk(gym.Env):
         self._at += 0.3 * float(action[0]) + self.np_random.normal(0.0, 0.1)
         self._steps += 1
         ends = abs(self._at) > 1.0
-        return self._seen(), -abs(self._at), ends, self._steps == self._limit and not ends, {}
+        return (
+            self._observation(),
+            -abs(self._at),
+            ends,
+            self._steps == self._limit and not ends,
+            {},
+        )
 
-    def _seen(self):
+    def _observation(self):
         shift = np.random.default_rng().uniform() if self._drifts else 0.0
         return np.array([self._at, self._steps / 16 + shift])
 
@@ -110,7 +116,7 @@ def vectors(n):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_vector_of_one_has_the_bits_of_its_environment(kind):
+def test_a_vector_of_one_environment_has_the_bits_of_a_single_environment(kind):
     env, make = KINDS[kind]
     plain = Training(make(), env(), steps=200, seed=4)
     rows = plain.run().rows
@@ -123,8 +129,8 @@ def test_a_vector_of_one_has_the_bits_of_its_environment(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_each_environment_is_learned_in_order(kind):
-    """A round by hand: all act, all step, all learn; episodes are numbered as they begin."""
+def test_a_training_in_a_vector_equals_a_loop_by_hand(kind):
+    # In each round all environments act, all step, and all are learned in order.
     env_type, make = KINDS[kind]
     n = 3
     by_hand, trained = make(), make()
@@ -162,7 +168,7 @@ def test_each_environment_is_learned_in_order(kind):
     assert {row["environment"] for row in result.rows} == set(range(n))
 
 
-def test_the_bits_do_not_depend_on_how_environments_are_run():
+def test_all_types_of_vectors_give_the_same_bits():
     outcomes = []
     for vector in vectors(3):
         agent = sdnn_agent()
@@ -193,7 +199,7 @@ def test_a_training_stopped_at_any_step_resumes_exactly(kind, tmp_path):
         assert states_equal(whole.agent, second.agent)
 
 
-def test_a_training_resumes_exactly_many_times_and_in_processes(tmp_path):
+def test_a_training_resumed_many_times_in_processes_has_the_same_bits(tmp_path):
     whole = Training(sdnn_agent(), sync(4), steps=120, seed=1)
     rows = whole.run().rows
     path = tmp_path / "training"
@@ -225,7 +231,7 @@ def test_batched_acrobots_have_the_bits_of_single_ones_and_resume_exactly(tmp_pa
     assert states_equal(whole.agent, slow.agent)
 
 
-def test_steps_and_callbacks_count_transitions(tmp_path):
+def test_steps_callbacks_and_evaluations_count_transitions(tmp_path):
     seen = []
 
     class Note(Callback):
@@ -244,7 +250,7 @@ def test_steps_and_callbacks_count_transitions(tmp_path):
     assert [row["step"] for row in rows if row["kind"] == "evaluation"] == [25, 50]
 
 
-def test_discrete_and_composed_spaces():
+def test_dict_observations_and_discrete_actions_are_learned_in_vectors():
     class Buttons(Walk):
         action_space = gym.spaces.Discrete(3, start=1)
 
@@ -256,8 +262,8 @@ def test_discrete_and_composed_spaces():
         def step(self, action):
             return super().step([float(action) - 2.0])
 
-        def _seen(self):
-            return {"at": super()._seen(), "lamp": int(self._at > 0)}
+        def _observation(self):
+            return {"at": super()._observation(), "lamp": int(self._at > 0)}
 
     plain, one = sdnn_agent(Buttons()), sdnn_agent(Buttons())
     plain.train(Buttons(), steps=100)
@@ -269,20 +275,22 @@ def test_discrete_and_composed_spaces():
         vector.close()
 
 
-def test_an_agent_may_go_from_many_environments_to_few_and_back():
+def test_the_number_of_environments_of_an_agent_may_change():
     agent = sdnn_agent()
     agent.train(sync(4), steps=50)
     assert agent.n_environments == 4
     n = agent.learning_report()["n_corrections"]
     agent.n_environments = 1
-    assert n < agent.learning_report()["n_corrections"] <= 50, "what waited is learned"
+    assert n < agent.learning_report()["n_corrections"] <= 50, (
+        "pending n-step transitions are learned"
+    )
     agent.train(Walk(), steps=30)
     assert agent.n_environments == 1
     agent.train(sync(2), steps=30)
     assert agent.n_environments == 2
 
 
-def test_a_warm_up_may_have_had_more_environments_than_there_are_now():
+def test_a_warm_up_may_continue_in_fewer_environments():
     agent = sdnn_agent(Unbounded(), warm_up_steps=60)
     agent.train(sync(5, Unbounded), steps=40)
     agent.n_environments = 2
@@ -292,7 +300,7 @@ def test_a_warm_up_may_have_had_more_environments_than_there_are_now():
     assert agent.n_environments == 2
 
 
-def test_a_fuzzy_warm_up_ends_once_no_action_of_others_is_pending():
+def test_a_fuzzy_warm_up_ends_after_the_last_pending_action():
     agent = fuzzy_agent(Unbounded(), warm_up_steps=10)
     agent.n_environments = 3
     seen = np.zeros(2)
@@ -302,7 +310,7 @@ def test_a_fuzzy_warm_up_ends_once_no_action_of_others_is_pending():
             agent.learn(Transition(seen, action, 0.0, seen + i, False), i)
     actions = [agent.act(seen, environment=i) for i in range(3)]
     agent.learn(Transition(seen, actions[0], 0.0, seen, False), 0)
-    assert agent.is_warming_up, "10 are learned, but two wait whose picks nobody would know"
+    assert agent.is_warming_up, "10 are learned, but two actions are pending"
     agent.begin_episode(1)
     agent.learn(Transition(seen, actions[2], 0.0, seen, False), 2)
     assert not agent.is_warming_up
@@ -349,7 +357,7 @@ class Recorder:
         self.learned[environment].append(tuple(float(x) for x in told))
 
 
-def test_an_environment_that_resets_itself_is_learned_without_the_steps_of_resets():
+def test_steps_of_automatic_resets_are_not_learned():
     n = 3
     by_mode = {}
     for mode in ("NEXT_STEP", "SAME_STEP"):
@@ -374,7 +382,7 @@ def test_an_environment_that_resets_itself_is_learned_without_the_steps_of_reset
             assert learner.learned[i][:80] == expected[:80]
 
 
-def test_observations_that_are_normalized_together_are_learned():
+def test_a_vector_with_normalized_observations_is_learned():
     from gymnasium.wrappers.vector import NormalizeObservation
 
     envs = NormalizeObservation(SyncVectorEnv([lambda: gym.make("CartPole-v1")] * 2))
@@ -386,7 +394,7 @@ def test_observations_that_are_normalized_together_are_learned():
     assert result.n_episodes > 2
 
 
-def test_cart_poles_that_gymnasium_makes_by_itself_are_learned():
+def test_gymnasiums_batched_cartpole_is_learned_without_its_resets():
     envs = gym.make_vec("CartPole-v1", num_envs=3)  # no SyncVectorEnv
     agent = SDNNQLearning(
         envs.single_observation_space, envs.single_action_space, approximator=SMALL,
@@ -416,7 +424,7 @@ def test_vectors_that_cannot_repeat_episodes_resume_with_new_ones_only(make, tmp
     vector.close()
 
 
-def test_another_vector_is_refused(tmp_path):
+def test_resuming_refuses_a_vector_of_another_size_or_other_observations(tmp_path):
     Training(sdnn_agent(), sync(3), steps=50, callbacks=[Stop(20, tmp_path / "t")]).run()
     for other in (sync(2), Walk()):
         refuses("env", Training.load, tmp_path / "t", other)
@@ -426,7 +434,7 @@ def test_another_vector_is_refused(tmp_path):
     assert Training.load(tmp_path / "t", sync(1)).run().n_steps == 50
 
 
-def test_new_episodes_begin_in_any_number_of_environments(tmp_path):
+def test_without_repeating_a_training_resumes_in_any_number_of_environments(tmp_path):
     Training(sdnn_agent(), sync(3), steps=50, callbacks=[Stop(20, tmp_path / "t")]).run()
     for other in (sync(3), sync(2), sync(5), Walk(), Opaque(2, "NEXT_STEP")):
         training = Training.load(tmp_path / "t", other, repeat_episodes=False)
@@ -435,7 +443,7 @@ def test_new_episodes_begin_in_any_number_of_environments(tmp_path):
         assert training.agent.n_environments == training.n_environments
 
 
-def test_a_callback_with_an_interval_is_called_after_its_multiples_only():
+def test_a_callback_with_step_interval_7_is_called_at_multiples_of_7():
     class Rare(Callback):
         step_interval = 7
 
@@ -459,8 +467,8 @@ def test_a_training_calls_the_learn_method_of_a_subclass():
 
     class DoubleWalk(Walk):
         def step(self, action):
-            seen, reward, *ends = super().step(action)
-            return seen, 2 * reward, *ends
+            observation, reward, *others = super().step(action)
+            return observation, 2 * reward, *others
 
     sizes = RBFNetworkConfig(n_actions=7)
     agents = [
@@ -472,7 +480,7 @@ def test_a_training_calls_the_learn_method_of_a_subclass():
     assert states_equal(*agents)
 
 
-def test_a_round_is_learned_up_to_the_first_step_that_cannot_be():
+def test_learn_each_learns_up_to_the_first_bad_transition():
     agent, by_hand = sdnn_agent(), sdnn_agent()
     agent.n_environments = by_hand.n_environments = 3
     seen = np.zeros((3, 2))

@@ -1,4 +1,4 @@
-"""Wrappers that learn: a training with them is resumed exactly, and evaluated as it was trained."""
+"""Wrappers with running statistics: exact resuming, and evaluation with the trained statistics."""
 
 import gymnasium as gym
 import numpy as np
@@ -24,17 +24,17 @@ def wrapped(*wrappers):
     return env
 
 
-class OwnMoments:
+class CustomMoments:
     def __init__(self):
         self.mean, self.var, self.count = np.zeros(2), np.ones(2), 0.0
 
 
-class OwnNormalization(gym.ObservationWrapper):
-    """A wrapper of a user: no switch that keeps it as it is."""
+class CustomNormalization(gym.ObservationWrapper):
+    """A user's wrapper, whose statistics cannot be frozen."""
 
     def __init__(self, env):
         super().__init__(env)
-        self.obs_rms = OwnMoments()
+        self.obs_rms = CustomMoments()
 
     def observation(self, observation):
         self.obs_rms.count += 1.0
@@ -48,7 +48,7 @@ WRAPPERS = {
     "observations": (NormalizeObservation,),
     "rewards": (NormalizeReward,),
     "both": (NormalizeObservation, gym.wrappers.RecordEpisodeStatistics, NormalizeReward),
-    "one's own": (OwnNormalization,),
+    "custom": (CustomNormalization,),
 }
 
 
@@ -60,7 +60,7 @@ def agent_for(env):
 
 @pytest.mark.parametrize("wrappers", WRAPPERS.values(), ids=WRAPPERS)
 @pytest.mark.parametrize("cut", [60, 61, 95, 119])
-def test_a_training_with_wrappers_resumes_exactly(wrappers, cut, tmp_path):
+def test_a_training_with_normalizing_wrappers_resumes_exactly(wrappers, cut, tmp_path):
     given = {"steps": 200, "evaluate_every": 50, "evaluation_episodes": 1}
     env = wrapped(*wrappers)
     whole = Training(agent_for(env), env, evaluation_env=wrapped(*wrappers), **given)
@@ -100,7 +100,7 @@ def test_a_loaded_agent_is_evaluated_with_the_statistics_of_its_training(tmp_pat
     assert found == [trained, trained]
 
 
-def test_an_evaluation_changes_no_statistics():
+def test_an_evaluation_does_not_change_the_statistics_of_wrappers():
     for wrappers in WRAPPERS.values():
         env = wrapped(*wrappers)
         agent = agent_for(env)
@@ -112,7 +112,7 @@ def test_an_evaluation_changes_no_statistics():
         assert all(flags)
 
 
-def test_wrappers_without_statistics_cause_a_warning():
+def test_evaluating_without_statistics_of_a_training_warns():
     env = wrapped(NormalizeObservation)
     with pytest.warns(RuntimeWarning, match="NormalizeObservation"):
         evaluate(agent_for(env), env, 1)
@@ -125,14 +125,14 @@ def unbounded(env):
 
 
 @pytest.mark.parametrize("learns_in", [0, 1])
-def test_environments_that_are_wrapped_otherwise_are_warned_of(learns_in):
+def test_training_and_evaluation_with_different_wrappers_warn(learns_in):
     envs = [wrapped(NormalizeObservation), unbounded(wrapped())]
     env, other = envs[learns_in], envs[1 - learns_in]
     with pytest.warns(RuntimeWarning, match=r"NormalizeObservation.*wrap both"):
         Training(agent_for(env), env, steps=5, evaluate_every=5, evaluation_env=other)
 
 
-def test_a_vector_whose_wrappers_learn_begins_new_episodes(tmp_path):
+def test_a_vector_with_normalization_resumes_with_new_episodes_only(tmp_path):
     def envs():
         return gym.vector.SyncVectorEnv([lambda: wrapped(NormalizeObservation)] * 2)
 
@@ -154,7 +154,7 @@ def test_a_vector_whose_wrappers_learn_begins_new_episodes(tmp_path):
 
 
 class Remembers(gym.Wrapper):
-    """Counts its steps for ever, and observes them."""
+    """Counts its steps over all episodes, and adds their parity to observations."""
 
     n = 0
 
@@ -164,7 +164,7 @@ class Remembers(gym.Wrapper):
         return (seen + self.n % 2).astype(np.float32), *rest
 
 
-def test_a_wrapper_whose_memory_nobody_knows_is_named_with_the_way_out(tmp_path):
+def test_a_wrapper_with_unknown_state_is_named_when_an_episode_cannot_be_repeated(tmp_path):
     env = wrapped(Remembers)
     training = Training(agent_for(env), env, steps=200, callbacks=[Stop(75, tmp_path / "training")])
     training.run()
@@ -173,7 +173,7 @@ def test_a_wrapper_whose_memory_nobody_knows_is_named_with_the_way_out(tmp_path)
     assert Training.load(tmp_path / "training", wrapped(), repeat_episodes=False)
 
 
-def test_statistics_in_a_file_are_checked(tmp_path):
+def test_statistics_for_an_environment_without_the_wrapper_are_refused(tmp_path):
     env = wrapped(NormalizeObservation)
     training = Training(agent_for(env), env, steps=200, callbacks=[Stop(75, tmp_path / "training")])
     training.run()

@@ -44,11 +44,11 @@ ODD_DEFAULTS = {"n_pattern_units": 60, "n_hidden_units": 150, "n_active_units": 
 
 
 def next_state(rng, state):
-    """A walk as an agent takes it: mostly near, sometimes far, sometimes at the very ends."""
-    kind = rng.integers(20)
-    if kind == 0:
+    """Return a state near the last one, or rarely anywhere, or at corners of the cube."""
+    chance = rng.integers(20)
+    if chance == 0:
         return rng.random(state.size)
-    if kind == 1:
+    if chance == 1:
         return rng.integers(0, 2, state.size).astype(float)
     return np.clip(state + 0.05 * rng.standard_normal(state.size), 0.0, 1.0)
 
@@ -59,7 +59,7 @@ def assert_equal_parameters(core, slow):
 
 
 def compare_while_learning(config, seed, n_steps, compare_weights_every):
-    """Both learn the same; returns how many steps corrected something."""
+    """Train core and transcription alike; return the number of steps with corrections."""
     core = _core.SDNNC(config, seed)
     slow = transcribe(core)
     rng = np.random.default_rng(seed)
@@ -85,17 +85,17 @@ def compare_while_learning(config, seed, n_steps, compare_weights_every):
 
 
 @pytest.mark.parametrize("n_steps", [1500, pytest.param(5000, marks=pytest.mark.slow)])
-def test_the_core_agrees_with_the_page_while_it_learns(n_steps):
+def test_sdnn_c_equals_its_numpy_transcription_while_learning(n_steps):
     assert compare_while_learning(_core.SDNNCConfig(), 1, n_steps, 500) > 0.9 * n_steps
 
 
 @pytest.mark.parametrize("n_inputs", [5, 6])
-def test_the_core_agrees_with_the_page_at_its_larger_sizes(n_inputs):
+def test_sdnn_c_of_five_and_six_inputs_equals_its_transcription(n_inputs):
     assert compare_while_learning(_core.SDNNCConfig(n_inputs=n_inputs), 2, 150, 75) > 100
 
 
 @pytest.mark.parametrize("name", ODD_SIZES)
-def test_the_core_agrees_with_the_page_at_odd_sizes(name):
+def test_sdnn_c_of_unusual_settings_equals_its_transcription(name):
     config = _core.SDNNCConfig(**{**ODD_DEFAULTS, **ODD_SIZES[name]})
     assert compare_while_learning(config, 3, 500, 100) > 300
 
@@ -109,7 +109,7 @@ def test_the_core_agrees_with_the_page_at_odd_sizes(name):
     lattice=st.integers(1, 8),
     seed=st.integers(0, 2**64 - 1),
 )
-def test_the_core_agrees_with_the_page_at_any_size(n_inputs, m, n, window, lattice, seed):
+def test_sdnn_c_of_any_size_equals_its_transcription(n_inputs, m, n, window, lattice, seed):
     n_active = 1 + round(window * (n - 1))
     config = _core.SDNNCConfig(
         n_inputs=n_inputs,
@@ -122,7 +122,7 @@ def test_the_core_agrees_with_the_page_at_any_size(n_inputs, m, n, window, latti
     compare_while_learning(config, seed, 30, 30)
 
 
-def test_the_paper_numbers_of_the_page():
+def test_the_transcription_maps_counts_to_values_as_in_the_paper():
     settings = page.Settings()
     counts = np.arange(301)
     np.testing.assert_array_equal(
@@ -132,7 +132,7 @@ def test_the_paper_numbers_of_the_page():
     assert {q: page.g_inverse(q, settings) for q in values} == values
 
 
-def test_code_books_of_two_inputs_are_independent():
+def test_pattern_tables_of_two_inputs_are_uncorrelated():
     network = _core.SDNNC(_core.SDNNCConfig(), 5)
     first, second = (network.table(mu).astype(int) for mu in (0, 1))
     anchors = [45 * i for i in range(8)]
@@ -142,7 +142,7 @@ def test_code_books_of_two_inputs_are_independent():
     assert np.abs(off_diagonal).max() < 5 * 14.2
 
 
-def test_c_scales_weights_and_changes_no_decision():
+def test_the_learning_coefficient_scales_weights_but_not_values():
     small, large = (
         SDNNC(SDNNCConfig(**SMALL, learning_coefficient=c), seed=1) for c in (0.125, 8.0)
     )
@@ -170,7 +170,7 @@ def test_c_scales_weights_and_changes_no_decision():
         lambda state: np.array(state, dtype=np.float32),
     ],
 )
-def test_states_of_any_layout(make):
+def test_states_of_any_sequence_dtype_and_stride_give_the_same_values(make):
     network = SDNNC(SDNNCConfig(**SMALL), seed=1)
     state = [0.125, 0.5, 0.875]
     network.update(state, 3, 20.0)
@@ -186,7 +186,7 @@ def test_returned_arrays_are_copies():
         assert not np.array_equal(array, read())
 
 
-def test_patterns_of_any_coding_can_be_given():
+def test_patterns_of_codings_replace_the_drawn_tables():
     tables = [Circular().patterns(40, seed=1), Symbolic(categories=("a", "b")).patterns(40, seed=2)]
     config = SDNNCConfig(n_inputs=2, n_pattern_units=40, n_hidden_units=90, n_active_units=30)
     network = SDNNC(config, seed=3, tables=tables)
@@ -209,11 +209,11 @@ def test_patterns_of_any_coding_can_be_given():
         ([np.ones(40), np.ones((3, 40))], "tables[0]"),
     ],
 )
-def test_patterns_that_do_not_fit_are_refused(tables, message):
+def test_tables_of_wrong_shape_or_values_are_refused(tables, message):
     refuses(message, SDNNC, SDNNCConfig(n_inputs=2, n_pattern_units=40), tables=tables)
 
 
-def test_the_average_agrees_with_its_formula():
+def test_averaged_weights_follow_their_formula():
     config = SDNNCConfig(
         n_inputs=3, n_pattern_units=12, n_hidden_units=90, n_active_units=30, averaging_interval=5
     )
@@ -241,7 +241,7 @@ def test_the_average_agrees_with_its_formula():
     assert n_snapshots > 100
 
 
-def test_a_unit_whose_weights_have_no_room_is_not_corrected():
+def test_units_at_the_weight_limit_are_not_corrected():
     sizes = {"n_inputs": 2, "n_pattern_units": 12, "n_hidden_units": 40, "n_active_units": 20}
     free = _core.SDNNC(SDNNCConfig(**sizes), 3)
     limited = _core.SDNNC(SDNNCConfig(**sizes, weight_limit=3), 3)

@@ -52,14 +52,14 @@ def given(folder, *only, jobs=1):
     return argparse.Namespace(folder=folder, only=only, jobs=jobs, redraw=False)
 
 
-def test_page_has_the_tables_of_the_stored_trials(scripts):
+def test_the_benchmark_page_has_the_tables_of_the_stored_trials(scripts):
     run, report, study = scripts.run, scripts.report, scripts.study
     tables = report.tables(study, scripts.studies.curves(run.KIND, study, given(EVIDENCE)))
     text = (EVIDENCE / "benchmarks.md").read_text()
     assert scripts.page.with_tables(text, tables) == text, "run bench/other_tasks/run.py --redraw"
 
 
-def test_every_stored_trial_is_whole(scripts):
+def test_every_stored_curve_is_complete(scripts):
     found = scripts.studies.curves(scripts.run.KIND, scripts.study, given(EVIDENCE))
     for trial in itertools.chain(*found.values()):
         assert trial["steps"] == sorted(set(trial["steps"]))
@@ -83,7 +83,7 @@ PHYSICS = {
 """Cases that need Box2D or MuJoCo."""
 
 
-def test_every_agent_learns_on_the_engine(scripts, monkeypatch):
+def test_every_agent_of_the_study_learns_40_steps(scripts, monkeypatch):
     """The study as specified but for its budget: those that need no other library."""
     monkeypatch.setattr(scripts.studies, "N_MILESTONE_EPISODES", 2)
     study, tried = scripts.study, set()
@@ -102,7 +102,7 @@ def test_every_agent_learns_on_the_engine(scripts, monkeypatch):
     assert len(tried) == 10
 
 
-def test_a_trial_runs_once_and_in_a_separate_process(scripts, tmp_path):
+def test_a_stored_trial_is_not_run_again(scripts, tmp_path):
     studies, file = scripts.studies, tmp_path / "study.toml"
     file.write_text(
         """
@@ -125,7 +125,7 @@ def test_a_trial_runs_once_and_in_a_separate_process(scripts, tmp_path):
     assert found == before
 
 
-def test_tables_by_hand(scripts):
+def test_tables_of_two_hand_made_trials_are_as_worked_by_hand(scripts):
     def trial(*returns):
         steps = [10_000, 20_000, 50_000][: len(returns)]
         return {"steps": steps, "mean_return": returns, "cpu_seconds": [1.0] * 3, "bytes": 2048}
@@ -148,7 +148,7 @@ def test_tables_by_hand(scripts):
     assert "| 2 | 10 | 16 | 475 |" in along
 
 
-def test_evaluations_take_no_part_in_the_processor_time(scripts, monkeypatch):
+def test_processor_time_excludes_evaluations(scripts, monkeypatch):
     monkeypatch.setattr(scripts.studies, "N_MILESTONE_EPISODES", 2)
 
     class Slow(gym.Wrapper):
@@ -174,7 +174,9 @@ def fail_in_store(measured, folder):
         raise RuntimeError
 
 
-def test_a_failed_trial_stops_no_other_and_keeps_the_packed_store(scripts, tmp_path, capsys):
+def test_a_failed_measurement_does_not_stop_others_or_change_the_packed_store(
+    scripts, tmp_path, capsys
+):
     measured = scripts.measured
     keys = [("a", 1), ("a b", 2)]
     measured.measure_missing("squares", squared, [*keys, ("bad", -1)], given(tmp_path))
@@ -190,7 +192,7 @@ def test_a_failed_trial_stops_no_other_and_keeps_the_packed_store(scripts, tmp_p
     assert len(measured.measured("squares", tmp_path)) == 3
 
 
-def test_a_process_that_dies_is_reported(scripts, tmp_path, capsys):
+def test_a_process_that_exits_is_reported_with_its_code(scripts, tmp_path, capsys):
     measured = scripts.measured
     keys = [("x", 0), ("x", 3)]
     measured.measure_missing("squares", squared, keys, given(tmp_path, jobs=2), apart=True)
@@ -198,20 +200,20 @@ def test_a_process_that_dies_is_reported(scripts, tmp_path, capsys):
     assert list(measured.measured("squares", tmp_path)) == [("x", 3)]
 
 
-def test_only_selects_trials_by_words(scripts):
+def test_only_selects_trials_by_whole_words(scripts):
     key = ("SDNN, small", "CartPole", 3)
     assert scripts.measured.is_wanted(key, given(EVIDENCE, "CartPole", "3"))
     assert not scripts.measured.is_wanted(key, given(EVIDENCE, "Cart"))
 
 
-def test_page_without_a_mark_is_refused(scripts):
+def test_a_page_without_the_marks_of_a_table_is_refused(scripts):
     with pytest.raises(ValueError, match="table: here"):
         scripts.page.with_tables("nothing", {"here": "| a |\n"})
     with pytest.raises(ValueError, match="end of table"):
         scripts.page.with_tables("<!-- table: here -->", {"here": "| a |\n"})
 
 
-def test_tables_go_between_their_marks(scripts):
+def test_tables_replace_the_text_between_their_marks(scripts):
     page = scripts.page
     text = f"before\n<!-- table: here -->\nold\n{page.END}\nafter\n"
     table = page.markdown(("a", "b"), [("1", "2")])
@@ -225,7 +227,7 @@ def test_an_unreached_target_is_written_as_never(scripts):
     assert scripts.page.interval(estimate, 1) == "1,234.5 [1.0, never]"
 
 
-def test_sensors_by_their_statistics(scripts):
+def test_sensor_wrappers_have_the_stated_noise_and_correlation(scripts):
     options = {"task": "CartPole-v1", "noise": 0.1, "copies": 2, "irrelevant": 3}
     env = gym.make("bench/Sensors-v0", correlation=0.95, **options)
     assert env.observation_space.shape == (4 * 3 + 3,)
@@ -250,7 +252,7 @@ def test_sensors_by_their_statistics(scripts):
     assert np.all(np.abs(observation[3:]) < 1)
 
 
-def test_tiles_of_pairs_tables_and_hashes(scripts):
+def test_tile_codings_of_pairs_hashes_and_tables_have_their_indices(scripts):
     tiles = sys.modules["tile_coding"]
     pairs, joint = tiles.PairTiles(3, 4, 2), tiles.TileCoding(2, 4, 2)
     assert pairs.n_tiles == 3 * joint.n_tiles
@@ -278,7 +280,7 @@ def test_tiles_of_pairs_tables_and_hashes(scripts):
         ((0.05, 0.0, 1.0, 1.0), [0.09028176, 8.03872742, 42.4742184, 39.5957511]),
     ],
 )
-def test_swift_sarsa_has_the_values_of_its_author(scripts, settings, values):
+def test_swift_sarsa_has_the_values_of_its_reference_implementation(scripts, settings, values):
     """SwiftTDBinaryFeatures, compiled with doubles, after 10, 100, 1,000 and 3,000 steps."""
     tiles = sys.modules["tile_coding"]
     names = ("step_size", "meta_step_size", "largest_rate", "step_size_decay")

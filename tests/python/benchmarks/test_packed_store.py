@@ -38,7 +38,7 @@ def content(folder):
 @pytest.mark.parametrize(
     "returns", [[10, -5, -250, 0], [0.1, -0.3, 1e300, 5.0], [2.0**60, 1, 0, 3]]
 )
-def test_a_packed_store_is_unpacked_as_it_was(packed_store, tmp_path, returns):
+def test_a_packed_store_is_unpacked_unchanged(packed_store, tmp_path, returns):
     with ResultStore(tmp_path / "one") as store:
         store.add(record(1, returns, version="0.0.9"))
         store.add(record(0, returns[::-1], finished_at="2026-11-26T00:00:00+00:00"))
@@ -52,7 +52,7 @@ def test_a_packed_store_is_unpacked_as_it_was(packed_store, tmp_path, returns):
     assert [file.name for file in (tmp_path / "two").iterdir()] == ["results.sqlite"]
 
 
-def test_results_that_are_there_stay(packed_store, tmp_path):
+def test_unpacking_does_not_overwrite_results(packed_store, tmp_path):
     with ResultStore(tmp_path) as store:
         store.add(record(0, [1.0]))
     before = content(tmp_path)

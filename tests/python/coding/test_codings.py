@@ -42,7 +42,7 @@ FITTED = {
 
 
 @pytest.mark.parametrize("name", FITTED)
-def test_patterns_are_signs_and_follow_from_the_seed(name):
+def test_patterns_are_signs_determined_by_the_seed(name):
     coding = FITTED[name]
     patterns = coding.patterns(400, 7)
     assert patterns.shape == (coding.size, 400)
@@ -64,7 +64,7 @@ def test_drawn_patterns_scatter_about_the_expected_correlations(name):
     assert np.linalg.eigvalsh(expected).min() > -1e-9
 
 
-def test_bins_by_hand():
+def test_bins_are_half_open_and_clipped_or_circular():
     anchor = Anchor(n_anchor_patterns=3, n_interpolated=1, low=0.0, high=4.0).fit(UNIT, 8)
     column = np.array([-1, 0, 0.99, 1, 2.5, 3.999, 4, 99])
     assert anchor.bins(column).tolist() == [0, 0, 0, 1, 2, 3, 3, 3]
@@ -76,7 +76,7 @@ def test_bins_by_hand():
     assert FITTED["symbolic"].bins(LETTERS).tolist() == [2, 0, 1, 0]
 
 
-def test_quantile_bins_hold_equal_shares():
+def test_quantile_bins_hold_equal_shares_of_samples():
     column = np.random.RandomState(0).lognormal(0, 3, 4000)
     coding = RandomInverse(spacing="quantile", n_bins=10).fit(column, 400)
     shares = np.bincount(coding.bins(column), minlength=10) / 4000
@@ -98,7 +98,7 @@ def test_a_value_between_subnormal_knots_has_the_bin_of_the_next_knot():
     st.sampled_from(["even", "quantile", "anchor"]),
 )
 @example([1.0, 5e-324, -5e-324], "quantile")
-def test_bins_never_leave_the_table_and_keep_the_order(values, kind):
+def test_bins_are_within_the_table_and_monotonic(values, kind):
     column = np.array(values)
     coding = Anchor() if kind == "anchor" else RandomInverse(spacing=kind)
     fitted = coding.fit(column, 64)
@@ -110,7 +110,7 @@ def test_bins_never_leave_the_table_and_keep_the_order(values, kind):
 
 
 @pytest.mark.parametrize("period", [24.0, 7.0, 2 * np.pi, 0.1])
-def test_a_period_away_is_the_same_bin_also_where_bins_meet(period):
+def test_circular_bins_repeat_with_the_period_also_at_edges(period):
     coding, edges = Circular(period=period), np.arange(360) * period / 360
     for turns in (-1000, -1, 1, 2, 365):
         np.testing.assert_array_equal(coding.bins(edges + turns * period), np.arange(360))
@@ -119,7 +119,7 @@ def test_a_period_away_is_the_same_bin_also_where_bins_meet(period):
 @pytest.mark.filterwarnings("ignore::sdnn.coding.CoarseCodeWarning")
 @settings(max_examples=100, deadline=None)
 @given(st.integers(1, 4000), st.floats(0.01, 3))
-def test_the_length_scale_is_where_the_correlation_is_one_over_e(half, length_scale):
+def test_the_correlation_at_the_length_scale_is_one_over_e(half, length_scale):
     n_units = 2 * half
     coding = RandomInverse(length_scale=length_scale).fit(UNIT, n_units)
     kept = 1 - 4 * coding.n_flipped / n_units
@@ -129,12 +129,12 @@ def test_the_length_scale_is_where_the_correlation_is_one_over_e(half, length_sc
 
 
 @pytest.mark.parametrize("name", FITTED)
-def test_codings_survive_json(name):
+def test_codings_equal_their_copies_through_json(name):
     coding = FITTED[name]
     assert from_dict(json.loads(json.dumps(to_dict(coding)))) == coding
 
 
-def test_names():
+def test_codings_are_found_by_name():
     assert set(CODINGS) == {
         "random-inverse", "anchor", "circular", "symbolic", "correlation-matrix", "with-missing",
     }  # fmt: skip
@@ -159,18 +159,18 @@ def test_names():
         (CorrelationMatrix(matrix=np.eye(2), categories=("a", "b", "c")), "row"),
     ],
 )
-def test_impossible_arguments_are_named(coding, error):
+def test_impossible_settings_are_refused_with_their_name(coding, error):
     refuses(error, coding.fit, UNIT, 64, error=(ValueError, TypeError))
 
 
-def test_symbols_are_checked():
+def test_mixed_missing_and_unknown_symbols_are_refused():
     refuses("words", Symbolic().fit, np.array(["a", 1], dtype=object), 64)
     refuses("NaN", Symbolic().fit, np.array([1.0, np.nan]), 64)
     refuses("'d', 'e'", FITTED["symbolic"].bins, np.array(["a", "d", "e", "d"]))
     refuses("fitted", RandomInverse().bins, UNIT)
 
 
-def test_numbers_are_checked():
+def test_nan_infinity_and_texts_are_refused_as_numbers():
     for coding in (RandomInverse(), Anchor(), Circular(period=1.0)):
         with pytest.raises(ValueError, match="contains NaN"):
             coding.fit(UNIT, 64).bins(np.array([0.5, np.nan]))
@@ -187,7 +187,7 @@ def test_numbers_are_checked():
 @pytest.mark.parametrize(
     "coding", [RandomInverse(), RandomInverse(spacing="quantile"), Anchor(), WithMissing()]
 )
-def test_a_fitted_coding_is_unchanged_by_fit(coding, column):
+def test_fitting_a_fitted_coding_does_not_change_it(coding, column):
     learned = coding.fit(column, 400)
     assert not learned.learns
     assert learned.fit(np.array(learned.ends()), 400) == learned
@@ -208,13 +208,13 @@ def test_a_fitted_coding_is_unchanged_by_fit(coding, column):
         5,
     ],
 )
-def test_impossible_knots_are_named(knots):
+def test_impossible_knots_are_refused_by_name(knots):
     for fields in ({"low": 0.0, "high": 1.0}, {}, {"spacing": "even"}):
         coding = RandomInverse(**{"spacing": "quantile", "knots": knots, **fields})
         refuses("knots", coding.fit, UNIT, 400)
 
 
-def test_knots_are_values_and_their_mean_ranks():
+def test_knots_of_quantiles_rise_from_rank_0_to_1():
     assert quantile_knots(np.array([5.0])) == ((5.0, 0.0),)
     knots = quantile_knots(np.random.RandomState(0).normal(size=5000))
     assert len(knots) <= MAX_KNOTS
@@ -224,7 +224,7 @@ def test_knots_are_values_and_their_mean_ranks():
     assert (levels[0], levels[-1]) == (0, 1)
 
 
-def test_missing_values_have_the_last_bin():
+def test_missing_and_unknown_values_have_the_last_bin():
     numbers = np.array([4.0, None, 0.0, np.nan, pd.NA], dtype=object)
     coding = WithMissing(base=Anchor(n_anchor_patterns=3, n_interpolated=1)).fit(numbers, 8)
     assert (coding.base.low, coding.base.high, coding.size) == (0.0, 4.0, 5)
@@ -249,16 +249,16 @@ def test_missing_values_have_the_last_bin():
         (WithMissing(), np.array(["a", None], dtype=object), "convert"),
     ],
 )
-def test_errors_of_codings_with_missing_values(coding, column, message):
+def test_impossible_codings_with_missing_values_are_refused(coding, column, message):
     refuses(message, coding.fit, column, 8)
 
 
-def test_unknown_categories_can_be_refused():
+def test_with_unknown_error_unknown_categories_are_refused():
     strict = WithMissing(base=Symbolic(), unknown="error").fit(LETTERS, 8)
     refuses("categories", strict.bins, np.array(["z"]))
 
 
-def test_there_may_be_many_symbols():
+def test_patterns_of_12_000_symbols_are_balanced_and_extend_those_of_fewer():
     coding = Symbolic(categories=tuple(range(12_000))).fit(np.arange(12_000), 20)
     patterns = coding.patterns(20, 3)
     assert patterns.shape == (12_000, 20)

@@ -13,7 +13,7 @@ X = RANDOM.uniform(0, 1, (12, 3))
 
 @pytest.mark.parametrize("pairs", ["all", [(0, 1), (2, None)]])
 @pytest.mark.parametrize("coding", [RandomInverse(n_bins=40), Circular(period=1.0)])
-def test_long_codes_approach_it(coding, pairs):
+def test_inner_products_of_long_codes_approach_the_kernel(coding, pairs):
     n_units = 20000
     model = SDNNRegressor(
         coding, pairs=pairs, n_pattern_units=n_units, n_output_units=1, max_iter=1, random_state=0
@@ -28,7 +28,7 @@ def test_long_codes_approach_it(coding, pairs):
     np.testing.assert_allclose(limit, limit.T)
 
 
-def test_by_hand():
+def test_the_kernel_of_one_and_two_inputs_is_as_worked_by_hand():
     coding = RandomInverse(n_bins=11, n_flipped=10, low=0.0, high=1.0)
     rho = 1 - 4 * 10 / 100
     one = kernel.AnalyticKernel(coding, n_inputs=2, n_units=100)
@@ -53,7 +53,7 @@ COLUMNS = {"different": RANDOM.lognormal(0, 2, 30), "equal": np.full(30, 3.5)}
         WithMissing(base=RandomInverse(spacing="quantile")),
     ],
 )
-def test_fitted_codings_are_not_fitted_again(coding, column):
+def test_the_kernel_uses_fitted_codings_unchanged(coding, column):
     learned = coding.fit(COLUMNS[column], 400)
     one = kernel.AnalyticKernel([learned, learned], n_units=400)
     assert one.codings == (learned, learned)
@@ -64,7 +64,7 @@ def test_fitted_codings_are_not_fitted_again(coding, column):
     assert kernel.plot_similarity(learned, 400) is not None
 
 
-def test_similarity_scatters_about_the_correlations():
+def test_similarities_of_drawn_patterns_are_near_the_correlations():
     for coding in ("random-inverse", "anchor", "circular", Symbolic(categories=("a", "b"))):
         drawn, expected = kernel.similarity(coding, 4000, 1), kernel.correlations(coding, 4000)
         assert drawn.shape == expected.shape
@@ -72,14 +72,14 @@ def test_similarity_scatters_about_the_correlations():
 
 
 @pytest.mark.parametrize("coding", ["random-inverse", Symbolic(categories=tuple("abc"))])
-def test_it_can_be_drawn(coding, tmp_path):
+def test_plot_similarity_draws_a_picture(coding, tmp_path):
     figure = kernel.plot_similarity(coding, n_units=200)
     figure.savefig(tmp_path / "similarity.png")
     assert (tmp_path / "similarity.png").stat().st_size > 5000
 
 
 @pytest.mark.parametrize("bad", [np.zeros((3, 1)), np.zeros((3, 3)), np.zeros(2)])
-def test_samples_of_another_shape_are_refused(bad):
+def test_samples_of_another_number_of_inputs_are_refused(bad):
     analytic = kernel.AnalyticKernel("anchor", n_inputs=2)
     refuses("X", analytic, bad)
     refuses("Y", analytic, np.zeros((1, 2)), bad)

@@ -11,21 +11,21 @@ BOX = gym.spaces.Box(-1.0, 1.0, (4,))
 
 
 @pytest.mark.parametrize("value", [2, np.int8(2), np.uint64(2)])
-def test_whole_numbers_of_every_type(value):
+def test_whole_accepts_integers_of_python_and_numpy(value):
     found = arguments.whole("n", value, 1, 2)
     assert found == 2
     assert type(found) is int
 
 
 @pytest.mark.parametrize("value", [0.5, 1, np.float32(0.5), np.int8(1), np.inf])
-def test_numbers_of_every_type(value):
+def test_real_accepts_numbers_of_python_and_numpy(value):
     found = arguments.real("x", value)
     assert found == value
     assert type(found) is float
 
 
 @pytest.mark.parametrize("seed", [-1, 2**64, None, 1.5])
-def test_seeds_that_the_core_does_not_take(seed):
+def test_seeds_outside_64_bits_are_refused(seed):
     refuses("seed", arguments.seed_of, seed)
     assert arguments.seed_of(2**64 - 1) == 2**64 - 1
 
@@ -40,7 +40,7 @@ def test_seeds_that_the_core_does_not_take(seed):
         (lambda: arguments.array_of("one", ["a"]), "must be numbers, got ['a']"),
     ],
 )
-def test_errors_carry_the_argument(check, problem):
+def test_errors_of_checks_carry_argument_and_problem(check, problem):
     with pytest.raises((TypeError, ValueError)) as caught:
         check()
     assert arguments.blamed(caught.value) == ("one", problem)

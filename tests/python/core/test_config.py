@@ -33,7 +33,7 @@ def other_value(field):
 
 
 @pytest.mark.parametrize(("kind", "field"), FIELDS, ids=IDS)
-def test_a_field_is_set_copied_and_kept(kind, field):
+def test_each_field_is_kept_by_copies_pickles_and_replace(kind, field):
     value = other_value(field)
     made = kind(**{field.name: value})
     assert getattr(made, field.name) == value != field.default == getattr(kind(), field.name)
@@ -51,7 +51,7 @@ def test_a_field_is_set_copied_and_kept(kind, field):
 
 
 @pytest.mark.parametrize(("kind", "field"), FIELDS, ids=IDS)
-def test_a_bad_value_is_refused_with_the_name_of_its_field(kind, field):
+def test_bad_values_of_each_field_are_refused_with_its_name(kind, field):
     bad = ["four", b"x", {}, object(), 5 if field.hint == "bool" else True]
     if not field.hint.endswith("None"):
         bad.append(None)
@@ -72,7 +72,7 @@ def test_a_bad_value_is_refused_with_the_name_of_its_field(kind, field):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_class_is_frozen_keyword_only_and_documented(kind):
+def test_configurations_are_frozen_keyword_only_and_documented(kind):
     (first, *_) = fields_of(kind)
     with pytest.raises(TypeError):
         kind(first.default)
@@ -87,7 +87,7 @@ def test_a_class_is_frozen_keyword_only_and_documented(kind):
         assert f"\n{field.name} : " in kind.__doc__
 
 
-def test_numbers_of_numpy_are_numbers():
+def test_configurations_accept_numpy_numbers_and_bools():
     made = QLearningConfig(n_steps=np.int64(3), epsilon=np.float32(0.5), discount=1)
     assert (made.n_steps, made.epsilon, made.discount) == (3, 0.5, 1.0)
     assert SDNNCConfig(circular=[np.True_, False]).circular == (True, False)

@@ -30,19 +30,19 @@ def arguments(limit, n, seed):
 
 
 @pytest.mark.parametrize("limit", [0.8, np.pi, 100.0, 1e5])
-def test_sin_cos_is_within_its_error(limit):
+def test_sine_and_cosine_are_within_085_units_of_the_last_place(limit):
     x = arguments(limit, 4000, seed=1)
     sin, cos = _core.sin_cos(x)
     assert worst_ulp(sin, [mpmath.sin(mpmath.mpf(float(v))) for v in x]) < 0.85
     assert worst_ulp(cos, [mpmath.cos(mpmath.mpf(float(v))) for v in x]) < 0.85
 
 
-def test_sin_cos_keeps_the_shape():
+def test_sine_and_cosine_keep_the_shape_of_their_argument():
     sin, cos = _core.sin_cos(np.zeros((2, 3)))
     assert sin.shape == cos.shape == (2, 3)
 
 
-def test_log_is_within_its_error():
+def test_the_logarithm_is_within_085_units_of_the_last_place():
     rng = np.random.default_rng(2)
     x = np.concatenate(
         [
@@ -55,7 +55,7 @@ def test_log_is_within_its_error():
     assert worst_ulp(_core.log(x), [mpmath.log(mpmath.mpf(float(v))) for v in x]) < 0.85
 
 
-def test_exp_is_within_its_error():
+def test_the_exponential_is_within_07_units_of_the_last_place():
     rng = np.random.default_rng(4)
     x = np.concatenate(
         [rng.uniform(-708.0, 709.7, 3000), rng.uniform(-1.0, 1.0, 4000), rng.uniform(-30, 0, 3000)]
@@ -66,7 +66,7 @@ def test_exp_is_within_its_error():
     assert worst_ulp(_core.exp(subnormal), exact) < 1.0
 
 
-def test_atan2_is_within_its_error():
+def test_the_arctangent_is_within_15_units_of_the_last_place():
     rng = np.random.default_rng(5)
     y, x = rng.uniform(-1.0, 1.0, (2, 6000))
     y[:2000] *= 2.0 ** rng.uniform(-300, 300, 2000)

@@ -48,7 +48,7 @@ def saved(tmp_path_factory):
     return {kind: ((folder / kind).read_bytes(), read[kind]) for kind in KINDS}
 
 
-def test_a_file_is_read_as_written(tmp_path):
+def test_a_file_is_read_exactly_as_written(tmp_path):
     path = tmp_path / "file"
     write_file(path, "agent", ARRAYS, DESCRIPTION)
     description, arrays = read_file(path, "training", "agent")
@@ -62,7 +62,7 @@ def test_a_file_is_read_as_written(tmp_path):
     assert path.read_bytes() == before == with_checksum(before)
 
 
-def test_the_file_is_one_of_safetensors(tmp_path):
+def test_files_can_be_read_by_safetensors(tmp_path):
     write_file(tmp_path / "file", "estimator", ARRAYS, DESCRIPTION)
     with safe_open(tmp_path / "file", framework="numpy") as file:
         about = json.loads(file.metadata()["sdnn"])
@@ -77,7 +77,7 @@ def test_the_file_is_one_of_safetensors(tmp_path):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_file_of_another_kind_is_refused(saved, kind, tmp_path):
+def test_readers_refuse_files_of_another_type(saved, kind, tmp_path):
     path = tmp_path / "other"
     path.write_bytes(saved[kind][0])
     for other, (_, read) in saved.items():
@@ -87,7 +87,7 @@ def test_a_file_of_another_kind_is_refused(saved, kind, tmp_path):
             refuses(kind, read, path)
 
 
-def test_files_of_other_programs_and_versions_are_refused(tmp_path):
+def test_files_of_other_programs_formats_or_checksums_are_refused(tmp_path):
     path = tmp_path / "other"
     for metadata in (None, {"sdnn": '{"format": "sdnn-agent-1", "class": "SDNNQLearning"}'}):
         save_file(ARRAYS, path, metadata)
@@ -114,7 +114,7 @@ def test_files_of_other_programs_and_versions_are_refused(tmp_path):
         (b"[1,2]", b"[1,3]"),
     ],
 )
-def test_invalid_content_with_a_valid_checksum_is_damage(part, other, tmp_path):
+def test_invalid_content_is_refused_despite_a_valid_checksum(part, other, tmp_path):
     path = tmp_path / "crafted"
     write_file(path, "agent", ARRAYS, {})
     content = path.read_bytes()
@@ -123,7 +123,7 @@ def test_invalid_content_with_a_valid_checksum_is_damage(part, other, tmp_path):
     refuses("crafted", read_file, path, "agent")
 
 
-def test_only_regular_files_are_read(tmp_path, monkeypatch):
+def test_only_regular_files_within_the_size_limit_are_read(tmp_path, monkeypatch):
     refuses("nothing", read_file, tmp_path / "nothing", "agent", error=FileNotFoundError)
     with pytest.raises(OSError, match=tmp_path.name):
         read_file(tmp_path, "agent")

@@ -65,7 +65,7 @@ def content_of(folder, **options):
         )
 
 
-def test_no_flipped_bit_changes_the_rows_of_a_store(tmp_path):
+def test_flipped_bits_of_a_store_are_noticed_or_harmless(tmp_path):
     path = make_store(tmp_path)
     content, expected = path.read_bytes(), content_of(tmp_path)
     rng = np.random.default_rng(5)
@@ -143,7 +143,7 @@ def test_a_store_with_another_schema_is_refused_before_any_query(tmp_path, state
         ("UPDATE measurements SET content = x'00'", "content"),
     ],
 )
-def test_a_store_with_other_values_is_refused_by_column(tmp_path, statement, column):
+def test_invalid_values_in_a_store_are_refused_with_their_column(tmp_path, statement, column):
     path = make_store(tmp_path)
     change(path, statement)
     with pytest.raises(StoreError, match=rf"results\.sqlite.*{column}"):
@@ -151,7 +151,7 @@ def test_a_store_with_other_values_is_refused_by_column(tmp_path, statement, col
 
 
 @pytest.mark.parametrize("config", ["", "[]", "nothing", "[" * 100_000, '{"a":' * 100_000])
-def test_a_configuration_of_a_store_is_a_table_in_json(tmp_path, config):
+def test_a_stored_configuration_must_be_a_json_object(tmp_path, config):
     with ResultStore(tmp_path) as store:
         store.add(make_record(config=config))
         assert make_record(config=config).key.config_hash == hash_of(config)
@@ -159,7 +159,7 @@ def test_a_configuration_of_a_store_is_a_table_in_json(tmp_path, config):
             store.load()
 
 
-def test_a_configuration_of_a_store_has_the_hash_beside_it(tmp_path):
+def test_a_stored_configuration_must_have_its_hash(tmp_path):
     record = make_record()
     with ResultStore(tmp_path) as store:
         store.add(replace(record, key=record.key._replace(config_hash="0" * 16)))
@@ -167,7 +167,7 @@ def test_a_configuration_of_a_store_has_the_hash_beside_it(tmp_path):
             store.load()
 
 
-def test_a_journal_of_a_store_rolls_back_and_removes_no_other_file(tmp_path):
+def test_a_journal_rolls_back_but_cannot_remove_other_files(tmp_path):
     path, victim = make_store(tmp_path), tmp_path / "mine.txt"
     expected = content_of(tmp_path)
     journal = hot_journal(path)
@@ -187,7 +187,7 @@ def test_a_journal_of_a_store_rolls_back_and_removes_no_other_file(tmp_path):
 
 
 @pytest.mark.parametrize("read_only", [True, False])
-def test_reading_changes_no_byte_whatever_the_journal(tmp_path, read_only):
+def test_reading_rolls_back_a_journal_but_refuses_a_stray_one(tmp_path, read_only):
     path = make_store(tmp_path)
     expected, before = content_of(tmp_path), path.read_bytes()
     journal = path.with_name(f"{path.name}-journal")
@@ -206,7 +206,7 @@ def test_reading_changes_no_byte_whatever_the_journal(tmp_path, read_only):
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a system of POSIX")
 @pytest.mark.parametrize("end", ["", "-journal", "-wal"])
 @pytest.mark.parametrize("kind", ["link", "pipe", "folder", "dangling"])
-def test_a_store_and_its_journal_are_files(tmp_path, end, kind):
+def test_a_store_and_its_journals_must_be_regular_files(tmp_path, end, kind):
     folder, other = tmp_path / "run", tmp_path / "other"
     folder.mkdir()
     other.mkdir()
@@ -228,7 +228,7 @@ def test_a_store_and_its_journal_are_files(tmp_path, end, kind):
     assert not (tmp_path / "nothing").exists()
 
 
-def test_measurements_are_json(tmp_path):
+def test_a_stored_measurement_must_be_json(tmp_path):
     with ResultStore(tmp_path) as store:
         store.put("cost", "b", {})
         values = ("cost", "b", "[" * 100_000)
@@ -241,7 +241,7 @@ def test_measurements_are_json(tmp_path):
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a system of POSIX")
 @pytest.mark.parametrize("kind", ["link", "pipe", "device"])
-def test_nothing_in_a_run_folder_is_written_through(tmp_path, kind):
+def test_files_of_a_run_replace_links_pipes_and_devices(tmp_path, kind):
     folder, kept = tmp_path / "run", tmp_path / "kept"
     Run.create(folder, RUN)
     Run.open(folder).train()
@@ -277,7 +277,7 @@ def test_nothing_in_a_run_folder_is_written_through(tmp_path, kind):
 
 
 @pytest.mark.parametrize("name", [".lock", "tensorboard", STORE_NAME])
-def test_links_that_would_be_written_to_are_refused(tmp_path, name):
+def test_links_to_files_written_in_place_are_refused(tmp_path, name):
     folder, other = tmp_path / "run", tmp_path / "other"
     run = Run.create(folder, RUN)
     other.mkdir()
@@ -315,7 +315,7 @@ except ValueError as error:
 """
 
 
-def test_a_file_that_is_cut_while_it_is_read_is_damaged(tmp_path):
+def test_a_file_truncated_while_it_is_read_is_reported_as_damaged(tmp_path):
     path = tmp_path / "file"
     write_file(path, "agent", {"a": np.zeros(2**20)}, {})
     done = python("-c", TRUNCATED, path)

@@ -38,7 +38,7 @@ def make_run(folder, **changes):
     (folder / "config.json").write_text(json.dumps(config | changes))
 
 
-def test_export_imports_nothing_that_a_configuration_names(folder):
+def test_export_does_not_import_modules_named_in_a_configuration(folder):
     make_run(folder / "run", environment={"id": "loud:Loud-v0"}, agent={"name": "nobody"})
     env = gym.make("Pendulum-v1")
     agent = SDNNQLearning(env.observation_space, env.action_space, approximator=agent_files.SMALL)
@@ -49,17 +49,17 @@ def test_export_imports_nothing_that_a_configuration_names(folder):
         Path("policy.h").unlink()
 
 
-def test_missing_packages_are_not_looked_for_in_the_present_folder(folder):
+def test_optional_packages_are_not_imported_from_the_current_folder(folder):
     make_run(folder / "run", output={"tensorboard": True})
     for arguments in (("resume", "run"), ("plot", "run"), ("--version",)):
         assert run("-m", "sdnn", *arguments) == []
 
 
-def test_a_module_that_is_named_is_found_in_the_present_folder(folder):
+def test_a_module_named_in_an_environment_id_is_imported_from_the_current_folder(folder):
     assert run("-m", "sdnn", "train", "loud:Loud-v0", "--dry-run") == ["loud"]
 
 
-def test_modules_that_a_study_imports_are_found_beside_it(folder):
+def test_modules_imported_by_a_study_are_found_beside_its_file(folder):
     (folder / "studies").mkdir()
     (folder / "loud.py").rename(folder / "studies" / "loud.py")
     study = '[study]\nimports = ["loud"]\n[base]\nenvironment = "Pendulum-v1"\n'

@@ -32,7 +32,7 @@ def short_trial(n_inputs, noise):
 
 @pytest.mark.usefixtures("restore")
 @pytest.mark.parametrize(("n_inputs", "noise"), [(4, 0.0), (4, 0.02), (6, 0.02)])
-def test_a_trial_has_the_same_bits_on_all_levels(n_inputs, noise):
+def test_a_trial_has_the_same_bits_on_every_instruction_set(n_inputs, noise):
     rows = {}
     for level in available_instruction_sets():
         set_instruction_set(level)
@@ -48,14 +48,14 @@ def test_a_trial_has_the_same_bits_on_all_levels(n_inputs, noise):
 
 
 @pytest.mark.usefixtures("restore")
-def test_levels_can_be_chosen():
+def test_every_available_instruction_set_can_be_selected():
     for level in available_instruction_sets():
         sdnn.set_instruction_set(level)
         assert sdnn.instruction_set() == level
 
 
 @pytest.mark.parametrize("name", ["", "sse9", "AVX2", "avx2 "])
-def test_bad_names(name):
+def test_unknown_instruction_sets_are_refused(name):
     before = instruction_set()
     with pytest.raises(ValueError, match="instruction set"):
         set_instruction_set(name)
@@ -64,20 +64,20 @@ def test_bad_names(name):
         set_instruction_set(2)
 
 
-def test_levels_beyond_the_processor():
+def test_instruction_sets_that_the_processor_lacks_are_refused():
     for name in {"portable", "neon", "avx2", "avx512"} - set(available_instruction_sets()):
         refuses("processor", set_instruction_set, name)
 
 
 @pytest.mark.parametrize(("value", "said"), [("portable", "portable"), ("sse9", "sse9")])
-def test_the_environment_variable_chooses(value, said):
+def test_the_environment_variable_selects_the_instruction_set(value, said):
     code = "import sdnn; print(sdnn.instruction_set())"
     done = python("-c", code, env=environment(SDNN_INSTRUCTION_SET=value))
     assert said in done.stdout + done.stderr
     assert (done.returncode == 0) == (value == "portable")
 
 
-def test_an_unusable_level_in_the_environment_is_an_error_not_an_abort():
+def test_an_unknown_instruction_set_in_the_environment_raises_an_error():
     calls = (
         "sdnn.SDNNRegressor(max_iter=1).fit([[0.0], [1.0]], [0.0, 1.0])",
         "sdnn.approximators.SDNNC()",

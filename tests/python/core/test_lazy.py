@@ -17,7 +17,7 @@ PACKAGES = ("sdnn", "sdnn.estimators", "sdnn.reproduction", "sdnn.runs")
 
 
 @pytest.mark.parametrize("name", PACKAGES)
-def test_every_public_name_is_there(name):
+def test_public_names_are_importable_listed_and_in_the_stub(name):
     package = importlib.import_module(name)
     for public in package.__all__:
         assert getattr(package, public) is not None, public
@@ -29,7 +29,7 @@ def test_every_public_name_is_there(name):
         package.nothing  # noqa: B018
 
 
-def test_importing_the_package_loads_nothing_large():
+def test_importing_sdnn_imports_no_large_package():
     code = (
         "import sys, sdnn\n"
         "large = {'click', 'gymnasium', 'joblib', 'matplotlib', 'numpy', 'pandas', 'pygame', "
@@ -40,7 +40,7 @@ def test_importing_the_package_loads_nothing_large():
     assert done.stdout == "set()\n"
 
 
-def test_an_installation_without_sources_works(tmp_path):
+def test_an_installation_of_compiled_modules_only_works(tmp_path):
     folder = Path(sdnn.__file__).parent
     shutil.copytree(folder, tmp_path / "sdnn", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(_core.__file__, tmp_path / "sdnn")

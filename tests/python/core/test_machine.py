@@ -4,7 +4,7 @@ import platform
 from sdnn.support import machine
 
 
-def test_the_processor_has_the_name_that_the_system_gives(tmp_path, monkeypatch):
+def test_the_name_of_the_processor_is_read_from_cpuinfo(tmp_path, monkeypatch):
     told = tmp_path / "cpuinfo"
     monkeypatch.setattr(machine, "_PROCESSOR_FILE", told)
     told.write_text("processor : 0\nmodel name\t: Fast One @ 1 GHz\nmodel name\t: Other\n")
@@ -18,7 +18,7 @@ def test_a_processor_without_a_name_is_unknown(tmp_path, monkeypatch):
     assert machine.processor() == "unknown"
 
 
-def test_only_cores_that_this_process_may_use_are_counted(monkeypatch):
+def test_n_cores_counts_the_cores_available_to_the_process(monkeypatch):
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 3, 5}, raising=False)
     assert machine.n_cores() == 3
     monkeypatch.delattr(os, "sched_getaffinity")

@@ -20,14 +20,14 @@ BINDINGS = Path(__file__).parents[3] / "cpp" / "bindings"
 IN_USE = "thread"
 
 
-def test_a_made_object_cannot_be_pickled_by_any_protocol():
+def test_objects_of_the_core_cannot_be_pickled():
     for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
         refuses(
             "pickle", pickle.dumps, core.Acrobot(core.AcrobotConfig()), protocol, error=TypeError
         )
 
 
-def test_only_one_class_releases_the_lock():
+def test_only_one_binding_header_releases_the_gil():
     for path in BINDINGS.glob("*.[ch]pp"):
         found = re.findall(r"gil_scoped_release|PyEval_SaveThread", path.read_text())
         assert path.name == "objects.hpp" or not found, path
@@ -67,7 +67,7 @@ def big_trial():
     return core.AcrobotTrial(**settings)
 
 
-def test_a_trial_that_advances_refuses_all_else():
+def test_a_trial_refuses_other_threads_while_it_advances():
     trial = big_trial()
     agent, network = trial.agent, trial.agent.networks[0]
     n_decisions = trial.n_decisions
@@ -101,7 +101,7 @@ def trainer_of(layer, form="auto", n_samples=20_000):
 
 
 @pytest.mark.parametrize("form", ["plain", "block"])
-def test_a_layer_that_is_trained_refuses_all_else(form):
+def test_a_layer_refuses_other_threads_while_it_is_trained(form):
     layer = core.ParallelPerceptron(core_cells.code(), 200, seed=1)
     trainer, other = trainer_of(layer, form), trainer_of(layer, form)
     order = np.tile(np.arange(20_000, dtype=np.int32), 20)
@@ -124,7 +124,7 @@ def test_a_layer_that_is_trained_refuses_all_else(form):
     assert count[0] > 0
 
 
-def test_a_layer_may_be_read_by_many_threads_but_not_trained_meanwhile():
+def test_a_layer_refuses_training_while_threads_read_it():
     layer = core.ParallelPerceptron(core_cells.code(), 4000, seed=1)
     trainer = trainer_of(layer, "plain", 5)
     bins = np.tile(np.array(core_cells.BINS, np.int32), (500_000, 1))
@@ -140,7 +140,7 @@ def test_a_layer_may_be_read_by_many_threads_but_not_trained_meanwhile():
     trainer.present([0])
 
 
-def test_a_batch_that_moves_refuses_all_else():
+def test_a_batch_of_acrobots_refuses_other_threads_while_it_steps():
     n = 2**16
     batch = core.AcrobotBatch(core.AcrobotConfig(), n)
     moving = np.ones(n, np.bool_)
@@ -163,7 +163,7 @@ LONG_WORK = {
 
 
 @pytest.mark.parametrize("work", LONG_WORK)
-def test_long_work_ends_on_ctrl_c_within_a_second(work):
+def test_ctrl_c_ends_long_work_of_the_core_within_3_seconds(work):
     program = f"""
 import sys, time
 sys.path.insert(0, {str(Path(core_cells.__file__).parent)!r})
@@ -207,7 +207,7 @@ def test_a_trial_continues_after_ctrl_c_between_episodes():
     np.testing.assert_array_equal(trial.test_rows()["steps"], alone.test_rows()["steps"])
 
 
-def test_the_process_ends_while_a_thread_works_in_the_core():
+def test_a_process_exits_cleanly_while_a_thread_works_in_the_core():
     program = """
 import threading, time, os, sdnn._core as c, numpy as np
 def work():

@@ -26,11 +26,11 @@ with whole_file(Path(sys.argv[1])) as file:
 """
 
 
-def under_way(folder: Path) -> list[Path]:
+def partial_files(folder: Path) -> list[Path]:
     return sorted(folder.glob(f"*{PARTIAL_SUFFIX}"))
 
 
-def test_a_file_is_written_as_a_whole(tmp_path):
+def test_write_whole_replaces_a_file_and_leaves_no_other(tmp_path):
     path = tmp_path / "report.html"
     write_whole(path, b"one")
     write_whole(path, b"two")
@@ -38,14 +38,14 @@ def test_a_file_is_written_as_a_whole(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
 
-def test_a_file_that_cannot_be_written_stays_as_it_was(tmp_path):
+def test_a_failed_write_keeps_the_existing_path(tmp_path):
     path = tmp_path / "report.html"
     path.mkdir()
     refuses("report.html", write_whole, path, b"new", error=OSError)
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
 
-def test_only_files_of_killed_processes_are_removed(tmp_path):
+def test_only_partial_files_of_dead_processes_are_removed(tmp_path):
     write_whole(tmp_path / "rows.csv", b"old")
     foreign = tmp_path / f"notes{PARTIAL_SUFFIX}"  # whose name we never gave
     foreign.write_bytes(b"mine")
@@ -53,19 +53,21 @@ def test_only_files_of_killed_processes_are_removed(tmp_path):
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         try:
             assert process.stdout.readline() == b"half\n"
-            found = under_way(tmp_path)
+            found = partial_files(tmp_path)
             assert len(found) == 2
             remove_abandoned_files(tmp_path)
-            assert under_way(tmp_path) == found
+            assert partial_files(tmp_path) == found
         finally:
             process.kill()
     remove_abandoned_files(tmp_path)
-    assert under_way(tmp_path) == [foreign]
+    assert partial_files(tmp_path) == [foreign]
     assert (tmp_path / "rows.csv").read_bytes() == b"old"
 
 
 @pytest.mark.parametrize(("seconds", "stays"), [(0, True), (3600, False)])
-def test_where_files_cannot_be_locked_their_age_counts(tmp_path, monkeypatch, seconds, stays):
+def test_without_file_locks_partial_files_are_removed_after_an_hour(
+    tmp_path, monkeypatch, seconds, stays
+):
     monkeypatch.setattr(files, "lock", lambda descriptor: None)
     left = tmp_path / f"rows.csv.0123456789abcdef{PARTIAL_SUFFIX}"
     mine = [tmp_path / "mine.txt", tmp_path / f"mine{PARTIAL_SUFFIX}"]
@@ -78,12 +80,12 @@ def test_where_files_cannot_be_locked_their_age_counts(tmp_path, monkeypatch, se
     assert (tmp_path / "rows.csv").read_bytes() == b"whole"
 
 
-def test_a_file_removed_before_it_was_locked_is_made_again(tmp_path, monkeypatch):
+def test_a_partial_file_removed_before_its_lock_is_created_again(tmp_path, monkeypatch):
     locks = []
 
     def removed_first(descriptor: int) -> bool:
         if not locks:
-            for path in under_way(tmp_path):
+            for path in partial_files(tmp_path):
                 path.unlink()
         locks.append(descriptor)
         return True
@@ -95,7 +97,7 @@ def test_a_file_removed_before_it_was_locked_is_made_again(tmp_path, monkeypatch
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a system of POSIX")
-def test_links_and_pipes_are_replaced(tmp_path):
+def test_write_whole_replaces_links_and_pipes(tmp_path):
     target = tmp_path / "target"
     target.write_bytes(b"old")
     names = [tmp_path / name for name in ("link", "dangling", "pipe", "device")]
@@ -111,7 +113,7 @@ def test_links_and_pipes_are_replaced(tmp_path):
     assert len(list(tmp_path.iterdir())) == 5
 
 
-def test_devices_are_written_to_under_their_own_names():
+def test_write_whole_writes_to_devices():
     ends = os.pipe()
     if Path(f"/dev/fd/{ends[1]}").exists():  # as /dev/stdout
         write_whole(Path(f"/dev/fd/{ends[1]}"), b"through")
@@ -120,7 +122,7 @@ def test_devices_are_written_to_under_their_own_names():
         os.close(end)
 
 
-def test_two_writers_of_one_file_leave_one_of_their_files(tmp_path):
+def test_concurrent_writers_leave_the_whole_file_of_one_of_them(tmp_path):
     path = tmp_path / "report.html"
     contents = [bytes([letter]) * 300_000 for letter in b"ab"]
     write_whole(path, contents[0])
@@ -142,11 +144,11 @@ def test_two_writers_of_one_file_leave_one_of_their_files(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
 
-def test_csv_quotes_special_characters():
+def test_csv_quotes_cells_with_commas():
     assert csv_bytes(("a", "b"), [(1, "x, y"), (2.5, "µ")]) == 'a,b\n1,"x, y"\n2.5,µ\n'.encode()
 
 
-def test_large_tables_are_written_in_pieces(tmp_path):
+def test_large_csv_tables_are_written_in_pieces_also_compressed(tmp_path):
     rows = [(number, "x" * 100) for number in range(30_000)]
     pieces = list(csv_pieces(("a", "b"), rows))
     assert len(pieces) > 2
@@ -158,7 +160,7 @@ def test_large_tables_are_written_in_pieces(tmp_path):
     assert b"".join(gzip_pieces(pieces)) == path.read_bytes()
 
 
-def test_pieces_that_fail_leave_no_file(tmp_path):
+def test_an_error_between_pieces_leaves_no_file(tmp_path):
     def pieces():
         yield b"one"
         raise ValueError("no second piece")
@@ -168,11 +170,11 @@ def test_pieces_that_fail_leave_no_file(tmp_path):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no such device here")
-def test_a_full_device_is_named():
+def test_an_error_of_a_full_device_names_it():
     refuses("/dev/full", write_whole, Path("/dev/full"), b"much", error=OSError)
 
 
-def test_a_file_that_cannot_be_made_is_named(tmp_path):
+def test_a_missing_folder_is_an_error_with_the_path(tmp_path):
     with pytest.raises(FileNotFoundError) as refused:
         write_whole(tmp_path / "none" / "out.txt", b"x")
     assert refused.value.filename == str(tmp_path / "none" / "out.txt")

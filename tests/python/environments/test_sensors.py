@@ -35,7 +35,7 @@ def run(env, n_episodes=20):
 @pytest.mark.parametrize("n_sensors", [4, 5, 6])
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 @pytest.mark.parametrize("stream", ["sensor_noise", "evaluation_sensor_noise"])
-def test_wrappers_equal_the_core_bit_for_bit(n_sensors, noise, stream):
+def test_sensor_wrappers_have_the_bits_of_the_core(n_sensors, noise, stream):
     functions = ("energy", "height")[: n_sensors - 4]
     env = RedundantSensors(AcrobotSwingUpEnv(dtype="float64"), functions)
     env = NoisySensors(env, sigma=noise, seed=42, stream=stream)
@@ -48,14 +48,14 @@ def test_wrappers_equal_the_core_bit_for_bit(n_sensors, noise, stream):
         np.testing.assert_array_equal(observation, core.observe(state))
 
 
-def test_spaces_hold_the_observations():
+def test_noisy_observations_are_within_their_space():
     env = NoisySensors(RedundantSensors(AcrobotSwingUpEnv()), sigma=0.3)
     assert env.observation_space == gym.spaces.Box(0.0, 1.0, (6,), np.float32)
     for observation in run(env)[0]:
         assert env.observation_space.contains(observation)
 
 
-def test_own_functions_of_the_base_observation():
+def test_redundant_sensors_may_be_custom_functions_with_bounds():
     env = RedundantSensors(
         AcrobotSwingUpEnv(dtype="float64"),
         (lambda s: s[0] - s[1], "height", lambda s: len(s)),
@@ -78,7 +78,7 @@ class Switches(gym.Env):
         return np.array([0, 1, 1], np.int8), {}
 
 
-def test_whole_numbers_get_fractions():
+def test_sensors_convert_integer_observations_to_float():
     noisy = NoisySensors(Switches(), 0.02, edge="saturate")
     seen, _ = noisy.reset(seed=1)
     assert noisy.observation_space.contains(seen)
@@ -92,7 +92,7 @@ def test_whole_numbers_get_fractions():
     assert seen.tolist() == [0.0, 1.0, 1.0, np.float32(1 / 3)]
 
 
-def test_edges_can_be_chosen():
+def test_edge_wraps_or_clips_noise_per_variable():
     env = gym.wrappers.TransformObservation(
         AcrobotSwingUpEnv(), np.ones_like, gym.spaces.Box(0.0, 1.0, (4,), np.float32)
     )
@@ -106,7 +106,7 @@ def test_edges_can_be_chosen():
     assert (np.array([noisy.reset()[0] for _ in range(100)]) > 0.5).all()
 
 
-def test_a_seed_at_reset_starts_the_noise_anew():
+def test_reset_with_a_seed_restarts_the_noise():
     env = NoisySensors(AcrobotSwingUpEnv(), seed=7)
     first, second = env.reset()[0], env.reset()[0]
     assert (first != second).all()
@@ -115,19 +115,19 @@ def test_a_seed_at_reset_starts_the_noise_anew():
     assert (env.reset(seed=8)[0] != first).all()
 
 
-def test_noise_leaves_the_task_alone():
+def test_noise_does_not_change_the_states_of_the_task():
     quiet, loud = AcrobotSwingUpEnv(), NoisySensors(AcrobotSwingUpEnv(), sigma=0.5)
     for clean, noisy in zip(run(quiet)[1], run(loud)[1], strict=True):
         np.testing.assert_array_equal(clean, noisy)
 
 
-def test_wrappers_are_part_of_the_spec():
+def test_sensor_wrappers_are_recreated_from_the_spec():
     env = NoisySensors(RedundantSensors(gym.make("sdnn/AcrobotSwingUp-v0")), sigma=0.01, seed=5)
     again = gym.make(env.spec)
     np.testing.assert_array_equal(env.reset()[0], again.reset()[0])
 
 
-def test_bad_arguments():
+def test_bad_arguments_of_sensor_wrappers_are_refused_by_name():
     env = AcrobotSwingUpEnv()
     refuses("functions", RedundantSensors, env, ("speed",))
     refuses("bounds", RedundantSensors, env, bounds=[(0.0, 1.0)])

@@ -1,4 +1,4 @@
-"""A goal that tightens with the learning episode that it is given, and with nothing else."""
+"""A goal that tightens with the number of the learning episode."""
 
 import pickle
 import warnings
@@ -27,7 +27,7 @@ def tolerance(env, **reset):
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
-def test_check_env(dtype):
+def test_gymnasiums_check_env_finds_no_fault(dtype):
     env = TighteningGoal(AcrobotSwingUpEnv(dtype=dtype))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -35,7 +35,7 @@ def test_check_env(dtype):
         check_env(env, skip_render_check=True)
 
 
-def test_tightens_with_the_episode_that_it_is_given():
+def test_the_goal_tolerance_follows_the_schedule_of_the_episode():
     env = TighteningGoal(AcrobotSwingUpEnv())
     schedule = GoalSchedule()
     for episode in (1, 2, 100, 10000, 10001, 3):
@@ -43,7 +43,7 @@ def test_tightens_with_the_episode_that_it_is_given():
         assert env.episode == episode
 
 
-def test_no_reset_without_an_episode_moves_the_task():
+def test_a_reset_without_an_episode_keeps_the_last_one():
     env = TighteningGoal(gym.make(ID))
     assert env.episode == 1
     assert tolerance(env) == GoalSchedule()(1)
@@ -61,7 +61,7 @@ def test_an_episode_that_is_set_holds_from_the_next_reset_on():
     assert [tolerance(env) for _ in range(2)] == [0.5, 0.5]
 
 
-def test_any_function_of_the_episode_is_a_schedule():
+def test_a_schedule_may_be_a_function_or_a_configuration():
     env = TighteningGoal(AcrobotSwingUpEnv(), lambda episode: 0.5**episode)
     assert [tolerance(env, options={"episode": k}) for k in (1, 2, 3)] == [0.5, 0.25, 0.125]
     constant = GoalSchedule(GoalScheduleConfig(kind="constant", constant_value=0.3))
@@ -70,7 +70,7 @@ def test_any_function_of_the_episode_is_a_schedule():
     assert pickle.loads(pickle.dumps(constant))(7) == 0.3
 
 
-def test_other_wrappers_may_lie_between_and_around():
+def test_the_episode_reaches_the_goal_through_other_wrappers():
     env = NoisySensors(TighteningGoal(RedundantSensors(gym.make(ID, config=AcrobotConfig()))))
     assert env.reset(options={"episode": 100})[0].shape == (6,)
     env.set_wrapper_attr("episode", 300)
@@ -78,7 +78,7 @@ def test_other_wrappers_may_lie_between_and_around():
     assert env.get_wrapper_attr("goal_tolerance") == 0.25
 
 
-def test_every_environment_of_a_vector_has_its_own():
+def test_environments_of_a_vector_have_separate_goals():
     envs = gym.make_vec(
         ID,
         num_envs=2,
@@ -94,13 +94,13 @@ def test_every_environment_of_a_vector_has_its_own():
     assert envs.step(still)[4]["goal_tolerance"].tolist() == [0.25, GoalSchedule()(1)]
 
 
-def test_it_is_part_of_the_spec():
+def test_the_wrapper_is_recreated_from_the_spec():
     env = TighteningGoal(gym.make(ID), schedule=lambda episode: 1.0 / episode)
     again = gym.make(env.spec)
     assert tolerance(again, options={"episode": 4}) == 0.25
 
 
-def test_bad_arguments_change_nothing():
+def test_bad_episodes_and_options_are_refused_and_change_nothing():
     env = TighteningGoal(AcrobotSwingUpEnv())
     for bad in (0, -1, 1.5):
         refuses("episode", env.reset, options={"episode": bad})

@@ -21,7 +21,7 @@ class Fixed(gym.Env):
         return self._observation, {}
 
 
-def test_ranges_become_the_unit_interval_and_values_outside_saturate():
+def test_observations_are_scaled_to_the_unit_interval_and_clipped():
     env = UnitSensors(Fixed([-2, 0, -1], [2, 8, 1], [-1, 6, 3]))
     observation, _ = env.reset()
     assert observation.tolist() == [0.25, 0.75, 1.0]
@@ -29,7 +29,7 @@ def test_ranges_become_the_unit_interval_and_values_outside_saturate():
     assert env.observation_space == gym.spaces.Box(0.0, 1.0, (3,), np.float64)
 
 
-def test_given_ranges_come_before_the_bounds_of_the_space():
+def test_observation_low_overrides_the_bounds_of_the_space():
     env = Fixed([-np.inf, 0], [4, 8], [1, 2])
     assert UnitSensors(env, observation_low=[-4, 0]).reset()[0].tolist() == [0.625, 0.25]
 
@@ -49,9 +49,9 @@ def test_unbounded_observations_need_a_range(large):
         ({"observation_high": [0, 8]}, "observation_low"),
     ],
 )
-def test_ranges_that_do_not_fit(arguments, message):
+def test_ranges_of_wrong_length_or_order_are_refused(arguments, message):
     refuses(message, UnitSensors, Fixed([0, 0], [1, 8], [1, 2]), **arguments)
 
 
-def test_other_observations_are_refused():
+def test_discrete_observations_are_refused():
     refuses("Box", UnitSensors, gym.make("FrozenLake-v1"))

@@ -1,4 +1,4 @@
-"""Many acrobots at once: the same as so many single ones."""
+"""Batched acrobots: the bits of single environments."""
 
 import gymnasium as gym
 import numpy as np
@@ -50,7 +50,7 @@ def pair(num_envs, **kwargs):
     ]
 
 
-def test_make_vec_makes_it():
+def test_make_vec_returns_the_batched_environment_with_the_spaces_of_a_sync_vector():
     envs = gym.make_vec(f"sdnn:{ID}", num_envs=5)
     assert isinstance(envs, AcrobotSwingUpVectorEnv)
     assert envs.num_envs == 5
@@ -64,7 +64,7 @@ def test_make_vec_makes_it():
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 @pytest.mark.parametrize("num_envs", [1, 3, 8, 13])
-def test_equals_single_environments(instruction_set, num_envs, dtype):
+def test_a_batch_has_the_bits_of_single_environments(instruction_set, num_envs, dtype):
     envs, sync = pair(num_envs, config=EASY, dtype=dtype)
     random = np.random.default_rng(num_envs)
     assert_same(envs.reset(seed=3), sync.reset(seed=3))
@@ -79,7 +79,7 @@ def test_equals_single_environments(instruction_set, num_envs, dtype):
     assert n_truncated >= num_envs
 
 
-def test_resets_like_single_environments():
+def test_resets_of_a_batch_equal_those_of_a_sync_vector():
     envs, sync = pair(4, config=EASY)
     random = np.random.default_rng(2)
     mask = np.array([True, False, True, False])
@@ -117,7 +117,7 @@ def end_episodes(envs):
     return infos["goal_tolerance"].tolist()
 
 
-def test_a_goal_tolerance_that_is_set_holds_from_each_ones_next_episode_on():
+def test_a_goal_tolerance_holds_from_the_next_episode_of_each_environment():
     envs = AcrobotSwingUpVectorEnv(2, config=AcrobotConfig(max_decisions=2))
     envs.reset()
     envs.goal_tolerance = GoalSchedule()(300)
@@ -128,7 +128,7 @@ def test_a_goal_tolerance_that_is_set_holds_from_each_ones_next_episode_on():
     assert envs.reset()[1]["goal_tolerance"].tolist() == [0.1, 0.2]
 
 
-def test_returned_arrays_belong_to_the_caller():
+def test_modifying_returned_arrays_does_not_change_the_environment():
     envs = AcrobotSwingUpVectorEnv(2)
     first = envs.reset()
     kept = [first[0].copy(), first[1]["state"].copy(), first[1]["goal_tolerance"].copy()]
@@ -140,7 +140,7 @@ def test_returned_arrays_belong_to_the_caller():
     np.testing.assert_array_equal(second[1]["goal_tolerance"], kept[2])
 
 
-def test_bad_actions_name_the_argument_and_move_nothing():
+def test_bad_actions_are_refused_by_index_and_change_nothing():
     envs = AcrobotSwingUpVectorEnv(3)
     with pytest.raises(gym.error.ResetNeeded):
         envs.step(np.zeros((3, 1)))
@@ -158,7 +158,7 @@ def test_bad_actions_name_the_argument_and_move_nothing():
     np.testing.assert_array_equal(observations, np.full((3, 4), 0.5))
 
 
-def test_bad_arguments():
+def test_bad_seeds_tolerances_and_masks_are_refused_by_name():
     envs = AcrobotSwingUpVectorEnv(2)
     refuses("seed", envs.reset, seed=[1, 2, 3])
     for bad in (-0.1, [1.0, np.nan], [1.0] * 3):
@@ -173,7 +173,7 @@ def test_bad_arguments():
         envs.step(np.zeros((2, 1)))
 
 
-def test_works_under_gymnasiums_vector_wrappers():
+def test_gymnasiums_vector_wrappers_record_whole_episodes():
     envs = RecordEpisodeStatistics(gym.make_vec(ID, num_envs=2, config=EASY))
     envs.reset()
     lengths = []
@@ -184,7 +184,7 @@ def test_works_under_gymnasiums_vector_wrappers():
     assert lengths == [12] * 4
 
 
-def test_renders_every_environment(monkeypatch):
+def test_a_batch_renders_every_environment_or_warns_without_a_mode(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     envs, sync = pair(2, render_mode="rgb_array")
     actions = np.array([[1.0], [-0.5]], np.float32)

@@ -1,4 +1,4 @@
-"""The estimators over the core equal the slow transcription, bit for bit."""
+"""The estimators have the bits of their transcription in NumPy."""
 
 import numpy as np
 import pytest
@@ -67,7 +67,7 @@ def agree(model, layer, X):
 
 @settings(max_examples=100, deadline=None)
 @given(problems(), st.integers(1, 2), st.integers(1, 30), st.sampled_from([1.0, 0.5, 0.3]))
-def test_regression(problem, n_outputs, n_output_units, share):
+def test_the_regressor_has_the_bits_of_its_transcription(problem, n_outputs, n_output_units, share):
     X, y, options, orders = problem
     y = np.stack([y, 2 - y * y], axis=1)[:, :n_outputs]
     model, counts = untrained(
@@ -88,7 +88,7 @@ def test_regression(problem, n_outputs, n_output_units, share):
 
 @settings(max_examples=100, deadline=None)
 @given(problems(), st.sampled_from(["one_vs_rest", "one_vs_one"]))
-def test_classification(problem, scheme):
+def test_the_classifier_has_the_bits_of_its_transcription(problem, scheme):
     X, y, options, orders = problem
     model, labels = untrained(SDNNClassifier(scheme=scheme, n_units_per_class=1, **options), X, y)
     layer = transcribed(model)
@@ -103,8 +103,8 @@ def test_classification(problem, scheme):
 
 
 @pytest.mark.parametrize("regression", [True, False])
-def test_fit_draws_seeds_and_then_a_permutation_per_epoch(regression):
-    """A whole fit: seeds of code and weights first, then one permutation per epoch."""
+def test_fit_draws_two_seeds_and_then_a_permutation_per_epoch(regression):
+    # The seeds are those of code and weights.
     random = np.random.RandomState(5)
     X = random.uniform(size=(30, 2))
     y = X[:, 0] if regression else np.digitize(X[:, 0], [0.3, 0.6])

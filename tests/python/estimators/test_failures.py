@@ -1,4 +1,4 @@
-"""Whatever fails or is interrupted leaves an estimator exactly as it was."""
+"""Errors and interruptions leave an estimator unchanged."""
 
 import functools
 import gc
@@ -84,7 +84,7 @@ def state_of(model):
 @pytest.mark.parametrize("training", ["auto", "block"])
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("work", WORKS)
-def test_a_failure_anywhere_leaves_the_old_model(kind, work, training):
+def test_an_error_at_any_call_leaves_the_model_unchanged(kind, work, training):
     model, y = made(kind, training=training)
     model.fit(X[::-1], y[::-1]).learn_one(X[0], y[0])
     before = state_of(model)
@@ -119,7 +119,7 @@ def test_a_failed_first_fit_leaves_an_unfitted_model(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_refused_samples_change_nothing(kind):
+def test_refused_samples_do_not_change_the_model(kind):
     model, y = made(kind)
     model.fit(X, y)
     before = state_of(model)
@@ -164,7 +164,7 @@ MANY = RANDOM.uniform(0, 1, (6000, 4))
 
 @pytest.mark.skipif(os.name == "nt", reason="no SIGINT to oneself")
 @pytest.mark.parametrize("training", ["dual", "block", "plain"])
-def test_ctrl_c_ends_training_and_leaves_the_old_model(training):
+def test_ctrl_c_ends_training_within_a_second_and_keeps_the_model(training):
     options = {"coding": UNIT, "output_range": (-1, 2), "random_state": 0, "training": training}
     model = SDNNRegressor(**options, max_iter=1, n_pattern_units=400).fit(MANY[:50], MANY[:50, 0])
     before = state_of(model.set_params(max_iter=100_000))
@@ -178,7 +178,7 @@ def test_ctrl_c_ends_training_and_leaves_the_old_model(training):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no SIGINT to oneself")
-def test_ctrl_c_ends_prediction():
+def test_ctrl_c_ends_prediction_within_a_second():
     model = SDNNRegressor(UNIT, max_iter=1).fit(MANY[:50], MANY[:50, 0])
     samples = RANDOM.uniform(0, 1, (200_000, 4))
     assert seconds_until_interrupted(lambda: model.predict(samples)) < 1

@@ -1,4 +1,4 @@
-"""A saved estimator comes back with every bit, and nothing but data is read."""
+"""Saved estimators are loaded with every bit; invalid files and settings are refused."""
 
 import numpy as np
 import pandas as pd
@@ -75,7 +75,7 @@ NUMPY = (np.int64(40), np.float32(0.3), np.bool_(True))
         SDNNRegressor(output_range=pd.DataFrame([[-3, 3]]), early_stopping=NUMPY[2], **SMALL),
     ],
 )
-def test_settings_may_be_of_numpy_and_pandas(model, tmp_path):
+def test_settings_of_numpy_and_pandas_types_are_saved(model, tmp_path):
     model.set_params(max_iter=2, n_pattern_units=np.int64(62)).fit(FRAME, LABELS)
     path = tmp_path / "model.safetensors"
     model.save(path)
@@ -121,7 +121,7 @@ def test_a_loaded_estimator_equals_the_saved_estimator(name, tmp_path):
     np.testing.assert_array_equal(same.weights_, model.weights_)
 
 
-def test_the_file_of_another_class_is_refused(tmp_path):
+def test_load_refuses_the_file_of_another_class(tmp_path):
     path = tmp_path / "model.safetensors"
     SDNNClassifier(**SMALL).fit(X, Y > 0).save(path)
     refuses("SDNNClassifier", SDNNRegressor.load, path)
@@ -146,7 +146,7 @@ def nested(depth):
         lambda description, arrays: description["codings"].insert(0, nested(800)),
     ],
 )
-def test_parts_that_do_not_fit_are_found_when_they_are_loaded(change, tmp_path):
+def test_inconsistent_parts_of_a_file_are_refused_as_damage(change, tmp_path):
     path = tmp_path / "model.safetensors"
     SDNNRegressor(**SMALL).fit(X, Y).save(path)
     description, arrays = read_file(path, "estimator")
@@ -155,7 +155,7 @@ def test_parts_that_do_not_fit_are_found_when_they_are_loaded(change, tmp_path):
     refuses("damaged", SDNNRegressor.load, path)
 
 
-def test_codings_of_ones_own_cannot_be_saved(tmp_path):
+def test_custom_codings_cannot_be_saved(tmp_path):
     class Own(RandomInverse):
         """A coding of one's own."""
 

@@ -1,4 +1,4 @@
-"""Which input is coded how, pairs, tables, and inputs that are words."""
+"""Codings of columns, pairs, tables, and columns of words."""
 
 import numpy as np
 import pandas as pd
@@ -23,7 +23,7 @@ CODING = [(Circular(period=24.0), "hour"), ("symbolic", ["color"])]
 SMALL = {"n_pattern_units": 256, "random_state": 0}
 
 
-def test_columns_are_given_as_to_a_column_transformer():
+def test_columns_are_selected_as_in_a_column_transformer():
     names = ["a", "b", "c"]
     for columns, expected in [
         (1, [1]),
@@ -42,13 +42,13 @@ def test_columns_are_given_as_to_a_column_transformer():
     refuses("mask", column_indices, [True], names, 3)
 
 
-def test_inputs_left_out_have_the_usual_coding():
+def test_columns_that_are_not_listed_have_the_default_coding():
     codings = codings_of_columns([("anchor", [1])], None, 3)
     assert [coding.name for coding in codings] == ["random-inverse", "anchor", "random-inverse"]
     refuses("coding", codings_of_columns, [("anchor",)], None, 3)
 
 
-def test_pairs_are_ordered_and_named():
+def test_pairs_are_ordered_and_may_be_names():
     assert input_pairs("all", None, 3) == [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)]
     assert input_pairs("all", None, 1) == [(0, 0)]
     assert input_pairs([("b", "a"), (-1, None)], ["a", "b"], 2) == [(1, 0), (1, 1)]
@@ -56,7 +56,7 @@ def test_pairs_are_ordered_and_named():
 
 
 @pytest.mark.parametrize("tables", ["shared", "separate"])
-def test_mixed_inputs_are_learned(tables):
+def test_circular_symbolic_and_numeric_inputs_are_learned_together(tables):
     model = SDNNRegressor(CODING, tables=tables, max_iter=200, **SMALL)
     model.fit(TABLE, TARGETS)
     assert [coding.name for coding in model.codings_] == ["circular", "symbolic", "random-inverse"]
@@ -71,14 +71,14 @@ WORDS = [("symbolic", [0])]
 
 
 @pytest.mark.parametrize("kind", [SDNNRegressor, SDNNKernelRidge])
-def test_lists_of_words_and_numbers_give_the_bits_of_tables(kind):
+def test_lists_with_words_have_the_bits_of_arrays(kind):
     options = SMALL if kind is SDNNRegressor else {}
     listed = kind(WORDS, **options).fit(LISTED, TARGETS)
     other = kind(WORDS, **options).fit(TABLE[["color", "size"]].to_numpy(), TARGETS)
     np.testing.assert_array_equal(listed.predict(LISTED[:9]), other.predict(LISTED[:9]))
 
 
-def test_numbers_in_lists_with_words_stay_numbers():
+def test_numbers_in_lists_with_words_remain_numbers():
     counts = [[color, size > 5, int(size)] for color, size in LISTED]
     model = SDNNRegressor([("symbolic", [0, 1, 2])], **SMALL).fit(counts, TARGETS)
     assert [coding.categories for coding in model.codings_] == [
@@ -124,7 +124,7 @@ def test_missing_values_and_unknown_categories_can_have_separate_patterns(tmp_pa
         model.partial_fit(holes.assign(size=1e3), TARGETS)
 
 
-def test_words_without_a_coding_are_refused():
+def test_columns_of_words_without_a_coding_are_refused():
     refuses("coding", SDNNRegressor().fit, TABLE, TARGETS)
     coding = [(Circular(period=24.0), "hour"), ("symbolic", ["size"])]
     assert "'color'" in str(refuses("coding", SDNNRegressor(coding).fit, TABLE, TARGETS))
@@ -132,20 +132,20 @@ def test_words_without_a_coding_are_refused():
     assert "coding" not in str(refuses("y", SDNNRegressor().fit, SIZES[:, None], words))
 
 
-def test_likeness_of_categories_generalizes():
-    """A category that was hardly met is answered like the one it is said to be like."""
-    kinds = np.array(["crow"] * 60 + ["cat"] * 60)
+def test_an_unseen_category_is_predicted_like_a_correlated_one():
+    # No raven is among the samples; its pattern is correlated with that of crows.
+    animals = np.array(["crow"] * 60 + ["cat"] * 60)
     light = RANDOM.uniform(0, 1, 120)
-    table = np.array([[kind, x] for kind, x in zip(kinds, light, strict=True)], dtype=object)
+    table = np.array([[animal, x] for animal, x in zip(animals, light, strict=True)], dtype=object)
     likeness = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.9], [0.0, 0.9, 1.0]]
     coding = CorrelationMatrix(matrix=likeness, categories=("cat", "crow", "raven"))
     model = SDNNClassifier([(coding, 0)], n_pattern_units=1000, random_state=0)
-    model.fit(table, kinds == "crow")
+    model.fit(table, animals == "crow")
     ravens = np.array([["raven", x] for x in np.linspace(0, 1, 20)], dtype=object)
     assert model.predict(ravens).all()
 
 
-def test_one_input_alone_has_the_plain_pattern():
+def test_a_single_input_has_its_plain_pattern_as_code():
     x = np.linspace(0, 1, 101)[:, None]
     y = np.sin(7 * x[:, 0])
     coding = RandomInverse(length_scale=0.1)
@@ -156,7 +156,7 @@ def test_one_input_alone_has_the_plain_pattern():
     assert model.score(x[1::2], y[1::2]) > 0.97
 
 
-def test_inputs_in_no_pair_are_ignored():
+def test_inputs_in_no_pair_do_not_change_predictions():
     x = np.random.RandomState(0).uniform(size=(50, 3))
     model = SDNNRegressor(pairs=[(0, 1), (1, None)], max_iter=3, **SMALL).fit(x, x[:, 0])
     other = x.copy()
@@ -165,7 +165,7 @@ def test_inputs_in_no_pair_are_ignored():
     assert model.transform_code(x).shape == (50, 2 * 256)
 
 
-def test_shared_tables_are_permuted_and_separate_ones_are_fresh():
+def test_shared_tables_are_permutations_and_separate_ones_differ():
     codings = [RandomInverse(low=0, high=1).fit(np.array([0.0, 1.0]), 64)] * 3
     pairs = input_pairs("all", None, 3)
     shared = draw_input_code(codings, pairs, 64, "shared", 1)
@@ -182,14 +182,14 @@ def test_shared_tables_are_permuted_and_separate_ones_are_fresh():
     assert len({table.tobytes() for table in tables}) == 12
 
 
-def test_a_symbolic_input_alone_is_a_lookup_table():
+def test_a_single_symbolic_input_learns_a_lookup_table():
     words = np.array([["a"], ["b"], ["c"], ["d"]], dtype=object)
     model = SDNNClassifier("symbolic", n_pattern_units=100, random_state=0).fit(words, [0, 1, 1, 0])
     assert model.predict(words).tolist() == [0, 1, 1, 0]
     assert Symbolic().fit(words[:, 0], 100).size == 4
 
 
-def test_pandas_categories_stand_beside_its_own_numbers():
+def test_pandas_categories_and_nullable_numbers_have_the_bits_of_objects():
     random = np.random.RandomState(4)
     frame = pd.DataFrame(
         {
@@ -231,7 +231,7 @@ def test_dates_are_refused_by_name():
     refuses("1", SDNNRegressor(**SMALL).fit, objects, y)
 
 
-def test_fields_of_codings_in_a_list_are_set_by_number_or_together():
+def test_set_params_reaches_listed_codings_by_number_or_all_at_once():
     model = SDNNRegressor([("anchor", [0]), (WithMissing(base=Circular()), [1]), ("circular", [2])])
     model.set_params(coding__period=24.0, coding__1__base__period=7.0, coding__0__n_interpolated=8)
     first, second, third = (coding for coding, _ in model.coding)
@@ -246,7 +246,7 @@ def test_fields_of_codings_in_a_list_are_set_by_number_or_together():
     refuses("period", SDNNRegressor("anchor").set_params, coding__period=24.0)
 
 
-def test_codings_of_a_list_are_searched():
+def test_grid_search_reaches_fields_of_listed_codings():
     grid = {"coding__1__length_scale": [0.1, 1.0]}
     model = SDNNKernelRidge([("symbolic", ["color"]), ("random-inverse", ["hour", "size"])])
     search = GridSearchCV(model, grid, cv=2).fit(TABLE, TARGETS)
@@ -254,7 +254,7 @@ def test_codings_of_a_list_are_searched():
 
 
 @pytest.mark.parametrize("kind", [SDNNRegressor, SDNNKernelRidge])
-def test_categories_of_a_frame_are_symbols(kind):
+def test_categorical_columns_are_symbols_without_a_coding(kind):
     options = SMALL if kind is SDNNRegressor else {}
     typed = TABLE.astype({"color": "category"})
     given = kind([(WithMissing(base=Symbolic()), ["color"])], **options).fit(TABLE, TARGETS)
@@ -268,7 +268,7 @@ def test_categories_of_a_frame_are_symbols(kind):
     assert np.isfinite(kind(**options).fit(numbers, TARGETS).predict(numbers)).all()
 
 
-def test_categories_of_a_frame_are_kept_in_files_and_selection(tmp_path):
+def test_categorical_columns_survive_selection_of_pairs_and_saving(tmp_path):
     typed = TABLE.astype({"color": "category"})
     model = SDNNRegressor(pairs="auto", **SMALL).fit(typed, TARGETS)
     model.partial_fit(typed, TARGETS)
@@ -279,12 +279,12 @@ def test_categories_of_a_frame_are_kept_in_files_and_selection(tmp_path):
 
 @pytest.mark.parametrize("kind", [SDNNClassifier, SDNNKernelClassifier])
 @pytest.mark.parametrize("labels", [[1, "a"], [None, "a"], [None, 1]])
-def test_labels_of_mixed_types_are_named(kind, labels):
+def test_labels_of_mixed_types_are_refused(kind, labels):
     mixed = np.array(labels * 20, dtype=object)
     refuses("labels", kind().fit, np.arange(40.0)[:, None], mixed)
 
 
-def test_errors_name_the_column():
+def test_errors_of_unsupported_columns_name_them():
     frame = TABLE.assign(when=pd.period_range("2020", periods=len(TABLE), freq="D"))
     refuses("when", SDNNRegressor(**SMALL).fit, frame, TARGETS)
     refuses("color", SDNNRegressor(**SMALL).fit, TABLE, TARGETS)
@@ -292,7 +292,7 @@ def test_errors_name_the_column():
     refuses("column", SDNNRegressor([("symbolic", [1])], **SMALL).fit, mixed, np.arange(18.0))
 
 
-def test_a_coding_that_cannot_be_saved_is_named(tmp_path):
+def test_saving_categories_of_bytes_is_refused_with_the_column(tmp_path):
     table = np.array([[0.0, b"a"], [1.0, b"b"]] * 9, dtype=object)
     model = SDNNRegressor([("symbolic", [1])], **SMALL).fit(table, np.arange(18.0))
     with pytest.raises(TypeError, match="column 1"):

@@ -26,7 +26,7 @@ LABELS = np.array(["low", "middle", "high"])[np.digitize(Y, [0.2, 0.8])]
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("model", [SDNNKernelRidge(), SDNNKernelClassifier()])
-def test_check_estimator_finds_nothing(model):
+def test_scikit_learns_check_estimator_finds_no_fault(model):
     results = check_estimator(model, on_skip=None, on_fail=None)
     other = {r["check_name"]: r["status"] for r in results if r["status"] != "passed"}
     assert set(other) <= {"check_array_api_input"}, other
@@ -51,7 +51,7 @@ def ridge(kernel, y, weights, alpha, of_test):
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])
-def test_it_solves_the_normal_equations(degree):
+def test_predictions_solve_the_weighted_normal_equations(degree):
     weights = RANDOM.uniform(0.2, 3, len(X))
     model = SDNNKernelRidge(alpha=0.3, degree=degree).fit(X, Y, weights)
     fresh = RANDOM.uniform(0, 1, (20, 4)).clip(X.min(axis=0), X.max(axis=0))
@@ -60,7 +60,7 @@ def test_it_solves_the_normal_equations(degree):
     assert (model.alpha_, model.degree_) == (0.3, degree)
 
 
-def test_settings_have_the_smallest_error_of_leaving_each_sample_out():
+def test_alpha_and_degree_minimize_the_leave_one_out_error():
     noisy = Y + np.random.RandomState(1).normal(0, 0.3, len(Y))
 
     def error(degree, alpha):
@@ -80,7 +80,7 @@ def test_settings_have_the_smallest_error_of_leaving_each_sample_out():
 
 
 @pytest.mark.parametrize("kind", [SDNNKernelRidge, SDNNKernelClassifier])
-def test_a_sample_of_weight_two_is_as_two_samples(kind):
+def test_integer_weights_equal_repeated_samples(kind):
     y = Y if kind is SDNNKernelRidge else LABELS
     weights = RANDOM.randint(0, 4, len(X))
     weighted = kind().fit(X, y, weights)
@@ -93,14 +93,14 @@ def test_a_sample_of_weight_two_is_as_two_samples(kind):
 
 
 @pytest.mark.parametrize("kind", [SDNNKernelRidge, SDNNKernelClassifier])
-def test_the_scale_of_weights_does_not_matter(kind):
+def test_the_scale_of_sample_weights_has_no_effect(kind):
     y = Y if kind is SDNNKernelRidge else LABELS
     weights = RANDOM.uniform(0, 1, len(X))
     small, sums_to_one = kind().fit(X, y, weights), kind().fit(X, y, weights / weights.sum())
     np.testing.assert_allclose(small.dual_coef_, sums_to_one.dual_coef_, rtol=1e-6, atol=1e-8)
 
 
-def test_low_rank_is_close_to_exact_and_takes_little_memory():
+def test_low_rank_fits_are_close_to_exact_ones_in_little_memory():
     samples = np.random.RandomState(0).uniform(0, 1, (3000, 2))
     y = np.sin(6 * samples[:, 0]) * samples[:, 1]
     exact = SDNNKernelRidge(max_components=3000, alpha=0.1, degree=2).fit(samples[:1000], y[:1000])
@@ -119,7 +119,7 @@ def test_low_rank_is_close_to_exact_and_takes_little_memory():
 
 
 @pytest.mark.parametrize("max_components", [30, 2000])
-def test_classes_are_learned_with_their_probabilities(max_components):
+def test_classes_are_learned_with_calibrated_probabilities(max_components):
     random = np.random.RandomState(3)
     samples = random.uniform(-1, 1, (900, 3))
     noisy = samples[:, 0] * samples[:, 1] + 0.1 * random.normal(size=900)
@@ -139,7 +139,7 @@ def test_classes_are_learned_with_their_probabilities(max_components):
     np.testing.assert_allclose(three.decision_function(X).sum(axis=1), 1)
 
 
-def test_class_weights_move_the_border():
+def test_class_weights_shift_predictions_towards_rare_classes():
     rare = np.where(np.quantile(Y, 0.9) < Y, "rare", "usual")
     noisy = X + np.random.RandomState(0).normal(0, 0.3, X.shape)
     plain, balanced, none = (
@@ -153,7 +153,7 @@ def test_class_weights_move_the_border():
     refuses("class", SDNNKernelClassifier().fit, X, np.zeros(len(X)))
 
 
-def test_all_pairs_have_the_sum_over_each_pair():
+def test_the_kernel_of_all_pairs_equals_that_of_listed_pairs():
     codings = [RandomInverse().fit(column, N_UNITS) for column in X.T]
     pairs = [(mu, nu) for mu in range(4) for nu in range(4) if mu != nu]
     np.testing.assert_allclose(
@@ -161,7 +161,7 @@ def test_all_pairs_have_the_sum_over_each_pair():
     )
 
 
-def test_noise_is_penalized_where_the_network_learns_it():
+def test_ridge_regression_scores_better_than_the_network_on_noise():
     noisy = Y + np.random.RandomState(1).normal(0, 0.5, len(Y))
     fresh = np.random.RandomState(2).uniform(0, 1, (300, 4))
     true = np.sin(5 * fresh[:, 0]) * fresh[:, 1] + fresh[:, 2]
@@ -170,7 +170,7 @@ def test_noise_is_penalized_where_the_network_learns_it():
     assert ridge > network + 0.05
 
 
-def test_tables_and_searches_are_accepted():
+def test_frames_grid_searches_and_several_outputs_are_accepted():
     frame = pd.DataFrame({"hour": 24 * X[:, 0], "kind": np.where(X[:, 1] > 0.5, "u", "v")})
     model = SDNNKernelRidge([(Circular(period=24.0), ["hour"]), ("symbolic", ["kind"])])
     grid = {"alpha": [0.01, 0.1], "pairs": ["all", [("hour", "kind")]]}
@@ -185,13 +185,13 @@ def test_tables_and_searches_are_accepted():
 
 
 @pytest.mark.parametrize("coding", ["random-inverse", "anchor", RandomInverse(spacing="quantile")])
-def test_a_constant_column_is_taken_as_by_the_network(coding):
+def test_a_constant_column_does_not_prevent_learning(coding):
     constant = np.column_stack([X, np.full(len(X), 7.0)])
     for model in (SDNNKernelRidge(coding), SDNNRegressor(coding, random_state=0)):
         assert model.fit(constant, Y).score(constant, Y) > 0.9
 
 
-def test_learned_codings_are_not_learned_again():
+def test_fitted_codings_are_used_unchanged():
     codings = SDNNRegressor(RandomInverse(spacing="quantile"), random_state=0).fit(X, Y).codings_
     model = SDNNKernelRidge([(coding, [i]) for i, coding in enumerate(codings)])
     assert [c.knots for c in model.fit(X[:50], Y[:50]).kernel_.codings] == [
@@ -235,7 +235,7 @@ def test_targets_whose_squares_overflow_are_refused():
 
 
 @pytest.mark.parametrize("coding", ["random-inverse", "with-missing", "anchor", "circular"])
-def test_time_grows_with_columns_at_most_in_proportion(coding):
+def test_five_hundred_columns_are_fitted_within_two_seconds(coding):
     wide = np.random.RandomState(0).uniform(size=(40, 500))
     begin = time.process_time()
     SDNNKernelRidge(coding).fit(wide, wide[:, 0]).predict(wide)

@@ -1,4 +1,4 @@
-"""Samples of which blocks are shuffled, not single ones."""
+"""Large samples, whose blocks are shuffled."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def few_are_many(monkeypatch):
 
 @pytest.mark.usefixtures("few_are_many")
 @pytest.mark.parametrize("make", [SDNNRegressor, SDNNClassifier])
-def test_forms_and_threads_change_no_bit(make):
+def test_training_forms_and_threads_give_the_same_bits(make):
     y = Y if make is SDNNRegressor else np.median(Y) < Y
     models = [
         make(training=form, n_jobs=n_jobs, **OPTIONS).fit(X, y)
@@ -33,7 +33,7 @@ def test_forms_and_threads_change_no_bit(make):
 
 
 @pytest.mark.usefixtures("few_are_many")
-def test_the_last_epochs_are_averaged_whatever_their_number():
+def test_predictions_average_the_networks_of_the_last_epochs():
     model = SDNNRegressor(**OPTIONS).fit(X, Y)
     for n_epochs, earlier in zip((3, 4, 5), model._earlier, strict=True):
         one = SDNNRegressor(**{**OPTIONS, "max_iter": n_epochs}).fit(X, Y)
@@ -42,21 +42,21 @@ def test_the_last_epochs_are_averaged_whatever_their_number():
 
 
 @pytest.mark.usefixtures("few_are_many")
-def test_sorted_samples_are_mixed():
+def test_samples_sorted_by_target_are_learned():
     order = np.argsort(Y)
     model = SDNNRegressor(**{**OPTIONS, "max_iter": 2}).fit(X[order], Y[order])
     assert model.score(X, Y) > 0.9
 
 
 @pytest.mark.usefixtures("few_are_many")
-def test_weights_and_held_out_samples_are_kept_apart():
+def test_early_stopping_and_sample_weights_work_with_blocks():
     held = SDNNRegressor(early_stopping=True, refit=True, **OPTIONS).fit(X, Y)
     assert held.score(X, Y) > 0.95
     twice = SDNNRegressor(**OPTIONS).fit(X, Y, np.full(len(X), 2.0))  # samples are shuffled
     assert twice.score(X, Y) > 0.95
 
 
-def test_blocks_in_any_order_are_trained_as_single_samples():
+def test_blocks_in_any_order_have_the_bits_of_single_samples():
     code = SDNNRegressor(RandomInverse(low=0, high=1), **{**OPTIONS, "max_iter": 1})
     network = code.fit(X, Y).network_
     bins = network.input_code.bins(X)

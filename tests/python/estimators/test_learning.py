@@ -1,4 +1,4 @@
-"""Learning of the estimators: order, options, forms of training, both schemes, several outputs."""
+"""Learning of the estimators: epochs, options, schemes of classes, outputs, and weights."""
 
 import itertools
 
@@ -31,7 +31,7 @@ def same(one, other):
     np.testing.assert_array_equal(one.thresholds_, other.thresholds_)
 
 
-def test_a_function_is_learned():
+def test_a_smooth_function_is_learned_with_r2_above_097():
     model = SDNNRegressor(UNIT, max_iter=300, random_state=0).fit(X, Y)
     assert model.score(X, Y) > 0.999
     fresh = np.random.RandomState(1).uniform(0.05, 0.95, (500, 2))
@@ -39,7 +39,7 @@ def test_a_function_is_learned():
 
 
 @pytest.mark.parametrize("scheme", ["one_vs_rest", "one_vs_one"])
-def test_classes_are_learned(scheme):
+def test_iris_is_learned_without_training_errors(scheme):
     points, labels = load_iris(return_X_y=True)
     model = SDNNClassifier(scheme=scheme, n_pattern_units=256, max_iter=100, random_state=0)
     model.fit(points[::2], labels[::2])
@@ -51,7 +51,7 @@ def test_classes_are_learned(scheme):
 
 @settings(max_examples=20, deadline=None)
 @given(st.lists(st.integers(1, 20), min_size=1, max_size=6), st.booleans())
-def test_partial_fit_in_any_portions_is_one_pass_of_fit(portions, regression):
+def test_partial_fit_in_any_portions_equals_one_epoch_of_fit(portions, regression):
     n = sum(portions)
     bounds = np.cumsum([0, *portions])
     if regression:
@@ -73,7 +73,7 @@ def test_partial_fit_in_any_portions_is_one_pass_of_fit(portions, regression):
     assert parts.n_iter_ == len(portions)
 
 
-def test_epochs_are_passes_of_partial_fit():
+def test_epochs_of_fit_equal_passes_of_partial_fit():
     fitted = SDNNRegressor(**REGRESSOR, max_iter=4, shuffle=False).fit(X, Y)
     online = SDNNRegressor(**REGRESSOR)
     for _ in range(4):
@@ -88,7 +88,7 @@ def test_epochs_are_passes_of_partial_fit():
     ("kind", "options", "targets"),
     [(SDNNRegressor, REGRESSOR, Y), (SDNNClassifier, {**GIVEN, "n_units_per_class": 8}, LABELS)],
 )
-def test_a_warm_start_continues_where_fit_ended(kind, options, targets):
+def test_a_warm_start_of_3_after_2_epochs_equals_5_epochs(kind, options, targets):
     model = kind(**options, shuffle=False, warm_start=True, max_iter=2).fit(X, targets)
     first, weights = model.network_, model.weights_
     assert model.set_params(max_iter=3).fit(X, targets).n_iter_ == 3
@@ -100,7 +100,7 @@ def test_a_warm_start_continues_where_fit_ended(kind, options, targets):
     np.testing.assert_array_equal(model.weights_, now)
 
 
-def test_a_warm_start_keeps_features_outputs_and_classes():
+def test_a_warm_start_refuses_other_features_outputs_and_classes():
     model = SDNNRegressor(**REGRESSOR, warm_start=True).fit(X, Y)
     refuses("features", model.fit, X[:, :1], Y)
     refuses("outputs", model.fit, X, np.column_stack([Y, Y]))
@@ -109,13 +109,13 @@ def test_a_warm_start_keeps_features_outputs_and_classes():
     refuses("classes", labels.fit, X[:, :1], np.full(len(X), 5))
 
 
-def test_several_labels_a_sample_are_learned_by_a_classifier_each():
+def test_multi_output_classification_is_learned():
     both = np.column_stack([LABELS, (X[:, 0] > 0.5).astype(int)])
     model = MultiOutputClassifier(SDNNClassifier(**GIVEN, max_iter=50)).fit(X, both)
     assert (model.predict(X) == both).mean() > 0.95
 
 
-def test_partial_fit_needs_ranges_for_a_single_sample_and_known_labels():
+def test_partial_fit_refuses_unknown_ranges_classes_and_outputs():
     refuses("minimum", SDNNRegressor(coding=UNIT).partial_fit, X[:1], Y[:1])
     model = SDNNClassifier(**GIVEN)
     refuses("classes", model.partial_fit, X, LABELS)
@@ -130,7 +130,7 @@ def test_partial_fit_needs_ranges_for_a_single_sample_and_known_labels():
     refuses("outputs", regressor.partial_fit, X, np.stack([Y, Y], axis=1))
 
 
-def test_one_sample_is_enough_where_every_column_is_given():
+def test_one_sample_can_be_learned_if_all_ranges_are_fixed():
     listed = [(UNIT, 0), (Circular(period=1.0), [1])]
     model = SDNNRegressor(coding=listed, output_range=(-3, 3), n_pattern_units=64)
     model.partial_fit(X[:1], Y[:1])
@@ -141,7 +141,7 @@ def test_one_sample_is_enough_where_every_column_is_given():
     refuses("output_range", model.fit, X[:1], Y[:1])
 
 
-def test_several_outputs_are_networks_side_by_side():
+def test_several_outputs_are_learned_independently():
     targets = np.stack([Y, 3 - 2 * X[:, 0]], axis=1)
     model = SDNNRegressor(UNIT, n_pattern_units=256, max_iter=100, random_state=0)
     model.fit(X, targets)
@@ -154,7 +154,7 @@ def test_several_outputs_are_networks_side_by_side():
     same(column, SDNNRegressor(**REGRESSOR, max_iter=2).fit(X, Y))
 
 
-def test_outputs_are_steps_within_the_range():
+def test_predictions_are_multiples_of_a_step_within_the_output_range():
     model = SDNNRegressor(**REGRESSOR, max_iter=20, n_averaged_epochs=1).fit(X, Y)
     counts = (model.predict(X) + 1.5) / (3 / 60)
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
@@ -165,7 +165,7 @@ def test_outputs_are_steps_within_the_range():
 
 
 @pytest.mark.parametrize("kind", [SDNNRegressor, SDNNClassifier])
-def test_early_stopping_keeps_the_best_weights(kind):
+def test_early_stopping_restores_the_weights_of_the_best_epoch(kind):
     targets = Y + RANDOM.normal(0, 0.3, len(Y)) if kind is SDNNRegressor else LABELS
     options = {"coding": UNIT, "n_pattern_units": 128, "random_state": 1, "shuffle": False}
     model = kind(**options, early_stopping=True, n_iter_no_change=4, max_iter=60)
@@ -181,7 +181,7 @@ def test_early_stopping_keeps_the_best_weights(kind):
     ("scheme", "n_units_each"), [("one_vs_rest", 1), ("one_vs_rest", 20), ("one_vs_one", 1)]
 )
 @pytest.mark.parametrize("n_classes", [2, 4])
-def test_the_largest_decision_wins(scheme, n_units_each, n_classes):
+def test_the_predicted_class_has_the_largest_decision(scheme, n_units_each, n_classes):
     labels = np.digitize(Y, np.quantile(Y, np.arange(1, n_classes) / n_classes))
     options = {**GIVEN, "scheme": scheme, "n_units_per_class": n_units_each, "max_iter": 1}
     model = SDNNClassifier(**options).fit(X, labels)
@@ -196,7 +196,7 @@ def test_the_largest_decision_wins(scheme, n_units_each, n_classes):
     assert len(model.thresholds_) == n_units * n_units_each
 
 
-def test_one_versus_one_counts_votes():
+def test_one_versus_one_decisions_are_rounded_votes():
     labels = np.digitize(Y, [-0.3, 0.1, 0.3])
     model = SDNNClassifier(**GIVEN, scheme="one_vs_one", max_iter=1).fit(X, labels)
     potentials = model.network_.potentials(model.network_.input_code.bins(X), 1)
@@ -209,7 +209,7 @@ def test_one_versus_one_counts_votes():
 
 
 @pytest.mark.parametrize("random_state", [0, 1, 2])
-def test_several_units_learn_the_parity_of_three_inputs(random_state):
+def test_many_units_per_class_learn_a_parity_that_one_unit_cannot(random_state):
     points = np.random.RandomState(0).uniform(size=(2000, 3))
     parity = (points > 0.5).sum(axis=1) % 2
     options = {"random_state": random_state, "n_pattern_units": 1000}
@@ -219,7 +219,7 @@ def test_several_units_learn_the_parity_of_three_inputs(random_state):
     assert single.fit(points[:1000], parity[:1000]).score(points[1000:], parity[1000:]) < 0.6
 
 
-def test_scores_are_shares_of_firing_units():
+def test_decisions_are_shares_of_active_units_and_probabilities_their_softmax():
     options = {**GIVEN, "n_units_per_class": 12, "n_averaged_epochs": 1}
     model = SDNNClassifier(**options).fit(X, LABELS)
     firing = model.network_.potentials(model.network_.input_code.bins(X), 1) > 0
@@ -232,7 +232,7 @@ def test_scores_are_shares_of_firing_units():
     np.testing.assert_array_equal(model.predict(X), model.predict_proba(X).argmax(axis=1))
 
 
-def test_the_number_of_units_is_shared_out():
+def test_the_default_number_of_units_per_class_falls_with_the_classes():
     assert len(SDNNClassifier(**GIVEN).fit(X, LABELS).thresholds_) == 3 * 60
     many = np.arange(len(X)) % 75
     assert len(SDNNClassifier(**GIVEN, max_iter=1).fit(X, many).thresholds_) == 75 * 16
@@ -243,11 +243,11 @@ def test_the_number_of_units_is_shared_out():
     refuses("one_vs_one", SDNNClassifier(scheme="one_vs_one", n_units_per_class=5).fit, X, LABELS)
 
 
-def test_weights_of_classes_are_numbers_of_presentations():
+def test_class_weights_are_numbers_of_presentations():
     rare = (Y > 0.6).astype(int)
     assert 0 < rare.sum() < 20
     options = {**GIVEN, "shuffle": False, "max_iter": 4}
-    weighted = SDNNClassifier(**options, class_weight={0: 1, 1: 3}).fit(X, rare)
+    weighted = SDNNClassifier(**options, class_weight={0: 1, 1: 3}).fit(X, rare)  # 1 or 3 times
     by_hand = SDNNClassifier(**options)
     by_hand.partial_fit(np.repeat(X, 1 + 2 * rare, axis=0), np.repeat(rare, 1 + 2 * rare), [0, 1])
     for _ in range(weighted.n_iter_ - 1):
@@ -267,7 +267,7 @@ def test_weights_of_classes_are_numbers_of_presentations():
 
 
 @pytest.mark.parametrize("make", [SDNNRegressor, SDNNClassifier])
-def test_weights_of_samples_are_numbers_of_presentations(make):
+def test_integer_sample_weights_equal_repeated_samples(make):
     times = np.arange(len(Y)) % 3
     targets = Y if make is SDNNRegressor else LABELS
     plain = make(**GIVEN, max_iter=3).fit(X, targets)
@@ -280,7 +280,7 @@ def test_weights_of_samples_are_numbers_of_presentations(make):
 
 
 @pytest.mark.parametrize("make", [SDNNRegressor, SDNNClassifier])
-def test_weights_that_sum_to_one_train_as_those_with_a_mean_of_one(make):
+def test_sample_weights_are_scaled_to_a_mean_of_one(make):
     targets = Y if make is SDNNRegressor else LABELS
     weights = RANDOM.uniform(0.5, 1.5, len(Y))
     one = make(**GIVEN, max_iter=3).fit(X, targets, weights / weights.sum())
@@ -289,14 +289,14 @@ def test_weights_that_sum_to_one_train_as_those_with_a_mean_of_one(make):
     assert boosted.fit(X, Y > 0).score(X, Y > 0) > 0.9
 
 
-def test_weights_of_samples_and_classes_are_multiplied():
+def test_sample_and_class_weights_are_multiplied():
     options = {**GIVEN, "max_iter": 4}
     labels = (Y > 0).astype(int)
     both = SDNNClassifier(**options, class_weight={0: 2, 1: 1}).fit(X, labels, np.full(len(Y), 0.5))
     same(both, SDNNClassifier(**options).fit(X, labels, np.where(labels == 0, 1.0, 0.5)))
 
 
-def test_sample_weights_count_in_validation_refitting_and_selection():
+def test_sample_weights_apply_to_early_stopping_and_selection_of_pairs():
     weights = np.where(X[:, 0] > 0.5, 1.0, 1e-3)
     wrong = np.where(X[:, 0] > 0.5, Y, 5.0)
     options = {**GIVEN, "early_stopping": True, "max_iter": 20, "n_iter_no_change": 20}
@@ -315,17 +315,17 @@ def test_sample_weights_count_in_validation_refitting_and_selection():
         np.full(len(Y), 1e7), np.zeros(len(Y)), "heavy",
     ],
 )  # fmt: skip
-def test_weights_that_mean_nothing_are_refused(make, bad):
+def test_invalid_sample_weights_are_refused(make, bad):
     model = make(**GIVEN)
     refuses("sample_weight", model.fit, X, Y if make is SDNNRegressor else LABELS, bad)
     assert not hasattr(model, "network_")
 
 
-def test_an_epoch_has_a_largest_size():
+def test_sample_weights_with_too_many_presentations_are_refused():
     refuses("sample_weight", sample_weights, np.full(1000, 1e6), 1000)
 
 
-def test_training_ends_when_all_weighted_samples_are_learned():
+def test_training_with_fractional_weights_ends_after_epochs_without_corrections():
     easy = (X[:, 0] > 0.5).astype(int)
     model = SDNNClassifier(**GIVEN, n_units_per_class=1, class_weight={0: 0.25, 1: 1}).fit(X, easy)
     assert model.n_iter_ < 100
@@ -333,7 +333,7 @@ def test_training_ends_when_all_weighted_samples_are_learned():
     assert model.score(X, easy) == 1
 
 
-def test_answers_of_the_last_epochs_are_averaged(tmp_path):
+def test_predictions_average_the_networks_of_three_epochs(tmp_path):
     noisy = Y + np.random.RandomState(1).normal(0, 0.5, len(Y))
     options = {**REGRESSOR, "shuffle": False, "output_range": (-3, 3)}
     model = SDNNRegressor(**options, max_iter=11, n_averaged_epochs=3).fit(X, noisy)
@@ -355,7 +355,7 @@ def test_answers_of_the_last_epochs_are_averaged(tmp_path):
     same(plain.learn_one(X[0], Y[0]), model)
 
 
-def test_networks_that_are_averaged_count_in_memory():
+def test_averaged_networks_count_towards_the_memory_limit():
     plain = {**REGRESSOR, "output_range": (-3, 3)}
     model = SDNNRegressor(**plain, max_iter=2).fit(X, Y)
     weights = 4 * model.weights_.size
@@ -378,7 +378,7 @@ def test_networks_that_are_averaged_count_in_memory():
         model.fit(X, Y)
 
 
-def test_averaging_helps_on_noisy_targets():
+def test_averaging_epochs_improves_the_score_on_noisy_targets():
     random = np.random.RandomState(3)
     points = random.uniform(size=(300, 2))
     noisy = np.sin(5 * points[:, 0]) * points[:, 1] + random.normal(0, 0.5, 300)
@@ -400,7 +400,7 @@ def test_early_stopping_keeps_the_averages_of_its_best_epochs():
     np.testing.assert_array_equal(model.predict(X), again.predict(X))
 
 
-def test_refitting_trains_on_everything_for_the_best_number_of_epochs():
+def test_refit_trains_on_all_samples_for_the_best_number_of_epochs():
     noisy = Y + np.random.RandomState(1).normal(0, 0.3, len(Y))
     options = {**GIVEN, "output_range": (-2, 2), "shuffle": False}
     model = SDNNRegressor(**options, early_stopping=True, refit=True, max_iter=60).fit(X, noisy)

@@ -1,4 +1,4 @@
-"""Samples one at a time: the bits of partial_fit, ranges that are too narrow, river's interface."""
+"""Online learning: single samples, ranges that are too narrow, and the interface of river."""
 
 import copy
 import pickle
@@ -46,7 +46,7 @@ def same(one, other):
 
 
 @pytest.mark.parametrize("named", [False, True])
-def test_one_at_a_time_has_the_bits_of_partial_fit(named):
+def test_learn_one_and_predict_one_have_the_bits_of_partial_fit_and_predict(named):
     one, other = regressor(), regressor(training="plain")
     for row, x, y in zip(ROWS, X, Y, strict=True):
         one.learn_one(row if named else x, y)
@@ -62,9 +62,11 @@ PREDICTING = [regressor, classifier, lambda: classifier(scheme="one_vs_one")]
 
 
 @pytest.mark.parametrize("kind", PREDICTING, ids=["regressor", "classifier", "one_vs_one"])
-def test_few_rows_have_the_bits_of_many(kind):
+def test_predictions_do_not_depend_on_the_number_of_rows(kind):
     model = kind().fit(X, LABELS // 2)
     expected = model.predict(X)
+    # Repeated single rows change to weights in bytes; more rows than a limit, or than a block of
+    # 64, are predicted in other ways.
     for n_rows in (1, 1, 1, 2, 9, 1, FEW_TO_PREDICT, FEW_TO_PREDICT + 1, 64, 65):
         np.testing.assert_array_equal(model.predict(X[:n_rows]), expected[:n_rows])
     assert len(model._networks_for(1)) > 1
@@ -72,7 +74,7 @@ def test_few_rows_have_the_bits_of_many(kind):
 
 
 @pytest.mark.parametrize("scheme", ["one_vs_rest", "one_vs_one"])
-def test_labels_one_at_a_time_have_the_bits_of_partial_fit(scheme):
+def test_learn_one_of_labels_has_the_bits_of_partial_fit(scheme):
     one, other = classifier(scheme=scheme), classifier(scheme=scheme, training="block")
     for x, label in zip(X, LABELS, strict=True):
         one.learn_one(x, label, classes=[0, 1, 2])
@@ -81,7 +83,7 @@ def test_labels_one_at_a_time_have_the_bits_of_partial_fit(scheme):
     assert [one.predict_one(x) for x in X] == one.predict(X).tolist()
 
 
-def test_fit_widens_a_range_at_once_and_partial_fit_as_targets_come():
+def test_fit_widens_the_output_range_before_training_and_partial_fit_during_it():
     options = {"max_iter": 1, "shuffle": False, "out_of_range": "widen"}
     within, beyond = Y.copy(), np.where(np.arange(len(Y)) == 99, 4.0, Y)
     same(regressor(**options).fit(X, within), regressor(**options).partial_fit(X, within))
@@ -93,7 +95,7 @@ def test_fit_widens_a_range_at_once_and_partial_fit_as_targets_come():
     assert not np.array_equal(one.weights_, other.weights_)
 
 
-def test_forms_may_take_turns():
+def test_portions_of_any_size_have_the_bits_of_plain_training():
     one, other = regressor(), regressor(training="plain")
     portions = [1, FEW_SAMPLES + 5, 3, 1, FEW_SAMPLES, 40]
     begin = 0
@@ -109,7 +111,7 @@ def test_forms_may_take_turns():
 
 @pytest.mark.parametrize("learns", [False, True])
 @pytest.mark.parametrize("kind", [regressor, classifier])
-def test_threads_may_predict_at_once(kind, learns):
+def test_concurrent_predictions_equal_sequential_ones(kind, learns):
     model = kind(n_pattern_units=200).fit(X, LABELS // 2)
     if learns:
         model.learn_one(X[0], 1)
@@ -139,7 +141,7 @@ def test_features_that_may_be_missing_may_be_left_out():
         refuses("word", model.predict_one, bad)
 
 
-def test_copies_learn_apart():
+def test_learning_does_not_change_a_copy():
     model = regressor().learn_one(X[0], Y[0])
     other = copy.deepcopy(model)
     before = other.weights_
@@ -148,7 +150,7 @@ def test_copies_learn_apart():
     np.testing.assert_array_equal(other.weights_, before)
 
 
-def test_inputs_of_all_codings_are_coded_alike():
+def test_learn_one_and_predict_one_code_inputs_like_fit_and_predict():
     model = regressor(coding=MIXED).fit(X, Y)
     assert [model.predict_one(x) for x in X] == model.predict(X).tolist()
     words = [(UNIT, [0, 1]), ("symbolic", [2])]
@@ -160,7 +162,7 @@ def test_inputs_of_all_codings_are_coded_alike():
     refuses("categories", model.predict_one, [0.1, 0.2, "w"])
 
 
-def test_several_outputs_one_at_a_time():
+def test_learn_one_and_predict_one_accept_several_outputs():
     targets = np.stack([Y, -Y], axis=1)
     model = regressor().fit(X, targets)
     model.learn_one(X[0], targets[0])
@@ -168,7 +170,7 @@ def test_several_outputs_one_at_a_time():
     refuses("outputs", model.learn_one, X[0], 0.5)
 
 
-def test_large_weights_are_learned_too():
+def test_weights_beyond_16_bits_are_learned_online():
     model = regressor().fit(X, Y)
     network = model.network_ = Network(
         model.network_.input_code,
@@ -192,7 +194,7 @@ def test_large_weights_are_learned_too():
         X[:1],
     ],
 )
-def test_bad_rows_are_named(bad):
+def test_bad_rows_are_refused_by_name(bad):
     model = regressor().learn_one(ROWS[0], Y[0])
     refuses("x", model.learn_one, bad, 0.1)
     refuses("x", model.predict_one, bad)
@@ -214,14 +216,14 @@ def test_values_outside_a_range_are_counted_and_warned_about_once():
 
 
 @pytest.mark.parametrize("kind", [regressor, classifier])
-def test_values_beyond_a_range_may_be_errors(kind):
+def test_with_out_of_range_error_values_outside_are_refused(kind):
     model = kind(out_of_range="error").fit(X, LABELS // 2)
     refuses("column", model.learn_one, [0.5, 3.5, 0.5, 0.5], 1)
     if kind is regressor:
         refuses("output_range_", model.learn_one, X[0], 3.5)
 
 
-def test_a_range_that_widens_follows_a_drift():
+def test_with_out_of_range_widen_predictions_follow_a_drift():
     options = {"coding": UNIT, "random_state": 0, "n_pattern_units": 100}
     clipping = SDNNRegressor(**options).fit(X, Y)
     widening = SDNNRegressor(out_of_range="widen", **options).fit(X, Y)
@@ -252,7 +254,7 @@ def test_fit_counts_and_warns_about_values_that_widen_a_range():
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_a_range_widens_alike_in_any_portions():
+def test_an_output_range_widens_equally_in_any_portions():
     drifting = Y + np.linspace(0, 9, len(Y))
     whole, parts, single = (regressor(out_of_range="widen") for _ in range(3))
     whole.partial_fit(X, drifting)
@@ -273,7 +275,7 @@ def river():
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_river_streams_are_learned(river):
+def test_river_estimators_learn_streams_and_refuse_other_models(river):
     model = river.RiverRegressor(SDNNRegressor(**OPTIONS, out_of_range="widen"), grace_period=50)
     assert model.predict_one(ROWS[0]) == 0.0
     errors = []
@@ -299,7 +301,7 @@ def test_river_streams_are_learned(river):
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_names_of_river_streams_may_be_numbers(river):
+def test_river_features_may_be_named_by_numbers(river):
     model = river.RiverRegressor(SDNNRegressor(**OPTIONS), grace_period=20)
     for x, y in zip(X[:40], Y[:40], strict=True):
         model.learn_one(dict(enumerate(x)), y)
@@ -320,7 +322,7 @@ def river_models(river, **options):
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 @pytest.mark.parametrize("n_before", [0, 19, 40])
 @pytest.mark.parametrize("number", [0, 1])
-def test_a_sample_that_cannot_be_learned_is_refused_alone(river, number, n_before):
+def test_river_estimators_refuse_a_bad_sample_and_keep_learning(river, number, n_before):
     model, other = (river_models(river, grace_period=20)[number] for _ in range(2))
     targets = [Y.tolist(), LABELS.tolist()][number]
     for row, target in zip(ROWS[:n_before], targets, strict=False):
@@ -338,7 +340,7 @@ def test_a_sample_that_cannot_be_learned_is_refused_alone(river, number, n_befor
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("number", [0, 1])
-def test_rivers_checks_of_estimators_pass(river, number):
+def test_rivers_estimator_checks_pass(river, number):
     model = river_models(river)[number]
     for check in pytest.importorskip("river.checks").yield_checks(model):
         check(model.clone())
@@ -357,7 +359,7 @@ def late_stream(n_samples):
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 @pytest.mark.parametrize("n_pattern_units", [40, None, 2000])  # the last begins anew
-def test_features_and_categories_of_river_streams_may_come_late(river, n_pattern_units):
+def test_river_features_and_categories_may_appear_late(river, n_pattern_units):
     model, other = (river_models(river)[0] for _ in range(2))
     errors = []
     for one in (model, other):
@@ -376,7 +378,7 @@ def test_features_and_categories_of_river_streams_may_come_late(river, n_pattern
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_growing_changes_no_prediction_and_survives_files(river, tmp_path):
+def test_adding_inputs_keeps_predictions_and_can_be_saved(river, tmp_path):
     from sdnn.estimators.growth import grow
 
     model = river_models(river)[0]
@@ -396,7 +398,7 @@ def test_growing_changes_no_prediction_and_survives_files(river, tmp_path):
     same(SDNNRegressor.load(tmp_path / "grown.safetensors"), model.fitted)
 
 
-def test_labels_of_equal_number_are_predicted_in_their_order(river):
+def test_before_fitting_the_first_of_equally_frequent_labels_is_predicted(river):
     model = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
     for row, label in zip(ROWS, ["red", "green", "blue", "blue", "green", "red"], strict=False):
         model.learn_one(row, label)
@@ -404,7 +406,7 @@ def test_labels_of_equal_number_are_predicted_in_their_order(river):
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_ranges_of_a_river_stream_are_followed(river):
+def test_follows_ranges_halves_the_error_on_drifting_features(river):
     random = np.random.RandomState(0)
     errors = {}
     for follows in (True, False):
@@ -420,7 +422,7 @@ def test_ranges_of_a_river_stream_are_followed(river):
     assert np.mean(errors[True][-500:]) < 0.5 * np.mean(errors[False][-500:])
 
 
-def test_classes_of_a_river_stream_may_come_late(river):
+def test_river_classes_may_appear_late(river):
     model = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=20)
     names = np.array(["middle", "low", "high"])[LABELS]
     order = np.argsort(LABELS == 2, kind="stable")  # class "high" comes last
@@ -450,7 +452,7 @@ def test_classes_of_a_river_stream_may_come_late(river):
 
 
 @pytest.mark.parametrize("n_classes", [2, 3])
-def test_probabilities_of_one_have_the_bits_of_those_of_many(n_classes):
+def test_predict_proba_one_has_the_bits_of_predict_proba(n_classes):
     model = classifier().fit(X, np.minimum(LABELS, n_classes - 1))
     each = [model.predict_proba_one(row) for row in X[:50]]
     np.testing.assert_array_equal(each, model.predict_proba(X[:50]))
@@ -459,7 +461,7 @@ def test_probabilities_of_one_have_the_bits_of_those_of_many(n_classes):
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_river_measures_and_wraps_classifiers_with_probabilities(river):
+def test_river_metrics_and_ensembles_accept_the_classifier(river):
     from river import ensemble, evaluate, metrics, multiclass
 
     model = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
@@ -486,7 +488,7 @@ def test_river_measures_and_wraps_classifiers_with_probabilities(river):
 
 
 @pytest.mark.parametrize("size", [1, 7, 200])
-def test_weights_are_numbers_of_presentations_in_any_portions(size):
+def test_fractional_sample_weights_are_presentations_in_any_portions(size):
     weights = np.tile([2.0, 0.5, 1.0, 0.25], 50)
     model, times = regressor(), presented(200, weights, 0)
     for begin in range(0, 200, size):

@@ -56,7 +56,7 @@ def fit(model, X, y):
 
 
 @pytest.mark.parametrize("seed", range(100))
-def test_an_outlier_is_warned_of_or_costs_little(seed):
+def test_an_outlier_causes_a_warning_or_a_loss_below_002(seed):
     random = np.random.RandomState(seed)
     (X, y), (X_test, y_test) = problem(random), problem(np.random.RandomState(seed), 400)
     make = network if seed % 2 else SDNNKernelRidge
@@ -71,7 +71,7 @@ def test_an_outlier_is_warned_of_or_costs_little(seed):
 
 
 @pytest.mark.parametrize("seed", range(100))
-def test_clean_data_cause_no_warning(seed):
+def test_samples_of_usual_distributions_cause_no_warning(seed):
     random = np.random.RandomState(seed)
     X = np.stack([make(random) for make in CLEAN], axis=1)[:, random.permutation(len(CLEAN))[:4]]
     y = CLEAN[seed % len(CLEAN)](random)
@@ -85,7 +85,7 @@ def test_clean_data_cause_no_warning(seed):
         assert fit(model, np.vstack([X[1:], X[:1] + 1e4]), labels)[1]
 
 
-def test_a_robust_range_is_that_of_all_without_outliers():
+def test_robust_ranges_of_clean_samples_equal_full_ranges():
     random = np.random.RandomState(0)
     X, y = problem(random)
     for make in (network, SDNNKernelRidge):
@@ -93,7 +93,7 @@ def test_a_robust_range_is_that_of_all_without_outliers():
         np.testing.assert_array_equal(plain.predict(X), robust.predict(X))
 
 
-def test_few_values_far_from_all_others_are_outliers():
+def test_usual_range_excludes_few_distant_values():
     usual = np.arange(100.0)
     assert usual_range(np.append(usual, [1e6, 2e6, -1e9])) == (0, 99)
     assert usual_range(np.append(np.zeros(100), [1.0, 1.0, 1e6])) == (0, 1)
@@ -115,13 +115,13 @@ def test_few_values_far_from_all_others_are_outliers():
         (Symbolic(), False),
     ],
 )
-def test_codings_warn_that_learn_a_range_of_equal_bins(coding, warns):
+def test_only_codings_that_fit_evenly_spaced_bins_warn_of_outliers(coding, warns):
     X = np.arange(100.0)[:, None] / 100
     X[7] = 1e6
     assert fit(network(coding=coding), X, np.arange(100.0))[1] == warns
 
 
-def test_the_first_samples_of_a_stream_are_checked_too():
+def test_partial_fit_warns_of_outliers_in_its_first_samples():
     X, y = problem(np.random.RandomState(0))
     y[3] = 1e6
     with pytest.warns(OutlierWarning, match="ranges='all'") as caught:
@@ -130,7 +130,7 @@ def test_the_first_samples_of_a_stream_are_checked_too():
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_a_range_recovers_from_an_outlier():
+def test_a_widened_output_range_ignores_one_outlier_but_follows_many():
     X, y = problem(np.random.RandomState(0), 1000)
     model = network(out_of_range="widen").partial_fit(X[:100], y[:100])
     width = np.ptp(model.output_range_)

@@ -14,7 +14,7 @@ XOR = ((X[:, 2] > 0.5) ^ (X[:, 5] > 0.5)).astype(int)
 OPTIONS = {"n_pattern_units": 60, "random_state": 0, "max_iter": 10}
 
 
-def test_the_pair_that_matters_is_selected():
+def test_the_only_relevant_pair_is_selected():
     options = {**OPTIONS, "n_units_per_class": 10}
     every = SDNNClassifier(**options).fit(X[:300], XOR[:300])
     auto = SDNNClassifier(**options, pairs="auto").fit(X[:300], XOR[:300])
@@ -24,7 +24,7 @@ def test_the_pair_that_matters_is_selected():
     np.testing.assert_array_equal(auto.weights_, given.weights_)
 
 
-def test_useless_features_are_left_out():
+def test_irrelevant_features_are_left_out():
     random = np.random.RandomState(1)
     wide = random.uniform(size=(500, 40))
     y = 10 * np.sin(np.pi * wide[:, 3] * wide[:, 17]) + 5 * wide[:, 30]
@@ -36,7 +36,7 @@ def test_useless_features_are_left_out():
     assert model.score(wide[300:], y[300:]) > budget.score(wide[300:], y[300:]) + 0.1
 
 
-def test_all_pairs_stay_where_all_matter():
+def test_all_pairs_are_kept_if_all_are_relevant():
     points = X[:300, :4]
     y = sum(np.sin(4 * points[:, i]) * points[:, j] for i, j in itertools.permutations(range(4), 2))
     options = {**OPTIONS, "n_output_units": 100}
@@ -46,7 +46,7 @@ def test_all_pairs_stay_where_all_matter():
 
 
 @pytest.mark.parametrize("kind", [SDNNRegressor, SDNNClassifier])
-def test_few_samples_and_single_features_select_nothing(kind):
+def test_few_samples_and_single_features_keep_all_pairs(kind):
     assert len(kind(**OPTIONS, pairs="auto").fit(X[:8], XOR[:8]).pairs_) == 56
     assert kind(**OPTIONS, pairs="auto").fit(X[:, :1], XOR).pairs_ == ((0, 0),)
 
@@ -63,7 +63,7 @@ CATEGORIES = {
 
 
 @pytest.mark.parametrize("name", CATEGORIES)
-def test_a_category_may_occur_once(name):
+def test_pairs_can_be_selected_with_a_category_that_occurs_once(name):
     frame = pd.DataFrame({"a": X[:, 0], "letter": LETTERS, "b": X[:, 5], "c": X[:, 6]})[:100]
     codings = [(CATEGORIES[name], ["letter"]), ("anchor", ["c"])]
     model = SDNNRegressor(codings, pairs="auto", **OPTIONS).fit(frame, X[:100, 2] + X[:100, 5])
@@ -75,7 +75,7 @@ def test_a_category_may_occur_once(name):
 
 
 @pytest.mark.parametrize("n_rare", [1, 3])
-def test_a_class_may_occur_once(n_rare):
+def test_pairs_can_be_selected_with_a_class_that_occurs_once(n_rare):
     labels = np.repeat([0, 1], [40 - n_rare, n_rare])
     model = SDNNClassifier(**OPTIONS, n_units_per_class=4, pairs="auto").fit(X[:40, :3], labels)
     assert set(model.pairs_) <= {(0, 1), (1, 0), (0, 2), (2, 0), (1, 2), (2, 1)}
@@ -85,7 +85,7 @@ def test_a_class_may_occur_once(n_rare):
     assert model.score(X[:1, :3], [2]) == 1
 
 
-def test_pairs_have_the_names_that_they_are_given_by():
+def test_pair_names_are_those_of_the_parameter():
     frame = pd.DataFrame(X[:, :3], columns=["a", "b", "c"])
     pairs = [("a", "b"), ("c", None)]
     model = SDNNClassifier(**OPTIONS, pairs=pairs).fit(frame, XOR)

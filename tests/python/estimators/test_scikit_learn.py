@@ -51,7 +51,7 @@ def targets_of(estimator):
     ],
     ids=["regressor", "classifier", "one-versus-one", "regressor-options", "classifier-options"],
 )
-def test_check_estimator_finds_nothing(made):
+def test_scikit_learns_check_estimator_finds_no_fault(made):
     results = check_estimator(made, on_skip=None, on_fail=None)
     other = {r["check_name"]: r["status"] for r in results if r["status"] != "passed"}
     # The first, of newer versions, asks for an environment variable that is read when SciPy is
@@ -70,7 +70,7 @@ def test_importing_sdnn_imports_no_scikit_learn():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_without_scikit_learn_the_message_says_what_to_install():
+def test_a_missing_scikit_learn_is_named_with_its_installation():
     code = (
         "import sys\nsys.modules['sklearn'] = None; sys.modules['joblib'] = None\nimport sdnn\n"
         "try: sdnn.SDNNRegressor\n"
@@ -86,7 +86,7 @@ def test_sparse_samples_are_refused(estimator):
     refuses("dense", estimator.predict, sparse.csr_matrix(X), error=TypeError)
 
 
-def test_prediction_checks_its_samples(estimator):
+def test_unfitted_estimators_and_wrong_features_are_refused(estimator):
     for use in (
         lambda: estimator.predict(X),
         lambda: estimator.transform_code(X),
@@ -101,7 +101,7 @@ def test_prediction_checks_its_samples(estimator):
     refuses("features", estimator.predict, X[:, :2])
 
 
-def test_targets_are_checked():
+def test_invalid_targets_are_refused():
     refuses("NaN", SDNNRegressor(**SMALL).fit, X, np.full(len(X), np.nan))
     refuses("y", SDNNRegressor(**SMALL).fit, X, LABELS)
     refuses("label", SDNNClassifier(**SMALL).fit, X, Y)
@@ -124,14 +124,14 @@ def test_targets_are_checked():
         ({"coding": RandomInverse(low=1.0, high=1.0)}, "low"),
     ],
 )
-def test_impossible_parameters_are_named(estimator, parameters, error):
+def test_impossible_parameters_are_refused_by_name(estimator, parameters, error):
     refuses(error, estimator.set_params(**parameters).fit, X, targets_of(estimator))
 
 
 @pytest.mark.parametrize(
     "kind", [SDNNRegressor, SDNNClassifier, SDNNKernelRidge, SDNNKernelClassifier]
 )
-def test_every_parameter_is_checked_and_named(kind):
+def test_every_parameter_is_checked_by_learn_one(kind):
     names = set(kind().get_params(deep=False))
     assert names == set(kind()._parameter_constraints)
     options = {"classes": [0, 1]} if kind is SDNNClassifier else {}
@@ -149,7 +149,7 @@ def test_subclasses_can_add_parameters_and_change_defaults():
     assert clone(Mine(**SMALL, note="x")).fit(X, Y).note == "x"
 
 
-def test_a_network_that_no_memory_holds_is_refused_with_its_size(monkeypatch):
+def test_a_memory_error_states_the_size_of_the_network(monkeypatch):
     def no_memory(*_arguments, **_options):
         raise MemoryError("std::bad_alloc")
 
@@ -157,7 +157,7 @@ def test_a_network_that_no_memory_holds_is_refused_with_its_size(monkeypatch):
     refuses("430080", SDNNRegressor(**SMALL).fit, X, Y, error=MemoryError)
 
 
-def test_too_little_memory_for_a_training_form_is_an_error(estimator):
+def test_a_memory_limit_below_the_dual_form_is_refused(estimator):
     refuses(
         "memory_limit",
         estimator.set_params(training="dual", memory_limit=1000).fit,
@@ -166,7 +166,7 @@ def test_too_little_memory_for_a_training_form_is_an_error(estimator):
     )
 
 
-def test_feature_names_are_kept_and_compared(estimator):
+def test_feature_names_are_stored_and_compared(estimator):
     table = pd.DataFrame(X, columns=["a", "b", "c"])
     estimator.fit(table, targets_of(estimator))
     assert estimator.feature_names_in_.tolist() == ["a", "b", "c"]
@@ -174,14 +174,14 @@ def test_feature_names_are_kept_and_compared(estimator):
     refuses("names", estimator.predict, table[["c", "b", "a"]])
 
 
-def test_a_constant_feature_is_no_information(estimator):
+def test_a_constant_feature_does_not_change_predictions(estimator):
     table = np.column_stack([X, np.full(len(X), 7.0)])
     estimator.fit(table, targets_of(estimator))
     changed = table + np.array([0, 0, 0, 5.0])
     np.testing.assert_array_equal(estimator.predict(table), estimator.predict(changed))
 
 
-def test_parameters_are_kept_as_they_were_given(estimator):
+def test_parameters_are_stored_unchanged(estimator):
     given = {"pairs": np.array([(0, 1), (1, 2)]), "coding": [("anchor", [0])], "max_iter": "many"}
     made = type(estimator)(**given)
     assert all(getattr(made, name) is value for name, value in given.items())
@@ -203,7 +203,7 @@ def test_subclasses_need_no_docstring(estimator, docstring):
     assert mine().get_params() == type(estimator)().get_params()
 
 
-def test_it_works_where_scikit_learn_puts_it(estimator):
+def test_pipelines_cross_validation_and_grid_search_accept_the_estimators(estimator):
     targets = targets_of(estimator)
     pipeline = make_pipeline(StandardScaler(), estimator)
     assert cross_val_score(pipeline, X, targets, cv=3).shape == (3,)
@@ -223,14 +223,14 @@ def test_it_works_where_scikit_learn_puts_it(estimator):
     )
 
 
-def test_progress_is_shown_on_request(estimator, capsys):
+def test_verbose_prints_progress(estimator, capsys):
     estimator.set_params(verbose=1).fit(X, targets_of(estimator))
     assert "training" in capsys.readouterr().out
     estimator.set_params(verbose=0).fit(X, targets_of(estimator))
     assert capsys.readouterr().out == ""
 
 
-def test_wide_tables_keep_to_the_budget_of_columns(estimator):
+def test_one_hundred_features_have_500_pairs_within_16_000_columns(estimator):
     table = RANDOM.uniform(size=(20, 100))
     options = {"n_pattern_units": None, "max_iter": 1}
     estimator.set_params(**options).fit(table, targets_of(estimator)[:20])
@@ -245,7 +245,7 @@ def test_wide_tables_keep_to_the_budget_of_columns(estimator):
     assert len(narrow.pairs_) == 22 * 21
 
 
-def test_few_bins_are_warned_of(estimator):
+def test_a_coding_with_few_bins_warns(estimator):
     estimator.set_params(coding=RandomInverse(length_scale=3.0), n_pattern_units=32)
     with pytest.warns(CoarseCodeWarning, match="length_scale"):
         estimator.fit(X, targets_of(estimator))

@@ -1,4 +1,4 @@
-"""The C header of a policy against the agent it is of, compiled for this processor.
+"""Exported C headers of policies, compiled for this processor and compared with the agent.
 
 ``nox -s emulation`` has other compilers and processors.
 """
@@ -52,7 +52,7 @@ def target(needs):
 
 
 @pytest.mark.parametrize("name", AGENTS)
-def test_the_actions_are_the_agents(name, target, tmp_path):
+def test_actions_of_the_c_header_are_those_of_the_agent(name, target, tmp_path):
     check_all_actions(name, target, tmp_path)
 
 
@@ -60,15 +60,15 @@ def test_the_actions_are_the_agents(name, target, tmp_path):
     ("reward", "tie_tolerance", "expected"),
     [(1.0, 0.25, 2**21), (1.0, 2.0**-24, 0), (1e-30, 0.0, 0), (1e-30, 1.0, 2**62)],
 )
-def test_the_tolerance_of_ties_is_in_units_of_values(reward, tie_tolerance, expected):
-    """A reward of 1 is that of two weights of 23 bits: a unit is 2^-23."""
+def test_tie_tolerance_is_exported_in_integer_units_of_values(reward, tie_tolerance, expected):
+    # The value 1 is a sum of two weights of 23 bits: its unit is 2^-23.
     rule = QLambdaConfig(tie_rule="lowest", tie_tolerance=tie_tolerance)
     agent = SDNNQLambda(Discrete(2), Discrete(2), learning=rule)
     agent.learn(Transition(0, 1, reward, 1, terminated=True))
     assert f"#define POLICY_TIE_TOLERANCE INT64_C({expected})\n" in c_header(agent, "policy").text
 
 
-def test_symbols_are_coded_as_ones_and_zeros(target, tmp_path):
+def test_discrete_observations_are_exported_as_one_hot_inputs(target, tmp_path):
     check_symbols(target, tmp_path)
 
 
@@ -78,8 +78,8 @@ def test_the_integer_path_needs_no_library_and_no_floating_point(name, target, n
     check_integer_path(name, target, tmp_path)
 
 
-def test_the_angle_of_a_pair_is_in_the_agents_bin(needs, tmp_path):
-    """At every bound, a 2^-28th of a radian before and after it."""
+def test_angles_have_the_bins_of_the_agent_at_every_boundary(needs, tmp_path):
+    # At every bound, 2^-28 radians before and after it.
     needs("gcc")
     agent = agents()["pairs"]
     header = c_header(agent, "policy")
@@ -112,8 +112,9 @@ def test_the_angle_of_a_pair_is_in_the_agents_bin(needs, tmp_path):
     np.testing.assert_array_equal(bins_in_c, np.column_stack([expected, expected]))
 
 
-def test_values_that_the_library_refuses_have_defined_results(needs, tmp_path):
-    """NaN is the lowest; an angle of NaN or infinity is 0. Conversions of NaN would be caught."""
+def test_nan_and_infinity_have_defined_bins(needs, tmp_path):
+    # NaN counts as the lowest value, an angle of NaN or infinity as 0. The sanitizer would report
+    # conversions of NaN.
     caught = ("-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all")
     needs("clang", options=caught)
     for name, agent in (("pairs", agents()["pairs"]), ("symbols", symbols_agent())):
@@ -147,7 +148,7 @@ def test_values_that_the_library_refuses_have_defined_results(needs, tmp_path):
         assert not known or (x, y, z)[symbol] == max(known)
 
 
-def test_two_headers_share_a_program_and_cpp_takes_them(needs, tmp_path):
+def test_two_headers_compile_in_one_c_or_cpp_program(needs, tmp_path):
     needs("gcc", "g++", "clang++")
     export_c_header(agents()["discrete"], tmp_path / "left.h")
     export_c_header(agents()["pairs"], tmp_path / "right.h", name="right_2")
@@ -193,7 +194,7 @@ def balance(agent, scale):
     return 500
 
 
-def test_the_example_balances_as_the_agent_does(needs, tmp_path):
+def test_the_c_example_balances_as_long_as_the_agent(needs, tmp_path):
     needs("gcc")
     env = gym.make("CartPole-v1")
     agent = SDNNQLearning(
@@ -213,7 +214,7 @@ def test_the_example_balances_as_the_agent_does(needs, tmp_path):
     assert n_steps > 40  # at random it falls after 20
 
 
-def test_values_of_actions_are_those_of_act():
+def test_tables_of_actions_are_those_of_the_agent():
     agent = lone_agent()
     header = c_header(agent, "one", fraction_bits=8)
     agent_values = agent.actions.astype(np.float32)
@@ -225,14 +226,14 @@ def test_values_of_actions_are_those_of_act():
     assert fixed == np.round(agent_values.astype(float) * 256).astype(int).tolist()
 
 
-def test_hidden_units_in_no_window_are_left_out():
+def test_hidden_units_outside_all_windows_are_not_exported():
     agent = discrete_agent()
     header = c_header(agent, "policy")
     assert "40 hidden units in use" in header.text
     assert header.weight_bytes == 40 * 4 * 3 * 24
 
 
-def test_weights_beyond_a_byte_take_two():
+def test_weights_beyond_a_byte_take_two_bytes():
     weights = np.array([[127, -128, 5], [1, 2, 3], [0, 0, 0], [0, 0, 0], [128, -129, 16383]])
     words, n_bytes = weight_words(weights)
     assert n_bytes.tolist() == [1, 2]
@@ -241,14 +242,14 @@ def test_weights_beyond_a_byte_take_two():
     assert (256 * lanes[1, :, 0] + lanes[2, :, 0]).tolist() == weights[4].tolist()
 
 
-def test_the_same_agent_gives_the_same_header():
+def test_acting_does_not_change_the_header():
     agent = agents()["several"]
     first = c_header(agent, "policy")
     agent.act([0.1, 0.2])
     assert c_header(agent, "policy") == first
 
 
-def test_numbers_of_fixed_point_fit_32_bits():
+def test_fraction_bits_are_reduced_until_numbers_fit_32_bits():
     wide = SDNNQLearning(box(1e5, 1.0), Discrete(2), approximator=SMALL)
     assert c_header(wide, "policy").fraction_bits == 14
     assert c_header(wide, "policy", fraction_bits=3).fraction_bits == 3
@@ -268,11 +269,11 @@ def test_numbers_of_fixed_point_fit_32_bits():
 @pytest.mark.parametrize(
     "name", ["", "2nd", "a-b", "_a", "a__b", "a_", "a b", "é", "x" * 41, "a;", "a\n", None, 3]
 )
-def test_names_that_are_none_in_c_are_refused(name):
+def test_names_that_are_no_c_identifiers_are_refused(name):
     refuses("name", c_header, lone_agent(), name)
 
 
-def test_the_text_is_at_most_three_times_its_bytes_of_flash():
+def test_the_header_has_at_most_three_characters_per_byte_of_flash():
     agent = SDNNQLearning(box(1.0, 2.0, 3.0), Discrete(3), preset="small", seed=1)
     agent.networks[0].set_parameters(
         np.random.default_rng(1).integers(-50, 50, (900, 240)), np.zeros(900, np.int32)
@@ -281,7 +282,7 @@ def test_the_text_is_at_most_three_times_its_bytes_of_flash():
     assert len(header.text) < 3 * header.flash_bytes
 
 
-def test_the_file_is_whole_or_not_there(tmp_path):
+def test_a_failed_export_leaves_no_file(tmp_path):
     agent = lone_agent()
     header = export_c_header(agent, tmp_path / "one.h")
     assert (tmp_path / "one.h").read_text() == header.text
@@ -291,7 +292,7 @@ def test_the_file_is_whole_or_not_there(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["one.h"]
 
 
-def test_agents_that_cannot_be_exported_are_refused():
+def test_agents_of_other_types_sizes_or_unknown_ranges_are_refused():
     for kind in (RBFQLearning, FuzzyQLearning):
         agent = kind(box(1.0, 1.0), box(1.0))
         refuses("agent", c_header, agent, "policy", error=TypeError)

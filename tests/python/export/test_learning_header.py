@@ -1,4 +1,4 @@
-"""An agent that learns in C against the library's, compiled for this processor, bit for bit.
+"""Agents that learn in C, compiled for this processor and compared bit for bit.
 
 ``nox -s emulation`` has other compilers and processors.
 """
@@ -40,7 +40,7 @@ def target(needs):
 
 
 @pytest.mark.parametrize("name", LEARNERS)
-def test_it_acts_and_learns_as_the_agent(name, target, tmp_path):
+def test_an_agent_in_c_acts_and_learns_with_the_bits_of_the_agent(name, target, tmp_path):
     check_life(name, target, tmp_path, options=SANITIZED)
 
 
@@ -57,8 +57,8 @@ def test_a_trained_agent_continues_in_c(make, target, tmp_path):
     assert image == save_image(agent)
 
 
-def test_it_searches_for_a_first_reward_as_the_agent(target, tmp_path):
-    """Rewards are 0 at first; then most are, while the search goes on and ends."""
+def test_an_agent_in_c_searches_for_a_first_reward_like_the_agent(target, tmp_path):
+    # The first 300 rewards are 0; of the later ones each 20th is not.
     agent = discrete()
     header, command = build(tmp_path, agent, target, *SANITIZED)
     lines = lines_of(agent, 1500, 5, header.fraction_bits)
@@ -71,8 +71,8 @@ def test_it_searches_for_a_first_reward_as_the_agent(target, tmp_path):
     assert image == save_image(agent)
 
 
-def test_any_readings_and_rewards_are_defined(target, tmp_path):
-    """Ends of the numbers' range, and every kind of line in any order."""
+def test_extreme_readings_and_rewards_have_defined_results(target, tmp_path):
+    # Half of the numbers are extreme; acting, learning and new episodes come in any order.
     for make in (discrete, sarsa, network, small_steps):
         folder = tmp_path / make.__name__
         folder.mkdir()
@@ -123,8 +123,8 @@ int main(void) {
 
 
 @pytest.mark.parametrize("make", [discrete, sarsa, network, small_steps])
-def test_images_of_extreme_numbers_are_refused_or_learn(make, target, tmp_path):
-    """Whatever is loaded is followed by an image that is loaded."""
+def test_images_with_extreme_numbers_are_refused_or_saved_again(make, target, tmp_path):
+    # The program fails if it cannot load an image that it saved.
     agent = make()
     live(agent, lines_of(agent, 300, 1, 16), 16)
     (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
@@ -152,8 +152,8 @@ def test_images_of_extreme_numbers_are_refused_or_learn(make, target, tmp_path):
     assert 40 < n_loaded < 180
 
 
-def test_the_largest_weights_stay_in_range(target, tmp_path):
-    """A weight of 2^24 - 1, which an image of the largest weights leads to, is halved to 2^23."""
+def test_weights_that_leave_their_range_are_halved(target, tmp_path):
+    # From the largest weights, a step leads to 2^24 - 1, which doubles the unit.
     learning = QLambdaConfig(
         schedule_steps=0,
         final_learning_rate=None,
@@ -189,7 +189,7 @@ def test_the_largest_weights_stay_in_range(target, tmp_path):
         (network, "one.set_progress(65536); const uint32_t a = one.act(x)"),
     ],
 )
-def test_cpp_takes_it_as_functions_and_as_a_class(compiler, make, act, needs, tmp_path):
+def test_cpp_can_learn_save_and_load_by_the_learner_class(compiler, make, act, needs, tmp_path):
     needs(compiler)
     (tmp_path / "agent.h").write_text(c_header(make(), "agent", learning=True).text)
     source = f"""
@@ -210,7 +210,7 @@ def test_cpp_takes_it_as_functions_and_as_a_class(compiler, make, act, needs, tm
 
 
 @pytest.mark.parametrize("name", LEARNERS)
-def test_memory_is_that_stated_in_the_header(name, target, tmp_path):
+def test_the_header_states_the_size_of_the_agent_in_memory(name, target, tmp_path):
     header = c_header(LEARNERS[name](), "agent", learning=True)
     (tmp_path / "agent.h").write_text(header.text)
     source = '#include "agent.h"\n#include <stdio.h>\nint main(void)'
@@ -245,7 +245,7 @@ def test_images_of_other_agents_are_refused_and_change_nothing(make):
     assert save_image(other) == image
 
 
-def test_an_image_of_impossible_numbers_changes_nothing():
+def test_an_image_of_a_linear_agent_with_impossible_numbers_is_refused():
     agent, same = discrete(), discrete()
     lines = lines_of(agent, 300, 1, 16)
     for one in (agent, same):
@@ -268,7 +268,7 @@ def test_an_image_of_impossible_numbers_changes_nothing():
     assert save_image(agent) == save_image(new)
 
 
-def test_an_image_of_an_impossible_network_changes_nothing():
+def test_an_image_of_a_network_with_impossible_numbers_is_refused():
     agent = network()
     before = save_image(agent)
     first = len(before) - 4 - 4 * c_header(agent, "agent", learning=True).n_words
@@ -304,8 +304,8 @@ int main(void) {
 """
 
 
-def test_real_numbers_are_ieee_754(target, tmp_path):
-    """Numbers of all sizes, subnormal ones too, and such as are nearly equal."""
+def test_software_floating_point_has_the_bits_of_ieee_754(target, tmp_path):
+    # Numbers of all sizes, also subnormal ones, and pairs of nearly equal numbers.
     (tmp_path / "agent.h").write_text(c_header(network(), "agent", learning=True).text)
     real = program(tmp_path, REAL_NUMBERS, target.compiler, *STRICT, *SANITIZED)
     random = np.random.default_rng(1)
@@ -323,7 +323,7 @@ def test_real_numbers_are_ieee_754(target, tmp_path):
     assert (came == expected.view(np.uint64))[is_finite].all()
 
 
-def test_other_agents_do_not_learn_in_c():
+def test_settings_that_cannot_learn_in_c_are_refused():
     for learning, approximator, named in (
         ({}, {"averaging_interval": 100}, "averaging_interval"),
         ({}, {"weight_limit": 0}, "weight_limit"),

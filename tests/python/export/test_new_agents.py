@@ -1,4 +1,4 @@
-"""Agents that have learned nothing, for a processor, in Python and by the command."""
+"""New agents for small processors, in Python and by the command."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ def export(invoke):
 
 @pytest.mark.parametrize("ram_bytes", [6000, 20_000, 10**6])
 @pytest.mark.parametrize("actions", [TWO, gym.spaces.MultiDiscrete([3, 4])])
-def test_an_agent_is_the_largest_that_fits(ram_bytes, actions):
+def test_a_new_linear_agent_is_the_largest_that_fits_the_memory(ram_bytes, actions):
     agent = new_agent(SPACE, actions, ram_bytes=ram_bytes, seed=3)
     n_units = agent.approximator.n_pattern_units
     assert c_header(agent, "agent", learning=True).ram_bytes <= ram_bytes
@@ -33,7 +33,7 @@ def test_an_agent_is_the_largest_that_fits(ram_bytes, actions):
 
 
 @pytest.mark.parametrize(("ram_bytes", "n_hidden"), [(9000, 75), (30_000, 300), (10**6, 900)])
-def test_a_network_is_the_largest_that_fits(ram_bytes, n_hidden):
+def test_a_new_network_is_the_largest_that_fits_the_memory(ram_bytes, n_hidden):
     agent = new_agent(SPACE, TWO, kind="sdnn-c", ram_bytes=ram_bytes, seed=3)
     sizes = agent.approximator
     assert (sizes.n_hidden_units, sizes.n_active_units) == (n_hidden, n_hidden // 3)
@@ -41,7 +41,7 @@ def test_a_network_is_the_largest_that_fits(ram_bytes, n_hidden):
     assert c_header(agent, "agent", learning=True).ram_bytes <= ram_bytes
 
 
-def test_a_network_is_as_large_as_given_and_learns_at_once():
+def test_a_new_network_keeps_its_sizes_and_draws_first_weights_in_c():
     given = SDNNQLearning.presets["small"].approximator
     config = replace(given, n_pattern_units=16, averaging_interval=0, weight_limit=127)
     agent = new_agent(SPACE, TWO, kind="sdnn-c", ram_bytes=10**6, approximator=config)
@@ -51,21 +51,21 @@ def test_a_network_is_as_large_as_given_and_learns_at_once():
     assert "agent_first_weights[" not in text  # drawn on the chip
 
 
-def test_a_network_may_have_few_units():
+def test_a_new_network_may_have_three_active_units():
     few = {"n_pattern_units": 4, "n_hidden_units": 8, "n_active_units": 3}
     config = SDNNCConfig(**few, averaging_interval=0, weight_limit=127)
     agent = new_agent(SPACE, TWO, kind="sdnn-c", ram_bytes=10**6, approximator=config)
     assert agent.approximator.n_active_units == 3
 
 
-def test_given_settings_are_kept():
+def test_new_agents_keep_sizes_seed_and_angles():
     config = LinearSDNNConfig(n_pattern_units=100, averaging_interval=0)
     agent = new_agent(SPACE, TWO, approximator=config, angles=[1], seed=5)
     assert (agent.approximator.n_pattern_units, agent.seed) == (100, 5)
     assert [(kind, list(at)) for kind, at in agent.inputs] == [("variable", [0]), ("circular", [1])]
 
 
-def test_agents_that_do_not_fit_or_lack_ranges_are_refused():
+def test_new_agents_without_memory_or_ranges_are_refused():
     refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=1000)
     refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=1.5)
     refuses("ram_bytes", new_agent, SPACE, TWO, kind="sdnn-c", ram_bytes=5000)
@@ -81,7 +81,7 @@ def test_agents_that_do_not_fit_or_lack_ranges_are_refused():
     assert c_header(known, "agent", learning=True).ram_bytes <= 20_000
 
 
-def test_the_command_makes_the_same_agent(export, tmp_path):
+def test_the_command_exports_the_same_linear_agent(export, tmp_path):
     settings = ("--set", "learning.discount=0.9", "--set", "approximator.n_actions=5")
     done = export("--new", *GIVEN, "--actions", "-1:1", "--ram", 9000, "--seed", 7, *settings)
     assert done.exit_code == 0, done.output
@@ -96,7 +96,7 @@ def test_the_command_makes_the_same_agent(export, tmp_path):
     assert f"{expected.ram_bytes:,} bytes of memory" in done.stdout
 
 
-def test_the_command_makes_the_same_network(export, tmp_path):
+def test_the_command_exports_the_same_network(export, tmp_path):
     settings = ("--set", "approximator.n_actions=3", "--set", "learning.discount=0.9")
     done = export("--new", *GIVEN, "--actions", "-1:1", "--agent", "sdnn-c", *settings)
     assert done.exit_code == 0, done.output
@@ -119,7 +119,7 @@ def test_the_command_makes_the_same_network(export, tmp_path):
         (["-1:1", "0:2"], gym.spaces.Box(np.array([-1.0, 0.0]), np.array([1.0, 2.0]), dtype=float)),
     ],
 )
-def test_actions_are_numbers_or_ranges(actions, space, export, tmp_path):
+def test_the_actions_option_accepts_counts_and_ranges(actions, space, export, tmp_path):
     words = [word for one in actions for word in ("--actions", one)]
     done = export("--new", *GIVEN, *words)
     assert done.exit_code == 0, done.output
@@ -127,7 +127,7 @@ def test_actions_are_numbers_or_ranges(actions, space, export, tmp_path):
     assert (tmp_path / "agent.h").read_text() == c_header(agent, "agent", learning=True).text
 
 
-def test_the_help_shows_a_command_on_separate_lines(invoke):
+def test_the_help_of_export_shows_an_example(invoke):
     told = invoke("export", "--help").stdout
     assert "\n  sdnn export --new --range -2.4:2.4 --range -3:3 --range -0.21:0.21\n" in told
 
@@ -158,14 +158,14 @@ def test_the_help_shows_a_command_on_separate_lines(invoke):
         *(((*GIVEN, "--actions", one), "--ram") for one in ("65536",)),
     ],
 )  # fmt: skip
-def test_bad_values_are_refused_by_their_option(words, named, export, tmp_path):
+def test_bad_options_of_new_agents_are_refused_by_name(words, named, export, tmp_path):
     done = export("--new", *words)
     assert done.exit_code == 2, done.output
     assert named in done.stderr
     assert not (tmp_path / "agent.h").exists()
 
 
-def test_a_run_and_a_new_agent_exclude_each_other(export):
+def test_export_refuses_a_run_together_with_options_of_new_agents(export):
     SDNNQLambda(SPACE, TWO, inputs="all", angle_pairs=[]).save("one.safetensors")
     for words, named in (
         ((), "RUN"),

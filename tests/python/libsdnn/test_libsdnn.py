@@ -87,7 +87,7 @@ def test_the_two_libraries_draw_different_weights(parameter_file):
 @pytest.mark.parametrize(
     ("name", "expected"), [("one_vs_one", "2a1aa1d6"), ("one_vs_rest", "60d6ed36")]
 )
-def test_a_classifiers_model_file_is_read_and_trained_again(name, expected):
+def test_the_model_file_of_a_classifier_is_read_with_libsdnns_weights(name, expected):
     model = libsdnn.read_model_file(FILES / f"{name}.bin", "libstdc++")
     assert model.parameters.scheme == name
     assert (
@@ -105,7 +105,7 @@ def test_a_classifiers_model_file_is_read_and_trained_again(name, expected):
     assert np.mean(predicted == truth) > 0.8
 
 
-def test_bins_are_cut_as_libsdnn_cuts_them(parameter_file):
+def test_values_have_the_bins_of_libsdnn(parameter_file):
     symbols = (
         "[NUMERICAL(RANDOM_INVERSE(1001,5)):2]",
         "[NUMERICAL(RANDOM_INVERSE(10,5)), SYMBOLIC(RANDOM_INVERSE(4,5))]",
@@ -138,18 +138,18 @@ def test_bins_are_cut_as_libsdnn_cuts_them(parameter_file):
         (("<ISSUE> % what", "}\n<ISSUE> % what"), "1"),
     ],
 )
-def test_bad_parameter_files_are_named(parameter_file, change, message):
+def test_invalid_parameter_files_are_refused_by_key(parameter_file, change, message):
     refuses(message, libsdnn.read_parameter_file, parameter_file(change))
 
 
-def test_seeds_are_needed_to_reproduce(parameter_file):
+def test_parameter_files_without_seeds_cannot_be_reproduced(parameter_file):
     path = parameter_file(("random_seed = [1]", "random_seed = hardware_entropy"))
     parameters = libsdnn.read_parameter_file(path)
     assert parameters.pattern_seed is None
     refuses("hardware_entropy", parameters.make_layer)
 
 
-def test_broken_model_files_are_refused(tmp_path):
+def test_damaged_model_files_are_refused(tmp_path):
     content = (FILES / "one_vs_one.bin").read_bytes()
     path = tmp_path / "model.bin"
     for broken in (b"", content[:3], content[:100], content[:-1], content + b"1234"):
@@ -159,7 +159,7 @@ def test_broken_model_files_are_refused(tmp_path):
     refuses("model.bin", libsdnn.read_model_file, path)
 
 
-def test_tables_of_any_size_are_not_drawn(parameter_file):
+def test_tables_beyond_the_memory_limit_are_refused(parameter_file):
     """2^24 patterns an input would take half a minute and 16 GB."""
     file = parameter_file(("1001,5", "16777216,5"))
     refuses("RANDOM_INVERSE", libsdnn.read_parameter_file(file).make_layer)

@@ -11,7 +11,7 @@ from sdnn.reproduction import EXPERIMENTS, case_spec, paper_spec, plan_trials, s
 from sdnn.runs import AGENTS, ProtocolSpec, trial_seed
 
 
-def test_experiment_a_is_the_one_of_the_paper():
+def test_experiment_a_has_the_cases_of_the_paper():
     (experiment,) = select_experiments("a")
     assert [(c.id, c.n_sensors, c.noise) for c in experiment.cases] == [
         ("s4", 4, 0.0),
@@ -20,7 +20,7 @@ def test_experiment_a_is_the_one_of_the_paper():
     assert all(case.agents == ("sdnn-c",) for case in experiment.cases)
 
 
-def test_experiment_b_is_the_one_of_the_paper():
+def test_experiment_b_has_the_cases_of_the_paper():
     (experiment,) = select_experiments("b")
     assert [(c.id, c.n_sensors, c.noise, c.paper_figure) for c in experiment.cases] == [
         ("s4", 4, 0.0, "Fig. 5"),
@@ -33,14 +33,14 @@ def test_experiment_b_is_the_one_of_the_paper():
     assert select_experiments("cost") == ()
 
 
-def test_all_of_the_paper_is_ninety_trials():
+def test_the_paper_has_ninety_trials():
     cases = [case for experiment in EXPERIMENTS for case in experiment.cases]
     plan = plan_trials(cases, 10, 0)
     # 20 of Experiment A and 80 of Experiment B, which share the 10 of SDNN-C in Case I.
     assert len(plan) == 20 + 80 - 10
 
 
-def test_agents_of_a_case_meet_the_same_seeds():
+def test_agents_of_a_case_have_the_same_seeds():
     (experiment,) = select_experiments("b")
     seeds = {}
     for planned in plan_trials(experiment.cases, 3, 0):
@@ -48,7 +48,7 @@ def test_agents_of_a_case_meet_the_same_seeds():
     assert {len(found) for found in seeds.values()} == {1}
 
 
-def test_rows_that_share_an_id_observe_the_same():
+def test_cases_with_the_same_id_have_the_same_sensors():
     seen = {}
     for experiment in EXPERIMENTS:
         for case in experiment.cases:
@@ -59,13 +59,13 @@ def test_rows_that_share_an_id_observe_the_same():
             assert set(case.agents) <= set(AGENTS)
 
 
-def test_presets_run_beside_the_agents_of_a_case():
+def test_presets_are_added_to_the_agents_of_a_case():
     experiment = EXPERIMENTS[0]
     both = experiment.with_agents([], ["robust", "paper", "robust"])
     assert [case.agents for case in both.cases] == 2 * [("sdnn-c", "sdnn-c-robust")]
 
 
-def test_canonical_json_is_sorted_and_does_not_depend_on_how_numbers_are_typed():
+def test_the_canonical_json_is_sorted_and_the_same_for_equal_numbers():
     config = paper_spec()
     text = config.canonical_json()
     assert text == json.dumps(json.loads(text), sort_keys=True, separators=(",", ":"))
@@ -75,7 +75,7 @@ def test_canonical_json_is_sorted_and_does_not_depend_on_how_numbers_are_typed()
     assert hashes == {config.config_hash}
 
 
-def test_changed_code_of_an_agent_is_another_version(monkeypatch):
+def test_the_version_of_an_agent_changes_the_hash(monkeypatch):
     config = paper_spec()
     before = config.config_hash
     monkeypatch.setitem(AGENTS, "sdnn-c", replace(AGENTS["sdnn-c"], version="2"))
@@ -83,7 +83,7 @@ def test_changed_code_of_an_agent_is_another_version(monkeypatch):
     assert config.config_hash != before
 
 
-def test_the_hash_covers_every_table():
+def test_the_hash_depends_on_every_table_of_settings():
     base = paper_spec()
     others = [
         paper_spec(agent={"name": "rbf"}),
@@ -98,7 +98,7 @@ def test_the_hash_covers_every_table():
     assert len(base.config_hash) == 16
 
 
-def test_a_case_fits_the_network_to_the_sensors():
+def test_a_case_has_one_network_input_per_sensor():
     (experiment,) = select_experiments("a")
     spec = case_spec(experiment.cases[1], "sdnn-c")
     assert spec.core_settings()["approximator"].n_inputs == 6
@@ -106,7 +106,7 @@ def test_a_case_fits_the_network_to_the_sensors():
     refuses("'fuzzy'", case_spec, experiment.cases[1], "fuzzy")
 
 
-def test_a_case_has_settings_for_every_agent():
+def test_a_case_has_settings_for_fuzzy_q_learning():
     (experiment,) = select_experiments("b")
     spec = case_spec(experiment.cases[2], "fuzzy")
     assert spec.core_settings()["approximator"] == FuzzyRulesConfig(n_inputs=5)
@@ -114,7 +114,7 @@ def test_a_case_has_settings_for_every_agent():
     assert spec.environment.paper_settings().sensors == SensorConfig(n_sensors=5, noise=0.02)
 
 
-def test_an_experiment_with_other_agents_differs_in_nothing_else():
+def test_with_agents_replaces_only_the_agents():
     (experiment,) = select_experiments("b")
     other = experiment.with_agents(["rbf", "sdnn-c", "rbf"])
     assert {case.agents for case in other.cases} == {("rbf", "sdnn-c")}
@@ -125,7 +125,7 @@ def test_an_experiment_with_other_agents_differs_in_nothing_else():
     assert experiment.with_agents([]) == experiment
 
 
-def test_trial_seed_follows_its_definition():
+def test_the_seed_of_a_trial_is_a_hash_of_root_seed_case_and_number():
     # zlib.crc32(b"s4") == 0x647FCC7F
     sequence = np.random.SeedSequence(7, spawn_key=(0x647FCC7F, 3))
     assert trial_seed(7, "s4", 3) == int(sequence.generate_state(1, np.uint64)[0]) >> 1
@@ -134,7 +134,7 @@ def test_trial_seed_follows_its_definition():
     assert max(seeds) < 2**63
 
 
-def test_plan_lists_shared_trials_once_and_pairs_agents():
+def test_a_plan_lists_shared_trials_once_and_in_order():
     (experiment,) = select_experiments("a")
     once = plan_trials(experiment.cases, 3, 0)
     assert plan_trials([*experiment.cases, *experiment.cases], 3, 0) == once

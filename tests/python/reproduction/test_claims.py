@@ -54,12 +54,12 @@ def verdicts(summaries, costs=()):
         ((10, math.nan, math.nan), Verdict.UNDECIDED),
     ],
 )
-def test_a_check_is_judged_by_the_whole_interval(interval, verdict):
+def test_a_check_holds_or_fails_with_its_whole_interval(interval, verdict):
     check = Check(measure="episodes_to_learn", case="s4", paper="about 150", at_most=150)
     assert verdict_of(check, Estimate(*interval)) == verdict
 
 
-def test_a_range_has_two_ends():
+def test_a_check_may_have_a_lower_and_an_upper_limit():
     check = Check(measure="final_steps", case="s4", paper="", at_least=3, at_most=5)
     assert verdict_of(check, Estimate(4, 3, 5)) == Verdict.HOLDS
     assert verdict_of(check, Estimate(2, 1, 2.5)) == Verdict.FAILS
@@ -83,7 +83,7 @@ def test_the_verdict_of_a_claim_follows_from_its_checks(parts, whole):
     assert ClaimOutcome(Claim(1, "", ()), outcomes).verdict == Verdict(whole)
 
 
-def test_the_claims_are_the_nine_of_the_paper_and_know_their_subjects():
+def test_the_nine_claims_refer_to_planned_cases_and_agents():
     assert [claim.number for claim in CLAIMS] == list(range(1, 10))
     planned = {(case.id, agent) for e in EXPERIMENTS for case in e.cases for agent in case.agents}
     series = {series.id for series in SERIES}
@@ -96,7 +96,7 @@ def test_the_claims_are_the_nine_of_the_paper_and_know_their_subjects():
         assert check.at_least > -math.inf or check.at_most < math.inf
 
 
-def test_good_data_support_claims_and_bad_data_do_not():
+def test_claims_hold_for_good_trials_and_fail_for_bad_ones():
     good = verdicts([result("s4", "sdnn-c", 4), result("s6", "sdnn-c", 4)])
     assert good[1] == good[2] == Verdict.HOLDS
     assert good[8] == Verdict.NOT_RUN  # the noisy cases are missing
@@ -105,13 +105,13 @@ def test_good_data_support_claims_and_bad_data_do_not():
     assert bad[1] == bad[2] == Verdict.FAILS
 
 
-def test_fuzzy_q_learning_is_judged_by_the_end():
+def test_claim_4_depends_on_the_final_steps_of_fuzzy_q_learning():
     cases = ("s4-noise", "s5-noise", "s6-noise")
     assert verdicts([result(case, "fuzzy", 50) for case in cases])[4] == Verdict.HOLDS
     assert verdicts([result(case, "fuzzy", 7) for case in cases])[4] == Verdict.FAILS
 
 
-def test_differences_count_censored_values_as_the_last_episode():
+def test_claims_count_censored_values_as_the_last_episode():
     late, early = result("s5-noise", "sdnn-c", 4), result("s4-noise", "sdnn-c", 50)
     (outcome,) = (o for o in judge_claims([late, early], ()) if o.claim.number == 6)
     assert outcome.checks[0].estimate == Estimate(15000.0, 15000.0, 15000.0)
@@ -120,19 +120,19 @@ def test_differences_count_censored_values_as_the_last_episode():
     assert next(o for o in same if o.claim.number == 6).verdict == Verdict.FAILS
 
 
-def test_trials_that_disagree_leave_a_claim_undecided():
+def test_evenly_split_trials_leave_a_claim_undecided():
     split = [4] * 5 + [50] * 5
     found = verdicts([result("s4", "sdnn-c", split), result("s6", "sdnn-c", 4)])
     assert found[2] == Verdict.UNDECIDED
 
 
 @pytest.mark.parametrize("size", [{"n_trials": 9}, {"n_tests": 1499}])
-def test_less_than_the_papers_scale_is_not_judged(size):
+def test_fewer_trials_or_episodes_than_the_papers_are_not_judged(size):
     found = verdicts([result("s4", "sdnn-c", 4, **size), result("s6", "sdnn-c", 4)])
     assert found[1] == found[2] == Verdict.NOT_JUDGED
 
 
-def test_growth_is_a_ratio_of_medians():
+def test_the_growth_of_costs_is_a_ratio_of_medians():
     costs = [
         cost("sdnn-c", 4, [10, 10, 10]), cost("sdnn-c", 8, [50, 50, 50]),
         cost("rbf", 4, [1, 1, 1]), cost("rbf", 8, [200, 220, 210]),
@@ -151,13 +151,13 @@ def test_growth_is_a_ratio_of_medians():
     assert judge_claims([], polynomial)[0].verdict == Verdict.FAILS
 
 
-def test_descriptions_name_both_sides():
+def test_the_description_of_a_difference_names_both_cases():
     text = str(Check(measure="final_steps", case="s6-noise", minus="s4", paper=""))
     for words in ("final steps", "SDNN-C", "6 noisy inputs", "4 inputs"):
         assert words in text
 
 
-def test_summaries_do_not_mix_measures():
+def test_measures_of_trials_are_kept_separately():
     summary = result("s4", "sdnn-c", [3] * 5 + [50] * 5)
     np.testing.assert_array_equal(summary.uncensored("episode_of_collapse"), [15000] * 5 + [0] * 5)
     assert summary.medians["final_share_solved"].value == 0.5

@@ -53,7 +53,7 @@ def measured(monkeypatch):
     return _measured
 
 
-def test_keys_are_all_series_in_ascending_inputs():
+def test_planned_costs_are_all_series_with_ascending_inputs():
     planned = planned_costs(SMALL)
     assert [*planned.values()] == [(series, n) for series in SERIES for n in (2, 3)]
     assert all(SMALL.config_hash in key for key in planned)
@@ -91,7 +91,7 @@ def test_stored_measurements_are_not_repeated(tmp_path, measured):
     assert {cost.version for cost in costs} == {_core.__version__}
 
 
-def test_settings_of_costs_live_side_by_side(tmp_path, measured):
+def test_costs_of_different_settings_are_stored_separately(tmp_path, measured):
     measured(tmp_path, FakeMeasure())
     other = replace(SMALL, n_rounds=5)
     assert [len(c.microseconds) for c in measured(tmp_path, FakeMeasure(), other)] == [5] * 8
@@ -101,7 +101,7 @@ def test_settings_of_costs_live_side_by_side(tmp_path, measured):
         assert records_digest(store.load()) == records_digest(())
 
 
-def test_times_of_another_machine_or_version_are_measured_anew(tmp_path, measured, monkeypatch):
+def test_costs_of_another_machine_or_version_are_measured_again(tmp_path, measured, monkeypatch):
     measured(tmp_path, FakeMeasure())
     for place, name in ((machine, "description"), (_core, "__version__")):
         with monkeypatch.context() as patched:
@@ -129,7 +129,7 @@ def test_table_gives_times_and_growth(tmp_path, measured):
     assert rows[1][-1] == "0.000729 MB"
 
 
-def test_figure_holds_the_stored_rows(tmp_path, measured):
+def test_the_figure_of_costs_shows_the_stored_medians(tmp_path, measured):
     costs = measured(tmp_path, FakeMeasure())
     (axes,) = draw_cost(costs).axes
     assert axes.get_yscale() == "log"
@@ -139,7 +139,7 @@ def test_figure_holds_the_stored_rows(tmp_path, measured):
 
 
 @pytest.mark.parametrize("series", SERIES, ids=[series.id for series in SERIES])
-def test_real_agents_are_measured(series):
+def test_every_series_measures_a_real_agent_and_its_table(series):
     times = measure_steps(series, 2, SMALL)
     microseconds, n_steps, table_bytes = times
     assert len(microseconds) == 3
@@ -157,13 +157,13 @@ def test_agents_that_exceed_the_memory_are_omitted():
     assert measure_steps(replace(series, core_agent=refuse), 2, SMALL) is None
 
 
-def test_costs_of_some_agents():
+def test_costs_may_be_limited_to_some_agents():
     found = {series.id for series, _ in planned_costs(SMALL, ["rbf"]).values()}
     assert found == {"rbf", "rbf-plain"}
     refuses("tiles", planned_costs, SMALL, ["tiles"])
 
 
-def test_the_seed_decides_what_the_timed_agent_learns():
+def test_timed_agents_learn_reproducibly_by_seed():
     def weights(kind, seed):
         rbf = _core.RBFNetworkConfig(n_inputs=2, n_actions=21)
         agent = kind(approximator=rbf, learning=_core.QLearningConfig(), seed=5)

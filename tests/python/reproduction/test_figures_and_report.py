@@ -49,7 +49,7 @@ def curves_of(axes):
     return [(line.get_xdata(), line.get_ydata()) for line in lines]
 
 
-def test_panels_hold_the_stored_rows(results):
+def test_panels_show_medians_and_quartiles_of_the_stored_rows(results):
     figure = draw_experiment(EXPERIMENT, results)
     for axes, result in zip(figure.axes[:2], results, strict=True):
         (_, smooth), (x, thin) = curves_of(axes)
@@ -68,7 +68,7 @@ def test_panels_hold_the_stored_rows(results):
         assert axes.get_xlim() == (0, 3000)
 
 
-def test_short_runs_are_drawn_as_they_are(tmp_path, run, collected):
+def test_short_trials_are_drawn_without_smoothing(tmp_path, run, collected):
     run(tmp_path, fake_trial.make_plan(2, 300))
     results = collected(EXPERIMENT, tmp_path, 2, 300)
     for axes, result in zip(draw_experiment(EXPERIMENT, results).axes, results, strict=True):
@@ -76,11 +76,11 @@ def test_short_runs_are_drawn_as_they_are(tmp_path, run, collected):
         np.testing.assert_array_equal(line, np.median(result.steps, axis=0))
 
 
-def test_only_the_planned_trials_are_drawn(results):
+def test_trials_of_another_seed_are_not_drawn(results):
     assert [result.n_trials for result in results] == [3, 3]
 
 
-def test_a_figure_names_its_trials_and_settings(results):
+def test_a_figure_states_its_trials_and_configurations(results):
     text = all_text(draw_experiment(EXPERIMENT, results))
     assert "3 trials x 3,000 episodes instead of 10 x 15,000" in text
     assert "quick" not in text.lower()
@@ -98,7 +98,7 @@ def test_figures_are_repeatable_to_the_byte(results):
     assert (png, svg) == figure_bytes(draw_experiment(EXPERIMENT, results))
 
 
-def test_a_run_reads_its_trials_once(monkeypatch, tmp_path, use_trial):
+def test_a_reproduction_reads_each_trial_once(monkeypatch, tmp_path, use_trial):
     use_trial(fake_trial.FakeTrial)
     calls = []
 
@@ -118,7 +118,7 @@ def test_a_run_reads_its_trials_once(monkeypatch, tmp_path, use_trial):
         assert done.table["digest"] == records_digest(store.load())
 
 
-def test_a_colour_stands_for_an_agent_in_every_figure(tmp_path, run, collected):
+def test_an_agent_has_the_same_color_in_every_figure(tmp_path, run, collected):
     def colors(*agents):
         other = EXPERIMENT.with_agents(agents)
         run(tmp_path, plan_trials(other.cases, 1, 0, 100))
@@ -140,14 +140,14 @@ def test_any_two_agents_of_a_figure_have_different_colors():
         assert len(set(agent_colors(pair).values())) == 2
 
 
-def test_mixed_settings_are_refused(results):
+def test_trials_of_mixed_configurations_are_refused(results):
     (first, *others) = results[0].records
     odd = replace(first, key=first.key._replace(config_hash="other"))
     refuses("configuration", measure, "", (odd, *others))
     refuses("0", measure, "", ())
 
 
-def test_summary_of_hand_made_trials(results):
+def test_measures_of_fake_trials_are_as_worked_by_hand(results):
     summary = results[0]
     steps = results[0].steps
     first_good = [10.0 * (1 + int(np.argmax(row < 50))) for row in steps]
@@ -163,7 +163,7 @@ def test_summary_of_hand_made_trials(results):
     )
 
 
-def test_estimates_as_text():
+def test_estimates_are_formatted_with_units_and_censoring():
     assert format_estimate(Estimate(4.0, 3.5, 5.0), "final_steps", 100) == "4 [3.5, 5]"
     assert format_estimate(Estimate(0.98, 0.9, 1.0), "final_share_solved", 100) == (
         "98 % [90, 100]"
@@ -179,7 +179,7 @@ def report(results):
     return Report(experiments=((EXPERIMENT, results),), costs=(), quick=False, seed=0)
 
 
-def test_tables_hold_cases_and_claims(report):
+def test_tables_show_cases_and_claims(report):
     claims, checks, cases = report.page(PICTURES).tables
     assert cases.title.startswith(EXPERIMENT.title)
     assert [row[0] for row in cases.rows] == [case.title for case in EXPERIMENT.cases]
@@ -191,7 +191,7 @@ def test_tables_hold_cases_and_claims(report):
     assert {row[-1] for row in checks.rows} == {"not judged", "not run"}
 
 
-def test_a_terminal_shows_claims_and_all_tables_on_demand(report):
+def test_a_terminal_shows_claims_and_on_demand_all_tables(report):
     brief, full = (Console(width=80, file=io.StringIO()) for _ in range(2))
     page = report.page(PICTURES)
     page.print(brief)
@@ -213,7 +213,7 @@ def test_json_is_valid_and_marks_censored_values(report):
     assert json.loads(text)["claims"][0]["checks"][0]["at_least"] is None
 
 
-def test_markdown_holds_the_tables(report):
+def test_the_markdown_report_shows_all_rows_of_tables(report):
     page = replace(report, quick=True).page(PICTURES)
     markdown = page.to_markdown()
     assert "not their result" in markdown
@@ -222,7 +222,7 @@ def test_markdown_holds_the_tables(report):
     assert f"digest of the rows {report.digest[:16]}" in markdown
 
 
-def test_row_files_hold_every_test_episode_once(report, results):
+def test_row_files_list_every_evaluation_once(report, results):
     records = [record for result in results for record in result.records]
     rows = [dict(zip(ROW_HEADER, row, strict=True)) for row in trial_rows(records)]
     assert len(rows) == 2 * 3 * 300
@@ -233,7 +233,7 @@ def test_row_files_hold_every_test_episode_once(report, results):
     assert rows[0]["solved"] in (0, 1)
 
 
-def test_page_is_one_file_with_everything(report, monkeypatch):
+def test_the_html_report_embeds_pictures_tables_and_settings(report, monkeypatch):
     outcome = TrialsOutcome(n_planned=6, n_reused=0, n_run=6, failures=(), interrupted=False)
     monkeypatch.setattr("sdnn.support.machine.description", lambda: "a <machine>")
     page = report.page(PICTURES)

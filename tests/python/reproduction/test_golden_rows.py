@@ -21,7 +21,7 @@ def digest_of(plan, records):
     return sha.hexdigest()
 
 
-def test_the_quick_reproduction_has_the_golden_rows(tmp_path):
+def test_the_rows_of_a_quick_reproduction_have_the_stored_digest(tmp_path):
     plan = PaperStudy(quick=True).plan()
     with ResultStore(tmp_path) as store:
         outcome = run_trials(plan, store)

@@ -58,7 +58,7 @@ def final_steps(case, **limits):
 
 
 @pytest.mark.parametrize("n_good", [3, 5, 8])
-def test_a_chance_is_that_of_six_good_trials_among_ten(n_good):
+def test_the_chance_of_a_claim_is_a_binomial_tail(n_good):
     """The median of ten is below a limit if six of them are: a binomial tail."""
     p = n_good / 10
     tail = sum(math.comb(10, k) * p**k * (1 - p) ** (10 - k) for k in range(6, 11))
@@ -70,7 +70,7 @@ def test_a_chance_is_that_of_six_good_trials_among_ten(n_good):
     assert found == TenTrials([measured("s4", values)]).chance(claim)
 
 
-def test_checks_of_a_claim_share_their_draws():
+def test_checks_of_a_claim_are_drawn_together():
     draws = TenTrials([measured("s4", 5 * [4] + 5 * [50])])
     once, twice, never = (
         draws.chance(Claim(1, "", checks))
@@ -87,7 +87,7 @@ def test_checks_of_a_claim_share_their_draws():
     assert never == Estimate(0.0, 0.0, 0.0)
 
 
-def test_chances_of_differences_count_censored_values_as_the_last_episode():
+def test_chances_count_censored_values_as_the_last_episode():
     later = Claim(6, "", (next(c for c in CLAIMS if c.number == 6).checks))
     late, early = measured("s5-noise", [4] * 3), measured("s4-noise", [4] * 3)
     assert TenTrials([late, early]).chance(later).value == 0.0  # both end with the trials
@@ -95,7 +95,7 @@ def test_chances_of_differences_count_censored_values_as_the_last_episode():
     assert TenTrials([late, early]).chance(later).value == 1.0
 
 
-def test_chances_need_trials_of_every_subject():
+def test_chances_without_trials_of_every_subject_are_none():
     difference = Check(measure="final_steps", case="s6-noise", minus="s4", paper="", at_most=2)
     claim = Claim(7, "", (difference,))
     assert TenTrials([measured("s4", [4, 4])]).chance(claim) is None
@@ -119,7 +119,7 @@ def test_chances_need_trials_of_every_subject():
         ("not run", "holds", 1.0, "not run"),
     ],
 )
-def test_a_claim_is_settled_by_more_trials_or_by_chance(own, more, share, settled):
+def test_more_trials_or_the_chance_decide_a_claim(own, more, share, settled):
     def outcome(word, **found):
         checked = CheckOutcome(CLAIMS[0].checks[0], None, Verdict(word))
         return ClaimOutcome(CLAIMS[0], (checked,), **found)
@@ -132,7 +132,7 @@ def test_a_claim_is_settled_by_more_trials_or_by_chance(own, more, share, settle
     assert claim.decided == Verdict(settled)
 
 
-def test_claims_are_settled_by_trials_of_all_their_subjects():
+def test_reference_trials_decide_claims_only_with_all_cases():
     split = [4] * 5 + [50] * 5
     ran = [measured("s4", split), measured("s6", [4] * 10)]
     kept = [measured("s4", [4] * 15 + [50] * 5), measured("s6", [4] * 20)]
@@ -145,7 +145,7 @@ def test_claims_are_settled_by_trials_of_all_their_subjects():
     assert [one.more for one in alone] == [None] * len(settled)
 
 
-def test_the_reference_results_are_of_the_papers_settings():
+def test_the_reference_results_have_the_papers_settings_and_scale():
     kept = reference_results()
     plan = plan_trials(CASES.values(), 1, kept[0].root_seed)
     planned = {(*p.key[:2], p.key.config_hash) for p in plan}
@@ -160,7 +160,7 @@ def test_the_reference_results_are_of_the_papers_settings():
 
 
 @pytest.mark.parametrize("agent", ["sdnn-c", "fuzzy"])
-def test_running_a_trial_again_gives_its_reference_result(tmp_path, agent):
+def test_a_repeated_trial_equals_its_reference_result(tmp_path, agent):
     kept = next(one for one in reference_results() if (one.case_id, one.agent) == ("s4", agent))
     plan = plan_trials([CASES["s4"]], 1, kept.root_seed)
     own = [planned for planned in plan if planned.key.agent == agent]
@@ -180,7 +180,7 @@ def fake_results(tmp_path, run, collected):
     return collected(EXPERIMENTS[0], tmp_path, 12)
 
 
-def test_written_trials_are_read_back(monkeypatch, tmp_path, fake_results):
+def test_written_reference_results_are_read_unchanged(monkeypatch, tmp_path, fake_results):
     content = script.reference_csv(fake_results, 7)
     (tmp_path / "kept.csv").write_bytes(content)
     assert tuple(content.decode().splitlines()[0].split(",")) == HEADER
@@ -196,7 +196,7 @@ def test_written_trials_are_read_back(monkeypatch, tmp_path, fake_results):
             np.testing.assert_array_equal(one.values[name], summary.values[name])
 
 
-def test_short_trials_are_not_kept(fake_results):
+def test_short_trials_are_refused_as_reference_results(fake_results):
     short = replace(fake_results[0], last_episode=300)
     refuses("s4", script.reference_csv, [short], 7)
 
@@ -238,7 +238,9 @@ def test_reports_show_the_reference_results(fake_results):
     assert 'class="verdict open">inconclusive</td>' in page
 
 
-def test_only_more_trials_of_the_same_settings_are_shown(monkeypatch, tmp_path, use_trial):
+def test_reference_results_are_shown_for_fewer_trials_of_the_same_settings_only(
+    monkeypatch, tmp_path, use_trial
+):
     use_trial(fake_trial.FakeTrial)
 
     def shown(**request):

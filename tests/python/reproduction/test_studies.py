@@ -1,4 +1,4 @@
-"""Hand-made trials: measures, paired differences, ends solved, claims, tables, figure."""
+"""Comparisons of hand-made trials: paired differences, claims, tables and figure."""
 
 import json
 import math
@@ -62,7 +62,7 @@ def records_of_two(study):
     ]
 
 
-def test_differences_are_paired_by_trial(study):
+def test_differences_between_variants_are_paired_by_trial(study):
     found = compare(mine := study(TWO), records_of_two(mine))
     old, new = (found.measured["s4-noise", name] for name in ("old", "new"))
     assert old.result.values["final_share_solved"].tolist() == [1.0, 1.0, 0.2, 0.0]
@@ -95,7 +95,7 @@ budget.episodes = 3000
 """
 
 
-def test_variants_that_only_last_longer_do_not_differ(study):
+def test_variants_with_longer_trials_only_do_not_differ(study):
     mine = study(LENGTHS)
     runs = {
         ("s4", "short"): ((100, 4),), ("s4", "long"): ((300, 4),),
@@ -120,7 +120,7 @@ def test_variants_that_only_last_longer_do_not_differ(study):
     assert png.startswith(b"\x89PNG")
 
 
-def test_claims_are_censored_where_their_own_trials_end(study):
+def test_claims_of_each_case_are_censored_at_its_last_episode(study):
     text = LENGTHS.replace('"s4", "s4-noise"', '"s4", "s4-noise", "s6"')
     mine = study(text + "[variants.long.cases.s6]\nbudget.episodes = 5000\n")
     n_tests = {"s4": 300, "s4-noise": 300, "s6": 500}
@@ -136,7 +136,7 @@ def test_claims_are_censored_where_their_own_trials_end(study):
     assert [one["ours"]["value"] for one in told["checks"]] == [">3000", ">5000"]
 
 
-def test_returns_have_the_digits_that_tell_them_apart():
+def test_returns_are_formatted_with_significant_digits():
     small = Estimate(0.00498, 0.0049, 0.0051)
     assert format_estimate(small, "final_return", 9) == "0.00498 [0.0049, 0.0051]"
     assert (
@@ -154,13 +154,13 @@ def test_returns_have_the_digits_that_tell_them_apart():
     )
 
 
-def test_dollar_signs_of_titles_are_dollar_signs(study):
+def test_dollar_signs_in_titles_can_be_drawn(study):
     mine = study(TWO.replace('title = "the new one"', 'title = "a$_$"'))
     png, _ = figure_bytes(draw_study(compare(mine, records_of_two(mine)), "at $1 or $_$"))
     assert png.startswith(b"\x89PNG")
 
 
-def test_few_trials_are_never_called_different(study):
+def test_differences_of_fewer_than_six_trials_are_not_called_different(study):
     for n_trials, differs in ((5, False), (6, True)):
         mine = study(TWO, n_trials=n_trials)
         records = [
@@ -174,7 +174,7 @@ def test_few_trials_are_never_called_different(study):
         assert not found.differs("mean_return")
 
 
-def test_incomplete_studies_are_omitted_and_named(study):
+def test_incomplete_combinations_are_omitted_with_a_warning(study):
     mine = study(TWO)
     records = records_of_two(mine)
     found = compare(mine, records[:-1])
@@ -233,7 +233,7 @@ def test_claims_are_judged_for_each_variant(study):
     }  # fmt: skip
 
 
-def test_chances_are_shown_from_twice_the_papers_trials_on(study):
+def test_chances_are_shown_from_20_trials_on(study):
     def chances(n_trials):
         mine = study(CLAIMED, n_trials=n_trials)
         return compare(mine, claimed_records(mine, n_trials))
@@ -257,7 +257,7 @@ def test_chances_are_shown_from_twice_the_papers_trials_on(study):
     assert title in page_of(found).to_html("")
 
 
-def test_small_runs_are_not_judged_and_claims_without_their_cases_not_shown(study):
+def test_small_studies_are_not_judged_and_show_claims_of_complete_cases_only(study):
     mine = study(CLAIMED, n_trials=2)
     records = [
         record(mine, case, variant, number, steps_of((60, 4)))
@@ -274,7 +274,7 @@ def test_small_runs_are_not_judged_and_claims_without_their_cases_not_shown(stud
 OWN = "[base]\nenvironment = 'sdnn/PaperAcrobot-v0'\n"
 
 
-def test_a_case_that_is_not_the_papers_has_no_claims(study):
+def test_custom_cases_have_no_claims(study):
     mine = study(OWN + "[study]\ntrials = 10\n[cases.mine]\n[variants.a]\n")
     records = [record(mine, "mine", "a", n, steps_of((1500, 4))) for n in range(10)]
     assert not any(judge_variants(compare(mine, records)).values())
@@ -308,7 +308,7 @@ def mixed(study):
     return compare(mine, records)
 
 
-def test_environments_are_judged_by_their_return(mixed):
+def test_other_environments_are_measured_by_their_returns(mixed):
     swing = mixed.measured["swing", "b"]
     assert tuple(swing.result.values) == ("final_return", "mean_return")
     assert swing.result.values["final_return"].tolist() == [28.5, 28.5]  # the last 2 of 20
@@ -336,7 +336,7 @@ def test_tables_have_a_row_for_each_variant_in_each_case(mixed):
     assert "| b | +10 [+10, +10] | +10 [+10, +10] |" in text
 
 
-def test_the_table_is_json(mixed):
+def test_the_table_of_a_study_is_valid_json(mixed):
     table = json.loads(json.dumps(json_of(mixed), allow_nan=False))
     assert [(r["case"], r["variant"], r["n_end_solved"]) for r in table["results"]] == [
         ("s4", "a", 2), ("s4", "b", 2), ("s4", "c", 2),
@@ -348,7 +348,7 @@ def test_the_table_is_json(mixed):
     assert swing["differences"]["mean_return"] == {"value": 10.0, "lower": 10.0, "upper": 10.0}
 
 
-def test_the_figure_is_the_same_each_time_and_shows_every_trial(mixed):
+def test_the_figure_shows_every_trial_and_is_reproducible(mixed):
     figure = draw_study(mixed, "footer")
     assert figure_bytes(figure) == figure_bytes(draw_study(mixed, "footer"))
     assert "filled: the reference, and what" in figure.texts[-1].get_text()

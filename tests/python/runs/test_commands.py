@@ -31,7 +31,7 @@ SHORT = ("--steps", 150, "--evaluate-every", 70, "--evaluation-episodes", 2, *SM
 DRIFTING = "drifting_env:tests/Drifting-v0"
 
 
-def test_train_evaluate_plot_record(invoke, tmp_path):
+def test_a_run_is_trained_evaluated_plotted_and_recorded(invoke, tmp_path):
     done = invoke("train", DRIFTING, *SHORT, "--seed", 3)
     assert done.exit_code == 0, done.output
     assert done.stderr == ""  # no progress where there is no terminal
@@ -78,7 +78,7 @@ def test_train_evaluate_plot_record(invoke, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:.*render_mode")
-def test_an_environment_that_cannot_be_rendered_is_not_recorded(invoke, tmp_path):
+def test_record_refuses_environments_that_cannot_be_rendered(invoke, tmp_path):
     done = invoke("train", "drifting_env:tests/Unseen-v0", *SHORT, "--out", "one")
     commands = done.stdout.splitlines()[-1]
     assert "sdnn plot one" in commands
@@ -90,7 +90,7 @@ def test_an_environment_that_cannot_be_rendered_is_not_recorded(invoke, tmp_path
     assert not (tmp_path / "x.gif").exists()
 
 
-def test_export_writes_a_c_header_of_a_run_or_an_agents_file(invoke, tmp_path):
+def test_export_writes_the_c_header_of_a_run_or_an_agent_file(invoke, tmp_path):
     assert invoke("train", DRIFTING, *SHORT, "--seed", 3, "--out", "run").exit_code == 0
     done = invoke("export", "run", "--c-header", "drift.h")
     assert done.exit_code == 0, done.output
@@ -109,7 +109,7 @@ def test_export_writes_a_c_header_of_a_run_or_an_agents_file(invoke, tmp_path):
     assert "text" not in told
 
 
-def test_export_writes_an_agent_that_learns(invoke):
+def test_export_with_learning_writes_linear_agents_and_refuses_unlimited_networks(invoke):
     linear = ("--agent", "q-lambda", *SHORT[:6], *SMALL[-2:], "--out", "one")
     assert invoke("train", DRIFTING, *linear).exit_code == 0
     done = invoke("export", "one", "--c-header", "drift.h", "--learning")
@@ -124,7 +124,7 @@ def test_export_writes_an_agent_that_learns(invoke):
     assert not Path("b.h").exists()
 
 
-def test_an_agent_that_needs_masks_is_not_exported(invoke, tmp_path):
+def test_export_refuses_agents_trained_with_action_masks(invoke, tmp_path):
     words = ("--agent", "q-lambda", "--steps", 60, "--evaluate-every", 0, "--out", "one")
     masks = ("--set", "environment.action_masks=true")
     taxi = "Taxi-v4" if "Taxi-v4" in gym.registry else "Taxi-v3"  # before Gymnasium 1.3
@@ -145,7 +145,7 @@ SCALED_LINES = [
 ]
 
 
-def test_runs_and_exports_name_the_scaling_of_observations(invoke):
+def test_train_and_export_state_the_scaling_of_observations(invoke):
     done = invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one")
     told = done.stdout.splitlines()[-2]
     assert "0 from -4 to 4, 1 from -2 to 3, and means of neighbours (1)" in told
@@ -162,7 +162,7 @@ def test_runs_and_exports_name_the_scaling_of_observations(invoke):
     assert told["scaling"] == {"ranges": [[-4.0, 4.0], [-2.0, 3.0]], "redundant": 1}
 
 
-def test_a_copied_agent_file_names_the_scaling_of_its_run(invoke):
+def test_a_copied_agent_file_keeps_the_scaling_of_its_run(invoke):
     assert invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one").exit_code == 0
     Path("agent.safetensors").write_bytes(Path("one/agent.safetensors").read_bytes())
     Path("config.json").write_text("of another program")
@@ -178,7 +178,7 @@ def test_a_copied_agent_file_names_the_scaling_of_its_run(invoke):
         refuses("4", use, agent, gym.make("tests/Drifting-v0"))
 
 
-def test_the_named_scaling_gives_the_observations_of_the_agent(invoke):
+def test_unit_sensors_with_the_stated_scaling_fit_the_agent(invoke):
     noisy = ("--noise", 0.01, "--range", "-4:4")
     assert invoke("train", DRIFTING, *SHORT, *noisy, "--out", "one").exit_code == 0
     agent = load_agent("one/agent.safetensors")
@@ -196,7 +196,7 @@ def test_a_run_is_exported_where_its_environment_cannot_be_made(invoke):
     assert SCALED_LINES[0] in invoke("export", "one", "--c-header", "a.h").stdout
 
 
-def test_errors_of_export_name_the_problem(invoke, tmp_path):
+def test_errors_of_export_name_option_or_file_and_write_nothing(invoke, tmp_path):
     space = gym.spaces.Box(-1.0, 1.0, (2,))
     SDNNQLearning(space, space).save("sdnn.safetensors")
     RBFQLearning(space, gym.spaces.Box(-1.0, 1.0, (1,))).save("rbf.safetensors")
@@ -223,7 +223,7 @@ def test_errors_of_export_name_the_problem(invoke, tmp_path):
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_several_runs_are_drawn_in_one_figure(invoke, tmp_path):
+def test_plot_draws_several_runs_as_one_curve(invoke, tmp_path):
     for seed in (1, 2):
         assert invoke("train", DRIFTING, *SHORT, "--seed", seed).exit_code == 0
     folders = sorted((tmp_path / "runs").iterdir())
@@ -232,7 +232,7 @@ def test_several_runs_are_drawn_in_one_figure(invoke, tmp_path):
     assert {(one["kind"], one["n_runs"], one["run"]) for one in drawn} == {("evaluation", "2", "")}
 
 
-def test_plot_names_runs_that_a_figure_omits(invoke, tmp_path):
+def test_plot_names_runs_without_rows(invoke, tmp_path):
     for seed in (1, 2):
         short = SHORT if seed == 1 else ("--dry-run", *SHORT)
         values = invoke("train", DRIFTING, *short, "--seed", seed, "--out", f"run{seed}").stdout
@@ -246,7 +246,7 @@ def test_plot_names_runs_that_a_figure_omits(invoke, tmp_path):
     assert "run1" not in done.stderr
 
 
-def test_dry_run_shows_the_configuration_and_writes_nothing(invoke, tmp_path):
+def test_train_dry_run_prints_the_configuration_and_writes_nothing(invoke, tmp_path):
     done = invoke(
         "train", "CartPole-v1", "--agent", "sdnn-c", "--preset", "robust", "--episodes", 7,
         "--noise", 0.1, "--redundant", 2, "--range", "-4:4", "--range", "1=-3:3",
@@ -273,7 +273,7 @@ def test_dry_run_shows_the_configuration_and_writes_nothing(invoke, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_angles_are_found_in_their_cosines_and_sines(invoke):
+def test_angle_pairs_find_makes_the_angle_of_pendulum_circular(invoke):
     done = invoke(
         "train", "Pendulum-v1", "--steps", 70, "--angle-pairs", "find", "--out", "one", *SMALL
     )
@@ -281,7 +281,7 @@ def test_angles_are_found_in_their_cosines_and_sines(invoke):
     assert Run.open("one").agent().approximator.circular == (True, False)
 
 
-def test_options_come_before_a_file(invoke, tmp_path):
+def test_options_override_the_configuration_file(invoke, tmp_path):
     (tmp_path / "mine.toml").write_text(
         'environment = "CartPole-v1"\nbudget.steps = 5\nseed = 8\nagent = "sdnn-c-robust"\n'
         "[learning]\ndiscount = 0.5\nepsilon = 0.2\n"
@@ -313,19 +313,19 @@ def test_options_come_before_a_file(invoke, tmp_path):
         (["--agent", "rbf", "--set", "agent.name=rbf"], ["--set agent.name", "--agent"]),
     ],
 )
-def test_two_options_do_not_set_the_same(invoke, options, words):
+def test_two_options_for_one_setting_are_refused(invoke, options, words):
     result = invoke("train", "CartPole-v1", *options, "--dry-run")
     assert (result.exit_code, result.stdout) == (2, "")
     assert all(word in result.stderr for word in words), result.stderr
 
 
-def test_help_names_the_defaults_of_environments(invoke):
+def test_the_help_of_train_states_the_default_number_of_steps(invoke):
     text = " ".join(invoke("train", "--help").stdout.split())
     assert "acrobot" not in text
     assert "By default 200,000" in text
 
 
-def test_the_module_of_an_environment_may_register_the_agent(invoke, tmp_path, monkeypatch):
+def test_an_environment_module_may_register_an_agent(invoke, tmp_path, monkeypatch):
     (tmp_path / "my_room.py").write_text(
         "import gymnasium as gym\nfrom dataclasses import replace\n"
         "from sdnn.runs import AGENTS, register\n"
@@ -346,7 +346,7 @@ def test_the_module_of_an_environment_may_register_the_agent(invoke, tmp_path, m
         gym.registry.pop("my/Room-v0", None)
 
 
-def test_a_specification_is_toml_or_json(invoke, tmp_path):
+def test_configuration_files_must_be_toml_or_json(invoke, tmp_path):
     (tmp_path / "mine.sh").write_text("echo")
     for command in (["train", "--config", "mine.sh"], ["sweep", "mine.sh"]):
         result = invoke(*command)
@@ -354,7 +354,7 @@ def test_a_specification_is_toml_or_json(invoke, tmp_path):
         assert re.search(r"mine\.sh: .*\.toml or \.json", result.stderr)
 
 
-def test_several_environments_are_learned_in(invoke):
+def test_train_with_n_envs_learns_in_several_environments(invoke):
     done = invoke("train", DRIFTING, *SHORT, "--n-envs", 4, "--out", "four", "--json")
     assert done.exit_code == 0, done.output
     assert json.loads(done.stdout)["n_steps"] == 150
@@ -409,7 +409,7 @@ def test_several_environments_are_learned_in(invoke):
         (["CartPole-v1", "--fast"], "--fast"),
     ],
 )
-def test_wrong_usage_is_exit_code_2_and_names_the_option(invoke, tmp_path, arguments, words):
+def test_bad_options_of_train_exit_with_2_and_name_the_option(invoke, tmp_path, arguments, words):
     result = invoke("train", *arguments)
     assert result.exit_code == 2
     assert words in result.stderr
@@ -417,9 +417,7 @@ def test_wrong_usage_is_exit_code_2_and_names_the_option(invoke, tmp_path, argum
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_missing_tensorboard_is_an_error_before_anything_is_written(
-    invoke, tmp_path, monkeypatch
-):
+def test_a_missing_tensorboard_is_refused_before_training(invoke, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "tensorboardX", None)
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
     result = invoke("train", "CartPole-v1", "--tensorboard")
@@ -498,7 +496,7 @@ discount = 0.5
         ),
     ],
 )
-def test_errors_in_a_file_differ_from_errors_in_options(invoke, tmp_path, text, arguments, words):
+def test_errors_name_the_line_of_the_file_or_the_option(invoke, tmp_path, text, arguments, words):
     (tmp_path / "mine.toml").write_text(text)
     result = invoke("train", "--config", "mine.toml", *arguments)
     assert result.exit_code == 2
@@ -506,7 +504,7 @@ def test_errors_in_a_file_differ_from_errors_in_options(invoke, tmp_path, text, 
     assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
 
 
-def test_errors_in_the_configuration_of_a_run_name_its_file(invoke, tmp_path):
+def test_an_unknown_environment_of_a_run_is_refused_with_its_configuration_file(invoke, tmp_path):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
     path = Path("one/config.json")
     path.write_text(path.read_text().replace("Drifting-v0", "Gone-v0"))
@@ -516,7 +514,7 @@ def test_errors_in_the_configuration_of_a_run_name_its_file(invoke, tmp_path):
         assert f"{path}: environment.id: " in result.stderr
 
 
-def test_a_run_is_resumed_with_the_specification_that_it_began_with(invoke):
+def test_resume_refuses_a_changed_configuration(invoke):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
     path = Path("one/config.json")
     text = path.read_text()
@@ -547,7 +545,9 @@ class StrongerEnv(drifting_env.DriftingEnv):
         (StrongerEnv, "action_space, Box(-1.0, 1.0, (1,), float32), got"),
     ],
 )
-def test_a_changed_environment_is_reported_in_one_line(invoke, monkeypatch, kind, words):
+def test_changed_spaces_of_an_environment_are_reported_in_one_line(
+    invoke, monkeypatch, kind, words
+):
     short = (*SHORT, "--env-arg", "max_episode_steps=5")  # ends with an episode
     assert invoke("train", DRIFTING, *short, "--out", "one").exit_code == 0
     monkeypatch.setattr(gym.registry["tests/Drifting-v0"], "entry_point", kind)
@@ -564,7 +564,7 @@ def test_a_changed_environment_is_reported_in_one_line(invoke, monkeypatch, kind
 BROKEN = "drifting_env:tests/Broken-v0"
 
 
-def test_an_unusable_reward_is_reported_with_its_step_and_checkpoint(invoke):
+def test_a_reward_of_nan_is_reported_with_its_step_and_the_way_to_resume(invoke):
     often = ("--steps", 400, "--evaluate-every", 0, *SMALL)
     result = invoke("train", BROKEN, *often, "--out", "one run")
     assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
@@ -577,7 +577,7 @@ def test_an_unusable_reward_is_reported_with_its_step_and_checkpoint(invoke):
     assert "sdnn resume two" in result.stderr
 
 
-def test_an_unusable_evaluation_is_reported_in_one_line(invoke, monkeypatch):
+def test_a_reward_of_nan_in_an_evaluation_is_reported_in_one_line(invoke, monkeypatch):
     assert invoke("train", BROKEN, *SHORT, "--out", "one").exit_code == 0
     config = json.loads(Path("one/config.json").read_text())
     config["environment"]["kwargs"] = {"at": 3}
@@ -588,7 +588,7 @@ def test_an_unusable_evaluation_is_reported_in_one_line(invoke, monkeypatch):
         assert re.search(rf"{BROKEN}: .*\bstep 3\b", result.stderr)
 
 
-def test_scaled_observations_need_no_second_environment(invoke):
+def test_scaling_observations_opens_no_second_environment(invoke):
     only = ("drifting_env:tests/Only-v0", *SHORT, "--redundant", 1, "--range", "all=-2:2")
     done = invoke("train", *only, "--evaluate-every", 0, "--out", "one")
     assert done.exit_code == 0
@@ -597,7 +597,7 @@ def test_scaled_observations_need_no_second_environment(invoke):
     assert scaling.ranges == ((-2.0, 2.0), (-2.0, 2.0))
 
 
-def test_without_evaluations_one_environment_is_open_at_a_time(invoke):
+def test_commands_without_evaluations_open_one_environment_at_a_time(invoke):
     only = ("drifting_env:tests/Only-v0", *SHORT)
     assert invoke("train", *only, "--evaluate-every", 0, "--out", "one").exit_code == 0
     for command in (
@@ -617,7 +617,7 @@ def test_without_evaluations_one_environment_is_open_at_a_time(invoke):
     assert drifting_env.OnlyEnv.n_open == 0
 
 
-def test_an_environment_that_does_not_repeat_itself_begins_a_new_episode(invoke):
+def test_resume_with_new_episode_repeats_no_steps(invoke):
     restless = ("drifting_env:tests/Restless-v0", *SHORT, "--evaluate-every", 0)
     assert invoke("train", *restless, "--steps", 70, "--out", "one run").exit_code == 0
     result = invoke("resume", "one run", "--steps", 100)
@@ -633,7 +633,7 @@ def test_an_environment_that_does_not_repeat_itself_begins_a_new_episode(invoke)
 
 
 @pytest.mark.parametrize("kind", ["RuntimeError", "TimeoutError", "BrokenPipeError"])
-def test_an_error_of_an_environment_is_reported_unchanged(invoke, kind):
+def test_an_error_of_an_environment_is_raised_with_its_traceback(invoke, kind):
     failing = ("--env-arg", "error=stalled", "--env-arg", f"kind={kind}")
     short = ("--steps", 400, "--evaluate-every", 0, *SMALL)
     arguments = ("train", BROKEN, *failing, *short, "--out", "one run")
@@ -648,7 +648,7 @@ def test_an_error_of_an_environment_is_reported_unchanged(invoke, kind):
     assert Training.load(run.folder / "checkpoint.safetensors", env).n_steps == 249
 
 
-def test_an_output_that_cannot_be_written_is_reported_in_one_line(invoke, tmp_path):
+def test_a_full_standard_output_is_reported_in_one_line(invoke, tmp_path):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
     command = f"{sys.executable} -m sdnn resume one --json"
     for out, errors in (("> /dev/full", "Error: [Errno 28] No space left"), ("| true", "")):
@@ -659,7 +659,7 @@ def test_an_output_that_cannot_be_written_is_reported_in_one_line(invoke, tmp_pa
         assert done.stderr.count("\n") == bool(errors), done.stderr
 
 
-def test_a_run_is_not_overwritten(invoke):
+def test_train_does_not_overwrite_runs_or_files(invoke):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
     before = Path("one/results.sqlite").read_bytes()
     result = invoke("train", DRIFTING, *SHORT, "--out", "one")
@@ -685,17 +685,9 @@ def test_keep_best_saves_the_best_agent(invoke):
     assert (result.exit_code, "--keep-best" in result.stderr) == (1, True)
 
 
-def test_ranges_that_do_not_suit_are_named(invoke):
-    options = [
-        "--agent",
-        "sdnn-c",
-        "--steps",
-        400,
-        "--range",
-        "0=-100:100",
-        "--range",
-        "1=0:0.0001",
-    ]
+def test_train_reports_ranges_that_are_too_wide_or_too_narrow(invoke):
+    ranges = ("--range", "0=-100:100", "--range", "1=0:0.0001")
+    options = ("--agent", "sdnn-c", "--steps", 400, *ranges)
     lines = invoke("train", "MountainCarContinuous-v0", *options, "--out", "one").stdout
     assert "observed variable 0 moved within 10% of the range" in lines
     assert "observed variable 1 left the range more than 10% of the time" in lines
@@ -703,7 +695,7 @@ def test_ranges_that_do_not_suit_are_named(invoke):
     assert "left the range" not in lines
 
 
-def test_no_hint_about_ranges_when_the_task_is_solved(invoke, monkeypatch):
+def test_train_does_not_report_ranges_of_a_solved_task(invoke, monkeypatch):
     monkeypatch.setattr(gym.spec("MountainCarContinuous-v0"), "reward_threshold", -1e9)
     narrow = ["--agent", "sdnn-c", "--range", "1=0:0.0001", "--set", "protocol.evaluate_every=200"]
     options = [*narrow, "--steps", 400, "--out", "one"]
@@ -712,7 +704,7 @@ def test_no_hint_about_ranges_when_the_task_is_solved(invoke, monkeypatch):
     assert "left the range" not in lines
 
 
-def test_values_that_are_too_coarse_are_named(invoke):
+def test_train_reports_values_in_steps_that_are_too_coarse(invoke):
     task = ("MountainCarContinuous-v0", "--agent", "sdnn-c", "--steps", 800)
     ends = ["approximator.q_low=-1e6", "approximator.q_high=1e6"]
     options = [word for one in ["learning.value_range=fixed", *ends] for word in ("--set", one)]
@@ -721,7 +713,7 @@ def test_values_that_are_too_coarse_are_named(invoke):
     assert "values come in steps" not in invoke("train", *task, "--out", "own").stdout
 
 
-def test_observations_that_are_left_out_are_named(invoke):
+def test_train_reports_observations_that_are_left_out(invoke):
     options = ["--agent", "q-lambda", "--steps", 1001, "--evaluate-every", 0]
     done = invoke("train", "drifting_env:tests/Crowded-v0", *options, "--out", "one", "--json")
     left_out = json.loads(done.stdout)["learning_report"]["left_out"]
@@ -734,7 +726,7 @@ def test_observations_that_are_left_out_are_named(invoke):
     assert "of 6 observations" not in lines
 
 
-def test_an_unfinished_warm_up_is_reported(invoke):
+def test_commands_report_an_unfinished_warm_up(invoke):
     told = WARMING_UP
     begun = ("--steps", 59, "--evaluate-every", 50, "--evaluation-episodes", 1, *SMALL)
     lines = invoke("train", DRIFTING, *begun, "--out", "one").stdout.splitlines()
@@ -753,7 +745,7 @@ def test_an_unfinished_warm_up_is_reported(invoke):
     assert json.loads(invoke("resume", "one", "--json").stdout)["is_warming_up"] is False
 
 
-def test_resume_with_a_new_goal(invoke):
+def test_resume_accepts_later_goals_and_refuses_earlier_or_conflicting_ones(invoke):
     done = json.loads(invoke("train", DRIFTING, *SHORT, "--out", "one", "--json").stdout)
     assert (done["n_steps"], done["reason"], done["folder"]) == (150, "done", "one")
     assert 0.0 <= done["learning_report"]["share_changed"] <= 1.0
@@ -768,7 +760,7 @@ def test_resume_with_a_new_goal(invoke):
 
 
 @pytest.mark.parametrize("command", [["resume"], ["evaluate"], ["plot"], ["record", "x.gif"]])
-def test_folders_that_are_no_runs(invoke, tmp_path, command):
+def test_folders_without_a_run_are_refused(invoke, tmp_path, command):
     word, *more = command
     assert invoke(word, "nowhere", *more).exit_code == 2
     (tmp_path / "empty").mkdir()
@@ -777,7 +769,7 @@ def test_folders_that_are_no_runs(invoke, tmp_path, command):
     assert "Error: empty " in result.stderr
 
 
-def test_files_of_other_kinds_are_wrong_usage(invoke):
+def test_unknown_output_formats_are_refused(invoke):
     assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
     for command, words in (
         (["record", "one", "x.avi"], "OUT"),
@@ -796,7 +788,7 @@ def test_files_of_other_kinds_are_wrong_usage(invoke):
         ('"7"', "7"), ("", ""), ("a\nb", "a\nb"), ("1 # one", 1),
     ],
 )  # fmt: skip
-def test_values_are_as_toml_has_them_or_texts(text, value):
+def test_values_of_options_are_parsed_as_toml_or_kept_as_text(text, value):
     assert value_of(text) == value
 
 
@@ -804,7 +796,7 @@ def test_values_are_as_toml_has_them_or_texts(text, value):
     ("number", "code", "word"),
     [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
 )
-def test_a_signal_stops_a_run_which_resumes_exactly(invoke, tmp_path, number, code, word):
+def test_a_run_stopped_by_a_signal_resumes_exactly(invoke, tmp_path, number, code, word):
     long = (
         DRIFTING, "--steps", 3000, "--evaluate-every", 700, "--evaluation-episodes", 2,
         "--range", "-4:4", "--noise", 0.01, "--checkpoint-every", 300, *SMALL,

@@ -50,7 +50,7 @@ def make(folder, config, returns=(), evaluations=(), every=20):
     return run
 
 
-def test_one_run(tmp_path):
+def test_a_single_run_has_curves_of_returns_running_medians_and_evaluations(tmp_path):
     run = make(tmp_path / "run", CONFIG, [1, 5, 3], [[1, 2, 3, 4, 10], [5, 5, 5, 5, 5]])
     returns, medians, evaluations = curves_of([run])[0]
     assert (returns.task, returns.agent) == ("CartPole-v1", "sdnn-c general")
@@ -64,13 +64,13 @@ def test_one_run(tmp_path):
     assert evaluations.high.tolist() == [4, 5]
 
 
-def test_the_running_median_is_of_twenty_episodes(tmp_path):
+def test_the_running_median_spans_twenty_episodes(tmp_path):
     run = make(tmp_path / "run", CONFIG, range(50))
     _, medians = curves_of([run])[0]
     assert medians.values[-1] == np.median(range(30, 50))
 
 
-def test_several_runs_of_one_task_are_one_curve(tmp_path):
+def test_runs_of_one_task_are_one_curve_with_quartiles(tmp_path):
     means = ([0, 1], [2, 1], [4, 3, 9])
     runs = [
         make(
@@ -91,7 +91,7 @@ def test_several_runs_of_one_task_are_one_curve(tmp_path):
     assert axes.lines[0].get_ydata().tolist() == [2, 1]
 
 
-def test_several_runs_without_evaluations_are_drawn_one_by_one(tmp_path):
+def test_runs_without_evaluations_are_drawn_separately(tmp_path):
     runs = [make(tmp_path / str(n), run_spec(CONFIG, seed=n), [n] * (5 + n)) for n in range(2)]
     curves, _ = curves_of(runs)
     assert [(curve.kind, curve.run) for curve in curves] == [
@@ -99,7 +99,7 @@ def test_several_runs_without_evaluations_are_drawn_one_by_one(tmp_path):
     ]
 
 
-def test_tasks_and_agents_are_parted(tmp_path):
+def test_runs_of_other_tasks_or_settings_are_separate_curves(tmp_path):
     noisy = run_spec(
         CONFIG,
         environment=EnvironmentSpec(
@@ -145,7 +145,7 @@ def configs_that_differ():
         yield run_spec(CONFIG, **change)
 
 
-def test_only_runs_that_differ_in_their_seeds_are_put_together(tmp_path):
+def test_only_runs_that_differ_in_seed_and_output_are_grouped(tmp_path):
     configs = list(configs_that_differ())
     folders = {}
     for n, config in enumerate(configs):
@@ -167,7 +167,7 @@ def test_only_runs_that_differ_in_their_seeds_are_put_together(tmp_path):
     assert len({(group.task, group.agent) for group in groups}) == len(groups)
 
 
-def test_names_state_the_differences_between_runs(tmp_path):
+def test_names_of_groups_state_their_different_settings(tmp_path):
     long = run_spec(CONFIG, steps=600)
     short = run_spec(CONFIG, steps=300)
     goals = {
@@ -187,7 +187,7 @@ def test_names_state_the_differences_between_runs(tmp_path):
     ]
 
 
-def test_goals_that_follow_from_the_seed_keep_runs_together(tmp_path):
+def test_later_goals_at_steps_that_depend_on_the_seed_keep_runs_grouped(tmp_path):
     of_episodes = run_spec(CONFIG, steps=None, episodes=30)
     targeted = run_spec(CONFIG, target_return=5.0)
     for config, one, other in (
@@ -202,7 +202,7 @@ def test_goals_that_follow_from_the_seed_keep_runs_together(tmp_path):
         assert len(groups_of(runs)) == 1
 
 
-def test_runs_that_are_evaluated_at_other_steps_are_both_drawn(tmp_path):
+def test_runs_evaluated_at_different_steps_are_separate_curves(tmp_path):
     runs = [
         make(
             tmp_path / str(every),
@@ -226,12 +226,12 @@ def test_runs_that_are_evaluated_at_other_steps_are_both_drawn(tmp_path):
     assert {curve.run for curve in curves} == {str(run.folder) for run in runs}
 
 
-def test_runs_of_other_lengths_are_not_cut(tmp_path):
+def test_runs_of_different_lengths_keep_their_lengths(tmp_path):
     runs = [make(tmp_path / str(n), run_spec(CONFIG, steps=20 * n), [], [[3]] * n) for n in (2, 5)]
     assert [curve.steps[-1] for curve in curves_of(runs)[0]] == [40, 100]
 
 
-def test_a_figure_names_runs_that_it_omits(tmp_path):
+def test_notes_name_runs_and_evaluations_that_are_omitted(tmp_path):
     seeds = [run_spec(CONFIG, seed=seed) for seed in range(4)]
     whole = make(tmp_path / "whole", seeds[0], [1], [[2], [4], [6]])
     short = make(tmp_path / "short", seeds[1], [1], [[0], [2]])
@@ -253,7 +253,7 @@ def test_a_figure_names_runs_that_it_omits(tmp_path):
     refuses(empty.folder.name, curves_of, [empty, make(tmp_path / "new", CONFIG)], error=RunError)
 
 
-def test_files_hold_the_numbers(tmp_path):
+def test_figures_and_csv_files_are_written_in_every_format(tmp_path):
     run = make(tmp_path / "run", CONFIG, [1.25], [[1, 2]])
     magic = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
     for suffix, first in magic.items():
@@ -267,7 +267,7 @@ def test_files_hold_the_numbers(tmp_path):
     refuses(".png", write_curves, curves_of([run])[0], tmp_path / "x.doc", error=RunError)
 
 
-def test_curves_need_rows_and_matplotlib(tmp_path, monkeypatch):
+def test_runs_without_rows_and_a_missing_matplotlib_are_refused(tmp_path, monkeypatch):
     run = make(tmp_path / "run", CONFIG)
     with pytest.raises(RunError, match="nothing to draw"):
         curves_of([run])

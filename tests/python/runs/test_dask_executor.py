@@ -18,19 +18,19 @@ from sdnn.runs.engine import Failed, Finished, run_to_end
 pytest.importorskip("distributed", reason="needs Dask")
 
 
-def test_a_probe_depends_on_settings_and_rows():
+def test_probes_differ_between_trials_and_contain_their_settings():
     first, second = plan_trials(EXPERIMENTS[0].cases, 1, 0, 30)
     assert probe(first) == probe(first) != probe(second)
     assert first.spec.canonical_json() in probe(first)
 
 
-def test_trials_that_cannot_be_sent_are_refused():
+def test_trials_that_cannot_be_pickled_are_refused():
     plan = plan_trials(EXPERIMENTS[0].cases, 1, 0, 30)
     object.__setattr__(plan[0], "lock", threading.Lock())
     refuses("lock", probes_of, plan, error=ClusterError)
 
 
-def test_a_result_of_another_version_or_trial_fails():
+def test_results_of_another_version_or_trial_count_as_failures():
     first, second = plan_trials(EXPERIMENTS[0].cases, 1, 0, 10)
     *_, (_, record) = run_to_end(first)
 
@@ -55,7 +55,7 @@ def closed_port():
 
 
 @pytest.mark.parametrize("kind", ["address", "scheme", "missing", "malformed"])
-def test_a_bad_address_is_named(tmp_path, closed_port, kind):
+def test_errors_of_the_connection_name_the_scheduler(tmp_path, closed_port, kind):
     path = tmp_path / "scheduler.json"
     scheduler = {
         "address": f"127.0.0.1:{closed_port}",
@@ -85,7 +85,7 @@ def test_a_missing_dask_names_the_package_to_install(monkeypatch, invoke):
     ("name", "value"),
     [("scheduler", ""), ("scheduler_timeout", 0.0), ("scheduler_timeout", float("nan"))],
 )
-def test_bad_arguments_are_named(name, value):
+def test_bad_schedulers_and_timeouts_are_refused_by_name(name, value):
     refuses(name, DaskExecutor, **{"scheduler": "127.0.0.1:8786"} | {name: value})
 
 
@@ -101,7 +101,7 @@ def test_bad_arguments_are_named(name, value):
         (["--executor", "dask", "--scheduler", ""], "scheduler must be"),
     ],
 )
-def test_wrong_usage_is_exit_code_2(options, words, invoke):
+def test_conflicting_options_of_executors_exit_with_2(options, words, invoke):
     result = invoke("reproduce", "a", *options)
     assert result.exit_code == 2
     assert words in result.stderr

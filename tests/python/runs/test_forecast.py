@@ -18,7 +18,7 @@ learning.discount = [0.8, 0.9]
 """
 
 
-def test_stored_trials_count_and_else_a_probe(use_trial, study, tmp_path, monkeypatch):
+def test_forecasts_use_stored_trials_or_else_one_probe(use_trial, study, tmp_path, monkeypatch):
     made = []
 
     class Probed(fake_trial.FakeTrial):
@@ -51,7 +51,7 @@ def test_stored_trials_count_and_else_a_probe(use_trial, study, tmp_path, monkey
     assert forecast["seconds"] == pytest.approx(3.0 + 2 * 10.05)
 
 
-def test_goals_in_steps_and_in_episodes_are_probed_apart(study, tmp_path, monkeypatch):
+def test_budgets_in_steps_and_in_episodes_have_separate_probes(study, tmp_path, monkeypatch):
     def probe(planned):
         return 3.0 if planned.spec.budget.steps is None else 0.01, 5  # for an episode, a step
 
@@ -72,7 +72,7 @@ def test_goals_in_steps_and_in_episodes_are_probed_apart(study, tmp_path, monkey
     assert [trial["seconds_of_a_trial"] for trial in forecast["trials"]] == [300.0, 200.0]
 
 
-def test_python_trials_share_a_core(monkeypatch):
+def test_forecasts_run_python_trials_one_at_a_time_and_compiled_ones_on_all_cores(monkeypatch):
     monkeypatch.setattr(sweep, "n_cores", lambda: 16)
     compiled, locked = (8.0, True), (4.0, False)
     assert wall_seconds(4 * [compiled], 2) == 16.0

@@ -1,4 +1,4 @@
-"""Names out of a stranger's store or study do no harm in tables, pages and figures."""
+"""Hostile names in a store or study are harmless in tables, pages and figures."""
 
 import csv
 import json
@@ -57,7 +57,7 @@ def table_of(name):
 @settings(max_examples=40, deadline=None)
 @given(NAMES)
 @example(WORST)
-def test_no_cell_of_a_csv_file_is_a_formula(name):
+def test_hostile_names_are_no_formulas_in_csv_files(name):
     header, *rows = csv.reader(
         csv_bytes([name], [[name], [-1.5], ["-1.5"]]).decode().splitlines(True)
     )
@@ -70,7 +70,7 @@ def test_no_cell_of_a_csv_file_is_a_formula(name):
 @settings(max_examples=40, deadline=None)
 @given(NAMES)
 @example(WORST)
-def test_markdown_shows_names_as_they_are(name):
+def test_markdown_shows_hostile_names_as_plain_text(name):
     page = Page(
         title=name, intro=f"About {name}", warnings=[name], source=f"From {name}",
         sections=[Section(table=table_of(name), notes=[f"About {name}"], terms={"a": name})],
@@ -84,7 +84,7 @@ def test_markdown_shows_names_as_they_are(name):
 @settings(max_examples=40, deadline=None)
 @given(NAMES)
 @example(WORST)
-def test_html_shows_names_as_they_are(name):
+def test_html_shows_hostile_names_as_plain_text(name):
     table = table_of(name)
     page = Page(
         title=name, intro=name, warnings=[name], source=name,
@@ -104,7 +104,7 @@ def test_html_shows_names_as_they_are(name):
 
 
 @pytest.mark.parametrize("name", [WORST, "$\\frac{", "&<>\"'", "=1+1", "-x|\\"])
-def test_a_study_of_hostile_names(study, name):
+def test_the_outputs_of_a_study_with_hostile_names_are_harmless(study, name):
     mine = study(
         f"[study]\ntitle = {json.dumps(name)}\ntrials = 2\n"
         f"[cases.mine]\ntitle = {json.dumps(name)}\nenvironment = 'sdnn/PaperAcrobot-v0'\n"

@@ -36,11 +36,11 @@ def of_rows(name, steps, returns=None):
         pytest.param([5] * 9, math.inf, id="fewer tests than a window"),
     ],
 )
-def test_learned_at_the_first_good_window_that_begins_with_a_good_test(steps, episode):
+def test_episodes_to_learn_end_at_the_first_good_window_that_begins_solved(steps, episode):
     assert episodes_to_learn(episodes(steps), steps) == episode
 
 
-def test_final_measures_use_the_last_fifty_tests():
+def test_final_measures_use_the_last_50_evaluations():
     steps = [3] * 100 + [50] * 24 + [4] * 26
     assert of_rows("final_steps", steps) == 4.0
     assert final_share_solved([s < 50 for s in steps]) == 0.52
@@ -61,29 +61,29 @@ def test_final_measures_use_the_last_fifty_tests():
         pytest.param([7, 50] * 100, 0.0, id="never mastered for a run"),
     ],
 )
-def test_a_collapse_is_the_end_of_the_last_mastered_run(steps, episode):
+def test_the_episode_of_collapse_ends_the_last_mastered_run(steps, episode):
     assert episode_of_collapse(episodes(steps), steps) == episode
 
 
-def test_too_few_tests_for_a_run_say_nothing():
+def test_fewer_than_50_evaluations_have_no_episode_of_collapse():
     assert math.isnan(episode_of_collapse(episodes([7] * 49), [7] * 49))
 
 
-def test_early_steps_are_those_of_the_first_episodes():
+def test_early_steps_are_the_median_of_the_first_evaluations():
     steps = [4] * 150 + [8] * 100 + [50] * 750
     assert of_rows("early_steps", steps) == 4.0
     assert of_rows("early_steps", [50] * 251) == 50.0
 
 
 @pytest.mark.parametrize("n_tests", [1, 9, 10, 49, 50, 137])
-def test_measures_take_trials_of_any_length(n_tests):
+def test_measures_are_within_bounds_for_trials_of_any_length(n_tests):
     steps = np.random.default_rng(n_tests).integers(1, 51, n_tests)
     assert episodes_to_learn(episodes(steps), steps) > 0
     assert 1 <= of_rows("final_steps", steps) <= 50
     assert 0 <= final_share_solved(steps < 50) <= 1
 
 
-def test_returns_are_averaged_over_all_tests_or_the_last_tenth():
+def test_mean_and_final_returns_average_all_or_the_last_tenth():
     def mean_and_final(returns):
         steps = np.full(len(returns), 50)
         return [of_rows(name, steps, returns) for name in ("mean_return", "final_return")]

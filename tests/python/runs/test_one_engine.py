@@ -40,7 +40,7 @@ def imports(name):
     return is_wanted
 
 
-def test_one_loop_steps_environments_and_learns():
+def test_only_the_training_loop_steps_environments_and_learns():
     steps, acts, learns = map(modules_with, map(calls, ("step", "act", "learn")))
     outside = {name for name in steps if not name.startswith("environments/")}
     assert outside == {"training/loop", "training/episodes"}
@@ -50,17 +50,17 @@ def test_one_loop_steps_environments_and_learns():
     assert acts - agents == {"training/loop", "training/evaluation"}
 
 
-def test_one_store_knows_sqlite():
+def test_only_the_store_imports_sqlite():
     assert modules_with(imports("sqlite3")) == {"runs/journal", "runs/store"}
 
 
-def test_one_display_draws_progress():
+def test_only_one_module_draws_progress_bars():
     drawn = modules_with(imports("rich.progress"))
     # The estimators' bars are the epochs of `verbose`, in notebooks and logs, too.
     assert drawn - {"estimators/training"} == {"support/progress"}
 
 
-def test_one_name_for_each_agent():
+def test_each_agent_class_has_one_registered_id():
     kinds = {entry.agent for entry in AGENTS.values()}
     assert len(kinds) == len(AGENTS)
     assert set(AGENTS) == {"sdnn-c", "q-lambda", "actor-critic", "rbf", "fuzzy"}

@@ -31,7 +31,7 @@ def run(tmp_path_factory):
     return made
 
 
-def test_gif_has_a_frame_per_state(run, tmp_path):
+def test_a_gif_shows_every_state_of_an_evaluation_episode(run, tmp_path):
     recording = record(run, tmp_path / "x.gif", seed=5)
     evaluation = run.evaluate(1, seed=5)
     assert recording.n_frames == evaluation.lengths[0] + 1
@@ -51,11 +51,11 @@ def test_gif_has_a_frame_per_state(run, tmp_path):
     assert np.array_equal(first, env.render())
 
 
-def test_steps_can_be_limited(run, tmp_path):
+def test_max_steps_limits_the_frames_of_a_recording(run, tmp_path):
     assert record(run, tmp_path / "x.gif", max_steps=5).n_frames == 6
 
 
-def test_mp4_has_even_sides_and_all_frames(run, tmp_path):
+def test_an_mp4_has_even_sides_and_every_frame(run, tmp_path):
     recording = record(run, tmp_path / "x.mp4", seed=5)
     program = imageio_ffmpeg.get_ffmpeg_exe()
     command = [program, "-i", tmp_path / "x.mp4", "-f", "null", "-"]
@@ -67,7 +67,7 @@ def test_mp4_has_even_sides_and_all_frames(run, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:.*render_modes")
-def test_an_environment_need_not_say_how_it_is_rendered(run, tmp_path, monkeypatch):
+def test_environments_without_render_metadata_are_recorded(run, tmp_path, monkeypatch):
     monkeypatch.setattr(drifting_env.DriftingEnv, "metadata", {})
     assert record(run, tmp_path / "x.gif", max_steps=3).n_frames == 4
     assert run.train(steps=101).has_pictures is False
@@ -80,18 +80,18 @@ def test_recordings_show_frames_between_decisions(tmp_path):
     run = Run.create(tmp_path / "run", config)
     run.train()
     recording = record(run, tmp_path / "x.gif", max_steps=2)
-    assert recording.n_frames == 51
+    assert recording.n_frames == 51  # the reset's, and 25 of each decision
     with Image.open(tmp_path / "x.gif") as picture:
         assert picture.n_frames == 51
         assert picture.info["duration"] == 40
 
 
-def test_a_missing_package_is_named(run, tmp_path, monkeypatch):
+def test_a_missing_imageio_ffmpeg_is_named(run, tmp_path, monkeypatch):
     monkeypatch.setattr("sdnn.runs.recording.find_spec", lambda name: None)
     refuses("imageio-ffmpeg", record, run, tmp_path / "x.gif", error=RunError)
 
 
-def test_other_formats_and_missing_frames_cannot_be_recorded(run, tmp_path, monkeypatch):
+def test_unknown_formats_and_invalid_frames_are_refused(run, tmp_path, monkeypatch):
     refuses(".gif", record, run, tmp_path / "x.avi", error=RunError)
     for picture in (None, "text", np.zeros((3, 3)), []):
         monkeypatch.setattr(drifting_env.DriftingEnv, "render", lambda self, p=picture: p)

@@ -67,7 +67,7 @@ def whole(tmp_path_factory):
     return _whole
 
 
-def test_a_run_is_made_where_a_killed_one_has_left_its_first_file(tmp_path):
+def test_a_run_is_created_over_the_partial_file_of_a_killed_one(tmp_path):
     left = tmp_path / "config.json.0123456789abcdef.partial"
     left.touch()
     assert Run.create(tmp_path, CONFIG).folder == tmp_path
@@ -111,7 +111,7 @@ def test_a_run_stopped_at_any_step_resumes_exactly(whole, tmp_path, config):
     expected = contents(whole(config))
     steps = sorted(random.Random(5).sample(range(1, 400), 12))
     run = Run.create(tmp_path / "run", config)
-    for step in steps:  # within an episode, as good as always
+    for step in steps:  # almost always within an episode
         outcome = Run.open(run.folder).train(callbacks=[Stop(step)])
         assert (outcome.n_steps, outcome.reason) == (step, "stopped")
     assert Run.open(run.folder).train().reason == "done"
@@ -129,14 +129,14 @@ class FailAt(Callback):
             raise ZeroDivisionError
 
 
-def test_after_an_error_a_run_resumes_from_the_last_checkpoint(whole, tmp_path):
+def test_after_an_error_in_a_callback_a_run_resumes_from_its_last_checkpoint(whole, tmp_path):
     run = Run.create(tmp_path / "run", CONFIG)
     with pytest.raises(ZeroDivisionError):
         run.train(callbacks=[FailAt(155)])
     env, evaluation_env = (CONFIG.environment.make() for _ in range(2))
     path = run.folder / "checkpoint.safetensors"
     kept = Training.load(path, env, evaluation_env=evaluation_env)
-    assert kept.n_steps == 140
+    assert kept.n_steps == 140  # a checkpoint every 70 steps, the error after 155
     run.train()
     assert contents(run) == contents(whole(CONFIG))
 
@@ -154,7 +154,7 @@ def test_a_run_killed_at_any_instant_resumes_exactly(whole, tmp_path):
     assert contents(Run(tmp_path / "run", config)) == contents(whole(config))
 
 
-def test_a_target_stops_the_run_and_a_new_goal_drops_it(tmp_path):
+def test_a_target_return_stops_a_run_until_a_new_goal_replaces_it(tmp_path):
     config = run_spec(CONFIG, target_return=-1e9)
     run = Run.create(tmp_path / "run", config)
     outcome = run.train()
@@ -179,12 +179,12 @@ def test_a_new_goal_is_kept_when_the_run_is_stopped_again(tmp_path):
     assert run.train(episodes=20).n_episodes == 20
 
 
-def test_a_goal_before_the_first_checkpoint(tmp_path):
+def test_a_run_may_end_before_its_first_checkpoint(tmp_path):
     run = Run.create(tmp_path / "run", CONFIG)
     assert run.train(steps=30).n_steps == 30
 
 
-def test_a_new_run_makes_each_environment_once(tmp_path, monkeypatch):
+def test_a_run_makes_training_and_evaluation_environment_once(tmp_path, monkeypatch):
     made = []
     make = EnvironmentSpec.make
     monkeypatch.setattr(
@@ -194,7 +194,7 @@ def test_a_new_run_makes_each_environment_once(tmp_path, monkeypatch):
     assert sorted(made) == ["evaluation_sensor_noise", "sensor_noise"]
 
 
-def test_existing_files_are_not_overwritten(whole, tmp_path):
+def test_create_refuses_folders_with_a_run_or_other_files(whole, tmp_path):
     run = whole(CONFIG)
     before = contents(run)
     with pytest.raises(RunError, match="sdnn resume"):
@@ -206,7 +206,7 @@ def test_existing_files_are_not_overwritten(whole, tmp_path):
     refuses("run", Run.create, tmp_path / "mine" / "thesis.txt", CONFIG, error=RunError)
 
 
-def test_a_run_whose_checkpoint_is_missing_does_not_start_again(tmp_path):
+def test_a_run_with_a_missing_checkpoint_is_not_restarted(tmp_path):
     run = Run.create(tmp_path / "run", CONFIG)
     with ResultStore(run.folder):  # killed before the first checkpoint
         pass
@@ -217,7 +217,7 @@ def test_a_run_whose_checkpoint_is_missing_does_not_start_again(tmp_path):
     assert [path.read_bytes() for path in sorted(run.folder.iterdir())] == before
 
 
-def test_a_run_that_cannot_be_resumed_stays_finished(tmp_path, monkeypatch):
+def test_a_run_that_cannot_be_resumed_remains_finished(tmp_path, monkeypatch):
     run = Run.create(tmp_path / "run", run_spec(CONFIG, steps=50))
     run.train()
     refuses("steps", run.train, steps=20, error=ConfigError)
@@ -227,7 +227,7 @@ def test_a_run_that_cannot_be_resumed_stays_finished(tmp_path, monkeypatch):
         assert store.keys() == {run.key}
 
 
-def test_a_run_counts_the_time_of_all_its_parts(tmp_path):
+def test_the_time_of_a_run_is_the_sum_over_its_parts(tmp_path):
     run = Run.create(tmp_path / "run", CONFIG)
     parts = []
     for step in (150, 300, 400):
@@ -239,12 +239,12 @@ def test_a_run_counts_the_time_of_all_its_parts(tmp_path):
     assert max(parts) < record.seconds < sum(parts)
 
 
-def test_episodes_without_seeds_are_no_run_in_a_folder(tmp_path):
+def test_runs_refuse_episodes_without_seeds(tmp_path):
     refuses("seeded_episodes", Run.create, tmp_path / "run", paper_spec(), error=ConfigError)
     assert not (tmp_path / "run").exists()
 
 
-def test_nothing_is_written_for_impossible_settings(tmp_path):
+def test_create_with_impossible_settings_writes_nothing(tmp_path):
     wrong = run_spec(CONFIG, environment=EnvironmentSpec(id="Nothing-v0"))
     with pytest.raises(ConfigError):
         Run.create(tmp_path / "run", wrong)
@@ -258,7 +258,7 @@ def _no_locks(*_, **__):
     raise OSError(errno.ENOLCK, "No locks available")
 
 
-def test_two_processes_do_not_train_one_run(tmp_path, monkeypatch):
+def test_a_run_that_another_process_trains_is_refused(tmp_path, monkeypatch):
     run = Run.create(tmp_path / "run", CONFIG)
     code = f"from sdnn.runs import Run; Run.open({str(run.folder)!r}).train(steps=20)"
     with run._locked():
@@ -268,26 +268,26 @@ def test_two_processes_do_not_train_one_run(tmp_path, monkeypatch):
     assert b"process" in other.stderr
     assert not run.rows()
     assert run.train(steps=20).n_steps == 20
-    monkeypatch.setattr("filelock.lock_descriptor", _no_locks)  # as in some network folders
+    # Some file systems of networks have no locks.
+    monkeypatch.setattr("filelock.lock_descriptor", _no_locks)
     assert run.train(steps=40).n_steps == 40
 
 
-def test_agents_and_evaluations(whole):
+def test_a_run_loads_its_agent_and_evaluates_it_reproducibly(whole):
     run = whole(CONFIG)
     np.testing.assert_array_equal(
         run.agent().q_values([0.5, 0.5, 0.5]),
         load_agent(run.folder / "agent.safetensors").q_values([0.5, 0.5, 0.5]),
     )
-    found = run.evaluate(3)
-    assert np.array_equal(run.evaluate(3).returns, found.returns)
-    assert not np.array_equal(run.evaluate(3, seed=1).returns, found.returns)
+    evaluation = run.evaluate(3)
+    assert np.array_equal(run.evaluate(3).returns, evaluation.returns)
+    assert not np.array_equal(run.evaluate(3, seed=1).returns, evaluation.returns)
     last = [row for row in run.rows() if row["kind"] == "evaluation"][-1]
     assert last["step"] == 360
-    # The root of the run's own evaluations gives their very episodes.
-    assert len(run.evaluate(2, seed=3).returns) == 2
+    assert len(run.evaluate(2, seed=3).returns) == 2  # the seed of the run
 
 
-def test_folders_that_hold_no_run_or_a_damaged_one(whole, tmp_path):
+def test_missing_and_damaged_files_of_a_run_are_refused_by_name(whole, tmp_path):
     refuses("run", Run.open, tmp_path, error=RunError)
     run = Run.create(tmp_path / "run", CONFIG)
     refuses("checkpoint", run.agent, error=RunError)
@@ -316,7 +316,7 @@ def test_folders_that_hold_no_run_or_a_damaged_one(whole, tmp_path):
         Run.open(run.folder)
 
 
-def test_a_run_can_be_watched_before_its_first_checkpoint(tmp_path, whole, monkeypatch):
+def test_rows_are_readable_before_the_first_checkpoint(tmp_path, whole, monkeypatch):
     monkeypatch.setattr("sdnn.runs.run.STORE_SECONDS", -1.0)
     run = Run.create(tmp_path / "run", CONFIG)
     seen = []
@@ -337,7 +337,7 @@ def normalized_cart_pole():
     return gym.wrappers.NormalizeObservation(gym.make("CartPole-v1").unwrapped)
 
 
-def test_a_run_keeps_statistics_of_wrappers(tmp_path):
+def test_a_resumed_run_keeps_the_statistics_of_wrappers(tmp_path):
     gym.register("tests/Normalized-v0", entry_point=normalized_cart_pole, max_episode_steps=60)
     spec = RunSpec.from_values(
         {

@@ -9,13 +9,13 @@ from sdnn.environments import NoisySensors, UnitSensors
 from sdnn.runs import ConfigError, EnvironmentSpec
 
 
-def test_without_noise_the_agent_gets_the_observation():
+def test_environments_without_noise_and_redundancy_are_unchanged():
     env = EnvironmentSpec(id="CartPole-v1", kwargs={"max_episode_steps": 7}).make()
     assert env.observation_space == gym.make("CartPole-v1").observation_space
     assert env.spec.max_episode_steps == 7
 
 
-def test_redundant_variables_are_means_of_neighbours_in_a_circle():
+def test_redundant_variables_are_means_of_neighbouring_variables():
     ranges = {"all": (-2.0, 2.0), "1": (-4.0, 4.0)}
     env = EnvironmentSpec(id="tests/Drifting-v0", ranges=ranges, redundant=3).make()
     observation, _ = env.reset(seed=1)
@@ -27,7 +27,7 @@ def test_redundant_variables_are_means_of_neighbours_in_a_circle():
 
 
 @pytest.mark.parametrize("redundant", [1, 5])
-def test_the_description_of_scaled_observations_is_exact(redundant):
+def test_the_description_of_the_scaling_reproduces_observations(redundant):
     environment = EnvironmentSpec(
         id="tests/Drifting-v0", ranges={"all": (-0.3, 0.4), "1": (-4.0, 4.0)}, redundant=redundant
     )
@@ -53,12 +53,12 @@ def test_the_description_of_scaled_observations_is_exact(redundant):
         assert np.array_equal(observation[:2], unit)
 
 
-def test_nothing_is_scaled_without_noise_and_redundancy():
+def test_without_noise_and_redundancy_there_is_no_scaling():
     environment = EnvironmentSpec(id="tests/Drifting-v0", ranges={"all": (-0.3, 0.4)})
     assert environment.scaling() is None
 
 
-def test_noise_is_in_parts_of_the_range_and_follows_the_reset():
+def test_noise_is_a_share_of_the_range_and_reproducible_by_seed():
     environment = EnvironmentSpec(
         id="tests/Drifting-v0", ranges={"all": (-50.0, 50.0)}, noise=0.02, redundant=1
     )
@@ -81,7 +81,7 @@ def test_noise_is_in_parts_of_the_range_and_follows_the_reset():
     assert not np.array_equal(errors(environment.make("evaluation_sensor_noise"), 3), first)
 
 
-def test_observations_of_any_shape_are_flattened():
+def test_discrete_observations_are_flattened_to_one_hot_vectors():
     env = EnvironmentSpec(id="FrozenLake-v1", redundant=1).make()
     observation, _ = env.reset(seed=0)
     assert observation.tolist() == [1.0, *[0.0] * 15, 0.5]
@@ -98,7 +98,7 @@ def test_observations_of_any_shape_are_flattened():
         ({"id": "CartPole-v1", "noise": 0.1, "ranges": {"4": (0, 1)}}, "environment.ranges.4", "4"),
     ],
 )
-def test_environments_that_cannot_be_made(environment, key, words):
+def test_impossible_environments_are_refused_with_their_key(environment, key, words):
     with pytest.raises(ConfigError, match=words) as caught:
         EnvironmentSpec(**environment).make()
     assert caught.value.key == key
@@ -111,7 +111,7 @@ def test_environments_that_cannot_be_made(environment, key, words):
         ({"kwargs": {"function": print}}, "kwargs"),
     ],
 )
-def test_values_out_of_range(values, key):
+def test_infinite_ranges_and_functions_are_refused_with_their_key(values, key):
     with pytest.raises(ConfigError) as caught:
         EnvironmentSpec(**{"id": "CartPole-v1", **values})
     assert caught.value.key == key

@@ -44,7 +44,7 @@ FULL = RunSpec(
 @pytest.mark.parametrize(
     "spec", [FULL, RunSpec(environment=CART_POLE), paper_spec(agent="rbf"), paper_spec()]
 )
-def test_a_specification_survives_json_and_pickle(spec):
+def test_specifications_equal_their_copies_through_json_and_pickle(spec):
     again = RunSpec.from_values(json.loads(json.dumps(spec.values())))
     assert again == spec
     assert hash(again) == hash(spec)
@@ -67,7 +67,7 @@ def test_replaced_settings_are_checked_and_filled_in_as_new_ones_are():
         spec.replace(sed=1)
 
 
-def test_missing_settings_are_filled_in():
+def test_missing_settings_have_the_general_defaults():
     spec = RunSpec(environment=CART_POLE)
     assert (spec.agent.preset, spec.label) == ("general", "q-lambda-general")
     assert (spec.budget.episodes, spec.budget.steps) == (None, 200_000)
@@ -76,7 +76,7 @@ def test_missing_settings_are_filled_in():
     assert RunSpec.from_values({"environment": "CartPole-v1", "agent": "q-lambda"}) == spec
 
 
-def test_the_paper_s_task_has_the_paper_s_settings():
+def test_the_papers_acrobot_has_the_papers_defaults():
     spec = paper_spec()
     assert (spec.agent.preset, spec.label) == ("paper", "sdnn-c")
     assert (spec.budget.episodes, spec.budget.steps) == (15_000, None)
@@ -87,7 +87,7 @@ def test_the_paper_s_task_has_the_paper_s_settings():
     assert general.make_agent(general.make_env()).approximator.n_inputs == 4
 
 
-def test_the_hash_covers_all_settings_that_change_rows():
+def test_the_hash_ignores_seed_and_output_but_no_other_settings():
     spec = RunSpec(environment=CART_POLE)
     assert spec.replace(seed=5).config_hash == spec.config_hash
     assert spec.replace(output=OutputSpec(tensorboard=True)).config_hash == spec.config_hash
@@ -145,20 +145,20 @@ def test_the_hash_covers_all_settings_that_change_rows():
         ),
     ],
 )
-def test_errors_name_the_key(values, key, words):
+def test_invalid_specifications_are_refused_with_their_key(values, key, words):
     with pytest.raises(ConfigError) as caught:
         RunSpec.from_values({"environment": "CartPole-v1"} | values)
     assert caught.value.key == key
     assert words in caught.value.problem
 
 
-def test_parts_of_another_agent_are_refused():
+def test_the_configuration_of_another_agent_is_refused():
     with pytest.raises(ConfigError) as caught:
         RunSpec(environment=CART_POLE, approximator=RBFNetworkConfig())
     assert caught.value.key == "approximator"
 
 
-def test_angle_pairs_are_not_found_in_scaled_observations():
+def test_angle_pairs_find_is_refused_with_noise():
     refuses(
         "noise",
         RunSpec,
@@ -168,7 +168,7 @@ def test_angle_pairs_are_not_found_in_scaled_observations():
     )
 
 
-def test_pairs_are_declared_in_units_of_the_environment():
+def test_with_own_units_angle_pairs_can_be_declared_despite_noise():
     environment = EnvironmentSpec(id="Pendulum-v1", noise=0.02, redundant=1, own_units=True)
     spec = RunSpec(environment=environment, agent=AgentSpec(name="rbf", angle_pairs=((0, 1),)))
     assert RunSpec.from_values(spec.values()) == spec
@@ -184,7 +184,7 @@ def test_pairs_are_declared_in_units_of_the_environment():
 
 
 @pytest.mark.parametrize("inputs", ["relevant", (1, 3)])
-def test_inputs_are_chosen_in_a_run(inputs):
+def test_the_setting_inputs_reaches_the_agent_and_the_hash(inputs):
     spec = RunSpec(
         environment=CART_POLE, agent=AgentSpec(name="sdnn-c", inputs=inputs, warm_up_steps=50)
     )
@@ -213,7 +213,9 @@ def test_inputs_are_chosen_in_a_run(inputs):
         ("paper", 0.0, {}, ("none", "all")),
     ],
 )
-def test_preprocessing_follows_from_the_preset(preset, noise, given, found):
+def test_defaults_of_inputs_and_angle_pairs_follow_from_preset_and_noise(
+    preset, noise, given, found
+):
     environment = EnvironmentSpec(id="Pendulum-v1", noise=noise)
     agent = AgentSpec(name="q-lambda", preset=preset, **given)
     spec = RunSpec(environment=environment, agent=agent)
@@ -222,26 +224,26 @@ def test_preprocessing_follows_from_the_preset(preset, noise, given, found):
     assert spec.make_agent(spec.make_env()).is_warming_up == (found != ("none", "all"))
 
 
-def test_an_agent_may_register_its_training():
-    class Told(Training):
+def test_a_registered_agent_may_have_its_training_class():
+    class InstantTraining(Training):
         def pieces(self, seconds):
             self.n_steps = self.steps
             yield
 
-    entry = replace(agent_entry("sdnn-c"), id="told", training=Told)
+    entry = replace(agent_entry("sdnn-c"), id="instant", training=InstantTraining)
     register(entry)
     try:
-        spec = RunSpec(environment=CART_POLE, agent=AgentSpec(name="told"))
+        spec = RunSpec(environment=CART_POLE, agent=AgentSpec(name="instant"))
         trial = spec.make_trial(0)
         trial.training.run()
-        assert isinstance(trial.training, Told)
+        assert isinstance(trial.training, InstantTraining)
         assert trial.finished
         trial.close()
     finally:
-        del AGENTS["told"]
+        del AGENTS["instant"]
 
 
-def test_ranges_are_fixed_or_adaptive():
+def test_adaptive_ranges_are_fitted_and_exclude_fixed_ones():
     seen = AgentSpec(name="sdnn-c", observation_range="adaptive", warm_up_steps=20)
     environment = EnvironmentSpec(id="MountainCar-v0")
     env = environment.make()
@@ -260,7 +262,7 @@ def test_ranges_are_fixed_or_adaptive():
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
-def test_fixed_ranges_are_not_narrowed(noise):
+def test_a_warm_up_does_not_narrow_fixed_ranges(noise):
     environment = EnvironmentSpec(id="CartPole-v1", noise=noise)
     given = {str(i): (-100.0, 100.0) for i in range(4)}
     spec = RunSpec(environment=environment.replace(ranges=given), agent="q-lambda")
@@ -273,7 +275,7 @@ def test_fixed_ranges_are_not_narrowed(noise):
     assert set(zip(low, high, strict=True)) == {expected}
 
 
-def test_agents_are_made_with_preset_and_settings():
+def test_make_agent_returns_the_class_with_its_settings():
     env = CART_POLE.make()
     for name, kind in {"sdnn-c": SDNNQLearning, "rbf": RBFQLearning}.items():
         spec = RunSpec(
@@ -307,14 +309,14 @@ def test_agents_are_made_with_preset_and_settings():
         ({"agent": "fuzzy"}, "environment.id", "action_space must be a Box"),
     ],
 )
-def test_errors_of_an_agent_name_the_setting(values, key, words):
+def test_errors_of_an_agent_are_reported_with_their_setting(values, key, words):
     with pytest.raises(ConfigError) as caught:
         RunSpec.from_values({"environment": "CartPole-v1", **values}).make_agent(CART_POLE.make())
     assert caught.value.key == key
     assert words in caught.value.problem
 
 
-def test_the_papers_acrobot_is_compiled_under_the_papers_protocol():
+def test_only_the_papers_protocol_runs_the_compiled_trial():
     spec = paper_spec(budget={"episodes": 20}, seed=3)
     assert spec.is_compiled
     trial = spec.core_trial()
@@ -334,7 +336,7 @@ def test_the_papers_acrobot_is_compiled_under_the_papers_protocol():
         refuses("trial", other.core_trial)
 
 
-def test_sensors_of_evaluations_are_quiet_if_wanted():
+def test_without_noisy_evaluations_their_sensors_have_no_noise():
     protocol = ProtocolSpec(noisy_evaluations=False)
     for spec in (
         RunSpec(

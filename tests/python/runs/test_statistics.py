@@ -13,12 +13,12 @@ from sdnn.reports.statistics import (
 )
 
 
-def test_bootstrap_of_two_values_is_exact():
+def test_the_bootstrap_of_the_median_of_two_values_is_exact():
     # Resamples of {0, 1}: medians 0, 1/2, 1 with probabilities 1/4, 1/2, 1/4.
     assert estimate_median([0.0, 1.0]) == Estimate(0.5, 0.0, 1.0)
 
 
-def test_bootstrap_of_the_median_agrees_with_the_asymptotic_interval():
+def test_the_interval_of_the_median_is_near_the_asymptotic_one():
     values = np.random.default_rng(0).normal(size=1000)
     found = estimate_median(values)
     # The standard deviation of the median of normal values is sqrt(pi / 2 / n).
@@ -34,7 +34,7 @@ def test_the_bootstrap_is_repeatable_and_keeps_the_global_state():
     np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002
 
 
-def test_censored_trials_stay_censored():
+def test_medians_of_mostly_censored_trials_are_infinite():
     assert estimate_median([math.inf] * 10) == Estimate(math.inf, math.inf, math.inf)
     mostly = estimate_median([100.0] * 7 + [math.inf] * 3)
     assert mostly.value == 100.0
@@ -42,14 +42,14 @@ def test_censored_trials_stay_censored():
     assert mostly.upper == math.inf
 
 
-def test_one_trial_has_no_interval_and_none_is_an_error():
+def test_the_median_of_one_trial_has_no_interval_and_of_none_is_refused():
     one = estimate_median([4.0])
     assert one.value == 4.0
     assert math.isnan(one.lower)
     refuses("shape", estimate_median, [])
 
 
-def test_running_median_of_a_curve():
+def test_the_running_median_shrinks_its_window_at_the_ends():
     curve = np.random.default_rng(3).normal(size=40)
     found = running_median(curve, 5)
     for i in range(40):
@@ -57,14 +57,14 @@ def test_running_median_of_a_curve():
     np.testing.assert_array_equal(running_median(curve, 1), curve)
 
 
-def test_contrast_of_two_values_each_is_exact():
+def test_the_contrast_of_two_values_each_is_exact():
     # Differences of the medians 0, 1/2, 1 and 10, 11, 12: the ends have probability 1/16 each.
     found = estimate_contrast([0.0, 1.0], [10.0, 12.0])
     assert found == Estimate(-10.5, -12.0, -9.0)
     assert estimate_contrast([8.0, 8.0], [2.0, 2.0], np.divide) == Estimate(4.0, 4.0, 4.0)
 
 
-def test_contrast_agrees_with_the_normal_interval():
+def test_the_interval_of_a_contrast_is_near_the_normal_one():
     rng = np.random.default_rng(1)
     found = estimate_contrast(rng.normal(1.0, 1.0, 800), rng.normal(0.0, 2.0, 800))
     half = 1.96 * math.sqrt(math.pi / 2 / 800 * (1 + 4))
@@ -72,19 +72,19 @@ def test_contrast_agrees_with_the_normal_interval():
     assert found.upper - found.lower == pytest.approx(2 * half, rel=0.25)
 
 
-def test_contrast_wants_values_that_are_not_infinite():
+def test_contrasts_of_single_or_nan_values_are_nan_and_of_infinite_ones_refused():
     assert math.isnan(estimate_contrast([1.0], [2.0, 3.0]).lower)
     assert math.isnan(estimate_contrast([math.nan, 1.0], [2.0, 3.0]).value)
     refuses("infinite", estimate_contrast, [1.0, math.inf], [2.0, 3.0])
     refuses("shape", estimate_contrast, [1.0], [])
 
 
-def test_bootstrap_of_the_mean_of_two_values_is_exact():
+def test_the_bootstrap_of_the_mean_of_two_values_is_exact():
     # Resamples of {0, 1}: means 0, 1/2, 1 with probabilities 1/4, 1/2, 1/4.
     assert estimate_mean([0.0, 1.0]) == Estimate(0.5, 0.0, 1.0)
 
 
-def test_bootstrap_of_the_mean_agrees_with_the_normal_interval():
+def test_the_interval_of_the_mean_is_near_the_normal_one():
     values = np.random.default_rng(1).normal(3.0, 2.0, 400)
     estimate = estimate_mean(values)
     half = 1.96 * values.std() / np.sqrt(values.size)
@@ -93,7 +93,7 @@ def test_bootstrap_of_the_mean_agrees_with_the_normal_interval():
     )
 
 
-def test_means_need_trials_with_finite_values():
+def test_means_of_infinite_values_or_no_trials_are_refused():
     one = estimate_mean([2.0])
     assert (one.value, math.isnan(one.lower), math.isnan(one.upper)) == (2.0, True, True)
     refuses("infinite", estimate_mean, [1.0, math.inf])

@@ -45,7 +45,7 @@ def test_times_are_read_without_rows(tmp_path):
         assert store.seconds() == {make_record(0).key: 0.5, make_record(1).key: 2.0}
 
 
-def test_every_row_reaches_its_labels(tmp_path):
+def test_the_view_labelled_rows_joins_rows_with_their_trial(tmp_path):
     path, _ = filled(tmp_path, 2)
     with sqlite3.connect(path) as connection:
         row = connection.execute(
@@ -56,13 +56,13 @@ def test_every_row_reaches_its_labels(tmp_path):
     assert row == (*make_record().key, "0.1", 10, 1, 1)
 
 
-def test_numbers_of_numpy_are_stored_as_numbers(tmp_path):
+def test_numpy_numbers_are_stored_as_numbers(tmp_path):
     with ResultStore(tmp_path) as store:
         store.add(make_record(seconds=np.float64(0.5), n_decisions=np.int64(57)))
         assert store.load()[0].seconds == 0.5
 
 
-def test_settings_live_side_by_side(tmp_path):
+def test_trials_of_different_configurations_are_stored_separately(tmp_path):
     with ResultStore(tmp_path) as store:
         store.add(make_record(steps=(50, 50)))
         store.add(make_record(config='{"a":1}', steps=(3, 3)))
@@ -99,7 +99,7 @@ with ResultStore(sys.argv[1], read_only=True) as store:
 """
 
 
-def test_a_folder_on_a_file_system_that_is_read_only(tmp_path):
+def test_a_store_on_a_read_only_file_system_can_be_read(tmp_path):
     path, _ = filled(tmp_path / "out", 2)
     mount = 'mount --bind "$1" "$1" && mount -o remount,ro,bind "$1" && ! touch "$1/x" && shift'
     apart = ("unshare", "--map-root-user", "--mount", "sh", "-c")
@@ -118,7 +118,7 @@ def test_a_folder_on_a_file_system_that_is_read_only(tmp_path):
     assert (done.returncode, done.stdout) == (0, "2 2\n"), done.stderr
 
 
-def test_after_a_trial_the_file_is_whole_by_itself(tmp_path):
+def test_after_each_trial_a_copy_of_the_file_is_complete(tmp_path):
     with ResultStore(tmp_path / "out") as store:
         for trial in range(3):
             store.add(make_record(trial, steps=range(1, 60)))
@@ -141,7 +141,7 @@ TRAINED = [
 ]  # fmt: skip
 
 
-def test_a_run_in_progress_grows_and_is_finished(tmp_path):
+def test_rows_of_a_run_are_appended_until_it_is_finished(tmp_path):
     key = make_record().key._replace(seed=2**64 - 1)
     told = {"config": "{}", "version": "0.1", "seconds": 1.5}
     with ResultStore(tmp_path) as store:
@@ -165,12 +165,12 @@ def test_a_run_in_progress_grows_and_is_finished(tmp_path):
         assert store.keys() == set()
 
 
-def test_rows_of_several_environments_say_which():
+def test_rows_keep_the_number_of_their_environment():
     rows = [{**TRAINED[0], "environment": 2}]
     assert TrialRows.from_training(rows).to_training() == rows
 
 
-def test_same_trial_twice_is_one_trial_and_other_rows_are_refused(tmp_path):
+def test_adding_a_trial_again_is_ignored_and_with_other_rows_refused(tmp_path):
     with ResultStore(tmp_path) as store:
         store.add(make_record())
         store.add(make_record(seconds=9.0))
@@ -180,7 +180,7 @@ def test_same_trial_twice_is_one_trial_and_other_rows_are_refused(tmp_path):
         assert store.load()[0].rows.steps.tolist() == [50, 7]
 
 
-def test_digest_sees_rows_and_keys_but_not_times_version_or_order(tmp_path):
+def test_the_digest_depends_on_rows_and_keys_only(tmp_path):
     def digest(name, records):
         with ResultStore(tmp_path / name) as store:
             for record in records:
@@ -194,7 +194,7 @@ def test_digest_sees_rows_and_keys_but_not_times_version_or_order(tmp_path):
     assert digest("4", [make_record(0), make_record(2)]) != base
 
 
-def test_half_written_trial_leaves_nothing(tmp_path):
+def test_an_error_while_a_trial_is_written_leaves_no_rows(tmp_path):
     with ResultStore(tmp_path) as store:
         bad = make_record()
         bad.rows.table["number"][:] = 10  # breaks the primary key at the second row
@@ -204,27 +204,27 @@ def test_half_written_trial_leaves_nothing(tmp_path):
         store.add(make_record())
 
 
-def test_file_writes_through_to_the_disk(tmp_path):
+def test_the_store_flushes_every_transaction_to_disk(tmp_path):
     with ResultStore(tmp_path) as store:
         assert store._connection.execute("PRAGMA journal_mode").fetchone() == ("delete",)
         assert store._connection.execute("PRAGMA synchronous").fetchone() == (2,)
 
 
-def test_folder_that_is_a_file(tmp_path):
+def test_a_folder_that_is_a_file_is_refused_and_kept(tmp_path):
     (tmp_path / "out").write_text("mine")
     refuses("out", ResultStore, tmp_path / "out", error=StoreError)
     assert (tmp_path / "out").read_text() == "mine"
 
 
 @pytest.mark.parametrize("content", [b"my notes", b"SQLite format 3\0" + bytes(200)])
-def test_damaged_or_other_file_is_named_and_kept(tmp_path, content):
+def test_files_that_are_no_database_are_refused_and_kept(tmp_path, content):
     path = tmp_path / "results.sqlite"
     path.write_bytes(content)
     refuses("results.sqlite", ResultStore, tmp_path, error=StoreError)
     assert path.read_bytes() == content
 
 
-def test_foreign_sqlite_file_is_named_and_kept(tmp_path):
+def test_databases_of_other_programs_are_refused_and_kept(tmp_path):
     path = tmp_path / "results.sqlite"
     with sqlite3.connect(path) as connection:
         connection.execute("CREATE TABLE trials (recipe TEXT)")
@@ -235,7 +235,7 @@ def test_foreign_sqlite_file_is_named_and_kept(tmp_path):
     assert os.listdir(tmp_path) == ["results.sqlite"]
 
 
-def test_other_schema_is_refused(tmp_path):
+def test_other_versions_of_the_schema_are_refused(tmp_path):
     path, _ = filled(tmp_path, 1)
     with sqlite3.connect(path) as connection:
         connection.execute("PRAGMA user_version = 99")
@@ -248,7 +248,7 @@ def test_other_schema_is_refused(tmp_path):
         ResultStore(tmp_path)
 
 
-def test_file_of_a_process_killed_before_the_schema_is_used(tmp_path):
+def test_a_database_without_a_schema_is_used(tmp_path):
     with sqlite3.connect(tmp_path / "results.sqlite") as connection:
         connection.execute("PRAGMA user_version = 0")
         connection.execute("VACUUM")
@@ -257,7 +257,7 @@ def test_file_of_a_process_killed_before_the_schema_is_used(tmp_path):
     assert filled(tmp_path, 1)
 
 
-def test_killed_run_resumes_to_the_same_content(tmp_path, run):
+def test_a_killed_run_of_trials_resumes_to_the_same_rows(tmp_path, run):
     child = subprocess.Popen(
         [sys.executable, fake_trial.__file__, str(tmp_path / "killed")],
         stdout=subprocess.PIPE,
@@ -276,7 +276,7 @@ def test_killed_run_resumes_to_the_same_content(tmp_path, run):
     assert resumed == run(tmp_path / "whole", plan)[1]
 
 
-def test_a_file_whose_making_was_killed_is_made_anew(tmp_path):
+def test_a_database_killed_in_its_first_transaction_is_created_again(tmp_path):
     """A kill inside the very first transaction leaves a journal that has to be rolled back."""
     path = tmp_path / "results.sqlite"
     assert hot_journal(path).stat().st_size > 0
@@ -286,7 +286,7 @@ def test_a_file_whose_making_was_killed_is_made_anew(tmp_path):
         assert len(store.keys()) == 1
 
 
-def test_a_measurement_is_stored_once(tmp_path):
+def test_a_stored_measurement_is_not_replaced(tmp_path):
     with ResultStore(tmp_path) as store:
         for value in (1.5, 2.5):
             store.put("cost", "b", {"value": value})

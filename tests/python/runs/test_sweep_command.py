@@ -50,11 +50,11 @@ def test_a_sweep_writes_its_files_and_resumes(invoke, tmp_path):
     assert re.search(r"\b12 of 12 .* out \(4 ", more.stdout)
 
 
-def test_rows_of_all_variants_are_written(invoke, tmp_path):
+def test_the_rows_and_trials_of_all_variants_are_written(invoke, tmp_path):
     invoke("sweep", "mine.toml", "--out", "out")
     with gzip.open(tmp_path / "out" / "mine-results.csv.gz", "rt") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 2 * 3 * 2 * 30
+    assert len(rows) == 2 * 3 * 2 * 30  # cases, variants, trials, evaluations
     assert {row["variant"] for row in rows} == {"base", "discount=0.8", "discount=0.9"}
     with (tmp_path / "out" / "mine-trials.csv").open() as file:
         trials = list(csv.DictReader(file))
@@ -67,7 +67,7 @@ def test_rows_of_all_variants_are_written(invoke, tmp_path):
     assert [float(t["final_share_solved"]) for t in trials[:2]] == shares
 
 
-def test_trials_are_shared_with_reproduce(invoke):
+def test_sweep_and_reproduce_share_stored_trials(invoke):
     invoke("reproduce", "a", "--trials", 2, "--episodes", 300)
     result = invoke("sweep", "mine.toml")
     assert re.search(r"\b8 of 8 .* results \(4 ", result.stdout)
@@ -75,7 +75,7 @@ def test_trials_are_shared_with_reproduce(invoke):
     assert "(0 " in again.stdout
 
 
-def test_json_is_the_file_and_does_not_depend_on_jobs(invoke, tmp_path):
+def test_the_json_output_is_the_written_table_for_any_number_of_jobs(invoke, tmp_path):
     one = invoke("sweep", "mine.toml", "--json", "--jobs", 1, "--out", "one", "--seed", 4)
     two = invoke("sweep", "mine.toml", "--json", "--jobs", 2, "--out", "two", "--seed", 4)
     table = json.loads(one.stdout)
@@ -87,7 +87,7 @@ def test_json_is_the_file_and_does_not_depend_on_jobs(invoke, tmp_path):
     assert json.loads(other.stdout)["digest"] != table["digest"]
 
 
-def test_the_page_holds_the_study_and_its_settings(invoke, tmp_path):
+def test_the_report_shows_the_study_and_escapes_its_title(invoke, tmp_path):
     invoke("sweep", "mine.toml", study=STUDY.replace("Mine", "Mine & <others>"))
     page = (tmp_path / "results" / "mine-report.html").read_text()
     assert "<h1>Mine &amp; &lt;others&gt;</h1>" in page
@@ -97,7 +97,7 @@ def test_the_page_holds_the_study_and_its_settings(invoke, tmp_path):
     assert page.count("<img") == 1
 
 
-def test_only_some_variants(invoke):
+def test_only_runs_the_selected_variants(invoke):
     result = invoke("sweep", "mine.toml", "--only", "discount=0.8", "--only", "discount=0.8")
     assert re.search(r"\b4 of 4 .* results \(4 ", result.stdout)
     assert " 4 of 6 " in result.stdout
@@ -116,7 +116,7 @@ def test_only_some_variants(invoke):
         (STUDY.replace("0.8", "1.8"), "mine.toml:9: axes.learning.discount[0]: must be"),
     ],
 )
-def test_wrong_files_are_exit_code_2_and_leave_nothing(invoke, tmp_path, study, words):
+def test_invalid_study_files_exit_with_2_and_write_nothing(invoke, tmp_path, study, words):
     from sdnn import _core
 
     for options in ([], ["--dry-run"]):
@@ -126,7 +126,7 @@ def test_wrong_files_are_exit_code_2_and_leave_nothing(invoke, tmp_path, study, 
         assert [p.name for p in tmp_path.iterdir()] == ["mine.toml"]
 
 
-def test_a_trial_that_raises_leaves_out_its_variant_only(invoke, tmp_path):
+def test_a_failing_trial_omits_its_variant_only(invoke, tmp_path):
     class Raising(fake_trial.FakeTrial):
         def __init__(self, *, learning, sensors, **others):
             super().__init__(**others)
@@ -191,7 +191,9 @@ def test_a_dry_run_reports_a_trial_that_raises(invoke):
     assert result.stderr.count("\n") == 1
 
 
-def test_a_custom_environment_from_a_module_beside_the_file(invoke, tmp_path, monkeypatch):
+def test_a_study_of_an_environment_from_a_module_beside_its_file_runs(
+    invoke, tmp_path, monkeypatch
+):
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "my_line_world.py").write_text(
         """
