@@ -12,7 +12,7 @@ import shutil
 import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -89,15 +89,16 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         if folder.exists() and not folder.is_dir():
             raise StoreError(f"the output must be a folder, but {folder} is a file")
         self._hashes: dict[int, Hash] = {}  # of the rows of runs in progress
-        with as_store_error(self.path):
+        with as_store_error(self.path), ExitStack() as on_error:
             if not read_only:
                 folder.mkdir(parents=True, exist_ok=True)
             recovered = self._recovered()
             if recovered is not None:
                 if read_only:
-                    self._connection = recovered
+                    self._connection = on_error.enter_context(closing(recovered))
                     if not _objects(recovered):
                         self._prepare(True)
+                    on_error.pop_all()
                     return
                 recovered.close()
                 with closing(connect(self.path)) as connection:
@@ -106,12 +107,10 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             if read_only and not is_new:
                 self._connection = connect(self.path, read_only=True)
                 return
-            self._connection = connect(None if read_only else self.path)
-            try:
-                self._prepare(is_new)
-            except BaseException:
-                self._connection.close()
-                raise
+            connection = connect(None if read_only else self.path)
+            self._connection = on_error.enter_context(closing(connection))
+            self._prepare(is_new)
+            on_error.pop_all()
 
     def _recovered(self) -> sqlite3.Connection | None:
         """Return a copy in memory without the transaction that a killed process left, if it did."""
@@ -120,8 +119,8 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             raise sqlite3.DatabaseError(f"there is a log of another program, {log.name}")
         if not is_there(journal) or not is_hot(self.path, journal):
             return None
-        recovered = connect(None)
-        with TemporaryDirectory() as folder:
+        with ExitStack() as on_error, TemporaryDirectory() as folder:
+            recovered = on_error.enter_context(closing(connect(None)))
             for path in (self.path, journal):
                 shutil.copyfile(path, Path(folder, path.name))
             place = Path(folder, self.path.name)
@@ -131,8 +130,9 @@ class ResultStore(AbstractContextManager["ResultStore"]):
                 is_lost = _inspect(place) and has_rows(self.path)
             except (sqlite3.DatabaseError, StoreError) as error:
                 raise foreign_journal(journal) from error
-        if is_lost:
-            raise foreign_journal(journal)
+            if is_lost:
+                raise foreign_journal(journal)
+            on_error.pop_all()
         return recovered
 
     def _prepare(self, is_new: bool) -> None:
@@ -420,14 +420,17 @@ def connect(path: Path | None, *, read_only: bool = False) -> sqlite3.Connection
     place = ":memory:"
     if path is not None:
         place = f"{path.absolute().as_uri()}?mode={'ro' if read_only else 'rwc'}"
-    connection = sqlite3.connect(place, uri=path is not None, timeout=BUSY_SECONDS)
-    for setting in (
-        "trusted_schema = OFF", "cell_size_check = ON", "mmap_size = 0",
-        f"query_only = {int(read_only)}",
-    ):  # fmt: skip
-        connection.execute(f"PRAGMA {setting}")
-    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES_OF_VALUE)
-    connection.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
+    with ExitStack() as on_error:
+        connection = sqlite3.connect(place, uri=path is not None, timeout=BUSY_SECONDS)
+        on_error.enter_context(closing(connection))
+        for setting in (
+            "trusted_schema = OFF", "cell_size_check = ON", "mmap_size = 0",
+            f"query_only = {int(read_only)}",
+        ):  # fmt: skip
+            connection.execute(f"PRAGMA {setting}")
+        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES_OF_VALUE)
+        connection.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
+        on_error.pop_all()
     return connection
 
 

@@ -186,13 +186,37 @@ def test_a_journal_rolls_back_but_cannot_remove_other_files(tmp_path):
     assert victim.read_bytes() == b"mine"
 
 
+def emptying_journal(path):
+    """Make the journal of a transaction before which the file was empty."""
+    journal = path.with_name(f"{path.name}-journal")
+    head = bytes.fromhex("d9d505f920a163d7") + struct.pack(">5I", 0, 1, 0, 512, 4096)
+    journal.write_bytes(head.ljust(512, b"\0"))
+    return journal
+
+
+@pytest.mark.parametrize("read_only", [True, False])
+def test_a_refused_store_leaves_no_connection_open(tmp_path, monkeypatch, read_only):
+    emptying_journal(make_store(tmp_path))
+    connections, real_connect = [], sqlite3.connect
+
+    def connect(*arguments, **options):
+        connections.append(real_connect(*arguments, **options))
+        return connections[-1]
+
+    monkeypatch.setattr(sqlite3, "connect", connect)
+    with pytest.raises(StoreError, match="move it away"):
+        ResultStore(tmp_path, read_only=read_only)
+    assert connections
+    for connection in connections:
+        with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+            connection.execute("SELECT 1")
+
+
 @pytest.mark.parametrize("read_only", [True, False])
 def test_reading_rolls_back_a_journal_but_refuses_a_stray_one(tmp_path, read_only):
     path = make_store(tmp_path)
     expected, before = content_of(tmp_path), path.read_bytes()
-    journal = path.with_name(f"{path.name}-journal")
-    head = bytes.fromhex("d9d505f920a163d7") + struct.pack(">5I", 0, 1, 0, 512, 4096)
-    journal.write_bytes(head.ljust(512, b"\0"))  # of a file that was empty
+    journal = emptying_journal(path)
     with pytest.raises(StoreError, match="move it away"):
         ResultStore(tmp_path, read_only=read_only)
     assert path.read_bytes() == before
