@@ -13,7 +13,7 @@ namespace sdnn::agents {
 struct ActorCriticConfig {
   double learning_rate = 0.5;
   double discount = 0.99;
-  double trace_decay = 0.8;
+  double trace_decay = 0.9;
   double actor_learning_rate = 0.1;
   double entropy = 0.01;
   int schedule_steps = 20000;
