@@ -3,7 +3,7 @@
 import pytest
 
 from bare_processors import BARE_TARGETS
-from c_learners import LEARNERS, check_life
+from c_learners import LEARNERS, check_learning
 from c_policies import (
     AGENTS,
     ALONE,
@@ -41,7 +41,7 @@ def test_learning_on_other_processors_has_the_bits_of_the_agent(
     target = (TARGETS | BARE_TARGETS)[kind]
     linker = ["ld.lld"] if kind in BARE_TARGETS else []
     needs(*filter(None, (target.compiler, target.runner)), *linker)
-    check_life(name, target, tmp_path, n_steps)
+    check_learning(name, target, tmp_path, n_steps)
 
 
 @pytest.mark.parametrize("name", LEARNERS)

@@ -53,12 +53,12 @@ def test_the_umbrella_header_includes_every_public_header():
 def test_headers_with_floating_point_include_the_check_of_compiler_options():
     guard = Path("core/detail/floating_point.hpp")
 
-    def reached(header, seen):
+    def reached(header, visited):
         for included in includes(header):
-            if included not in seen:
-                seen.add(included)
-                reached(included, seen)
-        return seen
+            if included not in visited:
+                visited.add(included)
+                reached(included, visited)
+        return visited
 
     unguarded = [
         header

@@ -34,13 +34,15 @@ def error_classes():
 @pytest.mark.parametrize("copied", [copy.copy, lambda error: pickle.loads(pickle.dumps(error))])
 def test_errors_equal_their_copies_and_pickles(copied):
     """An error that cannot be unpickled would end a pool of processes, and its message be lost."""
-    kinds = error_classes()
-    assert {"ConfigError", "StoreError", "UnusableStepError"} <= {kind.__name__ for kind in kinds}
-    for kind in kinds:
-        has_own = inspect.isfunction(kind.__init__)
-        words = list(inspect.signature(kind).parameters) if has_own else ["message"]
-        error = kind(*(f"{word} of it" for word in words))
-        again = copied(error)
-        assert type(again) is kind
-        assert str(again) == str(error), kind
-        assert vars(again) == vars(error), kind
+    classes = error_classes()
+    assert {"ConfigError", "StoreError", "UnusableStepError"} <= {
+        error_class.__name__ for error_class in classes
+    }
+    for error_class in classes:
+        has_own = inspect.isfunction(error_class.__init__)
+        words = list(inspect.signature(error_class).parameters) if has_own else ["message"]
+        error = error_class(*(f"{word} of it" for word in words))
+        copy_ = copied(error)
+        assert type(copy_) is error_class
+        assert str(copy_) == str(error), error_class
+        assert vars(copy_) == vars(error), error_class

@@ -31,25 +31,28 @@ def test_the_first_signal_calls_back_and_the_second_interrupts():
     assert asked == [1]
 
 
-def test_custom_handlers_and_other_threads_keep_their_handlers():
-    came = []
-    mine = lambda number, frame: came.append(number)  # noqa: E731
-    before = signal.signal(signal.SIGTERM, mine)
+def test_a_custom_handler_is_not_replaced():
+    calls = []
+    before = signal.signal(signal.SIGTERM, lambda number, frame: calls.append(number))
     try:
-        with Interrupts(lambda: came.append("asked"), (signal.SIGTERM,)) as interrupts:
+        with Interrupts(lambda: calls.append("interrupt"), (signal.SIGTERM,)) as interrupts:
             os.kill(os.getpid(), signal.SIGTERM)
-        assert (came, interrupts.received) == ([signal.SIGTERM], None)
+        assert (calls, interrupts.received) == ([signal.SIGTERM], None)
     finally:
         signal.signal(signal.SIGTERM, before)
 
-    def elsewhere():
-        with Interrupts(lambda: None):
-            came.append(signal.getsignal(signal.SIGINT))
 
-    thread = threading.Thread(target=elsewhere)
+def test_another_thread_than_the_main_one_keeps_the_handler():
+    handlers = []
+
+    def enter():
+        with Interrupts(lambda: None):
+            handlers.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=enter)
     thread.start()
     thread.join()
-    assert came[-1] is signal.default_int_handler
+    assert handlers == [signal.default_int_handler]
 
 
 class InterruptIn(gym.Wrapper):

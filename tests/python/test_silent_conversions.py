@@ -80,9 +80,9 @@ def test_values_that_numpy_would_convert_silently_are_refused(name):
     take = (TAKERS | LISTS | CELLS)[name]
     for word, make in OTHERS.items():
         if word not in shapes:
-            with pytest.raises((TypeError, ValueError)) as told:
+            with pytest.raises((TypeError, ValueError)) as error:
                 take(make())
-            assert "incompatible" not in str(told.value), word
+            assert "incompatible" not in str(error.value), word
     if name != "knots":
         take(HERE)
 
@@ -107,13 +107,13 @@ def test_texts_dates_and_bools_are_refused_as_numbers(kind):
 
 
 def test_settings_of_wrong_types_are_refused_with_their_table():
-    for given in (
+    for tables in (
         {"environment": 5}, {"agent": 5}, {"budget": 5}, {"budget": {"target_return": np.nan}},
         {"budget": {"target_return": "abc"}}, {"output": {"tensorboard": "yes"}},
         {"learning": 5}, {"approximator": []}, {"output": True}, {"protocol": "abc"},
     ):  # fmt: skip
-        with pytest.raises(Exception, match=next(iter(given))):
-            RunSpec(**{"environment": "CartPole-v1"} | given)
+        with pytest.raises(Exception, match=next(iter(tables))):
+            RunSpec(**{"environment": "CartPole-v1"} | tables)
 
 
 def test_seeds_of_trials_must_be_integers():

@@ -67,21 +67,21 @@ def new_env(actions="discrete", unbounded=False):
     return ActionMasks(Masked(actions, unbounded), Masked.mask)
 
 
-def new_agent(kind, env, **settings):
-    approximator = SMALL if kind is SDNNQLearning else LinearSDNNConfig(averaging_interval=0)
+def new_agent(agent_class, env, **settings):
+    approximator = SMALL if agent_class is SDNNQLearning else LinearSDNNConfig(averaging_interval=0)
     spaces = (
         getattr(env, "single_observation_space", env.observation_space),
         getattr(env, "single_action_space", env.action_space),
     )
-    return kind(*spaces, approximator=approximator, seed=3, warm_up_steps=60, **settings)
+    return agent_class(*spaces, approximator=approximator, seed=3, warm_up_steps=60, **settings)
 
 
 @pytest.mark.parametrize("unbounded", [False, True], ids=["bounds", "warm-up"])
 @pytest.mark.parametrize("actions", SPACES)
-@pytest.mark.parametrize("kind", AGENTS)
-def test_only_allowed_actions_are_taken(kind, actions, unbounded):
+@pytest.mark.parametrize("agent_class", AGENTS)
+def test_only_allowed_actions_are_taken(agent_class, actions, unbounded):
     env = new_env(actions, unbounded)
-    agent = new_agent(kind, env)
+    agent = new_agent(agent_class, env)
     assert agent.train(env, steps=300).n_steps == 300
     assert evaluate(agent, new_env(actions, unbounded), 5).returns.shape == (5,)
 
@@ -115,45 +115,45 @@ def test_masked_vectors_without_separate_resets_take_allowed_actions(mode, monke
     assert agent.train(env, steps=200).n_steps == 200
 
 
-@pytest.mark.parametrize("kind", AGENTS)
-def test_a_mask_that_allows_every_action_changes_nothing(kind):
+@pytest.mark.parametrize("agent_class", AGENTS)
+def test_a_mask_that_allows_every_action_changes_nothing(agent_class):
     env = Masked()
-    one, other = new_agent(kind, env), new_agent(kind, env)
+    agent, masked = new_agent(agent_class, env), new_agent(agent_class, env)
     random = np.random.default_rng(1)
     for _ in range(100):
-        here, after = random.uniform(-1, 1, (2, 2))
-        action = one.act(here)
-        assert other.act(here, mask=np.ones(5, bool)) == action
-        assert other.act(here, False, mask=[1] * 5) == one.act(here, False)
-        one.learn(Transition(here, action, 1.0, after, False))
-        other.learn(Transition(here, action, 1.0, after, False, np.ones(5, np.int8)))
-    for here in random.uniform(-1, 1, (10, 2)):
-        np.testing.assert_array_equal(one.q_values(here), other.q_values(here))
+        x, next_x = random.uniform(-1, 1, (2, 2))
+        action = agent.act(x)
+        assert masked.act(x, mask=np.ones(5, bool)) == action
+        assert masked.act(x, False, mask=[1] * 5) == agent.act(x, False)
+        agent.learn(Transition(x, action, 1.0, next_x, False))
+        masked.learn(Transition(x, action, 1.0, next_x, False, np.ones(5, np.int8)))
+    for x in random.uniform(-1, 1, (10, 2)):
+        np.testing.assert_array_equal(agent.q_values(x), masked.q_values(x))
 
 
-@pytest.mark.parametrize("kind", AGENTS)
-def test_targets_bootstrap_from_allowed_actions_only(kind):
-    here, after = np.array([-0.9, -0.9]), np.array([0.9, 0.9])
-    settings = {"value_range": "fixed"} if kind is SDNNQLearning else {"schedule_steps": 0}
-    learning = kind.learning_type(
+@pytest.mark.parametrize("agent_class", AGENTS)
+def test_targets_bootstrap_from_allowed_actions_only(agent_class):
+    x, next_x = np.array([-0.9, -0.9]), np.array([0.9, 0.9])
+    settings = {"value_range": "fixed"} if agent_class is SDNNQLearning else {"schedule_steps": 0}
+    learning = agent_class.learning_type(
         discount=0.5, learning_rate=1.0, final_learning_rate=None, **settings
     )
-    agent = new_agent(kind, Masked(), learning=learning)
+    agent = new_agent(agent_class, Masked(), learning=learning)
     for _ in range(30):
         for action, value in ((-1, 0.0), (0, 8.0), (1, 2.0), (2, 0.0), (3, 0.0)):
-            agent.learn(Transition(after, action, value, after, True))
+            agent.learn(Transition(next_x, action, value, next_x, True))
             agent.begin_episode()
-    high, low = agent.q_values(after)[[1, 2]]
+    high, low = agent.q_values(next_x)[[1, 2]]
     assert high > low > 0.5
 
     def learned(mask):
-        other = type(agent).rebuild(agent.description(), agent.state())
+        masked = type(agent).rebuild(agent.description(), agent.state())
         for _ in range(30):
-            other.learn(Transition(here, 0, 0.0, after, False, mask))
-            other.begin_episode()
-        return other.q_values(here)[1], other.q_values(after)
+            masked.learn(Transition(x, 0, 0.0, next_x, False, mask))
+            masked.begin_episode()
+        return masked.q_values(x)[1], masked.q_values(next_x)
 
-    step = 1.2 if kind is SDNNQLearning else 0.05  # SDNN-C with few units has coarse values
+    step = 1.2 if agent_class is SDNNQLearning else 0.05  # SDNN-C with few units has coarse values
     value, then = learned(None)
     assert value == pytest.approx(0.5 * then.max(), abs=step)
     value, then = learned([0, 0, 1, 0, 0])
@@ -162,11 +162,11 @@ def test_targets_bootstrap_from_allowed_actions_only(kind):
 
 @pytest.mark.parametrize("unbounded", [False, True], ids=["bounds", "warm-up"])
 @pytest.mark.parametrize("actions", SPACES)
-@pytest.mark.parametrize("kind", AGENTS)
+@pytest.mark.parametrize("agent_class", AGENTS)
 @pytest.mark.parametrize(("at", "n"), [(33, None), (100, None), (20, 3)])
-def test_a_training_with_masks_resumes_exactly(kind, actions, unbounded, at, n, tmp_path):
-    more = {"n_steps": 3} if kind is SDNNQLearning else {"bootstrap": "sarsa"}
-    learning = kind.learning_type(**more)
+def test_a_training_with_masks_resumes_exactly(agent_class, actions, unbounded, at, n, tmp_path):
+    more = {"n_steps": 3} if agent_class is SDNNQLearning else {"bootstrap": "sarsa"}
+    learning = agent_class.learning_type(**more)
 
     def masked_env():
         if n is None:
@@ -175,7 +175,7 @@ def test_a_training_with_masks_resumes_exactly(kind, actions, unbounded, at, n, 
 
     def begun(*callbacks):
         env = masked_env()
-        agent = new_agent(kind, env, learning=learning)
+        agent = new_agent(agent_class, env, learning=learning)
         return Training(agent, env, steps=150, callbacks=callbacks)
 
     check_exact_resume(begun, masked_env, tmp_path / "part", [at])
@@ -233,8 +233,8 @@ def test_a_mask_of_several_dimensions_may_be_parts_or_a_flat_array():
 
 def test_continuous_actions_refuse_masks():
     spaces = gym.spaces.Box(-1, 1, (2,)), gym.spaces.Box(-1, 1, (1,))
-    for kind in (SDNNQLambda, FuzzyQLearning):
-        agent = kind(*spaces)
+    for agent_class in (SDNNQLambda, FuzzyQLearning):
+        agent = agent_class(*spaces)
         with pytest.raises(ValueError, match=r"^mask must be None"):
             agent.act(np.zeros(2), mask=[1, 0, 1])
 

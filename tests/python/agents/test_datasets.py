@@ -69,13 +69,13 @@ def test_a_minari_dataset_is_learned_like_its_arrays(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     buffers = [
         minari.data_collector.EpisodeBuffer(
-            observations=list(one.observations),
-            actions=list(one.actions),
-            rewards=list(one.rewards),
-            terminations=list(one.terminations),
-            truncations=list(one.truncations),
+            observations=list(episode.observations),
+            actions=list(episode.actions),
+            rewards=list(episode.rewards),
+            terminations=list(episode.terminations),
+            truncations=list(episode.truncations),
         )
-        for one in logged()
+        for episode in logged()
     ]
     dataset = minari.create_dataset_from_buffers(
         "place/random-v0", buffer=buffers, observation_space=PLACE, action_space=BUTTONS

@@ -96,19 +96,23 @@ def test_arguments_of_other_libraries_are_refused_with_the_right_name(trained, f
         assert refused.value.argument == name
 
 
-def test_constructors_accept_environments_and_train_accepts_positional_steps(trained):
-    agent, env, _ = trained
+def test_train_accepts_positional_steps_and_whole_floats(trained):
+    agent, env, result = trained
     assert agent.train(env, 20).n_steps == 20
+    assert result.n_steps == 1500  # from 1.5e3
+    refuses("steps", agent.train, env, steps=1500.5)
+
+
+def test_constructors_accept_environments_and_vectors_in_the_place_of_spaces():
+    env = gym.make("CartPole-v1")
     envs = gym.make_vec("CartPole-v1", num_envs=2)
     expected = SDNNQLambda(env.observation_space, env.action_space).description()
     for source in (env, envs):
         assert SDNNQLambda(source).description() == expected
+    refuses("steps", SDNNQLambda(env).learn, 200, error=TypeError)
     refuses("gymnasium.make", SDNNQLambda, "CartPole-v1", error=TypeError)
     refuses("SDNNQLambda", SDNNQLambda, error=TypeError)
     refuses("action_space", SDNNQLambda, env.observation_space, error=TypeError)
-    refuses("steps", agent.learn, 200, error=TypeError)
-    assert trained[2].n_steps == 1500  # from 1.5e3, a whole float
-    refuses("steps", agent.train, env, steps=1500.5)
     assert "observation_space" in inspect.signature(SDNNQLambda).parameters
 
 

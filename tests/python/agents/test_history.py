@@ -19,7 +19,7 @@ def positions():
     env, places = exact(), [0, 2]
     space = env.observation_space
     return gym.wrappers.TransformObservation(
-        env, lambda seen: seen[places], gym.spaces.Box(space.low[places], space.high[places])
+        env, lambda x: x[places], gym.spaces.Box(space.low[places], space.high[places])
     )
 
 
@@ -27,7 +27,7 @@ def noisy():
     env, random = exact(), np.random.default_rng(1)
     deviation = np.array([0.24, 0.3, 0.02, 0.35])
     return gym.wrappers.TransformObservation(
-        env, lambda seen: seen + deviation * random.standard_normal(4), env.observation_space
+        env, lambda x: x + deviation * random.standard_normal(4), env.observation_space
     )
 
 

@@ -93,12 +93,12 @@ def test_values_after_imitation_are_the_returns_of_the_teacher(agent_class):
     a, b = [0.2, 0.2], [0.8, 0.8]
     learning = agent_class.learning_type(discount=0.5)
     push = gym.spaces.Discrete(2)
-    agent, other = (agent_class(SQUARE, push, learning=learning, **KNOWN) for _ in range(2))
+    whole, truncated = (agent_class(SQUARE, push, learning=learning, **KNOWN) for _ in range(2))
     ended = [Transition(a, 0, 0.0, b, False), Transition(b, 1, 8.0, b, True)]
-    imitate(agent, ended, epochs=200)
-    assert [value_of(agent, x) for x in (b, a)] == pytest.approx([8.0, 4.0], abs=0.2)
-    imitate(other, [(b, 1, 3.0, b, False, True)], epochs=400)  # v = 3 + v / 2
-    assert value_of(other, b) == pytest.approx(6.0, abs=0.2)
+    imitate(whole, ended, epochs=200)
+    assert [value_of(whole, x) for x in (b, a)] == pytest.approx([8.0, 4.0], abs=0.2)
+    imitate(truncated, [(b, 1, 3.0, b, False, True)], epochs=400)  # v = 3 + v / 2
+    assert value_of(truncated, b) == pytest.approx(6.0, abs=0.2)
 
 
 @pytest.mark.parametrize("n_rows", [1, 2, 40, 300])
@@ -133,14 +133,14 @@ def test_imitation_of_rows_columns_and_a_loaded_agent_have_the_same_bits(agent_c
         "observations", "actions", "rewards", "next_observations", "terminations", "truncations",
     )  # fmt: skip
     columns = dict(zip(names, map(np.array, zip(*rows, strict=True)), strict=True))
-    agent, other = (agent_class(gym.make("CartPole-v1"), seed=1) for _ in range(2))
+    agent, saved = (agent_class(gym.make("CartPole-v1"), seed=1) for _ in range(2))
     imitate(agent, rows, epochs=1)
     imitate(agent, rows, epochs=1)
-    imitate(other, columns, epochs=1)
-    other.save(tmp_path / "agent.safetensors")
-    other = agent_class.load(tmp_path / "agent.safetensors")
-    imitate(other, columns, epochs=1)
-    assert states_equal(agent, other)
+    imitate(saved, columns, epochs=1)
+    saved.save(tmp_path / "agent.safetensors")
+    saved = agent_class.load(tmp_path / "agent.safetensors")
+    imitate(saved, columns, epochs=1)
+    assert states_equal(agent, saved)
 
 
 def imitated(slow, x, action, value, margin):

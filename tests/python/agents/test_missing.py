@@ -40,20 +40,20 @@ def test_hold_repeats_the_last_reading_of_the_variable_environment_and_episode(a
     agent = agent_of(agent_class, "hold")
     agent.n_environments = 2
     never, last = state(agent, LOST), state(agent, READ | {"a": np.array([0.0, 0.5])})
-    assert never[:2] == [0.5, 0.375]
+    assert never[:2] == [0.5, 0.375]  # the middle, and 0.5 in the range of -1 to 3
     assert never[-1] == 0.5
     action = agent.act(READ)
     assert state(agent, LOST) == last
     agent.learn(Transition(READ, action, 1.0, READ | {"b": 2}, False))
     agent.act(READ, environment=1)
     agent.act(READ | {"c": np.array([-1.5])}, explore=False)
-    assert state(agent, LOST)[-1] == 0.125
+    assert state(agent, LOST)[-1] == 0.125  # -1.5 in the range of -2 to 2
     with ThreadPoolExecutor() as pool:
         pool.submit(agent.act, READ | {"c": np.array([-1.0])}, explore=False).result()
-        assert state(agent, LOST)[-1] == 0.25
+        assert state(agent, LOST)[-1] == 0.25  # -1.0 in the range of -2 to 2
     same = type(agent).rebuild(agent.description(), agent.state())
     assert state(same, LOST) == state(agent, LOST)
-    same.act(LOST)  # what was read greedily is not learned
+    same.act(LOST)  # readings of greedy actions are not kept
     assert state(same, LOST) == state(agent, READ | {"a": np.array([0.0, 0.5]), "b": 2})
     agent.begin_episode()
     assert state(agent, LOST) == never
@@ -67,7 +67,7 @@ def test_code_gives_missing_readings_a_separate_pattern(agent_class):
         table = core.table(i)
         assert np.array_equal(table[:-1], plain_core.table(i))
         is_last = state(agent, LOST)[i] * len(table) > len(table) - 1
-        assert is_last == (i != 1)
+        assert is_last == (i != 1)  # input 1 is the only reading that is present
     for _ in range(60):
         agent.learn(Transition(LOST, agent.act(LOST), 1.0, LOST, True))
         agent.learn(Transition(READ, agent.act(READ), -1.0, READ, True))
@@ -82,7 +82,7 @@ def test_an_angle_is_missing_if_either_of_its_pair_is():
     assert states == [states[0]] * 3
     agent = agent_of(SDNNQLambda, "hold", space, angle_pairs=[(0, 1)])
     agent.act([0.0, 1.0, 0.0])
-    assert state(agent, [1.0, np.nan, 0.0])[0] == 0.625
+    assert state(agent, [1.0, np.nan, 0.0])[0] == 0.625  # cosine 1 and held sine 1: 45 degrees
 
 
 def test_missing_readings_and_unsupported_modes_are_refused_with_a_remedy():

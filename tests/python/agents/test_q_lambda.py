@@ -65,8 +65,8 @@ def test_a_few_discrete_states_have_exact_independent_values(tmp_path):
     for state, reward in ((3, 2.0), (7, -5.0)):
         agent.learn(Transition(state, 1, reward, 4, terminated=True))
     agent.save(tmp_path / "agent.safetensors")
-    for one in (agent, load_agent(tmp_path / "agent.safetensors")):
-        values = np.array([one.q_values(state) for state in range(3, 8)])
+    for saved in (agent, load_agent(tmp_path / "agent.safetensors")):
+        values = np.array([saved.q_values(state) for state in range(3, 8)])
         np.testing.assert_allclose(values[:, 1], [2, 0, 0, 0, -5], rtol=1e-6)
         np.testing.assert_array_equal(values[:, 0], 0)
 

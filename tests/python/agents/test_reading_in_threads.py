@@ -28,7 +28,7 @@ AGENTS = {
 }
 
 
-def live(agent, n_steps, seed):
+def train(agent, n_steps, seed):
     rng = np.random.default_rng(seed)
     agent.begin_episode()
     observation = rng.random(N_INPUTS)
@@ -41,8 +41,8 @@ def live(agent, n_steps, seed):
 
 def read(agent, seed=0):
     observations = np.random.default_rng(seed).random((60, N_INPUTS))
-    ask = agent.value if isinstance(agent, FuzzyQLearning) else agent.q_values
-    return np.array([ask(observation) for observation in observations])
+    read_all = agent.value if isinstance(agent, FuzzyQLearning) else agent.q_values
+    return np.array([read_all(observation) for observation in observations])
 
 
 def greedy(agent, seed=0):
@@ -67,26 +67,26 @@ def in_threads(*works):
     return results
 
 
-@pytest.mark.parametrize("kind", AGENTS)
-def test_concurrent_readers_get_the_bits_of_a_single_reader(kind):
+@pytest.mark.parametrize("name", AGENTS)
+def test_concurrent_readers_get_the_bits_of_a_single_reader(name):
     # Without draws, whose order would be that of the threads.
-    agent = AGENTS[kind](learning=AGENTS[kind]().learning.replace(tie_rule="middle"))
+    agent = AGENTS[name](learning=AGENTS[name]().learning.replace(tie_rule="middle"))
     for round_number in range(3):
-        live(agent, 40, round_number)
-        for ask in (read, greedy):
-            expected = ask(agent)
-            for values in in_threads(*[lambda ask=ask: ask(agent)] * 4):
+        train(agent, 40, round_number)
+        for read_all in (read, greedy):
+            expected = read_all(agent)
+            for values in in_threads(*[lambda read_all=read_all: read_all(agent)] * 4):
                 np.testing.assert_array_equal(values, expected)
 
 
-@pytest.mark.parametrize("kind", AGENTS)
-def test_concurrent_readers_do_not_change_learning(kind):
-    alone, watched = AGENTS[kind](), AGENTS[kind]()
-    live(alone, 300, 7)
+@pytest.mark.parametrize("name", AGENTS)
+def test_concurrent_readers_do_not_change_learning(name):
+    alone, watched = AGENTS[name](), AGENTS[name]()
+    train(alone, 300, 7)
     done = threading.Event()
 
     def learn():
-        live(watched, 300, 7)
+        train(watched, 300, 7)
         done.set()
 
     def watch():

@@ -145,10 +145,10 @@ def same_state(first, second):
 
 
 @pytest.mark.parametrize(("n_environments", "n_cuts"), [(1, 100), (4, 24)])
-@pytest.mark.parametrize("kind", KINDS)
-def test_an_agent_saved_at_any_step_continues_exactly(kind, n_environments, n_cuts, tmp_path):
+@pytest.mark.parametrize("name", KINDS)
+def test_an_agent_saved_at_any_step_continues_exactly(name, n_environments, n_cuts, tmp_path):
     def new_agent():
-        agent = KINDS[kind]()
+        agent = KINDS[name]()
         agent.n_environments = n_environments
         return agent
 
@@ -191,11 +191,11 @@ def test_a_subclass_of_an_imported_module_can_be_unpickled(tmp_path, monkeypatch
         "spaces = gymnasium.spaces.Box(-1, 1, (2,)), gymnasium.spaces.Discrete(2)\n"
         "sys.stdout.buffer.write(pickle.dumps(docking.Docker(*spaces)))\n"
     )
-    told = subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, check=True
     )
     monkeypatch.syspath_prepend(tmp_path)
-    assert type(pickle.loads(told.stdout)).__name__ == "Docker"
+    assert type(pickle.loads(done.stdout)).__name__ == "Docker"
 
 
 def test_actions_keep_the_dtype_of_a_discrete_space(tmp_path):
@@ -229,11 +229,11 @@ def test_an_unchanged_class_that_is_defined_again_replaces_the_first(tmp_path):
 
 @pytest.mark.parametrize("n_steps", [40, 60])
 @pytest.mark.parametrize(
-    "kind", ["sdnn", "sdnn, vector", "fuzzy", "sdnn, switches", "sdnn, warm-up"]
+    "name", ["sdnn", "sdnn, vector", "fuzzy", "sdnn, switches", "sdnn, warm-up"]
 )
-def test_a_file_without_gymnasium_spaces_is_read(kind, n_steps, tmp_path):
+def test_a_file_without_gymnasium_spaces_is_read(name, n_steps, tmp_path):
     """C++ says all of an agent but Gymnasium's spaces."""
-    agent = lived(KINDS[kind](), 0, n_steps)
+    agent = lived(KINDS[name](), 0, n_steps)
     agent.save(tmp_path / "python")
 
     def change(description, _):

@@ -103,10 +103,10 @@ def test_every_setting_changes_what_an_agent_does_unless_listed(name, n_dimensio
         for value in others(field, getattr(parts[part], field.name)):
             try:
                 changed = dataclasses.replace(parts[part], **{field.name: value})
-                found = life(entry, n_dimensions, **parts | {part: changed})
+                outcome = life(entry, n_dimensions, **parts | {part: changed})
             except ValueError:
                 continue
-            if not all(map(np.array_equal, found, usual)):
+            if not all(map(np.array_equal, outcome, usual)):
                 return True
         return False
 

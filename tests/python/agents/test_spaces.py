@@ -57,13 +57,16 @@ ACTED = [
 
 
 @pytest.mark.parametrize(
-    ("name", "own", "found", "fits"),
+    ("name", "agent_space", "env_space", "fits"),
     [("observation", *case) for case in OBSERVED] + [("action", *case) for case in ACTED],
     ids=str,
 )
-def test_environments_are_accepted_if_their_spaces_fit_the_agents(name, own, found, fits):
+def test_environments_are_accepted_if_their_spaces_fit_the_agents(
+    name, agent_space, env_space, fits
+):
     agent, env = (
-        Spaces(space) if name == "observation" else Spaces(PLANE, space) for space in (own, found)
+        Spaces(space) if name == "observation" else Spaces(PLANE, space)
+        for space in (agent_space, env_space)
     )
     if fits:
         require_same_kind(agent, env)
@@ -94,9 +97,9 @@ def test_other_bounds_are_named_and_can_be_accepted_by_setting_the_space(tmp_pat
     refuses("observation_space", setattr, agent, "observation_space", PLANE)
     agent.observation_space = env.observation_space
     agent.save(tmp_path / "agent")
-    for one in (agent, load_agent(tmp_path / "agent")):
-        require_same_kind(one, env)
-        assert one.observation_range[1][-1] == 1.0
+    for loaded in (agent, load_agent(tmp_path / "agent")):
+        require_same_kind(loaded, env)
+        assert loaded.observation_range[1][-1] == 1.0
 
 
 class Colour(enum.Enum):
@@ -110,8 +113,8 @@ def test_keys_of_dict_spaces_are_saved_with_their_types(key, tmp_path):
     agent.save(tmp_path / "agent")
     again = load_agent(tmp_path / "agent")
     assert list(again.observation_space.spaces) == [key, "other"]
-    seen = space.sample()
-    assert again.act(seen) == agent.act(seen)
+    observation = space.sample()
+    assert again.act(observation) == agent.act(observation)
 
 
 @pytest.mark.parametrize(
@@ -153,17 +156,17 @@ def test_unbounded_actions_are_refused_with_a_remedy_that_works():
 
 
 def test_images_are_refused_with_a_remedy():
-    for kind in (RBFQLearning, SDNNQLearning):
+    for agent_class in (RBFQLearning, SDNNQLearning):
         with pytest.raises(ValueError, match="TransformObservation"):
-            kind(Box(0, 1, (10, 10, 6), np.bool_), Discrete(6))
+            agent_class(Box(0, 1, (10, 10, 6), np.bool_), Discrete(6))
 
 
-@pytest.mark.parametrize("kind", [RBFQLearning, SDNNQLearning, FuzzyQLearning])
-def test_max_table_bytes_limits_the_sum_of_all_networks(kind):
+@pytest.mark.parametrize("agent_class", [RBFQLearning, SDNNQLearning, FuzzyQLearning])
+def test_max_table_bytes_limits_the_sum_of_all_networks(agent_class):
     def fits(n_dimensions, limit):
-        approximator = kind.approximator_type(max_table_bytes=limit)
+        approximator = agent_class.approximator_type(max_table_bytes=limit)
         try:
-            kind(PLANE, Box(-1.0, 1.0, (n_dimensions,)), approximator=approximator)
+            agent_class(PLANE, Box(-1.0, 1.0, (n_dimensions,)), approximator=approximator)
         except ValueError as error:
             return "max_table_bytes" not in str(error)
         return True

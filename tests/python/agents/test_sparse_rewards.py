@@ -18,7 +18,7 @@ def new_agent(**learning):
     return SDNNQLambda(SQUARE, actions, learning=QLambdaConfig(**learning), seed=1, **KNOWN)
 
 
-def live(agent, rewards):
+def act_and_learn(agent, rewards):
     """Act in one state; return the actions."""
     actions = []
     for reward in rewards:
@@ -32,15 +32,11 @@ def longest_run(actions):
     return max(np.diff(np.concatenate([[-1], changes, [len(actions) - 1]])))
 
 
-def n_random_left(agent):
-    return int(agent.state().get("agent.n_random_left", 0))
-
-
 def test_random_actions_are_repeated_while_all_rewards_were_zero():
-    assert longest_run(live(new_agent(), [0.0] * 1000)) >= 40
-    assert longest_run(live(new_agent(max_action_repeat=20), [0.0] * 1000)) < 40
+    assert longest_run(act_and_learn(new_agent(), [0.0] * 1000)) >= 40
+    assert longest_run(act_and_learn(new_agent(max_action_repeat=20), [0.0] * 1000)) < 40
     for learning in ({"max_action_repeat": 1}, {"epsilon": 0.0}):
-        assert longest_run(live(new_agent(**learning), [0.0] * 1000)) < 15
+        assert longest_run(act_and_learn(new_agent(**learning), [0.0] * 1000)) < 15
 
 
 def test_random_actions_are_not_repeated_in_discrete_spaces():
@@ -52,21 +48,12 @@ def test_random_actions_are_not_repeated_in_discrete_spaces():
     assert longest_run(actions) < 15
 
 
-@pytest.mark.parametrize(("n_zeros", "n_left"), [(0, 0), (1, 2), (50, 100)])
-def test_after_the_first_reward_the_search_continues_for_twice_its_length(n_zeros, n_left):
-    agent = new_agent()
-    live(agent, [0.0] * n_zeros + [1.0])
-    assert n_random_left(agent) == n_left
-    live(agent, [1.0] * n_left)
-    assert n_random_left(agent) == 0
-
-
 def test_ends_of_episodes_are_counted_only_after_the_search():
     agent = new_agent()
-    live(agent, [0.0] * 10)
+    act_and_learn(agent, [0.0] * 10)
     agent.learn(Transition(HERE, 0, 1.0, HERE, True))
     assert "agent.n_ended" not in agent.state()
-    live(agent, [1.0] * 20)
+    act_and_learn(agent, [1.0] * 20)
     agent.learn(Transition(HERE, 0, 1.0, HERE, True))
     assert int(agent.state()["agent.n_ended"]) == 1
 
@@ -75,11 +62,11 @@ def test_ends_of_episodes_are_counted_only_after_the_search():
 def test_a_search_resumes_exactly(n_steps, tmp_path):
     rewards = [0.0] * 60 + [1.0] + [0.0] * 200
     whole, part = new_agent(), new_agent()
-    live(whole, rewards)
-    live(part, rewards[:n_steps])
+    act_and_learn(whole, rewards)
+    act_and_learn(part, rewards[:n_steps])
     part.save(tmp_path / "agent.safetensors")
     part = SDNNQLambda.load(tmp_path / "agent.safetensors")
-    live(part, rewards[n_steps:])
+    act_and_learn(part, rewards[n_steps:])
     assert states_equal(whole, part)
 
 

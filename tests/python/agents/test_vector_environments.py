@@ -75,8 +75,8 @@ class Unbounded(Walk):
 
 def sdnn_agent(env=None, **options):
     env = env or Walk()
-    given = {"approximator": SMALL, "learning": GENERAL, "seed": 3, **options}
-    return SDNNQLearning(env.observation_space, env.action_space, **given)
+    settings = {"approximator": SMALL, "learning": GENERAL, "seed": 3, **options}
+    return SDNNQLearning(env.observation_space, env.action_space, **settings)
 
 
 def rbf_agent():
@@ -115,9 +115,9 @@ def vectors(n):
     yield AsyncVectorEnv([Walk] * n, shared_memory=False, autoreset_mode=AutoresetMode.DISABLED)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_vector_of_one_environment_has_the_bits_of_a_single_environment(kind):
-    env, make = KINDS[kind]
+@pytest.mark.parametrize("name", KINDS)
+def test_a_vector_of_one_environment_has_the_bits_of_a_single_environment(name):
+    env, make = KINDS[name]
     plain = Training(make(), env(), steps=200, seed=4)
     rows = plain.run().rows
     for vector in (sync(1, env), sync(1, env, "SAME_STEP"), AsyncVectorEnv([env])):
@@ -128,10 +128,10 @@ def test_a_vector_of_one_environment_has_the_bits_of_a_single_environment(kind):
         vector.close()
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_training_in_a_vector_equals_a_loop_by_hand(kind):
+@pytest.mark.parametrize("name", KINDS)
+def test_a_training_in_a_vector_equals_a_loop_by_hand(name):
     # In each round all environments act, all step, and all are learned in order.
-    env_type, make = KINDS[kind]
+    env_type, make = KINDS[name]
     n = 3
     by_hand, trained = make(), make()
     result = trained.train(sync(n, env_type), steps=200, seed=4)
@@ -181,9 +181,9 @@ def test_all_types_of_vectors_give_the_same_bits():
         assert states_equal(other, agent)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_training_stopped_at_any_step_resumes_exactly(kind, tmp_path):
-    env, make = KINDS[kind]
+@pytest.mark.parametrize("name", KINDS)
+def test_a_training_stopped_at_any_step_resumes_exactly(name, tmp_path):
+    env, make = KINDS[name]
     path = tmp_path / "training"
     whole = Training(make(), sync(3, env), steps=150, seed=9)
     rows = whole.run().rows
@@ -204,13 +204,13 @@ def test_a_training_resumed_many_times_in_processes_has_the_same_bits(tmp_path):
     rows = whole.run().rows
     path = tmp_path / "training"
     training = Training(sdnn_agent(), sync(4), steps=120, seed=1, callbacks=[Stop(7, path)])
-    found = list(training.run().rows)
+    rows_of_parts = list(training.run().rows)
     for cut in (8, 30, 31, 33, 77, 1000):
         vector = AsyncVectorEnv([Walk] * 4)
         training = Training.load(path, vector, callbacks=[Stop(cut, path)])
-        found += training.run().rows
+        rows_of_parts += training.run().rows
         vector.close()
-    assert tuple(found) == rows
+    assert tuple(rows_of_parts) == rows
     assert states_equal(whole.agent, training.agent)
 
 
@@ -273,21 +273,6 @@ def test_dict_observations_and_discrete_actions_are_learned_in_vectors():
         vector = make(3, Buttons)
         assert sdnn_agent(Buttons()).train(vector, steps=100).n_steps == 100
         vector.close()
-
-
-def test_the_number_of_environments_of_an_agent_may_change():
-    agent = sdnn_agent()
-    agent.train(sync(4), steps=50)
-    assert agent.n_environments == 4
-    n = agent.learning_report()["n_corrections"]
-    agent.n_environments = 1
-    assert n < agent.learning_report()["n_corrections"] <= 50, (
-        "pending n-step transitions are learned"
-    )
-    agent.train(Walk(), steps=30)
-    assert agent.n_environments == 1
-    agent.train(sync(2), steps=30)
-    assert agent.n_environments == 2
 
 
 def test_a_warm_up_may_continue_in_fewer_environments():
@@ -353,8 +338,8 @@ class Recorder:
 
     def learn(self, transition, environment=0):
         observation, action, reward, next_observation, terminated = transition[:5]
-        told = (*observation, *action, reward, *next_observation, terminated)
-        self.learned[environment].append(tuple(float(x) for x in told))
+        values = (*observation, *action, reward, *next_observation, terminated)
+        self.learned[environment].append(tuple(float(x) for x in values))
 
 
 def test_steps_of_automatic_resets_are_not_learned():
@@ -372,26 +357,14 @@ def test_steps_of_automatic_resets_are_not_learned():
         for _ in range(80):
             action = plan.uniform(-1, 1, 1).astype(np.float32)
             next_observation, reward, terminated, truncated, _ = env.step(action)
-            told = (*observation, *action, reward, *next_observation, terminated)
-            expected.append(tuple(float(x) for x in told))
+            values = (*observation, *action, reward, *next_observation, terminated)
+            expected.append(tuple(float(x) for x in values))
             observation = next_observation
             if terminated or truncated:
                 observation, _ = env.reset()
                 expected.append("begin")
         for learner in by_mode.values():
             assert learner.learned[i][:80] == expected[:80]
-
-
-def test_a_vector_with_normalized_observations_is_learned():
-    from gymnasium.wrappers.vector import NormalizeObservation
-
-    envs = NormalizeObservation(SyncVectorEnv([lambda: gym.make("CartPole-v1")] * 2))
-    agent = SDNNQLearning(
-        envs.single_observation_space, envs.single_action_space, warm_up_steps=50, seed=1
-    )
-    result = agent.train(envs, steps=200)  # it refuses to reset one of them
-    assert result.n_steps == 200
-    assert result.n_episodes > 2
 
 
 def test_gymnasiums_batched_cartpole_is_learned_without_its_resets():
@@ -472,8 +445,8 @@ def test_a_training_calls_the_learn_method_of_a_subclass():
 
     sizes = RBFNetworkConfig(n_actions=7)
     agents = [
-        kind(Walk().observation_space, Walk.action_space, approximator=sizes, seed=1)
-        for kind in (Doubled, RBFQLearning)
+        name(Walk().observation_space, Walk.action_space, approximator=sizes, seed=1)
+        for name in (Doubled, RBFQLearning)
     ]
     for agent, env in zip(agents, (Walk, DoubleWalk), strict=True):
         agent.train(sync(2, env), steps=60, seed=1)

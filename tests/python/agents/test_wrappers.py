@@ -61,9 +61,9 @@ def agent_for(env):
 @pytest.mark.parametrize("wrappers", WRAPPERS.values(), ids=WRAPPERS)
 @pytest.mark.parametrize("cut", [60, 61, 95, 119])
 def test_a_training_with_normalizing_wrappers_resumes_exactly(wrappers, cut, tmp_path):
-    given = {"steps": 200, "evaluate_every": 50, "evaluation_episodes": 1}
+    options = {"steps": 200, "evaluate_every": 50, "evaluation_episodes": 1}
     env = wrapped(*wrappers)
-    whole = Training(agent_for(env), env, evaluation_env=wrapped(*wrappers), **given)
+    whole = Training(agent_for(env), env, evaluation_env=wrapped(*wrappers), **options)
     whole.run()
     env = wrapped(*wrappers)
     cut_training = Training(
@@ -71,7 +71,7 @@ def test_a_training_with_normalizing_wrappers_resumes_exactly(wrappers, cut, tmp
         env,
         evaluation_env=wrapped(*wrappers),
         callbacks=[Stop(cut, tmp_path / "training")],
-        **given,
+        **options,
     )
     cut_training.run()
     for callbacks in ([Stop(cut + 7, tmp_path / "training")], []):
@@ -92,12 +92,12 @@ def test_a_loaded_agent_is_evaluated_with_the_statistics_of_its_training(tmp_pat
     agent = agent_for(env)
     agent.train(env, steps=300)
     agent.save(tmp_path / "agent")
-    found = [
-        evaluate(one, wrapped(NormalizeObservation), 2, seed=5).returns.tolist()
-        for one in (agent, load_agent(tmp_path / "agent"))
+    returns = [
+        evaluate(wrapper, wrapped(NormalizeObservation), 2, seed=5).returns.tolist()
+        for wrapper in (agent, load_agent(tmp_path / "agent"))
     ]
     trained = evaluate(agent, env, 2, seed=5).returns.tolist()
-    assert found == [trained, trained]
+    assert returns == [trained, trained]
 
 
 def test_an_evaluation_does_not_change_the_statistics_of_wrappers():
@@ -108,7 +108,9 @@ def test_an_evaluation_does_not_change_the_statistics_of_wrappers():
         before = statistics_of(learning_wrappers(env))
         evaluate(agent, env, 1)
         assert statistics_of(learning_wrappers(env)) == before
-        flags = [getattr(one, "update_running_mean", True) for one in learning_wrappers(env)]
+        flags = [
+            getattr(wrapper, "update_running_mean", True) for wrapper in learning_wrappers(env)
+        ]
         assert all(flags)
 
 
@@ -121,7 +123,7 @@ def test_evaluating_without_statistics_of_a_training_warns():
 def unbounded(env):
     """Return an environment with the bounds of one whose observations are normalized."""
     space = wrapped(NormalizeObservation).observation_space
-    return gym.wrappers.TransformObservation(env, lambda seen: seen, space)
+    return gym.wrappers.TransformObservation(env, lambda x: x, space)
 
 
 @pytest.mark.parametrize("learns_in", [0, 1])
@@ -160,8 +162,8 @@ class Remembers(gym.Wrapper):
 
     def step(self, action):
         self.n += 1
-        seen, *rest = self.env.step(action)
-        return (seen + self.n % 2).astype(np.float32), *rest
+        x, *rest = self.env.step(action)
+        return (x + self.n % 2).astype(np.float32), *rest
 
 
 def test_a_wrapper_with_unknown_state_is_named_when_an_episode_cannot_be_repeated(tmp_path):

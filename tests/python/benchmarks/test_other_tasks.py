@@ -117,12 +117,12 @@ def test_a_stored_trial_is_not_run_again(scripts, tmp_path):
         agent = "tiles"
         """
     )
-    study, found = scripts.run.StudyFile(file, n_trials=1), {}
+    study, curves = scripts.run.StudyFile(file, n_trials=1), {}
     for _ in range(2):
         studies.run_study("x", study, given(tmp_path, "tiles"))
-        found, before = studies.curves("x", study, given(tmp_path)), found
-    assert set(found) == {("FrozenLake", "tiles")}
-    assert found == before
+        curves, first_curves = studies.curves("x", study, given(tmp_path)), curves
+    assert set(curves) == {("FrozenLake", "tiles")}
+    assert curves == first_curves
 
 
 def test_tables_of_two_hand_made_trials_are_as_worked_by_hand(scripts):

@@ -39,17 +39,17 @@ def content(folder):
     "returns", [[10, -5, -250, 0], [0.1, -0.3, 1e300, 5.0], [2.0**60, 1, 0, 3]]
 )
 def test_a_packed_store_is_unpacked_unchanged(packed_store, tmp_path, returns):
-    with ResultStore(tmp_path / "one") as store:
+    with ResultStore(tmp_path / "original") as store:
         store.add(record(1, returns, version="0.0.9"))
         store.add(record(0, returns[::-1], finished_at="2026-11-26T00:00:00+00:00"))
         store.add(record(2, []))
         store.put("squares", '["a", 1]', {"square": 0.1 + 0.2})
         store.put("cubes", "[2]", {"cube": [8, None]})
-    packed = packed_store.pack(tmp_path / "one")
-    packed_store.unpack(packed, tmp_path / "two")
-    assert content(tmp_path / "two") == content(tmp_path / "one")
-    assert packed_store.pack(tmp_path / "two") == packed
-    assert [file.name for file in (tmp_path / "two").iterdir()] == ["results.sqlite"]
+    packed = packed_store.pack(tmp_path / "original")
+    packed_store.unpack(packed, tmp_path / "unpacked")
+    assert content(tmp_path / "unpacked") == content(tmp_path / "original")
+    assert packed_store.pack(tmp_path / "unpacked") == packed
+    assert [file.name for file in (tmp_path / "unpacked").iterdir()] == ["results.sqlite"]
 
 
 def test_unpacking_does_not_overwrite_results(packed_store, tmp_path):

@@ -98,9 +98,9 @@ def test_a_value_between_subnormal_knots_has_the_bin_of_the_next_knot():
     st.sampled_from(["even", "quantile", "anchor"]),
 )
 @example([1.0, 5e-324, -5e-324], "quantile")
-def test_bins_are_within_the_table_and_monotonic(values, kind):
+def test_bins_are_within_the_table_and_monotonic(values, spacing):
     column = np.array(values)
-    coding = Anchor() if kind == "anchor" else RandomInverse(spacing=kind)
+    coding = Anchor() if spacing == "anchor" else RandomInverse(spacing=spacing)
     fitted = coding.fit(column, 64)
     order = np.sort(np.concatenate([column, [-np.finfo(float).max, 0, np.finfo(float).max]]))
     bins = fitted.bins(order)

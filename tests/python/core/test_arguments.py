@@ -12,16 +12,16 @@ BOX = gym.spaces.Box(-1.0, 1.0, (4,))
 
 @pytest.mark.parametrize("value", [2, np.int8(2), np.uint64(2)])
 def test_whole_accepts_integers_of_python_and_numpy(value):
-    found = arguments.whole("n", value, 1, 2)
-    assert found == 2
-    assert type(found) is int
+    number = arguments.whole("n", value, 1, 2)
+    assert number == 2
+    assert type(number) is int
 
 
 @pytest.mark.parametrize("value", [0.5, 1, np.float32(0.5), np.int8(1), np.inf])
 def test_real_accepts_numbers_of_python_and_numpy(value):
-    found = arguments.real("x", value)
-    assert found == value
-    assert type(found) is float
+    number = arguments.real("x", value)
+    assert number == value
+    assert type(number) is float
 
 
 @pytest.mark.parametrize("seed", [-1, 2**64, None, 1.5])

@@ -13,9 +13,9 @@ from refusals import refuses
 from sdnn import config
 from sdnn.config import QLearningConfig, SDNNCConfig, fields_of
 
-KINDS = [kind for name, kind in vars(config).items() if name.endswith("Config")]
-FIELDS = [(kind, field) for kind in KINDS for field in fields_of(kind)]
-IDS = [f"{kind.__name__}.{field.name}" for kind, field in FIELDS]
+KINDS = [config_class for name, config_class in vars(config).items() if name.endswith("Config")]
+FIELDS = [(config_class, field) for config_class in KINDS for field in fields_of(config_class)]
+IDS = [f"{config_class.__name__}.{field.name}" for config_class, field in FIELDS]
 
 
 def other_value(field):
@@ -27,31 +27,36 @@ def other_value(field):
     if field.hint.startswith("tuple"):
         return (True,) if "bool" in field.hint else (1, 0)
     number = field.default or 0
-    tried = (number + 1, number / 2, number - 1, 0.5)
-    inside = [x for x in tried if field.low <= x <= field.high and x != field.low]
+    candidates = (number + 1, number / 2, number - 1, 0.5)
+    inside = [x for x in candidates if field.low <= x <= field.high and x != field.low]
     return next(x for x in inside if "float" in field.hint or x == int(x))
 
 
-@pytest.mark.parametrize(("kind", "field"), FIELDS, ids=IDS)
-def test_each_field_is_kept_by_copies_pickles_and_replace(kind, field):
+@pytest.mark.parametrize(("config_class", "field"), FIELDS, ids=IDS)
+def test_each_field_is_kept_by_copies_pickles_and_replace(config_class, field):
     value = other_value(field)
-    made = kind(**{field.name: value})
-    assert getattr(made, field.name) == value != field.default == getattr(kind(), field.name)
-    assert made != kind()
-    assert f"{field.name}={value!r}" in repr(made).replace(f"{value}.0", f"{value}")
+    config_ = config_class(**{field.name: value})
+    assert (
+        getattr(config_, field.name)
+        == value
+        != field.default
+        == getattr(config_class(), field.name)
+    )
+    assert config_ != config_class()
+    assert f"{field.name}={value!r}" in repr(config_).replace(f"{value}.0", f"{value}")
     for again in (
-        pickle.loads(pickle.dumps(made)),
-        copy.deepcopy(made),
-        kind().replace(**{field.name: value}),
-        dataclasses.replace(kind(), **{field.name: value}),
-        kind(**dataclasses.asdict(made)),
+        pickle.loads(pickle.dumps(config_)),
+        copy.deepcopy(config_),
+        config_class().replace(**{field.name: value}),
+        dataclasses.replace(config_class(), **{field.name: value}),
+        config_class(**dataclasses.asdict(config_)),
     ):
-        assert again == made
-        assert hash(again) == hash(made)
+        assert again == config_
+        assert hash(again) == hash(config_)
 
 
-@pytest.mark.parametrize(("kind", "field"), FIELDS, ids=IDS)
-def test_bad_values_of_each_field_are_refused_with_its_name(kind, field):
+@pytest.mark.parametrize(("config_class", "field"), FIELDS, ids=IDS)
+def test_bad_values_of_each_field_are_refused_with_its_name(config_class, field):
     bad = ["four", b"x", {}, object(), 5 if field.hint == "bool" else True]
     if not field.hint.endswith("None"):
         bad.append(None)
@@ -66,29 +71,29 @@ def test_bad_values_of_each_field_are_refused_with_its_name(kind, field):
         if field.hint.startswith("tuple") and value == {}:
             continue
         with pytest.raises((TypeError, ValueError)) as caught:
-            kind(**{field.name: value})
+            config_class(**{field.name: value})
         assert caught.value.argument == field.name
         assert str(caught.value).startswith(f"{field.name} must be ")
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_configurations_are_frozen_keyword_only_and_documented(kind):
-    (first, *_) = fields_of(kind)
+@pytest.mark.parametrize("config_class", KINDS)
+def test_configurations_are_frozen_keyword_only_and_documented(config_class):
+    (first, *_) = fields_of(config_class)
     with pytest.raises(TypeError):
-        kind(first.default)
+        config_class(first.default)
     with pytest.raises(AttributeError):
-        setattr(kind(), first.name, first.default)
-    refuses("nothing", kind, nothing=1, error=TypeError)
-    names = [field.name for field in fields_of(kind)]
-    assert list(inspect.signature(kind).parameters) == names
-    assert [field.name for field in dataclasses.fields(kind)] == names
-    for field in fields_of(kind):
+        setattr(config_class(), first.name, first.default)
+    refuses("nothing", config_class, nothing=1, error=TypeError)
+    names = [field.name for field in fields_of(config_class)]
+    assert list(inspect.signature(config_class).parameters) == names
+    assert [field.name for field in dataclasses.fields(config_class)] == names
+    for field in fields_of(config_class):
         assert field.doc.endswith(".")
-        assert f"\n{field.name} : " in kind.__doc__
+        assert f"\n{field.name} : " in config_class.__doc__
 
 
 def test_configurations_accept_numpy_numbers_and_bools():
-    made = QLearningConfig(n_steps=np.int64(3), epsilon=np.float32(0.5), discount=1)
-    assert (made.n_steps, made.epsilon, made.discount) == (3, 0.5, 1.0)
+    config_ = QLearningConfig(n_steps=np.int64(3), epsilon=np.float32(0.5), discount=1)
+    assert (config_.n_steps, config_.epsilon, config_.discount) == (3, 0.5, 1.0)
     assert SDNNCConfig(circular=[np.True_, False]).circular == (True, False)
     assert SDNNCConfig(balanced_anchors=np.False_).balanced_anchors is False

@@ -75,11 +75,11 @@ def test_flipped_bits_of_a_store_are_noticed_or_harmless(tmp_path):
         flipped[place] ^= 1 << int(rng.integers(8))
         path.write_bytes(flipped)
         try:
-            found = content_of(tmp_path)
+            read = content_of(tmp_path)
         except StoreError as error:
             n_noticed += str(path) in str(error)
         else:
-            assert found == expected, "a bit of no meaning"
+            assert read == expected, "a bit of no meaning"
     assert n_noticed > 50
     path.write_bytes(content[: len(content) // 2])
     refuses("damaged", ResultStore, tmp_path, error=StoreError)
@@ -229,8 +229,8 @@ def test_reading_rolls_back_a_journal_but_refuses_a_stray_one(tmp_path, read_onl
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a system of POSIX")
 @pytest.mark.parametrize("end", ["", "-journal", "-wal"])
-@pytest.mark.parametrize("kind", ["link", "pipe", "folder", "dangling"])
-def test_a_store_and_its_journals_must_be_regular_files(tmp_path, end, kind):
+@pytest.mark.parametrize("target_type", ["link", "pipe", "folder", "dangling"])
+def test_a_store_and_its_journals_must_be_regular_files(tmp_path, end, target_type):
     folder, other = tmp_path / "run", tmp_path / "other"
     folder.mkdir()
     other.mkdir()
@@ -244,7 +244,7 @@ def test_a_store_and_its_journals_must_be_regular_files(tmp_path, end, kind):
         "dangling": lambda: path.symlink_to(tmp_path / "nothing"),
         "pipe": lambda: os.mkfifo(path),
         "folder": path.mkdir,
-    }[kind]()
+    }[target_type]()
     for read_only in (True, False):
         with pytest.raises(StoreError, match=path.name):
             ResultStore(folder, read_only=read_only)
@@ -264,8 +264,8 @@ def test_a_stored_measurement_must_be_json(tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a system of POSIX")
-@pytest.mark.parametrize("kind", ["link", "pipe", "device"])
-def test_files_of_a_run_replace_links_pipes_and_devices(tmp_path, kind):
+@pytest.mark.parametrize("target_type", ["link", "pipe", "device"])
+def test_files_of_a_run_replace_links_pipes_and_devices(tmp_path, target_type):
     folder, kept = tmp_path / "run", tmp_path / "kept"
     Run.create(folder, RUN)
     Run.open(folder).train()
@@ -279,13 +279,13 @@ def test_files_of_a_run_replace_links_pipes_and_devices(tmp_path, kind):
             path.rename(target)
         else:
             target.write_bytes(b"mine")
-        if kind == "pipe":
+        if target_type == "pipe":
             os.mkfifo(path)
         else:
-            path.symlink_to(target if kind == "link" else "/dev/null")
+            path.symlink_to(target if target_type == "link" else "/dev/null")
     contents = {name: (kept / name).read_bytes() for name in names}
     for name in ("config.json", "checkpoint.safetensors"):
-        if kind != "link":  # a run is read from files only
+        if target_type != "link":  # a run is read from files only
             with pytest.raises((OSError, RunError), match=name):
                 Run.open(folder).train(steps=30)
             (folder / name).unlink()

@@ -4,9 +4,7 @@ import sys
 
 import pytest
 
-import sdnn
 from processes import environment, python
-from refusals import refuses
 from sdnn import _core
 from sdnn.support.machine import available_instruction_sets, instruction_set, set_instruction_set
 
@@ -47,13 +45,6 @@ def test_a_trial_has_the_same_bits_on_every_instruction_set(n_inputs, noise):
             assert column.tobytes() == expected[name].tobytes(), (level, name)
 
 
-@pytest.mark.usefixtures("restore")
-def test_every_available_instruction_set_can_be_selected():
-    for level in available_instruction_sets():
-        sdnn.set_instruction_set(level)
-        assert sdnn.instruction_set() == level
-
-
 @pytest.mark.parametrize("name", ["", "sse9", "AVX2", "avx2 "])
 def test_unknown_instruction_sets_are_refused(name):
     before = instruction_set()
@@ -64,16 +55,11 @@ def test_unknown_instruction_sets_are_refused(name):
         set_instruction_set(2)
 
 
-def test_instruction_sets_that_the_processor_lacks_are_refused():
-    for name in {"portable", "neon", "avx2", "avx512"} - set(available_instruction_sets()):
-        refuses("processor", set_instruction_set, name)
-
-
-@pytest.mark.parametrize(("value", "said"), [("portable", "portable"), ("sse9", "sse9")])
-def test_the_environment_variable_selects_the_instruction_set(value, said):
+@pytest.mark.parametrize(("value", "expected"), [("portable", "portable"), ("sse9", "sse9")])
+def test_the_environment_variable_selects_the_instruction_set(value, expected):
     code = "import sdnn; print(sdnn.instruction_set())"
     done = python("-c", code, env=environment(SDNN_INSTRUCTION_SET=value))
-    assert said in done.stdout + done.stderr
+    assert expected in done.stdout + done.stderr
     assert (done.returncode == 0) == (value == "portable")
 
 
@@ -94,6 +80,6 @@ def test_an_unknown_instruction_set_in_the_environment_raises_an_error():
         text=True,
         check=True,
     )
-    told = done.stdout.splitlines()
-    assert len(told) == len(calls)
-    assert all("instruction set" in line and "got foo" in line for line in told)
+    printed = done.stdout.splitlines()
+    assert len(printed) == len(calls)
+    assert all("instruction set" in line and "got foo" in line for line in printed)

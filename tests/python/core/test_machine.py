@@ -5,9 +5,9 @@ from sdnn.support import machine
 
 
 def test_the_name_of_the_processor_is_read_from_cpuinfo(tmp_path, monkeypatch):
-    told = tmp_path / "cpuinfo"
-    monkeypatch.setattr(machine, "_PROCESSOR_FILE", told)
-    told.write_text("processor : 0\nmodel name\t: Fast One @ 1 GHz\nmodel name\t: Other\n")
+    cpuinfo = tmp_path / "cpuinfo"
+    monkeypatch.setattr(machine, "_PROCESSOR_FILE", cpuinfo)
+    cpuinfo.write_text("processor : 0\nmodel name\t: Fast One @ 1 GHz\nmodel name\t: Other\n")
     assert machine.processor() == "Fast One @ 1 GHz"
     assert machine.description() == f"Fast One @ 1 GHz, {machine.instruction_set()}"
 

@@ -29,8 +29,8 @@ def test_objects_of_the_core_cannot_be_pickled():
 
 def test_only_one_binding_header_releases_the_gil():
     for path in BINDINGS.glob("*.[ch]pp"):
-        found = re.findall(r"gil_scoped_release|PyEval_SaveThread", path.read_text())
-        assert path.name == "objects.hpp" or not found, path
+        matches = re.findall(r"gil_scoped_release|PyEval_SaveThread", path.read_text())
+        assert path.name == "objects.hpp" or not matches, path
 
 
 def in_thread(work):

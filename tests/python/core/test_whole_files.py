@@ -53,10 +53,10 @@ def test_only_partial_files_of_dead_processes_are_removed(tmp_path):
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         try:
             assert process.stdout.readline() == b"half\n"
-            found = partial_files(tmp_path)
-            assert len(found) == 2
+            partial = partial_files(tmp_path)
+            assert len(partial) == 2
             remove_abandoned_files(tmp_path)
-            assert partial_files(tmp_path) == found
+            assert partial_files(tmp_path) == partial
         finally:
             process.kill()
     remove_abandoned_files(tmp_path)
@@ -69,13 +69,13 @@ def test_without_file_locks_partial_files_are_removed_after_an_hour(
     tmp_path, monkeypatch, seconds, stays
 ):
     monkeypatch.setattr(files, "lock", lambda descriptor: None)
-    left = tmp_path / f"rows.csv.0123456789abcdef{PARTIAL_SUFFIX}"
-    mine = [tmp_path / "mine.txt", tmp_path / f"mine{PARTIAL_SUFFIX}"]
-    for path in (left, *mine):
+    abandoned = tmp_path / f"rows.csv.0123456789abcdef{PARTIAL_SUFFIX}"
+    foreign_files = [tmp_path / "mine.txt", tmp_path / f"mine{PARTIAL_SUFFIX}"]
+    for path in (abandoned, *foreign_files):
         path.write_bytes(b"half")
         os.utime(path, (time.time() - seconds,) * 2)
     remove_abandoned_files(tmp_path)
-    assert set(tmp_path.iterdir()) == {*mine, *([left] if stays else [])}
+    assert set(tmp_path.iterdir()) == {*foreign_files, *([abandoned] if stays else [])}
     write_whole(tmp_path / "rows.csv", b"whole")
     assert (tmp_path / "rows.csv").read_bytes() == b"whole"
 

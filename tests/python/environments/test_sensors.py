@@ -17,19 +17,19 @@ from sdnn.environments import (
 def run(env, n_episodes=20):
     """Observations and true states of random episodes."""
     rng = np.random.default_rng(1)
-    seen, states = [], []
+    observed, states = [], []
     for _ in range(n_episodes):
         observation, info = env.reset()
         ended = False
         while True:
-            seen.append(observation)
+            observed.append(observation)
             states.append(info["state"])
             if ended:
                 break
             action = rng.uniform(-1.0, 1.0, 1)
             observation, _, terminated, truncated, info = env.step(action)
             ended = terminated or truncated
-    return seen, states
+    return observed, states
 
 
 @pytest.mark.parametrize("n_sensors", [4, 5, 6])
@@ -41,9 +41,9 @@ def test_sensor_wrappers_have_the_bits_of_the_core(n_sensors, noise, stream):
     env = NoisySensors(env, sigma=noise, seed=42, stream=stream)
     config = SensorConfig(n_sensors=n_sensors, noise=noise)
     core = _core.AcrobotSensors(config, 42, _core.Stream.__members__[stream])
-    seen, states = run(env)
-    assert len(seen) > 50
-    for observation, state in zip(seen, states, strict=True):
+    observed, states = run(env)
+    assert len(observed) > 50
+    for observation, state in zip(observed, states, strict=True):
         assert observation.dtype == np.float64
         np.testing.assert_array_equal(observation, core.observe(state))
 
@@ -80,16 +80,16 @@ class Switches(gym.Env):
 
 def test_sensors_convert_integer_observations_to_float():
     noisy = NoisySensors(Switches(), 0.02, edge="saturate")
-    seen, _ = noisy.reset(seed=1)
-    assert noisy.observation_space.contains(seen)
-    assert seen[0] < 0.1
-    assert (seen[1:] > 0.9).all()
-    assert ((seen > 0.0) & (seen < 1.0)).any()
+    observed, _ = noisy.reset(seed=1)
+    assert noisy.observation_space.contains(observed)
+    assert observed[0] < 0.1
+    assert (observed[1:] > 0.9).all()
+    assert ((observed > 0.0) & (observed < 1.0)).any()
     more = RedundantSensors(Switches(), [lambda s: s.mean() / 2], bounds=[(0.0, 0.5)])
-    seen, _ = more.reset()
-    assert more.observation_space.contains(seen)
+    observed, _ = more.reset()
+    assert more.observation_space.contains(observed)
     assert more.observation_space.high[3] == 0.5
-    assert seen.tolist() == [0.0, 1.0, 1.0, np.float32(1 / 3)]
+    assert observed.tolist() == [0.0, 1.0, 1.0, np.float32(1 / 3)]
 
 
 def test_edge_wraps_or_clips_noise_per_variable():
@@ -98,10 +98,10 @@ def test_edge_wraps_or_clips_noise_per_variable():
     )
     edges = ("saturate", "wrap", "saturate", "saturate")
     noisy = NoisySensors(env, sigma=0.1, edge=edges, seed=3)
-    seen = np.array([noisy.reset()[0] for _ in range(100)])
-    assert (seen[:, 1] < 0.5).any()
-    assert (seen[:, 0] > 0.5).all()
-    assert (seen[:, 0] == 1.0).any()
+    observed = np.array([noisy.reset()[0] for _ in range(100)])
+    assert (observed[:, 1] < 0.5).any()
+    assert (observed[:, 0] > 0.5).all()
+    assert (observed[:, 0] == 1.0).any()
     noisy = NoisySensors(env, sigma=0.1, edge="saturate", seed=3)
     assert (np.array([noisy.reset()[0] for _ in range(100)]) > 0.5).all()
 

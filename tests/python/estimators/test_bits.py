@@ -108,13 +108,13 @@ def test_fit_draws_two_seeds_and_then_a_permutation_per_epoch(regression):
     random = np.random.RandomState(5)
     X = random.uniform(size=(30, 2))
     y = X[:, 0] if regression else np.digitize(X[:, 0], [0.3, 0.6])
-    kind = SDNNRegressor if regression else SDNNClassifier
+    estimator = SDNNRegressor if regression else SDNNClassifier
     options = {"n_pattern_units": 40, "random_state": 11, "max_iter": 7}
     if not regression:
         options["n_units_per_class"] = 1
-    model = kind(**options).fit(X, y)
+    model = estimator(**options).fit(X, y)
 
-    begun, targets = untrained(kind(**options), X, y)
+    begun, targets = untrained(estimator(**options), X, y)
     layer = transcribed(begun)
     bins = begun.network_.input_code.bins(X)
     slow = (

@@ -70,9 +70,9 @@ WORKS = {
 }
 
 
-def made(kind, **options):
-    estimator, own, y = KINDS[kind]
-    return estimator(UNIT, **{**OPTIONS, **own, **options}), y
+def new_model(name, **options):
+    estimator, settings, y = KINDS[name]
+    return estimator(UNIT, **{**OPTIONS, **settings, **options}), y
 
 
 def state_of(model):
@@ -82,10 +82,10 @@ def state_of(model):
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # in generators
 @pytest.mark.parametrize("training", ["auto", "block"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", KINDS)
 @pytest.mark.parametrize("work", WORKS)
-def test_an_error_at_any_call_leaves_the_model_unchanged(kind, work, training):
-    model, y = made(kind, training=training)
+def test_an_error_at_any_call_leaves_the_model_unchanged(name, work, training):
+    model, y = new_model(name, training=training)
     model.fit(X[::-1], y[::-1]).learn_one(X[0], y[0])
     before = state_of(model)
     counting = FailAtCall(-1)
@@ -100,14 +100,14 @@ def test_an_error_at_any_call_leaves_the_model_unchanged(kind, work, training):
             n_failed += 1
             assert state_of(model) == before, n
         else:  # some libraries go on after an error of a callback
-            model, _ = made(kind, training=training)
+            model, _ = new_model(name, training=training)
             model.fit(X[::-1], y[::-1]).learn_one(X[0], y[0])
     assert n_failed > 0.75 * len(places)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_failed_first_fit_leaves_an_unfitted_model(kind):
-    model, y = made(kind)
+@pytest.mark.parametrize("name", KINDS)
+def test_a_failed_first_fit_leaves_an_unfitted_model(name):
+    model, y = new_model(name)
     before = state_of(model)
     for n in np.random.RandomState(2).randint(1, 300, size=50):
         assert FailAtCall(n).stops(lambda: model.fit(X, y))
@@ -118,9 +118,9 @@ def test_a_failed_first_fit_leaves_an_unfitted_model(kind):
     assert state_of(model) == before
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_refused_samples_do_not_change_the_model(kind):
-    model, y = made(kind)
+@pytest.mark.parametrize("name", KINDS)
+def test_refused_samples_do_not_change_the_model(name):
+    model, y = new_model(name)
     model.fit(X, y)
     before = state_of(model)
     bad = X.copy()

@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.base import clone
-from sklearn.model_selection import GridSearchCV
 
 from refusals import refuses
 from sdnn import SDNNClassifier, SDNNRegressor
@@ -88,13 +87,6 @@ def test_settings_of_numpy_and_pandas_types_are_saved(model, tmp_path):
         assert same.coding == model.coding
     again = [clone(one).set_params(random_state=0).fit(FRAME, LABELS) for one in (same, model)]
     np.testing.assert_array_equal(again[0].weights_, again[1].weights_)
-
-
-def test_the_best_estimator_of_a_search_can_be_saved(tmp_path):
-    grid = {"coding__n_bins": np.arange(20, 50, 10), "coding__length_scale": NUMPY[1:2]}
-    found = GridSearchCV(SDNNRegressor(**SMALL), grid, cv=2).fit(X, Y).best_estimator_
-    found.save(tmp_path / "model.safetensors")
-    assert SDNNRegressor.load(tmp_path / "model.safetensors").coding == found.coding
 
 
 def test_columns_chosen_by_functions_or_iterators_cannot_be_saved(tmp_path):

@@ -28,9 +28,9 @@ LABELS = np.array(["low", "middle", "high"])[np.digitize(Y, [0.2, 0.8])]
 @pytest.mark.parametrize("model", [SDNNKernelRidge(), SDNNKernelClassifier()])
 def test_scikit_learns_check_estimator_finds_no_fault(model):
     results = check_estimator(model, on_skip=None, on_fail=None)
-    other = {r["check_name"]: r["status"] for r in results if r["status"] != "passed"}
-    assert set(other) <= {"check_array_api_input"}, other
-    assert set(other.values()) <= {"skipped"}
+    not_passed = {r["check_name"]: r["status"] for r in results if r["status"] != "passed"}
+    assert set(not_passed) <= {"check_array_api_input"}, not_passed
+    assert set(not_passed.values()) <= {"skipped"}
 
 
 def kernels(degree, fresh=X):
@@ -64,49 +64,57 @@ def test_alpha_and_degree_minimize_the_leave_one_out_error():
     noisy = Y + np.random.RandomState(1).normal(0, 0.3, len(Y))
 
     def error(degree, alpha):
-        kernel, ones, wrong = kernels(degree), np.ones(len(Y) - 1), []
+        kernel, ones, errors = kernels(degree), np.ones(len(Y) - 1), []
         for i in range(len(Y)):
             rest = np.arange(len(Y)) != i
             out = ridge(kernel[np.ix_(rest, rest)], noisy[rest], ones, alpha, kernel[i, rest])
-            wrong.append(out - noisy[i])
-        return np.mean(np.square(wrong)) / noisy.var()
+            errors.append(out - noisy[i])
+        return np.mean(np.square(errors)) / noisy.var()
 
     chosen = SDNNKernelRidge().fit(X, noisy)
     assert chosen.leave_one_out_error_ == pytest.approx(error(chosen.degree_, chosen.alpha_))
     for degree in (1, 2, 3):
         for factor in (0.1, 1, 10):
-            other = error(degree, factor * chosen.alpha_)
-            assert chosen.leave_one_out_error_ < other + 1e-9
+            other_error = error(degree, factor * chosen.alpha_)
+            assert chosen.leave_one_out_error_ < other_error + 1e-9
 
 
-@pytest.mark.parametrize("kind", [SDNNKernelRidge, SDNNKernelClassifier])
-def test_integer_weights_equal_repeated_samples(kind):
-    y = Y if kind is SDNNKernelRidge else LABELS
+@pytest.mark.parametrize("estimator", [SDNNKernelRidge, SDNNKernelClassifier])
+def test_integer_weights_equal_repeated_samples(estimator):
+    y = Y if estimator is SDNNKernelRidge else LABELS
     weights = RANDOM.randint(0, 4, len(X))
-    weighted = kind().fit(X, y, weights)
-    repeated = kind().fit(np.repeat(X, weights, axis=0), np.repeat(y, weights))
+    weighted = estimator().fit(X, y, weights)
+    repeated = estimator().fit(np.repeat(X, weights, axis=0), np.repeat(y, weights))
     outputs = (
-        one.predict if kind is SDNNKernelRidge else one.predict_proba
+        one.predict if estimator is SDNNKernelRidge else one.predict_proba
         for one in (weighted, repeated)
     )
     np.testing.assert_allclose(*(predict(X) for predict in outputs), atol=1e-8)
 
 
-@pytest.mark.parametrize("kind", [SDNNKernelRidge, SDNNKernelClassifier])
-def test_the_scale_of_sample_weights_has_no_effect(kind):
-    y = Y if kind is SDNNKernelRidge else LABELS
+@pytest.mark.parametrize("estimator", [SDNNKernelRidge, SDNNKernelClassifier])
+def test_the_scale_of_sample_weights_has_no_effect(estimator):
+    y = Y if estimator is SDNNKernelRidge else LABELS
     weights = RANDOM.uniform(0, 1, len(X))
-    small, sums_to_one = kind().fit(X, y, weights), kind().fit(X, y, weights / weights.sum())
+    small, sums_to_one = (
+        estimator().fit(X, y, weights),
+        estimator().fit(X, y, weights / weights.sum()),
+    )
     np.testing.assert_allclose(small.dual_coef_, sums_to_one.dual_coef_, rtol=1e-6, atol=1e-8)
 
 
-def test_low_rank_fits_are_close_to_exact_ones_in_little_memory():
+def test_low_rank_fits_are_close_to_exact_ones():
     samples = np.random.RandomState(0).uniform(0, 1, (3000, 2))
     y = np.sin(6 * samples[:, 0]) * samples[:, 1]
     exact = SDNNKernelRidge(max_components=3000, alpha=0.1, degree=2).fit(samples[:1000], y[:1000])
     same = clone(exact).set_params(max_components=999, random_state=0)
     same.fit(samples[:1000], y[:1000])
     np.testing.assert_allclose(same.predict(samples), exact.predict(samples), atol=0.01)
+
+
+def test_low_rank_fits_keep_to_the_documented_memory():
+    samples = np.random.RandomState(0).uniform(0, 1, (3000, 2))
+    y = np.sin(6 * samples[:, 0]) * samples[:, 1]
     tracemalloc.start()
     try:
         low = SDNNKernelRidge(max_components=100, random_state=0).fit(samples, y)
@@ -115,6 +123,7 @@ def test_low_rank_fits_are_close_to_exact_ones_in_little_memory():
         tracemalloc.stop()
     assert low.X_fit_.shape == (100, 2)
     assert low.score(samples, y) > 0.98
+    # The documented bytes for each component, and two matrices of 1000 bins.
     assert peak < 98304 * 100 + 2 * 8 * 1000**2
 
 
@@ -134,6 +143,9 @@ def test_classes_are_learned_with_calibrated_probabilities(max_components):
     np.testing.assert_array_equal(predicted == "yes", model.decision_function(samples[500:]) > 0)
     right = predicted == labels[500:]
     assert abs(probabilities.max(axis=1).mean() - right.mean()) < 0.1
+
+
+def test_decisions_of_three_classes_sum_to_one():
     three = SDNNKernelClassifier().fit(X, LABELS)
     assert three.decision_function(X).shape == (120, 3)
     np.testing.assert_allclose(three.decision_function(X).sum(axis=1), 1)
@@ -149,6 +161,10 @@ def test_class_weights_shift_predictions_towards_rare_classes():
     shares = [(one.predict(noisy) == "rare").mean() for one in (plain, balanced, none)]
     assert shares[0] < shares[1]
     assert shares[2] == 0
+
+
+def test_negative_class_weights_and_single_classes_are_refused():
+    rare = np.where(np.quantile(Y, 0.9) < Y, "rare", "usual")
     refuses("class_weight", SDNNKernelClassifier(class_weight={"rare": -1}).fit, X, rare)
     refuses("class", SDNNKernelClassifier().fit, X, np.zeros(len(X)))
 
@@ -170,12 +186,15 @@ def test_ridge_regression_scores_better_than_the_network_on_noise():
     assert ridge > network + 0.05
 
 
-def test_frames_grid_searches_and_several_outputs_are_accepted():
+def test_a_grid_search_over_pairs_of_a_frame_is_accepted():
     frame = pd.DataFrame({"hour": 24 * X[:, 0], "kind": np.where(X[:, 1] > 0.5, "u", "v")})
     model = SDNNKernelRidge([(Circular(period=24.0), ["hour"]), ("symbolic", ["kind"])])
     grid = {"alpha": [0.01, 0.1], "pairs": ["all", [("hour", "kind")]]}
-    found = GridSearchCV(model, grid, cv=3).fit(frame, Y)
-    assert found.best_estimator_.n_features_in_ == 2
+    search = GridSearchCV(model, grid, cv=3).fit(frame, Y)
+    assert search.best_estimator_.n_features_in_ == 2
+
+
+def test_several_outputs_are_predicted_like_single_ones_also_after_pickling():
     outputs = np.stack([Y, -Y], axis=1)
     both = SDNNKernelRidge().fit(X, outputs)
     np.testing.assert_allclose(both.predict(X)[:, 0], SDNNKernelRidge().fit(X, Y).predict(X))
@@ -209,6 +228,7 @@ def test_memory_does_not_grow_with_the_features(pairs):
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
+    # The documented bytes for pairs of samples, and three matrices of bins.
     assert peak < 48 * n_samples**2 + 3 * 8 * n_bins**2
 
 

@@ -26,9 +26,9 @@ GIVEN = {"coding": UNIT, "n_pattern_units": 128, "random_state": 3}
 REGRESSOR = {**GIVEN, "output_range": (-1.5, 1.5), "n_output_units": 60}
 
 
-def same(one, other):
-    np.testing.assert_array_equal(one.weights_, other.weights_)
-    np.testing.assert_array_equal(one.thresholds_, other.thresholds_)
+def same(model, expected):
+    np.testing.assert_array_equal(model.weights_, expected.weights_)
+    np.testing.assert_array_equal(model.thresholds_, expected.thresholds_)
 
 
 def test_a_smooth_function_is_learned_with_r2_above_097():
@@ -85,14 +85,14 @@ def test_epochs_of_fit_equal_passes_of_partial_fit():
 
 
 @pytest.mark.parametrize(
-    ("kind", "options", "targets"),
+    ("estimator", "options", "targets"),
     [(SDNNRegressor, REGRESSOR, Y), (SDNNClassifier, {**GIVEN, "n_units_per_class": 8}, LABELS)],
 )
-def test_a_warm_start_of_3_after_2_epochs_equals_5_epochs(kind, options, targets):
-    model = kind(**options, shuffle=False, warm_start=True, max_iter=2).fit(X, targets)
+def test_a_warm_start_of_3_after_2_epochs_equals_5_epochs(estimator, options, targets):
+    model = estimator(**options, shuffle=False, warm_start=True, max_iter=2).fit(X, targets)
     first, weights = model.network_, model.weights_
     assert model.set_params(max_iter=3).fit(X, targets).n_iter_ == 3
-    same(model, kind(**options, shuffle=False, max_iter=5).fit(X, targets))
+    same(model, estimator(**options, shuffle=False, max_iter=5).fit(X, targets))
     np.testing.assert_array_equal(first.layer.weights, weights)
     model.set_params(max_iter=1, training="dual", memory_limit=100)
     now = model.weights_
@@ -149,6 +149,9 @@ def test_several_outputs_are_learned_independently():
     assert model.predict(X).shape == (150, 2)
     assert model.score(X, targets) > 0.99
     assert model.output_range_.shape == (2, 2)
+
+
+def test_a_target_of_one_column_is_learned_like_a_vector_and_keeps_its_shape():
     column = SDNNRegressor(**REGRESSOR, max_iter=2).fit(X, Y[:, None])
     assert column.predict(X).shape == (150, 1)
     same(column, SDNNRegressor(**REGRESSOR, max_iter=2).fit(X, Y))
@@ -158,23 +161,26 @@ def test_predictions_are_multiples_of_a_step_within_the_output_range():
     model = SDNNRegressor(**REGRESSOR, max_iter=20, n_averaged_epochs=1).fit(X, Y)
     counts = (model.predict(X) + 1.5) / (3 / 60)
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
+
+
+def test_targets_above_the_output_range_are_counted_and_clipped():
     with pytest.warns(OutOfRangeWarning, match="range"):
         far = SDNNRegressor(**REGRESSOR, max_iter=20).fit(X, Y + 100)
     assert far.predict(X).max() == pytest.approx(1.5)
     assert far.n_outputs_out_of_range_ == len(X)
 
 
-@pytest.mark.parametrize("kind", [SDNNRegressor, SDNNClassifier])
-def test_early_stopping_restores_the_weights_of_the_best_epoch(kind):
-    targets = Y + RANDOM.normal(0, 0.3, len(Y)) if kind is SDNNRegressor else LABELS
+@pytest.mark.parametrize("estimator", [SDNNRegressor, SDNNClassifier])
+def test_early_stopping_restores_the_weights_of_the_best_epoch(estimator):
+    targets = Y + RANDOM.normal(0, 0.3, len(Y)) if estimator is SDNNRegressor else LABELS
     options = {"coding": UNIT, "n_pattern_units": 128, "random_state": 1, "shuffle": False}
-    model = kind(**options, early_stopping=True, n_iter_no_change=4, max_iter=60)
+    model = estimator(**options, early_stopping=True, n_iter_no_change=4, max_iter=60)
     model.fit(X, targets)
     best = int(np.argmax(model.validation_scores_))
     assert model.n_iter_ == len(model.validation_scores_) <= 60
-    again = kind(**options, early_stopping=True, n_iter_no_change=4, max_iter=best + 1)
+    again = estimator(**options, early_stopping=True, n_iter_no_change=4, max_iter=best + 1)
     same(model, again.fit(X, targets))
-    refuses("early", kind(early_stopping=True, validation_fraction=0.9).fit, X[:2], [0, 1])
+    refuses("early", estimator(early_stopping=True, validation_fraction=0.9).fit, X[:2], [0, 1])
 
 
 @pytest.mark.parametrize(
@@ -233,11 +239,15 @@ def test_decisions_are_shares_of_active_units_and_probabilities_their_softmax():
 
 
 def test_the_default_number_of_units_per_class_falls_with_the_classes():
+    # 60 units for each class, but 1200 divided by the number of classes if that is less.
     assert len(SDNNClassifier(**GIVEN).fit(X, LABELS).thresholds_) == 3 * 60
     many = np.arange(len(X)) % 75
     assert len(SDNNClassifier(**GIVEN, max_iter=1).fit(X, many).thresholds_) == 75 * 16
+
+
+def test_single_units_and_one_versus_one_have_no_probabilities():
     one = SDNNClassifier(**GIVEN, scheme="one_vs_one", max_iter=1).fit(X, LABELS)
-    assert len(one.thresholds_) == 3
+    assert len(one.thresholds_) == 3  # a unit for each pair of three classes
     assert not hasattr(one, "predict_proba")
     assert not hasattr(SDNNClassifier(n_units_per_class=1), "predict_proba")
     refuses("one_vs_one", SDNNClassifier(scheme="one_vs_one", n_units_per_class=5).fit, X, LABELS)
@@ -253,16 +263,24 @@ def test_class_weights_are_numbers_of_presentations():
     for _ in range(weighted.n_iter_ - 1):
         by_hand.partial_fit(np.repeat(X, 1 + 2 * rare, axis=0), np.repeat(rare, 1 + 2 * rare))
     same(weighted, by_hand)
+
+
+def test_balanced_class_weights_predict_the_rare_class_more_often():
     noisy = np.where(RANDOM.uniform(size=len(Y)) < 0.2, 1, 0)
     options = {**GIVEN, "max_iter": 8}
     plain = SDNNClassifier(**options).fit(X, noisy)
     balanced = SDNNClassifier(**options, class_weight="balanced").fit(X, noisy)
     assert balanced.predict(X).mean() > plain.predict(X).mean()
+
+
+def test_invalid_class_weights_and_those_of_online_learning_are_refused():
+    rare = (Y > 0.6).astype(int)
     for bad in ({0: -1, 1: 1}, {0: np.nan}, "even"):
         refuses("class_weight", SDNNClassifier(class_weight=bad).fit, X, rare)
     refuses(
         "class_weight", SDNNClassifier(class_weight="balanced").partial_fit, X, rare, classes=[0, 1]
     )
+    balanced = SDNNClassifier(**GIVEN, class_weight="balanced", max_iter=1).fit(X, rare)
     refuses("class_weight", balanced.learn_one, X[0], 1)
 
 
@@ -346,6 +364,7 @@ def test_predictions_average_the_networks_of_three_epochs(tmp_path):
     np.testing.assert_allclose(spread, np.std(answers, axis=0), atol=1e-12)
     assert spread.max() > 0
     assert model.predict_one(X[3]) == means[3]
+    # A saved model keeps the networks; online learning continues with the last one.
     path = tmp_path / "model.safetensors"
     model.save(path)
     np.testing.assert_array_equal(SDNNRegressor.load(path).predict(X), means)
@@ -385,9 +404,9 @@ def test_averaging_epochs_improves_the_score_on_noisy_targets():
     fresh = random.uniform(size=(500, 2))
     true = np.sin(5 * fresh[:, 0]) * fresh[:, 1]
     options = {"coding": UNIT, "n_pattern_units": 256, "random_state": 0}
-    one = SDNNRegressor(**options, n_averaged_epochs=1).fit(points, noisy).score(fresh, true)
-    four = SDNNRegressor(**options).fit(points, noisy).score(fresh, true)
-    assert four > one
+    last_epoch = SDNNRegressor(**options, n_averaged_epochs=1).fit(points, noisy).score(fresh, true)
+    averaged = SDNNRegressor(**options).fit(points, noisy).score(fresh, true)
+    assert averaged > last_epoch
 
 
 def test_early_stopping_keeps_the_averages_of_its_best_epochs():
@@ -407,5 +426,5 @@ def test_refit_trains_on_all_samples_for_the_best_number_of_epochs():
     best = int(np.argmax(model.validation_scores_))
     whole = SDNNRegressor(**options, max_iter=best + 1).fit(X, noisy)
     np.testing.assert_array_equal(model.weights_, whole.weights_)
-    one, other = (SDNNRegressor(**options, max_iter=7, refit=refit) for refit in (False, True))
-    np.testing.assert_array_equal(one.fit(X, noisy).predict(X), other.fit(X, noisy).predict(X))
+    plain, refitted = (SDNNRegressor(**options, max_iter=7, refit=refit) for refit in (False, True))
+    np.testing.assert_array_equal(plain.fit(X, noisy).predict(X), refitted.fit(X, noisy).predict(X))

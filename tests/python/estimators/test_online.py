@@ -39,31 +39,31 @@ def classifier(**options):
     return SDNNClassifier(**{"coding": UNIT, **OPTIONS, **options})
 
 
-def same(one, other):
-    np.testing.assert_array_equal(one.weights_, other.weights_)
-    np.testing.assert_array_equal(one.thresholds_, other.thresholds_)
-    assert one.n_iter_ == other.n_iter_
+def same(model, expected):
+    np.testing.assert_array_equal(model.weights_, expected.weights_)
+    np.testing.assert_array_equal(model.thresholds_, expected.thresholds_)
+    assert model.n_iter_ == expected.n_iter_
 
 
 @pytest.mark.parametrize("named", [False, True])
 def test_learn_one_and_predict_one_have_the_bits_of_partial_fit_and_predict(named):
-    one, other = regressor(), regressor(training="plain")
+    model, plain = regressor(), regressor(training="plain")
     for row, x, y in zip(ROWS, X, Y, strict=True):
-        one.learn_one(row if named else x, y)
-        other.partial_fit(x[None], [y])
-    same(one, other)
+        model.learn_one(row if named else x, y)
+        plain.partial_fit(x[None], [y])
+    same(model, plain)
     frame = pd.DataFrame(X, columns=NAMES) if named else X
-    singly = [one.predict_one(row if named else x) for row, x in zip(ROWS, X, strict=True)]
-    np.testing.assert_array_equal(singly, one.predict(frame))
+    singly = [model.predict_one(row if named else x) for row, x in zip(ROWS, X, strict=True)]
+    np.testing.assert_array_equal(singly, model.predict(frame))
     assert isinstance(singly[0], float)
 
 
 PREDICTING = [regressor, classifier, lambda: classifier(scheme="one_vs_one")]
 
 
-@pytest.mark.parametrize("kind", PREDICTING, ids=["regressor", "classifier", "one_vs_one"])
-def test_predictions_do_not_depend_on_the_number_of_rows(kind):
-    model = kind().fit(X, LABELS // 2)
+@pytest.mark.parametrize("make", PREDICTING, ids=["regressor", "classifier", "one_vs_one"])
+def test_predictions_do_not_depend_on_the_number_of_rows(make):
+    model = make().fit(X, LABELS // 2)
     expected = model.predict(X)
     # Repeated single rows change to weights in bytes; more rows than a limit, or than a block of
     # 64, are predicted in other ways.
@@ -75,44 +75,44 @@ def test_predictions_do_not_depend_on_the_number_of_rows(kind):
 
 @pytest.mark.parametrize("scheme", ["one_vs_rest", "one_vs_one"])
 def test_learn_one_of_labels_has_the_bits_of_partial_fit(scheme):
-    one, other = classifier(scheme=scheme), classifier(scheme=scheme, training="block")
+    model, block = classifier(scheme=scheme), classifier(scheme=scheme, training="block")
     for x, label in zip(X, LABELS, strict=True):
-        one.learn_one(x, label, classes=[0, 1, 2])
-        other.partial_fit(x[None], [label], classes=[0, 1, 2])
-    same(one, other)
-    assert [one.predict_one(x) for x in X] == one.predict(X).tolist()
+        model.learn_one(x, label, classes=[0, 1, 2])
+        block.partial_fit(x[None], [label], classes=[0, 1, 2])
+    same(model, block)
+    assert [model.predict_one(x) for x in X] == model.predict(X).tolist()
 
 
 def test_fit_widens_the_output_range_before_training_and_partial_fit_during_it():
     options = {"max_iter": 1, "shuffle": False, "out_of_range": "widen"}
     within, beyond = Y.copy(), np.where(np.arange(len(Y)) == 99, 4.0, Y)
     same(regressor(**options).fit(X, within), regressor(**options).partial_fit(X, within))
-    one, other = (regressor(**options) for _ in range(2))
-    for learn in (one.fit, other.partial_fit):
+    fitted, partly_fitted = (regressor(**options) for _ in range(2))
+    for learn in (fitted.fit, partly_fitted.partial_fit):
         with pytest.warns(OutOfRangeWarning):
             learn(X, beyond)
-    np.testing.assert_array_equal(one.output_range_, other.output_range_)
-    assert not np.array_equal(one.weights_, other.weights_)
+    np.testing.assert_array_equal(fitted.output_range_, partly_fitted.output_range_)
+    assert not np.array_equal(fitted.weights_, partly_fitted.weights_)
 
 
 def test_portions_of_any_size_have_the_bits_of_plain_training():
-    one, other = regressor(), regressor(training="plain")
+    model, plain = regressor(), regressor(training="plain")
     portions = [1, FEW_SAMPLES + 5, 3, 1, FEW_SAMPLES, 40]
     begin = 0
     for size in portions:
-        some = slice(begin, begin + size)
-        one.partial_fit(X[some], Y[some])
-        other.partial_fit(X[some], Y[some])
-        np.testing.assert_array_equal(one.predict(X[:2]), other.predict(X[:2]))
-        one = pickle.loads(pickle.dumps(one)) if size == 3 else copy.deepcopy(one)
+        portion = slice(begin, begin + size)
+        model.partial_fit(X[portion], Y[portion])
+        plain.partial_fit(X[portion], Y[portion])
+        np.testing.assert_array_equal(model.predict(X[:2]), plain.predict(X[:2]))
+        model = pickle.loads(pickle.dumps(model)) if size == 3 else copy.deepcopy(model)
         begin += size
-    same(one, other)
+    same(model, plain)
 
 
 @pytest.mark.parametrize("learns", [False, True])
-@pytest.mark.parametrize("kind", [regressor, classifier])
-def test_concurrent_predictions_equal_sequential_ones(kind, learns):
-    model = kind(n_pattern_units=200).fit(X, LABELS // 2)
+@pytest.mark.parametrize("make", [regressor, classifier])
+def test_concurrent_predictions_equal_sequential_ones(make, learns):
+    model = make(n_pattern_units=200).fit(X, LABELS // 2)
     if learns:
         model.learn_one(X[0], 1)
     else:
@@ -135,19 +135,19 @@ def test_features_that_may_be_missing_may_be_left_out():
     model = SDNNRegressor(codings, **OPTIONS).fit(pd.DataFrame(rows), Y)
     lacking = {name: value for name, value in rows[3].items() if name not in ("b", "word")}
     assert model.predict_one(lacking) == model.predict_one(rows[3])
-    other = copy.deepcopy(model)
-    same(model.learn_one(lacking, 0.5), other.learn_one(rows[3], 0.5))
+    copied = copy.deepcopy(model)
+    same(model.learn_one(lacking, 0.5), copied.learn_one(rows[3], 0.5))
     for bad in ({**lacking, "e": 1.0}, {"b": 0.5, "word": "u"}, {**lacking, "word": "u", "e": 1.0}):
         refuses("word", model.predict_one, bad)
 
 
 def test_learning_does_not_change_a_copy():
     model = regressor().learn_one(X[0], Y[0])
-    other = copy.deepcopy(model)
-    before = other.weights_
+    copied = copy.deepcopy(model)
+    before = copied.weights_
     for x, y in zip(X, Y, strict=True):
         model.learn_one(x, y)
-    np.testing.assert_array_equal(other.weights_, before)
+    np.testing.assert_array_equal(copied.weights_, before)
 
 
 def test_learn_one_and_predict_one_code_inputs_like_fit_and_predict():
@@ -157,8 +157,8 @@ def test_learn_one_and_predict_one_code_inputs_like_fit_and_predict():
     table = np.column_stack([X[:, :2].astype(object), np.where(X[:, 2] > 0.5, "u", "v")])
     model = regressor(coding=words).fit(table, Y)
     assert [model.predict_one(x) for x in table] == model.predict(table).tolist()
-    other = pickle.loads(pickle.dumps(model)).set_params(training="plain")
-    same(model.learn_one(list(table[0]), Y[0]), other.partial_fit(table[:1], Y[:1]))
+    plain = pickle.loads(pickle.dumps(model)).set_params(training="plain")
+    same(model.learn_one(list(table[0]), Y[0]), plain.partial_fit(table[:1], Y[:1]))
     refuses("categories", model.predict_one, [0.1, 0.2, "w"])
 
 
@@ -215,11 +215,11 @@ def test_values_outside_a_range_are_counted_and_warned_about_once():
     assert model.n_inputs_out_of_range_ == model.n_outputs_out_of_range_ == 0
 
 
-@pytest.mark.parametrize("kind", [regressor, classifier])
-def test_with_out_of_range_error_values_outside_are_refused(kind):
-    model = kind(out_of_range="error").fit(X, LABELS // 2)
+@pytest.mark.parametrize("make", [regressor, classifier])
+def test_with_out_of_range_error_values_outside_are_refused(make):
+    model = make(out_of_range="error").fit(X, LABELS // 2)
     refuses("column", model.learn_one, [0.5, 3.5, 0.5, 0.5], 1)
-    if kind is regressor:
+    if make is regressor:
         refuses("output_range_", model.learn_one, X[0], 3.5)
 
 
@@ -275,7 +275,7 @@ def river():
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_river_estimators_learn_streams_and_refuse_other_models(river):
+def test_river_estimators_learn_numbers_and_labels(river):
     model = river.RiverRegressor(SDNNRegressor(**OPTIONS, out_of_range="widen"), grace_period=50)
     assert model.predict_one(ROWS[0]) == 0.0
     errors = []
@@ -293,11 +293,14 @@ def test_river_estimators_learn_streams_and_refuse_other_models(river):
             labelled.learn_one(row, label)
     assert np.mean(hits) > 0.8
     assert labelled.clone().fitted is None
+
+
+def test_river_estimators_have_default_models_and_refuse_others(river):
     assert river.RiverRegressor().clone().model.out_of_range == "widen"
     assert river.RiverClassifier().clone().model.correction_share == 0.5
-    for kind, wrong in ((river.RiverRegressor, SDNNClassifier()), (river.RiverClassifier, 3)):
+    for make, wrong in ((river.RiverRegressor, SDNNClassifier()), (river.RiverClassifier, 3)):
         with pytest.raises(TypeError, match="model must be an SDNN"):
-            kind(wrong)
+            make(wrong)
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
@@ -323,19 +326,19 @@ def river_models(river, **options):
 @pytest.mark.parametrize("n_before", [0, 19, 40])
 @pytest.mark.parametrize("number", [0, 1])
 def test_river_estimators_refuse_a_bad_sample_and_keep_learning(river, number, n_before):
-    model, other = (river_models(river, grace_period=20)[number] for _ in range(2))
+    model, without_refusals = (river_models(river, grace_period=20)[number] for _ in range(2))
     targets = [Y.tolist(), LABELS.tolist()][number]
     for row, target in zip(ROWS[:n_before], targets, strict=False):
         model.learn_one(row, target)
-        other.learn_one(row, target)
+        without_refusals.learn_one(row, target)
     for bad in BAD_SAMPLES:
         refuses("x", model.learn_one, bad, targets[0])
     for bad in (None, float("nan"), *([] if number else ["word"])):
         refuses("y", model.learn_one, ROWS[0], bad)
     for row, target in zip(ROWS[n_before:60], targets[n_before:], strict=False):
         model.learn_one(row, target)
-        other.learn_one(row, target)
-    same(model.fitted, other.fitted)
+        without_refusals.learn_one(row, target)
+    same(model.fitted, without_refusals.fitted)
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -360,21 +363,21 @@ def late_stream(n_samples):
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 @pytest.mark.parametrize("n_pattern_units", [40, None, 2000])  # the last begins anew
 def test_river_features_and_categories_may_appear_late(river, n_pattern_units):
-    model, other = (river_models(river)[0] for _ in range(2))
+    ordered, reordered = (river_models(river)[0] for _ in range(2))
     errors = []
-    for one in (model, other):
-        one.model.set_params(n_pattern_units=n_pattern_units)
+    for model in (ordered, reordered):
+        model.model.set_params(n_pattern_units=n_pattern_units)
         for x, y in late_stream(900):
-            errors.append(abs(one.predict_one(x) - y))
-            one.learn_one(x if one is model else dict(reversed(x.items())), y)
+            errors.append(abs(model.predict_one(x) - y))
+            model.learn_one(x if model is ordered else dict(reversed(x.items())), y)
     assert errors[:900] == errors[900:]
-    assert set(model.fitted.feature_names_in_) == {"a", "b", "flag", "late", "word"}
+    assert set(ordered.fitted.feature_names_in_) == {"a", "b", "flag", "late", "word"}
     assert np.mean(errors[:900][-200:]) < 0.25
     for x in ({}, {"late": 0.5}, {**ROWS[0], "new": 1}, {"word": "x", "a": "y", "late": pd.NA}):
-        predicted = model.predict_one(x)
-        model.learn_one(x, 1.0)
+        predicted = ordered.predict_one(x)
+        ordered.learn_one(x, 1.0)
         assert np.isfinite(predicted)
-        assert pickle.loads(pickle.dumps(model)).predict_one(x) == model.predict_one(x)
+        assert pickle.loads(pickle.dumps(ordered)).predict_one(x) == ordered.predict_one(x)
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
@@ -437,14 +440,15 @@ def test_river_classes_may_appear_late(river):
     for label in (3, 2.5, None):
         refuses("y", model.learn_one, ROWS[0], label)
     refuses("x", model.learn_one, {"other": [1.0]}, "highest")
-    assert len(model.fitted.classes_) == 3  # none is added by an error
+    assert len(model.fitted.classes_) == 3, "an error adds no class"
+
+
+def test_river_classifiers_refuse_nan_labels_and_new_classes_of_one_vs_one(river):
+    names = np.array(["middle", "low", "high"])[LABELS]
     numbers = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=20)
     for row, label in zip(ROWS[:30], LABELS, strict=False):
         numbers.learn_one(row, float(label))
     refuses("y", numbers.learn_one, ROWS[0], float("nan"))
-    refuses(
-        "follows_ranges", river.RiverClassifier, SDNNClassifier(), follows_ranges=1, error=TypeError
-    )
     pairs = river.RiverClassifier(SDNNClassifier(**OPTIONS, scheme="one_vs_one"), grace_period=20)
     for row in np.argsort(LABELS == 2, kind="stable")[:30].tolist():
         pairs.learn_one(ROWS[row], names[row])
@@ -461,8 +465,8 @@ def test_predict_proba_one_has_the_bits_of_predict_proba(n_classes):
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_river_metrics_and_ensembles_accept_the_classifier(river):
-    from river import ensemble, evaluate, metrics, multiclass
+def test_before_fitting_river_probabilities_are_frequencies_of_labels(river):
+    from river import ensemble
 
     model = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
     assert model.predict_proba_one(ROWS[0]) == {}
@@ -472,6 +476,12 @@ def test_river_metrics_and_ensembles_accept_the_classifier(river):
     assert ensemble.VotingClassifier([model, model])._multiclass  # not for two classes alone
     single = river.RiverClassifier(SDNNClassifier(**OPTIONS, scheme="one_vs_one"))
     refuses("scheme", single.predict_proba_one, ROWS[0], error=NotImplementedError)
+
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+def test_river_metrics_and_multiclass_wrappers_accept_the_classifier(river):
+    from river import evaluate, metrics, multiclass
+
     stream = list(zip(ROWS, (Y > 0.2).tolist(), strict=True)) * 3
     model = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
     metric = evaluate.progressive_val_score(stream, model, metrics.ROCAUC() + metrics.LogLoss())
@@ -494,8 +504,8 @@ def test_fractional_sample_weights_are_presentations_in_any_portions(size):
     for begin in range(0, 200, size):
         part = slice(begin, begin + size)
         model.partial_fit(X[part], Y[part], sample_weight=weights[part])
-    other = regressor().partial_fit(X[times], Y[times])
-    np.testing.assert_array_equal(model.weights_, other.weights_)
+    repeated = regressor().partial_fit(X[times], Y[times])
+    np.testing.assert_array_equal(model.weights_, repeated.weights_)
     assert len(times) == pytest.approx(weights.sum(), abs=2)
     halves = classifier().partial_fit(X, LABELS, [0, 1, 2], np.full(200, 0.5))
     assert (

@@ -20,8 +20,8 @@ def test_the_only_relevant_pair_is_selected():
     auto = SDNNClassifier(**options, pairs="auto").fit(X[:300], XOR[:300])
     assert set(auto.pairs_) == {(2, 5), (5, 2)}
     assert auto.score(X[300:], XOR[300:]) > max(0.95, every.score(X[300:], XOR[300:]))
-    given = SDNNClassifier(**options, pairs=[(2, 5), (5, 2)]).fit(X[:300], XOR[:300])
-    np.testing.assert_array_equal(auto.weights_, given.weights_)
+    expected_model = SDNNClassifier(**options, pairs=[(2, 5), (5, 2)]).fit(X[:300], XOR[:300])
+    np.testing.assert_array_equal(auto.weights_, expected_model.weights_)
 
 
 def test_irrelevant_features_are_left_out():
@@ -45,10 +45,10 @@ def test_all_pairs_are_kept_if_all_are_relevant():
     np.testing.assert_array_equal(model.weights_, SDNNRegressor(**options).fit(points, y).weights_)
 
 
-@pytest.mark.parametrize("kind", [SDNNRegressor, SDNNClassifier])
-def test_few_samples_and_single_features_keep_all_pairs(kind):
-    assert len(kind(**OPTIONS, pairs="auto").fit(X[:8], XOR[:8]).pairs_) == 56
-    assert kind(**OPTIONS, pairs="auto").fit(X[:, :1], XOR).pairs_ == ((0, 0),)
+@pytest.mark.parametrize("estimator", [SDNNRegressor, SDNNClassifier])
+def test_few_samples_and_single_features_keep_all_pairs(estimator):
+    assert len(estimator(**OPTIONS, pairs="auto").fit(X[:8], XOR[:8]).pairs_) == 56
+    assert estimator(**OPTIONS, pairs="auto").fit(X[:, :1], XOR).pairs_ == ((0, 0),)
 
 
 LETTERS = np.where(X[:, 2] > 0.5, "u", "v").astype(object)
@@ -67,11 +67,11 @@ def test_pairs_can_be_selected_with_a_category_that_occurs_once(name):
     frame = pd.DataFrame({"a": X[:, 0], "letter": LETTERS, "b": X[:, 5], "c": X[:, 6]})[:100]
     codings = [(CATEGORIES[name], ["letter"]), ("anchor", ["c"])]
     model = SDNNRegressor(codings, pairs="auto", **OPTIONS).fit(frame, X[:100, 2] + X[:100, 5])
-    given = SDNNRegressor(codings, pairs=model.pairs_, **OPTIONS)
-    given.fit(frame, X[:100, 2] + X[:100, 5])
+    expected_model = SDNNRegressor(codings, pairs=model.pairs_, **OPTIONS)
+    expected_model.fit(frame, X[:100, 2] + X[:100, 5])
     assert model.coding == codings
-    assert model.codings_ == given.codings_
-    np.testing.assert_array_equal(model.weights_, given.weights_)
+    assert model.codings_ == expected_model.codings_
+    np.testing.assert_array_equal(model.weights_, expected_model.weights_)
 
 
 @pytest.mark.parametrize("n_rare", [1, 3])

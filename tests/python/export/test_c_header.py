@@ -173,8 +173,10 @@ def test_two_headers_compile_in_one_c_or_cpp_program(needs, tmp_path):
     left = agents()["discrete"].act([2.0, -1.0, 20000 / 65536, 3000 / 65536], explore=False)
     right = agents()["pairs"].act(np.float32([0.6, -0.8, 2.0]), explore=False)
     for compiler, options in (("gcc", STRICT), ("g++", STRICT_CPP), ("clang++", STRICT_CPP)):
-        said = [float(word) for word in run(program(tmp_path, source, compiler, *options)).split()]
-        assert said == [left, right[0], right[1]]
+        printed = [
+            float(word) for word in run(program(tmp_path, source, compiler, *options)).split()
+        ]
+        assert printed == [left, right[0], right[1]]
 
 
 def balance(agent, scale):
@@ -293,8 +295,8 @@ def test_a_failed_export_leaves_no_file(tmp_path):
 
 
 def test_agents_of_other_types_sizes_or_unknown_ranges_are_refused():
-    for kind in (RBFQLearning, FuzzyQLearning):
-        agent = kind(box(1.0, 1.0), box(1.0))
+    for agent_class in (RBFQLearning, FuzzyQLearning):
+        agent = agent_class(box(1.0, 1.0), box(1.0))
         refuses("agent", c_header, agent, "policy", error=TypeError)
     unknown = SDNNQLearning(box(np.inf, 1.0), Discrete(2), approximator=SMALL)
     refuses("observation_range", c_header, unknown, "policy", error=RuntimeError)

@@ -14,13 +14,13 @@ from c_learners import (
     LEARNERS,
     SMALL,
     build,
-    check_life,
+    check_learning,
     discrete,
     lines_of,
-    live,
-    lived,
     network,
     paper_rule,
+    run_agent,
+    run_program,
     sarsa,
     several,
     small_steps,
@@ -41,19 +41,19 @@ def target(needs):
 
 @pytest.mark.parametrize("name", LEARNERS)
 def test_an_agent_in_c_acts_and_learns_with_the_bits_of_the_agent(name, target, tmp_path):
-    check_life(name, target, tmp_path, options=SANITIZED)
+    check_learning(name, target, tmp_path, options=SANITIZED)
 
 
 @pytest.mark.parametrize("make", [discrete, network, small_steps])
 def test_a_trained_agent_continues_in_c(make, target, tmp_path):
     agent = make()
-    live(agent, lines_of(agent, 500, 3, 16), 16)
+    run_agent(agent, lines_of(agent, 500, 3, 16), 16)
     header, command = build(tmp_path, agent, target)
     lines = lines_of(agent, 500, 4, header.fraction_bits)
     # The program gets an image that it refuses, and begins with what the header knows.
     nothing = bytes(len(save_image(agent)))
-    came, image = lived(command, nothing, lines, agent.n_dimensions)
-    assert came == live(agent, lines, header.fraction_bits)
+    actions, image = run_program(command, nothing, lines, agent.n_dimensions)
+    assert actions == run_agent(agent, lines, header.fraction_bits)
     assert image == save_image(agent)
 
 
@@ -66,8 +66,8 @@ def test_an_agent_in_c_searches_for_a_first_reward_like_the_agent(target, tmp_pa
     lines[:300, n_rewards] = 0
     lines[300:, n_rewards] *= np.arange(len(lines) - 300) % 20 == 0
     nothing = save_image(agent)
-    came, image = lived(command, nothing, lines, agent.n_dimensions)
-    assert came == live(agent, lines, header.fraction_bits)
+    actions, image = run_program(command, nothing, lines, agent.n_dimensions)
+    assert actions == run_agent(agent, lines, header.fraction_bits)
     assert image == save_image(agent)
 
 
@@ -85,8 +85,8 @@ def test_extreme_readings_and_rewards_have_defined_results(target, tmp_path):
         lines = np.where(random.random(lines.shape) < 0.5, ends, lines)
         lines[:, 0] = random.integers(0, 3, len(lines))
         lines[:, -1] = random.random(len(lines)) < 0.1
-        came, image = lived(command, save_image(agent), lines.astype("<i4"), 1)
-        assert np.max(came) < len(agent.actions_of(0))
+        actions, image = run_program(command, save_image(agent), lines.astype("<i4"), 1)
+        assert np.max(actions) < len(agent.actions_of(0))
         load_image(agent, image)
 
 
@@ -126,7 +126,7 @@ int main(void) {
 def test_images_with_extreme_numbers_are_refused_or_saved_again(make, target, tmp_path):
     # The program fails if it cannot load an image that it saved.
     agent = make()
-    live(agent, lines_of(agent, 300, 1, 16), 16)
+    run_agent(agent, lines_of(agent, 300, 1, 16), 16)
     (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
     options = (*STRICT, "-O1", *SANITIZED, "-fsanitize=address")
     hostile = program(tmp_path, HOSTILE, target.compiler, *options)
@@ -173,8 +173,8 @@ def test_weights_that_leave_their_range_are_halved(target, tmp_path):
     now, reward = np.eye(9, dtype="<i4")[symbol], 2 * value << header.fraction_bits - 10
     lines = np.concatenate([[0], now, [0], now, [0], [1], now, [reward], now, [1]], dtype="<i4")
     lines = lines.reshape(2, -1)
-    came, image = lived(command, save_image(agent), lines, 1)
-    assert came == live(agent, lines, header.fraction_bits)
+    actions, image = run_program(command, save_image(agent), lines, 1)
+    assert actions == run_agent(agent, lines, header.fraction_bits)
     assert image == save_image(agent)
     assert agent._state_of("agent")["action_value.weights"].max() == 2**22
     load_image(agent, image)
@@ -220,38 +220,38 @@ def test_the_header_states_the_size_of_the_agent_in_memory(name, target, tmp_pat
 
 @pytest.mark.parametrize("make", [discrete, network])
 def test_images_of_other_agents_are_refused_and_change_nothing(make):
-    agent, other = make(), make()
-    live(agent, lines_of(agent, 300, 1, 16), 16)
+    agent, loaded = make(), make()
+    run_agent(agent, lines_of(agent, 300, 1, 16), 16)
     image = save_image(agent)
-    before = save_image(other)
-    for place in range(0, len(image), len(image) // 97):
+    before = save_image(loaded)
+    for position in range(0, len(image), len(image) // 97):
         damaged = bytearray(image)
-        damaged[place] ^= 4
+        damaged[position] ^= 4
         with pytest.raises(ValueError, match=r"damaged|another seed"):
-            load_image(other, bytes(damaged))
-    for wrong in (image[:-1], image + b"x", b""):
-        refuses("image", load_image, other, wrong)
-    refuses("image", load_image, other, 3, error=TypeError)
+            load_image(loaded, bytes(damaged))
+    for of_wrong_size in (image[:-1], image + b"x", b""):
+        refuses("image", load_image, loaded, of_wrong_size)
+    refuses("image", load_image, loaded, 3, error=TypeError)
     refuses("image", load_image, sarsa(), image)
     refuses("image", load_image, paper_rule(), image)
     config = replace(SMALL, averaging_interval=8)
-    stranger = SDNNQLambda(
+    with_averages = SDNNQLambda(
         box(1.0, 2.0, 3.0), gym.spaces.Discrete(3, start=-1), seed=1, approximator=config,
         inputs="all", angle_pairs=[],
     )  # fmt: skip
-    refuses("image", load_image, stranger, image)
-    assert save_image(other) == before
-    load_image(other, image)
-    assert save_image(other) == image
+    refuses("image", load_image, with_averages, image)
+    assert save_image(loaded) == before
+    load_image(loaded, image)
+    assert save_image(loaded) == image
 
 
 def test_an_image_of_a_linear_agent_with_impossible_numbers_is_refused():
     agent, same = discrete(), discrete()
     lines = lines_of(agent, 300, 1, 16)
-    for one in (agent, same):
-        live(one, lines[:-1], 16)
-        one.act([0.1, 0.2, 0.3])
-        one.learn(Transition([0.1, 0.2, 0.3], 0, 1.0, [0.2, 0.2, 0.3], False))
+    for trained in (agent, same):
+        run_agent(trained, lines[:-1], 16)
+        trained.act([0.1, 0.2, 0.3])
+        trained.learn(Transition([0.1, 0.2, 0.3], 0, 1.0, [0.2, 0.2, 0.3], False))
     # n_snapshots, n_ended, n_learned, n_steps
     for number in (slice(12, 16), slice(20, 24), slice(24, 32), slice(32, 40)):
         forged = bytearray(save_image(agent))
@@ -263,8 +263,8 @@ def test_an_image_of_a_linear_agent_with_impossible_numbers_is_refused():
     # Another life in between leaves nothing behind.
     new = discrete()
     load_image(agent, save_image(new))
-    came = live(agent, lines, 16)
-    assert came == live(new, lines, 16)
+    actions = run_agent(agent, lines, 16)
+    assert actions == run_agent(new, lines, 16)
     assert save_image(agent) == save_image(new)
 
 
@@ -317,10 +317,10 @@ def test_software_floating_point_has_the_bits_of_ieee_754(target, tmp_path):
     with np.errstate(all="ignore"):
         a, b = numbers.T
         expected = np.column_stack([a + b, a - b, a * b, a / b])
-    came = np.frombuffer(run(real, input=numbers.tobytes()), "<u8").reshape(-1, 4)
+    actions = np.frombuffer(run(real, input=numbers.tobytes()), "<u8").reshape(-1, 4)
     is_finite = np.isfinite(expected)
     assert is_finite.mean() > 0.9
-    assert (came == expected.view(np.uint64))[is_finite].all()
+    assert (actions == expected.view(np.uint64))[is_finite].all()
 
 
 def test_settings_that_cannot_learn_in_c_are_refused():

@@ -128,8 +128,8 @@ def test_the_actions_option_accepts_counts_and_ranges(actions, space, export, tm
 
 
 def test_the_help_of_export_shows_an_example(invoke):
-    told = invoke("export", "--help").stdout
-    assert "\n  sdnn export --new --range -2.4:2.4 --range -3:3 --range -0.21:0.21\n" in told
+    help_text = invoke("export", "--help").stdout
+    assert "\n  sdnn export --new --range -2.4:2.4 --range -3:3 --range -0.21:0.21\n" in help_text
 
 
 @pytest.mark.parametrize(

@@ -193,7 +193,7 @@ def lines_of(agent, n_steps, seed, fraction_bits):
     return table.astype("<i4")
 
 
-def live(agent, lines, fraction_bits):
+def run_agent(agent, lines, fraction_bits):
     """The indices of the actions that the library's agent takes for the lines."""
     n, scale = (lines.shape[1] - 3) // 2, 2.0**fraction_bits
     actions = []
@@ -240,7 +240,7 @@ def build(folder, agent, target, *options):
     return header, [target.runner, program] if target.runner else [program]
 
 
-def lived(command, image, lines, n_dimensions):
+def run_program(command, image, lines, n_dimensions):
     """The actions and the image that the program ends with."""
     done = subprocess.run(
         [str(word) for word in command],
@@ -258,21 +258,21 @@ def life(name, n_steps, fraction_bits):
     agent = LEARNERS[name]()
     lines = lines_of(agent, n_steps, 1, fraction_bits)
     nothing = save_image(agent)
-    return lines, nothing, live(agent, lines, fraction_bits), save_image(agent)
+    return lines, nothing, run_agent(agent, lines, fraction_bits), save_image(agent)
 
 
-def check_life(name, target, folder, n_steps=3000, options=()):
+def check_learning(name, target, folder, n_steps=3000, options=()):
     """It acts and learns as the library's agent, from nothing and from an image."""
     home = LEARNERS[name]()
     header, command = build(folder, home, target, *options)
     lines, nothing, expected, learned = life(name, n_steps, header.fraction_bits)
-    came, image = lived(command, nothing, lines, home.n_dimensions)
-    assert came == expected
+    actions, image = run_program(command, nothing, lines, home.n_dimensions)
+    assert actions == expected
     assert image == learned
     # Python loads the experience, and both continue from it.
     load_image(home, image)
     assert save_image(home) == image
     more = lines_of(home, min(n_steps, 3000) // 10, 2, header.fraction_bits)
-    came, image = lived(command, image, more, home.n_dimensions)
-    assert came == live(home, more, header.fraction_bits)
+    actions, image = run_program(command, image, more, home.n_dimensions)
+    assert actions == run_agent(home, more, header.fraction_bits)
     assert image == save_image(home)

@@ -4,9 +4,6 @@ from dataclasses import replace
 import numpy as np
 
 from refusals import refuses
-from sdnn.agents import FuzzyQLearningConfig
-from sdnn.approximators import FuzzyRulesConfig
-from sdnn.environments import SensorConfig
 from sdnn.reproduction import EXPERIMENTS, case_spec, paper_spec, plan_trials, select_experiments
 from sdnn.runs import AGENTS, ProtocolSpec, trial_seed
 
@@ -45,14 +42,14 @@ def test_agents_of_a_case_have_the_same_seeds():
     seeds = {}
     for planned in plan_trials(experiment.cases, 3, 0):
         seeds.setdefault((planned.key.case_id, planned.key.trial), set()).add(planned.key.seed)
-    assert {len(found) for found in seeds.values()} == {1}
+    assert {len(case_seeds) for case_seeds in seeds.values()} == {1}
 
 
 def test_cases_with_the_same_id_have_the_same_sensors():
-    seen = {}
+    sensors = {}
     for experiment in EXPERIMENTS:
         for case in experiment.cases:
-            assert seen.setdefault(case.id, (case.n_sensors, case.noise)) == (
+            assert sensors.setdefault(case.id, (case.n_sensors, case.noise)) == (
                 case.n_sensors,
                 case.noise,
             )
@@ -104,14 +101,6 @@ def test_a_case_has_one_network_input_per_sensor():
     assert spec.core_settings()["approximator"].n_inputs == 6
     assert (spec.budget.episodes, spec.protocol.evaluate_every_episodes) == (15_000, 10)
     refuses("'fuzzy'", case_spec, experiment.cases[1], "fuzzy")
-
-
-def test_a_case_has_settings_for_fuzzy_q_learning():
-    (experiment,) = select_experiments("b")
-    spec = case_spec(experiment.cases[2], "fuzzy")
-    assert spec.core_settings()["approximator"] == FuzzyRulesConfig(n_inputs=5)
-    assert spec.learning == FuzzyQLearningConfig()
-    assert spec.environment.paper_settings().sensors == SensorConfig(n_sensors=5, noise=0.02)
 
 
 def test_with_agents_replaces_only_the_agents():

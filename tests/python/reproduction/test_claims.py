@@ -122,14 +122,14 @@ def test_claims_count_censored_values_as_the_last_episode():
 
 def test_evenly_split_trials_leave_a_claim_undecided():
     split = [4] * 5 + [50] * 5
-    found = verdicts([result("s4", "sdnn-c", split), result("s6", "sdnn-c", 4)])
-    assert found[2] == Verdict.UNDECIDED
+    judged = verdicts([result("s4", "sdnn-c", split), result("s6", "sdnn-c", 4)])
+    assert judged[2] == Verdict.UNDECIDED
 
 
 @pytest.mark.parametrize("size", [{"n_trials": 9}, {"n_tests": 1499}])
 def test_fewer_trials_or_episodes_than_the_papers_are_not_judged(size):
-    found = verdicts([result("s4", "sdnn-c", 4, **size), result("s6", "sdnn-c", 4)])
-    assert found[1] == found[2] == Verdict.NOT_JUDGED
+    judged = verdicts([result("s4", "sdnn-c", 4, **size), result("s6", "sdnn-c", 4)])
+    assert judged[1] == judged[2] == Verdict.NOT_JUDGED
 
 
 def test_the_growth_of_costs_is_a_ratio_of_medians():

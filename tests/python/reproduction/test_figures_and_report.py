@@ -127,12 +127,12 @@ def test_an_agent_has_the_same_color_in_every_figure(tmp_path, run, collected):
         lines = {line.get_color() for line in figure.axes[0].get_lines()}
         return [text.get_text() for text in legend.get_texts()], lines
 
-    titles, one = colors("rbf")
+    titles, color = colors("rbf")
     assert titles == ["RBFN"]
-    titles, two = colors("rbf", "sdnn-c")
+    titles, two_colors = colors("rbf", "sdnn-c")
     assert titles == ["RBFN", "SDNN-C"]
-    assert one < two
-    assert len(two) == 2
+    assert color < two_colors
+    assert len(two_colors) == 2
 
 
 def test_any_two_agents_of_a_figure_have_different_colors():

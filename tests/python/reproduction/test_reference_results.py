@@ -134,43 +134,47 @@ def test_more_trials_or_the_chance_decide_a_claim(own, more, share, settled):
 
 def test_reference_trials_decide_claims_only_with_all_cases():
     split = [4] * 5 + [50] * 5
-    ran = [measured("s4", split), measured("s6", [4] * 10)]
-    kept = [measured("s4", [4] * 15 + [50] * 5), measured("s6", [4] * 20)]
-    settled = {one.claim.number: one for one in judge_claims(ran, reference=kept)}
-    assert settled[2].verdict == Verdict.UNDECIDED
-    assert settled[2].more.checks[0].estimate.value == 4
-    assert settled[2].decided == Verdict.HOLDS
-    assert settled[8].more is None  # the noisy cases are missing
-    alone = judge_claims(ran, reference=kept[:1])
-    assert [one.more for one in alone] == [None] * len(settled)
+    results = [measured("s4", split), measured("s6", [4] * 10)]
+    reference = [measured("s4", [4] * 15 + [50] * 5), measured("s6", [4] * 20)]
+    outcomes = {
+        outcome.claim.number: outcome for outcome in judge_claims(results, reference=reference)
+    }
+    assert outcomes[2].verdict == Verdict.UNDECIDED
+    assert outcomes[2].more.checks[0].estimate.value == 4
+    assert outcomes[2].decided == Verdict.HOLDS
+    assert outcomes[8].more is None  # the noisy cases are missing
+    without_s6 = judge_claims(results, reference=reference[:1])
+    assert [outcome.more for outcome in without_s6] == [None] * len(outcomes)
 
 
 def test_the_reference_results_have_the_papers_settings_and_scale():
-    kept = reference_results()
-    plan = plan_trials(CASES.values(), 1, kept[0].root_seed)
+    results = reference_results()
+    plan = plan_trials(CASES.values(), 1, results[0].root_seed)
     planned = {(*p.key[:2], p.key.config_hash) for p in plan}
-    assert {(one.case_id, one.agent, one.config_hash) for one in kept} == planned, (
+    assert {(result.case_id, result.agent, result.config_hash) for result in results} == planned, (
         "if no row changed, run docs/studies/write_reference_results.py --rekey"
     )
-    for one in kept:
-        assert one.n_trials >= 100
-        assert len(set(one.rows_digests)) == one.n_trials
-        assert is_paper_scale(one)
-        assert one.root_seed != 0  # what `sdnn reproduce` runs by default is not among them
+    for result in results:
+        assert result.n_trials >= 100
+        assert len(set(result.rows_digests)) == result.n_trials
+        assert is_paper_scale(result)
+        assert result.root_seed != 0  # what `sdnn reproduce` runs by default is not among them
 
 
 @pytest.mark.parametrize("agent", ["sdnn-c", "fuzzy"])
 def test_a_repeated_trial_equals_its_reference_result(tmp_path, agent):
-    kept = next(one for one in reference_results() if (one.case_id, one.agent) == ("s4", agent))
-    plan = plan_trials([CASES["s4"]], 1, kept.root_seed)
-    own = [planned for planned in plan if planned.key.agent == agent]
+    reference = next(
+        result for result in reference_results() if (result.case_id, result.agent) == ("s4", agent)
+    )
+    plan = plan_trials([CASES["s4"]], 1, reference.root_seed)
+    of_agent = [planned for planned in plan if planned.key.agent == agent]
     with ResultStore(tmp_path) as store:
-        run_trials(own, store)
+        run_trials(of_agent, store)
         (record,) = store.load()
-    assert record.rows.digest()[:16] == kept.rows_digests[0]
+    assert record.rows.digest()[:16] == reference.rows_digests[0]
     summary = measure("", (record,))
     for name in STEP_MEASURES:
-        assert summary.values[name][0] == kept.values[name][0]
+        assert summary.values[name][0] == reference.values[name][0]
 
 
 @pytest.fixture
@@ -187,13 +191,13 @@ def test_written_reference_results_are_read_unchanged(monkeypatch, tmp_path, fak
     monkeypatch.setattr(reference_module, "_FILES", tmp_path)
     monkeypatch.setattr(reference_module, "FILE_NAME", "kept.csv")
     read = reference_module.reference_results.__wrapped__()
-    assert [(one.case_id, one.root_seed, one.n_trials) for one in read] == [
+    assert [(result.case_id, result.root_seed, result.n_trials) for result in read] == [
         ("s4", 7, 12), ("s6", 7, 12)
     ]  # fmt: skip
-    for one, summary in zip(read, fake_results, strict=True):
-        assert one.config_hash == summary.config_hash
+    for result, summary in zip(read, fake_results, strict=True):
+        assert result.config_hash == summary.config_hash
         for name in STEP_MEASURES:
-            np.testing.assert_array_equal(one.values[name], summary.values[name])
+            np.testing.assert_array_equal(result.values[name], summary.values[name])
 
 
 def test_short_trials_are_refused_as_reference_results(fake_results):
@@ -201,26 +205,26 @@ def test_short_trials_are_refused_as_reference_results(fake_results):
     refuses("s4", script.reference_csv, [short], 7)
 
 
-def report_of(results, kept=()):
+def report_of(results, reference=()):
     return Report(
         experiments=((EXPERIMENTS[0], tuple(results)),), costs=(), quick=False, seed=0,
-        reference=tuple(kept),
+        reference=tuple(reference),
     )  # fmt: skip
 
 
 def test_reports_show_the_reference_results(fake_results):
     picture = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
-    alone = report_of(fake_results)
-    assert "With more trials" not in [table.title for table in alone.page(picture).tables]
-    assert "With more trials" not in alone.page(picture).to_html("")
-    assert alone.to_json()["claims"][0]["with_more_trials"] is None
+    usual = report_of(fake_results)
+    assert "With more trials" not in [table.title for table in usual.page(picture).tables]
+    assert "With more trials" not in usual.page(picture).to_html("")
+    assert usual.to_json()["claims"][0]["with_more_trials"] is None
 
     half = measured("s4", 10 * [4] + 10 * [50])
-    kept = [
-        ReferenceResult(**vars(one), config_hash="", root_seed=7, rows_digests=())
-        for one in (half, measured("s6", 20 * [4]))
+    reference = [
+        ReferenceResult(**vars(result), config_hash="", root_seed=7, rows_digests=())
+        for result in (half, measured("s6", 20 * [4]))
     ]
-    report = report_of(fake_results, kept)
+    report = report_of(fake_results, reference)
     tables = [*report.page(picture).tables]
     assert [row[-1] for row in tables[0].rows if row[0] == "2"] == ["inconclusive"]
     rows = next(table.rows for table in tables if table.title == "With more trials")
@@ -231,8 +235,8 @@ def test_reports_show_the_reference_results(fake_results):
     assert [row[3:6] for row in checks] == [
         ("20", "27 [4, 50]", "undecided"), ("20", "4 [4, 4]", "holds")
     ]  # fmt: skip
-    told = next(one for one in report.to_json()["claims"] if one["number"] == 2)
-    assert (told["verdict"], told["decided"]) == ("holds", "inconclusive")
+    claim = next(result for result in report.to_json()["claims"] if result["number"] == 2)
+    assert (claim["verdict"], claim["decided"]) == ("holds", "inconclusive")
     page = report.page(picture).to_html("")
     assert "root seed 7" in page
     assert 'class="verdict open">inconclusive</td>' in page
@@ -243,14 +247,16 @@ def test_reference_results_are_shown_for_fewer_trials_of_the_same_settings_only(
 ):
     use_trial(fake_trial.FakeTrial)
 
-    def shown(**request):
-        found = []
+    def shown_results(**request):
+        reports = []
         monkeypatch.setattr(
-            reproduce_module, "Report", lambda **parts: found.append(Report(**parts)) or found[-1]
+            reproduce_module,
+            "Report",
+            lambda **parts: reports.append(Report(**parts)) or reports[-1],
         )
         run_study(PaperStudy("a", **request), tmp_path)
-        return {(one.case_id, one.n_trials) for one in found[0].reference}
+        return {(result.case_id, result.n_trials) for result in reports[0].reference}
 
-    assert shown(n_trials=2) == {("s4", 100), ("s6", 100)}
-    assert shown(n_trials=2, n_episodes=100) == set()
-    assert shown(n_trials=101) == set()
+    assert shown_results(n_trials=2) == {("s4", 100), ("s6", 100)}
+    assert shown_results(n_trials=2, n_episodes=100) == set()
+    assert shown_results(n_trials=101) == set()

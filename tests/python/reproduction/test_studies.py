@@ -63,8 +63,8 @@ def records_of_two(study):
 
 
 def test_differences_between_variants_are_paired_by_trial(study):
-    found = compare(mine := study(TWO), records_of_two(mine))
-    old, new = (found.measured["s4-noise", name] for name in ("old", "new"))
+    comparison = compare(mine := study(TWO), records_of_two(mine))
+    old, new = (comparison.measured["s4-noise", name] for name in ("old", "new"))
     assert old.result.values["final_share_solved"].tolist() == [1.0, 1.0, 0.2, 0.0]
     assert new.result.values["final_share_solved"].tolist() == [1.0, 1.0, 1.0, 0.9]
     assert old.solved_at_end.tolist() == [True, True, False, False]
@@ -106,17 +106,17 @@ def test_variants_with_longer_trials_only_do_not_differ(study):
         for pair, of_pair in runs.items()
         for number in range(6)
     ]
-    found = compare(mine, records)
+    comparison = compare(mine, records)
     for case, name in (("s4", "episode_of_collapse"), ("s4-noise", "episodes_to_learn")):
-        longer = found.measured[case, "long"]
+        longer = comparison.measured[case, "long"]
         assert longer.differences[name].value == 0.0
         assert not longer.differs(name)
-    tables = {table.title: table.rows for table in page_of(found).tables}
+    tables = {table.title: table.rows for table in page_of(comparison).tables}
     rows = tables["Case I: 4 inputs, no noise"]
     assert [row[6] for row in rows] == [">1,000 [>1,000, >1,000]", ">3,000 [>3,000, >3,000]"]
     (row,) = tables["Case I: 4 inputs, no noise: minus short, trial by trial"]
     assert not any("*" in cell for cell in row)
-    png, _ = figure_bytes(draw_study(found, "footer"))
+    png, _ = figure_bytes(draw_study(comparison, "footer"))
     assert png.startswith(b"\x89PNG")
 
 
@@ -129,11 +129,14 @@ def test_claims_of_each_case_are_censored_at_its_last_episode(study):
         for case, n in n_tests.items()
         for number in range(6)
     ]
-    found = compare(mine, records)
-    claim = judge_variants(found)["long"][1]  # of the episodes to learn in both
+    comparison = compare(mine, records)
+    claim = judge_variants(comparison)["long"][1]  # of the episodes to learn in both
     assert [checked.last_episode for checked in claim.checks] == [3000, 5000]
-    told = json_of(found)["claims"][0]
-    assert [one["ours"]["value"] for one in told["checks"]] == [">3000", ">5000"]
+    claim_in_json = json_of(comparison)["claims"][0]
+    assert [check_in_json["ours"]["value"] for check_in_json in claim_in_json["checks"]] == [
+        ">3000",
+        ">5000",
+    ]
 
 
 def test_returns_are_formatted_with_significant_digits():
@@ -168,20 +171,20 @@ def test_differences_of_fewer_than_six_trials_are_not_called_different(study):
             for variant, steps in (("old", 50), ("new", 4))
             for n in range(n_trials)
         ]
-        found = compare(mine, records).measured["s4-noise", "new"]
-        assert found.differences["final_steps"].upper == -46.0
-        assert found.differs("final_steps") is differs
-        assert not found.differs("mean_return")
+        comparison = compare(mine, records).measured["s4-noise", "new"]
+        assert comparison.differences["final_steps"].upper == -46.0
+        assert comparison.differs("final_steps") is differs
+        assert not comparison.differs("mean_return")
 
 
 def test_incomplete_combinations_are_omitted_with_a_warning(study):
     mine = study(TWO)
     records = records_of_two(mine)
-    found = compare(mine, records[:-1])
-    assert list(found.measured) == [("s4-noise", "old")]
-    assert page_of(found).warnings[0].startswith("Not complete: 1 of 2 combinations")
-    found = compare(mine, records[4:])
-    assert found.measured["s4-noise", "new"].differences == {}
+    comparison = compare(mine, records[:-1])
+    assert list(comparison.measured) == [("s4-noise", "old")]
+    assert page_of(comparison).warnings[0].startswith("Not complete: 1 of 2 combinations")
+    comparison = compare(mine, records[4:])
+    assert comparison.measured["s4-noise", "new"].differences == {}
     assert compare(mine, ()).measured == {}
 
 
@@ -207,27 +210,34 @@ def claimed_records(study, n_trials=10):
                 yield record(study, case, variant, number, steps)
 
 
-def test_claims_are_judged_for_each_variant(study):
+@pytest.fixture
+def claimed(study):
     mine = study(CLAIMED)
-    found = compare(mine, claimed_records(mine))
+    return compare(mine, claimed_records(mine))
+
+
+def test_claims_are_judged_for_each_variant(claimed):
     verdicts = {
         variant: {n: c.verdict for n, c in claims.items()}
-        for variant, claims in judge_variants(found).items()
+        for variant, claims in judge_variants(claimed).items()
     }
     assert verdicts == {
         "old": {5: Verdict.HOLDS, 6: Verdict.HOLDS, 7: Verdict.HOLDS},
         "new": {5: Verdict.FAILS, 6: Verdict.FAILS, 7: Verdict.HOLDS},
         "fuzzy": {3: Verdict.HOLDS, 4: Verdict.FAILS},
     }
-    overview = next(page_of(found).tables)
+
+
+def test_reports_and_json_of_a_study_show_the_verdicts_of_claims(claimed):
+    overview = next(page_of(claimed).tables)
     assert overview.header == ("variant", "claim 3", "claim 4", "claim 5", "claim 6", "claim 7")
     assert overview.rows[1] == ("new", "-", "-", "does not hold", "does not hold", "holds")
-    page = page_of(found).to_html("")
+    page = page_of(claimed).to_html("")
     assert page.count('class="verdict bad">does not hold</td>') >= 3
     assert page.count('class="verdict good">holds</td>') >= 5
-    checks = next(t for t in page_of(found).tables if t.title == "Each quantity of the claims")
+    checks = next(t for t in page_of(claimed).tables if t.title == "Each quantity of the claims")
     assert next(row[:2] for row in checks.rows if row[0] == "fuzzy") == ("fuzzy", "3")
-    table = json_of(found)
+    table = json_of(claimed)
     assert {(c["variant"], c["number"], c["verdict"]) for c in table["claims"]} >= {
         ("new", 5, "does not hold"), ("new", 7, "holds"), ("old", 5, "holds"),
     }  # fmt: skip
@@ -238,13 +248,13 @@ def test_chances_are_shown_from_20_trials_on(study):
         mine = study(CLAIMED, n_trials=n_trials)
         return compare(mine, claimed_records(mine, n_trials))
 
-    def tables(found):
-        return {table.title: table for table in page_of(found).tables}
+    def tables(comparison):
+        return {table.title: table for table in page_of(comparison).tables}
 
     title = "How often ten trials show the claims"
     assert title not in tables(chances(19))
-    found = chances(20)
-    table = tables(found)[title]
+    comparison = chances(20)
+    table = tables(comparison)[title]
     assert table.header[1:] == tuple(f"claim {n}" for n in (3, 4, 5, 6, 7))
     always, never = "100 % [100, 100]", "0 % [0, 0]"
     assert table.rows == [
@@ -252,9 +262,11 @@ def test_chances_are_shown_from_20_trials_on(study):
         ("new", "-", "-", never, never, always),
         ("fuzzy", always, never, "-", "-", "-"),
     ]
-    told = {(c["variant"], c["number"]): c["ten_trials_show_it"] for c in json_of(found)["claims"]}
-    assert told["new", 6] == {"value": 0.0, "lower": 0.0, "upper": 0.0}
-    assert title in page_of(found).to_html("")
+    chances_in_json = {
+        (c["variant"], c["number"]): c["ten_trials_show_it"] for c in json_of(comparison)["claims"]
+    }
+    assert chances_in_json["new", 6] == {"value": 0.0, "lower": 0.0, "upper": 0.0}
+    assert title in page_of(comparison).to_html("")
 
 
 def test_small_studies_are_not_judged_and_show_claims_of_complete_cases_only(study):
@@ -265,8 +277,8 @@ def test_small_studies_are_not_judged_and_show_claims_of_complete_cases_only(stu
         for number in range(2)
         if case != "s5-noise"
     ]
-    found = compare(mine, records)
-    judged = {number: c for own in judge_variants(found).values() for number, c in own.items()}
+    comparison = compare(mine, records)
+    judged = {number: c for own in judge_variants(comparison).values() for number, c in own.items()}
     assert sorted(judged) == [3, 5, 7]
     assert {c.verdict for c in judged.values()} == {Verdict.NOT_JUDGED}
 

@@ -31,7 +31,14 @@ SHORT = ("--steps", 150, "--evaluate-every", 70, "--evaluation-episodes", 2, *SM
 DRIFTING = "drifting_env:tests/Drifting-v0"
 
 
-def test_a_run_is_trained_evaluated_plotted_and_recorded(invoke, tmp_path):
+@pytest.fixture
+def trained(invoke):
+    """The folder of a short run."""
+    assert invoke("train", DRIFTING, *SHORT, "--out", "run").exit_code == 0
+    return Path("run")
+
+
+def test_train_prints_a_summary_and_the_next_commands(invoke):
     done = invoke("train", DRIFTING, *SHORT, "--seed", 3)
     assert done.exit_code == 0, done.output
     assert done.stderr == ""  # no progress where there is no terminal
@@ -43,36 +50,37 @@ def test_a_run_is_trained_evaluated_plotted_and_recorded(invoke, tmp_path):
     assert f"sdnn plot {folder}" in lines[-1]
     assert lines[-1].endswith(f"sdnn record {folder} x.gif")
 
-    found = json.loads(invoke("evaluate", folder, "--episodes", 3, "--seed", 9, "--json").stdout)
-    returns = Run.open(folder).evaluate(3, 9).returns
-    assert found["returns"] == returns.tolist()
-    assert found["mean_return"] == pytest.approx(returns.mean())
-    assert found["range"] == [returns.min(), returns.max()]
-    text = invoke("evaluate", folder, "--episodes", 3).stdout
-    assert text.startswith(f"{folder}: mean return ")
-    assert (
-        json.loads(invoke("evaluate", folder, "--episodes", 1, "--json").stdout)[
-            "standard_deviation"
-        ]
-        is None
-    )
 
-    figure, numbers = folder / "curves.png", folder / "curves.csv"
-    written = invoke("plot", folder).stdout
+def test_evaluate_prints_the_returns_of_an_evaluation(invoke, trained):
+    evaluate = ("evaluate", trained, "--json", "--episodes")
+    printed = json.loads(invoke(*evaluate, 3, "--seed", 9).stdout)
+    returns = Run.open(trained).evaluate(3, 9).returns
+    assert printed["returns"] == returns.tolist()
+    assert printed["mean_return"] == pytest.approx(returns.mean())
+    assert printed["range"] == [returns.min(), returns.max()]
+    text = invoke("evaluate", trained, "--episodes", 3).stdout
+    assert text.startswith(f"{trained}: mean return ")
+    assert json.loads(invoke(*evaluate, 1).stdout)["standard_deviation"] is None
+
+
+def test_plot_writes_a_figure_and_the_numbers_of_its_curves(invoke, trained):
+    figure, numbers = trained / "curves.png", trained / "curves.csv"
+    written = invoke("plot", trained).stdout
     assert str(figure) in written
     assert str(numbers) in written
     drawn = list(csv.DictReader(numbers.read_text().splitlines()))
-    rows = Run.open(folder).rows()
-    assert [float(one["value"]) for one in drawn if one["kind"] == "evaluation"] == [
-        row["mean_return"] for row in rows if row["kind"] == "evaluation"
-    ]
-    assert [float(one["value"]) for one in drawn if one["kind"] == "return"] == [
-        row["return"] for row in rows if row["kind"] == "episode"
-    ]
+    rows = Run.open(trained).rows()
+    for kind, row_kind, name in (
+        ("evaluation", "evaluation", "mean_return"), ("return", "episode", "return"),
+    ):  # fmt: skip
+        values = [float(point["value"]) for point in drawn if point["kind"] == kind]
+        assert values == [row[name] for row in rows if row["kind"] == row_kind]
     assert figure.stat().st_size > 10_000
-    assert "x.svg" in invoke("plot", folder, "--out", "x.svg").stdout
+    assert "x.svg" in invoke("plot", trained, "--out", "x.svg").stdout
 
-    recorded = invoke("record", folder, "x.gif", "--steps", 4)
+
+def test_record_writes_a_gif_of_the_requested_steps(invoke, trained, tmp_path):
+    recorded = invoke("record", trained, "x.gif", "--steps", 4)
     assert recorded.stdout.startswith("wrote x.gif: 5 frames, return ")
     assert (tmp_path / "x.gif").read_bytes().startswith(b"GIF89a")
 
@@ -99,17 +107,17 @@ def test_export_writes_the_c_header_of_a_run_or_an_agent_file(invoke, tmp_path):
     assert Path("drift.h").read_text() == c_header(agent, "drift").text
     assert done.stdout.startswith("wrote drift.h: ")
     options = ("--name", "mine", "--fraction-bits", 12, "--json")
-    told = json.loads(
+    printed = json.loads(
         invoke("export", "run/agent.safetensors", "--c-header", "b.h", *options).stdout
     )
     header = c_header(agent, "mine", fraction_bits=12)
     assert Path("b.h").read_text() == header.text
-    assert (told["file"], told["name"], told["fraction_bits"]) == ("b.h", "mine", 12)
-    assert told["flash_bytes"] == header.flash_bytes
-    assert "text" not in told
+    assert (printed["file"], printed["name"], printed["fraction_bits"]) == ("b.h", "mine", 12)
+    assert printed["flash_bytes"] == header.flash_bytes
+    assert "text" not in printed
 
 
-def test_export_with_learning_writes_linear_agents_and_refuses_unlimited_networks(invoke):
+def test_export_with_learning_writes_the_header_of_a_linear_agent(invoke):
     linear = ("--agent", "q-lambda", *SHORT[:6], *SMALL[-2:], "--out", "one")
     assert invoke("train", DRIFTING, *linear).exit_code == 0
     done = invoke("export", "one", "--c-header", "drift.h", "--learning")
@@ -117,8 +125,11 @@ def test_export_with_learning_writes_linear_agents_and_refuses_unlimited_network
     header = c_header(Run.open("one").agent(), "drift", learning=True)
     assert Path("drift.h").read_text() == header.text
     assert f"{header.ram_bytes:,} bytes of memory" in done.stdout
-    assert invoke("train", DRIFTING, *SHORT, "--out", "two").exit_code == 0
-    done = invoke("export", "two", "--c-header", "b.h", "--learning")
+
+
+def test_export_with_learning_refuses_a_network_without_a_weight_limit(invoke):
+    assert invoke("train", DRIFTING, *SHORT, "--out", "one").exit_code == 0
+    done = invoke("export", "one", "--c-header", "b.h", "--learning")
     assert done.exit_code == 1
     assert "approximator.weight_limit=127" in done.stderr
     assert not Path("b.h").exists()
@@ -147,9 +158,9 @@ SCALED_LINES = [
 
 def test_train_and_export_state_the_scaling_of_observations(invoke):
     done = invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one")
-    told = done.stdout.splitlines()[-2]
-    assert "0 from -4 to 4, 1 from -2 to 3, and means of neighbours (1)" in told
-    assert "sdnn.runs.Run.open('one').spec.make_env()" in told
+    printed = done.stdout.splitlines()[-2]
+    assert "0 from -4 to 4, 1 from -2 to 3, and means of neighbours (1)" in printed
+    assert "sdnn.runs.Run.open('one').spec.make_env()" in printed
     for source in ("one", "one/agent.safetensors", "one/checkpoint.safetensors"):
         done = invoke("export", source, "--c-header", "a.h")
         assert [line.strip() for line in done.stdout.splitlines()[2:]] == SCALED_LINES
@@ -158,16 +169,18 @@ def test_train_and_export_state_the_scaling_of_observations(invoke):
         comment, _ = text.split(" */\n", 1)
         assert comment.startswith("/* What this policy observes is scaled, ")
         assert [line.removeprefix(" *   ") for line in comment.splitlines()[4:]] == SCALED_LINES
-    told = json.loads(invoke("export", "one", "--c-header", "a.h", "--json").stdout)
-    assert told["scaling"] == {"ranges": [[-4.0, 4.0], [-2.0, 3.0]], "redundant": 1}
+    printed = json.loads(invoke("export", "one", "--c-header", "a.h", "--json").stdout)
+    assert printed["scaling"] == {"ranges": [[-4.0, 4.0], [-2.0, 3.0]], "redundant": 1}
 
 
 def test_a_copied_agent_file_keeps_the_scaling_of_its_run(invoke):
     assert invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one").exit_code == 0
     Path("agent.safetensors").write_bytes(Path("one/agent.safetensors").read_bytes())
     Path("config.json").write_text("of another program")
-    told = json.loads(invoke("export", "agent.safetensors", "--c-header", "a.h", "--json").stdout)
-    assert told["scaling"] == {"ranges": [[-4.0, 4.0], [-2.0, 3.0]], "redundant": 1}
+    printed = json.loads(
+        invoke("export", "agent.safetensors", "--c-header", "a.h", "--json").stdout
+    )
+    assert printed["scaling"] == {"ranges": [[-4.0, 4.0], [-2.0, 3.0]], "redundant": 1}
     assert all(line in Path("a.h").read_text() for line in SCALED_LINES)
 
     agent = load_agent("agent.safetensors")
@@ -229,7 +242,9 @@ def test_plot_draws_several_runs_as_one_curve(invoke, tmp_path):
     folders = sorted((tmp_path / "runs").iterdir())
     assert "curves.png and curves.csv" in invoke("plot", *folders, folders[0]).stdout
     drawn = list(csv.DictReader(Path("curves.csv").read_text().splitlines()))
-    assert {(one["kind"], one["n_runs"], one["run"]) for one in drawn} == {("evaluation", "2", "")}
+    assert {(point["kind"], point["n_runs"], point["run"]) for point in drawn} == {
+        ("evaluation", "2", "")
+    }
 
 
 def test_plot_names_runs_without_rows(invoke, tmp_path):
@@ -360,9 +375,9 @@ def test_train_with_n_envs_learns_in_several_environments(invoke):
     assert json.loads(done.stdout)["n_steps"] == 150
     run = Run.open("four")
     assert run.spec.protocol.n_envs == 4
-    seen = {row["environment"] for row in run.rows() if row["kind"] == "episode"}
-    assert len(seen) > 1
-    assert seen <= {0, 1, 2, 3}
+    environments = {row["environment"] for row in run.rows() if row["kind"] == "episode"}
+    assert len(environments) > 1
+    assert environments <= {0, 1, 2, 3}
     assert invoke("resume", "four", "--steps", 170).exit_code == 0
     assert invoke("plot", "four").exit_code == 0
 
@@ -707,7 +722,7 @@ def test_train_does_not_report_ranges_of_a_solved_task(invoke, monkeypatch):
 def test_train_reports_values_in_steps_that_are_too_coarse(invoke):
     task = ("MountainCarContinuous-v0", "--agent", "sdnn-c", "--steps", 800)
     ends = ["approximator.q_low=-1e6", "approximator.q_high=1e6"]
-    options = [word for one in ["learning.value_range=fixed", *ends] for word in ("--set", one)]
+    options = [word for point in ["learning.value_range=fixed", *ends] for word in ("--set", point)]
     lines = invoke("train", *task, *options, "--out", "wide").stdout
     assert re.search(r"values come in steps of 3\.85e\+03, .*approximator\.q_low", lines)
     assert "values come in steps" not in invoke("train", *task, "--out", "own").stdout
@@ -727,14 +742,14 @@ def test_train_reports_observations_that_are_left_out(invoke):
 
 
 def test_commands_report_an_unfinished_warm_up(invoke):
-    told = WARMING_UP
+    printed = WARMING_UP
     begun = ("--steps", 59, "--evaluate-every", 50, "--evaluation-episodes", 1, *SMALL)
     lines = invoke("train", DRIFTING, *begun, "--out", "one").stdout.splitlines()
-    assert lines[1].startswith(told)
+    assert lines[1].startswith(printed)
     assert "60 steps" in lines[1]
     assert "sdnn resume one --steps N" in lines[1]
-    assert invoke("evaluate", "one", "--episodes", 1).stdout.splitlines()[-1] == told
-    assert invoke("record", "one", "x.gif", "--steps", 2).stdout.splitlines()[-1] == told
+    assert invoke("evaluate", "one", "--episodes", 1).stdout.splitlines()[-1] == printed
+    assert invoke("record", "one", "x.gif", "--steps", 2).stdout.splitlines()[-1] == printed
     evaluate = ("evaluate", "one", "--episodes", 1, "--json")
     assert json.loads(invoke(*evaluate).stdout)["is_warming_up"] is True
     done = json.loads(invoke("resume", "one", "--json").stdout)

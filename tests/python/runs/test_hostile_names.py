@@ -95,17 +95,17 @@ def test_html_shows_hostile_names_as_plain_text(name):
         ],
     )  # fmt: skip
     plain_page = Page(**{**vars(page), **dict.fromkeys(("title", "intro", "source"), "n")})
-    found = Tags(page.to_html(name))
-    assert found.tags == Tags(plain_page.to_html("n")).tags
-    assert {"script", "a"}.isdisjoint(found.tags)
-    assert [value for key, value in found.attributes if key == "alt"] == [name]
-    assert not [key for key, _ in found.attributes if key.startswith("on")]
-    assert sum(plain(name) in text for text in found.texts) >= 11
+    tags = Tags(page.to_html(name))
+    assert tags.tags == Tags(plain_page.to_html("n")).tags
+    assert {"script", "a"}.isdisjoint(tags.tags)
+    assert [value for key, value in tags.attributes if key == "alt"] == [name]
+    assert not [key for key, _ in tags.attributes if key.startswith("on")]
+    assert sum(plain(name) in text for text in tags.texts) >= 11
 
 
 @pytest.mark.parametrize("name", [WORST, "$\\frac{", "&<>\"'", "=1+1", "-x|\\"])
 def test_the_outputs_of_a_study_with_hostile_names_are_harmless(study, name):
-    mine = study(
+    hostile = study(
         f"[study]\ntitle = {json.dumps(name)}\ntrials = 2\n"
         f"[cases.mine]\ntitle = {json.dumps(name)}\nenvironment = 'sdnn/PaperAcrobot-v0'\n"
         f"[variants.{json.dumps(name)}]\n[variants.other]\ntitle = {json.dumps(name)}\n"
@@ -119,13 +119,13 @@ def test_the_outputs_of_a_study_with_hostile_names_are_harmless(study, name):
             finished_at=name,
             steps=[4] * 20,
         )
-        for pair, one in mine.combinations.items()
-        for key in mine.keys(*pair)
+        for pair, one in hostile.combinations.items()
+        for key in hostile.keys(*pair)
     ]
-    comparison = compare(mine, records)
+    comparison = compare(hostile, records)
     _, svg = figure_bytes(draw_study(comparison, name))
     assert "script" not in {element.tag for element in ElementTree.fromstring(svg).iter()}
-    additions = mine.additions(comparison)
+    additions = hostile.additions(comparison)
     page = study_page(comparison, "abc", additions, svg)
     assert "script" not in Tags(page.to_html("")).tags
     markdown = MarkdownIt("gfm-like", {"linkify": False}).render(page.to_markdown())

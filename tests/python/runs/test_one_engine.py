@@ -11,11 +11,11 @@ PACKAGE = Path(sdnn.__file__).parent
 
 def modules_with(is_wanted):
     """Names of the modules of the package that have a wanted node in their syntax trees."""
-    found = set()
+    modules = set()
     for path in PACKAGE.rglob("*.py"):
         if any(map(is_wanted, ast.walk(ast.parse(path.read_text("utf-8"))))):
-            found.add(path.relative_to(PACKAGE).with_suffix("").as_posix())
-    return found
+            modules.add(path.relative_to(PACKAGE).with_suffix("").as_posix())
+    return modules
 
 
 def calls(method):
@@ -34,7 +34,7 @@ def calls(method):
 def imports(name):
     def is_wanted(node):
         if isinstance(node, ast.Import):
-            return any(one.name == name for one in node.names)
+            return any(alias.name == name for alias in node.names)
         return isinstance(node, ast.ImportFrom) and node.module == name
 
     return is_wanted
@@ -61,6 +61,6 @@ def test_only_one_module_draws_progress_bars():
 
 
 def test_each_agent_class_has_one_registered_id():
-    kinds = {entry.agent for entry in AGENTS.values()}
-    assert len(kinds) == len(AGENTS)
+    classes = {entry.agent for entry in AGENTS.values()}
+    assert len(classes) == len(AGENTS)
     assert set(AGENTS) == {"sdnn-c", "q-lambda", "actor-critic", "rbf", "fuzzy"}

@@ -57,12 +57,12 @@ def whole(tmp_path_factory):
     done = []
 
     def _whole(config):
-        found = next((run for run in done if run.spec == config), None)
-        if found is None:
-            found = Run.create(folder / str(len(done)), config)
-            found.train()
-            done.append(found)
-        return found
+        run = next((run for run in done if run.spec == config), None)
+        if run is None:
+            run = Run.create(folder / str(len(done)), config)
+            run.train()
+            done.append(run)
+        return run
 
     return _whole
 
@@ -305,12 +305,12 @@ def test_missing_and_damaged_files_of_a_run_are_refused_by_name(whole, tmp_path)
     refuses("checkpoint.safetensors", run.agent, error=RunError)
     refuses("checkpoint.safetensors", run.train, error=RunError)
     config = run.folder / "config.json"
-    told = json.loads(config.read_text())
+    values = json.loads(config.read_text())
     for goal in ({"at_step": "x", "steps": 9}, {"at_step": 1}, {"at_step": 1, "steps": -5}, 7):
-        config.write_text(json.dumps({**told, "goals": [goal]}))
+        config.write_text(json.dumps({**values, "goals": [goal]}))
         with pytest.raises(ConfigError, match=r"config\.json: goals"):
             Run.open(run.folder)
-    config.write_text(json.dumps(told, indent=2))
+    config.write_text(json.dumps(values, indent=2))
     config.write_text(config.read_text().replace('"steps": 400', '"steps": "many"', 1))
     with pytest.raises(ConfigError, match=r"config\.json: budget\.steps"):
         Run.open(run.folder)
@@ -319,17 +319,17 @@ def test_missing_and_damaged_files_of_a_run_are_refused_by_name(whole, tmp_path)
 def test_rows_are_readable_before_the_first_checkpoint(tmp_path, whole, monkeypatch):
     monkeypatch.setattr("sdnn.runs.run.STORE_SECONDS", -1.0)
     run = Run.create(tmp_path / "run", CONFIG)
-    seen = []
+    rows_before = []
 
     class Watch(Callback):
         def on_step(self, training):
             if training.n_steps == CONFIG.output.checkpoint_every - 1:
-                seen.extend(run.rows())
+                rows_before.extend(run.rows())
                 assert not (run.folder / "checkpoint.safetensors").exists()
 
     run.train(callbacks=[Watch()])
-    assert seen
-    assert seen == run.rows()[: len(seen)]
+    assert rows_before
+    assert rows_before == run.rows()[: len(rows_before)]
     assert contents(run) == contents(whole(CONFIG))
 
 

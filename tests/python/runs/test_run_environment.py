@@ -66,13 +66,13 @@ def test_noise_is_a_share_of_the_range_and_reproducible_by_seed():
     assert isinstance(env, NoisySensors)
 
     def errors(env, seed):
-        found = []
+        differences = []
         observation, _ = env.reset(seed=seed)
         for _ in range(40):
             position, speed = (env.unwrapped.state + 50) / 100
-            found.append(observation - [position, speed, 0.5 * (position + speed)])
+            differences.append(observation - [position, speed, 0.5 * (position + speed)])
             observation, *_ = env.step(np.zeros(1, np.float32))
-        return np.array(found)
+        return np.array(differences)
 
     first = errors(env, 3)
     assert first.std() == pytest.approx(0.02, rel=0.2)

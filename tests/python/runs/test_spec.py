@@ -205,7 +205,7 @@ def test_the_setting_inputs_reaches_the_agent_and_the_hash(inputs):
 
 
 @pytest.mark.parametrize(
-    ("preset", "noise", "given", "found"),
+    ("preset", "noise", "options", "expected"),
     [
         ("general", 0.0, {}, ("find", "relevant")),
         ("general", 0.1, {}, ("none", "relevant")),
@@ -214,14 +214,14 @@ def test_the_setting_inputs_reaches_the_agent_and_the_hash(inputs):
     ],
 )
 def test_defaults_of_inputs_and_angle_pairs_follow_from_preset_and_noise(
-    preset, noise, given, found
+    preset, noise, options, expected
 ):
     environment = EnvironmentSpec(id="Pendulum-v1", noise=noise)
-    agent = AgentSpec(name="q-lambda", preset=preset, **given)
+    agent = AgentSpec(name="q-lambda", preset=preset, **options)
     spec = RunSpec(environment=environment, agent=agent)
-    assert (spec.agent.angle_pairs, spec.agent.inputs) == found
+    assert (spec.agent.angle_pairs, spec.agent.inputs) == expected
     assert RunSpec.from_values(spec.values()) == spec
-    assert spec.make_agent(spec.make_env()).is_warming_up == (found != ("none", "all"))
+    assert spec.make_agent(spec.make_env()).is_warming_up == (expected != ("none", "all"))
 
 
 def test_a_registered_agent_may_have_its_training_class():
@@ -244,28 +244,28 @@ def test_a_registered_agent_may_have_its_training_class():
 
 
 def test_adaptive_ranges_are_fitted_and_exclude_fixed_ones():
-    seen = AgentSpec(name="sdnn-c", observation_range="adaptive", warm_up_steps=20)
+    adaptive = AgentSpec(name="sdnn-c", observation_range="adaptive", warm_up_steps=20)
     environment = EnvironmentSpec(id="MountainCar-v0")
     env = environment.make()
     plain = RunSpec(environment=environment, agent="sdnn-c")
     assert not plain.make_agent(env).is_warming_up
-    agent = RunSpec(environment=environment, agent=seen).make_agent(env)
+    agent = RunSpec(environment=environment, agent=adaptive).make_agent(env)
     assert agent.is_warming_up
     agent.train(env, steps=20)
     low, high = agent.observation_range
     assert (low > env.observation_space.low).all()
     assert (high < env.observation_space.high).all()
-    given = environment.replace(ranges={"0": (-1.0, 1.0)})
+    options = environment.replace(ranges={"0": (-1.0, 1.0)})
     with pytest.raises(ConfigError, match="given") as caught:
-        RunSpec(environment=given, agent=seen).make_agent(env)
+        RunSpec(environment=options, agent=adaptive).make_agent(env)
     assert caught.value.key == "environment.ranges"
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_a_warm_up_does_not_narrow_fixed_ranges(noise):
     environment = EnvironmentSpec(id="CartPole-v1", noise=noise)
-    given = {str(i): (-100.0, 100.0) for i in range(4)}
-    spec = RunSpec(environment=environment.replace(ranges=given), agent="q-lambda")
+    options = {str(i): (-100.0, 100.0) for i in range(4)}
+    spec = RunSpec(environment=environment.replace(ranges=options), agent="q-lambda")
     env = spec.environment.make()
     agent = spec.make_agent(env)
     agent.train(env, steps=spec.agent.warm_up_steps)
@@ -277,7 +277,7 @@ def test_a_warm_up_does_not_narrow_fixed_ranges(noise):
 
 def test_make_agent_returns_the_class_with_its_settings():
     env = CART_POLE.make()
-    for name, kind in {"sdnn-c": SDNNQLearning, "rbf": RBFQLearning}.items():
+    for name, agent_class in {"sdnn-c": SDNNQLearning, "rbf": RBFQLearning}.items():
         spec = RunSpec(
             environment=CART_POLE,
             agent=AgentSpec(name=name, warm_up_steps=20),
@@ -285,7 +285,7 @@ def test_make_agent_returns_the_class_with_its_settings():
             learning={"discount": 0.5},
         )
         agent = spec.make_agent(env)
-        assert type(agent) is kind
+        assert type(agent) is agent_class
         assert agent.seed == 7
         assert agent.learning.discount == 0.5
         assert agent.is_warming_up

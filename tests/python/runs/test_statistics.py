@@ -20,11 +20,11 @@ def test_the_bootstrap_of_the_median_of_two_values_is_exact():
 
 def test_the_interval_of_the_median_is_near_the_asymptotic_one():
     values = np.random.default_rng(0).normal(size=1000)
-    found = estimate_median(values)
+    estimate = estimate_median(values)
     # The standard deviation of the median of normal values is sqrt(pi / 2 / n).
     half = 1.96 * math.sqrt(math.pi / 2 / 1000)
-    assert found.upper - found.lower == pytest.approx(2 * half, rel=0.25)
-    assert found.lower < found.value < found.upper
+    assert estimate.upper - estimate.lower == pytest.approx(2 * half, rel=0.25)
+    assert estimate.lower < estimate.value < estimate.upper
 
 
 def test_the_bootstrap_is_repeatable_and_keeps_the_global_state():
@@ -51,25 +51,25 @@ def test_the_median_of_one_trial_has_no_interval_and_of_none_is_refused():
 
 def test_the_running_median_shrinks_its_window_at_the_ends():
     curve = np.random.default_rng(3).normal(size=40)
-    found = running_median(curve, 5)
+    medians = running_median(curve, 5)
     for i in range(40):
-        assert found[i] == np.median(curve[max(0, i - 2) : i + 3])
+        assert medians[i] == np.median(curve[max(0, i - 2) : i + 3])
     np.testing.assert_array_equal(running_median(curve, 1), curve)
 
 
 def test_the_contrast_of_two_values_each_is_exact():
     # Differences of the medians 0, 1/2, 1 and 10, 11, 12: the ends have probability 1/16 each.
-    found = estimate_contrast([0.0, 1.0], [10.0, 12.0])
-    assert found == Estimate(-10.5, -12.0, -9.0)
+    estimate = estimate_contrast([0.0, 1.0], [10.0, 12.0])
+    assert estimate == Estimate(-10.5, -12.0, -9.0)
     assert estimate_contrast([8.0, 8.0], [2.0, 2.0], np.divide) == Estimate(4.0, 4.0, 4.0)
 
 
 def test_the_interval_of_a_contrast_is_near_the_normal_one():
     rng = np.random.default_rng(1)
-    found = estimate_contrast(rng.normal(1.0, 1.0, 800), rng.normal(0.0, 2.0, 800))
+    estimate = estimate_contrast(rng.normal(1.0, 1.0, 800), rng.normal(0.0, 2.0, 800))
     half = 1.96 * math.sqrt(math.pi / 2 / 800 * (1 + 4))
-    assert found.value == pytest.approx(1.0, abs=2 * half)
-    assert found.upper - found.lower == pytest.approx(2 * half, rel=0.25)
+    assert estimate.value == pytest.approx(1.0, abs=2 * half)
+    assert estimate.upper - estimate.lower == pytest.approx(2 * half, rel=0.25)
 
 
 def test_contrasts_of_single_or_nan_values_are_nan_and_of_infinite_ones_refused():

@@ -66,8 +66,8 @@ def test_trials_of_different_configurations_are_stored_separately(tmp_path):
     with ResultStore(tmp_path) as store:
         store.add(make_record(steps=(50, 50)))
         store.add(make_record(config='{"a":1}', steps=(3, 3)))
-        (found,) = store.load([make_record(config='{"a":1}').key])
-        assert found.rows.steps.tolist() == [3, 3]
+        (record,) = store.load([make_record(config='{"a":1}').key])
+        assert record.rows.steps.tolist() == [3, 3]
         assert len(store.keys()) == 2
 
 
@@ -143,13 +143,13 @@ TRAINED = [
 
 def test_rows_of_a_run_are_appended_until_it_is_finished(tmp_path):
     key = make_record().key._replace(seed=2**64 - 1)
-    told = {"config": "{}", "version": "0.1", "seconds": 1.5}
+    metadata = {"config": "{}", "version": "0.1", "seconds": 1.5}
     with ResultStore(tmp_path) as store:
-        store.extend(key, TrialRows.from_training(TRAINED[:2]), 0, **told)
+        store.extend(key, TrialRows.from_training(TRAINED[:2]), 0, **metadata)
         assert (store.keys(), store.load()) == (set(), ())
         assert store.rows(key).to_training() == TRAINED[:2]
         # After a kill, what was stored after the last checkpoint is stored again.
-        store.extend(key, TrialRows.from_training(TRAINED[1:], 1), 1, **told)
+        store.extend(key, TrialRows.from_training(TRAINED[1:], 1), 1, **metadata)
         assert store.rows(key).to_training() == TRAINED
         nothing = TrialRows.from_training([])
         store.add(replace(make_record(seconds=2.0), key=key, rows=nothing))
@@ -161,7 +161,7 @@ def test_rows_of_a_run_are_appended_until_it_is_finished(tmp_path):
         assert record.rows.steps.tolist() == [5.5]
         assert record.rows.episode_return.tolist() == [1.5]
         assert record.rows.solved.tolist() == [0.5]
-        store.extend(key, nothing, 3, **told)
+        store.extend(key, nothing, 3, **metadata)
         assert store.keys() == set()
 
 

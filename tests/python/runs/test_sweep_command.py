@@ -170,9 +170,9 @@ def test_dry_run_counts_and_estimates_without_making_a_file(invoke, tmp_path):
     lines = invoke("sweep", "mine.toml", "--dry-run").stdout.splitlines()
     assert "1 of them stored in results" in lines[0]
     assert "(from 1 stored trial)" in lines[0]
-    found = json.loads(invoke("sweep", "mine.toml", "--dry-run", "--json", "--jobs", 3).stdout)
-    assert (found["planned"], found["stored"], found["jobs"]) == (8, 4, 3)
-    assert len(found["trials"]) == 6
+    forecast = json.loads(invoke("sweep", "mine.toml", "--dry-run", "--json", "--jobs", 3).stdout)
+    assert (forecast["planned"], forecast["stored"], forecast["jobs"]) == (8, 4, 3)
+    assert len(forecast["trials"]) == 6
     invoke("sweep", "mine.toml")
     done = json.loads(invoke("sweep", "mine.toml", "--dry-run", "--json").stdout)
     assert done["seconds"] == 0.0

@@ -7,7 +7,6 @@ import pytest
 
 from refusals import refuses
 from sdnn import _core
-from sdnn.agents import SDNNQLearning
 from sdnn.agents.registry import labels, title_of
 from sdnn.reproduction import Case, case_spec
 from sdnn.runs import (
@@ -123,13 +122,6 @@ class Nothing:
 
 def entry_of(agent_id):
     return AgentEntry(id=agent_id, title="", approximator=Nothing, learning=Nothing, agent=object)
-
-
-def test_the_settings_of_a_preset_are_those_of_the_agents_class():
-    spec = spec_of("sdnn-c-robust")
-    assert spec.approximator == SDNNQLearning.presets["robust"].approximator
-    assert spec.learning == SDNNQLearning.presets["robust"].learning
-    assert spec_of("sdnn-c").learning == SDNNQLearning.presets["paper"].learning
 
 
 def test_computing_action_values_does_not_change_the_rows_of_a_trial():
