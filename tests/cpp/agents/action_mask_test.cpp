@@ -12,7 +12,7 @@ namespace {
 
 const std::vector<std::uint8_t> kMask{0, 1, 0, 1, 1, 0, 1};
 
-TEST(ActionMask, IsSplitByDimensions) {
+TEST(ActionMask, IsSplitIntoPartsOfDimensions) {
   ActionMask left = kMask;
   EXPECT_EQ(take_part(left, 3).size(), 3U);
   EXPECT_EQ(left.size(), 4U);
@@ -35,7 +35,7 @@ TEST(ActionMask, DrawsEachAllowedAction) {
   EXPECT_EQ(draw_allowed({}, 9, [](std::size_t n) { return n - 1; }), 8U);
 }
 
-TEST(ActionMask, ExcludesValues) {
+TEST(ActionMask, SetsValuesOfForbiddenActionsToMinusInfinity) {
   constexpr double kNever = -std::numeric_limits<double>::infinity();
   std::vector<double> values{5.0, 1.0, 7.0};
   exclude(ActionMask(kMask).first(3), values);
@@ -44,7 +44,7 @@ TEST(ActionMask, ExcludesValues) {
   EXPECT_EQ(values[1], 1.0);
 }
 
-TEST(ActionMask, NeedsZerosAndOnesAndOneAllowed) {
+TEST(ActionMask, HasZerosAndOnesAndAtLeastOneAllowedAction) {
   EXPECT_TRUE(is_mask(kMask));
   EXPECT_FALSE(is_mask(std::vector<std::uint8_t>{0, 0}));
   EXPECT_FALSE(is_mask(std::vector<std::uint8_t>{1, 2}));

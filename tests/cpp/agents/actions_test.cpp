@@ -18,7 +18,7 @@ std::string error_of(const ActionConfig& config, std::size_t n_in_box) {
   return testing::message_of([&] { const Actions actions(config, n_in_box); });
 }
 
-TEST(Actions, OfABoxCutItsRangesEvenly) {
+TEST(Actions, OfABoxAreEvenlySpacedAndFoundByTheNearestIndex) {
   const Actions actions({.low = {-2.0, 0.0}, .high = {2.0, 0.3}}, 5);
   EXPECT_EQ(actions.n_dimensions(), 2U);
   EXPECT_EQ(actions.of_index(1, 0), -1.0);
@@ -31,7 +31,7 @@ TEST(Actions, OfABoxCutItsRangesEvenly) {
   EXPECT_EQ(Actions({.low = {-2.0}, .high = {2.0}}, 1).index_of(1.0, 0), 0U);
 }
 
-TEST(Actions, OfABoxMayLieBetweenTwoIndices) {
+TEST(Actions, AnOffsetMovesAnActionOfABoxToItsNeighbour) {
   const Actions actions({.low = {-2.0}, .high = {2.0}}, 5);
   EXPECT_EQ(actions.beside_index(1, 0.25, 0), -0.75);
   EXPECT_EQ(actions.beside_index(4, -0.5, 0), 1.5);
@@ -40,7 +40,7 @@ TEST(Actions, OfABoxMayLieBetweenTwoIndices) {
   EXPECT_EQ(discrete.beside_index(1, 0.25, 0), 4.0);
 }
 
-TEST(Actions, OfANumberAreThePlaceInTheRange) {
+TEST(Actions, OfANormalizedNumberAreScaledToTheRange) {
   const Actions actions({.low = {-2.0, 0.0}, .high = {6.0, 1.0}}, 0);
   EXPECT_EQ(actions.of_normalized(-1.0, 0), -2.0);
   EXPECT_EQ(actions.of_normalized(-0.5, 0), 0.0);
@@ -48,7 +48,7 @@ TEST(Actions, OfANumberAreThePlaceInTheRange) {
   EXPECT_EQ(actions.of_normalized(-0.5, 1), 0.25);
 }
 
-TEST(Actions, OfWholeNumbersAreTheNearest) {
+TEST(Actions, OfABoxOfIntegersAreRoundedToTheNearestInteger) {
   const ActionConfig bytes{.low = {0.0}, .high = {255.0}, .number = ActionNumber::whole};
   const Actions actions(bytes, 5);
   const Numbers expected = {0.0, 64.0, 128.0, 191.0, 255.0};
@@ -61,7 +61,7 @@ TEST(Actions, OfWholeNumbersAreTheNearest) {
 }
 
 // The numbers are numpy.float32(0.1) and so on.
-TEST(Actions, AreRoundedToTheNumbersOfTheTask) {
+TEST(Actions, AreRoundedToTheFloatingPointTypeOfTheTask) {
   const auto middle = [](double low, double high, ActionNumber number) {
     return Actions({.low = {low}, .high = {high}, .number = number}, 3).of_index(1, 0);
   };
@@ -72,7 +72,7 @@ TEST(Actions, AreRoundedToTheNumbersOfTheTask) {
   EXPECT_EQ(middle(0.0, 0x1.8p-23, ActionNumber::float16), 0x1.0p-23);  // a tie goes to the even
 }
 
-TEST(Actions, OfADiscreteSpaceAreItsFirstAndTheIndex) {
+TEST(Actions, OfADiscreteSpaceAreConsecutiveIntegersFromItsFirst) {
   const Actions actions({.low = {-1.0, 10.0}, .high = {1.0, 10.0}, .discrete = true}, 99);
   EXPECT_EQ(actions.n_actions(), (std::vector<std::size_t>{3, 1}));
   EXPECT_EQ(actions.of_index(2, 0), 1.0);
@@ -80,7 +80,7 @@ TEST(Actions, OfADiscreteSpaceAreItsFirstAndTheIndex) {
   EXPECT_EQ(actions.index_of(1.0, 0), 2U);
 }
 
-TEST(Actions, OfAnotherTaskAreRefused) {
+TEST(Actions, OutsideTheSpaceAreRefused) {
   const Actions box({.low = {-2.0, 0.0}, .high = {2.0, 1.0}}, 5);
   const Actions buttons({.low = {2.0}, .high = {4.0}, .discrete = true}, 1);
   EXPECT_NO_THROW(box.require_action(Numbers{0.123, 1.0}));
@@ -93,7 +93,7 @@ TEST(Actions, OfAnotherTaskAreRefused) {
   }
 }
 
-TEST(Actions, NameTheFieldThatDoesNotFit) {
+TEST(Actions, RefuseBadConfigurationsByTheirField) {
   EXPECT_EQ(error_of({.low = {0.0}, .high = {1.0}}, 3), "no error");
   EXPECT_NE(error_of({}, 3).find("action.low"), std::string::npos);
   for (const ActionConfig& bad :

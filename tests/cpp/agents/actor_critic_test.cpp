@@ -35,7 +35,7 @@ std::vector<double> probabilities(const ActorCritic& agent, const State& state) 
 }
 
 /// Steps of random states, with rewards for the last action.
-void live(ActorCritic& agent, int n_steps, std::uint64_t seed) {
+void learn_at_random(ActorCritic& agent, int n_steps, std::uint64_t seed) {
   core::Random random(seed, core::Stream::useless_inputs);
   State state{random.uniform(), random.uniform()};
   for (int step = 0; step < n_steps; ++step) {
@@ -49,14 +49,14 @@ void live(ActorCritic& agent, int n_steps, std::uint64_t seed) {
   }
 }
 
-TEST(ActorCritic, BeginsWithEvenProbabilitiesAndNoValue) {
+TEST(ActorCritic, StartsWithUniformProbabilitiesAndValueZero) {
   ActorCritic agent = actor_critic_of({});
   for (const double p : probabilities(agent, {0.2, 0.7})) EXPECT_NEAR(p, 1.0 / 3.0, 1e-9);
   EXPECT_EQ(agent.value(State{0.2, 0.7}), 0.0);
 }
 
 // A critic with alpha = 1 and no trace has the reward of a terminal transition at once.
-TEST(ActorCritic, TheCriticLearnsTheValueOfAState) {
+TEST(ActorCritic, WithRateOneTheCriticLearnsRewardPlusDiscountedValue) {
   ActorCritic agent = actor_critic_of(
       {.learning_rate = 1.0, .discount = 0.5, .trace_decay = 0.0, .final_learning_rate = {}});
   const State a{0.1, 0.1}, b{0.9, 0.9};
@@ -79,7 +79,7 @@ TEST(ActorCritic, ForbiddenActionsAreNeitherTakenNorLearned) {
   EXPECT_EQ(p[0], p[1]);  // one allowed action has a gradient of 0
 }
 
-TEST(ActorCritic, TheScaleOfRewardsChangesNothingButValues) {
+TEST(ActorCritic, ProbabilitiesDoNotDependOnTheScaleOfRewards) {
   std::vector<double> p;
   for (const double scale : {1.0, 0x1p40, 0x1p-40}) {
     ActorCritic agent = actor_critic_of({});
@@ -109,19 +109,19 @@ TEST(ActorCritic, EnvironmentsHaveSeparateTraces) {
   EXPECT_THROW(agent.begin_episode(2), std::invalid_argument);
 }
 
-TEST(ActorCritic, EveryInstructionSetGivesTheSameBits) {
+TEST(ActorCritic, LearnsTheSameBitsOnEveryInstructionSet) {
   std::vector<core::State> states;
   testing::on_every_instruction_set([&](const auto&) {
     ActorCritic agent = actor_critic_of({}, {3, 5});
-    live(agent, 300, 2);
+    learn_at_random(agent, 300, 2);
     states.push_back(core::state_of(agent));
   });
   for (const core::State& state : states) EXPECT_EQ(state, states.front());
 }
 
-TEST(ActorCritic, RefusedTransitionsChangeNothing) {
+TEST(ActorCritic, RefusesBadTransitionsAndChangesNothing) {
   ActorCritic agent = actor_critic_of({});
-  live(agent, 50, 1);
+  learn_at_random(agent, 50, 1);
   const core::State before = core::state_of(agent);
   const State a{0.1, 0.1};
   const double infinity = std::numeric_limits<double>::infinity();

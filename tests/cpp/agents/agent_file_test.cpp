@@ -21,7 +21,7 @@ using Numbers = std::vector<double>;
 
 constexpr std::uint64_t kSeed = 18446744073709551615U;  // the largest there is
 
-ControllerConfig small() {
+ControllerConfig sdnn_config() {
   return {.approximator = approximators::SDNNCConfig{.n_pattern_units = 16,
                                                      .n_anchor_patterns = 3,
                                                      .n_interpolated = 3,
@@ -39,21 +39,21 @@ ControllerConfig small() {
           .warm_up_steps = 20};
 }
 
-ControllerConfig fuzzy() {
-  ControllerConfig config = small();
+ControllerConfig fuzzy_config() {
+  ControllerConfig config = sdnn_config();
   config.approximator = approximators::FuzzyRulesConfig{.n_sets = 4, .n_actions = 5};
   config.learning = FuzzyQLearningConfig{.trace_decay = 0.8};
   return config;
 }
 
-ControllerConfig rbf() {
-  ControllerConfig config = small();
+ControllerConfig rbf_config() {
+  ControllerConfig config = sdnn_config();
   config.approximator = approximators::RBFNetworkConfig{.n_bases = 3, .n_actions = 7};
   return config;
 }
 
 template <class Agent>
-void live(Agent& controller, int n_steps) {
+void learn(Agent& controller, int n_steps) {
   for (int t = 0; t < n_steps; ++t) {
     const Numbers observed{0.1 * (t % 10), 1.0 * (t % 7)}, next{0.1 * ((t + 1) % 10), 1.0};
     const auto taken = controller.act(observed);
@@ -62,42 +62,42 @@ void live(Agent& controller, int n_steps) {
   }
 }
 
-TEST(AgentFile, TheControllerThatIsReadContinuesAsTheOneThatWasWritten) {
+TEST(AgentFile, AReadControllerContinuesLikeTheWrittenOne) {
   const testing::Folder folder;
-  for (const ControllerConfig& config : {small(), rbf(), fuzzy()}) {
+  for (const ControllerConfig& config : {sdnn_config(), rbf_config(), fuzzy_config()}) {
     for (const int n_steps : {10, 50}) {  // within the warm-up and after it
       AgentFile file{Controller(config)};
-      live(file.controller, n_steps);
+      learn(file.controller, n_steps);
       file.write(folder / "agent");
       AgentFile again(folder / "agent");
       again.write(folder / "again");
       EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "again"));
-      live(file.controller, 40);
-      live(again.controller, 40);
+      learn(file.controller, 40);
+      learn(again.controller, 40);
       EXPECT_EQ(core::state_of(file.controller), core::state_of(again.controller));
     }
   }
 }
 
-TEST(AgentFile, ASavedAgentIsTheController) {
+TEST(AgentFile, ASavedAgentActsAndLearnsLikeTheController) {
   const testing::Folder folder;
-  AgentFile file{Controller(small())};
-  live(file.controller, 10);
+  AgentFile file{Controller(sdnn_config())};
+  learn(file.controller, 10);
   file.write(folder / "agent");
   SavedAgent saved(folder / "agent");
   EXPECT_EQ(saved.n_variables(), 2U);
   EXPECT_EQ(saved.n_dimensions(), 1U);
   saved.begin_episode();
   file.controller.begin_episode();
-  live(saved, 40);
-  live(file.controller, 40);
+  learn(saved, 40);
+  learn(file.controller, 40);
   saved.write(folder / "saved");
   file.write(folder / "agent");
   EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "saved"));
 }
 
-TEST(AgentFile, SettingsHaveTheNamesAndWordsOfTheConfigurations) {
-  const json description = AgentFile{Controller(small())}.description();
+TEST(AgentFile, SettingsAreWrittenWithTheirNamesAndValues) {
+  const json description = AgentFile{Controller(sdnn_config())}.description();
   EXPECT_EQ(description["class"], "SDNNQLearning");
   EXPECT_EQ(description["kind"], "sdnn-c");
   EXPECT_EQ(description["seed"], kSeed);
@@ -114,15 +114,15 @@ TEST(AgentFile, SettingsHaveTheNamesAndWordsOfTheConfigurations) {
   EXPECT_EQ(description["observation"]["adaptive"], true);
   EXPECT_EQ(description["action"]["number"], "float32");
   const auto config = detail::controller_config_in(description);
-  EXPECT_EQ(config.approximator, small().approximator);
-  EXPECT_EQ(config.learning, small().learning);
-  EXPECT_EQ(config.observation, small().observation);
-  EXPECT_EQ(config.action, small().action);
+  EXPECT_EQ(config.approximator, sdnn_config().approximator);
+  EXPECT_EQ(config.learning, sdnn_config().learning);
+  EXPECT_EQ(config.observation, sdnn_config().observation);
+  EXPECT_EQ(config.action, sdnn_config().action);
 }
 
-TEST(AgentFile, WhatBelongsToATrainingIsKept) {
+TEST(AgentFile, DataOfATrainingIsKeptWhenAnAgentIsWrittenAgain) {
   const testing::Folder folder;
-  AgentFile{Controller(rbf())}.write(folder / "agent");
+  AgentFile{Controller(rbf_config())}.write(folder / "agent");
   core::FileContent content = core::read_file(folder / "agent", {"agent"});
   content.kind = "training";
   content.description["training"] = {{"note", "für später"}};
@@ -130,7 +130,7 @@ TEST(AgentFile, WhatBelongsToATrainingIsKept) {
   content.tensors["training.actions"] = testing::tensor_of<double>({-1.5});
   core::write_file(folder / "training", content);
   AgentFile file(folder / "training");
-  live(file.controller, 30);
+  learn(file.controller, 30);
   file.write(folder / "later");
   const core::FileContent later = core::read_file(folder / "later", {"training"});
   EXPECT_EQ(later.description, content.description);
@@ -138,12 +138,12 @@ TEST(AgentFile, WhatBelongsToATrainingIsKept) {
   EXPECT_TRUE(later.tensors.contains("agent.action_value.weights"));
 }
 
-TEST(AgentFile, NamesTheFieldThatDoesNotFit) {
+TEST(AgentFile, RefusesInvalidFieldsByName) {
   const testing::Folder folder;
   const auto path = folder / "agent";
-  AgentFile lived{Controller(small())};
-  live(lived.controller, 30);
-  lived.write(path);
+  AgentFile trained{Controller(sdnn_config())};
+  learn(trained.controller, 30);
+  trained.write(path);
   const core::FileContent good = core::read_file(path, {"agent"});
   const auto error_of = [&](const core::FileContent& content) {
     core::write_file(path, content);
@@ -188,9 +188,9 @@ TEST(AgentFile, NamesTheFieldThatDoesNotFit) {
             path.string() + ": is a file of kind 'estimator', expected agent or training");
 }
 
-// Files of tests/python/reference/agent_files.py: agents that were made and lived in Python, what
+// Files of tests/python/reference/agent_files.py: agents that were made and trained in Python, what
 // they did next, and what they had learned then.
-TEST(AgentFile, LivesAsInPython) {
+TEST(AgentFile, AgentsFromPythonActAndLearnWithTheSameBits) {
   const testing::Folder folder;
   for (const std::string name :
        {"sdnn", "sdnn-vector", "sdnn-discrete", "sdnn-symbols", "sdnn-pairs", "sdnn-warm-up",

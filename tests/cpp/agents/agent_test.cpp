@@ -36,7 +36,7 @@ void expect_that_learning_begins_no_episode(A agent) {
   EXPECT_GT(others, 50);
 }
 
-TEST(Agent, ATerminatedTransitionBeginsNoEpisode) {
+TEST(Agent, ATerminatedTransitionDoesNotRestartTheGreedyFirstSteps) {
   const EpsilonGreedyConfig policy{
       .epsilon = 1.0, .n_greedy_steps = 1, .tie_rule = TieRule::lowest};
   expect_that_learning_begins_no_episode(testing::OneDimension<QLearning<testing::LookupTable>>(

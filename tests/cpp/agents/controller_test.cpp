@@ -93,34 +93,34 @@ void step(Controller& controller, core::Random& random, Numbers& observed, bool 
   observed = next;
 }
 
-void expect_that_it_continues(const ControllerConfig& config, std::size_t n_environments = 1) {
-  Controller uncut(config), cut(config);
+void expect_exact_resume(const ControllerConfig& config, std::size_t n_environments = 1) {
+  Controller uncut(config), resumed(config);
   uncut.set_n_environments(n_environments);
-  cut.set_n_environments(n_environments);
+  resumed.set_n_environments(n_environments);
   core::Random random(5, core::Stream::weights), same(5, core::Stream::weights);
-  Numbers observed{1.0, 0.0, 0.0, 0.0}, same_observed = observed;
+  Numbers observed{1.0, 0.0, 0.0, 0.0}, resumed_observed = observed;
   for (int t = 0; t < 90; ++t) {
     step(uncut, random, observed, false);
-    step(cut, same, same_observed, t % 10 == 3);
+    step(resumed, same, resumed_observed, t % 10 == 3);
   }
-  EXPECT_EQ(core::state_of(uncut), core::state_of(cut));
+  EXPECT_EQ(core::state_of(uncut), core::state_of(resumed));
   EXPECT_FALSE(uncut.is_warming_up());
 }
 
-TEST(Controller, ContinuesAfterItWasSavedAnywhere) {
+TEST(Controller, ContinuesExactlyAfterItWasSavedAtAnyStep) {
   const LinearSDNNConfig linear{.n_pattern_units = 16, .n_actions = 5, .action_window = 3};
   for (const ControllerConfig& config :
        {rbf_config(), rbf_of_vectors(), sdnn(), fuzzy_config(), fuzzy_of_vectors(),
         with(linear, QLambdaConfig{.max_action_repeat = 5}, 2),
         with(linear, ActorCriticConfig{}, 2)}) {
-    expect_that_it_continues(config);
-    expect_that_it_continues(whole(config));
-    expect_that_it_continues(with_warm_up(config));
-    expect_that_it_continues(with_warm_up(whole(config)), 3);
+    expect_exact_resume(config);
+    expect_exact_resume(whole(config));
+    expect_exact_resume(with_warm_up(config));
+    expect_exact_resume(with_warm_up(whole(config)), 3);
   }
 }
 
-TEST(Controller, DoesWhatItsAgentDoes) {
+TEST(Controller, ActsAndLearnsLikeItsAgent) {
   RBFNetworkConfig bases = kBases;
   bases.n_inputs = 3;
   const RBFNetwork part(bases);
@@ -149,7 +149,7 @@ TEST(Controller, DoesWhatItsAgentDoes) {
 }
 
 // Each with a workspace and random numbers of its own; and what the controller itself would do.
-TEST(Controller, IsReadByManyThreads) {
+TEST(Controller, GivesTheSameActionsToConcurrentReaders) {
   for (const ControllerConfig& config :
        {rbf_config(), rbf_of_vectors(), sdnn(), fuzzy_config(), fuzzy_of_vectors()}) {
     Controller controller(config);
@@ -184,7 +184,7 @@ TEST(Controller, IsReadByManyThreads) {
   }
 }
 
-TEST(Controller, OfSeveralRobotsDoesWhatItsAgentDoes) {
+TEST(Controller, WithSeveralEnvironmentsActsAndLearnsLikeItsAgent) {
   const Numbers observed = {1.0, 0.0, 4.0, 11.0}, state = {0.5, 0.75, 0.25};
   testing::OneDimension<FuzzyQLearning> agent(approximators::FuzzyRules({.n_inputs = 3}), kTraces,
                                               3);
@@ -211,7 +211,7 @@ TEST(Controller, OfSeveralRobotsDoesWhatItsAgentDoes) {
 }
 
 // With 5 actions on 0, 1 and 2 the second and the third are 1; alone it is the third, the nearest.
-TEST(Controller, RemembersWhichIndexAWholeActionWasWhileItsRobotIsThere) {
+TEST(Controller, LearnsTheIndexThatWasTakenOfEqualRoundedActions) {
   const Numbers observed = {1.0, 0.0, 4.0, 11.0}, state = {0.5, 0.75, 0.25};
   for (const bool leaves : {false, true}) {
     auto config = with(kBases, QLearningConfig{.policy = {.epsilon = 1.0, .n_greedy_steps = 0}});
@@ -235,7 +235,7 @@ TEST(Controller, RemembersWhichIndexAWholeActionWasWhileItsRobotIsThere) {
   }
 }
 
-TEST(Controller, LearnsTheNearestActionOfABox) {
+TEST(Controller, LearnsAnActionBetweenTwoAsTheNearest) {
   const Numbers observed = {1.0, 0.0, 4.0, 11.0};
   Controller one(rbf_config()), other(rbf_config());
   one.learn(observed, Numbers{0.9}, 1.0, observed, true);
@@ -243,7 +243,7 @@ TEST(Controller, LearnsTheNearestActionOfABox) {
   EXPECT_EQ(core::state_of(one), core::state_of(other));
 }
 
-TEST(Controller, ABadArgumentChangesNothing) {
+TEST(Controller, RefusesBadArgumentsAndChangesNothing) {
   const Numbers good(4, 0.5), shorter(3, 0.5), nan = {0.5, 0.5, testing::kNaN, 0.5};
   for (ControllerConfig config :
        {rbf_config(), rbf_of_vectors(), fuzzy_config(), fuzzy_of_vectors()}) {
@@ -272,7 +272,7 @@ TEST(Controller, ABadArgumentChangesNothing) {
   }
 }
 
-TEST(Controller, AFuzzyOneLearnsItsLastActionOnly) {
+TEST(Controller, WithFuzzyRulesLearnsOnlyItsLastAction) {
   const Numbers here(4, 0.5), there(4, 0.25);
   Controller controller(fuzzy_config());
   const Numbers action = {controller.act(here)[0]};
@@ -313,7 +313,7 @@ TEST(Controller, TakesAllowedActionsOnly) {
                std::invalid_argument);
 }
 
-TEST(Controller, KeepsTheRatesOfItsWarmUp) {
+TEST(Controller, KeepsRatesSetDuringItsWarmUp) {
   Controller controller(with_warm_up(rbf_config()));
   controller.set_epsilon(0.75);
   controller.set_progress(0.5);
@@ -327,7 +327,7 @@ TEST(Controller, KeepsTheRatesOfItsWarmUp) {
   EXPECT_EQ(controller.learning_rate(), 0.5);
 }
 
-TEST(Controller, RefusesStatesThatDoNotFit) {
+TEST(Controller, RefusesInconsistentStates) {
   Controller controller(rbf_config());
   (void)controller.act(Numbers(4, 0.5));
   const core::State good = core::state_of(controller);
@@ -346,7 +346,7 @@ TEST(Controller, RefusesStatesThatDoNotFit) {
 }
 
 // A state may ask for no more memory than it has arrays.
-TEST(Controller, ComparesSizesBeforeItAllocatesMemory) {
+TEST(Controller, RefusesStatesOfWrongSizeBeforeItAllocatesMemory) {
   const auto error_of = [](const ControllerConfig& config, const core::State& state) {
     return testing::message_of([&] { (void)Controller::restored(config, state); });
   };
@@ -363,7 +363,7 @@ TEST(Controller, ComparesSizesBeforeItAllocatesMemory) {
   EXPECT_NE(error_of(config, state).find("agent.rules.values"), std::string::npos);
 }
 
-TEST(Controller, KeepsPatternsAndRefusesThemForActionsOfSeveralDimensions) {
+TEST(Controller, KeepsCustomPatternsForOneDimensionOfActionsOnly) {
   ControllerConfig config = sdnn();
   std::vector<coding::PatternTable> tables;
   std::vector<std::int8_t> signs;
@@ -377,7 +377,7 @@ TEST(Controller, KeepsPatternsAndRefusesThemForActionsOfSeveralDimensions) {
   EXPECT_THROW(Controller(config, tables), std::invalid_argument);
 }
 
-TEST(Controller, FindsImpossibleSettingsBeforeItsWarmUp) {
+TEST(Controller, RefusesImpossibleSettingsBeforeItsWarmUp) {
   ControllerConfig config = with_warm_up(rbf_config());
   std::get<RBFNetworkConfig>(config.approximator).n_bases = 1;
   EXPECT_THROW(Controller{config}, std::invalid_argument);
@@ -421,10 +421,10 @@ class LateTask {
   core::Random random_{5, core::Stream::weights};
 };
 
-TEST(Controller, AddsInputsThatMatterLaterAndKeepsWhatItLearned) {
+TEST(Controller, AddsInputsThatBecomeRelevantLater) {
   Controller uncut(LateTask::config());
   uncut.set_n_environments(2);
-  Controller cut = uncut;
+  Controller resumed = uncut;
   LateTask task, same;
   std::vector<std::size_t> n_inputs;
   for (std::size_t t = 0; t < 1700; ++t) {
@@ -432,7 +432,7 @@ TEST(Controller, AddsInputsThatMatterLaterAndKeepsWhatItLearned) {
     const bool was_warm = !uncut.is_warming_up();
     const std::uint64_t identity = uncut.identity();
     task.step(uncut, environment, t >= 400, false);
-    same.step(cut, environment, t >= 400, t % 90 == 7);
+    same.step(resumed, environment, t >= 400, t % 90 == 7);
     if (uncut.is_warming_up()) continue;
     const std::size_t n = uncut.observations().n_inputs();
     if (!n_inputs.empty() && n == n_inputs.back()) continue;
@@ -443,7 +443,7 @@ TEST(Controller, AddsInputsThatMatterLaterAndKeepsWhatItLearned) {
   }
   EXPECT_EQ(n_inputs.size(), 2U);
   EXPECT_EQ(uncut.observations().inputs().back().first, 4U);
-  EXPECT_EQ(core::state_of(uncut), core::state_of(cut));
+  EXPECT_EQ(core::state_of(uncut), core::state_of(resumed));
 }
 
 }  // namespace

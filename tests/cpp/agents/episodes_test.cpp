@@ -28,7 +28,7 @@ struct Counting {
   }
 };
 
-TEST(Episodes, ComeAndGoAtTheEnd) {
+TEST(Episodes, AreAddedAndRemovedAtTheEnd) {
   Episodes<Count> episodes(Count{1});
   EXPECT_EQ(episodes.size(), 1U);
   episodes.resize(3, [] { return Count{7}; });
@@ -41,7 +41,7 @@ TEST(Episodes, ComeAndGoAtTheEnd) {
   EXPECT_EQ(episodes.of(2).steps, 8);
 }
 
-TEST(Episodes, OfTheFirstEnvironmentHaveTheNamesOfTheOnlyOne) {
+TEST(Episodes, OfTheFirstEnvironmentAreSavedWithoutANumber) {
   Counting object;
   EXPECT_EQ(core::state_of(object).size(), 1U);
   EXPECT_EQ(testing::number_of<int>(core::state_of(object), "steps"), 5);
@@ -49,15 +49,15 @@ TEST(Episodes, OfTheFirstEnvironmentHaveTheNamesOfTheOnlyOne) {
   const core::State state = core::state_of(object);
   EXPECT_EQ(state.size(), 3U);
   EXPECT_EQ(testing::number_of<int>(state, "environment.2.steps"), 6);
-  Counting other;
-  core::restore(other, state);
-  EXPECT_EQ(core::state_of(other), state);
-  core::restore(other, core::state_of(Counting{}));
-  EXPECT_EQ(other.episodes.size(), 1U);
-  testing::expect_that_damage_is_refused(other);
+  Counting restored;
+  core::restore(restored, state);
+  EXPECT_EQ(core::state_of(restored), state);
+  core::restore(restored, core::state_of(Counting{}));
+  EXPECT_EQ(restored.episodes.size(), 1U);
+  testing::expect_that_damage_is_refused(restored);
 }
 
-TEST(Episodes, NameWhatIsImpossible) {
+TEST(Episodes, RefuseBadNumbersOfEnvironments) {
   Episodes<Count> episodes(Count{1});
   const auto make = [] { return Count{}; };
   EXPECT_EQ(testing::message_of([&] { (void)episodes.of(1); }),

@@ -19,7 +19,7 @@ std::size_t best_by(TieRule rule, const Row& values) {
   return EpsilonGreedy({.tie_rule = rule}, 1).select(values, 0, true);
 }
 
-TEST(BestValue, IsTheLargestWhereverItStands) {
+TEST(BestValue, IsTheLargestAtAnyIndex) {
   for (std::size_t size = 1; size < 70; ++size) {
     for (std::size_t at = 0; at < size; ++at) {
       Row values(size, -3.0);
@@ -31,25 +31,25 @@ TEST(BestValue, IsTheLargestWhereverItStands) {
   }
 }
 
-TEST(BestValue, InfinitiesAreValues) {
+TEST(BestValue, MayBeInfinite) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   EXPECT_EQ(best_value(std::span<const double>(Row{0.0, kInfinity, -kInfinity})), kInfinity);
   EXPECT_EQ(best_value(std::span<const double>(Row(9, -kInfinity))), -kInfinity);
 }
 
-TEST(EpsilonGreedy, ASingleBestActionIsTakenByEveryRule) {
+TEST(EpsilonGreedy, EveryTieRuleTakesASingleBestAction) {
   const Row values = {-3.0, 0.5, -1.0, 0.25};
   for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
     EXPECT_EQ(best_by(rule, values), 1U);
   }
 }
 
-TEST(EpsilonGreedy, LowestTakesTheFirstOfTheTied) {
+TEST(EpsilonGreedy, LowestTakesTheFirstOfTiedActions) {
   EXPECT_EQ(best_by(TieRule::lowest, {0, 2, 1, 2, 2}), 1U);
   EXPECT_EQ(best_by(TieRule::lowest, {0, 0, 0}), 0U);
 }
 
-TEST(EpsilonGreedy, MiddleTakesTheMiddleOfTheFirstWidestRun) {
+TEST(EpsilonGreedy, MiddleTakesTheMiddleOfTheFirstLongestRunOfTies) {
   EXPECT_EQ(best_by(TieRule::middle, {0, 1, 1, 0, 1, 1, 1, 0}), 5U);
   EXPECT_EQ(best_by(TieRule::middle, {1, 1, 0, 1, 1}), 0U);  // even: rounded down; the first run
   EXPECT_EQ(best_by(TieRule::middle, {0, 1, 1, 1, 1}), 2U);
@@ -57,7 +57,7 @@ TEST(EpsilonGreedy, MiddleTakesTheMiddleOfTheFirstWidestRun) {
   EXPECT_EQ(best_by(TieRule::middle, {1, 0, 1, 0, 2}), 4U);
 }
 
-TEST(EpsilonGreedy, WithinTheToleranceOfTheBestIsATie) {
+TEST(EpsilonGreedy, ValuesWithinTheToleranceOfTheBestAreTies) {
   const Row values = {0.0, 0.75, 0.75, 0.5, 0.0, 1.0, 0.0};
   const auto taken = [&](TieRule rule, double tolerance) {
     return EpsilonGreedy({.tie_rule = rule, .tie_tolerance = tolerance}, 1).select(values, 0, true);
@@ -88,7 +88,7 @@ TEST(EpsilonGreedy, UniformTakesEveryTiedActionEquallyOften) {
 }
 
 // The rules of fuzzy Q-learning keep floats: the same picks and the same draws as from doubles.
-TEST(EpsilonGreedy, FloatsAreSelectedFromAsDoublesAre) {
+TEST(EpsilonGreedy, SelectsFromFloatsLikeFromDoubles) {
   for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
     const EpsilonGreedyConfig config{.epsilon = 0.3, .n_greedy_steps = 2, .tie_rule = rule};
     EpsilonGreedy of_doubles(config, 4), of_floats(config, 4);
@@ -104,7 +104,7 @@ TEST(EpsilonGreedy, FloatsAreSelectedFromAsDoublesAre) {
   }
 }
 
-TEST(EpsilonGreedy, TheFirstStepsAreGreedyAndLaterOnesRandomWithProbabilityEpsilon) {
+TEST(EpsilonGreedy, FirstStepsAreGreedyAndLaterOnesRandomWithProbabilityEpsilon) {
   EpsilonGreedy policy({}, 2);  // epsilon 0.1 after 10 steps
   Row values(50, 0.0);
   values[7] = 1.0;
@@ -134,7 +134,7 @@ TEST(EpsilonGreedy, WithoutExplorationEveryStepIsGreedy) {
   for (int step = 0; step < 100; ++step) EXPECT_EQ(policy.select(Row{0, 1, 0}, step, false), 1U);
 }
 
-TEST(EpsilonGreedy, EvaluationDoesNotDisturbTheStreamsOfLearning) {
+TEST(EpsilonGreedy, EvaluationDoesNotChangeTheActionsOfLearning) {
   EpsilonGreedy alone({.n_greedy_steps = 5}, 8);
   EpsilonGreedy evaluated({.n_greedy_steps = 5}, 8);
   const Row tied(30, 0.0);
@@ -144,7 +144,7 @@ TEST(EpsilonGreedy, EvaluationDoesNotDisturbTheStreamsOfLearning) {
   }
 }
 
-TEST(EpsilonGreedy, TheSameSeedGivesTheSameActionsAndAnotherSeedOthers) {
+TEST(EpsilonGreedy, EqualSeedsGiveEqualActionsAndOtherSeedsDifferentOnes) {
   EpsilonGreedy first({}, 1), same({}, 1), other({}, 2);
   const Row tied(601, 0.0);
   int differ = 0;
@@ -157,7 +157,7 @@ TEST(EpsilonGreedy, TheSameSeedGivesTheSameActionsAndAnotherSeedOthers) {
 }
 
 // Which of numbers and NaN is the best one Eigen leaves open: a number of the row, or refused.
-TEST(EpsilonGreedy, ANaNIsNeverTaken) {
+TEST(EpsilonGreedy, AnActionWithNaNIsNeverTaken) {
   for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
     EXPECT_THROW(best_by(rule, {}), std::invalid_argument);
     EXPECT_THROW(best_by(rule, Row(2, std::nan(""))), std::invalid_argument);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kOne = 4096.0;
 
-TEST(SquareRoot, IsTheIntegerPart) {
+TEST(SquareRoot, IsRoundedDownToAnInteger) {
   for (const std::uint64_t root : {0ULL, 1ULL, 2ULL, 3ULL, 1000ULL, 4294967295ULL}) {
     EXPECT_EQ(square_root(root * root), root);
     if (root > 0) {
@@ -21,7 +21,7 @@ TEST(SquareRoot, IsTheIntegerPart) {
   }
 }
 
-TEST(ErrorScale, NormalErrorsHaveARootMeanSquareOfOne) {
+TEST(ErrorScale, NormalizesErrorsToARootMeanSquareOfOne) {
   core::Random random(1, core::Stream::weights);
   ErrorScale scale;
   double sum = 0.0;
@@ -34,26 +34,27 @@ TEST(ErrorScale, NormalErrorsHaveARootMeanSquareOfOne) {
   EXPECT_NEAR(sum / 2000, 1.0, 0.1);
 }
 
-TEST(ErrorScale, TheFirstErrorIsOneAndTheSignIsKept) {
+TEST(ErrorScale, NormalizesTheFirstErrorToPlusOrMinusOne) {
   for (const std::int64_t error : {std::int64_t{1} << 28, -(std::int64_t{1} << 20)}) {
     ErrorScale scale;
     EXPECT_NEAR(scale.normalized(error, 0) / kOne, error > 0 ? 1.0 : -1.0, 1e-3);
   }
 }
 
-TEST(ErrorScale, AChangeOfTheUnitChangesNothing) {
-  ErrorScale one, other;
+TEST(ErrorScale, DoesNotDependOnTheUnit) {
+  ErrorScale scale, finer_scale;
   for (int i = 0; i < 50; ++i) {
     const std::int64_t error = (std::int64_t{i} - 20) << 24;
     const int n_doubled = i / 10;
-    EXPECT_NEAR(one.normalized(error, 3), other.normalized(error >> n_doubled, 3 + n_doubled), 3);
+    EXPECT_NEAR(scale.normalized(error, 3),
+                finer_scale.normalized(error >> n_doubled, 3 + n_doubled), 3);
   }
 }
 
-TEST(ErrorScale, OneWildErrorIsClipped) {
+TEST(ErrorScale, ClipsAnOutlierToThree) {
   ErrorScale scale;
   for (int i = 0; i < 100; ++i) scale.normalized(1 << 20, 0);
-  EXPECT_EQ(scale.normalized(std::int64_t{1} << 33, 0), 3 << 12);
+  EXPECT_EQ(scale.normalized(std::int64_t{1} << 33, 0) / kOne, 3.0);
   EXPECT_EQ(ErrorScale().normalized(0, 0), 0);
 }
 

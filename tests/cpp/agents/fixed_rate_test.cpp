@@ -37,7 +37,7 @@ TEST(FixedRate, TicksDoNotDrift) {
   EXPECT_EQ(rate.worst_lateness(), 0.0);
 }
 
-TEST(FixedRate, AfterAMissItContinuesWithTheNextTick) {
+TEST(FixedRate, SkipsMissedTicksAndCountsThem) {
   HandClock clock;
   FixedRate rate = clock.rate(4.0);
   EXPECT_EQ(rate.wait(), 0);
@@ -57,7 +57,7 @@ TEST(FixedRate, AfterAMissItContinuesWithTheNextTick) {
   EXPECT_EQ(rate.n_misses(), 2);
 }
 
-TEST(FixedRate, SleepingThroughATickIsAMiss) {
+TEST(FixedRate, SleepingLongerThanAPeriodIsAMiss) {
   HandClock clock;
   FixedRate rate = clock.rate(4.0);
   rate.wait();
@@ -81,7 +81,7 @@ TEST(FixedRate, SleepingThroughATickIsAMiss) {
 }
 
 // At any rate, however long the work takes: a tick begins in its own period, and none begins twice.
-TEST(FixedRate, EveryTickIsOnItsGrid) {
+TEST(FixedRate, EveryTickBeginsWithinItsPeriod) {
   core::Random random(2, core::Stream::weights);
   for (int run = 0; run < 200; ++run) {
     HandClock clock;
@@ -109,7 +109,7 @@ TEST(FixedRate, EveryTickIsOnItsGrid) {
   }
 }
 
-TEST(FixedRate, KeepsTimeByTheSteadyClock) {
+TEST(FixedRate, TenPeriodsOf200HzTakeAtLeast49Ms) {
   using Clock = std::chrono::steady_clock;
   const auto before = Clock::now();
   FixedRate rate(200.0);
@@ -118,7 +118,7 @@ TEST(FixedRate, KeepsTimeByTheSteadyClock) {
   EXPECT_GE(Clock::now() - before, std::chrono::milliseconds(49));
 }
 
-TEST(FixedRate, NamesWhatIsImpossible) {
+TEST(FixedRate, RefusesRatesOutOfRange) {
   for (const double bad : {0.0, -1.0, 1e-4, 2e6, testing::kNaN, testing::kInfinity}) {
     EXPECT_THROW(FixedRate{bad}, std::invalid_argument);
   }

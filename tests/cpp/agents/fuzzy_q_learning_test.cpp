@@ -30,7 +30,7 @@ std::vector<float> table(const Fuzzy& agent) {
 }
 
 // With one input, sets at 0, 1/2, 1; actions -1, 0, 1. At 0.125 rules 0 and 1 are true 3/4 and 1/4.
-TEST(FuzzyQLearning, OneStepByHand) {
+TEST(FuzzyQLearning, AStepMovesValuesOfFiredRulesAsWorkedByHand) {
   FuzzyRules rules({.n_inputs = 1, .n_sets = 3, .n_actions = 3});
   rules.set_value(0, 2, 4.0F);  // rule 0 picks +1
   rules.set_value(1, 0, 2.0F);  // rule 1 picks -1
@@ -51,7 +51,7 @@ TEST(FuzzyQLearning, OneStepByHand) {
   for (const std::size_t untouched : {0U, 1U}) EXPECT_EQ(agent.rules().values(0)[untouched], 0.0F);
 }
 
-TEST(FuzzyQLearning, OnlyFiredRulesAreTouched) {
+TEST(FuzzyQLearning, LearnsOnlyTheChosenActionsOfFiredRules) {
   Fuzzy agent(FuzzyRules({.n_inputs = 3}), {}, 1);
   const State state = {0.3, 0.5, 0.9};
   const double action = agent.act(state);
@@ -91,26 +91,27 @@ TEST(FuzzyQLearning, RulesExploreIndependentlyAfterTheGreedyFirstSteps) {
 }
 
 // Traces by hand: one input at centres, so truth values are 1. gamma lambda = 0.45.
-TEST(FuzzyQLearning, TracesByHand) {
+TEST(FuzzyQLearning, TracesDecayByDiscountTimesLambdaAsWorkedByHand) {
   Fuzzy agent(FuzzyRules({.n_inputs = 1, .n_sets = 3, .n_actions = 1}),
               {.trace_decay = 0.5, .policy = kGreedy}, 1);
-  const auto live = [&agent](double s, double reward, double next, bool terminated = false) {
+  const auto act_and_learn = [&agent](double s, double reward, double next,
+                                      bool terminated = false) {
     agent.learn(State{s}, agent.act(State{s}), reward, State{next}, terminated);
   };
   const auto v = [&agent](std::size_t rule) { return agent.rules().values(rule)[0]; };
-  live(0.0, 0.0, 0.5);
+  act_and_learn(0.0, 0.0, 0.5);
   EXPECT_EQ(v(0), 0.0F);
-  live(0.5, 2.0, 1.0);  // step = 0.5 2; e = 0.45, 1
+  act_and_learn(0.5, 2.0, 1.0);  // step = 0.5 2; e = 0.45, 1
   EXPECT_EQ(v(0), 0.45F);
   EXPECT_EQ(v(1), 1.0F);
-  live(0.0, 1.0, 1.0);  // step = 0.5 (1 - 0.45F); e = 0.45^2 + 1, 0.45
+  act_and_learn(0.0, 1.0, 1.0);  // step = 0.5 (1 - 0.45F); e = 0.45^2 + 1, 0.45
   const double step = 0.5 * (1.0 - static_cast<double>(0.45F));
   EXPECT_FLOAT_EQ(v(0), static_cast<float>(0.45 + step * 1.2025));
   EXPECT_FLOAT_EQ(v(1), static_cast<float>(1.0 + step * 0.45));
-  live(1.0, 4.0, 1.0, true);  // the traces end with the episode
+  act_and_learn(1.0, 4.0, 1.0, true);  // the traces end with the episode
   const float v1 = v(1);
   EXPECT_EQ(v(2), 2.0F);
-  live(1.0, 4.0, 1.0, true);
+  act_and_learn(1.0, 4.0, 1.0, true);
   EXPECT_EQ(v(1), v1);
 }
 
@@ -130,19 +131,19 @@ TEST(FuzzyQLearning, AStepAllocatesNothingWithAndWithoutTraces) {
   }
 }
 
-TEST(FuzzyQLearning, TracesThatWouldNotFadeAreRefused) {
+TEST(FuzzyQLearning, RefusesTracesThatDoNotDecay) {
   const FuzzyQLearningConfig config{.discount = 1.0, .trace_decay = 1.0};
   EXPECT_EQ(testing::message_of([&] { Fuzzy(FuzzyRules({.n_inputs = 1}), config, 1); }),
             "trace_decay must be at most 0.99 / discount, got 1");
 }
 
-TEST(FuzzyQLearning, TooManyTracesAreRefusedBeforeMemoryIsAllocated) {
+TEST(FuzzyQLearning, RefusesTooManyTracesBeforeItAllocatesMemory) {
   const FuzzyRules rules({.n_inputs = 16, .n_sets = 2, .n_actions = 2});
   EXPECT_THROW(Fuzzy(rules, {.discount = 1.0, .trace_decay = 0.99}, 1), std::length_error);
   EXPECT_EQ(Fuzzy(rules, {}, 1).n_inputs(), 16U);
 }
 
-TEST(FuzzyQLearning, ABadTransitionTeachesNothing) {
+TEST(FuzzyQLearning, RefusesBadTransitionsAndLearnsNothing) {
   Fuzzy agent(FuzzyRules({.n_inputs = 2}), {}, 1);
   const State state = {0.3, 0.6}, other = {0.3, 0.7}, bad = {0.3, 1.7};
   const auto learn = [&agent](const State& s, double a, double r, const State& next) {
@@ -169,34 +170,34 @@ Fuzzy traced_agent() {
           3};
 }
 
-TEST(FuzzyQLearning, ARewardThatIsTooLargeLeavesTheTraces) {
-  Fuzzy one = traced_agent(), other = traced_agent();
+TEST(FuzzyQLearning, ARefusedRewardDoesNotChangeTraces) {
+  Fuzzy agent = traced_agent(), without_refusals = traced_agent();
   const State state = {0.3, 0.6}, next = {0.3, 0.7};
   for (int step = 0; step < 20; ++step) {
-    const double action = one.act(state);
-    EXPECT_EQ(other.act(state), action);
-    EXPECT_THROW(one.learn(state, action, 1e300, next, false), std::overflow_error);
-    one.learn(state, action, 1.0, next, false);
-    other.learn(state, action, 1.0, next, false);
+    const double action = agent.act(state);
+    EXPECT_EQ(without_refusals.act(state), action);
+    EXPECT_THROW(agent.learn(state, action, 1e300, next, false), std::overflow_error);
+    agent.learn(state, action, 1.0, next, false);
+    without_refusals.learn(state, action, 1.0, next, false);
   }
-  EXPECT_EQ(table(one), table(other));
+  EXPECT_EQ(table(agent), table(without_refusals));
 }
 
-TEST(FuzzyQLearning, ALifeCanBeCutAnywhere) {
-  testing::expect_that_a_life_can_be_cut(traced_agent);
-  testing::expect_that_a_life_can_be_cut(traced_agent, 3);
+TEST(FuzzyQLearning, ContinuesExactlyAfterItWasSavedAtAnyStep) {
+  testing::expect_exact_resume(traced_agent);
+  testing::expect_exact_resume(traced_agent, 3);
 }
 
 // Where two environments fire different rules, each goes as if it were alone, but for what is
 // drawn.
-TEST(FuzzyQLearning, EachEnvironmentHasItsLastActionAndTraces) {
+TEST(FuzzyQLearning, EnvironmentsHaveSeparateLastActionsAndTraces) {
   const FuzzyQLearningConfig config{.trace_decay = 0.5, .policy = kGreedy};
   const FuzzyRules rules({.n_inputs = 2, .n_sets = 4, .n_actions = 3});
   Fuzzy both(rules, config, 1), low(rules, config, 1), high(rules, config, 1);
   both.set_n_environments(2);
   EXPECT_EQ(both.n_environments(), 2U);
   core::Random world(4, core::Stream::weights);
-  State state = {0.1, 0.1}, other = {0.9, 0.9};
+  State low_state = {0.1, 0.1}, high_state = {0.9, 0.9};
   for (int i = 0; i < 300; ++i) {
     if (i % 20 == 0) {
       both.begin_episode(0);
@@ -206,19 +207,19 @@ TEST(FuzzyQLearning, EachEnvironmentHasItsLastActionAndTraces) {
       both.begin_episode(1);
       high.begin_episode();
     }
-    const State next = {world.uniform() / 3.0, world.uniform() / 3.0};
-    const State other_next = {1.0 - world.uniform() / 3.0, 1.0 - world.uniform() / 3.0};
-    const double action = both.act(state), other_action = both.act(other, true, 1);
-    ASSERT_EQ(action, low.act(state));
-    ASSERT_EQ(other_action, high.act(other));
+    const State next_low = {world.uniform() / 3.0, world.uniform() / 3.0};
+    const State next_high = {1.0 - world.uniform() / 3.0, 1.0 - world.uniform() / 3.0};
+    const double low_action = both.act(low_state), high_action = both.act(high_state, true, 1);
+    ASSERT_EQ(low_action, low.act(low_state));
+    ASSERT_EQ(high_action, high.act(high_state));
     ASSERT_EQ(both.last_action(1), high.last_action());
-    const double reward = world.uniform(), other_reward = -world.uniform();
-    both.learn(state, action, reward, next, i % 20 == 19);
-    both.learn(other, other_action, other_reward, other_next, i % 33 == 32, 1);
-    low.learn(state, action, reward, next, i % 20 == 19);
-    high.learn(other, other_action, other_reward, other_next, i % 33 == 32);
-    state = next;
-    other = other_next;
+    const double low_reward = world.uniform(), high_reward = -world.uniform();
+    both.learn(low_state, low_action, low_reward, next_low, i % 20 == 19);
+    both.learn(high_state, high_action, high_reward, next_high, i % 33 == 32, 1);
+    low.learn(low_state, low_action, low_reward, next_low, i % 20 == 19);
+    high.learn(high_state, high_action, high_reward, next_high, i % 33 == 32);
+    low_state = next_low;
+    high_state = next_high;
   }
   for (const double x : {0.05, 0.2, 0.3}) {
     EXPECT_EQ(testing::value_of(both, State{x, x / 2.0}),
@@ -226,9 +227,10 @@ TEST(FuzzyQLearning, EachEnvironmentHasItsLastActionAndTraces) {
     EXPECT_EQ(testing::value_of(both, State{1.0 - x, 0.8}),
               testing::value_of(high, State{1.0 - x, 0.8}));
   }
-  EXPECT_THROW(both.learn(state, both.act(state), 1.0, state, false, 1), std::invalid_argument);
-  EXPECT_THROW((void)both.act(state, true, 2), std::invalid_argument);
-  EXPECT_THROW((void)both.act(state, false, 2), std::invalid_argument);
+  EXPECT_THROW(both.learn(low_state, both.act(low_state), 1.0, low_state, false, 1),
+               std::invalid_argument);
+  EXPECT_THROW((void)both.act(low_state, true, 2), std::invalid_argument);
+  EXPECT_THROW((void)both.act(low_state, false, 2), std::invalid_argument);
   EXPECT_THROW(both.begin_episode(2), std::invalid_argument);
   EXPECT_THROW(both.set_n_environments(0), std::invalid_argument);
 }
@@ -237,7 +239,7 @@ TEST(FuzzyQLearning, ARestoredAgentAllocatesNothing) {
   testing::expect_that_a_restored_agent_allocates_nothing(traced_agent, testing::allocation_count);
 }
 
-TEST(FuzzyQLearning, AStateWithoutAnActForgetsTheLast) {
+TEST(FuzzyQLearning, ARestoredStateWithoutAnActionForgetsTheLastOne) {
   Fuzzy agent = traced_agent();
   const core::State fresh = core::state_of(agent);
   const State state = {0.3, 0.6};
@@ -247,7 +249,7 @@ TEST(FuzzyQLearning, AStateWithoutAnActForgetsTheLast) {
   EXPECT_EQ(agent.act(state), action);
 }
 
-TEST(FuzzyQLearning, RefusesAStateThatDoesNotFit) {
+TEST(FuzzyQLearning, RefusesInconsistentStates) {
   Fuzzy agent = traced_agent();
   agent.begin_episode();
   for (const State& state : {State{0.3, 0.6}, State{0.9, 0.1}}) {
@@ -290,7 +292,7 @@ FuzzyQLearning agent_of_two() {
   return {std::vector<FuzzyRules>{small_rules(), small_rules()}, kTraced, 1};
 }
 
-TEST(FuzzyQLearning, WithVectorsEachDimensionLearnsAsASeparateAgent) {
+TEST(FuzzyQLearning, DimensionsOfAnActionLearnLikeSeparateAgents) {
   FuzzyQLearning both = agent_of_two();
   Fuzzy first = part(1), second = part(seed_of_dimension(1, 1));
   EXPECT_EQ(both.n_dimensions(), 2U);
@@ -317,12 +319,12 @@ TEST(FuzzyQLearning, WithVectorsEachDimensionLearnsAsASeparateAgent) {
   EXPECT_EQ(core::state_of(both.dimensions()[1]), core::state_of(second));
 }
 
-TEST(FuzzyQLearning, WithVectorsALifeCanBeCutAnywhere) {
-  testing::expect_that_a_life_can_be_cut(agent_of_two);
-  testing::expect_that_a_life_can_be_cut(agent_of_two, 3);
+TEST(FuzzyQLearning, WithTwoDimensionsContinuesExactlyAfterItWasSaved) {
+  testing::expect_exact_resume(agent_of_two);
+  testing::expect_exact_resume(agent_of_two, 3);
 }
 
-TEST(FuzzyQLearning, NeedsRulesOfTheSameInputs) {
+TEST(FuzzyQLearning, RefusesRulesOfDifferentInputs) {
   const std::vector<FuzzyRules> rules = {FuzzyRules({.n_inputs = 2}), FuzzyRules({.n_inputs = 3})};
   EXPECT_THROW(FuzzyQLearning(rules, {}, 1), std::invalid_argument);
   EXPECT_THROW(FuzzyQLearning(std::vector<FuzzyRules>{}, {}, 1), std::invalid_argument);

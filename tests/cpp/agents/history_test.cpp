@@ -76,7 +76,7 @@ TEST(LeastSquares, FindsTheWeightsOfALine) {
   for (std::size_t k = 0; k < expected.size(); ++k) EXPECT_NEAR(weights[k], expected[k], 1e-4);
 }
 
-TEST(History, NoneLeavesStatesAsTheyAre) {
+TEST(History, NoneDoesNotChangeStates) {
   const HistoryFilter none(2);
   EXPECT_TRUE(none.is_none());
   HistoryFilter::Memory memory;
@@ -87,7 +87,7 @@ TEST(History, NoneLeavesStatesAsTheyAre) {
 }
 
 // Changes in the experience: 0.2 of the number and, the shorter way, 0.1 of the angle; a symbol.
-TEST(History, DifferencesAreInputsBehindThoseOfTheObservation) {
+TEST(History, DifferencesOfNumbersAndAnglesAreAppendedAsWorkedByHand) {
   const RandomExperience experience{.n_inputs = 3,
                                     .states = {0.5, 0.95, 0.25},
                                     .next_states = {0.7, 0.05, 0.75},
@@ -110,7 +110,7 @@ TEST(History, DifferencesAreInputsBehindThoseOfTheObservation) {
   EXPECT_DOUBLE_EQ(state[3], 0.0);  // beyond the largest one
 }
 
-TEST(History, AveragesMoveByAHalfAndAFifth) {
+TEST(History, AveragesMoveByAHalfAndAFifthOfTheDistance) {
   const RandomExperience experience{.n_inputs = 2, .circular = {false, true}};
   const HistoryFilter filter(History::averages, experience, {0, 0}, 1);
   EXPECT_EQ(filter.circular(), (std::vector<bool>{false, true, false, true, false, true}));
@@ -125,7 +125,7 @@ TEST(History, AveragesMoveByAHalfAndAFifth) {
   }
 }
 
-TEST(History, AutoFindsWhatTheTaskNeeds) {
+TEST(History, AutoSelectsNoneDifferencesOrObserver) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const auto kind = [seed](double noise, bool is_velocity_hidden) {
       const Mass mass = pushed_mass(1000, noise, is_velocity_hidden, seed);
@@ -139,8 +139,9 @@ TEST(History, AutoFindsWhatTheTaskNeeds) {
             History::none);  // too few transitions
 }
 
-TEST(History, AnObserverIsNearerToTheStateThanItsSensors) {
-  const Mass learned = pushed_mass(1000, 0.05, false, 1), other = pushed_mass(1000, 0.05, false, 2);
+TEST(History, AnObserverReducesTheErrorOfNoisySensors) {
+  const Mass learned = pushed_mass(1000, 0.05, false, 1),
+             restored = pushed_mass(1000, 0.05, false, 2);
   const HistoryFilter filter = fitted(History::observer, learned.experience);
   EXPECT_LT(filter.gain(), 1.0);
   HistoryFilter::Memory memory;
@@ -149,10 +150,10 @@ TEST(History, AnObserverIsNearerToTheStateThanItsSensors) {
     return std::span(rows).subspan(2 * t, 2);
   };
   double of_estimates = 0.0, of_sensors = 0.0;
-  filter.begin(row(other.experience.states, 0), memory, state);
+  filter.begin(row(restored.experience.states, 0), memory, state);
   for (std::size_t t = 0; t < 1000; ++t) {
-    const auto sensed = row(other.experience.next_states, t), exact = row(other.exact, t);
-    filter.follow(Numbers{other.experience.actions[0][t]}, sensed, memory, state);
+    const auto sensed = row(restored.experience.next_states, t), exact = row(restored.exact, t);
+    filter.follow(Numbers{restored.experience.actions[0][t]}, sensed, memory, state);
     for (std::size_t i = 0; i < 2; ++i) {
       of_estimates += (state[i] - exact[i]) * (state[i] - exact[i]);
       of_sensors += (sensed[i] - exact[i]) * (sensed[i] - exact[i]);
@@ -175,7 +176,7 @@ ControllerConfig config_of(History history, bool is_running = false) {
 }
 
 /// Lives on in noisy observations of the mass; returns the actions.
-Numbers lived(Controller& controller, core::Random& random, int n_steps) {
+Numbers actions_of(Controller& controller, core::Random& random, int n_steps) {
   Numbers actions, observation{0.5, 0.5};
   controller.begin_episode();
   for (int t = 0; t < n_steps; ++t) {
@@ -192,7 +193,7 @@ Numbers lived(Controller& controller, core::Random& random, int n_steps) {
   return actions;
 }
 
-TEST(History, ALifeWithHistoryCanBeCutAnywhere) {
+TEST(History, ContinuesExactlyAfterItWasSavedAtAnyStep) {
   for (const History history :
        {History::differences, History::averages, History::observer, History::automatic}) {
     for (const bool is_running : {false, true}) {
@@ -200,22 +201,22 @@ TEST(History, ALifeWithHistoryCanBeCutAnywhere) {
       Controller whole(config);
       core::Random random(5, core::Stream::weights);
       for (int part = 0; part < 8; ++part) {
-        (void)lived(whole, random, 50 + part);
-        Controller other = Controller::restored(config, core::state_of(whole));
-        ASSERT_EQ(core::state_of(other), core::state_of(whole));
+        (void)actions_of(whole, random, 50 + part);
+        Controller restored = Controller::restored(config, core::state_of(whole));
+        ASSERT_EQ(core::state_of(restored), core::state_of(whole));
         core::Random same = random;
-        ASSERT_EQ(lived(other, same, 30), lived(whole, random, 30));
-        ASSERT_EQ(core::state_of(other), core::state_of(whole));
+        ASSERT_EQ(actions_of(restored, same, 30), actions_of(whole, random, 30));
+        ASSERT_EQ(core::state_of(restored), core::state_of(whole));
       }
     }
   }
 }
 
-TEST(History, StatesThatDoNotFitAreRefused) {
+TEST(History, RefusesInconsistentStates) {
   const ControllerConfig config = config_of(History::observer);
   Controller controller(config);
   core::Random random(5, core::Stream::weights);
-  (void)lived(controller, random, 250);
+  (void)actions_of(controller, random, 250);
   const core::State state = core::state_of(controller);
   ASSERT_NO_THROW((void)Controller::restored(config, state));
   for (const auto& [name, tensor] : state) {
@@ -235,7 +236,7 @@ TEST(History, StatesThatDoNotFitAreRefused) {
 }
 
 // The transitions of an agent, read by another one that never acts.
-TEST(History, ALogTeachesWhatActingDoes) {
+TEST(History, ReadingTransitionsLearnsTheSameWeightsAsActing) {
   Controller actor(config_of(History::differences)), reader(config_of(History::differences));
   core::Random random(5, core::Stream::weights);
   Numbers observation{0.5, 0.5};
@@ -255,10 +256,10 @@ TEST(History, ALogTeachesWhatActingDoes) {
   EXPECT_EQ(weights(actor), weights(reader));
 }
 
-TEST(History, GreedyEpisodesHaveAMemoryApart) {
+TEST(History, GreedyEpisodesHaveASeparateMemory) {
   Controller controller(config_of(History::differences));
   core::Random random(5, core::Stream::weights);
-  (void)lived(controller, random, 300);
+  (void)actions_of(controller, random, 300);
   Controller same = controller;
   controller.begin_greedy_episode();
   (void)controller.act(Numbers{0.1, 0.9}, false);
@@ -267,8 +268,8 @@ TEST(History, GreedyEpisodesHaveAMemoryApart) {
                       controller.state_of(Numbers{0.5, 0.9}).end());
   EXPECT_GT(state[2], 0.5);  // it would have moved up from 0.3
   EXPECT_EQ(state[3], 0.5);
-  core::Random other = random;
-  EXPECT_EQ(lived(controller, random, 50), lived(same, other, 50));
+  core::Random restored = random;
+  EXPECT_EQ(actions_of(controller, random, 50), actions_of(same, restored, 50));
 }
 
 }  // namespace

@@ -54,7 +54,7 @@ std::vector<double> values(const Agent& agent, const State& state, std::size_t d
 }
 
 // alpha = 1: all values become 8, then a tenth of the missing margin of 1 parts two of them.
-TEST(Imitation, MovesAllValuesToTheReturnAndTwoApart) {
+TEST(Imitation, MovesAllValuesToTheReturnAndTheBestTwoApart) {
   QLambda agent = q_lambda_of();
   agent.imitate(kState, Indices{2}, 8.0, 1.0);
   const std::vector<double> q = values(agent, kState);
@@ -64,7 +64,7 @@ TEST(Imitation, MovesAllValuesToTheReturnAndTwoApart) {
   EXPECT_EQ(agent.n_learned(), 1);
 }
 
-TEST(Imitation, LeavesValuesThatAreFarEnoughApart) {
+TEST(Imitation, KeepsDistancesBeyondTheMargin) {
   QLambda agent = q_lambda_of();
   for (int i = 0; i < 200; ++i) agent.imitate(kState, Indices{2}, 8.0, 1.0);
   const std::vector<double> apart = values(agent, kState);
@@ -77,7 +77,7 @@ TEST(Imitation, LeavesValuesThatAreFarEnoughApart) {
 }
 
 // Q is the sum of the dimensions' parts, each of which has the margin.
-TEST(Imitation, OrdersTheActionsOfEachDimension) {
+TEST(Imitation, SeparatesTheActionsOfEachDimensionByTheMargin) {
   for (const int window : {1, 2}) {
     QLambda agent = q_lambda_of({4, 1, 3}, window);
     for (int i = 0; i < 300; ++i) agent.imitate(kState, Indices{1, 0, 2}, -3.0, 0.5);
@@ -106,7 +106,7 @@ TEST(Imitation, LearnsValuesOfAnySize) {
   }
 }
 
-TEST(Imitation, EndsTheEpisode) {
+TEST(Imitation, LearnsThePendingTransition) {
   const QLambdaConfig sarsa{.discount = 0.5,
                             .trace_decay = 0.0,
                             .bootstrap = Bootstrap::sarsa,
@@ -119,7 +119,7 @@ TEST(Imitation, EndsTheEpisode) {
 }
 
 // A fresh policy is even: a step of 1 moves preferences by 1 - 1/3 and by -1/3.
-TEST(Imitation, OfAnActorIsAStepOfItsLogProbability) {
+TEST(Imitation, OfAnActorMovesPreferencesByTheGradientOfItsLogProbability) {
   ActorCritic agent = imitating_actor_critic();
   agent.imitate(kState, Indices{1}, 5.0);
   const double up = std::exp(2.0 / 3.0), down = std::exp(-1.0 / 3.0);
@@ -130,7 +130,7 @@ TEST(Imitation, OfAnActorIsAStepOfItsLogProbability) {
 }
 
 TEST(Imitation, GivesTheSameBitsOnEveryInstructionSetAndAfterASave) {
-  const auto live = [](auto& agent, std::uint64_t seed) {
+  const auto learn_and_imitate = [](auto& agent, std::uint64_t seed) {
     core::Random random(seed, core::Stream::useless_inputs);
     for (int i = 0; i < 100; ++i) {
       const State state{random.uniform(), random.uniform()};
@@ -140,17 +140,17 @@ TEST(Imitation, GivesTheSameBitsOnEveryInstructionSetAndAfterASave) {
       agent.learn(state, action, random.normal(), State{0.5, 0.5}, false);
     }
   };
-  const auto expect_equal = [&live](const auto& make) {
+  const auto expect_equal = [&learn_and_imitate](const auto& make) {
     std::vector<core::State> states;
     testing::on_every_instruction_set([&](const auto&) {
       auto agent = make();
-      live(agent, 1);
-      auto other = make();
-      core::restore(other, core::state_of(agent));
-      live(agent, 2);
-      live(other, 2);
+      learn_and_imitate(agent, 1);
+      auto restored = make();
+      core::restore(restored, core::state_of(agent));
+      learn_and_imitate(agent, 2);
+      learn_and_imitate(restored, 2);
       states.push_back(core::state_of(agent));
-      EXPECT_EQ(states.back(), core::state_of(other));
+      EXPECT_EQ(states.back(), core::state_of(restored));
     });
     for (const core::State& state : states) EXPECT_EQ(state, states.front());
   };
@@ -158,7 +158,7 @@ TEST(Imitation, GivesTheSameBitsOnEveryInstructionSetAndAfterASave) {
   expect_equal([] { return imitating_actor_critic({3, 5}); });
 }
 
-TEST(Imitation, RefusesWhatCannotBeImitated) {
+TEST(Imitation, RefusesBadActionsAndReturnsAndChangesNothing) {
   QLambda agent = q_lambda_of();
   agent.imitate(kState, Indices{0}, 1.0, 1.0);
   const core::State before = core::state_of(agent);
@@ -180,7 +180,7 @@ ControllerConfig config_of(AnyApproximatorConfig approximator, AnyLearningConfig
 }
 
 // The second variable was in [2, 4]: its range is twice that width more at each end.
-TEST(Imitation, RangesOfAWarmUpReachBeyondATeacher) {
+TEST(Imitation, EndsAWarmUpWithRangesWiderThanTheLog) {
   const LinearSDNNConfig small{.n_pattern_units = 20, .averaging_interval = 0};
   Controller agent(config_of(small, QLambdaConfig{}));
   EXPECT_THROW(agent.end_warm_up_of_teacher(), std::invalid_argument);
@@ -198,7 +198,7 @@ TEST(Imitation, RangesOfAWarmUpReachBeyondATeacher) {
   EXPECT_THROW(agent.end_warm_up_of_teacher(), std::invalid_argument);
 }
 
-TEST(Imitation, NeedsALinearReadout) {
+TEST(Imitation, IsRefusedByControllersWithoutALinearReadout) {
   ControllerConfig config =
       config_of(approximators::RBFNetworkConfig{.n_bases = 3}, QLearningConfig{});
   config.observation = {.low = {-1.0, -1.0}, .high = {1.0, 1.0}};

@@ -52,7 +52,7 @@ class World {
 
   /// The next thing that happens to an agent: an episode begins, it acts, or it learns. Returns
   /// the action that it took, if any.
-  std::optional<Action> tick(Agent& agent) {
+  std::optional<Action> step(Agent& agent) {
     if (begins_) {
       agent.begin_episode(environment_);
       begins_ = false;
@@ -101,9 +101,9 @@ class World {
 /// one, for 120 random cuts, wherever it is cut and under whatever instruction sets. With several
 /// environments these take turns.
 template <class Make>
-void expect_that_a_life_can_be_cut(const Make& make, std::size_t n_environments = 1) {
+void expect_exact_resume(const Make& make, std::size_t n_environments = 1) {
   using Agent = decltype(make());
-  constexpr std::size_t kTicks = 400;
+  constexpr std::size_t kSteps = 400;
   Agent whole = make();
   whole.set_n_environments(n_environments);
   std::vector<World<Agent>> worlds;
@@ -113,20 +113,20 @@ void expect_that_a_life_can_be_cut(const Make& make, std::size_t n_environments 
     std::vector<World<Agent>> worlds;
   };
   std::vector<Cut> cuts;
-  for (std::size_t t = 0; t < kTicks; ++t) {
+  for (std::size_t t = 0; t < kSteps; ++t) {
     cuts.push_back({core::state_of(whole), worlds});
-    worlds[t % n_environments].tick(whole);
+    worlds[t % n_environments].step(whole);
   }
   const core::State end = core::state_of(whole);
   core::Random random(11, core::Stream::weights);
   on_every_instruction_set([&](auto) {
     for (int i = 0; i < 120; ++i) {
-      const std::size_t at = random.below(kTicks);
+      const std::size_t at = random.below(kSteps);
       Agent resumed = make();
       core::restore(resumed, cuts[at].state);
       ASSERT_EQ(core::state_of(resumed), cuts[at].state) << at;
       std::vector<World<Agent>> rest = cuts[at].worlds;
-      for (std::size_t t = at; t < kTicks; ++t) rest[t % n_environments].tick(resumed);
+      for (std::size_t t = at; t < kSteps; ++t) rest[t % n_environments].step(resumed);
       ASSERT_EQ(core::state_of(resumed), end) << at;
     }
   });
@@ -138,7 +138,7 @@ template <class Make>
 void expect_that_a_restored_agent_allocates_nothing(const Make& make, auto allocation_count) {
   auto agent = make();
   World<decltype(make())> world(agent.n_inputs(), 7);
-  for (int t = 0; t < 100; ++t) world.tick(agent);
+  for (int t = 0; t < 100; ++t) world.step(agent);
   core::restore(agent, core::state_of(agent));
   agent.begin_episode();
   core::Random random(5, core::Stream::weights);

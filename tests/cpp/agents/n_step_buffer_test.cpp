@@ -29,7 +29,7 @@ void expect_oldest(NStepBuffer& steps, int i) {
   EXPECT_EQ(oldest.reward, static_cast<double>(1 << i));
 }
 
-TEST(NStepBuffer, GiveTheOldestFirstWhileTheRingWraps) {
+TEST(NStepBuffer, ReturnsTheOldestStepFirst) {
   NStepBuffer steps(3, 1, 2);
   EXPECT_EQ(steps.size(), 0U);
   add(steps, 0);
@@ -46,7 +46,7 @@ TEST(NStepBuffer, GiveTheOldestFirstWhileTheRingWraps) {
 }
 
 // Rewards 1, 2, 4, then 8, 16; gamma = 1/2: every number is exact.
-TEST(NStepBuffer, TheReturnOfTheOldestDiscountsWhatCameSince) {
+TEST(NStepBuffer, TheReturnOfTheOldestStepDiscountsLaterRewards) {
   NStepBuffer steps(3, 1, 2);
   EXPECT_EQ(steps.return_of_oldest(5.0, 0.5), 5.0);
   for (int i = 0; i < 3; ++i) add(steps, i);
@@ -61,7 +61,7 @@ TEST(NStepBuffer, TheReturnOfTheOldestDiscountsWhatCameSince) {
   EXPECT_EQ(steps.return_of_oldest(-8.0, 0.5), 8.0 + 8.0 - 2.0);
 }
 
-TEST(NStepBuffer, KnowWhereTheNewestLed) {
+TEST(NStepBuffer, KnowsTheNextStateOfTheNewestStep) {
   NStepBuffer steps(2, 1, 2);
   EXPECT_TRUE(steps.is_continued_by(Numbers{0.9}));  // nothing waits
   add(steps, 3);
@@ -84,7 +84,7 @@ TEST(NStepBuffer, VisitsEachPendingStepOnce) {
   EXPECT_FALSE(steps.each_is([](const NStepBuffer::Step& step) { return step.reward < 4.0; }));
 }
 
-TEST(NStepBuffer, RefuseWhatCannotWait) {
+TEST(NStepBuffer, RefusesInconsistentStates) {
   NStepBuffer steps(3, 1, 2);
   for (int i = 0; i < 2; ++i) add(steps, i);
   testing::expect_that_damage_is_refused(steps);

@@ -39,7 +39,7 @@ Numbers scaled(const ObservationScale& scale, const Numbers& observed) {
   return state;
 }
 
-TEST(ObservationScale, ByHand) {
+TEST(ObservationScale, ScalesNumbersAndAnglesAsWorkedByHand) {
   const ObservationScale scale = scale_of_angles();
   EXPECT_EQ(scale.n_observed(), 4U);
   EXPECT_EQ(scale.n_inputs(), 3U);
@@ -51,7 +51,7 @@ TEST(ObservationScale, ByHand) {
   EXPECT_EQ(scaled(scale, {0.0, 0.0, 1e308, -1e308})[1], 1.0);
 }
 
-TEST(ObservationScale, SymbolsByHand) {
+TEST(ObservationScale, ScalesOneHotSymbolsToTheMiddleOfTheirBin) {
   const ObservationScale scale = scale_of_symbols();
   EXPECT_EQ(scale.n_inputs(), 3U);
   EXPECT_EQ(scaled(scale, {1.0, 0.0, 0.0, 0.0, 0.0, 1.0}), (Numbers{0.25, 0.5, 2.5 / 3.0}));
@@ -59,7 +59,7 @@ TEST(ObservationScale, SymbolsByHand) {
   EXPECT_EQ(scaled(scale, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0})[2], 0.5 / 3.0);  // the first of equals
 }
 
-TEST(ObservationScale, GivesStatesWhateverIsObserved) {
+TEST(ObservationScale, StatesAreInTheUnitIntervalForAnyFiniteObservation) {
   const ObservationScale scale = scale_of_angles();
   core::Random random(1, core::Stream::weights);
   for (int i = 0; i < 5000; ++i) {
@@ -99,7 +99,7 @@ TEST(ObservationScale, MissingReadingsAreRefusedHeldOrCoded) {
   EXPECT_THROW(scaled(angles, {1.0, 2.0, 3.0}), std::invalid_argument);
 }
 
-TEST(ObservationScale, NamesWhatDoesNotFit) {
+TEST(ObservationScale, RefusesBadRangesAndInputsByName) {
   const auto error_of = [](const Numbers& low, const Numbers& high, ObservedInput input) {
     return testing::message_of([&] { const ObservationScale scale(low, high, {input}); });
   };

@@ -30,12 +30,16 @@ Observations fitted(const ObservationConfig& config, const Numbers& seen,
   return observations;
 }
 
-Numbers low_of(const Observations& one) { return {one.low().begin(), one.low().end()}; }
-Numbers high_of(const Observations& one) { return {one.high().begin(), one.high().end()}; }
+Numbers low_of(const Observations& observations) {
+  return {observations.low().begin(), observations.low().end()};
+}
+Numbers high_of(const Observations& observations) {
+  return {observations.high().begin(), observations.high().end()};
+}
 
-std::vector<ObservedKind> kinds_of(const Observations& one) {
+std::vector<ObservedKind> kinds_of(const Observations& observations) {
   std::vector<ObservedKind> kinds;
-  for (const ObservedInput& input : one.inputs()) kinds.push_back(input.kind);
+  for (const ObservedInput& input : observations.inputs()) kinds.push_back(input.kind);
   return kinds;
 }
 
@@ -51,7 +55,7 @@ TEST(Observations, WithFixedRangesNeedNoFit) {
   EXPECT_EQ(state, (Numbers{0.5, 0.25}));
 }
 
-TEST(Observations, AreFittedWithAQuarterMoreAtEachEnd) {
+TEST(Observations, AreFittedWithAQuarterOfTheirWidthMoreAtEachEnd) {
   const auto observations = fitted(unbounded(3), {0.0, -5.0, 7.0, 4.0, 5.0, 7.0});
   EXPECT_EQ(low_of(observations), (Numbers{-1.0, -7.5, 5.25}));  // a constant: a quarter of itself
   EXPECT_EQ(high_of(observations), (Numbers{5.0, 7.5, 8.75}));
@@ -59,14 +63,15 @@ TEST(Observations, AreFittedWithAQuarterMoreAtEachEnd) {
   EXPECT_EQ(low_of(fitted(half_known, {0.0, 0.4, 4.0, 0.6})), (Numbers{-1.0, 0.0}));
 }
 
-TEST(Observations, ThatAreMissingGiveNoRanges) {
+TEST(Observations, ThatAreMissingDoNotChangeFittedRanges) {
   const double end = testing::kInfinity;
   const auto observations = fitted(unbounded(2), {0.0, end, 4.0, testing::kNaN, end, -end});
+  // A quarter of 0 to 4 more at each end; a variable that was never read counts as a constant 0.
   EXPECT_EQ(low_of(observations), (Numbers{-1.0, -0.25}));
   EXPECT_EQ(high_of(observations), (Numbers{5.0, 0.25}));
 }
 
-TEST(Observations, AdaptiveRangesLeaveOutWhatIsRareAndStayWithinTheFixedOnes) {
+TEST(Observations, AdaptiveRangesExcludeRareValuesAndStayWithinFixedOnes) {
   const double pi = std::numbers::pi;
   const ObservationConfig config{.low = {-100.0, 0.0, 0.0, {}, -pi, -1.0},
                                  .high = {100.0, 4.0, 1.0, {}, pi, 1.0},
@@ -88,7 +93,7 @@ TEST(Observations, AdaptiveRangesLeaveOutWhatIsRareAndStayWithinTheFixedOnes) {
   EXPECT_EQ(high_of(observations), (Numbers{7.0, 4.0, 1.0, 10.0, pi, 3.0}));
 }
 
-TEST(Observations, NarrowedRangesOfFewInputsAreFittedWhereTheFixedOneIsMoreThanTwiceAsWide) {
+TEST(Observations, RangesMoreThanTwiceTooWideAreNarrowedForUpToFourInputs) {
   const auto range = [](double low, double high, Numbers seen, std::size_t n_variables = 1) {
     ObservationConfig config{.narrowed = true};
     config.low.assign(n_variables, low);
@@ -109,7 +114,7 @@ TEST(Observations, NarrowedRangesOfFewInputsAreFittedWhereTheFixedOneIsMoreThanT
   EXPECT_EQ(range(-100.0, 100.0, {0.0, 4.0}, 5), std::pair(-100.0, 100.0));
 }
 
-TEST(Observations, PairsOnTheCircleAreFound) {
+TEST(Observations, FindPairsOnACircleAsAngles) {
   ObservationConfig config{.low = Ends(4, -10.0), .high = Ends(4, 10.0), .find_angle_pairs = true};
   Numbers seen, standing;
   for (int t = 0; t < 40; ++t) {
@@ -129,7 +134,7 @@ TEST(Observations, PairsOnTheCircleAreFound) {
   EXPECT_EQ(fitted(config, seen).n_inputs(), 4U);
 }
 
-TEST(Observations, SymbolsAreInputsWhereTheyAreCoded) {
+TEST(Observations, CodeSymbolsAsOneInputOrAsVariables) {
   const ObservationConfig config{.low = {0.0, 0.0, -2.0, 0.0, 0.0},
                                  .high = {1.0, 1.0, 2.0, 1.0, 1.0},
                                  .adaptive = false,
@@ -180,7 +185,7 @@ TEST(Observations, FindNoisyAnglesButNotPositions) {
   EXPECT_EQ(n_inputs(few), 2U);
 }
 
-TEST(Observations, KeepSomeInputsAndAddOthersAtTheEnd) {
+TEST(Observations, AppendInputsThatAreAddedLater) {
   ObservationConfig config = unbounded(5);
   config.relevant_only = true;
   Observations first(config, true, 1), second = first;
@@ -212,7 +217,7 @@ TEST(Observations, KeepSomeInputsAndAddOthersAtTheEnd) {
                           "state: kept");  // not in order
 }
 
-TEST(Observations, NameTheFieldThatDoesNotFit) {
+TEST(Observations, RefuseBadConfigurationsByTheirField) {
   const ObservationConfig good{.low = Ends(3, 0.0), .high = Ends(3, 1.0), .symbols = {{1, 2}}};
   EXPECT_EQ(error_of(good), "no error");
   const auto names = [&good](const char* name, auto change) {

@@ -7,7 +7,7 @@
 namespace sdnn::agents {
 namespace {
 
-TEST(Presets, TheSmallOneIsTheGeneralOneWithFewerUnits) {
+TEST(Presets, SmallDiffersFromGeneralInItsSizesOnly) {
   const Preset small = small_preset(4);
   const Preset general = general_preset(4);
   EXPECT_EQ(small.learning, general.learning);

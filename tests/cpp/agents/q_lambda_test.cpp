@@ -37,7 +37,7 @@ double q(const QLambda& agent, const State& state, std::size_t action) {
 }
 
 /// Steps of a random walk, in `n_environments` in turn.
-void live(QLambda& agent, int n_steps, std::uint64_t seed) {
+void learn_at_random(QLambda& agent, int n_steps, std::uint64_t seed) {
   core::Random random(seed, core::Stream::useless_inputs);
   State state{random.uniform(), random.uniform()};
   for (int step = 0; step < n_steps; ++step) {
@@ -51,7 +51,7 @@ void live(QLambda& agent, int n_steps, std::uint64_t seed) {
 }
 
 // gamma = 1/2, alpha = 1, no trace: the value of what follows halves.
-TEST(QLambda, OneStepTargetsByHand) {
+TEST(QLambda, TargetsOfOneStepAreAsWorkedByHand) {
   QLambda agent = agent_of({.learning_rate = 1.0,
                             .discount = 0.5,
                             .trace_decay = 0.0,
@@ -66,14 +66,14 @@ TEST(QLambda, OneStepTargetsByHand) {
   EXPECT_NEAR(q(agent, a, 0), 5.0, 0.5);
 }
 
-TEST(QLambda, RatesHaveGoneHalfOfTheWayAfterScheduleSteps) {
+TEST(QLambda, RatesAreHalfwayAfterScheduleSteps) {
   QLambda agent = agent_of({.learning_rate = 1.0,
                             .policy = {.epsilon = 0.5, .n_greedy_steps = 0},
                             .schedule_steps = 100,
                             .final_learning_rate = 0.5,
                             .final_epsilon = 0.25});
   EXPECT_EQ(agent.learning_rate(), 1.0);
-  live(agent, 100, 1);
+  learn_at_random(agent, 100, 1);
   EXPECT_EQ(agent.learning_rate(), 0.75);
   EXPECT_EQ(agent.epsilon(), 0.375);
   agent.set_learning_rate(0.125);
@@ -91,7 +91,7 @@ QLambdaConfig with_tolerance(double tolerance) {
 }
 
 // Rewards of 1 and 0.8 tie within 0.25, of 1 and 0.7 do not, whatever a unit of values is.
-TEST(QLambda, TheToleranceOfTiesIsInValues) {
+TEST(QLambda, TheToleranceOfTiesIsInUnitsOfValues) {
   const State a{0.1, 0.1};
   for (const double scale : {1.0, 1e-300, 1e250}) {
     QLambda agent = agent_of(with_tolerance(0.25 * scale));
@@ -114,14 +114,14 @@ TEST(QLambda, TheToleranceOfTiesIsInValues) {
   }
 }
 
-TEST(QLambda, ActionsThatAreNotAllowedNeverTie) {
+TEST(QLambda, MaskedActionsNeverTie) {
   const State a{0.1, 0.1};
   QLambda agent = agent_of(with_tolerance(1e308));
   agent.learn(a, Indices{2}, 1e-300, a, true);
   EXPECT_EQ(agent.act(a, true, 0, std::vector<std::uint8_t>{0, 1, 1}).front(), 1U);
 }
 
-TEST(QLambda, RefusesMasksThatDoNotFit) {
+TEST(QLambda, RefusesMasksOfWrongSizeOrValues) {
   QLambda agent = agent_of({}, {3, 2});
   auto workspace = agent.workspace();
   core::Random ties(1, core::Stream::ties);
@@ -139,7 +139,7 @@ TEST(QLambda, RefusesMasksThatDoNotFit) {
   EXPECT_TRUE(std::ranges::equal(agent.best_action(state, workspace, ties, only), Indices{2, 0}));
 }
 
-TEST(QLambda, EpsilonGoesToZeroButStaysWhereStatesAreSymbolsAlone) {
+TEST(QLambda, EpsilonDecaysToZeroButStaysConstantForSymbolsOnly) {
   const QLambdaConfig config{.policy = {.epsilon = 0.5, .n_greedy_steps = 0},
                              .schedule_steps = 100};
   EXPECT_EQ(agent_of(config).final_epsilon(), 0.0);
@@ -151,19 +151,19 @@ TEST(QLambda, EpsilonGoesToZeroButStaysWhereStatesAreSymbolsAlone) {
   EXPECT_EQ(with_symbols({4, 0}, config).final_epsilon(), 0.0);
   QLambda agent = with_symbols({4, 3}, config);
   EXPECT_EQ(agent.final_epsilon(), 0.5);
-  live(agent, 100, 1);
+  learn_at_random(agent, 100, 1);
   EXPECT_EQ(agent.epsilon(), 0.5);
   QLambdaConfig given = config;
   given.final_epsilon = 0.25;
   EXPECT_EQ(with_symbols({4, 3}, given).final_epsilon(), 0.25);
 }
 
-TEST(QLambda, LearnsTheSameOnEveryInstructionSet) {
+TEST(QLambda, LearnsTheSameBitsOnEveryInstructionSet) {
   for (const auto traces : {TraceKind::dutch, TraceKind::replacing}) {
     std::vector<std::vector<std::int32_t>> learned;
     testing::on_every_instruction_set([&](auto) {
       QLambda agent = agent_of({.traces = traces}, {5, 2}, 2);
-      live(agent, 300, 2);
+      learn_at_random(agent, 300, 2);
       const auto weights = agent.readout().weights();
       learned.emplace_back(weights.begin(), weights.end());
     });
@@ -188,7 +188,7 @@ int longest_action(QLambda agent, int n_ended) {
   return longest;
 }
 
-TEST(QLambda, EndsMakeRandomActionsShorter) {
+TEST(QLambda, EveryEndOfAnEpisodeHalvesTheLongestRandomActionDownToFiveSteps) {
   const std::vector<std::size_t> many{250, 250};
   const auto agent = [&](int longest) { return agent_of({.max_action_repeat = longest}, many); };
   EXPECT_EQ(longest_action(agent(100), 0), 100);
@@ -197,7 +197,10 @@ TEST(QLambda, EndsMakeRandomActionsShorter) {
   EXPECT_EQ(longest_action(agent(100), 7), 5);
   EXPECT_EQ(longest_action(agent(100), 40), 5);
   EXPECT_EQ(longest_action(agent(3), 7), 3);
-  QLambda ended = agent(100);
+}
+
+TEST(QLambda, RefusesStatesWithAnImpossibleNumberOfEndedEpisodes) {
+  QLambda ended = agent_of({.max_action_repeat = 100}, {250, 250});
   for (int i = 0; i < 40; ++i) ended.learn({{0.5, 0.5}}, Indices{0, 0}, 1.0, {{0.5, 0.5}}, true);
   const core::State good = core::state_of(ended);
   for (const int bad : {-1, 21}) {
@@ -207,7 +210,7 @@ TEST(QLambda, EndsMakeRandomActionsShorter) {
 }
 
 // Ten rewards of 0, then one of 1: twenty more steps are random, each action for 1 to 5 of them.
-TEST(QLambda, SearchesWhileAllRewardsAreZeroAndTwiceAsLongAfterwards) {
+TEST(QLambda, SearchesTwiceAsLongAfterTheFirstRewardAsBeforeIt) {
   const State state{0.5, 0.5};
   QLambda agent = agent_of({.max_action_repeat = 10}, {200, 200});
   for (int i = 0; i < 10; ++i) agent.learn(state, Indices{0, 0}, 0.0, state, i % 3 == 2);
@@ -236,7 +239,7 @@ TEST(QLambda, EnvironmentsHaveSeparateTraces) {
   EXPECT_THROW(together.learn(a, Indices{0}, 0.0, b, false, 1), std::invalid_argument);
 }
 
-TEST(QLambda, TracesAreReplacingInSeveralEnvironments) {
+TEST(QLambda, UsesReplacingTracesInSeveralEnvironments) {
   const auto state_after = [](TraceKind traces, std::size_t n_environments) {
     QLambda agent = agent_of({.traces = traces});
     agent.set_n_environments(n_environments);
@@ -253,7 +256,7 @@ TEST(QLambda, TracesAreReplacingInSeveralEnvironments) {
   EXPECT_NE(state_after(TraceKind::dutch, 1), state_after(TraceKind::replacing, 1));
 }
 
-TEST(QLambda, RefusesWhatCannotBeLearnedAndLearnsNothing) {
+TEST(QLambda, RefusesBadTransitionsAndSettingsAndLearnsNothing) {
   QLambda agent = agent_of({});
   const State a{0.1, 0.1};
   const core::State before = core::state_of(agent);
@@ -269,7 +272,7 @@ TEST(QLambda, RefusesWhatCannotBeLearnedAndLearnsNothing) {
   EXPECT_THROW(agent_of({}, {0}), std::invalid_argument);
 }
 
-TEST(LinearSDNN, RefusesWhatDoesNotFitIntoItsMemory) {
+TEST(LinearSDNN, RefusesTablesBeyondTheMemoryLimit) {
   const std::size_t n_actions[] = {3};
   EXPECT_THROW(LinearSDNN({.n_inputs = 2, .max_table_bytes = 1000}, n_actions, 1),
                std::length_error);

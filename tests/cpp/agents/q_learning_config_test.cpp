@@ -13,7 +13,7 @@
 namespace sdnn::agents::small_q_learning {
 namespace {
 
-TEST(QLearning, RatesGoInAStraightLineWithProgress) {
+TEST(QLearning, RatesChangeLinearlyWithProgress) {
   Agent agent(LookupTable(1, 5, 2),
               {.learning_rate = 0.5,
                .policy = {.epsilon = 0.75},
@@ -43,7 +43,7 @@ TEST(QLearning, RatesGoInAStraightLineWithProgress) {
   EXPECT_EQ(steady.epsilon(), 0.1);
 }
 
-TEST(QLearning, RatesFallByEqualFactorsWithAnExponentialSchedule) {
+TEST(QLearning, AnExponentialScheduleMultipliesRatesByEqualFactors) {
   const QLearningConfig config{.learning_rate = 1.0,
                                .policy = {.epsilon = 0.5},
                                .final_learning_rate = 0.0625,
@@ -65,7 +65,7 @@ TEST(QLearning, RatesFallByEqualFactorsWithAnExponentialSchedule) {
   EXPECT_EQ(learning_rate_at(steady.config(), 0.7), 0.5);
 }
 
-TEST(QLearning, AnExponentialScheduleStaysBetweenItsEnds) {
+TEST(QLearning, AnExponentialScheduleStaysBetweenItsFirstAndLastValue) {
   core::Random random(3, core::Stream::weights);
   for (int i = 0; i < 2000; ++i) {
     const double first = 1.0 - random.uniform();
@@ -83,7 +83,7 @@ TEST(QLearning, AnExponentialScheduleStaysBetweenItsEnds) {
   }
 }
 
-TEST(QLearning, EpsilonMayReachItsFinalValueBeforeTheEnd) {
+TEST(QLearning, EpsilonReachesItsFinalValueAfterTheExplorationFraction) {
   const QLearningConfig config{.learning_rate = 1.0,
                                .policy = {.epsilon = 0.5},
                                .final_learning_rate = 0.5,
@@ -106,7 +106,7 @@ TEST(QLearning, EpsilonMayReachItsFinalValueBeforeTheEnd) {
   EXPECT_EQ(epsilon_at(steady.config(), 0.1), 0.1);
 }
 
-TEST(QLearning, AnExponentialScheduleHasNoEndAtZero) {
+TEST(QLearning, AnExponentialScheduleFromOrToZeroIsRefused) {
   EXPECT_EQ(message({.final_epsilon = 0.0, .schedule = Schedule::exponential}),
             "final_epsilon must be greater than 0 where the schedule is exponential, got 0");
   EXPECT_EQ(
@@ -116,7 +116,7 @@ TEST(QLearning, AnExponentialScheduleHasNoEndAtZero) {
   EXPECT_EQ(message({.policy = {.epsilon = 0.0}, .schedule = Schedule::exponential}), "no error");
 }
 
-TEST(QLearning, RatesThatAreSetStayWhateverTheProgress) {
+TEST(QLearning, RatesThatAreSetDoNotFollowProgress) {
   Agent agent(LookupTable(1, 5, 2),
               {.learning_rate = 0.5, .final_learning_rate = 0.25, .final_epsilon = 0.0}, 1);
   agent.set_learning_rate(0.75);

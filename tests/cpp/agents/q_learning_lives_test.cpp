@@ -16,17 +16,16 @@
 namespace sdnn::agents::small_q_learning {
 namespace {
 
-TEST(QLearning, ALifeCanBeCutAnywhere) {
-  testing::expect_that_a_life_can_be_cut(sdnn_agent);
-  testing::expect_that_a_life_can_be_cut(rbf_agent);
-  testing::expect_that_a_life_can_be_cut(vector_agent);
-  testing::expect_that_a_life_can_be_cut(rbf_agent, 2);
-  testing::expect_that_a_life_can_be_cut(vector_agent, 3);
+TEST(QLearning, ContinuesExactlyAfterItWasSavedAtAnyStep) {
+  testing::expect_exact_resume(sdnn_agent);
+  testing::expect_exact_resume(rbf_agent);
+  testing::expect_exact_resume(vector_agent);
+  testing::expect_exact_resume(rbf_agent, 2);
+  testing::expect_exact_resume(vector_agent, 3);
 }
 
-// Repeats ATransitionOfSeveralStepsIsLearnedOnceWhenTheyAreKnown, while another environment goes
-// its way.
-TEST(QLearning, EachEnvironmentHasPendingSteps) {
+// Rewards 1 and 2 in the first environment, 8 and 8 in the second; gamma = 1/2, alpha = 1.
+TEST(QLearning, EnvironmentsHaveSeparatePendingSteps) {
   LookupTable table(2, 5, 2);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
   agent.set_n_environments(2);
@@ -65,15 +64,15 @@ TEST(QLearning, PendingStepsOfRemovedEnvironmentsAreLearned) {
 }
 
 // All that other environments share with it is drawn and learned here, and in nobody's name.
-TEST(QLearning, AnyOneOfSeveralEnvironmentsIsLikeTheOnlyOne) {
+TEST(QLearning, EachOfSeveralEnvironmentsLearnsLikeASingleOne) {
   auto alone = vector_agent();
   testing::World<decltype(alone)> world(2, 9);
-  for (int t = 0; t < 300; ++t) world.tick(alone);
+  for (int t = 0; t < 300; ++t) world.step(alone);
   for (const std::size_t environment : {0U, 2U}) {
     auto one_of_four = vector_agent();
     one_of_four.set_n_environments(4);
     testing::World<decltype(alone)> same_world(2, 9, environment);
-    for (int t = 0; t < 300; ++t) same_world.tick(one_of_four);
+    for (int t = 0; t < 300; ++t) same_world.step(one_of_four);
     const core::State state = core::state_of(one_of_four);
     const std::string before =
         environment == 0 ? "" : "environment." + std::to_string(environment) + ".";
@@ -86,7 +85,7 @@ TEST(QLearning, AnyOneOfSeveralEnvironmentsIsLikeTheOnlyOne) {
   }
 }
 
-TEST(QLearning, RefusesAStateOfEnvironmentsThatDoesNotFit) {
+TEST(QLearning, RefusesInconsistentStatesOfEnvironments) {
   auto agent = sdnn_agent();
   agent.set_n_environments(3);
   const std::vector<double> place = {0.5, 0.5};
@@ -109,14 +108,14 @@ TEST(QLearning, ARestoredAgentAllocatesNothing) {
   testing::expect_that_a_restored_agent_allocates_nothing(rbf_agent, testing::allocation_count);
 }
 
-TEST(QLearning, RefusesAStateThatDoesNotFit) {
+TEST(QLearning, RefusesInconsistentStates) {
   auto agent = sdnn_agent();
   testing::World<OneDimension<QLearning<SDNNC>>> world(2, 7);
   const core::State young = core::state_of(agent);
-  while (core::state_of(agent).contains("n_random_left")) world.tick(agent);
+  while (core::state_of(agent).contains("n_random_left")) world.step(agent);
   while (testing::number_of<std::int32_t>(core::state_of(agent), "n_kept") == 0 ||
          core::state_of(agent).at("n_step_buffer.rewards").size() < 2) {
-    world.tick(agent);
+    world.step(agent);
   }
   agent.set_learning_rate(std::nullopt);  // what may be missing
   agent.set_epsilon(std::nullopt);

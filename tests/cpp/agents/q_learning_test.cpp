@@ -16,7 +16,7 @@
 namespace sdnn::agents::small_q_learning {
 namespace {
 
-TEST(QLearning, EquationOneByHand) {
+TEST(QLearning, CorrectsValuesByEquationOneAsWorkedByHand) {
   Agent agent(LookupTable(1, 5, 2), {}, 1);  // alpha = 0.5, gamma = 0.9
   const auto q = [&](int s, std::size_t a) { return agent.network().value(cell(s), a); };
   agent.learn(cell(1), 0, 10.0, cell(2), true);  // 0.5 * 0 + 0.5 * 10
@@ -32,7 +32,7 @@ TEST(QLearning, EquationOneByHand) {
 }
 
 // The next state's value is taken before the correction, also when it is the same state.
-TEST(QLearning, ATransitionToItselfUsesTheOldValue) {
+TEST(QLearning, ATransitionToTheSameStateUsesItsOldValue) {
   LookupTable table(1, 5, 2);
   table.update(cell(3), 0, 4.0);
   Agent agent(table, {}, 1);
@@ -41,7 +41,7 @@ TEST(QLearning, ATransitionToItselfUsesTheOldValue) {
 }
 
 // Rewards 1, 2, 4, then the goal with 8; gamma = 1/2, alpha = 1: every number is exact.
-TEST(QLearning, ATransitionOfSeveralStepsIsLearnedOnceWhenTheyAreKnown) {
+TEST(QLearning, NStepReturnsAreLearnedOnceAfterNSteps) {
   LookupTable table(1, 5, 2);
   table.update(cell(2), 1, 16.0);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
@@ -62,7 +62,7 @@ TEST(QLearning, ATransitionOfSeveralStepsIsLearnedOnceWhenTheyAreKnown) {
   EXPECT_EQ(agent.network(), learned);
 }
 
-TEST(QLearning, PendingStepsAtATimeLimitAreLearnedWhenTheNextEpisodeBegins) {
+TEST(QLearning, PendingStepsAreLearnedWhenTheNextEpisodeBegins) {
   LookupTable table(1, 5, 2);
   table.update(cell(2), 1, 16.0);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 5}, 1);
@@ -78,7 +78,7 @@ TEST(QLearning, PendingStepsAtATimeLimitAreLearnedWhenTheNextEpisodeBegins) {
   EXPECT_EQ(q(1), 2.0 + 0.5 * 16.0);
 }
 
-TEST(QLearning, ATransitionFromElsewhereBeginsAnew) {
+TEST(QLearning, PendingStepsAreLearnedBeforeATransitionFromAnotherState) {
   LookupTable table(1, 5, 2);
   table.update(cell(2), 1, 16.0);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 3}, 1);
@@ -92,7 +92,7 @@ TEST(QLearning, ATransitionFromElsewhereBeginsAnew) {
   EXPECT_EQ(q(3), 8.0);
 }
 
-TEST(QLearning, TransitionsThatCouldNotBeLearnedLaterAreRefusedAtOnce) {
+TEST(QLearning, BadTransitionsAreRefusedBeforeTheyArePending) {
   Agent agent(LookupTable(1, 5, 2), {.n_steps = 3}, 1);
   EXPECT_THROW(agent.learn(Position{1.5}, 0, 1.0, cell(1), false), std::invalid_argument);
   EXPECT_THROW(agent.learn(cell(0), 0, 1.0, Position{1.5}, false), std::invalid_argument);
@@ -107,7 +107,7 @@ struct Corridor {
   static bool is_goal(int s) { return s == 4; }
 };
 
-TEST(QLearning, ASmallDecisionProcessIsSolvedExactly) {
+TEST(QLearning, ACorridorOfFiveCellsIsSolvedExactly) {
   Agent agent(LookupTable(1, 5, 2), {.learning_rate = 1.0, .discount = 0.9}, 1);
   for (int sweep = 0; sweep < 6; ++sweep) {
     for (int s = 0; s < 4; ++s) {
@@ -128,7 +128,7 @@ TEST(QLearning, ASmallDecisionProcessIsSolvedExactly) {
   }
 }
 
-TEST(QLearning, StepsAreCountedFromTheBeginningOfAnEpisode) {
+TEST(QLearning, GreedyFirstStepsAreCountedFromTheBeginningOfAnEpisode) {
   LookupTable table(1, 5, 3);
   table.update(cell(0), 2, 1.0);
   Agent agent(table, {.policy = {.epsilon = 1.0, .n_greedy_steps = 4}}, 3);
@@ -141,7 +141,7 @@ TEST(QLearning, StepsAreCountedFromTheBeginningOfAnEpisode) {
   EXPECT_GT(others, 90);  // of 200, two thirds are expected
 }
 
-TEST(QLearning, ABadTransitionLeavesTheWholeStateAsItWas) {
+TEST(QLearning, RefusesBadTransitionsAndChangesNothing) {
   using Vectors = QLearning<RBFNetwork>;
   Vectors agent(
       {RBFNetwork({.n_inputs = 1, .n_actions = 3}), RBFNetwork({.n_inputs = 1, .n_actions = 2})},
@@ -195,7 +195,7 @@ TEST(QLearning, ARandomActionLastsKStepsWithProbabilityOneKth) {
   }
 }
 
-TEST(QLearning, AKeptActionEndsWithTheEpisodeAndEvaluationDoesNotUseItUp) {
+TEST(QLearning, ARepeatedActionEndsWithTheEpisodeAndNotWithEvaluations) {
   LookupTable table(1, 1, 1 << 17);
   table.update(cell(0), 5, 1.0);
   Agent agent(table, {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}, .max_action_repeat = 1000},
@@ -213,7 +213,7 @@ TEST(QLearning, AKeptActionEndsWithTheEpisodeAndEvaluationDoesNotUseItUp) {
   EXPECT_NEAR(n_kept, 100, 36);  // P(d >= 2)
 }
 
-TEST(QLearning, TheFirstStepsOfALifeAreRandom) {
+TEST(QLearning, StartStepsAreRandomAndLaterOnesGreedy) {
   LookupTable table(1, 1, 1 << 17);
   table.update(cell(0), 5, 1.0);
   for (const int longest : {1, 7}) {
@@ -235,7 +235,7 @@ TEST(QLearning, TheFirstStepsOfALifeAreRandom) {
   }
 }
 
-TEST(QLearning, ABadStateIsNoneOfTheFirstSteps) {
+TEST(QLearning, ARefusedStateDoesNotCountAsAStartStep) {
   OneDimension<QLearning<RBFNetwork>> agent(RBFNetwork({.n_inputs = 1}),
                                             {.policy = {.epsilon = 0.0}, .start_steps = 1}, 1);
   EXPECT_THROW((void)agent.act({{2.0}}), std::invalid_argument);
@@ -244,7 +244,7 @@ TEST(QLearning, ABadStateIsNoneOfTheFirstSteps) {
   EXPECT_FALSE(core::state_of(agent).contains("n_random_left"));
 }
 
-TEST(QLearning, WithoutRepetitionsTheirStreamIsNotTouched) {
+TEST(QLearning, WithoutRepeatedActionsTheirRandomStreamIsNotUsed) {
   OneDimension<QLearning<RBFNetwork>> agent(RBFNetwork({.n_inputs = 1}),
                                             {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}}, 1);
   const core::State before = core::state_of(agent);
@@ -255,7 +255,7 @@ TEST(QLearning, WithoutRepetitionsTheirStreamIsNotTouched) {
 }
 
 // gamma = 1/2: the first sum is 8, so the range is 8 and a quarter more.
-TEST(QLearning, TheRangeOfValuesFollowsTheRewards) {
+TEST(QLearning, AnAdaptiveRangeOfValuesFollowsTheRewards) {
   OneDimension<QLearning<SDNNC>> agent(SDNNC(network(), 1),
                                        {.discount = 0.5, .value_range = ValueRange::adaptive}, 1);
   const auto scale = [&agent]() -> const auto& { return agent.network().output_scale(); };
@@ -277,7 +277,7 @@ TEST(QLearning, TheRangeOfValuesFollowsTheRewards) {
   EXPECT_EQ(given.network().output_scale().q_high(), 16.0);
 }
 
-TEST(QLearning, GreedyActionsFollowTheAverageWhereThereIsOne) {
+TEST(QLearning, GreedyActionsFollowAveragedValues) {
   approximators::SDNNCConfig config = network();
   config.averaging_interval = 5;
   QLearning<SDNNC> averaging({SDNNC(config, 3), SDNNC(config, 4)},
@@ -317,7 +317,7 @@ TEST(QLearning, ACorrectionMovesEveryDimensionByTheErrorOfTheMean) {
   EXPECT_EQ(agent.networks()[0].value(cell(1), 0), 0.5 * (1.0 + 0.5 * 6.0));
 }
 
-TEST(QLearning, EveryDimensionHasAnotherSeedTheFirstThatOfTheWhole) {
+TEST(QLearning, DimensionsHaveDifferentSeedsAndTheFirstThatOfTheAgent) {
   EXPECT_EQ(seed_of_dimension(7, 0), 7U);
   std::set<std::uint64_t> seeds;
   for (std::size_t d = 0; d < 100; ++d) seeds.insert(seed_of_dimension(7, d));
@@ -325,7 +325,7 @@ TEST(QLearning, EveryDimensionHasAnotherSeedTheFirstThatOfTheWhole) {
   EXPECT_EQ(seeds.size(), 199U);
 }
 
-TEST(QLearning, NeedsNetworksOfTheSameInputs) {
+TEST(QLearning, RefusesNetworksOfDifferentInputs) {
   using Tables = std::vector<LookupTable>;
   EXPECT_THROW(QLearning<LookupTable>(Tables{}, {}, 1), std::invalid_argument);
   EXPECT_THROW(QLearning<LookupTable>(Tables{LookupTable(1, 2, 2), LookupTable(2, 2, 2)}, {}, 1),
@@ -334,7 +334,7 @@ TEST(QLearning, NeedsNetworksOfTheSameInputs) {
 
 /// Some steps at random states, after each of which `check` is called with the state.
 template <class Check>
-void live(OneDimension<QLearning<SDNNC>>& agent, const Check& check) {
+void learn_at_random(OneDimension<QLearning<SDNNC>>& agent, const Check& check) {
   core::Random random(4, core::Stream::exploration);
   std::vector<double> state(2);
   std::vector<double> next(2);
@@ -347,7 +347,7 @@ void live(OneDimension<QLearning<SDNNC>>& agent, const Check& check) {
 }
 
 // An action is found by counts of firing units, without the values that it is the best by.
-TEST(QLearning, TheBestActionByCountsIsThatByValues) {
+TEST(QLearning, TheBestActionByCountsIsTheBestByValues) {
   for (const int n_actions : {0, 7}) {
     for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
       for (const double tolerance : {0.0, 1.0, 2.5}) {
@@ -358,11 +358,11 @@ TEST(QLearning, TheBestActionByCountsIsThatByValues) {
         ASSERT_TRUE(agent.network().values_rise());
         auto workspace = agent.workspace();
         const EpsilonGreedy by_values(policy, 1);
-        core::Random one(9, core::Stream::ties);
-        core::Random other = one;
-        live(agent, [&](const std::vector<double>& state) {
-          const std::size_t action = agent.best_action(state, workspace, one);
-          ASSERT_EQ(action, by_values.best_action(agent.values(state, workspace), other));
+        core::Random ties(9, core::Stream::ties);
+        core::Random same_ties = ties;
+        learn_at_random(agent, [&](const std::vector<double>& state) {
+          const std::size_t action = agent.best_action(state, workspace, ties);
+          ASSERT_EQ(action, by_values.best_action(agent.values(state, workspace), same_ties));
           if (rule == TieRule::uniform) return;  // drawn from the agent's own stream
           std::vector<std::uint8_t> mask(agent.n_actions(0));
           for (std::size_t a = 0; a < mask.size(); ++a) mask[a] = a % 5 == 2 ? 1 : 0;
@@ -370,7 +370,7 @@ TEST(QLearning, TheBestActionByCountsIsThatByValues) {
           std::ranges::copy(agent.values(state, workspace), values.begin());
           exclude(mask, values);
           agent.read(state, workspace);
-          ASSERT_EQ(agent.best_of(workspace, mask), by_values.best_action(values, other));
+          ASSERT_EQ(agent.best_of(workspace, mask), by_values.best_action(values, same_ties));
         });
       }
     }
@@ -378,7 +378,7 @@ TEST(QLearning, TheBestActionByCountsIsThatByValues) {
 }
 
 // A step between values may be lost by rounding: then values need not rise with the counts.
-TEST(QLearning, ValuesThatDoNotRiseAreCompared) {
+TEST(QLearning, ValuesThatDoNotRiseWithCountsAreComparedThemselves) {
   auto config = network();
   config.q_low = -7.262490008916344e+16;
   config.q_high = -7.26249000891634e+16;
@@ -386,7 +386,7 @@ TEST(QLearning, ValuesThatDoNotRiseAreCompared) {
   ASSERT_FALSE(agent.network().values_rise());
   auto workspace = agent.workspace();
   core::Random ties(9, core::Stream::ties);
-  live(agent, [&](const std::vector<double>& state) {
+  learn_at_random(agent, [&](const std::vector<double>& state) {
     const std::size_t action = agent.best_action(state, workspace, ties);
     const auto values = agent.values(state, workspace);
     ASSERT_EQ(values[action], *std::ranges::max_element(values));

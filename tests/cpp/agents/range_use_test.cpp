@@ -10,18 +10,20 @@ namespace {
 
 using Numbers = std::vector<double>;
 
-TEST(RangeNotes, TellHowRangesAreUsed) {
+TEST(RangeNotes, StateTheSharesOfRangesThatAreUsedAndOfValuesBeyondThem) {
   const double pi = std::numbers::pi;
   const Observations observations(
       {.low = {0.0, -1.0, -pi, 0.0}, .high = {100.0, 1.0, pi, 1.0}, .angles = {2}}, false, 1);
   RangeNotes notes(4);
-  for (int t = 0; t < 4000; ++t) {  // one in eight is noted in the mean, of these the last 256
+  for (int t = 0; t < 4000; ++t) {
     notes.note(Numbers{20.0 + t / 100.0, t % 4 == 0 ? 3.0 : 0.0, 1.0 * t, 0.5});
     if (t == 80) {
       EXPECT_FALSE(notes.use(observations)[0]);
     }
   }
   const auto use = notes.use(observations);
+  // About one step in eight is noted and the last 256 notes are kept: 2048 steps of 1/100. The
+  // middle 90 % of the noted values are the used range.
   EXPECT_NEAR(use[0]->share_used, 0.9 * 20.48 / 100, 0.02);
   EXPECT_EQ(use[1]->share_used, 0.5);
   EXPECT_NEAR(use[1]->share_beyond, 0.25, 0.08);
@@ -30,7 +32,7 @@ TEST(RangeNotes, TellHowRangesAreUsed) {
   EXPECT_EQ(use[0]->share_beyond, 0.0);
 }
 
-TEST(RangeNotes, AreOfAllStepsOfRegularEpisodes) {
+TEST(RangeNotes, SampleAllPhasesOfRegularEpisodes) {
   const Observations observations({.low = {0.0}, .high = {1.0}}, false, 1);
   for (const int period : {3, 4, 5, 8, 16, 24}) {
     RangeNotes notes(1);

@@ -57,7 +57,7 @@ std::vector<bool> relevant(const RandomExperience& experience) {
   return Relevance(experience).inputs(std::vector<bool>(experience.n_inputs));
 }
 
-TEST(Relevance, KeepsWhatActionsAndRewardsHaveToDoWith) {
+TEST(Relevance, KeepsInputsThatActionsOrRewardsDependOn) {
   int n_noise_kept = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     for (const double memory : {0.0, 0.95}) {
@@ -73,7 +73,7 @@ TEST(Relevance, KeepsWhatActionsAndRewardsHaveToDoWith) {
   EXPECT_LE(n_noise_kept, 16);  // of 320
 }
 
-TEST(Relevance, KeepsEverythingWhereNothingIsFoundOrLittleIsKnown) {
+TEST(Relevance, KeepsAllInputsWithoutRelevanceOrWithFewTransitions) {
   RandomExperience nothing = pushed_mass(500, 3, 0.0, false, 1);
   std::ranges::fill(nothing.states, 0.5);
   std::ranges::fill(nothing.next_states, 0.5);
@@ -81,7 +81,7 @@ TEST(Relevance, KeepsEverythingWhereNothingIsFoundOrLittleIsKnown) {
   EXPECT_EQ(relevant(pushed_mass(99, 3, 0.0, true, 1)), std::vector<bool>(5, true));
 }
 
-TEST(Relevance, KeepsWhatIsKnownToMatterAndWhatItDependsOn) {
+TEST(Relevance, KeepsListedInputsAndThoseThatPredictThem) {
   const auto experience = pushed_mass(1000, 3, 0.0, false, 1);
   EXPECT_EQ(Relevance(experience).inputs({false, false, false, true, false}),
             (std::vector<bool>{true, true, false, true, false}));
@@ -111,7 +111,7 @@ TEST(Relevance, FindsInputsThatMatterOnlyTogether) {
   EXPECT_LE(n_noise_kept, 2);  // of 40
 }
 
-TEST(Relevance, OfManyNoiseInputsHardlyAnyIsKept) {
+TEST(Relevance, KeepsHardlyAnyOfManyNoiseInputs) {
   int n_noise_kept = 0;
   for (const std::size_t n_noise : {30U, 100U, 300U}) {
     for (std::uint64_t seed = 1; seed <= 3; ++seed) {
@@ -135,7 +135,7 @@ RandomExperience permuted(const RandomExperience& experience,
   return result;
 }
 
-TEST(Relevance, ThePermutationOfInputsPermutesTheChoice) {
+TEST(Relevance, DoesNotDependOnTheOrderOfInputs) {
   for (const std::size_t n_noise : {5U, 40U}) {
     const RandomExperience experience = pushed_mass(600, n_noise, 0.9, true, 4);
     const std::vector<bool> kept = relevant(experience);
@@ -187,7 +187,7 @@ TEST(Relevance, KeepsOrLeavesOutOneHotVectorsAsAWhole) {
   }
 }
 
-TEST(Relevance, TwoBinaryInputsAreJudgedByThemselves) {
+TEST(Relevance, JudgesTwoBinaryInputsSeparately) {
   // Actions set the first input, chance the second; the third is the reward.
   int n_kept_by_chance = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -264,7 +264,7 @@ TEST(BinaryGroups, HoldConstantsAtAnEndOfTheirRange) {
   EXPECT_EQ(groups_of(states, states, 6), (Groups{{0, 1, 3, 4}}));
 }
 
-TEST(Relevance, AnAngleThatPassesItsEndHasMovedLittle) {
+TEST(Relevance, TreatsAnAngleThatWrapsAroundAsASmallChange) {
   // The angle moves by what the second input tells, all round; the third is noise.
   core::Random random(3, core::Stream::useless_inputs);
   RandomExperience experience{.n_inputs = 3, .circular = {true, false, false}};

@@ -20,7 +20,7 @@ struct Stream {
     return range.note(reward, terminated, rewards);
   }
   /// An episode with a reward of 1 in each step.
-  void live(int n_steps, double reward = 1.0, bool terminates = true) {
+  void note_episode(int n_steps, double reward = 1.0, bool terminates = true) {
     for (int t = 1; t <= n_steps; ++t) note(reward, terminates && t == n_steps);
   }
 
@@ -34,70 +34,70 @@ void expect_range(const ReturnRange& range, double low, double high) {
 }
 
 // gamma = 15/16: every number is exact.
-TEST(ReturnRange, AtFirstGrowsByAQuarterMoreThanItMust) {
-  Stream one(0.9375);  // no returns before 64 steps
-  EXPECT_FALSE(one.range.is_known());
-  EXPECT_FALSE(one.note(0.0));
-  EXPECT_FALSE(one.range.is_known());
-  EXPECT_TRUE(one.note(16.0));  // 16 + 16 / 4
-  EXPECT_TRUE(one.range.is_known());
-  expect_range(one.range, 0.0, 20.0);
-  EXPECT_FALSE(one.note(5.0));  // 5 + 15 = 20, still inside
-  EXPECT_TRUE(one.note(5.25));  // 5.25 + 18.75 = 24, and 24 / 4
-  expect_range(one.range, 0.0, 30.0);
-  EXPECT_TRUE(one.note(-42.5));  // -42.5 + 22.5 = -20, and (30 + 20) / 4
-  expect_range(one.range, -32.5, 30.0);
+TEST(ReturnRange, GrowsAtFirstByAQuarterMoreThanNeeded) {
+  Stream environment(0.9375);  // no returns before 64 steps
+  EXPECT_FALSE(environment.range.is_known());
+  EXPECT_FALSE(environment.note(0.0));
+  EXPECT_FALSE(environment.range.is_known());
+  EXPECT_TRUE(environment.note(16.0));  // 16 + 16 / 4
+  EXPECT_TRUE(environment.range.is_known());
+  expect_range(environment.range, 0.0, 20.0);
+  EXPECT_FALSE(environment.note(5.0));  // 5 + 15 = 20, still inside
+  EXPECT_TRUE(environment.note(5.25));  // 5.25 + 18.75 = 24, and 24 / 4
+  expect_range(environment.range, 0.0, 30.0);
+  EXPECT_TRUE(environment.note(-42.5));  // -42.5 + 22.5 = -20, and (30 + 20) / 4
+  expect_range(environment.range, -32.5, 30.0);
 }
 
-TEST(ReturnRange, OfPunishmentsBeginsWithThem) {
-  Stream one(1.0);
-  EXPECT_TRUE(one.note(-4.0));
-  expect_range(one.range, -5.0, 0.0);
+TEST(ReturnRange, OfNegativeRewardsEndsAtZero) {
+  Stream environment(1.0);
+  EXPECT_TRUE(environment.note(-4.0));
+  expect_range(environment.range, -5.0, 0.0);
 }
 
 // Episodes of one step: returns are rewards. Of 100 the lowest five and the highest two are left
 // out, and above there is room for a quarter more.
-TEST(ReturnRange, HoldsMostReturns) {
-  Stream one(0.5);
-  for (int i = 1; i <= 100; ++i) one.note(i - 21.0, true);
-  EXPECT_LE(one.range.low(), -15.0);
-  EXPECT_GE(one.range.low(), -17.0);  // that of fewer returns is kept where it fits
-  EXPECT_GE(one.range.high(), 77.0);
-  EXPECT_LE(one.range.high(), 77.0 + 92.0 / 4);
+TEST(ReturnRange, ContainsAllButTheRarestReturns) {
+  Stream environment(0.5);
+  for (int i = 1; i <= 100; ++i) environment.note(i - 21.0, true);
+  EXPECT_LE(environment.range.low(), -15.0);
+  EXPECT_GE(environment.range.low(), -17.0);  // that of fewer returns is kept where it fits
+  EXPECT_GE(environment.range.high(), 77.0);
+  EXPECT_LE(environment.range.high(), 77.0 + 92.0 / 4);
 }
 
-TEST(ReturnRange, ShrinksWhenReturnsDo) {
-  Stream one(0.99);
-  for (int i = 0; i < 200; ++i) one.live(15, -200.0);
-  EXPECT_LT(one.range.low(), -2000.0);
-  for (int i = 0; i < 400; ++i) one.live(15, -1.0);
-  EXPECT_GT(one.range.low(), -30.0);
-  EXPECT_LE(one.range.low(), (std::pow(0.99, 15) - 1.0) / 0.01 + 1.0);
-  EXPECT_EQ(one.range.high(), 0.0);
+TEST(ReturnRange, ShrinksWithReturns) {
+  Stream environment(0.99);
+  for (int i = 0; i < 200; ++i) environment.note_episode(15, -200.0);
+  EXPECT_LT(environment.range.low(), -2000.0);
+  for (int i = 0; i < 400; ++i) environment.note_episode(15, -1.0);
+  EXPECT_GT(environment.range.low(), -30.0);
+  EXPECT_LE(environment.range.low(), (std::pow(0.99, 15) - 1.0) / 0.01 + 1.0);
+  EXPECT_EQ(environment.range.high(), 0.0);
 }
 
-TEST(ReturnRange, OneOutlierChangesLittle) {
+TEST(ReturnRange, OneOutlierWidensItAtMostTwoAndAHalfTimes) {
   for (const double outlier : {1e3, 1e6, -1e3, -1e6, 1e300}) {
     for (const bool terminates : {true, false}) {
-      Stream one(0.99);
-      for (int i = 0; i < 400; ++i) one.live(50, 1.0, terminates);
-      const double width = one.range.high() - one.range.low();
-      one.note(outlier);
+      Stream environment(0.99);
+      for (int i = 0; i < 400; ++i) environment.note_episode(50, 1.0, terminates);
+      const double width = environment.range.high() - environment.range.low();
+      environment.note(outlier);
       for (int i = 0; i < 400; ++i) {
-        one.live(50, 1.0, terminates);
-        EXPECT_LE(one.range.high() - one.range.low(), 2.5 * width) << outlier;
+        environment.note_episode(50, 1.0, terminates);
+        EXPECT_LE(environment.range.high() - environment.range.low(), 2.5 * width) << outlier;
       }
     }
   }
 }
 
 // The return of a reward of 1 in each step is 100, whatever the limit; a terminated episode's less.
-TEST(ReturnRange, ATimeLimitIsNoEnd) {
+TEST(ReturnRange, TruncatedEpisodesCountWithTheirFutureRewards) {
   for (const int limit : {10, 50, 200, 1000}) {
     Stream limited(0.99), ended(0.99);
     for (int i = 0; i < 20000 / limit; ++i) {
-      limited.live(limit, 1.0, false);
-      ended.live(limit);
+      limited.note_episode(limit, 1.0, false);
+      ended.note_episode(limit);
     }
     EXPECT_GE(limited.range.high(), 100.0) << limit;
     EXPECT_LE(limited.range.high(), 126.0) << limit;
@@ -108,45 +108,46 @@ TEST(ReturnRange, ATimeLimitIsNoEnd) {
 }
 
 TEST(ReturnRange, IsKnownFromTheFirstOfRareRewards) {
-  Stream one(0.99);
-  for (int i = 0; i < 500; ++i) one.live(20, 0.0);
-  EXPECT_FALSE(one.range.is_known());
-  one.note(1.0, true);
-  expect_range(one.range, 0.0, 1.25);
+  Stream environment(0.99);
+  for (int i = 0; i < 500; ++i) environment.note_episode(20, 0.0);
+  EXPECT_FALSE(environment.range.is_known());
+  environment.note(1.0, true);
+  expect_range(environment.range, 0.0, 1.25);
 }
 
 TEST(ReturnRange, EnvironmentsHaveSeparateRewards) {
   ReturnRange range(1.0);
-  ReturnRange::Rewards one = range.no_rewards(), other = range.no_rewards();
-  EXPECT_TRUE(range.note(8.0, false, one));
+  ReturnRange::Rewards environment = range.no_rewards(), other = range.no_rewards();
+  EXPECT_TRUE(range.note(8.0, false, environment));
   EXPECT_FALSE(range.note(9.0, false, other));  // 17 if it were the same episode
   expect_range(range, 0.0, 10.0);
 }
 
-TEST(ReturnRange, MovesRarely) {
-  Stream one(0.9);
+TEST(ReturnRange, MovesFewerThan40TimesIn10000Steps) {
+  Stream environment(0.9);
   core::Random random(1, core::Stream::weights);
   int n_moves = 0;
   for (int i = 0; i < 10000; ++i) {
-    n_moves += one.note(std::exp(10.0 * random.uniform()) - 100.0, random.below(30) == 0);
+    n_moves += environment.note(std::exp(10.0 * random.uniform()) - 100.0, random.below(30) == 0);
   }
   EXPECT_LT(n_moves, 40);
 }
 
-TEST(ReturnRange, StaysFinite) {
-  Stream one(1.0);
-  for (int i = 0; i < 9000; ++i) one.note(1e300 * (i / 700 % 2 == 0 ? 1.0 : -1.0), i % 2000 == 0);
-  EXPECT_LT(one.range.high(), 1.7e300);
-  EXPECT_GT(one.range.low(), -1.7e300);
+TEST(ReturnRange, StaysFiniteWithHugeRewards) {
+  Stream environment(1.0);
+  for (int i = 0; i < 9000; ++i)
+    environment.note(1e300 * (i / 700 % 2 == 0 ? 1.0 : -1.0), i % 2000 == 0);
+  EXPECT_LT(environment.range.high(), 1.7e300);
+  EXPECT_GT(environment.range.low(), -1.7e300);
   ReturnRange other(1.0);
-  core::restore(other, core::state_of(one.range));  // a range this wide can be saved
-  EXPECT_EQ(core::state_of(other), core::state_of(one.range));
+  core::restore(other, core::state_of(environment.range));  // a range this wide can be saved
+  EXPECT_EQ(core::state_of(other), core::state_of(environment.range));
 }
 
-TEST(ReturnRange, RefusesWhatIsNoRange) {
-  Stream one(0.5);
-  for (int i = 0; i < 1000; ++i) one.note(8.0, i % 2 == 0);
-  ReturnRange& range = one.range;
+TEST(ReturnRange, RefusesInconsistentStates) {
+  Stream environment(0.5);
+  for (int i = 0; i < 1000; ++i) environment.note(8.0, i % 2 == 0);
+  ReturnRange& range = environment.range;
   testing::expect_that_damage_is_refused(range);
   const core::State good = core::state_of(range);
   const auto refused = [&](const core::State& bad, const std::string& name) {

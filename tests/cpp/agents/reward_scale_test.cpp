@@ -14,7 +14,7 @@ namespace sdnn::agents {
 namespace {
 
 // 2^40 is 40 powers of two above 1; the headroom is 16, and 4 more after each refusal.
-TEST(RewardScale, RefusesWhatIsFarBeyondUntilItRecurs) {
+TEST(RewardScale, RefusesAnOutlierUntilItRecursSevenTimes) {
   RewardScale scale;
   EXPECT_TRUE(scale.accepts(0.0));
   EXPECT_FALSE(scale.size());
@@ -29,14 +29,14 @@ TEST(RewardScale, RefusesWhatIsFarBeyondUntilItRecurs) {
   EXPECT_TRUE(RewardScale().accepts(0x1p1000));
 }
 
-TEST(RewardScale, BeginsWithWhatIsCommon) {
+TEST(RewardScale, StartsWithTheCommonSizeOfTheFirstRewards) {
   RewardScale scale(std::vector<double>{0.0, 0x1p90, 1.0, -1.0, 0.0, 0.5});
   EXPECT_EQ(scale.size(), 0);
   EXPECT_FALSE(scale.accepts(0x1p90));
 }
 
 // From 40 to 16 above the largest reward of a window, which is 0, less a quarter, and so on.
-TEST(RewardScale, ForgetsASizeThatNoRewardReaches) {
+TEST(RewardScale, ForgetsASizeThatRewardsNoLongerReach) {
   RewardScale scale;
   ASSERT_TRUE(scale.accepts(0x1p40));
   for (int n = 1; n < 1024; ++n) scale.accepts(0.0);
@@ -53,7 +53,7 @@ TEST(RewardScale, ForgetsASizeThatNoRewardReaches) {
 }
 
 // The first reward of 2^60 has 31 bits, so that 1 is none; the smaller unit clips its value.
-TEST(QLambda, RefinesItsUnitForSmallerRewards) {
+TEST(QLambda, RefineUnitMakesSmallerRewardsLearnable) {
   QLambda agent({{.n_inputs = 2, .n_pattern_units = 40}, std::vector<std::size_t>{3}, 1}, {}, 1);
   const std::vector<double> state{0.3, 0.6};
   const auto value = [&](std::size_t action) {

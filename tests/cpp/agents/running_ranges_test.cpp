@@ -23,7 +23,7 @@ TEST(RunningRanges, AreTwoAndAHalfDeviationsAroundTheMean) {
   EXPECT_GT(high, 7.0);
 }
 
-TEST(RunningRanges, MissingReadingsAreLeftOutAndHugeOnesStayFinite) {
+TEST(RunningRanges, IgnoreMissingReadingsAndStayFinite) {
   RunningRanges ranges(1);
   const double infinity = std::numeric_limits<double>::infinity();
   for (const double x : {2.0, std::nan(""), infinity, 4.0}) ranges.note(std::vector{x});
@@ -38,7 +38,7 @@ TEST(RunningRanges, MissingReadingsAreLeftOutAndHugeOnesStayFinite) {
 }
 
 // Symbols, angles and pairs keep their ranges.
-TEST(Observations, RunningRangesFollowNumbersOnly) {
+TEST(Observations, RunningRangesChangeForNumbersOnly) {
   ObservationConfig config;
   config.low = {0.0, -1.0, -1.0, {}};
   config.high = {1.0, 1.0, 1.0, {}};

@@ -27,7 +27,7 @@ std::vector<SoftmaxTerm> softmax_of(const std::vector<double>& preferences,
   return terms;
 }
 
-TEST(Softmax, EqualsItsFormulaInDoubles) {
+TEST(Softmax, EqualsItsFormulaInFloatingPoint) {
   core::Random random(1, core::Stream::weights);
   for (int trial = 0; trial < 200; ++trial) {
     std::vector<double> preferences(1 + random.below(7));
@@ -56,7 +56,7 @@ TEST(Softmax, EqualPreferencesAreExactlyEven) {
   }
 }
 
-TEST(Softmax, AnActionThatIsNotAllowedHasNoPart) {
+TEST(Softmax, AMaskedActionHasProbabilityZero) {
   const std::uint8_t allowed[] = {0, 1, 1};
   const auto terms = softmax_of({9.0, 1.0, 1.0}, allowed);
   EXPECT_EQ(terms[0].weight, 0U);
@@ -81,7 +81,7 @@ TEST(Softmax, ActionsAreDrawnByTheirProbability) {
 }
 
 // Three units over five bins: thresholds between bins 0 and 1, at bin 2, between bins 3 and 4.
-TEST(Thermometers, UnitsAreAboveTheThresholdsBelowTheBin) {
+TEST(Thermometers, UnitsWithThresholdsAboveTheBinAreNegative) {
   const approximators::Thermometers thermometers(3, {5, 0});
   ASSERT_EQ(thermometers.n_columns(), 3U);
   const std::vector<std::vector<std::int32_t>> negative{

@@ -31,7 +31,7 @@ void step(WarmUp& warm_up, std::size_t environment = 0) {
   learn(warm_up, environment, warm_up.act(draw, always, true, environment));
 }
 
-TEST(WarmUp, KeepsActionsForSomeStepsAndReachesAll) {
+TEST(WarmUp, RepeatsActionsForSomeStepsAndTakesAllOfThem) {
   WarmUp warm_up(2, 1, 1000, 3, true);
   std::set<double> taken;
   int n_changes = 0;
@@ -47,7 +47,7 @@ TEST(WarmUp, KeepsActionsForSomeStepsAndReachesAll) {
   EXPECT_GT(n_changes, 20);
 }
 
-TEST(WarmUp, KeepsNoActionThatIsNotAllowed) {
+TEST(WarmUp, DoesNotRepeatAMaskedAction) {
   WarmUp warm_up(2, 1, 1000, 3, true);
   double forbidden = -1.0;
   const auto draw_other = [&](core::Pcg64& random, Numbers& action) {
@@ -62,7 +62,7 @@ TEST(WarmUp, KeepsNoActionThatIsNotAllowed) {
   }
 }
 
-TEST(WarmUp, RemembersMasksWhereThereAreSome) {
+TEST(WarmUp, RemembersMasks) {
   WarmUp warm_up(1, 1, 1000, 3, true);
   const Numbers here{0.5}, action{1.0};
   const std::vector<std::uint8_t> mask{0, 1, 1};
@@ -76,7 +76,7 @@ TEST(WarmUp, RemembersMasksWhereThereAreSome) {
   }
 }
 
-TEST(WarmUp, EvaluationChangesNothing) {
+TEST(WarmUp, EvaluationDoesNotChangeItsActions) {
   WarmUp one(2, 1, 100, 3, true), other = one;
   for (int t = 0; t < 50; ++t) {
     (void)one.act(draw, always, false, 0);
@@ -84,7 +84,7 @@ TEST(WarmUp, EvaluationChangesNothing) {
   }
 }
 
-TEST(WarmUp, RemembersTransitionsInTheirOrder) {
+TEST(WarmUp, RemembersTransitionsInOrder) {
   WarmUp warm_up(2, 1, 3, 3, true);
   warm_up.set_n_environments(2);
   learn(warm_up, 1, {2.0});
@@ -104,7 +104,7 @@ TEST(WarmUp, RemembersTransitionsInTheirOrder) {
   EXPECT_THROW((void)warm_up.act(draw, always, true, 1), std::invalid_argument);
 }
 
-TEST(WarmUp, WaitsForWhatWasActedWhereOnlyOwnActionsAreLearned) {
+TEST(WarmUp, WaitsForPendingActionsIfOnlyTheAgentsActionsAreLearned) {
   WarmUp warm_up(2, 1, 2, 3, false);
   warm_up.set_n_environments(2);
   step(warm_up, 0);

@@ -76,7 +76,7 @@ void expect_a_model(Q model) {
   EXPECT_NEAR(q.value(state, 1), 3.0, 0.5);
 }
 
-TEST(ActionValue, EveryModelKeepsTheConceptsPromises) {
+TEST(ActionValue, EveryModelReadsWithoutChangeAndMovesToItsTarget) {
   expect_a_model(testing::LookupTable(2, 4, 5));
   expect_a_model(SDNNC(small_network(), 3));
   expect_a_model(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
@@ -121,13 +121,13 @@ void expect_that_workspaces_follow(Q q) {
   expect_fresh(copy, workspace_of_both, states[0]);
 }
 
-TEST(ActionValue, AnyNumberOfWorkspacesFollowsAModel) {
+TEST(ActionValue, WorkspacesFollowTheUpdatesOfAModel) {
   expect_that_workspaces_follow(SDNNC(small_network(), 3));
   expect_that_workspaces_follow(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
 }
 
 #ifndef NDEBUG
-TEST(ActionValueDeathTest, ForeignWorkspacesOfAnotherSizeAreRefused) {
+TEST(ActionValueDeathTest, AWorkspaceOfAnotherSizeIsRefused) {
   SDNNCConfig config = small_network();
   const SDNNC network(config, 3);
   config.n_hidden_units += 8;
@@ -160,7 +160,7 @@ void expect_rates_as_defined(Q model) {
   EXPECT_EQ(row, same);
 }
 
-TEST(ActionValue, EveryModelCorrectsAtARateAsDefined) {
+TEST(ActionValue, EveryModelCorrectsAtARateLikeAtOneTowardsAMixedTarget) {
   expect_rates_as_defined(testing::LookupTable(2, 4, 5));
   expect_rates_as_defined(SDNNC(small_network(), 3));
   expect_rates_as_defined(RBFNetwork({.n_inputs = 2, .n_actions = 5}));

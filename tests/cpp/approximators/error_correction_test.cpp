@@ -19,36 +19,36 @@ std::vector<std::uint32_t> select(std::vector<std::int32_t> potentials, int defi
 
 using Units = std::vector<std::uint32_t>;
 
-TEST(SelectUnits, NothingWithoutDeficit) { EXPECT_EQ(select({1, -1}, 0), Units{}); }
+TEST(SelectUnits, SelectsNoneWithoutDeficit) { EXPECT_EQ(select({1, -1}, 0), Units{}); }
 
 // Seven units in three subsets, cut at floor(7i/3): {0,1}, {2,3}, {4,5,6}.
-TEST(SelectUnits, TheNearestInactiveUnitOfEachSubset) {
+TEST(SelectUnits, SelectsTheNearestInactiveUnitOfEachSubset) {
   EXPECT_EQ(select({-5, -3, 9, -8, -7, -2, -2}, 3), (Units{1, 3, 5}));
 }
 
-TEST(SelectUnits, TheNearestActiveUnitOfEachSubset) {
+TEST(SelectUnits, SelectsTheNearestActiveUnitOfEachSubset) {
   EXPECT_EQ(select({5, 3, -9, 8, 7, 2, 2}, -3), (Units{1, 3, 5}));
 }
 
-TEST(SelectUnits, ASubsetWithoutSuchAUnitGivesNone) {
+TEST(SelectUnits, SelectsNoneOfASubsetWithoutSuchAUnit) {
   EXPECT_EQ(select({5, 3, 9, -8, 7, 2, 2}, 3), (Units{3}));
   EXPECT_EQ(select({5, 3, 9, 8}, 2), Units{});
 }
 
-TEST(SelectUnits, APotentialOfZeroIsInactive) {
+TEST(SelectUnits, CountsAPotentialOfZeroAsInactive) {
   EXPECT_EQ(select({0, -1}, 1), (Units{0}));
   EXPECT_EQ(select({0, 1}, -1), (Units{1}));
 }
 
-TEST(SelectUnits, EqualDistancesGoToTheLowestIndex) {
+TEST(SelectUnits, SelectsTheLowestIndexOfEqualDistances) {
   EXPECT_EQ(select({-4, -4, -4}, 1), Units{0});
 }
 
-TEST(SelectUnits, OneSubsetPerUnitTakesAll) {
+TEST(SelectUnits, SelectsAllWithOneSubsetPerUnit) {
   EXPECT_EQ(select({-4, -40, -400}, 3), (Units{0, 1, 2}));
 }
 
-TEST(SelectUnits, InstructionSetsSelectTheNearestOfAnySubset) {
+TEST(SelectUnits, SelectsTheSameUnitsOnEveryInstructionSet) {
   core::Random random(1, core::Stream::weights);
   for (int size = 1; size < 150; ++size) {
     std::vector<std::int32_t> potentials(static_cast<std::size_t>(size));

@@ -19,20 +19,20 @@ FiredRules fire(const FuzzyRules& rules, const std::vector<double>& state) {
   return fired;
 }
 
-TEST(FuzzyRules, TruthValuesByHand) {
+TEST(FuzzyRules, TruthValuesAreAsWorkedByHand) {
   const FuzzyRules rules({.n_inputs = 2, .n_sets = 5, .n_actions = 3});
   EXPECT_EQ(rules.n_rules(), 25U);
   // 0.25 (n_sets - 1) = 1: the centre of set 1. 0.8125 * 4 = 3.25: sets 3 and 4.
-  const FiredRules one = fire(rules, {0.25, 0.8125});
-  EXPECT_EQ(one.rules, (std::vector<std::size_t>{8, 9}));
-  EXPECT_EQ(one.truth_values, (std::vector<double>{0.75, 0.25}));
+  const FiredRules at_a_centre = fire(rules, {0.25, 0.8125});
+  EXPECT_EQ(at_a_centre.rules, (std::vector<std::size_t>{8, 9}));
+  EXPECT_EQ(at_a_centre.truth_values, (std::vector<double>{0.75, 0.25}));
   // 0.125 * 4 = 0.5: sets 0 and 1.
-  const FiredRules two = fire(rules, {0.125, 0.8125});
-  EXPECT_EQ(two.rules, (std::vector<std::size_t>{3, 8, 4, 9}));
-  EXPECT_EQ(two.truth_values, (std::vector<double>{0.375, 0.375, 0.125, 0.125}));
+  const FiredRules between_centres = fire(rules, {0.125, 0.8125});
+  EXPECT_EQ(between_centres.rules, (std::vector<std::size_t>{3, 8, 4, 9}));
+  EXPECT_EQ(between_centres.truth_values, (std::vector<double>{0.375, 0.375, 0.125, 0.125}));
 }
 
-TEST(FuzzyRules, TruthValuesArePartsOfOneAndTheRulesDiffer) {
+TEST(FuzzyRules, TruthValuesOfDifferentRulesSumToOne) {
   core::Random random(3, core::Stream::ties);
   for (const int d : {1, 2, 3, 4, 6}) {
     const FuzzyRules rules({.n_inputs = d, .n_sets = 2 + d, .n_actions = 2});
@@ -55,7 +55,7 @@ TEST(FuzzyRules, TruthValuesArePartsOfOneAndTheRulesDiffer) {
 }
 
 // The triangles written down: max(0, 1 - |x - centre| / spacing), multiplied over the inputs.
-TEST(FuzzyRules, AgreesWithTheTrianglesOfAllRules) {
+TEST(FuzzyRules, EqualProductsOfTrianglesOfAllRules) {
   const FuzzyRules rules({.n_inputs = 3, .n_sets = 4, .n_actions = 1});
   core::Random random(4, core::Stream::ties);
   for (int trial = 0; trial < 200; ++trial) {
@@ -79,7 +79,7 @@ std::string refusal(const FuzzyRulesConfig& config) {
   return testing::message_of<std::length_error>([&] { FuzzyRules rules(config); });
 }
 
-TEST(FuzzyRules, TooLargeATableIsRefusedBeforeMemoryIsAllocated) {
+TEST(FuzzyRules, RefuseLargeTablesBeforeTheyAllocateMemory) {
   EXPECT_EQ(
       refusal({.n_inputs = 9}),
       "n_sets or n_inputs must be smaller: a table of 9^9 = 387420489 rules needs 32543321076 "
@@ -91,7 +91,7 @@ TEST(FuzzyRules, TooLargeATableIsRefusedBeforeMemoryIsAllocated) {
   EXPECT_EQ(refusal({.n_inputs = 2, .max_table_bytes = 81 * 84}), "no error");
 }
 
-TEST(FuzzyRules, ABadStateFiresNothing) {
+TEST(FuzzyRules, RefuseBadStatesAndFireNoRules) {
   const FuzzyRules rules({.n_inputs = 2});
   FiredRules fired = fire(rules, {0.3, 0.4});
   const auto before = fired.rules;

@@ -25,7 +25,7 @@ std::vector<std::int32_t> potentials(const HiddenLayer& p, const Input& input) {
   return h;
 }
 
-TEST(HiddenLayer, PotentialsAndCorrectionByHand) {
+TEST(HiddenLayer, PotentialsAndCorrectionsAreAsWorkedByHand) {
   HiddenLayer p(2, 3);
   p.set_weight(0, 0, 2);
   p.set_weight(0, 2, -1);
@@ -42,7 +42,7 @@ TEST(HiddenLayer, PotentialsAndCorrectionByHand) {
 }
 
 // Random problems of many shapes, with weights on both sides of one byte, against plain sums.
-TEST(HiddenLayer, EqualsPlainSumsOnRandomProblems) {
+TEST(HiddenLayer, PotentialsEqualPlainSumsOnRandomProblems) {
   core::Random random(11, core::Stream::weights);
   std::size_t n_high_columns = 0;
   for (int problem = 0; problem < 60; ++problem) {
@@ -96,7 +96,7 @@ TEST(HiddenLayer, EqualsPlainSumsOnRandomProblems) {
   EXPECT_GT(n_high_columns, 1000U);
 }
 
-TEST(HiddenLayer, AWeightOutsideAByteHasAHighByte) {
+TEST(HiddenLayer, AWeightBeyondAByteHasAHighByte) {
   HiddenLayer p(3, 2);
   const Input x{.plus = {0}, .minus = {1}};
   const std::vector<std::uint32_t> unit = {2};
@@ -117,7 +117,7 @@ TEST(HiddenLayer, AWeightOutsideAByteHasAHighByte) {
 }
 
 // A pass reads only the columns with high bytes if a block has few of them, else all columns.
-TEST(HiddenLayer, FewAndManyHighBytesAddUpAlike) {
+TEST(HiddenLayer, FewAndManyHighBytesGiveTheSameSums) {
   HiddenLayer p(130, 1000);
   for (std::size_t j = 0; j < 1000; j += 3) p.set_weight(7, j, j % 2 == 0 ? 5000 : -5000);
   p.set_weight(100, 6, 200);
@@ -130,7 +130,7 @@ TEST(HiddenLayer, FewAndManyHighBytesAddUpAlike) {
   EXPECT_EQ(h[0], 0);
 }
 
-TEST(HiddenLayer, TouchingMemoryChangesNothing) {
+TEST(HiddenLayer, TouchingMemoryDoesNotChangeWeights) {
   HiddenLayer p(70, 100);
   p.set_weight(3, 50, -1000);
   p.touch_memory();
@@ -149,7 +149,7 @@ TEST(HiddenLayer, CorrectionsThatCancelStayInAByte) {
 }
 
 // Bounds of weights are looked up and lowered on the way, those of neighbours too.
-TEST(HiddenLayer, CorrectionsEqualPlainOnesHoweverFarWeightsGo) {
+TEST(HiddenLayer, CorrectionsEqualPlainOnesAtAnySizeOfWeights) {
   constexpr std::size_t kUnits = 130;
   constexpr std::uint32_t kColumns = 40;
   HiddenLayer p(kUnits, kColumns, 10);
@@ -185,7 +185,7 @@ TEST(HiddenLayer, CorrectionsEqualPlainOnesHoweverFarWeightsGo) {
 }
 
 // The bound of a weight grows with every correction, and is looked up when it gets to the limit.
-TEST(HiddenLayer, AWeightThatCameBackStillHasItsHighByte) {
+TEST(HiddenLayer, AWeightNearTheLimitOfAByteKeepsItsValueOverManyCorrections) {
   HiddenLayer p(1, 2);
   const Input x{.plus = {0}, .minus = {}};
   const std::vector<std::uint32_t> unit = {0};
@@ -198,7 +198,7 @@ TEST(HiddenLayer, AWeightThatCameBackStillHasItsHighByte) {
   }
 }
 
-TEST(HiddenLayer, OverflowIsDetectedBeforeAnythingChanges) {
+TEST(HiddenLayer, RefusesWeightsBeyondTheLimitAndChangesNothing) {
   HiddenLayer p(2, 2);
   const Input x{.plus = {0}, .minus = {}};
   p.set_weight(1, 0, 16382);
@@ -213,12 +213,12 @@ TEST(HiddenLayer, OverflowIsDetectedBeforeAnythingChanges) {
   EXPECT_EQ(p.weight(1, 0), 16382);
 }
 
-TEST(HiddenLayer, ALargerInputLowersTheWeightLimitSoThatPotentialsFit) {
+TEST(HiddenLayer, ManyColumnsLowerTheWeightLimitSoThatPotentialsFit) {
   const HiddenLayer p(1, std::size_t{1} << 20);
   EXPECT_EQ(p.weight_limit(), 1023);  // 2^20 * 1023 < 2^30
 }
 
-TEST(HiddenLayer, AddingToAColumnIsSettingItsWeights) {
+TEST(HiddenLayer, AddingToAColumnEqualsSettingItsWeights) {
   HiddenLayer added(130, 3);
   HiddenLayer set(130, 3);
   core::Random random(5, core::Stream::weights);
@@ -246,7 +246,7 @@ TEST(HiddenLayer, AddingToAColumnIsSettingItsWeights) {
   EXPECT_THROW(added.add_to_column(0, changes, 1), std::invalid_argument);
 }
 
-TEST(HiddenLayer, NamesWhatIsImpossible) {
+TEST(HiddenLayer, RefusesBadSizesAndWeights) {
   EXPECT_THROW(HiddenLayer(0, 1), std::invalid_argument);
   EXPECT_THROW(HiddenLayer(1, 0), std::invalid_argument);
   EXPECT_THROW(HiddenLayer(1, 3, 4), std::invalid_argument);

@@ -57,7 +57,7 @@ Numbers values_of_all(const LinearSDNN& readout, const Numbers& state, bool aver
   return all;
 }
 
-TEST(LinearSDNN, HasTheSameValuesWithMoreInputs) {
+TEST(LinearSDNN, KeepsItsValuesWhenInputsAreAdded) {
   for (int n_first = 2; n_first <= 5; ++n_first) {
     core::Random random(7, core::Stream::weights);
     LinearSDNN readout(small_readout(n_first), kThreeAndTwo, 5);
@@ -82,7 +82,7 @@ TEST(LinearSDNN, HasTheSameValuesWithMoreInputs) {
   }
 }
 
-TEST(LinearSDNN, IsWiredAsIfInputsHadBeenAddedAtOnce) {
+TEST(LinearSDNN, InputsAddedOneByOneAreWiredLikeInputsAddedAtOnce) {
   core::Random random(7, core::Stream::weights);
   LinearSDNN two(small_readout(2), kThreeAndTwo, 5);
   learn_at_random(two, 30, random);
@@ -98,13 +98,13 @@ TEST(LinearSDNN, IsWiredAsIfInputsHadBeenAddedAtOnce) {
   EXPECT_TRUE(std::ranges::equal(five.weights(), at_once.weights()));
 }
 
-TEST(LinearSDNN, HasTheSmallestPatternsWithAnyNumberOfInputs) {
+TEST(LinearSDNN, HasAtLeast64PatternUnitsWithManyInputs) {
   for (const int n_inputs : {300, 50'000, std::numeric_limits<int>::max()}) {
     EXPECT_EQ(with_pattern_units({.n_inputs = n_inputs}).n_pattern_units, 64) << n_inputs;
   }
 }
 
-TEST(LinearSDNN, RefusesCountsThatNoReadoutHas) {
+TEST(LinearSDNN, RefusesStatesWithImpossibleCounts) {
   core::Random random(7, core::Stream::weights);
   LinearSDNN readout(small_readout(2), kThreeAndTwo, 5);
   learn_at_random(readout, 9, random);

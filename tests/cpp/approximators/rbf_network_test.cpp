@@ -42,7 +42,7 @@ UsedRBF taught(const RBFNetworkConfig& config, int n_corrections) {
 }
 
 // d = 1, two bases at 0 and 1, width 1: at x = 0 Gaussians 1 and e^-1/2, at 1/2 equal ones.
-TEST(RBFNetwork, OneGradientStepByHand) {
+TEST(RBFNetwork, AGradientStepIsAsWorkedByHand) {
   UsedRBF network(
       {.n_inputs = 1, .n_bases = 2, .n_actions = 3, .width = 1.0, .gradient_rate = 0.5});
   EXPECT_EQ(network.n_joint_bases(), 4U);
@@ -145,7 +145,7 @@ std::string refusal_of_network(const RBFNetworkConfig& config) {
   return testing::message_of<std::length_error>([&] { UsedRBF network(config); });
 }
 
-TEST(RBFNetwork, TooManyBasesAreRefusedBeforeMemoryIsAllocated) {
+TEST(RBFNetwork, RefusesTooManyBasesBeforeItAllocatesMemory) {
   EXPECT_EQ(refusal_of_network({.n_inputs = 13}),
             "n_bases or n_inputs must be smaller: a table of 4^14 = 268435456 joint bases needs "
             "2147483648 bytes, but "
@@ -160,7 +160,7 @@ TEST(RBFNetwork, TooManyBasesAreRefusedBeforeMemoryIsAllocated) {
       "but max_table_bytes is 1073741824");
 }
 
-TEST(RBFNetwork, BadArgumentsChangeNothing) {
+TEST(RBFNetwork, RefusesBadArgumentsAndChangesNothing) {
   UsedRBF network = taught({.n_inputs = 2, .n_actions = 3}, 10);
   const std::vector<double> weights(network.weights().begin(), network.weights().end());
   const std::vector<double> good = {0.1, 0.2};

@@ -22,7 +22,7 @@ std::vector<double> averaged_values(Network& network, const State& state) {
   return out;
 }
 
-TEST(SDNNC, AveragingDoesNotTouchLearning) {
+TEST(SDNNC, AveragingDoesNotChangeLearning) {
   Network network(small(), 5), averaging_one(averaging(), 5);
   core::Random random(1, core::Stream::weights);
   for (int t = 0; t < 400; ++t) {
@@ -41,7 +41,7 @@ TEST(SDNNC, AveragingDoesNotTouchLearning) {
   EXPECT_NE(averaged_values(averaging_one, state), values(network, state));
 }
 
-TEST(SDNNC, OtherParametersBeginAnotherAverage) {
+TEST(SDNNC, SettingParametersRestartsTheAverage) {
   Network network(averaging(), 5);
   const State state = {0.2, 0.7, 0.4};
   for (int t = 0; t < 50; ++t) network.update(state, 30, 10.0);

@@ -13,7 +13,7 @@ TEST(ActionCode, ThePaperHas601Windows) {
   for (const std::size_t action : {0U, 1U, 300U, 600U}) EXPECT_EQ(code.first_unit(action), action);
 }
 
-TEST(ActionCode, FewActionsGetWindowsSpreadEvenly) {
+TEST(ActionCode, FewActionsHaveEvenlySpacedWindows) {
   const ActionCode code(900, 300, 3);
   EXPECT_EQ(code.first_unit(0), 0U);
   EXPECT_EQ(code.first_unit(1), 300U);
@@ -21,14 +21,14 @@ TEST(ActionCode, FewActionsGetWindowsSpreadEvenly) {
   EXPECT_EQ(ActionCode(10, 4, 1).first_unit(0), 0U);
 }
 
-TEST(ActionCode, TheTorqueRangeIsCutEvenly) {
+TEST(ActionCode, ActionsAreEvenlySpacedInTheirRange) {
   EXPECT_EQ(action_value(0, 601, -10, 10), -10.0);
   EXPECT_EQ(action_value(300, 601, -10, 10), 0.0);
   EXPECT_EQ(action_value(600, 601, -10, 10), 10.0);
   EXPECT_DOUBLE_EQ(action_value(1, 601, -10, 10), -10.0 + 1.0 / 30);
 }
 
-TEST(ActionCode, NamesWhatIsImpossible) {
+TEST(ActionCode, RefusesBadSizesByName) {
   const auto message = [](int n, int active, int actions) {
     return testing::message_of([&] { ActionCode(n, active, actions); });
   };

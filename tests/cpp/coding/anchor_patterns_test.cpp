@@ -12,14 +12,14 @@ PatternTable paper_table(std::uint64_t seed, AnchorConfig config = {.n_units = 2
   return anchor_patterns(config, random);
 }
 
-TEST(AnchorPatterns, AnchorsAreBalancedAndEveryPatternNearlySo) {
+TEST(AnchorPatterns, AnchorsHaveHalfOfTheirUnitsOn) {
   const PatternTable table = paper_table(2);
   for (std::size_t anchor = 0; anchor < 8; ++anchor) {
     EXPECT_EQ(table[45 * anchor].count(), 100U);
   }
 }
 
-TEST(AnchorPatterns, UnbalancedAnchorsAreFairUnits) {
+TEST(AnchorPatterns, UnbalancedAnchorsHaveIndependentUnits) {
   core::Random random(6, core::Stream::code_books);
   core::Random same = random;
   const PatternTable table = anchor_patterns(
@@ -27,14 +27,14 @@ TEST(AnchorPatterns, UnbalancedAnchorsAreFairUnits) {
   for (std::size_t k = 0; k < 70; ++k) EXPECT_EQ(table[0][k], same.below(2) == 1);
 }
 
-TEST(AnchorPatterns, OddPatternsAreBalancedToOneUnit) {
+TEST(AnchorPatterns, AnchorsOfOddSizeAreBalancedToOneUnit) {
   const PatternTable table = paper_table(2, {.n_units = 7});
   EXPECT_EQ(table[0].count(), 3U);
 }
 
 // Between two anchors every differing unit flips once: distances to the first anchor are the cuts
 // floor(j * differing / 45), and the last portion leads to the next anchor.
-TEST(AnchorPatterns, NeighboursDifferByNearlyEqualPortions) {
+TEST(AnchorPatterns, NeighboursDifferByEqualPortionsOfUnits) {
   for (const bool circular : {false, true}) {
     const PatternTable table = paper_table(3, {.n_units = 200, .circular = circular});
     for (std::size_t first = 0; first < (circular ? 360U : 315U); first += 45) {
@@ -50,7 +50,7 @@ TEST(AnchorPatterns, NeighboursDifferByNearlyEqualPortions) {
   }
 }
 
-TEST(AnchorPatterns, NamesWhatIsImpossible) {
+TEST(AnchorPatterns, RefuseBadSizesByName) {
   const auto message = [](AnchorConfig config) {
     return testing::message_of([&] { paper_table(1, config); });
   };

@@ -39,7 +39,7 @@ TEST(CorrelationMatrix, ApproachesTheCorrelationsOfAngles) {
   }
 }
 
-TEST(CorrelationMatrix, MakesOppositeAndUnrelatedSymbols) {
+TEST(CorrelationMatrix, GivesOppositeAndUncorrelatedPatterns) {
   const std::array<double, 9> wanted{1, -1, 0, -1, 1, 0, 0, 0, 1};
   core::Random random(2, core::Stream::code_books);
   const auto table = coding::correlation_matrix_patterns(200, wanted, 3, random);
@@ -47,7 +47,7 @@ TEST(CorrelationMatrix, MakesOppositeAndUnrelatedSymbols) {
   EXPECT_NEAR(correlation(table, 0, 2), 0.0, 0.021);
 }
 
-TEST(CorrelationMatrix, RefusesWhatIsNoCorrelationMatrix) {
+TEST(CorrelationMatrix, RefusesMatricesThatAreNoCorrelations) {
   core::Random random(2, core::Stream::code_books);
   const auto make = [&](std::array<double, 4> wanted, int n_units) {
     return coding::correlation_matrix_patterns(n_units, wanted, 2, random);

@@ -22,7 +22,7 @@ TEST(PatternTable, KeepsSignsBitByBit) {
   EXPECT_EQ(table.sign(1, 2), 1);
 }
 
-TEST(PatternTable, BeginsEveryPatternOnAWord) {
+TEST(PatternTable, StartsEveryPatternAtAWord) {
   PatternTable table(3, 65);
   EXPECT_EQ(table.n_words(), 2U);
   table.flip(1, 64);
@@ -43,7 +43,7 @@ TEST(PatternTable, BalancedPatternsHaveHalfOfTheUnitsOn) {
   }
 }
 
-TEST(PatternTable, BinsAreHalfOpenAndOneFallsIntoTheLast) {
+TEST(PatternTable, BinsAreHalfOpenAndTheLastOneIsClosed) {
   EXPECT_EQ(coding::bin_of(0.0, 360), 0);
   EXPECT_EQ(coding::bin_of(1.0 / 360 * 0.999, 360), 0);
   EXPECT_EQ(coding::bin_of(0.5, 360), 180);
@@ -51,7 +51,7 @@ TEST(PatternTable, BinsAreHalfOpenAndOneFallsIntoTheLast) {
   EXPECT_EQ(coding::bin_of(1.0, 360), 359);
 }
 
-TEST(PatternTable, RefusesWhatIsNoPattern) {
+TEST(PatternTable, RefusesSignsOfWrongSizeOrValue) {
   const std::array<std::int8_t, 2> signs{1, 0};
   EXPECT_THROW(PatternTable::from_signs(signs, 1, 2), std::invalid_argument);
   EXPECT_THROW(PatternTable::from_signs(signs, 1, 3), std::invalid_argument);

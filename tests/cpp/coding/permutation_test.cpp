@@ -13,11 +13,11 @@ PatternTable table(std::initializer_list<std::int8_t> signs) {
   return PatternTable::from_signs({signs.begin(), signs.size()}, 1, signs.size());
 }
 
-TEST(Permutation, UnitKIsUnitPermutationOfK) {
+TEST(Permutation, MovesUnitPermutationOfKToUnitK) {
   EXPECT_EQ(permuted(table({1, -1, -1}), {2, 0, 1}), table({-1, 1, -1}));
 }
 
-TEST(Permutation, TheInverseUndoesIt) {
+TEST(Permutation, IsUndoneByItsInverse) {
   core::Random random(1, core::Stream::permutations);
   const Permutation sigma = random_permutation(130, random);
   const Permutation back = inverse(sigma);
@@ -28,7 +28,7 @@ TEST(Permutation, TheInverseUndoesIt) {
   EXPECT_EQ(permuted(permuted(pattern, sigma), back), pattern);
 }
 
-TEST(Permutation, RefusesWhatIsNone) {
+TEST(Permutation, RefusesIndicesThatAreNoPermutation) {
   EXPECT_THROW(static_cast<void>(permuted(table({1, -1, -1}), {0, 1})), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(permuted(table({1, -1, -1}), {0, 1, 1})), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(permuted(table({1, -1, -1}), {0, 1, 3})), std::invalid_argument);

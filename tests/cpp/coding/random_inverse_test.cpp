@@ -16,7 +16,7 @@ int product(const PatternTable& table, std::size_t one, std::size_t other) {
   return sum;
 }
 
-TEST(RandomInverse, NeighboursDifferInTheGivenNumberOfEachSign) {
+TEST(RandomInverse, NeighboursDifferInNFlippedUnitsOfEachSign) {
   core::Random random(3, core::Stream::code_books);
   const auto table = coding::random_inverse_patterns({40, 60, 3}, random);
   for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {

@@ -23,7 +23,7 @@ PatternTable table(std::vector<std::int8_t> signs, std::size_t n_bins) {
   return PatternTable::from_signs(signs, n_bins, signs.size() / n_bins);
 }
 
-TEST(SelectiveDesensitization, IsThePatternWhereTheModifierIsOn) {
+TEST(SelectiveDesensitization, KeepsThePatternWhereTheModifierIsOn) {
   // Pair (0, 1): pattern of input 0 where that of input 1 is +1; pair (1, 0) the other way round.
   const SelectiveDesensitization code(
       {table({1, -1, 1, -1}, 1), table({1, 1, -1, -1, -1, 1, 1, -1}, 2)},
@@ -43,7 +43,7 @@ TEST(SelectiveDesensitization, IsThePatternWhereTheModifierIsOn) {
   EXPECT_EQ(positive[1], 0b0100U);  // 0 0 +1 -1
 }
 
-TEST(SelectiveDesensitization, AllowsAnInputAlone) {
+TEST(SelectiveDesensitization, AcceptsASingleInput) {
   const SelectiveDesensitization code({table({1, -1}, 1)}, {table({1, 1}, 1)}, {{0, 0}});
   std::uint64_t active = 0;
   std::uint64_t positive = 0;
@@ -53,7 +53,7 @@ TEST(SelectiveDesensitization, AllowsAnInputAlone) {
 }
 
 // Products read from the tables are those of the codes' words, with shared gates and without.
-TEST(SelectiveDesensitization, TheInnerProductIsThatOfTheCodes) {
+TEST(SelectiveDesensitization, InnerProductsOfBinsEqualThoseOfCodes) {
   core::Random random(4, core::Stream::code_books);
   for (const std::size_t n_units : {5U, 64U, 200U, 300U}) {
     const auto draw = [&] {
@@ -83,7 +83,7 @@ TEST(SelectiveDesensitization, TheInnerProductIsThatOfTheCodes) {
   }
 }
 
-TEST(SelectiveDesensitization, NamesTheBadBin) {
+TEST(SelectiveDesensitization, RefusesBadBinsByIndex) {
   const SelectiveDesensitization code({table({1, -1}, 1)}, {table({1, 1, 1, 1}, 2)}, {{0, 1}});
   code.check_bins(std::array<std::int32_t, 4>{0, 1, 0, 0});
   const std::array<std::int32_t, 4> bad{0, 1, 0, 2};
@@ -93,7 +93,7 @@ TEST(SelectiveDesensitization, NamesTheBadBin) {
   EXPECT_THROW(code.check_bins(std::array<std::int32_t, 3>{0, 0, 0}), std::invalid_argument);
 }
 
-TEST(SelectiveDesensitization, RefusesTablesThatDoNotFit) {
+TEST(SelectiveDesensitization, RefusesTablesOfDifferentSizes) {
   const auto make = [](std::vector<PatternTable> modified, std::vector<PatternTable> modifiers,
                        std::vector<coding::InputPair> pairs) {
     return SelectiveDesensitization(std::move(modified), std::move(modifiers), std::move(pairs));

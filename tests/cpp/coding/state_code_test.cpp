@@ -85,7 +85,7 @@ INSTANTIATE_TEST_SUITE_P(Inputs, StateCodeOfInputs,
                                            Wiring{6, {4}}, Wiring{5, {2, 3}}, Wiring{6, {1, 3, 4}},
                                            Wiring{4, {1, 2, 3}}, Wiring{6, {1, 2, 4, 5}}));
 
-TEST_P(StateCodeOfInputs, TheCodeFollowsTheEquationOfLayer3) {
+TEST_P(StateCodeOfInputs, EqualsTheEquationOfLayer3) {
   const Wiring wiring = GetParam();
   const std::size_t l = wiring.l;
   const auto code = wiring.code(37, 5);
@@ -114,7 +114,7 @@ TEST_P(StateCodeOfInputs, TheCodeFollowsTheEquationOfLayer3) {
 }
 
 // Half a sum and half a difference: one of the two is neutral, whatever the signs.
-TEST_P(StateCodeOfInputs, HalfAsManyPairedColumnsAreActive) {
+TEST_P(StateCodeOfInputs, ThePairedCodeHasHalfAsManyActiveColumns) {
   const std::size_t l = GetParam().l;
   const std::size_t k = GetParam().n_partners();
   const auto code = GetParam().code(37, 5);
@@ -137,7 +137,7 @@ TEST_P(StateCodeOfInputs, HalfAsManyPairedColumnsAreActive) {
   EXPECT_EQ(2 * n_listed, n_active);
 }
 
-TEST_P(StateCodeOfInputs, EveryColumnOfThePairedCodeHasItsUnits) {
+TEST_P(StateCodeOfInputs, EveryColumnOfThePairedCodeStandsForOneOrTwoUnits) {
   const auto code = GetParam().code(13, 5);
   std::vector<int> taken(code.n_columns(), 0);
   for (std::size_t j = 0; j < code.n_columns(); ++j) {
@@ -152,7 +152,7 @@ TEST_P(StateCodeOfInputs, EveryColumnOfThePairedCodeHasItsUnits) {
   EXPECT_THROW(static_cast<void>(code.columns_of(code.n_columns())), std::invalid_argument);
 }
 
-TEST_P(StateCodeOfInputs, TheDifferenceIsThatOfThePairedCodes) {
+TEST_P(StateCodeOfInputs, ChangesOfColumnsEqualTheDifferenceOfCodes) {
   const std::size_t l = GetParam().l;
   const auto code = GetParam().code(50, 6);
   core::Random random(2, core::Stream::ties);
@@ -170,7 +170,7 @@ TEST_P(StateCodeOfInputs, TheDifferenceIsThatOfThePairedCodes) {
   }
 }
 
-TEST_P(StateCodeOfInputs, TheInnerProductIsThatOfTheDenseCodes) {
+TEST_P(StateCodeOfInputs, InnerProductsOfBinsEqualThoseOfDenseCodes) {
   const std::size_t l = GetParam().l;
   const auto code = GetParam().code(50, 6);
   core::Random random(1, core::Stream::ties);
@@ -189,13 +189,13 @@ TEST_P(StateCodeOfInputs, TheInnerProductIsThatOfTheDenseCodes) {
 }
 
 // |x_SD|^2 = sum over groups of the ones of the modifier: 1200 at the paper's size for anchors.
-TEST(StateCode, AnAnchorStateHasHalfOfItsColumns) {
+TEST(StateCode, AnAnchorStateHasHalfOfItsColumnsActive) {
   const auto code = small_code(4, 64, 7);
   const std::vector<Bin> anchors = {0, 45, 90, 135};
   EXPECT_EQ(code.inner_product(anchors, anchors), 12 * 32);
 }
 
-TEST(StateCode, RefusesWrongWiring) {
+TEST(StateCode, RefusesBadPermutationsAndStrides) {
   const auto code = small_code(2, 3, 9);
   const std::vector<PatternTable> tables = {code.table(0), code.table(1)};
   EXPECT_THROW(StateCode({code.table(0)}, {}), std::invalid_argument);

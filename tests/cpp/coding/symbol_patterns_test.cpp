@@ -12,7 +12,7 @@ PatternTable table_of(int n_symbols, int n_units, bool balanced, std::uint64_t s
   return symbol_patterns(n_symbols, n_units, balanced, random);
 }
 
-TEST(SymbolPatterns, ABalancedPatternForEach) {
+TEST(SymbolPatterns, EachSymbolHasABalancedPattern) {
   const PatternTable table = table_of(30, 200, true);
   EXPECT_EQ(table.n_bins(), 30U);
   EXPECT_EQ(table.n_units(), 200U);
@@ -20,7 +20,7 @@ TEST(SymbolPatterns, ABalancedPatternForEach) {
 }
 
 // Independent patterns differ in half of their units: the standard deviation is below 8 of 200.
-TEST(SymbolPatterns, NeighboursAreAsFarApartAsAnyTwo) {
+TEST(SymbolPatterns, AnyTwoSymbolsDifferInHalfOfTheirUnits) {
   const PatternTable table = table_of(30, 200, true);
   for (std::size_t j = 0; j < 30; ++j) {
     for (std::size_t k = j + 1; k < 30; ++k) {
@@ -29,7 +29,7 @@ TEST(SymbolPatterns, NeighboursAreAsFarApartAsAnyTwo) {
   }
 }
 
-TEST(SymbolPatterns, OthersAreFairUnits) {
+TEST(SymbolPatterns, UnbalancedPatternsHaveIndependentUnits) {
   core::Random same(6, core::Stream::code_books);
   const PatternTable table = table_of(2, 70, false, 6);
   for (std::size_t symbol = 0; symbol < 2; ++symbol) {
@@ -37,12 +37,12 @@ TEST(SymbolPatterns, OthersAreFairUnits) {
   }
 }
 
-TEST(SymbolPatterns, AnotherSeedGivesOthers) {
+TEST(SymbolPatterns, EqualSeedsGiveEqualPatterns) {
   EXPECT_EQ(table_of(5, 40, true), table_of(5, 40, true));
   EXPECT_NE(table_of(5, 40, true), table_of(5, 40, true, 2));
 }
 
-TEST(SymbolPatterns, NamesWhatIsImpossible) {
+TEST(SymbolPatterns, RefuseBadSizes) {
   EXPECT_THROW(table_of(0, 40, true), std::invalid_argument);
   EXPECT_THROW(table_of(2, 1, true), std::invalid_argument);
 }

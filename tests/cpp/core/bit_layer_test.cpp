@@ -23,7 +23,7 @@ TEST(BitLayer, UnitIIsBitIModulo64OfItsWord) {
   EXPECT_EQ(layer.count(), 3U);
 }
 
-TEST(BitLayer, VisitsTheUnitsThatAreOnInRisingOrder) {
+TEST(BitLayer, VisitsActiveUnitsInOrder) {
   const auto row = words({0, 63, 64, 127, 199}, 200);
   std::vector<std::size_t> visited;
   BitLayer(row.data(), 200).for_each_set([&](std::size_t unit) { visited.push_back(unit); });
@@ -33,15 +33,15 @@ TEST(BitLayer, VisitsTheUnitsThatAreOnInRisingOrder) {
 TEST(BitLayer, TheDistanceCountsUnitsThatDiffer) {
   const auto a = words({1, 2, 100}, 101);
   const auto b = words({2, 3, 99}, 101);
-  const BitLayer one(a.data(), 101);
-  const BitLayer other(b.data(), 101);
-  EXPECT_EQ(one.distance(other), 4U);
-  EXPECT_EQ(one.distance(one), 0U);
-  EXPECT_NE(one, other);
-  EXPECT_EQ(one, BitLayer(words({1, 2, 100}, 101).data(), 101));
+  const BitLayer layer(a.data(), 101);
+  const BitLayer changed(b.data(), 101);
+  EXPECT_EQ(layer.distance(changed), 4U);
+  EXPECT_EQ(layer.distance(layer), 0U);
+  EXPECT_NE(layer, changed);
+  EXPECT_EQ(layer, BitLayer(words({1, 2, 100}, 101).data(), 101));
 }
 
-TEST(BitLayer, WordsNeededAreRoundedUp) {
+TEST(BitLayer, TheNumberOfWordsIsRoundedUp) {
   static_assert(n_bit_words(0) == 0 && n_bit_words(1) == 1 && n_bit_words(64) == 1);
   static_assert(n_bit_words(65) == 2 && n_bit_words(200) == 4);
   EXPECT_EQ(BitLayer(nullptr, 0).count(), 0U);

@@ -27,7 +27,7 @@ struct Learning {
   }
 };
 
-TEST(ConfigFields, NameTheMembersInOrderThoseOfAPartToo) {
+TEST(ConfigFields, ListMembersAndNestedMembersInOrder) {
   std::string names;
   std::apply([&](const auto&... field) { ((names += std::string(field.name) + " "), ...); },
              Learning::fields());

@@ -55,7 +55,7 @@ TEST(SinCos, KeepsItsBits) {
   EXPECT_EQ(digest, 6117906030201916266u);
 }
 
-TEST(Log, HandlesTheEndsOfItsRange) {
+TEST(Log, IsExactAtTheLimitsOfItsRange) {
   EXPECT_EQ(sdnn::core::log(1.0), 0.0);
   EXPECT_EQ(sdnn::core::log(0.0), -kInfinity);
   EXPECT_EQ(sdnn::core::log(-0.0), -kInfinity);
@@ -65,14 +65,14 @@ TEST(Log, HandlesTheEndsOfItsRange) {
   EXPECT_TRUE(std::isnan(sdnn::core::log(kNaN)));
 }
 
-TEST(Exp, UndoesTheLogarithm) {
+TEST(Exp, IsTheInverseOfTheLogarithm) {
   for (double x = 1e-300; x < 1e300; x *= 7.3) {
     const double y = sdnn::core::log(x);  // an error in y is one of x times |y|
     EXPECT_NEAR(sdnn::core::exp(y) / x, 1.0, (std::abs(y) + 2.0) * 2e-16) << x;
   }
 }
 
-TEST(Exp, HandlesTheEndsOfItsRange) {
+TEST(Exp, IsExactAtTheLimitsOfItsRange) {
   EXPECT_EQ(sdnn::core::exp(0.0), 1.0);
   EXPECT_EQ(sdnn::core::exp(-0.0), 1.0);
   EXPECT_EQ(sdnn::core::exp(5e-324), 1.0);
@@ -96,7 +96,7 @@ TEST(Exp, KeepsItsBits) {
   EXPECT_EQ(digest, 2816221857222245310U);
 }
 
-TEST(Atan2, TreatsZerosAndInfinitiesAsTheCLibraryDoes) {
+TEST(Atan2, TreatsZerosAndInfinitiesLikeTheCLibrary) {
   for (const double y : {0.0, -0.0, 1.0, -1.0, 5e-324, -5e-324, kInfinity, -kInfinity}) {
     for (const double x : {0.0, -0.0, 2.0, -2.0, 1.7e308, -1.7e308, kInfinity, -kInfinity}) {
       const double got = sdnn::core::atan2(y, x), expected = std::atan2(y, x);
@@ -129,7 +129,7 @@ TEST(NormalQuantile, IsOddAboutOneHalfAndRises) {
   }
 }
 
-TEST(NormalQuantile, HandlesTheEndsOfItsRange) {
+TEST(NormalQuantile, IsExactAtTheLimitsOfItsRange) {
   EXPECT_EQ(normal_quantile(0.0), -kInfinity);
   EXPECT_EQ(normal_quantile(1.0), kInfinity);
   for (const double p : {-1e-300, 1.0000000000000002, kInfinity, -kInfinity, kNaN}) {

@@ -7,7 +7,7 @@
 namespace sdnn::core {
 namespace {
 
-TEST(InstructionSet, AnyLevelOnOfferCanBeForced) {
+TEST(InstructionSet, AvailableLevelsCanBeSelectedAndOthersAreRefused) {
   const InstructionSet before = instruction_set();
   for (const auto level : kInstructionSets) {
     if (offers(level)) {
@@ -20,7 +20,7 @@ TEST(InstructionSet, AnyLevelOnOfferCanBeForced) {
   set_instruction_set(name_of(before));
 }
 
-TEST(InstructionSet, NamesWhatIsImpossible) {
+TEST(InstructionSet, AnUnknownNameIsRefusedWithThePossibleOnes) {
   EXPECT_EQ(testing::message_of([] { set_instruction_set("sse9"); }),
             "instruction set must be portable, neon, avx2 or avx512, got sse9");
 }

@@ -23,7 +23,7 @@ struct Drawn {
 
 // Expected numbers of numpy.random.Generator(PCG64(SeedSequence(seeds))): integers, random,
 // integers, raw.
-TEST(Pcg64, DrawsAsNumPy) {
+TEST(Pcg64, DrawsTheNumbersOfNumPy) {
   const std::vector<Drawn> drawn = {
       {{0}, {5, 4, 3, 1, 2}, 0.016527635528529094, 42963, 15002187965291974971U},
       {{5, 4294967296}, {6, 5, 3, 2, 6}, 0.4106650053839328, 718495, 17808439220834274975U},

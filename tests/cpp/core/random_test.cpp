@@ -36,10 +36,10 @@ TEST(Random, StartsWithTheReferenceBits) {
   EXPECT_EQ(zero.bits(), 0x068a99bcd127fe03u);
 }
 
-TEST(Random, StreamsAreIndependentOfOneAnother) {
-  Random one(1, Stream::weights), other(1, Stream::ties);
+TEST(Random, StreamsAreUncorrelated) {
+  Random weights(1, Stream::weights), ties(1, Stream::ties);
   int equal_bits = 0;
-  for (int i = 0; i < 1000; ++i) equal_bits += 64 - std::popcount(one.bits() ^ other.bits());
+  for (int i = 0; i < 1000; ++i) equal_bits += 64 - std::popcount(weights.bits() ^ ties.bits());
   EXPECT_NEAR(equal_bits, 32000, 5 * 126.5);  // five standard deviations
 }
 
@@ -56,10 +56,10 @@ TEST(Random, UniformIsInTheHalfOpenUnitInterval) {
   EXPECT_LT(low, 1e-3);
   EXPECT_LT(high, 1.0);
   EXPECT_GT(high, 0.999);
-  EXPECT_NEAR(sum / 100000, 0.5, 5 * 0.2887 / 316.2);
+  EXPECT_NEAR(sum / 100000, 0.5, 5 * 0.2887 / 316.2);  // five deviations of the mean of 10^5
 }
 
-TEST(Random, BelowIsUniformAndBounded) {
+TEST(Random, BelowIsUniformAndWithinItsBound) {
   Random random(4, Stream::ties);
   std::array<int, 7> counts{};
   for (int i = 0; i < 70000; ++i) {
@@ -120,12 +120,12 @@ TEST(Random, ShuffleReachesEveryOrderEquallyOften) {
   }
 }
 
-TEST(Random, GoesOnFromItsState) {
+TEST(Random, ContinuesFromItsState) {
   Random random(1, Stream::weights);
   for (int i = 0; i < 100; ++i) (void)random.bits();
-  Random other(2, Stream::ties);
-  sdnn::core::restore(other, sdnn::core::state_of(random));
-  for (int i = 0; i < 100; ++i) EXPECT_EQ(other.bits(), random.bits());
+  Random restored(2, Stream::ties);
+  sdnn::core::restore(restored, sdnn::core::state_of(random));
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(restored.bits(), random.bits());
 }
 
 // A state of zeros gives only zeros, for which below(3) would not terminate.

@@ -60,7 +60,7 @@ FileContent example() {
 }
 
 // Byte by byte as the format's own library writes it: larger types first, then by name.
-TEST(Files, AreWrittenAsByTheLibraryOfSafetensors) {
+TEST(Files, HaveTheBytesOfTheSafetensorsLibrary) {
   const testing::Folder folder;
   write_file(folder / "file", example());
   const std::string file = testing::content_of(folder / "file");
@@ -77,7 +77,7 @@ TEST(Files, AreWrittenAsByTheLibraryOfSafetensors) {
   EXPECT_EQ(folder.n_files(), 1U);
 }
 
-TEST(Files, AreReadAsTheyWereWritten) {
+TEST(Files, AreReadAsWritten) {
   const testing::Folder folder;
   for (const FileContent& content : {example(), FileContent{.kind = "estimator", .tensors = {}}}) {
     write_file(folder / "file", content);
@@ -89,7 +89,7 @@ TEST(Files, AreReadAsTheyWereWritten) {
 }
 
 // Files that Python wrote: see tests/python/reference/agent_files.py.
-TEST(Files, OfPythonAreWrittenAgainByteByByte) {
+TEST(Files, FromPythonAreReadAndWrittenByteByByte) {
   const testing::Folder folder;
   for (const std::string name : {"agents/sdnn", "agents/sdnn-symbols", "agents/fuzzy-vector",
                                  "files/training", "files/estimator"}) {
@@ -100,7 +100,7 @@ TEST(Files, OfPythonAreWrittenAgainByteByByte) {
   }
 }
 
-TEST(Files, EveryFlippedBitAndEveryCutIsNoticed) {
+TEST(Files, WithAFlippedBitOrTruncatedAreRefused) {
   const testing::Folder folder;
   Random random(1, Stream::weights);
   for (const std::string name : {"agents/sdnn", "files/training", "files/estimator"}) {
@@ -124,7 +124,7 @@ TEST(Files, EveryFlippedBitAndEveryCutIsNoticed) {
   }
 }
 
-TEST(Files, OfAnotherKindFormatOrProgramAreRefused) {
+TEST(Files, OfAnotherTypeFormatOrProgramAreRefused) {
   const testing::Folder folder;
   const auto path = folder / "file";
   const auto error_of = [&path] {
@@ -159,7 +159,7 @@ TEST(Files, OfAnotherKindFormatOrProgramAreRefused) {
 #endif
 }
 
-TEST(Safetensors, SayWhatIsWrongWithThem) {
+TEST(Safetensors, InvalidFilesAreRefusedWithTheProblem) {
   const auto error_of = [](const std::string& file) {
     return testing::runtime_error_of([&] { (void)parsed(file); });
   };
@@ -206,7 +206,7 @@ TEST(Safetensors, SayWhatIsWrongWithThem) {
 }
 
 // Nothing but a content or std::runtime_error comes of any damage.
-TEST(Safetensors, NoDamageGivesAnythingElse) {
+TEST(Safetensors, DamagedFilesAreReadOrRefusedWithARuntimeError) {
   const std::string good = file_of(kHeader, kData);
   Random random(1, Stream::weights);
   int n_refused = 0;

@@ -45,7 +45,7 @@ struct Outer {
 
 using Names = std::vector<std::string>;
 
-TEST(State, HasATensorOfEveryMemberInTheOrderOfTheNames) {
+TEST(State, HasATensorForEveryMemberInOrderOfNames) {
   const State state = state_of(Outer{});
   Names names;
   for (const auto& [name, tensor] : state) names.push_back(name);
@@ -64,27 +64,27 @@ TEST(State, HasATensorOfEveryMemberInTheOrderOfTheNames) {
   EXPECT_EQ(testing::number_of<float>(state, "grid", 4), 5.0F);
 }
 
-TEST(State, IsPutBack) {
+TEST(State, RestoresEveryMember) {
   Outer changed;
   changed.step = 8;
   changed.is_on = false;
   changed.list = {7, 8, 9};
   changed.grid[5] = -1.0F;
   changed.second.value = testing::kNaN;
-  Outer other;
-  restore(other, state_of(changed));
-  EXPECT_EQ(other.step, 8);
-  EXPECT_FALSE(other.is_on);
-  EXPECT_EQ(other.list, changed.list);
-  EXPECT_EQ(other.grid, changed.grid);
-  EXPECT_EQ(other.first.value, 0.5);
-  EXPECT_EQ(state_of(other), state_of(changed));  // the bits of a NaN too
+  Outer restored;
+  restore(restored, state_of(changed));
+  EXPECT_EQ(restored.step, 8);
+  EXPECT_FALSE(restored.is_on);
+  EXPECT_EQ(restored.list, changed.list);
+  EXPECT_EQ(restored.grid, changed.grid);
+  EXPECT_EQ(restored.first.value, 0.5);
+  EXPECT_EQ(state_of(restored), state_of(changed));  // the bits of a NaN too
   changed.list.clear();
-  restore(other, state_of(changed));
-  EXPECT_TRUE(other.list.empty());
+  restore(restored, state_of(changed));
+  EXPECT_TRUE(restored.list.empty());
 }
 
-TEST(State, WhatDoesNotFitIsNamedAndChangesNothing) {
+TEST(State, RefusesInconsistentTensorsAndChangesNothing) {
   Outer object;
   testing::expect_that_damage_is_refused(object);
   const State good = state_of(object);
@@ -118,7 +118,7 @@ struct Sparse {
   }
 };
 
-TEST(State, HasNothingOfWhatIsMissing) {
+TEST(State, OmitsMissingOptionalMembers) {
   Sparse none;
   EXPECT_TRUE(state_of(none).empty());
   Sparse some{2.5, std::vector<Inner>(11)};
@@ -126,16 +126,16 @@ TEST(State, HasNothingOfWhatIsMissing) {
   const State state = state_of(some);
   EXPECT_EQ(state.size(), 12U);
   EXPECT_EQ(testing::number_of<double>(state, "other.10.value"), 7.0);
-  Sparse other{1.0, std::vector<Inner>(2)};
-  restore(other, state);
-  EXPECT_EQ(other.limit, 2.5);
-  EXPECT_EQ(state_of(other), state);
-  restore(other, state_of(none));
-  EXPECT_EQ(other.limit, std::nullopt);
-  EXPECT_TRUE(other.others.empty());
+  Sparse restored{1.0, std::vector<Inner>(2)};
+  restore(restored, state);
+  EXPECT_EQ(restored.limit, 2.5);
+  EXPECT_EQ(state_of(restored), state);
+  restore(restored, state_of(none));
+  EXPECT_EQ(restored.limit, std::nullopt);
+  EXPECT_TRUE(restored.others.empty());
   State bad = state;
   bad.erase("other.4.value");
-  testing::expect_refused(other, bad, "state: other.10.value must not be there");
+  testing::expect_refused(restored, bad, "state: other.10.value must not be there");
 }
 
 TEST(StateReader, NamesTheTensorThatCouldNotBeRestored) {

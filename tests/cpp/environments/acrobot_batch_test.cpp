@@ -83,7 +83,7 @@ int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps,
   return n_episodes;
 }
 
-TEST(AcrobotBatch, KeepsTheBitsOfASingleOneAtEveryLevel) {
+TEST(AcrobotBatch, HasTheBitsOfSingleAcrobotsOnEveryInstructionSet) {
   sdnn::testing::on_every_instruction_set([&](auto level) {
     SCOPED_TRACE(level);
     int n_episodes = 0, n_goals = 0;
@@ -95,7 +95,7 @@ TEST(AcrobotBatch, KeepsTheBitsOfASingleOneAtEveryLevel) {
   });
 }
 
-TEST(AcrobotBatch, KeepsTheBitsWithOtherConfigurations) {
+TEST(AcrobotBatch, HasTheBitsOfSingleAcrobotsWithOtherConfigurations) {
   AcrobotConfig config;
   config.goal_test = GoalTest::decision_instant;
   config.link_mass_2 = 1.25;
@@ -117,7 +117,7 @@ TEST(AcrobotBatch, KeepsTheBitsWithOtherConfigurations) {
 }
 
 // The angle of a fast acrobot leaves the range of sin_cos in one lane only.
-TEST(AcrobotBatch, OneOverflowLeavesTheOthersAlone) {
+TEST(AcrobotBatch, AnOverflowDoesNotChangeTheOtherAcrobots) {
   sdnn::testing::on_every_instruction_set([&](auto level) {
     SCOPED_TRACE(level);
     AcrobotBatch batch({}, 5);
@@ -138,7 +138,7 @@ TEST(AcrobotBatch, OneOverflowLeavesTheOthersAlone) {
   });
 }
 
-TEST(AcrobotBatch, RejectsBadArgumentsBeforeAnythingMoves) {
+TEST(AcrobotBatch, RefusesBadArgumentsBeforeAnyAcrobotMoves) {
   AcrobotBatch batch({}, 3);
   const auto message = [&batch](Step step) { return testing::message_of([&] { step.of(batch); }); };
   Step step(3);

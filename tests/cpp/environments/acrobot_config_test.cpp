@@ -7,7 +7,7 @@ namespace {
 using namespace sdnn::environments;
 
 // Section 4.1: the limits of speed are 3 pi and 5 pi, idling is below 5 degrees.
-TEST(AcrobotConfig, HasThePapersNumbers) {
+TEST(AcrobotConfig, HasTheLimitsOfThePaper) {
   const AcrobotConfig config;
   EXPECT_DOUBLE_EQ(config.goal_velocity_1, 9.42477796076938);
   EXPECT_DOUBLE_EQ(config.goal_velocity_2, 15.707963267948966);

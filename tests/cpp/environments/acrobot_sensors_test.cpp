@@ -24,7 +24,7 @@ std::vector<double> observe(const SensorConfig& config, const AcrobotState& stat
   return observe(sensors, state);
 }
 
-TEST(AcrobotSensors, NormalizeAsWorkedByHand) {
+TEST(AcrobotSensors, AreNormalizedAsWorkedByHand) {
   const auto rest = observe({6, 0.0}, {0.0, 0.0, 0.0, 0.0});
   EXPECT_EQ(rest, (std::vector<double>{0.5, 0.5, 0.5, 0.5, 0.0, 0.0}));
   const auto seen = observe({6, 0.0}, {kPi / 2.0, -kPi / 2.0, 1.5 * kPi, -2.5 * kPi});
@@ -72,7 +72,7 @@ TEST(AcrobotSensors, NoiseIsOneNormalNumberPerSensorInOrder) {
   }
 }
 
-TEST(AcrobotSensors, NoiseWrapsAnglesAndSaturatesTheRest) {
+TEST(AcrobotSensors, NoiseWrapsAnglesAndClipsOtherSensors) {
   AcrobotSensors sensors({6, 0.02}, 8, Stream::sensor_noise);
   int low = 0, high = 0, floor = 0, ceiling = 0;
   for (int i = 0; i < 2000; ++i) {
@@ -106,7 +106,7 @@ TEST(AcrobotSensors, NoiseMayEnterBeforeRedundantVariablesAreComputed) {
   }
 }
 
-TEST(AcrobotSensors, UselessInputsComeLastAndLeaveTheOthersAsTheyAre) {
+TEST(AcrobotSensors, ConstantAndRandomInputsAreAppendedWithoutChangingOthers) {
   const AcrobotState state{0.3, -1.0, 2.0, -3.0};
   AcrobotSensors without({5, 0.02}, 42, Stream::sensor_noise);
   AcrobotSensors clean({.n_sensors = 4, .n_constant = 2, .n_random = 1}, 42, Stream::sensor_noise);
@@ -129,7 +129,7 @@ TEST(AcrobotSensors, UselessInputsComeLastAndLeaveTheOthersAsTheyAre) {
   EXPECT_NE(observe(constant, state)[4], 0.5);
 }
 
-TEST(SensorNoise, RejectsBadSizes) {
+TEST(SensorNoise, RefusesNegativeAndNonFiniteSizes) {
   for (const double bad : {-0.1, std::nan(""), std::numeric_limits<double>::infinity()}) {
     EXPECT_THROW(SensorNoise(bad, {SensorEdge::wrap}, 1, Stream::sensor_noise),
                  std::invalid_argument);

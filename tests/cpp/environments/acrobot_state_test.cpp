@@ -11,7 +11,7 @@ namespace {
 using namespace sdnn::environments;
 using sdnn::core::kPi;
 
-TEST(WrapAngle, IsTheHalfOpenTurnAroundZero) {
+TEST(WrapAngle, MapsToTheHalfOpenTurnAroundZero) {
   const double below_pi = std::nextafter(kPi, 0.0);
   for (const double inside : {0.0, 1.0, -1.0, below_pi, -below_pi, -kPi, 5e-324}) {
     EXPECT_EQ(wrap_angle(inside), inside);
@@ -28,13 +28,13 @@ TEST(WrapAngle, IsTheHalfOpenTurnAroundZero) {
   }
 }
 
-TEST(AcrobotState, WrapsItsAnglesAlone) {
+TEST(AcrobotState, WrapsItsAnglesOnly) {
   EXPECT_EQ(wrapped({3.0 * kPi, -2.0 * kPi, 7.0, -40.0}), (AcrobotState{-kPi, 0.0, 7.0, -40.0}));
   const AcrobotState inside{1.0, -3.0, 0.0, 1e300};
   EXPECT_EQ(wrapped(inside), inside);
 }
 
-TEST(AcrobotState, HasFiniteNumbers) {
+TEST(AcrobotState, RefusesNaNAndInfinity) {
   for (Eigen::Index i = 0; i < 4; ++i) {
     for (const double bad :
          {std::numeric_limits<double>::quiet_NaN(), -std::numeric_limits<double>::infinity()}) {

@@ -8,7 +8,7 @@
 namespace sdnn::environments {
 namespace {
 
-TEST(AcrobotTeam, NobodyMovesWithoutJoining) {
+TEST(AcrobotTeam, DoesNotMoveWithoutMembersAndRefusesBadArguments) {
   AcrobotTeam team;
   EXPECT_FALSE(team.step([](std::size_t, const StepResult&) { FAIL(); }));
   Acrobot acrobot;

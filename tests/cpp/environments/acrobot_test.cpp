@@ -31,13 +31,13 @@ TEST(AcrobotDynamics, KeepsItsEnergyWithoutTorque) {
 }
 
 // Hanging: d11 = 4.5, d12 = 1.75, d22 = 1.25; folded up: d11 = 2.5, d12 = 0.75.
-TEST(AcrobotDynamics, HasTheMassMatrixWorkedByHand) {
+TEST(AcrobotDynamics, TheMassMatrixIsAsWorkedByHand) {
   EXPECT_EQ(Acrobot().mass_matrix(0.0), (Eigen::Matrix2d{{4.5, 1.75}, {1.75, 1.25}}));
   EXPECT_EQ(Acrobot().mass_matrix(kPi), (Eigen::Matrix2d{{2.5, 0.75}, {0.75, 1.25}}));
 }
 
 // M a + h + phi = (0, torque), with h and phi as printed by Spong.
-TEST(AcrobotDynamics, SolvesTheMassMatrixForTheAccelerations) {
+TEST(AcrobotDynamics, AccelerationsSolveTheEquationOfMotion) {
   sdnn::core::Random random(2, sdnn::core::Stream::exploration);
   const AcrobotConfig config{.link_mass_2 = 1.5, .link_length_1 = 0.75, .center_of_mass_2 = 0.3};
   const Acrobot acrobot(config);
@@ -70,7 +70,7 @@ TEST(AcrobotDynamics, GainsTheWorkOfTheTorque) {
   EXPECT_NEAR(acrobot.energy() - before, 7.0 * (acrobot.state()[1] - angle), 1e-12);
 }
 
-TEST(AcrobotDynamics, MirrorsWithTheTorque) {
+TEST(AcrobotDynamics, AMirroredTorqueGivesAMirroredState) {
   Acrobot left, right;
   for (const double torque : {3.0, -10.0, 7.5, 0.25}) {
     left.step(torque, 0.0);
@@ -96,7 +96,7 @@ TEST(AcrobotDynamics, KeepsItsBits) {
   EXPECT_EQ(digest, 12301352983019598016u);
 }
 
-TEST(AcrobotTask, PenalizesIdlingAtTheDecisionInstant) {
+TEST(AcrobotTask, PenalizesRestingAtTheDecisionInstant) {
   AcrobotConfig config;
   config.gravity = 0.0;  // drifts at constant speed
   config.goal_height = 3.0;
@@ -117,7 +117,7 @@ TEST(AcrobotTask, PenalizesIdlingAtTheDecisionInstant) {
   EXPECT_EQ(wide.step(0.0, 1.0).reward, 0.0);
 }
 
-TEST(AcrobotTask, PenalizesSpeedWithoutEndingAnything) {
+TEST(AcrobotTask, PenalizesHighSpeedWithoutEndingTheEpisode) {
   AcrobotConfig config{.gravity = 0.0, .goal_height = 3.0};
   Acrobot acrobot(config);
   acrobot.set_state({1.0, 0.0, 9.5, 0.0});  // 3 pi = 9.42
@@ -125,12 +125,12 @@ TEST(AcrobotTask, PenalizesSpeedWithoutEndingAnything) {
   EXPECT_EQ(fast_1.reward, -5.0);
   EXPECT_FALSE(fast_1.terminated || fast_1.truncated);
   config.goal_velocity_1 = 1e6;
-  Acrobot other(config);
-  other.set_state({1.0, 0.0, -2.0, 40.0});
-  const double reward = other.step(0.0, 1.0).reward;
-  EXPECT_GT(std::abs(other.state()[3]), 5.0 * kPi);
+  Acrobot fast(config);
+  fast.set_state({1.0, 0.0, -2.0, 40.0});
+  const double reward = fast.step(0.0, 1.0).reward;
+  EXPECT_GT(std::abs(fast.state()[3]), 5.0 * kPi);
   EXPECT_EQ(reward, -5.0);
-  config.goal_velocity_2 = std::abs(other.state()[3]);  // the limit itself is allowed
+  config.goal_velocity_2 = std::abs(fast.state()[3]);  // the limit itself is allowed
   Acrobot limited(config);
   limited.set_state({1.0, 0.0, -2.0, 40.0});
   EXPECT_EQ(limited.step(0.0, 1.0).reward, 0.0);
@@ -153,7 +153,7 @@ TEST(AcrobotTask, EndsAtTheInstantTheGoalIsReached) {
   EXPECT_NO_THROW(acrobot.step(0.0, 1.0));
 }
 
-TEST(AcrobotTask, CanTestTheGoalAtDecisionsOnly) {
+TEST(AcrobotTask, MayTestTheGoalAtDecisionsOnly) {
   const AcrobotConfig config{.goal_test = GoalTest::decision_instant};
   Acrobot acrobot(config);
   acrobot.set_state({2.0, 0.0, 2.0, 0.0});
@@ -163,7 +163,7 @@ TEST(AcrobotTask, CanTestTheGoalAtDecisionsOnly) {
   EXPECT_TRUE(acrobot.step(0.0, 1.0).terminated);
 }
 
-TEST(AcrobotTask, NeedsSpeedsBelowTheScaledLimits) {
+TEST(AcrobotTask, TheGoalNeedsSpeedsBelowTheScaledLimits) {
   const auto ends = [](const AcrobotState& start, double goal_tolerance) {
     const AcrobotConfig config{.gravity = 0.0, .decision_interval = 0.02};
     Acrobot acrobot(config);
@@ -188,13 +188,13 @@ TEST(AcrobotTask, TruncatesAfterTheLastDecision) {
   EXPECT_THROW(acrobot.step(0.0, 1.0), std::logic_error);
 }
 
-TEST(AcrobotTask, IntegrationStepsDivideTheDecisionInterval) {
+TEST(AcrobotTask, RefusesIntegrationStepsThatDoNotDivideTheDecisionInterval) {
   for (const double bad : {0.03, 0.7, 2.0, 1e-7}) {
     EXPECT_THROW(Acrobot({.integration_step = bad}), std::invalid_argument) << bad;
   }
 }
 
-TEST(AcrobotTask, RejectsBadArguments) {
+TEST(AcrobotTask, RefusesBadTorquesTolerancesAndStates) {
   Acrobot acrobot;
   for (const double bad : {kNaN, kInfinity, -kInfinity, 10.0001, -10.0001}) {
     EXPECT_THROW(acrobot.step(bad, 1.0), std::invalid_argument) << bad;

@@ -44,7 +44,7 @@ TEST(GoalSchedule, NeverRises) {
   }
 }
 
-TEST(GoalSchedule, BeginsWithEpisodeOne) {
+TEST(GoalSchedule, RefusesEpisodesBelowOne) {
   EXPECT_THROW(GoalSchedule()(0), std::invalid_argument);
   EXPECT_THROW(GoalSchedule()(-5), std::invalid_argument);
 }

@@ -24,7 +24,7 @@ Pairs apply(Rule& rule, std::size_t sample, const std::vector<std::int32_t>& pot
   return pairs;
 }
 
-TEST(PDeltaRule, CorrectsTheNearestLowestIndexFirst) {
+TEST(PDeltaRule, CorrectsTheNearestUnitsAndOfEqualOnesTheLowestIndex) {
   const std::vector<std::int32_t> potentials{5, -2, 0, 3, -2, -9};  // units 0 and 3 fire
   estimators::PDeltaRule rule(6, std::vector<double>{2.0, 4.0, 1.0, 3.49, 3.5, 0.0, 99.0, -99.0},
                               1);
@@ -38,7 +38,7 @@ TEST(PDeltaRule, CorrectsTheNearestLowestIndexFirst) {
   EXPECT_EQ(apply(rule, 7, potentials), (Pairs{{0, -1}, {3, -1}}));
 }
 
-TEST(PDeltaRule, GroupsDoNotMix) {
+TEST(PDeltaRule, GroupsOfUnitsAreCorrectedSeparately) {
   estimators::PDeltaRule rule(4, std::vector<double>{2.0, 0.0}, 2);
   EXPECT_EQ(apply(rule, 0, {1, -1, 1, -1}), (Pairs{{1, 1}, {2, -1}}));
 }
@@ -53,7 +53,7 @@ TEST(PDeltaRule, CorrectsAShareOfTheDeficit) {
   EXPECT_EQ(apply(rule, 4, potentials), (Pairs{{3, -1}}));
 }
 
-TEST(PDeltaRule, DistinguishesDistantUnits) {
+TEST(PDeltaRule, ComparesDistancesNear32BitsExactly) {
   const std::int32_t far = 2000000000;
   estimators::PDeltaRule rule(3, std::vector<double>{1.0, 2.0}, 1);
   EXPECT_EQ(apply(rule, 0, {-far, 1 - far, -far}), (Pairs{{1, 1}}));
@@ -61,7 +61,7 @@ TEST(PDeltaRule, DistinguishesDistantUnits) {
   EXPECT_EQ(apply(rule, 0, {far, far, 7}), (Pairs{{0, -1}, {2, -1}}));
 }
 
-TEST(ClassScheme, NamesGoBothWaysAndCountUnits) {
+TEST(ClassScheme, SchemesHaveNamesAndNumbersOfUnits) {
   for (const auto scheme : estimators::kClassSchemes) {
     EXPECT_EQ(estimators::class_scheme_named(estimators::name_of(scheme)), scheme);
   }
@@ -71,13 +71,13 @@ TEST(ClassScheme, NamesGoBothWaysAndCountUnits) {
   EXPECT_THROW(estimators::n_units_for(ClassScheme::one_vs_one, 1), std::invalid_argument);
 }
 
-TEST(PerceptronRule, OneVersusRest) {
+TEST(PerceptronRule, OneVersusRestCorrectsUnitsOfWrongSign) {
   estimators::PerceptronRule rule(3, std::vector<std::int32_t>{1}, 3, ClassScheme::one_vs_rest);
   EXPECT_EQ(apply(rule, 0, {1, 0, -1}), (Pairs{{0, -1}, {1, 1}}));
   EXPECT_EQ(apply(rule, 0, {0, 1, 0}), Pairs{});
 }
 
-TEST(PerceptronRule, OneVersusOne) {
+TEST(PerceptronRule, OneVersusOneCorrectsTheUnitsOfTheClass) {
   // Units (0,1) (0,2) (0,3) (1,2) (1,3) (2,3).
   const std::vector<std::int32_t> labels{0, 2, 3};
   estimators::PerceptronRule rule(6, labels, 4, ClassScheme::one_vs_one);

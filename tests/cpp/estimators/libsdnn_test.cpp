@@ -16,7 +16,7 @@ using estimators::StandardLibrary;
 
 constexpr std::array<std::uint32_t, 1> kSeed{1};
 
-TEST(Libsdnn, TheOtherLibraryTakesRemainders) {
+TEST(Libsdnn, WithTheMsvcLibraryNumbersAreRemainders) {
   LibsdnnRandom ours(kSeed, StandardLibrary::msvc);
   std::seed_seq sequence(kSeed.begin(), kSeed.end());
   std::mt19937 theirs(sequence);

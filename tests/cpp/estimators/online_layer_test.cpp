@@ -76,7 +76,7 @@ TEST(OnlineLayer, HasTheBitsOfPlainTraining) {
   });
 }
 
-TEST(OnlineLayer, ChangesNothingWhenItIsStopped) {
+TEST(OnlineLayer, AStoppedPresentationChangesNothing) {
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     const Problem problem = testing::random_problem(seed);
     const auto layer = testing::layer_for(problem);
@@ -103,7 +103,7 @@ TEST(OnlineLayer, ChangesNothingWhenItIsStopped) {
   }
 }
 
-TEST(OnlineLayer, ChangesNothingWhenAWeightWouldLeaveItsRange) {
+TEST(OnlineLayer, AnOverflowOfAWeightChangesNothing) {
   Problem problem = testing::random_problem(1);
   const std::size_t n_columns = problem.code->n_columns();
   const std::vector<std::int32_t> weights(problem.n_units * n_columns, 16383);
@@ -127,7 +127,7 @@ TEST(OnlineLayer, ChangesNothingWhenAWeightWouldLeaveItsRange) {
   EXPECT_EQ(testing::bits_of(*layer), before);
 }
 
-TEST(OnlineLayer, RefusesWeightsThatDoNotFitAndBadArguments) {
+TEST(OnlineLayer, RefusesWeightsBeyond14BitsAndBadArguments) {
   const Problem problem = testing::random_problem(1);
   const std::vector<std::int32_t> weights(problem.n_units * problem.code->n_columns(), 16384);
   const std::vector<std::int32_t> thresholds(problem.n_units, 0);
@@ -146,7 +146,7 @@ TEST(OnlineLayer, RefusesWeightsThatDoNotFitAndBadArguments) {
   EXPECT_THROW(online.present(bins, rule), std::invalid_argument);
 }
 
-TEST(Interruption, EndsEveryFormAndPrediction) {
+TEST(Interruption, EndsTrainingInEveryFormAndPrediction) {
   const Problem problem = testing::random_problem(3);
   const auto layer = testing::layer_for(problem);
   for (const auto form : {TrainingForm::plain, TrainingForm::dual, TrainingForm::block}) {

@@ -28,7 +28,7 @@ std::shared_ptr<const ParallelPerceptron::Code> small_code() {
       std::vector<coding::InputPair>{{0, 0}});
 }
 
-TEST(ParallelPerceptron, PotentialsByHand) {
+TEST(ParallelPerceptron, PotentialsAndCountsAreAsWorkedByHand) {
   const std::vector<std::int32_t> weights{1, 2, 3, -4, 5, 6};
   const std::vector<std::int32_t> thresholds{1, -2};
   const ParallelPerceptron layer(small_code(), 2, weights, thresholds);
@@ -48,7 +48,7 @@ TEST(ParallelPerceptron, PotentialsByHand) {
   EXPECT_EQ(counts, (std::vector<std::int32_t>{0, 0, 1, 1}));
 }
 
-TEST(ParallelPerceptron, SweepsAndSinglesAgree) {
+TEST(ParallelPerceptron, ManyQueriesHaveThePotentialsOfSingleOnes) {
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     const auto problem = testing::random_problem(seed);
     const auto layer = testing::layer_for(problem);
@@ -86,7 +86,7 @@ std::shared_ptr<const ParallelPerceptron::Code> code_of_three(std::size_t n_unit
   return std::make_shared<coding::SelectiveDesensitization>(modified, modifiers, pairs);
 }
 
-TEST(ParallelPerceptron, BlocksAndSinglesAgree) {
+TEST(ParallelPerceptron, BlocksOfQueriesHaveThePotentialsOfSingleOnes) {
   for (const std::size_t n_units : {42U, 130U}) {
     for (const int range : {3, 400, 100000}) {  // sums of 16 bits, and of 32
       const ParallelPerceptron layer(code_of_three(n_units), 100, 5, range);
@@ -106,7 +106,7 @@ TEST(ParallelPerceptron, BlocksAndSinglesAgree) {
   }
 }
 
-TEST(ParallelPerceptron, CountsOfLayersAreThoseOfEach) {
+TEST(ParallelPerceptron, CountsOfSeveralLayersEqualThoseOfEachLayer) {
   const auto code = code_of_three(130);
   const ParallelPerceptron narrow(code, 100, 5, 3);
   const ParallelPerceptron wide(code, 100, 6, 100000);
@@ -132,7 +132,7 @@ TEST(ParallelPerceptron, CountsOfLayersAreThoseOfEach) {
   EXPECT_THROW(ParallelPerceptron::counts({}, {}, 1, 1, out), std::invalid_argument);
 }
 
-TEST(ParallelPerceptron, ThrowsWhatAThreadThrows) {
+TEST(ParallelPerceptron, RethrowsTheErrorOfAThread) {
   const std::vector<std::int32_t> weights(6);
   const ParallelPerceptron layer(small_code(), 2, weights, std::vector<std::int32_t>(2));
   const std::vector<std::int32_t> bins(2000);
@@ -144,7 +144,7 @@ TEST(ParallelPerceptron, ThrowsWhatAThreadThrows) {
   }
 }
 
-TEST(ParallelPerceptron, DrawsWholeNumbersInRange) {
+TEST(ParallelPerceptron, DrawsEveryWeightInItsRange) {
   const ParallelPerceptron layer(small_code(), 400, 3, 2);
   std::vector<int> seen(5);
   for (std::size_t i = 0; i < 400; ++i) {

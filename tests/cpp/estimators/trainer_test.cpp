@@ -12,7 +12,7 @@ namespace {
 
 using estimators::TrainingForm;
 
-TEST(Trainer, StopsBeforeAPotentialOverflows) {
+TEST(Trainer, CorrectionsStopBeforeAPotentialOverflows) {
   auto problem = testing::random_problem(2);
   std::fill(problem.targets.begin(), problem.targets.end(), 0.0);  // a silent unit stays as it is
   const std::size_t n_columns = problem.code->n_columns();
@@ -34,7 +34,7 @@ TEST(Trainer, StopsBeforeAPotentialOverflows) {
   }
 }
 
-TEST(Trainer, RefusesBadArgumentsAndKeepsTheLayer) {
+TEST(Trainer, RefusesBadArgumentsAndDoesNotChangeTheLayer) {
   const auto problem = testing::random_problem(1);
   const auto layer = testing::layer_for(problem);
   const auto before = testing::bits_of(*layer);

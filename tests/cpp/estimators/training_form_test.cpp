@@ -19,7 +19,7 @@ coding::SelectiveDesensitization demonstration_code(std::size_t n_pattern_units 
   return {tables, tables, {{0, 1}, {1, 0}}};
 }
 
-TEST(TrainingForm, NamesGoBothWays) {
+TEST(TrainingForm, FormsAreFoundByTheirNames) {
   ASSERT_EQ(estimators::kTrainingForms.size(), 4U);
   for (const auto form : estimators::kTrainingForms) {
     EXPECT_EQ(estimators::training_form_named(estimators::name_of(form)), form);
@@ -27,7 +27,7 @@ TEST(TrainingForm, NamesGoBothWays) {
   EXPECT_THROW(estimators::training_form_named("primal"), std::invalid_argument);
 }
 
-TEST(TrainingForm, MemoryByHand) {
+TEST(TrainingForm, MemoryOfEachFormIsAsWorkedByHand) {
   const auto code = demonstration_code();
   EXPECT_EQ(estimators::with_product_type(code, []<class Product>() { return sizeof(Product); }),
             2U);
@@ -46,7 +46,7 @@ TEST(TrainingForm, MemoryByHand) {
 
 /// The dual form computes an inner product of codes for every two samples: too slow for 20,000
 /// samples of 16,000 columns.
-TEST(TrainingForm, IsBlockWhereInnerProductsOfAllSamplesTakeTooLong) {
+TEST(TrainingForm, IsBlockForManySamplesOfLongCodes) {
   const auto code = demonstration_code(8000);
   const auto chosen = [&](std::size_t n_samples, std::size_t n_units) {
     return estimators::choose_form(TrainingForm::automatic, n_units, code, n_samples,
@@ -59,7 +59,7 @@ TEST(TrainingForm, IsBlockWhereInnerProductsOfAllSamplesTakeTooLong) {
 
 /// Processor seconds of both forms were measured at these sizes, 20 pairs of 800 units: set-up and
 /// synchronization, then an epoch. Where the ratio is below 1.3 either choice is good.
-TEST(TrainingForm, SuitsTheEpochs) {
+TEST(TrainingForm, IsTheFasterFormByMeasuredTimes) {
   struct Measured {
     std::size_t n_samples;
     double dual_once, dual_epoch, block_once, block_epoch;
@@ -91,7 +91,7 @@ TEST(TrainingForm, SuitsTheEpochs) {
   }
 }
 
-TEST(TrainingForm, SuitsTheSizeAndTheLimit) {
+TEST(TrainingForm, DependsOnTheSamplesAndTheMemoryLimit) {
   const auto code = demonstration_code();
   const auto chosen = [&](std::size_t n_samples, std::size_t limit) {
     return estimators::choose_form(TrainingForm::automatic, 280, code, n_samples, limit);

@@ -46,7 +46,7 @@ class Witness {
   std::vector<Learned> learned;
 };
 
-TEST(TimeAgentSteps, AStepLearnsTheTransitionToANewStateAndActsThere) {
+TEST(TimeAgentSteps, EachStepLearnsTheTransitionToANewStateAndActsThere) {
   Witness witness;
   const Times times = time_agent_steps(witness, 3, 5);
   EXPECT_EQ(times.size(), 3U);
@@ -65,7 +65,7 @@ TEST(TimeAgentSteps, AStepLearnsTheTransitionToANewStateAndActsThere) {
   }
 }
 
-TEST(TimeAgentSteps, ImpossibleNumbersAndNoRepetitionsLeaveTheAgentAlone) {
+TEST(TimeAgentSteps, BadNumbersAndNoRepetitionsDoNotChangeTheAgent) {
   Witness witness;
   EXPECT_THROW(time_agent_steps(witness, -1, 1), std::invalid_argument);
   EXPECT_THROW(time_agent_steps(witness, kMaxRepetitions + 1, 1), std::invalid_argument);

@@ -17,7 +17,7 @@ Trial table_trial() {
                {.episodes = 40, .evaluate_every_episodes = 10}, 1);
 }
 
-TEST(TimeDecisions, OneTimePerDecisionAndTheTrialIsTheSame) {
+TEST(TimeDecisions, ReturnsATimePerDecisionWithoutChangingTheTrial) {
   Trial timed = table_trial();
   Trial plain = table_trial();
   const Times times = time_decisions(timed, 25);

@@ -15,7 +15,7 @@ SDNNC small_network() {
                1);
 }
 
-TEST(NetworkParts, ACorrectionCorrectsTheRequestedNumberOfUnits) {
+TEST(NetworkParts, ATimedCorrectionChangesTheRequestedNumberOfUnits) {
   NetworkParts parts(small_network(), 1);
   parts.time_corrections(1, 6);
   int n_changed = 0;

@@ -25,7 +25,7 @@ static_assert(agents::Agent<agents::QLearning<PlainRBFNetwork>>);
 using Plain = testing::WithWorkspace<PlainRBFNetwork>;
 using Factored = testing::WithWorkspace<RBFNetwork>;
 
-TEST(PlainRBFNetwork, GivesAndLearnsWhatTheFactoredOneDoes) {
+TEST(PlainRBFNetwork, LearnsLikeTheFactoredNetwork) {
   const RBFNetworkConfig config = {.n_inputs = 3, .n_actions = 17};
   Factored factored(config);
   Plain plain(config);
@@ -57,7 +57,7 @@ Plain taught(const RBFNetworkConfig& config, int n_corrections) {
 }
 
 // Two algorithms: every joint basis against the product over the dimensions.
-TEST(PlainRBFNetwork, AgreesWithTheFactoredOneAtEverySize) {
+TEST(PlainRBFNetwork, HasTheValuesOfTheFactoredNetworkAtEverySize) {
   for (const int d : {1, 2, 3, 4}) {
     for (const RBFNetworkConfig& config :
          {RBFNetworkConfig{.n_inputs = d, .n_actions = 17},

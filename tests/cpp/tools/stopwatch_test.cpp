@@ -19,7 +19,7 @@ TEST(TimeEach, PreparesAndTimesEveryRepetitionInOrder) {
   EXPECT_EQ(times.size(), 3U);
 }
 
-TEST(TimeEach, TimesWhatIsTimedAndNotWhatIsPrepared) {
+TEST(TimeEach, ExcludesPreparationFromTimes) {
   constexpr std::int64_t kLong = 2'000'000;
   const auto wait = [] {
     for (const std::int64_t end = now() + kLong; now() < end;) {

@@ -117,7 +117,7 @@ TEST(AcrobotTrial, GoldenTracesOfTheRBFNetwork) {
   EXPECT_EQ(digest(noisy.rows()), 7920621632295173362U);
 }
 
-TEST(AcrobotTrial, TogetherTheRowsAreThoseOfEachAlone) {
+TEST(AcrobotTrial, TrialsRunTogetherHaveTheRowsOfTrialsRunAlone) {
   const auto make = [](std::size_t i) {
     return table_trial({.sensors = {.n_sensors = 4 + static_cast<int>(i % 3), .noise = 0.01},
                         .protocol = {.episodes = 30 + 10 * static_cast<int>(i)},
@@ -144,7 +144,7 @@ TEST(AcrobotTrial, TogetherTheRowsAreThoseOfEachAlone) {
   }
 }
 
-TEST(AcrobotTrial, TestEpisodesDoNotChangeWhatIsLearned) {
+TEST(AcrobotTrial, EvaluationsDoNotChangeWhatIsLearned) {
   for (const double noise : {0.0, 0.02}) {
     Setting setting{.sensors = {.noise = noise}};
     setting.protocol.evaluate_every_episodes = 1;
@@ -159,7 +159,7 @@ TEST(AcrobotTrial, TestEpisodesDoNotChangeWhatIsLearned) {
   }
 }
 
-TEST(AcrobotTrial, AnUnsolvedTestEpisodeCountsAllItsDecisions) {
+TEST(AcrobotTrial, AnUnsolvedEvaluationCountsAllItsDecisions) {
   auto run = table_trial({.acrobot = {.goal_height = 2.5}, .protocol = {.episodes = 20}});
   run.advance(20);
   for (const TestRow& row : run.rows()) {
@@ -171,7 +171,7 @@ TEST(AcrobotTrial, AnUnsolvedTestEpisodeCountsAllItsDecisions) {
   EXPECT_EQ(run.n_decisions(), 22 * 50);
 }
 
-TEST(AcrobotTrial, ASolvedTestEpisodeEndsAtTheGoal) {
+TEST(AcrobotTrial, ASolvedEvaluationEndsAtTheGoal) {
   // At the start the tip hangs 2 m below joint 1: a goal there is reached within the first second.
   auto run = table_trial({.acrobot = {.goal_height = -2.5}, .protocol = {.episodes = 10}});
   run.advance(10);
@@ -213,7 +213,7 @@ struct Recorder {
   std::vector<bool> ends;
 };
 
-TEST(AcrobotTrial, TheTimeLimitIsATerminationOnRequestOnly) {
+TEST(AcrobotTrial, ATimeLimitIsATerminationOnlyWithoutBootstrapping) {
   for (const bool bootstraps : {true, false}) {
     auto run =
         agent_trial(Recorder{}, {.acrobot = {.max_decisions = 3},
@@ -224,7 +224,7 @@ TEST(AcrobotTrial, TheTimeLimitIsATerminationOnRequestOnly) {
   }
 }
 
-TEST(AcrobotTrial, TestsAreNoisyUnlessSaidOtherwise) {
+TEST(AcrobotTrial, EvaluationsAreNoisyOnlyWithNoisyEvaluations) {
   for (const bool noisy : {true, false}) {
     auto run = agent_trial(Recorder{}, {.acrobot = {.max_decisions = 1},
                                         .sensors = {.noise = 0.02},
@@ -245,7 +245,7 @@ long n_page_faults() {
 
 // Memory is met for the first time when a trial is made, not while it decides. Once a trial has
 // been run, so that code and libraries are there, a few faults are left to the operating system.
-TEST(AcrobotTrial, AnEpisodeMeetsNoMemoryForTheFirstTime) {
+TEST(AcrobotTrial, AnEpisodeCausesNoPageFaults) {
   for (const int n_inputs : {4, 6}) {
     const Setting setting{.sensors = {.n_sensors = n_inputs, .noise = 0.02},
                           .protocol = {.episodes = 60}};
@@ -259,7 +259,7 @@ TEST(AcrobotTrial, AnEpisodeMeetsNoMemoryForTheFirstTime) {
 
 #endif
 
-TEST(AcrobotTrial, NamesWhatIsImpossible) {
+TEST(AcrobotTrial, RefusesBadNumbersAndTrialsThatCannotRunTogether) {
   using testing::message_of;
   EXPECT_EQ(message_of([] { trial(LookupTable(5, 2, 3), {}); }),
             "n_inputs must be the number of inputs of the sensors, 4, got 5");

@@ -10,7 +10,7 @@
 namespace sdnn::tools {
 namespace {
 
-TEST(DenseProduct, IsTheProductAtAnySize) {
+TEST(DenseProduct, EqualsThePlainProductAtAnySize) {
   for (const auto& [n_rows, n_columns] : std::vector<std::pair<std::size_t, std::size_t>>{
            {1, 1}, {3, 7}, {8, 16}, {9, 33}, {90, 240}, {16, 8}}) {
     DenseProduct product(n_rows, n_columns, 1);
@@ -31,7 +31,7 @@ TEST(DenseProduct, IsTheProductAtAnySize) {
   }
 }
 
-TEST(DenseProduct, RefusesImpossibleSizes) {
+TEST(DenseProduct, RefusesBadSizes) {
   EXPECT_THROW(DenseProduct(0, 1, 1), std::invalid_argument);
   EXPECT_THROW(DenseProduct(1, 0, 1), std::invalid_argument);
 }

@@ -12,7 +12,7 @@ namespace {
 
 // A walk with small steps and jumps, with corrections of random actions in between: every way to
 // come by potentials is used, and each gives the integers of a full pass.
-TEST(ActivationCache, WhateverWayIsTakenThePotentialsAreThoseOfAFullPass) {
+TEST(ActivationCache, CachedPotentialsEqualThoseOfAFullPass) {
   const SDNNCConfig config{.n_pattern_units = 90, .n_hidden_units = 130, .n_active_units = 50};
   testing::WithWorkspace<SDNNC> network(config, 3);
   core::Random random(5, core::Stream::sensor_noise);
@@ -45,7 +45,7 @@ TEST(ActivationCache, WhateverWayIsTakenThePotentialsAreThoseOfAFullPass) {
   EXPECT_GT(counts.full, 20U);
 }
 
-TEST(ActivationCache, ReplacedWeightsAreNotRemembered) {
+TEST(ActivationCache, IsInvalidatedBySettingParameters) {
   const SDNNCConfig config{.n_pattern_units = 10, .n_hidden_units = 20, .n_active_units = 10};
   testing::WithWorkspace<SDNNC> network(config, 1);
   const std::vector<double> state = {0.1, 0.2, 0.3, 0.4};

@@ -49,7 +49,7 @@ TEST(ColumnChanges, AreAddedToTheColumnsListed) {
   });
 }
 
-TEST(ColumnChanges, TheLargestByteOfEachUnit) {
+TEST(ColumnChanges, FindTheLargestByteOfEachUnit) {
   testing::on_every_instruction_set([](std::string_view level) {
     core::Random random(2, core::Stream::weights);
     for (int problem = 0; problem < 200; ++problem) {

@@ -13,7 +13,7 @@
 namespace sdnn::approximators {
 namespace {
 
-TEST(ColumnSet, HoldsWhatWasAddedOnce) {
+TEST(ColumnSet, HoldsEachAddedColumnOnce) {
   ColumnSet set(130);
   EXPECT_EQ(set.size(), 0U);
   for (const std::size_t column : {0U, 63U, 64U, 129U, 64U}) set.add(column);
@@ -22,7 +22,7 @@ TEST(ColumnSet, HoldsWhatWasAddedOnce) {
   EXPECT_FALSE(set.holds(1) || set.holds(128));
 }
 
-TEST(ColumnSet, RemovesWhatItHolds) {
+TEST(ColumnSet, RemovesColumns) {
   ColumnSet set(70);
   set.add(3);
   set.add(69);
@@ -33,7 +33,7 @@ TEST(ColumnSet, RemovesWhatItHolds) {
   EXPECT_EQ(set.words()[1].to_ullong(), std::uint64_t{1} << 5);
 }
 
-TEST(ListedColumns, FindsThoseInASetAsOftenAsTheyCome) {
+TEST(ListedColumns, FindsColumnsOfASetWithTheirRepetitions) {
   ColumnSet set(200);
   for (const std::size_t column : {7U, 70U, 130U, 199U}) set.add(column);
   const std::vector<std::uint32_t> columns = {1, 7, 7, 8, 70, 130, 131, 130, 2};
@@ -48,7 +48,7 @@ TEST(ListedColumns, FindsThoseInASetAsOftenAsTheyCome) {
   EXPECT_EQ(listed.in(ColumnSet(200), out.data()), 0U);
 }
 
-TEST(IntersectBits, FindsTheColumnsOfBothInAnyNumberOfWords) {
+TEST(IntersectBits, FindsTheCommonColumnsForAnyNumberOfWords) {
   core::Random random(4, core::Stream::weights);
   for (std::size_t n_words = 1; n_words < 40; ++n_words) {
     ColumnSet set(64 * n_words);

@@ -54,7 +54,7 @@ TEST(LinearRows, SumsOfTheLargestWeightsAreExactOnEveryInstructionSet) {
   }
 }
 
-TEST(LinearRows, ManyRowsHaveTheSumsOfEach) {
+TEST(LinearRows, SumsOfManyRowsEqualThoseOfSingleRows) {
   const Rows code = random_rows(320, 1);
   std::vector<Rows> rows;
   std::vector<const std::int32_t*> pointers;
@@ -73,7 +73,7 @@ TEST(LinearRows, ManyRowsHaveTheSumsOfEach) {
   });
 }
 
-TEST(LinearRows, AStepByHand) {
+TEST(LinearRows, AStepOfTracesAndWeightsIsAsWorkedByHand) {
   // Traces 3 and -3 (of kTraceOne / 4 + 1) decay towards 0; a code of +1, -1, 0.
   std::vector<std::int32_t> weights{100, 100, 100}, traces{3, -3, 4096};
   const std::vector<std::int32_t> active{-1, -1, 0}, negative{0, -1, 0};
@@ -92,7 +92,7 @@ TEST(LinearRows, AStepByHand) {
   EXPECT_NE(use.traces, 0);
 }
 
-TEST(LinearRows, AReplacedTraceForgetsWhatItWasWhereTheCodeIsNotNeutral) {
+TEST(LinearRows, AReplacingTraceIsOverwrittenWhereTheCodeIsActive) {
   std::vector<std::int32_t> weights{0, 0}, traces{9000, 9000};
   const std::vector<std::int32_t> active{-1, 0}, negative{-1, 0};
   learn_row(weights.data(), traces.data(), {active.data(), negative.data()}, 2,
@@ -105,7 +105,7 @@ TEST(LinearRows, AReplacedTraceForgetsWhatItWasWhereTheCodeIsNotNeutral) {
   EXPECT_EQ(traces, (std::vector<std::int32_t>{-kTraceOne, 9000}));
 }
 
-TEST(LinearRows, ATraceEndsAtZeroAndIsNeverBeyondItsLimit) {
+TEST(LinearRows, TracesDecayToZeroAndStayWithinTheirLimit) {
   std::vector<std::int32_t> weights{0, 0}, traces{kLargestTrace, -kLargestTrace};
   const std::vector<std::int32_t> active{-1, -1}, negative{0, -1};
   RowStep step{

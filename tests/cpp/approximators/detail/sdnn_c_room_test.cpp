@@ -24,7 +24,7 @@ SDNNCConfig five_inputs() {
           .n_active_units = 40};
 }
 
-TEST(Wiring, HasATablePerInput) {
+TEST(Wiring, HasOneTablePerInput) {
   const SDNNCConfig config = five_inputs();
   const auto tables = code_books_of(config, 1);
   std::vector<std::size_t> sizes;
@@ -34,7 +34,8 @@ TEST(Wiring, HasATablePerInput) {
   EXPECT_EQ(coding::pattern_bytes_of(config, coding::n_bins_of(config)), 40.0 * (1 + 4) * 8);
 }
 
-TEST(Wiring, StridesAreAsManyAsThereArePartners) {
+// An input's partners are those at certain distances (strides) in the circle of inputs.
+TEST(Wiring, HasAsManyStridesAsPartners) {
   SDNNCConfig config = five_inputs();
   EXPECT_EQ(strides_of(config, 1), (std::vector<std::size_t>{1, 2, 3, 4}));
   config.max_pairs = 14;  // 2 of 4 for each of 5 inputs
@@ -49,7 +50,7 @@ TEST(Wiring, StridesAreAsManyAsThereArePartners) {
 }
 
 // Equal configs and seeds give equal codes, with and without given tables.
-TEST(Wiring, IsThatOfTheNetwork) {
+TEST(Wiring, IsReproducibleAndThatOfTheNetwork) {
   const SDNNCConfig config = five_inputs();
   const auto wiring = wiring_of(config, code_books_of(config, 3), 3);
   const SDNNC network(config, 3);
@@ -65,7 +66,7 @@ TEST(Wiring, IsThatOfTheNetwork) {
   EXPECT_NE(code_of(*wiring_of(config, code_books_of(config, 4), 4)), code_of(*wiring));
 }
 
-TEST(Wiring, IsRefusedBeforeItIsMade) {
+TEST(Wiring, RefusesTooManySymbolsAndMissingTables) {
   SDNNCConfig config = five_inputs();
   config.n_symbols[1] = config.n_symbols[3] = 1 << 24;
   EXPECT_THROW(code_books_of(config, 1), std::length_error);
@@ -78,7 +79,7 @@ TEST(Wiring, IsRefusedBeforeItIsMade) {
 }
 
 // The fields of files are used before they are checked, so impossible fields must be accepted.
-TEST(Wiring, TheSizeOfCodeBooksIsANumberForAnyFields) {
+TEST(Wiring, TheSizeOfCodeBooksIsFiniteForAnyFields) {
   constexpr int kMost = 2147483647;
   for (const int n : {-kMost, -1, 0, kMost}) {
     const SDNNCConfig config{.n_inputs = n,

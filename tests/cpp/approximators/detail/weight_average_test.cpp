@@ -14,7 +14,7 @@ double steps_of(const WeightAverage& average, std::size_t unit, std::size_t colu
   return average.weight(unit, column) / static_cast<double>(1 << average.fraction_bits());
 }
 
-TEST(WeightAverage, ByHand) {
+TEST(WeightAverage, SnapshotsAreAveragedAsWorkedByHand) {
   HiddenLayer layer(2, 3);
   WeightAverage average(layer, 2);
   const auto note = [&](std::uint64_t n, std::int32_t weight) {
@@ -38,7 +38,7 @@ TEST(WeightAverage, ByHand) {
 }
 
 // High bytes, the last unit of a layer that fills no block, and the largest weights.
-TEST(WeightAverage, TakesWeightsOfAnySize) {
+TEST(WeightAverage, AveragesWeightsOfAnySize) {
   constexpr std::int32_t kLimit = HiddenLayer::kWeightLimit;
   HiddenLayer layer(70, 4);
   for (const std::int32_t weight : {127, -127, 128, -4000, kLimit, -kLimit}) {
@@ -46,19 +46,19 @@ TEST(WeightAverage, TakesWeightsOfAnySize) {
     layer.set_weight(3, 1, -weight);
     WeightAverage average(layer, 1);
     average.note(1, layer);
-    const std::int32_t one = 1 << average.fraction_bits();
-    EXPECT_LE(std::abs(weight) * one, 32767);
-    EXPECT_GT(std::abs(weight) * one, 16000);
-    EXPECT_EQ(average.weight(69, 1), weight * one);
-    EXPECT_EQ(average.weight(3, 1), -weight * one);
+    const std::int32_t unit_weight = 1 << average.fraction_bits();
+    EXPECT_LE(std::abs(weight) * unit_weight, 32767);
+    EXPECT_GT(std::abs(weight) * unit_weight, 16000);
+    EXPECT_EQ(average.weight(69, 1), weight * unit_weight);
+    EXPECT_EQ(average.weight(3, 1), -weight * unit_weight);
     layer.set_weight(69, 1, -weight);
     for (std::uint64_t n = 2; n < 4000; ++n) average.note(n, layer);
-    EXPECT_NEAR(average.weight(69, 1), -weight * one, 4) << weight;  // moved by eighths
+    EXPECT_NEAR(average.weight(69, 1), -weight * unit_weight, 4) << weight;  // moved by eighths
   }
 }
 
 // A weight that swings for ever, half of the time up: its average comes to rest in the middle.
-TEST(WeightAverage, StillsWhatSwings) {
+TEST(WeightAverage, AnOscillatingWeightAveragesToItsMiddle) {
   HiddenLayer layer(1, 1);
   WeightAverage average(layer, 10);
   for (std::uint64_t n = 1; n <= 20000; ++n) {
@@ -69,7 +69,7 @@ TEST(WeightAverage, StillsWhatSwings) {
   EXPECT_LT(average.n_snapshots(), 64U + 64U * 4U);  // ever rarer: 64 log(20000 / 640) and 64
 }
 
-TEST(WeightAverage, ForgetsAndBeginsAnew) {
+TEST(WeightAverage, ForgetRestartsTheAverage) {
   HiddenLayer layer(1, 1);
   WeightAverage average(layer, 10);
   layer.set_weight(0, 0, 5);
@@ -83,7 +83,7 @@ TEST(WeightAverage, ForgetsAndBeginsAnew) {
   EXPECT_EQ(steps_of(average, 0, 0), 9);
 }
 
-TEST(WeightAverage, RefusesAStateThatDoesNotFit) {
+TEST(WeightAverage, RefusesInconsistentStates) {
   const HiddenLayer layer(2, 3);
   WeightAverage average(layer, 3);
   testing::expect_that_damage_is_refused(average);

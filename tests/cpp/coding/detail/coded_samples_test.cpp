@@ -20,7 +20,7 @@ SelectiveDesensitization small_code(std::size_t n_units) {
   return {{draw(), draw()}, {draw(), draw()}, {{0, 1}, {1, 0}}};
 }
 
-TEST(CodedSamples, SignsByHand) {
+TEST(CodedSamples, SignsAreAsWorkedByHand) {
   const SelectiveDesensitization code(
       {PatternTable::from_signs(std::vector<std::int8_t>{1, -1, 1}, 1, 3)},
       {PatternTable::from_signs(std::vector<std::int8_t>{1, 1, -1}, 1, 3)}, {{0, 0}});
@@ -29,7 +29,7 @@ TEST(CodedSamples, SignsByHand) {
   EXPECT_EQ(signs, (std::vector<std::int8_t>{1, -1, 0}));
 }
 
-TEST(CodedSamples, ProductsAreThoseOfTheSigns) {
+TEST(CodedSamples, ProductsEqualThoseOfSigns) {
   const auto code = small_code(70);
   const std::vector<Bin> bins = {0, 1, 2, 3, 4, 0};
   const std::vector<Bin> others = {4, 4, 1, 2};
@@ -48,7 +48,7 @@ TEST(CodedSamples, ProductsAreThoseOfTheSigns) {
   }
 }
 
-TEST(CodedSamples, CodesAreFilledUpToFourWords) {
+TEST(CodedSamples, CodesArePaddedToFourWords) {
   const auto code = small_code(70);
   const CodedSamples coded(code, std::vector<Bin>{0, 1, 2, 3});
   EXPECT_EQ(coded.size(), 2U);

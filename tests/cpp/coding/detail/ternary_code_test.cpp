@@ -13,7 +13,7 @@
 namespace sdnn {
 namespace {
 
-TEST(TernaryCode, AreExactForAnyNumberOfWords) {
+TEST(TernaryCode, InnerProductsAreExactForAnyNumberOfWords) {
   core::Random random(3, core::Stream::weights);
   for (std::size_t n_words = 0; n_words < 270; n_words += n_words < 70 ? 1 : 13) {
     const auto one = testing::random_code(n_words, random);
@@ -27,7 +27,7 @@ TEST(TernaryCode, AreExactForAnyNumberOfWords) {
   }
 }
 
-TEST(TernaryCode, HoldTheExtremes) {  // where counts in bytes are fullest
+TEST(TernaryCode, InnerProductsOfFullCodesDoNotOverflow) {  // where counts in bytes are fullest
   for (const std::size_t n_words : {124U, 128U, 400U}) {
     testing::Code on{std::vector<std::uint64_t>(n_words, ~std::uint64_t{0}),
                      std::vector<std::uint64_t>(n_words, ~std::uint64_t{0})};
@@ -49,7 +49,7 @@ std::vector<int> entries_of(const coding::ColumnLists& slots, std::size_t n_word
   return entries;
 }
 
-TEST(ColumnLists, LeadFromOneCodeToAnother) {
+TEST(ColumnLists, ListTheChangesFromOneCodeToAnother) {
   core::Random random(5, core::Stream::weights);
   for (std::size_t n_words = 0; n_words < 9; ++n_words) {
     for (const std::size_t n_changes : {0U, 1U, 5U, 1000U}) {
@@ -75,7 +75,7 @@ TEST(ColumnLists, LeadFromOneCodeToAnother) {
   }
 }
 
-TEST(ColumnLists, HoldTheLongestLists) {
+TEST(ColumnLists, HaveRoomForChangesOfEveryColumn) {
   const std::size_t n_words = 3;
   testing::Code up{std::vector<std::uint64_t>(n_words, ~std::uint64_t{0}),
                    std::vector<std::uint64_t>(n_words, ~std::uint64_t{0})};

@@ -23,7 +23,7 @@ TEST(AlignedBuffer, IsZeroedAlignedAndCopiedByValue) {
   EXPECT_EQ(AlignedBuffer<std::int8_t>().size(), 0U);
 }
 
-TEST(AlignedBuffer, RefusesSizesThatWouldWrap) {
+TEST(AlignedBuffer, RefusesSizesThatOverflow) {
   EXPECT_THROW(AlignedBuffer<std::int32_t>(SIZE_MAX / 4), std::bad_alloc);
   EXPECT_EQ(checked_product(SIZE_MAX / 3, 3), SIZE_MAX);
   EXPECT_THROW(checked_product(SIZE_MAX / 3 + 1, 3), std::bad_alloc);

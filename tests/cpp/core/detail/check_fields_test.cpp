@@ -41,7 +41,7 @@ std::string refusal(const Numbers& numbers) {
   }
 }
 
-TEST(CheckFields, TakesWhatIsWithinItsBounds) {
+TEST(CheckFields, AcceptsValuesWithinTheirBounds) {
   EXPECT_EQ(refusal({}), "");
   EXPECT_EQ(refusal({.share = 1.0, .rate = 2.0, .any = -1e300, .last = 1e-9, .sizes = {0, 7}}), "");
 }

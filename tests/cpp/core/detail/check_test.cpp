@@ -17,12 +17,12 @@ using sdnn::testing::message_of;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-TEST(Require, SaysWhatWasExpectedAndWhatCame) {
+TEST(Require, StatesTheExpectedAndTheActualValue) {
   EXPECT_EQ(message_of([] { require(false, "n_bins", "even", 7); }), "n_bins must be even, got 7");
   EXPECT_EQ(message_of([] { require(true, "n_bins", "even", 8); }), "no error");
 }
 
-TEST(RequireInRange, AcceptsTheEndsAndNothingBeyond) {
+TEST(RequireInRange, AcceptsTheLimitsAndNothingBeyond) {
   EXPECT_NO_THROW(require_in_range("n", 1, 1, 900));
   EXPECT_NO_THROW(require_in_range("n", 900, 1, 900));
   EXPECT_EQ(message_of([] { require_in_range("n_active_units", 901, 1, 900); }),
@@ -45,7 +45,7 @@ TEST(RequireFinite, RejectsNonFinite) {
   }
 }
 
-TEST(RequireUnitValues, NamesTheFirstBadOne) {
+TEST(RequireUnitValues, NamesTheFirstBadValue) {
   const auto message = [](std::vector<double> values) {
     return message_of([&] { require_unit_values("state", values, 2); });
   };

@@ -16,14 +16,14 @@ std::uint32_t crc32_of(const std::string& text, std::uint32_t before = 0) {
   return crc32(std::as_bytes(std::span(text)), before);
 }
 
-TEST(Crc32, IsThatOfZlib) {
+TEST(Crc32, EqualsZlib) {
   EXPECT_EQ(crc32_of(""), 0U);
   EXPECT_EQ(crc32_of("a"), 0xe8b7be43U);
   EXPECT_EQ(crc32_of("123456789"), 0xcbf43926U);  // the check value of catalogues
   EXPECT_EQ(crc32_of("The quick brown fox jumps over the lazy dog"), 0x414fa339U);
 }
 
-TEST(Crc32, ContinuesWithTheBytesThatFollow) {
+TEST(Crc32, MayBeComputedInTwoParts) {
   const std::string text = "bytes in two parts, of any lengths";
   for (std::size_t n = 0; n <= text.size(); ++n) {
     EXPECT_EQ(crc32_of(text.substr(n), crc32_of(text.substr(0, n))), crc32_of(text)) << n;
@@ -40,7 +40,7 @@ std::uint32_t crc32_by_bits(const std::string& text) {
   return ~crc;
 }
 
-TEST(Crc32, IsTheSameOnAllInstructionSetsAndForAllLengths) {
+TEST(Crc32, EqualsItsDefinitionOnEveryInstructionSet) {
   std::string text;
   for (std::uint32_t n = 0, x = 1; n < 300; ++n, x = x * 1103515245U + 12345U) {
     const std::uint32_t expected = crc32_by_bits(text);

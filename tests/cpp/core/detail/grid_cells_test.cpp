@@ -22,7 +22,7 @@ std::string message(std::size_t n_per_dimension, std::size_t n_dimensions, std::
       [&] { grid_cells("n_sets", "rules", n_per_dimension, n_dimensions, bytes, limit); });
 }
 
-TEST(GridCells, IsThePower) {
+TEST(GridCells, CountsArePowersOfTheCellsPerDimension) {
   EXPECT_EQ(grid_cells("n", "cells", 9, 6, 84, kAnything), 531441U);
   EXPECT_EQ(grid_cells("n", "cells", 4, 7, 8, kAnything), 16384U);
   EXPECT_EQ(grid_cells("n", "cells", 5, 0, 1, kAnything), 1U);
@@ -30,7 +30,7 @@ TEST(GridCells, IsThePower) {
             SIZE_MAX / 2 + 1);
 }
 
-TEST(GridCells, TheLimitIsTheLargestAllowed) {
+TEST(GridCells, ATableOfTheSizeOfTheLimitIsAccepted) {
   EXPECT_EQ(message(10, 2, 8, 800), "no error");
   EXPECT_EQ(
       message(10, 2, 8, 799),
@@ -38,7 +38,7 @@ TEST(GridCells, TheLimitIsTheLargestAllowed) {
       "is 799");
 }
 
-TEST(GridCells, WhatCannotBeCountedIsRefusedUnderAnyLimit) {
+TEST(GridCells, SizesOf64BitsAndMoreAreRefused) {
   EXPECT_EQ(
       message(2, 63, 4, kAnything),
       "n_sets must be smaller: a table of 2^63 = 9223372036854775808 rules needs 2^64 bytes or "
@@ -50,7 +50,7 @@ TEST(GridCells, WhatCannotBeCountedIsRefusedUnderAnyLimit) {
             "18446744073709551615");
 }
 
-TEST(GridCells, NoMoreThanCanBeAddressed) {
+TEST(GridCells, SizesBeyondTheAddressSpaceAreRefused) {
   EXPECT_EQ(message(2, 33, 1, kAnything),
             sizeof(std::size_t) > 4 ? "no error"
                                     : "n_sets must be smaller: a table of 2^33 = 8589934592 rules "
@@ -58,7 +58,7 @@ TEST(GridCells, NoMoreThanCanBeAddressed) {
                                       "addressed");
 }
 
-TEST(RequireTableBytes, SaysWhatToReduce) {
+TEST(RequireTableBytes, NamesTheSettingToReduce) {
   require_table_bytes("n_actions", "bases", 800.0, 800);
   EXPECT_EQ(
       message_of<std::length_error>([] { require_table_bytes("n_actions", "bases", 1e18, 800); }),

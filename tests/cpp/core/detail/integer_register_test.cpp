@@ -13,27 +13,27 @@ template <class Integer, class Wide>
 void check_register() {
   constexpr std::size_t kSize = IntegerRegister<Integer>::kSize;
   static_assert(kSize * sizeof(Integer) == 32);
-  std::vector<Integer> one(kSize);
-  std::vector<Integer> other(kSize);
+  std::vector<Integer> added(kSize);
+  std::vector<Integer> subtracted(kSize);
   for (std::size_t i = 0; i < kSize; ++i) {
-    one[i] = static_cast<Integer>(3 * i);
-    other[i] = static_cast<Integer>(i % 2 == 0 ? 5 : -7);
+    added[i] = static_cast<Integer>(3 * i);
+    subtracted[i] = static_cast<Integer>(i % 2 == 0 ? 5 : -7);
   }
   IntegerRegister<Integer> sum;
   sum.clear();
-  sum.add(one.data());
-  sum.subtract(other.data());
+  sum.add(added.data());
+  sum.subtract(subtracted.data());
   std::vector<Integer> stored(kSize);
   sum.store(stored.data());
   std::vector<Wide> wide(kSize, 100);
   sum.add_to(wide.data());
   for (std::size_t i = 0; i < kSize; ++i) {
-    EXPECT_EQ(stored[i], one[i] - other[i]);
-    EXPECT_EQ(wide[i], 100 + one[i] - other[i]);
+    EXPECT_EQ(stored[i], added[i] - subtracted[i]);
+    EXPECT_EQ(wide[i], 100 + added[i] - subtracted[i]);
   }
-  sum.load(other.data());
+  sum.load(subtracted.data());
   sum.store(stored.data());
-  EXPECT_EQ(stored, other);
+  EXPECT_EQ(stored, subtracted);
 }
 
 TEST(IntegerRegister, AddsSubtractsAndWidens) {

@@ -20,14 +20,14 @@ using testing::n_points_left;
 using testing::StopAt;
 using testing::StopError;
 
-TEST(Interruption, DoesNothingUnlessSomebodyAsks) {
+TEST(Interruption, DoesNothingUntilItIsRequested) {
   EXPECT_NO_THROW(interruption_point());
   const StopAt stop(1);
   EXPECT_NO_THROW(interruption_point());
   EXPECT_THROW(interruption_point(), StopError);
 }
 
-TEST(Interruption, SaysWhetherToLookAtOnce) {
+TEST(Interruption, PassesOnWhetherToCheckImmediately) {
   static int n_at_once;
   n_at_once = 0;
   interruption_check() = [](bool at_once) { n_at_once += at_once ? 1 : 0; };
@@ -38,25 +38,25 @@ TEST(Interruption, SaysWhetherToLookAtOnce) {
   interruption_check() = nullptr;
 }
 
-TEST(Interruption, EndsTheMakingOfPatterns) {
+TEST(Interruption, EndsTheGenerationOfPatterns) {
   Random random(1, Stream::code_books);
   const coding::AnchorConfig config{.n_units = 20, .n_anchor_patterns = 3, .n_interpolated = 4};
   const StopAt stop(4);
   EXPECT_THROW(coding::anchor_patterns(config, random), StopError);
 }
 
-TEST(Interruption, ShufflesToTheSameOrderIfItGoesOn) {
-  std::vector<std::uint32_t> one(200'000), other(200'000);
-  std::iota(one.begin(), one.end(), 0U);
-  std::iota(other.begin(), other.end(), 0U);
-  Random(1, Stream::weights).shuffle(std::span(one));
+TEST(Interruption, DoesNotChangeTheOrderOfAShuffleThatContinues) {
+  std::vector<std::uint32_t> expected(200'000), shuffled(200'000);
+  std::iota(expected.begin(), expected.end(), 0U);
+  std::iota(shuffled.begin(), shuffled.end(), 0U);
+  Random(1, Stream::weights).shuffle(std::span(expected));
   const StopAt stop(1000);
-  Random(1, Stream::weights).shuffle(std::span(other));
+  Random(1, Stream::weights).shuffle(std::span(shuffled));
   EXPECT_LT(n_points_left, 1000);
-  EXPECT_EQ(one, other);
+  EXPECT_EQ(expected, shuffled);
 }
 
-TEST(Interruption, OfAStepEndsTheEpisodesOfABatch) {
+TEST(Interruption, OfAStepEndsTheMovingEpisodesOfABatch) {
   environments::AcrobotBatch batch({}, 3);
   const std::vector<double> torques(3, 1.0), tolerances(3, 1.0);
   std::vector<std::uint8_t> moving{1, 0, 1}, terminated(3), truncated(3);

@@ -37,17 +37,17 @@ SDNN_DISPATCH(std::string_view, mixed, (), ())
 
 namespace {
 
-TEST(Kernel, GivesTheSameOnEveryInstructionSet) {
+TEST(Kernel, GivesTheSameResultOnEveryInstructionSet) {
   const int items[] = {1, 2, 3, 4, 5, 6, 7, 8, 9};
   sdnn::testing::on_every_instruction_set(
       [&](auto level) { EXPECT_EQ(sum(items, 9), 45) << level; });
 }
 
-TEST(Kernel, RunsTheVersionOfTheInstructionSetInUse) {
+TEST(Kernel, RunsTheVersionOfTheSelectedInstructionSet) {
   sdnn::testing::on_every_instruction_set([](auto level) { EXPECT_EQ(version(), level); });
 }
 
-TEST(Kernel, TakesAVersionThatIsWrittenByHand) {
+TEST(Kernel, PrefersHandWrittenVersions) {
   sdnn::testing::on_every_instruction_set([](auto level) {
     EXPECT_EQ(mixed(), level == "avx2" || level == "neon" ? "by hand" : "made") << level;
   });

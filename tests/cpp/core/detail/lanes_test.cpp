@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::uint64_t kOnes = ~std::uint64_t{0};
 
-TEST(Lanes, OneNumberIsItsOwnLane) {
+TEST(Lanes, ADoubleIsASingleLane) {
   EXPECT_EQ(select(true, 1.0, 2.0), 1.0);
   EXPECT_EQ(select(false, 1.0, 2.0), 2.0);
   EXPECT_TRUE(any(true));

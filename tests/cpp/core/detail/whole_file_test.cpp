@@ -15,7 +15,7 @@ namespace {
 
 void write(WholeFile& file, const std::string& text) { file.write(std::as_bytes(std::span(text))); }
 
-TEST(WholeFile, IsThereWhenItIsFinished) {
+TEST(WholeFile, AppearsWhenItIsFinished) {
   const testing::Folder folder;
   testing::write_content(folder / "file", "before");
   {
@@ -32,7 +32,7 @@ TEST(WholeFile, IsThereWhenItIsFinished) {
   EXPECT_EQ(folder.n_files(), 1U);
 }
 
-TEST(WholeFile, ALinkIsReplaced) {
+TEST(WholeFile, ReplacesALink) {
   const testing::Folder folder;
   testing::write_content(folder / "target", "before");
   std::filesystem::create_symlink(folder / "target", folder / "link");
@@ -48,7 +48,7 @@ TEST(WholeFile, ALinkIsReplaced) {
   EXPECT_EQ(folder.n_files(), 3U);
 }
 
-TEST(WholeFile, ADeviceIsWrittenTo) {
+TEST(WholeFile, WritesToADevice) {
   const std::filesystem::path device = "/dev/null";
   if (!std::filesystem::exists(device)) GTEST_SKIP() << "needs " << device;
   WholeFile file(device);
@@ -57,7 +57,7 @@ TEST(WholeFile, ADeviceIsWrittenTo) {
   EXPECT_TRUE(std::filesystem::is_character_file(device));
 }
 
-TEST(WholeFile, LeavesNothingWhereItIsNotFinished) {
+TEST(WholeFile, LeavesNoFileIfItIsNotFinished) {
   const testing::Folder folder;
   testing::write_content(folder / "file", "before");
   {
@@ -70,7 +70,7 @@ TEST(WholeFile, LeavesNothingWhereItIsNotFinished) {
 }
 
 // Each has the same beginning, and 16 digits that nobody can foresee.
-TEST(WholeFile, IsWrittenUnderAnotherNameEachTime) {
+TEST(WholeFile, HasADifferentTemporaryNameEachTime) {
   const testing::Folder folder;
   std::set<std::string> names;
   for (int i = 0; i < 20; ++i) {
@@ -99,7 +99,7 @@ TEST(RegularFile, IsReadInParts) {
       "cannot be read to its end");
 }
 
-TEST(RegularFile, DevicesAndFoldersAreRefused) {
+TEST(RegularFile, RefusesDevicesAndFolders) {
   const testing::Folder folder;
   const auto error_of = [](const std::filesystem::path& path) {
     return testing::runtime_error_of([&] { const RegularFile file(path); });

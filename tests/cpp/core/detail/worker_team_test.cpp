@@ -31,6 +31,6 @@ TEST(WorkerTeam, RunOverCoversEveryItemOnce) {
   }
 }
 
-TEST(WorkerTeam, EndsWithoutEverHavingWorked) { WorkerTeam team(4); }
+TEST(WorkerTeam, EndsWithoutWork) { WorkerTeam team(4); }
 
 }  // namespace

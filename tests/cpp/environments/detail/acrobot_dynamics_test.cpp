@@ -23,7 +23,7 @@ TEST(AcrobotDynamicsForms, EnergyAsWorkedByHand) {
   EXPECT_NEAR(dynamics.energy({0.0, core::kPi, 2.0, -1.0}), kinetic + potential, 1e-13);
 }
 
-TEST(AcrobotDynamicsForms, StopsAtTheGoalAndSaysSo) {
+TEST(AcrobotDynamicsForms, IntegrationStopsAtTheGoal) {
   const AcrobotDynamics dynamics;
   One::State state{2.0, 0.0, 2.0, 0.0};
   EXPECT_TRUE(dynamics.integrate<One>(state, 0.0, 9.0, 15.0, true));

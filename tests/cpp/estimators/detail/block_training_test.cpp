@@ -15,8 +15,8 @@ TEST(BlockTraining, HasTheBitsOfPlainTraining) {
   testing::expect_bits_of_plain_training(estimators::TrainingForm::block);
 }
 
-TEST(BlockTraining,
-     HasThemWherePlansAreKept) {  // from the second round in the order of the data on
+// Plans are kept from the second epoch in the order of the data on.
+TEST(BlockTraining, HasTheBitsOfPlainTrainingWithKeptPlans) {
   for (std::uint64_t seed = 300; seed < 330; ++seed) {
     auto problem = testing::in_data_order(testing::random_problem(seed), 6, false);
     if (seed % 2 == 0) problem.orders[3] = {0};  // something else in between
@@ -26,29 +26,29 @@ TEST(BlockTraining,
   }
 }
 
-TEST(BlockTraining, HasThemOverSeveralLargeBlocks) {
+TEST(BlockTraining, HasTheBitsOfPlainTrainingOverSeveralBlocks) {
   const auto problem = testing::in_data_order(
       testing::with_samples(testing::random_problem(12), 1300, 12), 4, false);
   for (const std::size_t limit :
        {std::size_t{1} << 30, std::size_t{3} << 20}) {  // with plans, without
-    const auto one = testing::layer_for(problem);
-    const auto other = testing::layer_for(problem);
+    const auto plain_layer = testing::layer_for(problem);
+    const auto block_layer = testing::layer_for(problem);
     const auto rule = [&] {
       return estimators::PDeltaRule(problem.n_units, problem.targets, problem.n_groups);
     };
-    auto plain = testing::trainer_for(problem, one, estimators::TrainingForm::plain);
-    estimators::PDeltaTrainer block(other, problem.bins, rule(), estimators::TrainingForm::block,
-                                    limit, 2);
+    auto plain = testing::trainer_for(problem, plain_layer, estimators::TrainingForm::plain);
+    estimators::PDeltaTrainer block(block_layer, problem.bins, rule(),
+                                    estimators::TrainingForm::block, limit, 2);
     EXPECT_LE(block.memory(), limit);
     for (const auto& order : problem.orders) {
       ASSERT_EQ(plain.present(order).n_units, block.present(order).n_units);
     }
     block.synchronize();
-    EXPECT_EQ(testing::bits_of(*one), testing::bits_of(*other));
+    EXPECT_EQ(testing::bits_of(*plain_layer), testing::bits_of(*block_layer));
   }
 }
 
-TEST(BlockTraining, ChangesToWideWeightsWithoutChangingThem) {
+TEST(BlockTraining, HasTheBitsOfPlainTrainingWithWeightsBeyond16Bits) {
   auto problem = testing::random_problem(5);
   const std::size_t n_columns = problem.code->n_columns();
   for (const std::int32_t start :
@@ -60,17 +60,17 @@ TEST(BlockTraining, ChangesToWideWeightsWithoutChangingThem) {
       return std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units,
                                                               weights, thresholds);
     };
-    const auto one = layer();
-    const auto other = layer();
-    auto plain = testing::trainer_for(problem, one, estimators::TrainingForm::plain);
-    auto block = testing::trainer_for(problem, other, estimators::TrainingForm::block, 2);
+    const auto plain_layer = layer();
+    const auto block_layer = layer();
+    auto plain = testing::trainer_for(problem, plain_layer, estimators::TrainingForm::plain);
+    auto block = testing::trainer_for(problem, block_layer, estimators::TrainingForm::block, 2);
     for (int epoch = 0; epoch < 20; ++epoch) {
       for (const auto& order : problem.orders) {
         ASSERT_EQ(plain.present(order).n_units, block.present(order).n_units);
       }
     }
     block.synchronize();
-    EXPECT_EQ(testing::bits_of(*one), testing::bits_of(*other));
+    EXPECT_EQ(testing::bits_of(*plain_layer), testing::bits_of(*block_layer));
   }
 }
 

@@ -81,19 +81,19 @@ void check_walk(std::int32_t largest) {
   }
 }
 
-TEST(CodeWalk, SumsWhatEachCodeAsksFor) {
+TEST(CodeWalk, SumsOfStepsEqualSumsOfCodes) {
   check_walk<std::int16_t>(63);  // twice 256 columns of 63 just fit
   check_walk<std::int32_t>(1000000);
 }
 
-TEST(CodeWalk, StartsFromZeroWhereThatIsNearer) {
+TEST(CodeWalk, StartsDistantCodesFromZero) {
   core::Random random(9, core::Stream::weights);
   const CodeWalk walk = walk_through(some_codes(kChunkWords, random), kChunkWords);
   EXPECT_FALSE(walk.steps[3].from_zero);
   EXPECT_TRUE(walk.steps.back().from_zero);
 }
 
-TEST(ChunkedWeights, HoldTheTilesAndZerosBeyond) {
+TEST(ChunkedWeights, AreCopiesOfTilesPaddedWithZeros) {
   WeightTiles<std::int32_t> tiles(20, 3 * 64);
   tiles.at(17, 130) = -300;
   tiles.at(17, 131) = 40000;
@@ -106,7 +106,7 @@ TEST(ChunkedWeights, HoldTheTilesAndZerosBeyond) {
   EXPECT_EQ(ChunkedWeights<std::int32_t>::bytes(32, 4), 4U * 32 * 256);
 }
 
-TEST(ChunkedWeights, GoThereAndBack) {
+TEST(ChunkedWeights, KeepTilesThroughConversionToNarrowWeights) {
   WeightTiles<std::int32_t> tiles(200, 128);
   std::int32_t value = -10000;
   for (std::size_t i = 0; i < 200; ++i) {

@@ -14,7 +14,8 @@ TEST(DualTraining, HasTheBitsOfPlainTraining) {
   testing::expect_bits_of_plain_training(estimators::TrainingForm::dual);
 }
 
-TEST(DualTraining, HasThemInDataOrder) {  // where corrections wait for each other
+// In the order of the data, corrections depend on each other.
+TEST(DualTraining, HasTheBitsOfPlainTrainingInDataOrder) {
   for (std::uint64_t seed = 300; seed < 340; ++seed) {
     for (const bool at_once : {false, true}) {
       testing::compare_with_plain(
@@ -25,14 +26,14 @@ TEST(DualTraining, HasThemInDataOrder) {  // where corrections wait for each oth
   }
 }
 
-TEST(DualTraining, HasThemOverManyWindows) {
+TEST(DualTraining, HasTheBitsOfPlainTrainingOverManyWindows) {
   const auto problem = testing::with_samples(testing::random_problem(11), 1500, 11);
   testing::compare_with_plain(testing::in_data_order(problem, 4, false),
                               estimators::TrainingForm::dual, 2,
                               [](bool same) { ASSERT_TRUE(same); });
 }
 
-TEST(DualTraining, EmptiesCoefficientsBeforeTheyOverflow) {
+TEST(DualTraining, HasTheBitsOfPlainTrainingWithCoefficientsNearOverflow) {
   // Two samples of one code that want opposite things: one coefficient rises for ever, one falls.
   auto problem = testing::random_problem(3);
   const std::size_t n_inputs = problem.code->n_inputs();
@@ -47,7 +48,7 @@ TEST(DualTraining, EmptiesCoefficientsBeforeTheyOverflow) {
                               [](bool same) { ASSERT_TRUE(same); });
 }
 
-TEST(DualTraining, KeepsProductsIn32BitsOfLongCodes) {
+TEST(DualTraining, HasTheBitsOfPlainTrainingWithProductsBeyond16Bits) {
   // 2 * 20,000 columns may all be active: a product can exceed 16 bits.
   std::vector<coding::PatternTable> tables;
   coding::PatternTable all_on(2, 20000);

@@ -7,7 +7,7 @@
 namespace sdnn {
 namespace {
 
-TEST(PlainTraining, OneCorrectionByHand) {
+TEST(PlainTraining, ACorrectionIsAsWorkedByHand) {
   // x_SD = +1 -1; units 0 and 1 silent at distances 3 and 1; one of them shall fire.
   const std::vector<std::int8_t> signs{1, -1};
   const std::vector<std::int8_t> on{1, 1};

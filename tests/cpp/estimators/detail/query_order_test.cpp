@@ -14,7 +14,7 @@ namespace {
 
 using namespace sdnn;
 
-TEST(QueryOrder, HilbertsCurveVisitsEveryPointByStepsOfOne) {
+TEST(QueryOrder, TheHilbertCurveVisitsEveryPointInStepsOfOne) {
   for (const auto& [n_axes, n_bits] : {std::pair{2, 4}, std::pair{3, 3}}) {
     const std::uint32_t side = 1U << n_bits;
     std::size_t n_points = 1;
@@ -41,7 +41,7 @@ TEST(QueryOrder, HilbertsCurveVisitsEveryPointByStepsOfOne) {
   }
 }
 
-TEST(QueryOrder, KeepsALatticeAsItIsAndShortensARandomWalk) {
+TEST(QueryOrder, KeepsTheOrderOfALatticeAndShortensThatOfRandomPoints) {
   std::vector<std::int32_t> lattice;
   for (std::int32_t x = 0; x < 30; ++x) {
     for (std::int32_t y = 0; y < 30; ++y) lattice.insert(lattice.end(), {x, y});

@@ -41,7 +41,7 @@ void check_sums(std::int32_t largest, std::size_t n_per_sum) {
   }
 }
 
-TEST(SignedSums, AreExactWhateverTheTypes) {
+TEST(SignedSums, AreExactForAllTypes) {
   check_sums<std::int16_t, std::int8_t>(1, 127);
   check_sums<std::int32_t, std::int8_t>(127, 1);
   check_sums<std::int32_t, std::int16_t>(4000, 8);
@@ -49,13 +49,13 @@ TEST(SignedSums, AreExactWhateverTheTypes) {
   check_sums<std::int32_t, std::int32_t>(1000000, std::numeric_limits<std::int32_t>::max());
 }
 
-TEST(SignedSums, OfNothingChangeNothing) {
+TEST(SignedSums, OfNoColumnsDoNotChangeSums) {
   std::vector<std::int32_t> to(40, 9);
   estimators::add_signed(to.data(), to.size(), estimators::SignedRows<std::int16_t>(), 0, 8);
   EXPECT_EQ(to, std::vector<std::int32_t>(40, 9));
 }
 
-TEST(SignedSums, TakeCodesAsRows) {
+TEST(SignedSums, EqualPlainSumsOverRowsOfCodes) {
   core::Random random(10, core::Stream::weights);
   constexpr std::size_t kChunkWords = 2;
   constexpr std::size_t kColumns = 64 * kChunkWords;
@@ -86,7 +86,7 @@ void check_one_row() {
   });
 }
 
-TEST(SignedSums, TakeARowAlone) {
+TEST(SignedSums, EqualPlainSumsOfASingleRow) {
   check_one_row<std::int16_t>();
   check_one_row<std::int32_t>();
 }

@@ -14,7 +14,7 @@ namespace {
 
 using estimators::WeightTiles;
 
-TEST(WeightTiles, LastTileIsAsWideAsNeeded) {
+TEST(WeightTiles, TheLastTileIsAsWideAsNeeded) {
   WeightTiles<std::int32_t> tiles(102, 3);
   EXPECT_EQ(tiles.n_tiles(), 2U);
   EXPECT_EQ(tiles.n_padded_units(), 112U);
