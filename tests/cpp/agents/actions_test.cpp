@@ -31,7 +31,7 @@ TEST(Actions, OfABoxAreEvenlySpacedAndFoundByTheNearestIndex) {
   EXPECT_EQ(Actions({.low = {-2.0}, .high = {2.0}}, 1).index_of(1.0, 0), 0U);
 }
 
-TEST(Actions, AnOffsetMovesAnActionOfABoxToItsNeighbour) {
+TEST(Actions, AnOffsetMovesActionsOfABoxButNotDiscreteOnes) {
   const Actions actions({.low = {-2.0}, .high = {2.0}}, 5);
   EXPECT_EQ(actions.beside_index(1, 0.25, 0), -0.75);
   EXPECT_EQ(actions.beside_index(4, -0.5, 0), 1.5);
