@@ -6,7 +6,7 @@ import pytest
 import sdnn_actor_critic as page
 from hypothesis import given, settings, strategies as st
 
-from q_lambda_transcription import SMALL, life
+from q_lambda_transcription import SMALL, random_transitions
 from refusals import refuses
 from sdnn import _core
 from sdnn.agents import (
@@ -61,15 +61,15 @@ def test_weights_are_those_of_the_numpy_transcription(
         seed=seed,
     )
     (critic,) = agent.networks
-    slow = page.ActorCritic(Code(critic), n_actions, page.Settings(**learning, seed=seed))
-    for state, action, reward, next_state, end in life(seed, 25, n_actions, scale):
-        np.testing.assert_array_equal(agent.act(state), slow.act(state))
-        for one in (agent, slow):
-            one.learn(state, action, reward, next_state, end == "terminal")
+    transcription = page.ActorCritic(Code(critic), n_actions, page.Settings(**learning, seed=seed))
+    for state, action, reward, next_state, end in random_transitions(seed, 25, n_actions, scale):
+        np.testing.assert_array_equal(agent.act(state), transcription.act(state))
+        for learner in (agent, transcription):
+            learner.learn(state, action, reward, next_state, end == "terminal")
             if end == "limit":
-                one.begin_episode()
-        assert critic.exponent == slow.critic.exponent
-        np.testing.assert_array_equal(critic.weights(), slow.critic.weights)
+                learner.begin_episode()
+        assert critic.exponent == transcription.critic.exponent
+        np.testing.assert_array_equal(critic.weights(), transcription.critic.weights)
 
 
 def test_an_agent_of_a_bounded_space_acts_without_a_warm_up():

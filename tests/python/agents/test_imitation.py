@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from q_lambda_transcription import SMALL, Code, QLambda, life
+from q_lambda_transcription import SMALL, Code, QLambda, random_transitions
 from refusals import refuses
 from sdnn.agents import (
     FuzzyQLearning,
@@ -206,7 +206,7 @@ def test_weights_after_imitation_are_those_of_the_numpy_transcription(
     )
     sizes = [n_actions] * n_dimensions
     slow, margin = QLambda(Code(agent.readout.code, 2), sizes, window, learning), 0.1 * scale
-    for state, action, value, _, _ in life(seed, 25, sizes, scale):
+    for state, action, value, _, _ in random_transitions(seed, 25, sizes, scale):
         torques = np.array(action) / (n_actions - 1)
         agent._imitate_step(Transition(state, torques, 0.0, state, True), value, margin)
         imitated(slow, slow.code(state), action, value, margin)

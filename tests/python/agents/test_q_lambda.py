@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from q_lambda_transcription import SMALL, Code, QLambda, life
+from q_lambda_transcription import SMALL, Code, QLambda, random_transitions
 from sdnn import _core
 from sdnn.agents import QLambdaConfig, RBFQLearning, SDNNQLambda, Transition, evaluate, load_agent
 from sdnn.approximators import LinearSDNNConfig
@@ -46,17 +46,18 @@ def test_weights_are_those_of_the_numpy_transcription(
         seed=seed,
     )
     (readout,) = agent.networks
-    slow = QLambda(Code(readout.code, 2), n_actions, window, learning)
-    for state, action, reward, next_state, end in life(seed, 25, n_actions, scale):
+    transcription = QLambda(Code(readout.code, 2), n_actions, window, learning)
+    for state, action, reward, next_state, end in random_transitions(seed, 25, n_actions, scale):
         # Acting keeps sums for learning.
-        x = slow.code(state)
-        assert slow.value(x, [int(index) for index in agent.act(state)]) == slow.best_value(x)
-        for one in (agent, slow):
-            one.learn(state, action, reward, next_state, end == "terminal")
+        x = transcription.code(state)
+        best = [int(index) for index in agent.act(state)]
+        assert transcription.value(x, best) == transcription.best_value(x)
+        for learner in (agent, transcription):
+            learner.learn(state, action, reward, next_state, end == "terminal")
             if end == "limit":
-                one.begin_episode()
-        assert readout.exponent == slow.exponent
-        np.testing.assert_array_equal(readout.weights(), slow.weights)
+                learner.begin_episode()
+        assert readout.exponent == transcription.exponent
+        np.testing.assert_array_equal(readout.weights(), transcription.weights)
 
 
 def test_a_few_discrete_states_have_exact_independent_values(tmp_path):
@@ -97,7 +98,7 @@ def test_values_scale_exactly_with_rewards(scale):
         agent = _core.BareAgent(
             approximator=LinearSDNNConfig(**SMALL), n_actions=[3], learning=QLambdaConfig(), seed=1
         )
-        for state, action, reward, next_state, end in life(3, 200, [3], 2.0):
+        for state, action, reward, next_state, end in random_transitions(3, 200, [3], 2.0):
             agent.learn(state, action, reward * scale, next_state, end == "terminal")
         return agent.networks[0].values([0.2, 0.6])
 

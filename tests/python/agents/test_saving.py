@@ -55,7 +55,7 @@ RANDOMLY = SDNNCConfig(
 FALLING = QLearningConfig(learning_rate=1.0, final_learning_rate=0.2)
 TRACES = FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3)
 
-KINDS = {
+AGENTS = {
     "sdnn": lambda: SDNNQLearning(PLANE, TORQUE, approximator=RANDOMLY, learning=GENERAL, seed=5),
     "sdnn, vector": lambda: SDNNQLearning(
         PLANE, TWO_TORQUES, approximator=SMALL, learning=GENERAL, seed=5
@@ -107,14 +107,14 @@ KINDS = {
 N_STEPS = 150
 
 
-def lived(agent, first, last, cut=None):
-    """Steps ``first`` to ``last`` of a life in which everything follows from the step's number.
+def run_steps(agent, first, last, cut=None):
+    """Run steps ``first`` to ``last``, each of which depends on its number only.
 
     At a ``cut`` the agent is replaced after acting and before learning, or after both. Where it
     has several environments these take turns.
     """
     for step in range(first, last):
-        where = step % agent.n_environments
+        environment = step % agent.n_environments
         rng = np.random.default_rng(step)
         observation, next_observation = (
             {"at": rng.uniform(-1, 1, 2), "lamp": int(rng.integers(2))}
@@ -123,14 +123,14 @@ def lived(agent, first, last, cut=None):
             for _ in range(2)
         )
         if step % 17 == 0:
-            agent.begin_episode(where)
+            agent.begin_episode(environment)
         agent.progress = step / N_STEPS
-        action = agent.act(observation, environment=where)
+        action = agent.act(observation, environment=environment)
         if cut is not None and step == cut[0] and cut[1] == "before learning":
             agent = cut[2](agent)
         agent.learn(
             Transition(observation, action, float(rng.normal()), next_observation, step % 17 == 16),
-            where,
+            environment,
         )
         if step % 5 == 0:
             agent.act(observation, explore=False)
@@ -145,38 +145,38 @@ def same_state(first, second):
 
 
 @pytest.mark.parametrize(("n_environments", "n_cuts"), [(1, 100), (4, 24)])
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", AGENTS)
 def test_an_agent_saved_at_any_step_continues_exactly(name, n_environments, n_cuts, tmp_path):
     def new_agent():
-        agent = KINDS[name]()
+        agent = AGENTS[name]()
         agent.n_environments = n_environments
         return agent
 
-    whole = lived(new_agent(), 0, N_STEPS)
+    whole = run_steps(new_agent(), 0, N_STEPS)
 
     def from_file(agent):
         agent.save(tmp_path / "agent.safetensors")
         return load_agent(tmp_path / "agent.safetensors")
 
-    ways = [from_file, lambda agent: pickle.loads(pickle.dumps(agent)), copy.deepcopy]
+    copies = [from_file, lambda agent: pickle.loads(pickle.dumps(agent)), copy.deepcopy]
     cuts = np.random.default_rng(7).permutation(N_STEPS - 1)[:n_cuts]
     for number, cut in enumerate(cuts):
         when = ("before learning", "after learning")[number // 3 % 2]
-        again = lived(new_agent(), 0, N_STEPS, (cut, when, ways[number % 3]))
-        same_state(whole, again)
+        resumed = run_steps(new_agent(), 0, N_STEPS, (cut, when, copies[number % 3]))
+        same_state(whole, resumed)
 
 
 def test_learning_does_not_change_earlier_copies():
-    agent = lived(KINDS["sdnn"](), 0, 40)
+    agent = run_steps(AGENTS["sdnn"](), 0, 40)
     for copied in (copy.deepcopy(agent), copy.copy(agent)):
         before = copied.state()
-        lived(agent, 40, 90)
+        run_steps(agent, 40, 90)
         for name, array in copied.state().items():
             assert np.array_equal(array, before[name]), name
 
 
 def test_load_agent_returns_the_class_that_was_saved(tmp_path):
-    KINDS["rbf"]().save(tmp_path / "agent")
+    AGENTS["rbf"]().save(tmp_path / "agent")
     assert type(load_agent(tmp_path / "agent")) is RBFQLearning
     assert isinstance(RBFQLearning.load(tmp_path / "agent"), RBFQLearning)
     refuses("RBFQLearning", SDNNQLearning.load, tmp_path / "agent")
@@ -214,7 +214,7 @@ def test_a_second_class_of_the_same_name_is_refused_except_in_main():
     for module in ("__main__", "__main__", "script"):  # a notebook's cell, a script imported too
         again = type("DefinedAgain", (RBFQLearning,), {"__module__": module})
     agent = again(PLANE, TORQUE)
-    assert type(pickle.loads(pickle.dumps(KINDS["rbf"]()))) is RBFQLearning
+    assert type(pickle.loads(pickle.dumps(AGENTS["rbf"]()))) is RBFQLearning
     assert type(copy.deepcopy(agent)) is again
 
 
@@ -233,7 +233,7 @@ def test_an_unchanged_class_that_is_defined_again_replaces_the_first(tmp_path):
 )
 def test_a_file_without_gymnasium_spaces_is_read(name, n_steps, tmp_path):
     """C++ says all of an agent but Gymnasium's spaces."""
-    agent = lived(KINDS[name](), 0, n_steps)
+    agent = run_steps(AGENTS[name](), 0, n_steps)
     agent.save(tmp_path / "python")
 
     def change(description, _):
@@ -243,7 +243,7 @@ def test_a_file_without_gymnasium_spaces_is_read(name, n_steps, tmp_path):
     assert again.action_space == agent.action_space
     assert again.observation_space == agent.observation_space
     for one in (agent, again):
-        lived(one, n_steps, 90)
+        run_steps(one, n_steps, 90)
     assert states_equal(agent, again)
 
 
@@ -262,7 +262,7 @@ def test_progress_is_read_from_the_arrays_of_the_file(tmp_path):
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory):
     path = tmp_path_factory.mktemp("saved") / "agent.safetensors"
-    lived(KINDS["sdnn"](), 0, 30).save(path)
+    run_steps(AGENTS["sdnn"](), 0, 30).save(path)
     return path
 
 

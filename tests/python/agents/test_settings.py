@@ -55,8 +55,8 @@ def others(field, value):
     return [one for one in dict.fromkeys([kind((value or 0) * 2), *tried]) if one != value]
 
 
-def life(entry, n_dimensions, approximator, learning):
-    """Return the actions of a short life, and values and greedy actions after it."""
+def actions_and_values(entry, n_dimensions, approximator, learning):
+    """Return the actions of some steps, and values and greedy actions after them."""
     agent = entry.agent(
         gym.spaces.Box(0.0, 1.0, (3,), np.float64),
         gym.spaces.Box(-1.0, 1.0, (n_dimensions,), np.float64),
@@ -97,13 +97,13 @@ def test_every_setting_changes_what_an_agent_does_unless_listed(name, n_dimensio
         "approximator": entry.approximator(**approximator),
         "learning": entry.learning(**learning),
     }
-    usual = life(entry, n_dimensions, **parts)
+    usual = actions_and_values(entry, n_dimensions, **parts)
 
     def has_effect(part, field):
         for value in others(field, getattr(parts[part], field.name)):
             try:
                 changed = dataclasses.replace(parts[part], **{field.name: value})
-                outcome = life(entry, n_dimensions, **parts | {part: changed})
+                outcome = actions_and_values(entry, n_dimensions, **parts | {part: changed})
             except ValueError:
                 continue
             if not all(map(np.array_equal, outcome, usual)):

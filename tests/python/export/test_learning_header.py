@@ -51,8 +51,8 @@ def test_a_trained_agent_continues_in_c(make, target, tmp_path):
     header, command = build(tmp_path, agent, target)
     lines = lines_of(agent, 500, 4, header.fraction_bits)
     # The program gets an image that it refuses, and begins with what the header knows.
-    nothing = bytes(len(save_image(agent)))
-    actions, image = run_program(command, nothing, lines, agent.n_dimensions)
+    refused_image = bytes(len(save_image(agent)))
+    actions, image = run_program(command, refused_image, lines, agent.n_dimensions)
     assert actions == run_agent(agent, lines, header.fraction_bits)
     assert image == save_image(agent)
 
@@ -65,8 +65,8 @@ def test_an_agent_in_c_searches_for_a_first_reward_like_the_agent(target, tmp_pa
     n_rewards = (lines.shape[1] - 3) // 2 + 1
     lines[:300, n_rewards] = 0
     lines[300:, n_rewards] *= np.arange(len(lines) - 300) % 20 == 0
-    nothing = save_image(agent)
-    actions, image = run_program(command, nothing, lines, agent.n_dimensions)
+    initial_image = save_image(agent)
+    actions, image = run_program(command, initial_image, lines, agent.n_dimensions)
     assert actions == run_agent(agent, lines, header.fraction_bits)
     assert image == save_image(agent)
 

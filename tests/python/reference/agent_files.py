@@ -1,7 +1,7 @@
 """Writes the files that both languages must read alike: call it to renew tests/data.
 
-For each agent: a file, a life of some steps (observations, actions and so on), and the file that
-the agent leaves after it. Of the other kinds of files: a small one.
+For each agent: a file, some steps (observations, actions and so on), and the file that the agent
+leaves after them. Of the other kinds of files: a small one.
 """
 
 import json
@@ -110,8 +110,8 @@ def agents():
         )
 
 
-def life(agent, rng, n_steps):
-    """Lets an agent live; gives what it saw and did, step by step."""
+def record_steps(agent, rng, n_steps):
+    """Run some steps; return observations, actions and rewards of each."""
     steps = []
     turn, speed, other = rng.uniform(-3, 3, 3)
 
@@ -168,12 +168,12 @@ def write_agents(folder):
     folder.mkdir(parents=True, exist_ok=True)
     for name, agent in agents():
         rng = np.random.default_rng(5)
-        life(agent, rng, 120)
+        record_steps(agent, rng, 120)
         agent.progress = 0.5
         if name == "fuzzy":  # as after a run with noise
             agent.scaling = Scaling(ranges=((-1.0, 1.0),) * 3, n_redundant=1)
         agent.save(folder / f"{name}.safetensors")
-        steps = life(agent, rng, N_STEPS)
+        steps = record_steps(agent, rng, N_STEPS)
         agent.save(folder / f"{name}-after.safetensors")
         (folder / f"{name}.json").write_text(json.dumps(steps, indent=1) + "\n")
 

@@ -215,7 +215,7 @@ def make_agent(kind, **options):
     return agent
 
 
-def lived(agent, n_steps=7):
+def trained(agent, n_steps=7):
     """The agent after some steps; an exploring act comes last."""
     generator = np.random.default_rng(1)
     for _ in range(n_steps):
@@ -232,7 +232,7 @@ def memory(agent):
     return repr(agent.description()), arrays
 
 
-def insanity(agent):
+def agent_fault(agent):
     """Return what is wrong with an agent that was made or has learned, or ""."""
     observations = [sampled(agent.observation_space) for _ in range(36)]
     observation = observations[0]
@@ -274,8 +274,8 @@ def state_fault(agent):
     return ""
 
 
-class Lived:
-    """An agent that has lived, for one cell after the other as long as all of them are refused."""
+class ReusedAgent:
+    """A trained agent for one cell after the other, as long as all of them are refused."""
 
     def __init__(self, kind):
         self._kind = kind
@@ -287,7 +287,7 @@ class Lived:
     @property
     def agent(self):
         if self._agent is None:
-            self._agent = lived(make_agent(self._kind))
+            self._agent = trained(make_agent(self._kind))
             self._before = memory(self._agent)
         return self._agent
 
@@ -296,7 +296,7 @@ class Lived:
         return memory(self._agent) == self._before
 
 
-def judged(parameter, call, lived_agent=None, value=None):
+def judged(parameter, call, reused=None, value=None):
     """Run a cell: ``call`` gives what is wrong with an accepted value. Give the fault, or "".
 
     A message must show what ``value`` makes, too.
@@ -308,13 +308,13 @@ def judged(parameter, call, lived_agent=None, value=None):
     except TYPED as error:
         if fault := message_fault(error, parameter, value):
             return fault
-        if lived_agent is None or lived_agent.is_unchanged:
+        if reused is None or reused.is_unchanged:
             return ""
         fault = f"refused, but changed the agent: {str(error)[:100]}"
     except Exception as error:
         return f"raised {type(error).__name__}: {str(error)[:200]}"
-    if lived_agent is not None:
-        lived_agent.forget()
+    if reused is not None:
+        reused.forget()
     return fault
 
 
@@ -392,7 +392,7 @@ def constructor_cells(name):
 
 def _constructor_cell(name, parameter, value):
     def call():
-        return insanity(make_agent(name, **{parameter: value()}))
+        return agent_fault(make_agent(name, **{parameter: value()}))
 
     return lambda: judged(parameter, call, value=value)
 
@@ -411,34 +411,34 @@ def setting_cells(name):
 def _setting_cell(kind, part, settings, field, value):
     def call():
         changed = dataclasses.replace(settings, **{field: value()})
-        return insanity(make_agent(kind, **{part: changed}))
+        return agent_fault(make_agent(kind, **{part: changed}))
 
     return lambda: judged(field, call, value=value)
 
 
 def transition_cells(kind):
-    cell = partial(_transition_cell, Lived(kind))
+    cell = partial(_transition_cell, ReusedAgent(kind))
     return bad_cells(f"{kind}.learn: {{}}", Transition._fields, cell)
 
 
-def _transition_cell(life, parameter, value):
+def _transition_cell(reused, parameter, value):
     def run():
-        agent = life.agent
+        agent = reused.agent
         good = Transition(HERE, agent.last, 1.0, [0.3, 0.4], False)
 
         def call():
             agent.learn(good._replace(**{parameter: value()}))
-            return state_fault(agent) or insanity(agent)
+            return state_fault(agent) or agent_fault(agent)
 
-        return judged(parameter, call, life, value)
+        return judged(parameter, call, reused, value)
 
     return run
 
 
 def method_cells(kind):
     """Every public method and settable property of an agent."""
-    life = Lived(kind)
-    for name, method in inspect.getmembers(type(life.agent)):
+    reused = ReusedAgent(kind)
+    for name, method in inspect.getmembers(type(reused.agent)):
         if name.startswith("_") or name == "rebuild":  # rebuild: see the cells of files
             continue
         if kind != KINDS[0] and name in ("train", "save", "load"):  # the same of all kinds
@@ -449,13 +449,13 @@ def method_cells(kind):
             parameters = parameters_of(method)
         else:
             continue
-        cell = partial(_method_cell, life, kind, name, parameters)
+        cell = partial(_method_cell, reused, kind, name, parameters)
         yield from bad_cells(f"{kind}.{name}: {{}}", parameters, cell)
 
 
-def _method_cell(life, kind, name, parameters, parameter, value):
+def _method_cell(reused, kind, name, parameters, parameter, value):
     def run():
-        agent = life.agent
+        agent = reused.agent
         if ", warm-up" in kind and name in ("q_values", "value", "rule_values"):
             return ""  # which has no values yet
         given = arguments(agent, parameters) | {parameter: value()}
@@ -463,10 +463,10 @@ def _method_cell(life, kind, name, parameters, parameter, value):
         def call():
             if isinstance(getattr(type(agent), name), property):
                 setattr(agent, name, given[parameter])
-                return insanity(agent)
+                return agent_fault(agent)
             return result_fault(agent, getattr(agent, name)(**given), given)
 
-        return judged(parameter, call, life, value)
+        return judged(parameter, call, reused, value)
 
     return run
 
@@ -522,7 +522,7 @@ def arguments(agent, parameters):
 def result_fault(agent, result, given):
     """Return what is wrong with the result of a method, or ""."""
     if isinstance(result, agents.Agent):
-        return insanity(result)
+        return agent_fault(result)
     if "observation" in given and "explore" in given:
         return action_fault(agent, result)
     if isinstance(result, agents.TrainingResult):
@@ -554,8 +554,8 @@ def loop_cells():
 
 def _loop_cell(kind, name, function, parameters, parameter, value):
     def run():
-        life = Lived(kind)
-        agent = life.agent
+        reused = ReusedAgent(kind)
+        agent = reused.agent
         good = arguments(agent, parameters)
         training = Training(agent, Slope(agent.action_space), steps=5, seed=3)
         if name == "evaluate":
@@ -581,14 +581,14 @@ def _loop_cell(kind, name, function, parameters, parameter, value):
                 training.run()
             return ""
 
-        return judged(parameter, call, life if name == "evaluate" else None, value)
+        return judged(parameter, call, reused if name == "evaluate" else None, value)
 
     return run
 
 
 def file_cells(kind):
     """Every value of a file's description and every array, damaged."""
-    agent = lived(make_agent(kind))
+    agent = trained(make_agent(kind))
     env = Slope(agent.action_space)
     training = Training(agent, env, steps=45, seed=3)
     training.run()
@@ -643,7 +643,7 @@ def _file_cell(description, arrays, kind):
         write_file(path, "training", arrays, description)
         for load in (load_agent, lambda path: _trained(path, kind)):
             try:
-                fault = insanity(load(path))
+                fault = agent_fault(load(path))
             except EnoughError:
                 continue
             except OverflowError:

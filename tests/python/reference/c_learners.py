@@ -131,7 +131,7 @@ def _with(config):
     return {"approximator": config, "inputs": "all", "angle_pairs": []}
 
 
-# A line of life: what to do (0: begin an episode, 1: act and learn, 2: act greedily), observation,
+# A line of input: what to do (0: begin an episode, 1: act and learn, 2: act greedily), observation,
 # reward, next observation, whether it terminated.
 DRIVER = """
 #include <stdio.h>
@@ -160,7 +160,7 @@ int main(void) {
 
 
 def lines_of(agent, n_steps, seed, fraction_bits):
-    """Lines of life with episodes that end in every way, and rewards of many sizes."""
+    """Lines with episodes that end in every way, and rewards of many sizes."""
     random = np.random.default_rng(seed)
     space, scale = agent.observation_space, 2**fraction_bits
 
@@ -230,12 +230,12 @@ def build(folder, agent, target, *options):
     if target in BARE_TARGETS.values():
         (folder / "stdio.h").write_text(STDIO)
     source = DRIVER.replace("ACT(line[0] == 1)", act % "line[0] == 1").replace("LEARN", learn)
-    (folder / "life.c").write_text(source)
-    program = folder / "life"
+    (folder / "steps.c").write_text(source)
+    program = folder / "steps"
     run(
         target.compiler, *STRICT, "-O2", *target.options, *options,
         *(("-static",) if target.runner else ()),
-        "-I", folder, folder / "life.c", "-o", program,
+        "-I", folder, folder / "steps.c", "-o", program,
     )  # fmt: skip
     return header, [target.runner, program] if target.runner else [program]
 
@@ -253,26 +253,26 @@ def run_program(command, image, lines, n_dimensions):
 
 
 @functools.cache
-def life(name, n_steps, fraction_bits):
-    """Lines of life, and what the library's agent begins with, does and remembers in the end."""
+def recorded_steps(name, n_steps, fraction_bits):
+    """Lines, the first image of the library's agent, its actions and its last image."""
     agent = LEARNERS[name]()
     lines = lines_of(agent, n_steps, 1, fraction_bits)
-    nothing = save_image(agent)
-    return lines, nothing, run_agent(agent, lines, fraction_bits), save_image(agent)
+    initial_image = save_image(agent)
+    return lines, initial_image, run_agent(agent, lines, fraction_bits), save_image(agent)
 
 
 def check_learning(name, target, folder, n_steps=3000, options=()):
-    """It acts and learns as the library's agent, from nothing and from an image."""
-    home = LEARNERS[name]()
-    header, command = build(folder, home, target, *options)
-    lines, nothing, expected, learned = life(name, n_steps, header.fraction_bits)
-    actions, image = run_program(command, nothing, lines, home.n_dimensions)
+    """Check that a program acts and learns like the agent, from the header and from an image."""
+    agent = LEARNERS[name]()
+    header, command = build(folder, agent, target, *options)
+    lines, initial_image, expected, last_image = recorded_steps(name, n_steps, header.fraction_bits)
+    actions, image = run_program(command, initial_image, lines, agent.n_dimensions)
     assert actions == expected
-    assert image == learned
+    assert image == last_image
     # Python loads the experience, and both continue from it.
-    load_image(home, image)
-    assert save_image(home) == image
-    more = lines_of(home, min(n_steps, 3000) // 10, 2, header.fraction_bits)
-    actions, image = run_program(command, image, more, home.n_dimensions)
-    assert actions == run_agent(home, more, header.fraction_bits)
-    assert image == save_image(home)
+    load_image(agent, image)
+    assert save_image(agent) == image
+    later_lines = lines_of(agent, min(n_steps, 3000) // 10, 2, header.fraction_bits)
+    actions, image = run_program(command, image, later_lines, agent.n_dimensions)
+    assert actions == run_agent(agent, later_lines, header.fraction_bits)
+    assert image == save_image(agent)

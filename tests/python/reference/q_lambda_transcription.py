@@ -17,7 +17,7 @@ SMALL = {
 }
 
 
-def life(seed, n_steps, n_actions, scale):
+def random_transitions(seed, n_steps, n_actions, scale):
     """Transitions of episodes that end in a terminal state, at a limit, or not at all."""
     rng = np.random.default_rng(seed)
     state = rng.random(2)
