@@ -54,7 +54,7 @@ class SDNNCConfig:
     n_inputs : int
         l, number of inputs (section 3.1). Must be in [2, 1024].
     max_pairs : int
-        Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least. Must be in [0, 1048576].
+        Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper, but 1,024 of more than 32 relevant inputs of an agent with a linear readout. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least. Must be in [0, 1048576].
     n_pattern_units : int
         m, units per pattern (section 4.2: 200). Must be in [2, 65536].
     n_anchor_patterns : int
@@ -166,7 +166,7 @@ class SDNNCConfig:
     @property
     def max_pairs(self) -> int:
         """
-        Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least.
+        Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper, but 1,024 of more than 32 relevant inputs of an agent with a linear readout. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least.
         """
     @property
     def max_table_bytes(self) -> int:
@@ -542,7 +542,7 @@ class LinearSDNNConfig:
     n_inputs : int
         l, number of inputs (section 3.1). Must be in [2, 1024].
     max_pairs : int
-        Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least. Must be in [0, 1048576].
+        Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper, but 1,024 of more than 32 relevant inputs of an agent with a linear readout. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least. Must be in [0, 1048576].
     n_pattern_units : int
         m, units per pattern. 0: as many as make about 3,072 columns, at most 768; at least 256 where these make no more than 14,336 columns, at least 64 anywhere. Must be in [0, 65536].
     n_anchor_patterns : int
@@ -610,7 +610,7 @@ class LinearSDNNConfig:
     @property
     def max_pairs(self) -> int:
         """
-        Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least.
+        Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper, but 1,024 of more than 32 relevant inputs of an agent with a linear readout. Pairs are drawn at random so that each input is modified by as many others as it modifies, and by one at least.
         """
     @property
     def max_table_bytes(self) -> int:

@@ -252,6 +252,19 @@ def test_sensor_wrappers_have_the_stated_noise_and_correlation(scripts):
     assert np.all(np.abs(observation[3:]) < 1)
 
 
+def test_the_shortest_path_over_cells(scripts):
+    env = gym.make("bench/Cells-v0")
+    assert env.reset(seed=1)[0].nonzero()[0].tolist() == [0]
+    assert env.step(3)[0].nonzero()[0].tolist() == [0]  # stays at the border
+    assert env.step(2)[0].nonzero()[0].tolist() == [10]
+    for steps, action in ((8, 2), (9, 0)):
+        for _ in range(steps):
+            observation, reward, terminated, truncated, _ = env.step(action)
+            assert (reward, truncated, observation.sum()) == (-1.0, False, 1)
+            assert terminated == (observation[99] == 1)
+    assert terminated
+
+
 def test_tile_codings_of_pairs_hashes_and_tables_have_their_indices(scripts):
     tiles = sys.modules["tile_coding"]
     pairs, joint = tiles.PairTiles(3, 4, 2), tiles.TileCoding(2, 4, 2)

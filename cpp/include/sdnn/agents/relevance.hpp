@@ -42,13 +42,14 @@ struct RandomExperience {
 /// of these must be exceeded, of pairs twice. Shifts leave each series as it is, so slow noise,
 /// which seems to depend on everything, is compared with itself.
 ///
-/// There are about n^2 comparisons of n inputs, and of many inputs some exceed that by chance. With
-/// more than 24 inputs the cube root of F, which is nearly normal, must also lie sqrt(2 log(10
+/// There are about n^2 comparisons of n inputs, so with many inputs some exceed that by chance.
+/// With more than 24 inputs the cube root of F, which is nearly normal, must also lie sqrt(2 log(10
 /// n^2)) standard deviations above its mean over the shifts, and rest on 8 values.
 ///
-/// Three binary inputs or more form groups (see detail::binary_groups), which matter as a whole if
-/// one input does. As a group has many chances, its inputs need that evidence among few inputs,
-/// too.
+/// Three binary inputs or more form groups (see detail::binary_groups). A group matters as a whole
+/// if one of its inputs does; since it has a chance with each of them, that needs the evidence
+/// above, also among few inputs. A one-hot vector matters, too, if actions decide which of its
+/// inputs is on next.
 class Relevance {
  public:
   /// With more `caution` than 1 as many times more evidence is needed: for who looks often.
@@ -59,69 +60,37 @@ class Relevance {
   /// two are found. Shapes: (n_inputs,).
   std::vector<bool> inputs(const std::vector<bool>& known) const {
     const std::size_t n_inputs = experience_.n_inputs;
-    const std::size_t n = experience_.size();
+    if (experience_.size() < kLeast) return std::vector<bool>(n_inputs, true);
+    const Series series = all_series();
     std::vector<bool> matters(n_inputs);
-    if (n < kLeast) return std::vector<bool>(n_inputs, true);
-    std::vector<Bins> bins, bins_of_actions;
-    std::vector<std::vector<double>> changes;
-    for (std::size_t i = 0; i < n_inputs; ++i) {
-      bins.push_back(binned(column(experience_.states, i)));
-      changes.push_back(changes_of(i));
-    }
-    for (const auto& actions : experience_.actions) bins_of_actions.push_back(binned(actions));
-    std::vector<std::vector<std::size_t>> group_of(n_inputs);  // empty: the input alone
-    const auto groups =
-        detail::binary_groups(experience_.states, experience_.next_states, n_inputs);
-    for (const auto& group : groups) {
-      for (const std::size_t i : group.inputs) {
-        group_of[i] = group.inputs;
-        bins[i] = halves(column(experience_.states, i));
-      }
-    }
-    const auto is_strict = [&](std::size_t i) {
-      return n_inputs > kMostWithoutChance || !group_of[i].empty();
-    };
-    const std::vector<std::vector<double>> outcomes{experience_.rewards, sums_of_rewards()};
-    std::vector<std::size_t> pending;
+    std::vector<std::size_t> pending;  // changes that others may decide
     const auto add = [&](std::size_t i) {
-      for (const std::size_t member : group_of[i].empty() ? std::vector{i} : group_of[i]) {
+      const std::vector<std::size_t> alone{i};
+      for (const std::size_t member : series.group_of[i].empty() ? alone : series.group_of[i]) {
         matters[member] = true;
         pending.push_back(member);
       }
     };
     for (std::size_t i = 0; i < n_inputs; ++i) {
       core::interruption_point();
-      if (matters[i]) continue;
-      const auto decides = [&](const auto& values) {
-        return depends(values, bins[i], is_strict(i));
-      };
-      const auto changes_it = [&](const Bins& actions) {
-        return depends(changes[i], actions, is_strict(i));
-      };
-      if (known[i] || std::ranges::any_of(outcomes, decides) ||
-          std::ranges::any_of(bins_of_actions, changes_it)) {
-        add(i);
-      }
+      if (!matters[i] && (known[i] || matters_alone(series, i))) add(i);
     }
-    for (const auto& group : groups) {
-      const auto steers = [&](const Bins& actions) { return are_moved(group, actions); };
-      if (!matters[group.inputs.front()] && std::ranges::any_of(bins_of_actions, steers)) {
-        add(group.inputs.front());
-      }
+    for (const auto& group : series.groups) {
+      if (!matters[group.inputs.front()] && are_steered(group, series)) add(group.inputs.front());
     }
     while (!pending.empty()) {
       const std::size_t moved = pending.back();
       pending.pop_back();
       for (std::size_t i = 0; i < n_inputs; ++i) {
         core::interruption_point();
-        const bool needs_more = is_strict(i) || is_strict(moved);
-        if (!matters[i] && depends(changes[moved], bins[i], needs_more)) add(i);
+        const bool is_strict = series.is_strict(i) || series.is_strict(moved);
+        if (!matters[i] && depends(series.changes[moved], series.bins[i], is_strict)) add(i);
       }
     }
     if (n_inputs <= kMostInPairs) {
       const std::vector<bool> alone = matters;
-      for (const auto& one : outcomes) find_pairs(one, bins, alone, is_strict, matters);
-      for (const auto& group : groups) {
+      for (const auto& outcomes : series.outcomes) find_pairs(outcomes, series, alone, matters);
+      for (const auto& group : series.groups) {
         const bool any = std::ranges::any_of(group.inputs, [&](auto i) { return matters[i]; });
         for (const std::size_t i : group.inputs) matters[i] = any;
       }
@@ -131,9 +100,9 @@ class Relevance {
   }
 
  private:
-  static constexpr std::size_t kLeast = 100;  // fewer say nothing
-  static constexpr std::size_t kMostWithoutChance = 24;
-  static constexpr std::size_t kLeastDeciding = 8;
+  static constexpr std::size_t kLeast = 100;             // fewer say nothing
+  static constexpr std::size_t kMostWithoutChance = 24;  // inputs: more need more evidence
+  static constexpr std::size_t kLeastDeciding = 8;       // values that evidence rests on
   static constexpr std::size_t kBins = 8;
   static constexpr std::size_t kMostBins = 16;     // of a pair
   static constexpr std::size_t kMostInPairs = 64;  // time grows as their square
@@ -144,6 +113,55 @@ class Relevance {
   static constexpr double kFactorOfPairs = 2.0;  // there are more of them
 
   using Bins = std::vector<std::uint8_t>;
+
+  /// All that is compared, and which inputs belong together.
+  struct Series {
+    std::vector<Bins> bins = {};                    ///< of each input
+    std::vector<std::vector<double>> changes = {};  ///< of each input
+    std::vector<Bins> bins_of_actions = {};         ///< of each dimension
+    std::vector<std::vector<double>> outcomes = {};
+    std::vector<detail::BinaryGroup> groups = {};
+    std::vector<std::vector<std::size_t>> group_of = {};  ///< of each input; empty: it is alone
+
+    /// Whether what an input decides, or what decides it, must stand out of n^2 comparisons.
+    bool is_strict(std::size_t i) const {
+      return bins.size() > kMostWithoutChance || !group_of[i].empty();
+    }
+  };
+
+  Series all_series() const {
+    const std::size_t n_inputs = experience_.n_inputs;
+    Series series;
+    for (std::size_t i = 0; i < n_inputs; ++i) {
+      series.bins.push_back(binned(column(experience_.states, i)));
+      series.changes.push_back(changes_of(i));
+    }
+    for (const auto& actions : experience_.actions) {
+      series.bins_of_actions.push_back(binned(actions));
+    }
+    series.outcomes = {experience_.rewards, sums_of_rewards()};
+    series.groups = detail::binary_groups(experience_.states, experience_.next_states, n_inputs);
+    series.group_of.resize(n_inputs);
+    for (const auto& group : series.groups) {
+      for (const std::size_t i : group.inputs) {
+        series.group_of[i] = group.inputs;
+        series.bins[i] = halves(column(experience_.states, i));
+      }
+    }
+    return series;
+  }
+
+  /// Whether outcomes depend on an input, or its changes on actions.
+  bool matters_alone(const Series& series, std::size_t i) const {
+    const bool is_strict = series.is_strict(i);
+    return std::ranges::any_of(series.outcomes,
+                               [&](const auto& outcomes) {
+                                 return depends(outcomes, series.bins[i], is_strict);
+                               }) ||
+           std::ranges::any_of(series.bins_of_actions, [&](const Bins& actions) {
+             return depends(series.changes[i], actions, is_strict);
+           });
+  }
 
   std::vector<double> column(const std::vector<double>& rows, std::size_t i) const {
     std::vector<double> values;
@@ -191,7 +209,7 @@ class Relevance {
     return bins;
   }
 
-  /// Two bins of a binary input, however rare its larger value is.
+  /// The two bins of a binary input, however rare its larger value is.
   static Bins halves(const std::vector<double>& values) {
     const double low = std::ranges::min(values);
     Bins bins;
@@ -231,9 +249,9 @@ class Relevance {
   }
 
   /// Adds the inputs that matter together with another one.
-  void find_pairs(const std::vector<double>& outcomes, std::vector<Bins> bins,
-                  const std::vector<bool>& alone, const auto& is_strict,
-                  std::vector<bool>& matters) const {
+  void find_pairs(const std::vector<double>& outcomes, const Series& series,
+                  const std::vector<bool>& alone, std::vector<bool>& matters) const {
+    std::vector<Bins> bins = series.bins;
     for (Bins& of_input : bins) {
       for (std::uint8_t& bin : of_input) bin /= 2;
     }
@@ -242,7 +260,8 @@ class Relevance {
       for (std::size_t j = 0; j < bins.size(); ++j) {
         core::interruption_point();
         if (j == i || alone[j] || (j < i && !alone[i])) continue;
-        if (!depends(beyond, bins[j], is_strict(i) || is_strict(j), &bins[i])) continue;
+        const bool is_strict = series.is_strict(i) || series.is_strict(j);
+        if (!depends(beyond, bins[j], is_strict, &bins[i])) continue;
         matters[i] = matters[j] = true;
       }
     }
@@ -260,6 +279,7 @@ class Relevance {
     return values;
   }
 
+  /// The number of bins that hold values.
   static double n_different(const Bins& bins) {
     bool is_used[kMostBins] = {};
     for (const std::uint8_t bin : bins) is_used[bin] = true;
@@ -301,28 +321,32 @@ class Relevance {
                       2.0 / (9.0 * (n_different(bins) - 1.0)));
   }
 
-  /// Whether actions decide which input of a one-hot vector is on next, given that which is.
-  bool are_moved(const detail::BinaryGroup& group, const Bins& actions) const {
+  /// Whether actions decide which input of a one-hot vector is on next, given which one is.
+  bool are_steered(const detail::BinaryGroup& group, const Series& series) const {
     if (group.symbols.empty()) return false;
-    std::vector<double> by_chance;
-    for (std::size_t k = 1; k <= kShifts; ++k) {
-      const std::size_t shift = k * actions.size() / (kShifts + 1);
-      by_chance.push_back(detail::steering(group, actions, shift));
-    }
-    return stands_out(detail::steering(group, actions, 0) / caution_, by_chance, 0.0);
+    return std::ranges::any_of(series.bins_of_actions, [&](const Bins& actions) {
+      std::vector<double> by_chance;
+      for (std::size_t k = 1; k <= kShifts; ++k) {
+        core::interruption_point();
+        const std::size_t shift = k * actions.size() / (kShifts + 1);
+        by_chance.push_back(detail::steering(group, actions, shift));
+      }
+      return stands_out(detail::steering(group, actions, 0) / caution_, by_chance, 0.0);
+    });
   }
 
-  /// Whether a normal number is too large for one of n^2 that came by chance. Those of the shifted
-  /// series show mean and variance, which are at least 1 - `variance` and `variance`, if it is not
-  /// 0: those of the cube root of F with independent values.
-  bool stands_out(double statistic, const std::vector<double>& by_chance, double variance) const {
-    double mean = 0.0, square = 0.0;
+  /// Whether a statistic is larger than n^2 normal numbers with the mean and the variance of those
+  /// `by_chance`. With a `least_variance` above 0 it is the cube root of F, whose mean and variance
+  /// are never below those of independent normal values, 1 - least_variance and least_variance.
+  bool stands_out(double statistic, const std::vector<double>& by_chance,
+                  double least_variance) const {
+    double mean = 0.0, variance = 0.0;
     for (const double x : by_chance) mean += x / kShifts;
-    for (const double x : by_chance) square += (x - mean) * (x - mean) / kShifts;
+    for (const double x : by_chance) variance += (x - mean) * (x - mean) / kShifts;
+    if (least_variance > 0.0) mean = std::max(mean, 1.0 - least_variance);
     const auto n_inputs = static_cast<double>(experience_.n_inputs);
     const double margin = std::sqrt(2.0 * std::log(10.0 * n_inputs * n_inputs));
-    if (variance > 0.0) mean = std::max(mean, 1.0 - variance);
-    return statistic > mean + margin * std::sqrt(std::max(square, variance));
+    return statistic > mean + margin * std::sqrt(std::max(variance, least_variance));
   }
 
   const RandomExperience& experience_;

@@ -17,7 +17,8 @@ constexpr auto state_code_fields(const char* units = "m, units per pattern (sect
       core::field("n_inputs", &Config::n_inputs, "l, number of inputs (section 3.1).",
                   core::within(2, 1024)),
       core::field("max_pairs", &Config::max_pairs,
-                  "Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper. Pairs "
+                  "Most pairs of inputs that are formed; 0: all l (l - 1), as in the paper, but "
+                  "1,024 of more than 32 relevant inputs of an agent with a linear readout. Pairs "
                   "are drawn at random so that each input is modified by as many others as it "
                   "modifies, and by one at least.",
                   core::within(0, 1 << 20)),

@@ -1,0 +1,95 @@
+"""Tasks with many inputs: noise is left out, binary inputs stay together, steps stay short."""
+
+import gymnasium as gym
+import numpy as np
+
+from sdnn.agents import SDNNQLambda, evaluate, load_agent
+from sdnn.approximators import LinearSDNNConfig
+
+
+class WithNoise(gym.ObservationWrapper):
+    """CartPole with `n` further inputs: numbers, or binary ones of which one is 1 at a time."""
+
+    def __init__(self, n, kind):
+        super().__init__(gym.make("CartPole-v1"))
+        bounds = self.env.observation_space
+        low, high = np.append(bounds.low, np.zeros(n)), np.append(bounds.high, np.ones(n))
+        self.observation_space = gym.spaces.Box(low.astype(np.float32), high.astype(np.float32))
+        self._n, self._kind = n, kind
+
+    def observation(self, observation):
+        if self._kind == "numbers":
+            noise = self.np_random.random(self._n)
+        elif self._kind == "bits":
+            noise = self.np_random.integers(2, size=self._n)
+        else:
+            noise = np.arange(self._n) == self.np_random.integers(self._n)
+        return np.append(observation, noise).astype(np.float32)
+
+
+class Square(gym.Env):
+    """A square of cells as binary variables: a one-hot vector of cells, or two of coordinates."""
+
+    action_space = gym.spaces.Discrete(4)
+
+    def __init__(self, size, one_hot):
+        self._size, self._one_hot = size, one_hot
+        n = size * size if one_hot else 2 * size
+        self.observation_space = gym.spaces.MultiBinary(n)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self._cell = np.zeros(2, int)
+        return self._observation(), {}
+
+    def step(self, action):
+        self._cell = np.clip(
+            self._cell + [(1, 0), (-1, 0), (0, 1), (0, -1)][action], 0, self._size - 1
+        )
+        return self._observation(), -1.0, bool((self._cell == self._size - 1).all()), False, {}
+
+    def _observation(self):
+        observation = np.zeros(self.observation_space.n, np.int8)
+        x, y = self._cell
+        observation[[self._size * y + x] if self._one_hot else [x, self._size + y]] = 1
+        return observation
+
+
+def test_noise_is_left_out_however_many_inputs_it_has():
+    for kind in ("numbers", "bits", "one-hot"):
+        agent = SDNNQLambda(env := WithNoise(100, kind), seed=1)
+        agent.train(env, steps=1001, seed=1)
+        kept = [variable for _, variables in agent.inputs for variable in variables]
+        assert kept[:4] == [0, 1, 2, 3]
+        assert len(kept) <= (5 if kind == "numbers" else 4)
+
+
+def test_binary_inputs_are_kept_as_a_whole_and_learned():
+    for one_hot in (True, False):
+        env = gym.wrappers.TimeLimit(Square(6, one_hot), 100)
+        agent = SDNNQLambda(env, seed=1)
+        agent.train(env, steps=6000, seed=1)
+        assert len(agent.inputs) == env.observation_space.shape[0]
+        assert evaluate(agent, env, episodes=1, seed=1).mean_return == -10.0
+
+
+def max_pairs(env, **options):
+    agent = SDNNQLambda(env, seed=1, **options)
+    agent.train(env, steps=1001, seed=1)
+    return agent.readout.config.max_pairs
+
+
+def test_more_than_32_inputs_form_1024_pairs(tmp_path):
+    env = gym.wrappers.TimeLimit(Square(6, one_hot=True), 100)
+    assert max_pairs(env) == 1024
+    assert max_pairs(env, inputs="all") == 0
+    assert max_pairs(env, approximator=LinearSDNNConfig(max_pairs=72)) == 72
+    assert max_pairs(gym.wrappers.TimeLimit(Square(5, one_hot=True), 100)) == 0
+    agent = SDNNQLambda(env, seed=1)
+    agent.train(env, steps=1500, seed=1)
+    agent.save(tmp_path / "agent.safetensors")
+    loaded = load_agent(tmp_path / "agent.safetensors")
+    for resumed in (agent, loaded):
+        resumed.train(env, steps=200, seed=2)
+    observation = env.reset(seed=1)[0]
+    np.testing.assert_array_equal(loaded.q_values(observation), agent.q_values(observation))
