@@ -36,12 +36,12 @@ from sdnn.estimators.training import (
     History,
     Rows,
     Trainer,
-    averaged_every,
+    epochs_between_averages,
     held_out,
     most_epochs,
-    presented,
     run_epochs,
     sample_weights,
+    samples_of_epoch,
     without_absent,
 )
 
@@ -158,7 +158,7 @@ class BaseSDNN(Fitted, CodedInputs):
 
     @abc.abstractmethod
     def _set_outputs(self, y: ArrayLike) -> int:
-        """Learn the outputs from targets (or all classes); return the number of units."""
+        """Set the range of outputs, or the classes, from targets; return the number of units."""
 
     @abc.abstractmethod
     def _check_outputs(self, y: Array, classes: ArrayLike | None) -> None:
@@ -166,7 +166,7 @@ class BaseSDNN(Fitted, CodedInputs):
 
     @abc.abstractmethod
     def _targets(self, y: Array, at_once: bool = False) -> Array:
-        """Return targets as learned, one row per sample; may widen the output range."""
+        """Return firing counts or class numbers for targets; may widen the output range."""
 
     @abc.abstractmethod
     def _rule_arguments(self, targets: Array) -> Rule:
@@ -176,8 +176,8 @@ class BaseSDNN(Fitted, CodedInputs):
     def _validation_score(self, bins: Ints, targets: Array, weights: Floats | None) -> float:
         """Return the network's score; larger is better."""
 
-    def _conditional(self, bins: Ints, targets: Array, weights: Floats | None) -> Array:
-        """Return targets as they are learned where samples have the same code."""
+    def _targets_to_learn(self, bins: Ints, targets: Array, weights: Floats | None) -> Array:
+        """Return the target that each sample learns: samples with the same code may share one."""
         return targets
 
     def _presentations(self, targets: Array, weights: Floats | None) -> Floats | None:
@@ -213,10 +213,10 @@ class BaseSDNN(Fitted, CodedInputs):
             in_blocks = self.shuffle and times is None and n_samples > LARGE_SAMPLE
             if in_blocks:
                 rows = random.permutation(rows)
-            # The block form reuses sums of blocks that are presented again, and is chosen for few
-            # epochs.
+            # The block form reuses the sums of blocks that are presented again, and is chosen for
+            # few epochs.
             n_epochs = min(max_iter, 2) if in_blocks else max_iter
-            learned = self._conditional(bins[rows], targets[rows], weights_of_rows)
+            learned = self._targets_to_learn(bins[rows], targets[rows], weights_of_rows)
             trainer = self._trainer(bins[rows], learned, n_epochs)
             return trainer, run_epochs(
                 self, trainer, n_samples, max_iter, random, scored, times, n_averaged, in_blocks
@@ -239,8 +239,8 @@ class BaseSDNN(Fitted, CodedInputs):
     def _partial_fit(
         self, X: ArrayLike, y: ArrayLike, classes: ArrayLike | None, sample_weight: ArrayLike | None
     ) -> Self:
-        """Present samples in order, once or by their weights; all or nothing."""
-        work = self._scratch()
+        """Present samples in order, once or by their weights; an error changes nothing."""
+        work = self._copy_to_train()
         first = not hasattr(self, "network_")
         if first:
             self._validate_params()
@@ -254,7 +254,7 @@ class BaseSDNN(Fitted, CodedInputs):
             work._note_inputs(table)
         weights = sample_weights(sample_weight, len(table))
         if weights is not None:
-            rows = presented(len(table), weights, 0, work._n_weighted)
+            rows = samples_of_epoch(len(table), weights, 0, work._n_weighted)
             work._n_weighted += len(table)
             table, observed = table[rows], observed[rows]
         if len(table):
@@ -265,7 +265,7 @@ class BaseSDNN(Fitted, CodedInputs):
 
     def _learn_one(self, x: Sample, y: Array, classes: ArrayLike | None) -> Self:
         """Learn a sample; y has shape (1,) or (1, n_outputs)."""
-        work = self._scratch()
+        work = self._copy_to_train()
         if hasattr(self, "network_"):
             work._check_outputs(y, classes)
             code = work.network_.input_code
@@ -285,7 +285,7 @@ class BaseSDNN(Fitted, CodedInputs):
     def _begin(
         self, X: object, table: Array, y: ArrayLike, pairs: Pairs | None = None, n_networks: int = 1
     ) -> np.random.RandomState:
-        """Fit the codings, draw tables and weights; return the generator of orders."""
+        """Fit the codings, draw tables and weights; return the generator for orders of samples."""
         n_units = self._set_outputs(y)
         codings = self._codings(X, table)
         random: np.random.RandomState = check_random_state(self.random_state)
@@ -306,7 +306,7 @@ class BaseSDNN(Fitted, CodedInputs):
         return random
 
     def _resume(self, table: Array, y: Array) -> np.random.RandomState:
-        """Continue with a copy of the network; return the generator of orders."""
+        """Prepare a copy of the network to train on; return the generator for orders of samples."""
         self._check_outputs(y, None)
         network = self.network_
         n_networks, code = self._n_networks(len(table)), network.input_code
@@ -334,10 +334,10 @@ class BaseSDNN(Fitted, CodedInputs):
 
     def _n_networks(self, n_samples: int) -> int:
         """Return the most networks that `fit` keeps, averaged ones included."""
-        n_kept = (most_epochs(self.max_iter, n_samples) - 1) // averaged_every(n_samples)
+        n_kept = (most_epochs(self.max_iter, n_samples) - 1) // epochs_between_averages(n_samples)
         n_earlier = min(self.n_averaged_epochs - 1, n_kept)
         has_best = self.early_stopping and not self.refit
-        return 1 + (2 if has_best else 1) * n_earlier  # the best ones beside the last ones
+        return 1 + (2 if has_best else 1) * n_earlier  # early stopping keeps the best networks, too
 
     def _n_threads(self) -> int:
         return int(effective_n_jobs(self.n_jobs))
@@ -355,9 +355,9 @@ class BaseSDNN(Fitted, CodedInputs):
         return _core.PerceptronTrainer(self.network_.layer, bins, *rule, **options)
 
     def _learn(self, bins: Ints, targets: Array) -> None:
-        """Present every sample once, in order; all or nothing.
+        """Present every sample once, in order; an error changes nothing.
 
-        A few samples are learned in place, so that no later statement may fail.
+        A few samples are learned in place, so nothing that may raise can follow this call.
         """
         self.n_iter_ += 1
         if self._earlier:
@@ -375,7 +375,7 @@ class BaseSDNN(Fitted, CodedInputs):
         trainer.synchronize()
 
     def _note_inputs(self, table: Array) -> None:
-        """Count values to learn that are outside their input's range."""
+        """Count the values outside their input's range; warn of the first, or raise an error."""
         n_outside, first = self.network_.input_code.outside(table)
         if n_outside == 0:
             return

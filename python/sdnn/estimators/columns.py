@@ -108,7 +108,7 @@ def with_fields(coding: Codings, fields: Mapping[str, object]) -> Codings:
 
 
 def has_field(coding: Coding, name: str) -> bool:
-    """Return whether a coding has a field of this name, before ``__``."""
+    """Return whether a coding has the field that a name begins with, before ``__``."""
     return name.partition("__")[0] in field_names(coding)
 
 
@@ -120,7 +120,7 @@ def field_names(coding: Coding) -> list[str]:
 
 
 def with_own_fields(coding: Coding, fields: Mapping[str, object]) -> Coding:
-    """Return a coding with some fields, or fields of these, replaced."""
+    """Return a coding with some fields replaced; ``base__period`` is a field of its field."""
     if not all(has_field(coding, name) for name in fields):
         raise ValueError(f"{coding!r} must have the fields {sorted(fields)}")
     for name, value in sorted(fields.items()):  # "base" before "base__period"
@@ -130,7 +130,7 @@ def with_own_fields(coding: Coding, fields: Mapping[str, object]) -> Coding:
     return coding
 
 
-def of_categories(table: object) -> list[int]:
+def categorical_columns(table: object) -> list[int]:
     """Return the columns of a data frame whose type is "category"."""
     types = table.dtypes if hasattr(table, "columns") and hasattr(table, "dtypes") else ()
     return [index for index, column_type in enumerate(types) if str(column_type) == "category"]
@@ -153,14 +153,14 @@ def codings_of_columns(
             if index in codings:
                 raise ValueError(f"feature {index} has more than one coding")
             codings[index] = entry
-    for index in of_categories(table):
+    for index in categorical_columns(table):
         if isinstance(coding, str) or index not in codings:
             codings[index] = WithMissing(base=Symbolic())
     return [codings.get(index) or RandomInverse() for index in range(n_inputs)]
 
 
-def lacking(coding: Coding, column: Array) -> Coding:
-    """Return the coding of a column: with a pattern for missing numbers, if it lacks some."""
+def with_missing_pattern(coding: Coding, column: Array) -> Coding:
+    """Return the coding, wrapped in `WithMissing` if the column has missing values."""
     if not coding.is_numeric:
         return coding
     is_float = column.dtype == np.float64
@@ -171,7 +171,7 @@ def lacking(coding: Coding, column: Array) -> Coding:
 def input_pairs(
     pairs: PairChoice, names: Sequence[str] | None, n_inputs: int, seed: int = 0
 ) -> Pairs:
-    """Return the pairs (modified, modifier) of features; (mu, mu) is mu's plain pattern.
+    """Return the pairs (modified, modifier) of features; (i, i) is feature i's plain pattern.
 
     "all" gives every pair of different features. Other words give at most `PAIR_BUDGET` of them,
     drawn with the seed so that each input is modified, and modifies, equally often.

@@ -25,7 +25,7 @@ NAMES = ("classes_", "feature_names_in_")  # arrays whose type may be text
 
 
 class Learned(BaseEstimator):
-    """Attributes that files hold unchanged: numbers, words and arrays of numbers."""
+    """Base of estimators: the attributes that files hold unchanged."""
 
     n_corrected_: NDArray[np.int64]
     n_features_in_: int
@@ -76,7 +76,7 @@ class Fitted(Learned):
     verbose: int
     network_: Network
     _earlier: tuple[Network, ...] = ()
-    _n_weighted = 0  # samples with weights that partial_fit has received
+    _n_weighted = 0  # number of weighted samples that partial_fit has received
 
     @property
     def _fitted_network(self) -> Network:
@@ -105,7 +105,7 @@ class Fitted(Learned):
         return self._fitted_network.layer.thresholds
 
     def _networks_for(self, n_samples: int) -> tuple[Network, ...]:
-        """Return the averaged networks, ready to predict a number of samples."""
+        """Return the networks to average, with weights in bytes where that predicts faster."""
         networks = (*self._earlier, self.network_)
         for network in networks:
             network.expect_few(n_samples, self.memory_limit // len(networks))
@@ -126,7 +126,7 @@ class Fitted(Learned):
         return [(names[mu], None if mu == nu else names[nu]) for mu, nu in self.pairs_]
 
     def _weight_changes(self) -> Floats:
-        """Return the mean squared change of the weights of pairs with each feature."""
+        """Return for each feature the mean squared change of its pairs' weights by training."""
         network, code = self.network_, self.network_.input_code
         untrained = _core.ParallelPerceptron(code.core, network.n_units, seed=self._weight_seed)
         change = network.layer.weights - untrained.weights
@@ -153,8 +153,8 @@ class Fitted(Learned):
         for number, table in enumerate(tables.values()):
             arrays[f"table.{number}"] = np.packbits(table > 0, axis=1)
         for number, network in enumerate(networks):
-            arrays[f"weights.{number}"] = narrowed(network.layer.weights)
-            arrays[f"thresholds.{number}"] = narrowed(network.layer.thresholds)
+            arrays[f"weights.{number}"] = in_smallest_type(network.layer.weights)
+            arrays[f"thresholds.{number}"] = in_smallest_type(network.layer.thresholds)
         attributes = {
             name: held[name] for name in ATTRIBUTES if name in held and name not in arrays
         }
@@ -281,8 +281,8 @@ def restored(value: Any) -> Any:
     return [restored(item) for item in value] if isinstance(value, list) else value
 
 
-def narrowed(values: Ints) -> Array:
-    """Return integers in the smallest type that holds them."""
+def in_smallest_type(values: Ints) -> Array:
+    """Convert integers to the smallest type that holds them."""
     for integer in (np.int8, np.int16):
         if np.array_equal(narrow := values.astype(integer), values):
             return narrow
@@ -340,7 +340,7 @@ def require_fitted(coding: Coding, n_units: int) -> Coding:
 
 
 def read_code(description: Description, arrays: Arrays, memory_limit: int) -> InputCode:
-    """Build the code; nothing is allocated before its size is known."""
+    """Build the code of a file; ValueError before allocation if it exceeds ``memory_limit``."""
     n_units = whole("n_pattern_units", description["n_pattern_units"], 2, 2**24)
     codings = [require_fitted(from_dict(coding), n_units) for coding in description["codings"]]
     last = len(codings) - 1

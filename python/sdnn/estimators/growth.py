@@ -17,7 +17,7 @@ Table = NDArray[np.int8]
 
 
 def pairs_of_new(n_before: int, n_new: int, random: np.random.RandomState) -> Pairs:
-    """Return the pairs of new inputs and earlier inputs, or a random share beyond the budget.
+    """Return the pairs that new inputs form; beyond the budget, a random share of them.
 
     >>> pairs_of_new(2, 1, np.random.RandomState(0))
     [(2, 0), (0, 2), (2, 1), (1, 2)]
@@ -43,7 +43,7 @@ def grow(
     """
     network, before = model.network_, model.network_.input_code
     n_before, n_units = len(before.codings), before.core.n_units
-    n_patterns = sum(coding.size for coding in before.codings)  # differs at the next growth
+    n_patterns = sum(coding.size for coding in before.codings)  # part of the seed: grows each time
     random = np.random.RandomState((model._weight_seed + n_patterns) % 2**32)
     added = pairs_of_new(n_before, len(new), random)
     pairs = [*before.pairs, *added]
@@ -52,7 +52,7 @@ def grow(
     codings = [changed.get(index, coding) for index, coding in enumerate(before.codings)]
     codings += new.values()
     require_memory(model.memory_limit, network.n_units, 1, n_units, codings, pairs)
-    tables: dict[int, Table] = {}  # by identity: pairs share them
+    tables: dict[int, Table] = {}  # by `id` of the old table, which several pairs may share
 
     def lengthened(table: Table, index: int) -> Table:
         """Return a table with random patterns before the last one, which is for missing values."""
@@ -81,7 +81,7 @@ def grow(
     weights = np.zeros((network.n_units, code.core.n_columns), dtype=np.int32)
     weights[:, : before.core.n_columns] = network.layer.weights
     names = [*model.feature_names_in_.tolist(), *new]
-    work = model._scratch()
+    work = model._copy_to_train()
     thresholds = network.layer.thresholds
     work.network_ = Network(code, network.n_units, weights=weights, thresholds=thresholds)
     work._earlier = ()

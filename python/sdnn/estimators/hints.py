@@ -11,8 +11,8 @@ import numpy as np
 WORDS_HINT = "words need a coding of their own, such as coding=[('symbolic', columns)]"
 
 
-def first_of_words(X: object) -> tuple[str | int | None, list[object]]:
-    """Return the name or number of the first column that cannot be numbers, and its values."""
+def first_column_of_words(X: object) -> tuple[str | int | None, list[object]]:
+    """Return the first column that cannot be read as numbers: its name or number, and values."""
     names = list(X.columns) if hasattr(X, "columns") else itertools.count()
     for name, column in zip(names, np.asarray(X).T, strict=False):
         try:

@@ -24,21 +24,21 @@ from sdnn.estimators.columns import (
     Codings,
     Floats,
     Sample,
+    categorical_columns,
     coding_entries,
     codings_of_columns,
     field_names,
-    lacking,
-    of_categories,
     with_fields,
+    with_missing_pattern,
 )
-from sdnn.estimators.hints import first_of_words, hint_about
+from sdnn.estimators.hints import first_column_of_words, hint_about
 from sdnn.estimators.network import InputCode
 from sdnn.estimators.outliers import OutlierWarning, numbers_to_range, usual_range, warn_caller
 from sdnn.estimators.parameters import parameter, words
 from sdnn.estimators.training import ClassWeight, without_absent
 from sdnn.support.arguments import require, shown
 
-MOST_BEYOND = 30.0  # outliers that are kept, in widths of the range of the others
+MOST_BEYOND = 30.0  # largest distance of an outlier that is kept, in widths of the usual range
 DATES = (datetime.date, datetime.time, datetime.timedelta, np.datetime64, np.timedelta64)
 DATES_HINT = "give numbers for it, such as the hour with coding=[(Circular(period=24), columns)]"
 
@@ -53,21 +53,21 @@ def refuse_dates(X: object) -> None:
     else:
         return
     for name, value in zip(names, rows[0] if len(rows) else (), strict=False):
-        if isinstance(value, DATES) or hasattr(value, "to_timestamp"):  # a period of pandas
+        if isinstance(value, DATES) or hasattr(value, "to_timestamp"):  # pandas.Period
             raise ValueError(f"X has dates or times in column {name!r}: {DATES_HINT}")
 
 
 def with_types_kept(X: object) -> object:
     """Return samples in a form in which scikit-learn keeps the type of every value."""
     if hasattr(X, "columns") and hasattr(X, "astype"):
-        return X.astype(object)  # pandas has no common type of categories and its own numbers
+        return X.astype(object)  # pandas cannot convert categories and nullable numbers together
     if hasattr(X, "dtype"):
         return X
     try:
         is_of_words = np.asarray(X).dtype.kind in "SU"
     except ValueError:  # rows of different lengths
         return X
-    return np.array(X, dtype=object) if is_of_words else X  # else numbers and NaN become words
+    return np.array(X, dtype=object) if is_of_words else X  # NumPy would turn numbers into words
 
 
 @dataclasses.dataclass(eq=False, repr=False)
@@ -86,7 +86,7 @@ class CodedInputs(BaseEstimator):
         }
 
     _has_outliers = False
-    """Whether the last call that learned left values out of a range."""
+    """Whether the last `fit` left outliers out of a range."""
 
     def set_params(self, **params: object) -> Self:
         """Set parameters; ``coding__length_scale`` and the like replace fields of codings.
@@ -105,7 +105,7 @@ class CodedInputs(BaseEstimator):
         params: dict[str, object] = super().get_params(deep)
         if deep:
             is_list = isinstance(self.coding, list | tuple)
-            with contextlib.suppress(ValueError):  # `fit` will refuse this coding
+            with contextlib.suppress(ValueError):  # `fit` raises the error of an invalid coding
                 for number, (coding, _) in enumerate(coding_entries(self.coding)):
                     prefix = f"coding__{number}__" if is_list else "coding__"
                     params |= {prefix + name: getattr(coding, name) for name in field_names(coding)}
@@ -140,7 +140,7 @@ class CodedInputs(BaseEstimator):
         """
         # An interrupt of scikit-learn's _fit_context could leave its global setting changed.
         self._validate_params()
-        work = self._scratch()
+        work = self._copy_to_train()
         work._fit(*without_absent(X, y, sample_weight))
         self.__dict__ = work.__dict__
         return self
@@ -149,8 +149,8 @@ class CodedInputs(BaseEstimator):
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         """Check the samples and learn from them."""
 
-    def _scratch(self) -> Self:
-        """Return a shallow copy to train, so that failures leave this one unchanged."""
+    def _copy_to_train(self) -> Self:
+        """Return a shallow copy to train, so that an error leaves this estimator unchanged."""
         work = object.__new__(type(self))
         work.__dict__.update(self.__dict__)
         work.__dict__.pop("_has_outliers", None)
@@ -163,7 +163,7 @@ class CodedInputs(BaseEstimator):
         codings: Sequence[Coding] | None = None,
         **options: bool | int,
     ) -> Any:
-        """Check data by scikit-learn's rules; words pass where a coding takes them.
+        """Check data by scikit-learn's rules, but allow text where a coding reads it.
 
         ``codings`` are the fitted codings of the inputs; None if they are to be learned, and
         numbers to be checked with them.
@@ -171,7 +171,7 @@ class CodedInputs(BaseEstimator):
         refuse_dates(X)
         every = (*(coding for coding, _ in coding_entries(self.coding)), *(codings or ()))
         numeric = all(coding.is_numeric for coding in every)
-        numeric = numeric and (codings is not None or not of_categories(X))
+        numeric = numeric and (codings is not None or not categorical_columns(X))
         options["reset"] = codings is None
         try:
             validated = validate_data(
@@ -179,12 +179,12 @@ class CodedInputs(BaseEstimator):
                 X if numeric else with_types_kept(X),
                 y,
                 dtype=np.float64 if numeric else None,
-                ensure_all_finite="allow-nan" if numeric else False,  # they may have a pattern
+                ensure_all_finite="allow-nan" if numeric else False,  # NaN may have a pattern
                 **options,
             )
         except ValueError as error:
             if "could not convert string" in str(error) and np.asarray(X).dtype.kind in "OSU":
-                name, column = first_of_words(X)
+                name, column = first_column_of_words(X)
                 raise ValueError(f"{error} in column {name!r}; {hint_about(column)}") from None
             raise
         if codings is not None:
@@ -202,7 +202,7 @@ class CodedInputs(BaseEstimator):
                 continue
             try:
                 numbers = np.asarray(table[:, index], dtype=np.float64)
-            except (TypeError, ValueError) as error:  # such as of pandas.NA
+            except (TypeError, ValueError) as error:  # pandas.NA raises TypeError, for example
                 hint = hint_about(table[:, index].tolist())
                 raise ValueError(f"{error} in column {name!r}; {hint}") from None
             if np.isnan(numbers).any():
@@ -219,9 +219,9 @@ class CodedInputs(BaseEstimator):
     def _codings(self, X: object, table: Array) -> list[Coding]:
         """Return the unfitted coding of each input, and check the table's numbers."""
         codings = codings_of_columns(self.coding, self._feature_names(), table.shape[1], X)
-        codings = [lacking(coding, table[:, index]) for index, coding in enumerate(codings)]
+        codings = [with_missing_pattern(coding, table[:, i]) for i, coding in enumerate(codings)]
         if any(coding.learns for coding in codings):
-            self._need_two(table, "ranges and categories that are not given")
+            self._require_two_samples(table, "ranges and categories that are not given")
         self._check_numbers(table, codings)
         return codings
 
@@ -262,7 +262,7 @@ class CodedInputs(BaseEstimator):
         self._has_outliers |= is_left_out
         return usual if is_left_out else full
 
-    def _need_two(self, samples: Array, what: str) -> None:
+    def _require_two_samples(self, samples: Array, what: str) -> None:
         """Raise scikit-learn's ValueError for a single sample."""
         if len(samples) < 2:
             raise ValueError(
@@ -389,5 +389,5 @@ class CodedClassifier(ClassifierMixin, CodedInputs):
 
     def predict(self, X: ArrayLike) -> Array:
         """Predict the labels of samples, shape (n_samples,)."""
-        winners = self._winners(self.decision_function(X))  # first: it may raise NotFittedError
+        winners = self._winners(self.decision_function(X))  # may raise NotFittedError first
         return self.classes_[winners]

@@ -31,15 +31,15 @@ AUTO = words("auto")
 DEGREES = (1, 2, 3)
 LARGEST_TARGET = 1e140  # so that sums of squares are finite
 LOG_STEEPNESS = (0.0, 5.0)  # bounds, for the softmax of scores
-ALPHAS = np.logspace(-6, 0, 19)  # to try, as shares of the sum of eigenvalues
+ALPHAS = np.logspace(-6, 0, 19)  # penalties to try, relative to the sum of eigenvalues
 NEGLIGIBLE = 1e-12  # eigenvalues, as shares of the largest
 ROWS_AT_ONCE = 4096
-MOST_LEFT_OUT = 8192  # samples whose errors choose alpha where the rank is low
+MOST_LEFT_OUT = 8192  # samples used for leave-one-out with low rank
 
 
 @dataclasses.dataclass
 class Samples:
-    """Targets, weights, and the share of a sample that is left out at a time.
+    """Targets and weights of samples, and their counts for leave-one-out.
 
     A sample of count 2 stands for two samples, so that leaving one out leaves half of its weight.
     """
@@ -60,7 +60,7 @@ class Samples:
 
 @dataclasses.dataclass
 class Diagonal:
-    """The problem in centered features in which it is diagonal."""
+    """The ridge problem in centered features whose normal equations are diagonal."""
 
     values: Floats  # eigenvalues, shape (n_features,)
     moments: Floats  # weighted sums of features times targets, shape (n_features, n_outputs)
@@ -72,7 +72,7 @@ class Diagonal:
 
 @dataclasses.dataclass
 class Solution:
-    """Outputs are ``kernel @ dual + intercept``."""
+    """A solution of the ridge problem: outputs are ``kernel @ dual + intercept``."""
 
     alpha: float
     error: float  # mean square by leave-one-out, in variances of the targets
@@ -82,7 +82,7 @@ class Solution:
     rows: Rows  # the numbers of these samples
 
 
-def portions(n_samples: int) -> Iterator[Rows]:
+def row_blocks(n_samples: int) -> Iterator[Rows]:
     """Yield the numbers of samples, `ROWS_AT_ONCE` at a time."""
     for begin in range(0, n_samples, ROWS_AT_ONCE):
         yield np.arange(begin, min(begin + ROWS_AT_ONCE, n_samples))
@@ -96,7 +96,7 @@ def eigenvectors(matrix: Floats) -> tuple[Floats, Floats]:
 
 
 def diagonal(kernel: Floats, samples: Samples) -> Diagonal:
-    """Diagonalize the problem of samples that are all components; overwrite their kernel."""
+    """Diagonalize the exact problem, in which every sample is a component; overwrites `kernel`."""
     weights, roots = samples.weights, np.sqrt(samples.weights)[:, None]
     mean = weights @ kernel / weights.sum()
     kernel -= mean
@@ -113,7 +113,7 @@ def diagonal(kernel: Floats, samples: Samples) -> Diagonal:
 def low_rank_diagonal(
     kernel_of: Callable[[Rows], Floats], components: Rows, samples: Samples
 ) -> Diagonal:
-    """Diagonalize the problem by Nystroem's features, in portions of the samples.
+    """Diagonalize the low-rank problem in Nystroem's features, a block of samples at a time.
 
     ``kernel_of`` returns the kernel of samples, given by number, and components.
     """
@@ -123,7 +123,7 @@ def low_rank_diagonal(
     gram, sums = np.zeros((len(values), len(values))), np.zeros(len(values))
     kernel_sums = np.zeros(len(components))
     moments = np.zeros((len(values), samples.targets.shape[1]))
-    for rows in portions(n_samples):
+    for rows in row_blocks(n_samples):
         kernel, weights = kernel_of(rows), samples.weights[rows]
         features = kernel @ to_features
         kernel_sums += weights @ kernel
@@ -136,14 +136,14 @@ def low_rank_diagonal(
     values, rotation = eigenvectors(gram)
     to_dual = to_features @ rotation
     rows = np.unique(np.linspace(0, n_samples - 1, MOST_LEFT_OUT).astype(np.int64))
-    features = np.concatenate([kernel_of(rows[part]) @ to_dual for part in portions(len(rows))])
+    features = np.concatenate([kernel_of(rows[part]) @ to_dual for part in row_blocks(len(rows))])
     features -= sums @ rotation / total
     features *= np.sqrt(samples.weights[rows])[:, None]
     return Diagonal(values, rotation.T @ moments, to_dual, kernel_sums / total, features, rows)
 
 
 def solve(problem: Diagonal, samples: Samples, alpha: float | None) -> Solution:
-    """Solve for a given alpha, or for the alpha with the smallest leave-one-out error."""
+    """Solve the problem for an alpha, by default the one with the least leave-one-out error."""
     left = samples[problem.rows]
     total, roots = samples.weights.sum(), np.sqrt(left.weights)[:, None]
     targets = roots * (left.targets - samples.mean)
@@ -167,7 +167,7 @@ def solve(problem: Diagonal, samples: Samples, alpha: float | None) -> Solution:
     return Solution(penalty, error, dual, intercept, left_out, problem.rows)
 
 
-def of_degree(kernel: Floats, degree: int) -> Floats:
+def apply_degree(kernel: Floats, degree: int) -> Floats:
     """Turn a kernel, in place, into the kernel of functions of up to ``2 * degree`` inputs."""
     if degree == 2:
         kernel *= 0.5 + 0.5 * kernel
@@ -230,7 +230,7 @@ class BaseKernelRidge(CodedInputs):
     random_state: RandomState = parameter(None, "random_state")
 
     @staticmethod
-    def _counts_of(sample_weight: ArrayLike | None, n_samples: int) -> Floats:
+    def _sample_counts(sample_weight: ArrayLike | None, n_samples: int) -> Floats:
         counts = sample_weights(sample_weight, n_samples)
         return np.ones(n_samples) if counts is None else counts
 
@@ -264,9 +264,9 @@ class BaseKernelRidge(CodedInputs):
         base = self.kernel_(self.X_fit_)
         solutions = {}
         for degree in DEGREES if self.degree == "auto" else (int(self.degree),):
-            problem = diagonal(of_degree(base.copy(), degree), samples[components])
+            problem = diagonal(apply_degree(base.copy(), degree), samples[components])
             solutions[degree] = solve(problem, samples[components], alpha)
-            del problem  # before the next problem takes as much memory
+            del problem  # free its memory before the next degree needs as much
         self.degree_ = min(solutions, key=lambda degree: solutions[degree].error)
         solution = solutions[self.degree_]
         if len(table) > len(components):
@@ -279,13 +279,13 @@ class BaseKernelRidge(CodedInputs):
 
     def _kernel(self, table: Array) -> Floats:
         """Return the kernel of samples and components."""
-        return of_degree(self.kernel_(table, self.X_fit_), self.degree_)
+        return apply_degree(self.kernel_(table, self.X_fit_), self.degree_)
 
     def _outputs(self, X: ArrayLike) -> Floats:
         """Return the outputs of samples, shape (n_samples, n_outputs)."""
         check_is_fitted(self, "dual_coef_")
         table = self._validated(X, codings=self.kernel_.codings)
-        parts = [self._kernel(table[rows]) @ self.dual_coef_ for rows in portions(len(table))]
+        parts = [self._kernel(table[rows]) @ self.dual_coef_ for rows in row_blocks(len(table))]
         return np.concatenate(parts) + self.intercept_
 
 
@@ -309,7 +309,7 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         table, targets = self._check_samples(X, y)
-        counts = self._counts_of(sample_weight, len(table))
+        counts = self._sample_counts(sample_weight, len(table))
         self._flat = targets.ndim == 1
         targets = targets.reshape(len(table), -1)
         self._solve(X, table, targets.clip(*self._ranges_of(targets)), counts)
@@ -351,7 +351,7 @@ class SDNNKernelClassifier(CodedClassifier, BaseKernelRidge):
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         table, labels = self._check_samples(X, y)
-        counts = self._counts_of(sample_weight, len(table))
+        counts = self._sample_counts(sample_weight, len(table))
         self._set_classes(labels)
         one_hot = (labels[:, None] == self.classes_).astype(np.float64)
         of_classes = class_weights(self.class_weight, labels)
@@ -375,6 +375,6 @@ class SDNNKernelClassifier(CodedClassifier, BaseKernelRidge):
 
     def predict_proba(self, X: ArrayLike) -> Floats:
         """Return a softmax of the scores, shape (n_samples, n_classes)."""
-        scores = self._outputs(X)  # first: it may raise NotFittedError
+        scores = self._outputs(X)  # before `steepness_`: raises NotFittedError
         probabilities: Floats = softmax(self.steepness_ * scores, axis=1)
         return probabilities

@@ -18,9 +18,9 @@ from sdnn.estimators.columns import PAIR_BUDGET, Array, Floats, Ints, Pairs
 Rule = tuple[Array, float] | tuple[Ints, int, str]
 """Arguments of learning: (counts, share) of the p-delta rule, or (labels, n_classes, scheme)."""
 COLUMN_BUDGET = 16000  # columns divided among the pairs by default
-FEW_SAMPLES = 32  # up to which weights in bytes learn faster
-FEW_TO_PREDICT = 12  # up to which they predict faster
-WORTH_BYTES = 2  # samples predicted, a few at a time, after which weights are copied into bytes
+FEW_SAMPLES = 32  # largest number of samples that weights in bytes learn faster
+FEW_TO_PREDICT = 12  # largest number of samples that weights in bytes predict faster
+WORTH_BYTES = 2  # number of single predictions after which weights are copied into bytes
 
 
 def units_for_pairs(n_pairs: int) -> int:
@@ -34,9 +34,9 @@ def units_for_pairs(n_pairs: int) -> int:
 
 
 def code_bytes(codings: Sequence[Coding], pairs: Sequence[tuple[int, int]], n_units: int) -> int:
-    """Return about how many bytes drawing and keeping the patterns takes."""
+    """Estimate the bytes that drawing and keeping the patterns takes."""
     of_pairs = sum(codings[mu].size + codings[nu].size for mu, nu in pairs)
-    return int(of_pairs * n_units * 9 / 8)  # a byte a unit, and a bit in the core
+    return int(of_pairs * n_units * 9 / 8)  # each unit is a byte here and a bit in the core
 
 
 class InputCode:
@@ -81,7 +81,7 @@ class InputCode:
 
     @functools.cached_property
     def _even(self) -> tuple[slice | Ints, Floats, Floats, Floats, Ints] | None:
-        """The inputs in pairs, ranges, half widths and numbers of bins, if all bins are even."""
+        """Inputs, low, high, half widths and n_bins for `bins_of_row`; None for uneven bins."""
         codings = [present(self.codings[index]) for index in self.used]
         ranges = [coding.even_range() for coding in codings]
         if None in ranges:
@@ -95,7 +95,7 @@ class InputCode:
         return used, low, high, half_width, sizes
 
     def bins_of_row(self, row: Array) -> Ints:
-        """Return the bins of one sample; bins of equal width are computed at once, to be fast."""
+        """Return the bins of one sample: faster than `bins` where all bins have equal width."""
         if self._even is None or row.dtype != np.float64:
             return self.bins(row[None])
         used, low, high, half_width, sizes = self._even
@@ -180,9 +180,9 @@ class Network:
         self.input_code = input_code
         self.n_units = n_units
         self._online: _core.OnlineLayer | None = None
-        self._n_predicted = 0  # samples, few at a time
-        self._learned: object = None  # marks the last change of the online layer
-        self._synchronized: object = None  # the last change that the other layer has
+        self._n_predicted = 0  # samples predicted in calls with few samples
+        self._learned: object = None  # a new object after each change of the online layer
+        self._synchronized: object = None  # `_learned` when the other layer was synchronized
         self._lock = threading.RLock()
         try:
             self._layer = layer or _core.ParallelPerceptron(
@@ -227,14 +227,14 @@ class Network:
         return self._online
 
     def expect_few(self, n_samples: int, memory_limit: int) -> None:
-        """Copy the weights into bytes once a few samples at a time are predicted repeatedly."""
+        """Count calls with few samples, and copy the weights into bytes once that saves time."""
         if self._online is None and n_samples <= FEW_TO_PREDICT:
             if self._n_predicted >= WORTH_BYTES:
                 self.online(memory_limit)
             self._n_predicted += n_samples
 
     def predicts_in_bytes(self, n_samples: int) -> bool:
-        """Whether a number of samples is predicted by the layer for single samples."""
+        """Return whether the layer for single samples predicts this number of samples faster."""
         is_behind = self._synchronized is not self._learned
         return self._online is not None and n_samples <= (
             FEW_SAMPLES if is_behind else FEW_TO_PREDICT
@@ -250,7 +250,7 @@ class Network:
         if online is None:
             return False
         ended = object()
-        self._learned = object()  # in case an interrupt follows before the other mark
+        self._learned = object()  # an interrupt during learning leaves the layer marked as changed
         if len(rule) == 2:
             online.learn_counts(bins, *rule)
         else:

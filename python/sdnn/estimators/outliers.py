@@ -49,7 +49,7 @@ def usual_range(values: Floats) -> tuple[float, float]:
 
 
 def middle_of(ordered: Floats) -> tuple[float, float]:
-    """Return the smallest and largest of sorted values without their tails."""
+    """Return the limits of the middle 95 % of sorted values."""
     n_tail = min(int(np.ceil(TAIL * len(ordered))), (len(ordered) - 1) // 2)
     return float(ordered[n_tail]), float(ordered[-1 - n_tail])
 

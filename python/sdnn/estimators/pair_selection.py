@@ -11,12 +11,12 @@ from sdnn.coding import Coding, CorrelationMatrix, Symbolic, WithMissing
 from sdnn.coding.symbols import present
 from sdnn.estimators.columns import Array, Floats, Pairs, input_pairs
 
-HELD_OUT_EVERY = 5  # samples
+HELD_OUT_EVERY = 5  # every fifth sample is held out
 FEWEST_SAMPLES = 10
 
 
 def with_categories(coding: Coding, column: Array) -> Coding:
-    """Return a coding with all categories of the column, if it could refuse unknown categories."""
+    """Return a categorical coding with all categories of the column, so that no part lacks any."""
     base = present(coding)
     is_strict = not isinstance(coding, WithMissing) or coding.unknown == "error"
     if isinstance(base, CorrelationMatrix) or (isinstance(base, Symbolic) and is_strict):

@@ -41,7 +41,7 @@ def documents(base: type) -> Callable[[type[Estimator]], type[Estimator]]:
 
     def decorate(estimator: type[Estimator]) -> type[Estimator]:
         text, of_base = inspect.getdoc(estimator), inspect.getdoc(base)
-        if text is None or of_base is None:  # with python -OO
+        if text is None or of_base is None:  # python -OO removes docstrings
             return estimator
         for title in ("Parameters", "Attributes", "Notes"):
             heading = f"{title}\n{'-' * len(title)}\n"

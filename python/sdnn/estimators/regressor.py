@@ -19,7 +19,7 @@ from sdnn.estimators.training import weighted_mean
 from sdnn.support.arguments import array_of, explains_names, require, shown
 
 MARGIN = 0.2  # share of the range of targets that is added on either side
-FURTHEST = 1e300  # largest end of an output range, so that its width is finite
+FURTHEST = 1e300  # largest limit of an output range, so that its width is finite
 
 
 @explains_names()
@@ -112,7 +112,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     def predict_one(self, x: Sample) -> float | Floats:
         """Predict a sample given as to `learn_one`: a float, or shape (n_outputs,)."""
         counts = self._counts(self._bins_of_one(x), self.n_outputs_, n_threads=1)
-        values = self._of_counts(mean_of(counts))[0]
+        values = self._outputs_of_counts(mean_of(counts))[0]
         return float(values[0]) if self._flat else values
 
     def predict(self, X: ArrayLike, return_std: bool = False) -> Floats | tuple[Floats, Floats]:
@@ -123,7 +123,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         """
         bins = self._bins(X)
         counts = self._counts(bins, self.n_outputs_, self._n_threads())
-        values = self._of_counts(mean_of(counts))
+        values = self._outputs_of_counts(mean_of(counts))
         if not return_std:
             return values[:, 0] if self._flat else values
         spread = self._step() * np.std(counts, axis=0)
@@ -146,19 +146,19 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
                 f"y must have as many outputs as before, {self.n_outputs_}, got {n_outputs}"
             )
 
-    def _conditional(self, bins: Ints, targets: Floats, weights: Floats | None) -> Floats:
-        """Return the mean target of the samples with each code, which all of them learn.
+    def _targets_to_learn(self, bins: Ints, targets: Floats, weights: Floats | None) -> Floats:
+        """Return for each sample the mean target of all samples with its code.
 
         Otherwise the network would follow the noise of the last presented sample.
         """
-        codes, of_samples = np.unique(bins, axis=0, return_inverse=True)
+        codes, code_of_sample = np.unique(bins, axis=0, return_inverse=True)
         if len(codes) == len(bins):
             return targets
-        of_samples = of_samples.reshape(-1)
-        counts = np.bincount(of_samples, weights)
+        code_of_sample = code_of_sample.reshape(-1)  # NumPy 2.0 returns a column
+        counts = np.bincount(code_of_sample, weights)
         weighted = targets if weights is None else targets * weights[:, None]
-        means = [np.bincount(of_samples, column) / counts for column in weighted.T]
-        return np.ascontiguousarray(np.stack(means, axis=1)[of_samples])
+        means = [np.bincount(code_of_sample, column) / counts for column in weighted.T]
+        return np.ascontiguousarray(np.stack(means, axis=1)[code_of_sample])
 
     def _rule_arguments(self, targets: Floats) -> Rule:
         return targets, self.correction_share
@@ -182,7 +182,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             expected = f"be (low, high) or one row (low, high) per output, within {FURTHEST}"
             require(is_range, "output_range", f"{expected}, low < high", self.output_range)
             return ranges
-        self._need_two(targets, "the output_range that is not given")
+        self._require_two_samples(targets, "the output_range that is not given")
         low, high = self._ranges_of(targets)
         if np.any(np.maximum(-low, high) > FURTHEST):
             raise ValueError(f"y must be within {FURTHEST}, got [{low.min()}, {high.max()}]")
@@ -194,23 +194,23 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         width: Floats = self.output_range_[:, 1] - self.output_range_[:, 0]
         return width / self._counts_of_range
 
-    def _in_counts(self, targets: Floats) -> Floats:
-        """Return targets in units of the firing count, not rounded."""
+    def _counts_of_targets(self, targets: Floats) -> Floats:
+        """Convert targets to firing counts, which are not rounded."""
         return (targets - self.output_range_[:, 0]) / self._step()
 
-    def _of_counts(self, counts: Array) -> Floats:
-        """Return the outputs of firing counts, shape (n_samples, n_outputs)."""
+    def _outputs_of_counts(self, counts: Array) -> Floats:
+        """Convert firing counts to outputs, shape (n_samples, n_outputs)."""
         return self._step() * counts + self.output_range_[:, 0]
 
     def _targets(self, y: Floats, at_once: bool = False) -> Floats:
-        """Return targets in counts; those outside the range are clipped, refused, or widen it."""
+        """Convert targets to firing counts; ``out_of_range`` decides about those out of range."""
         targets = y.reshape(len(y), -1)
-        counts = self._in_counts(targets)
+        counts = self._counts_of_targets(targets)
         if counts.min() >= 0 and counts.max() <= self._counts_of_range:
             return counts
         low, high = self.output_range_.T
         outside = (targets < low) | (targets > high)
-        if not outside.any():  # a count that was rounded
+        if not outside.any():  # only the rounded counts are outside
             return counts
         row, output = np.argwhere(outside)[0].tolist()
         problem = (
@@ -228,20 +228,20 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         if at_once:
             self._widen(targets.min(axis=0))
             self._widen(targets.max(axis=0))
-            return self._in_counts(targets)
+            return self._counts_of_targets(targets)
         begin = 0
         for row in np.flatnonzero(outside.any(axis=1)).tolist():
-            counts[begin:row] = self._in_counts(targets[begin:row])
+            counts[begin:row] = self._counts_of_targets(targets[begin:row])
             begin = row
             low, high = self.output_range_.T
-            # The range does not follow an outlier all the way.
+            # An outlier widens the range by at most its width on either side.
             nearest = targets[row].clip(2 * low - high, 2 * high - low)
             self.n_outputs_out_of_range_ += self._widen(nearest)
-        counts[begin:] = self._in_counts(targets[begin:])
+        counts[begin:] = self._counts_of_targets(targets[begin:])
         return counts
 
     def _widen(self, targets: Floats) -> int:
-        """Widen the ranges to targets of one sample; return the number of ranges widened."""
+        """Widen the output ranges to one sample's targets; return the number of ranges widened."""
         low, high = self.output_range_.T
         new_low = np.where(targets < low, targets - MARGIN * (high - targets), low)
         new_high = np.where(targets > high, targets + MARGIN * (targets - low), high)

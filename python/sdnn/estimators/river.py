@@ -27,14 +27,14 @@ from sdnn.support.arguments import flag, require, shown, whole
 Features = Mapping[Hashable, Any]  # a sample of river
 Sample = dict[str, Any]
 Target = Any  # a number or a label
-WINDOW = 500  # samples whose range is followed
-REMEMBERED = 1000  # last samples, from which new features and categories are learned
-FEWEST = 5  # of these samples must have a new feature or category
-MOST_FEATURES = 1000  # later ones are ignored
+WINDOW = 500  # number of last samples whose range inputs are scaled from
+REMEMBERED = 1000  # number of last samples kept to learn new features and categories from
+FEWEST = 5  # number of kept samples that must have a new feature or category
+MOST_FEATURES = 1000  # later features are ignored
 MOST_CATEGORIES = 1000  # later categories of a feature count as missing values
 
 
-def cleaned(x: Features) -> Sample:
+def cleaned_sample(x: Features) -> Sample:
     """Return a sample with strings as names and None for missing values."""
     sample = {str(name): value for name, value in x.items()}
     if len(sample) < len(x):
@@ -121,11 +121,11 @@ class FollowedRanges:
         if self.n_noted % WINDOW == 0 or np.any((values < low) | (values > high)):
             low = np.fmin.reduce(self.recent)
             high = np.fmax.reduce(self.recent)
-            is_range = high > low  # also where none is NaN
+            is_range = high > low  # False where the window has only NaN
             self.now = np.where(is_range, low, self.now[0]), np.where(is_range, high, self.now[1])
 
     def moved(self, x: dict[str, object], learns: bool) -> dict[str, object]:
-        """Return a sample with its finite numbers moved and its other values unchanged."""
+        """Map a sample's finite numbers from the range of the window to the learned range."""
         try:
             values = np.array([x.get(name) for name in self.names], dtype=np.float64)
         except (TypeError, ValueError):
@@ -141,7 +141,7 @@ class FollowedRanges:
         return {**x, **{name: value for name, value, is_moved in moved if is_moved}}
 
 
-class Waiting:
+class StreamEstimator:
     """Collects the first samples, from which ranges, categories and classes are learned.
 
     Later features and categories are learned from the last samples, once several have them.
@@ -168,14 +168,14 @@ class Waiting:
         self.samples: collections.deque[Sample] = collections.deque(maxlen=most)
         self.targets: collections.deque[Target] = collections.deque(maxlen=most)
         self.n_learned = 0
-        self.n_before_news: int | None = None  # samples before the first new feature or category
-        self.reads: dict[str, Callable[[object], object]] = {}  # by feature; read its values
+        self.n_before_additions: int | None = None  # `n_learned` at the first addition
+        self.reads: dict[str, Callable[[object], object]] = {}  # converter of each feature's values
         self.categories: dict[str, set[object]] = {}  # learned categories by feature
         self.most_columns = 0  # limit of a growing code
 
     def learn_one(self, x: Features, y: Target) -> None:
         """Learn one sample; an error changes nothing."""
-        sample = cleaned(x)
+        sample = cleaned_sample(x)
         self._check_target(y)
         if self.fitted is not None:
             self._learn(self._sample(sample, learns=True), y)
@@ -183,13 +183,13 @@ class Waiting:
         self.targets.append(y)
         self.n_learned += 1
         if self.fitted is not None:
-            self._learn_news(sample)
+            self._learn_additions(sample)
         elif len(self.samples) >= self.grace_period and (
             len(set(self.targets)) >= self.least_targets
         ):
             try:
                 self._begin()
-            except ValueError:  # because of a setting, as the samples were checked
+            except ValueError:  # caused by a setting of the model: the samples were checked
                 self.samples.pop()
                 self.targets.pop()
                 raise
@@ -289,18 +289,18 @@ class Waiting:
             return False
         return self.reads[name](value) not in known
 
-    def _learn_news(self, sample: Mapping[str, object]) -> None:
-        """Learn new features and categories some time after the first of them."""
-        if self.n_before_news is None:
+    def _learn_additions(self, sample: Mapping[str, object]) -> None:
+        """Add new features and categories, a grace period after the first of them was observed."""
+        if self.n_before_additions is None:
             may_be_new = self.categories or not sample.keys() <= self.reads.keys()
             if not (may_be_new and any(self._is_new(*item) for item in sample.items())):
                 return
-            self.n_before_news = self.n_learned - 1
-        n_last = self.n_learned - self.n_before_news
+            self.n_before_additions = self.n_learned - 1
+        n_last = self.n_learned - self.n_before_additions
         if n_last < max(self.grace_period, min(self.n_learned // 10, REMEMBERED)):
             return
-        self.n_before_news = None
-        new, changed = self._frequent_news()
+        self.n_before_additions = None
+        new, changed = self._frequent_additions()
         if not (new or changed):
             return
         before = self.reads.copy(), self.categories.copy()
@@ -313,10 +313,10 @@ class Waiting:
             for x, y in list(zip(self.samples, self.targets, strict=True))[-n_last:]:
                 self._learn(self._sample(x), y)
 
-    def _frequent_news(self) -> tuple[list[str], dict[int, Coding]]:
-        """Return new features, and by number the codings of features with new categories.
+    def _frequent_additions(self) -> tuple[list[str], dict[int, Coding]]:
+        """Return new features, and the extended coding of each feature with new categories.
 
-        Only news that several of the last samples have count.
+        Features and categories that fewer than `FEWEST` kept samples have are left out.
         """
         counts = collections.Counter(
             (name, self.reads[name](value) if name in self.reads else None)
@@ -326,7 +326,7 @@ class Waiting:
         )
         often = [news for news, count in counts.items() if count >= FEWEST]
         new: list[str] = []
-        if isinstance(self.model.pairs, str):  # listed pairs have none of new features
+        if isinstance(self.model.pairs, str):  # a list of pairs cannot name new features
             new = sorted(name for name, _ in often if name not in self.reads)
         changed: dict[int, Coding] = {}
         for index, name in enumerate(self.reads):
@@ -356,7 +356,7 @@ class Waiting:
         return True
 
 
-class RiverRegressor(Waiting, base.Regressor):
+class RiverRegressor(StreamEstimator, base.Regressor):
     """An `SDNNRegressor` for river's streams.
 
     Parameters
@@ -386,10 +386,10 @@ class RiverRegressor(Waiting, base.Regressor):
         """Predict one target."""
         if self.fitted is None:
             return float(np.mean(self.targets)) if self.targets else 0.0
-        return float(self.fitted.predict_one(self._sample(cleaned(x))))
+        return float(self.fitted.predict_one(self._sample(cleaned_sample(x))))
 
 
-class RiverClassifier(Waiting, base.Classifier):
+class RiverClassifier(StreamEstimator, base.Classifier):
     """An `SDNNClassifier` for river's streams.
 
     Parameters
@@ -420,14 +420,14 @@ class RiverClassifier(Waiting, base.Classifier):
 
     def _learn(self, sample: Sample, y: Target) -> None:
         if y not in self.fitted.classes_:
-            self.fitted._bins_of_one(sample)  # raises before a class is added
+            self.fitted._bins_of_one(sample)  # raises for a bad sample before a class is added
             self.fitted._add_class(y)
         super()._learn(sample, y)
 
     def predict_one(self, x: Features, **_options: object) -> Target:
         """Predict one label; None before the first sample."""
         if self.fitted is not None:
-            return self.fitted.predict_one(self._sample(cleaned(x)))
+            return self.fitted.predict_one(self._sample(cleaned_sample(x)))
         # Ties go to the label that was observed first.
         return max(dict.fromkeys(self.targets), key=self.targets.count, default=None)
 
@@ -444,5 +444,5 @@ class RiverClassifier(Waiting, base.Classifier):
         if self.fitted is None:
             n_samples = len(self.targets)
             return {y: n / n_samples for y, n in collections.Counter(self.targets).items()}
-        each = self.fitted.predict_proba_one(self._sample(cleaned(x))).tolist()
+        each = self.fitted.predict_proba_one(self._sample(cleaned_sample(x))).tolist()
         return dict(zip(self.fitted.classes_.tolist(), each, strict=True))

@@ -21,8 +21,8 @@ from sdnn.estimators.network import Network
 from sdnn.support.arguments import require
 
 LARGE_SAMPLE = 5000
-"""Samples above which one epoch alone changes much, and blocks are shuffled instead of samples."""
-BLOCK = 512  # samples; the trainer reuses sums of blocks that it meets again
+"""Size from which on every epoch's network is averaged, and blocks of samples are shuffled."""
+BLOCK = 512  # samples; the trainer reuses the sums of a block in later epochs
 LARGEST_WEIGHT = 10**6
 MOST_PRESENTED = 2**28  # samples in an epoch: their indices take a GiB
 
@@ -36,7 +36,7 @@ MOST_PRESENTATIONS = 80_000  # samples presented in all epochs by default
 
 @dataclasses.dataclass
 class History:
-    """The epochs of a training; ``network`` is the last one, or the best by validation."""
+    """The result of the epochs; ``network`` is the last one, or the best by validation."""
 
     network: Network
     n_corrected: list[int] = dataclasses.field(default_factory=list)
@@ -91,7 +91,7 @@ def without_absent(
     try:
         n_samples = _num_samples(X)
         fits = _num_samples(y) == n_samples
-    except TypeError:  # validation explains it later
+    except TypeError:  # validation raises a clearer error later
         fits = False
     if sample_weight is None or not fits:
         return X, y, sample_weight
@@ -113,19 +113,19 @@ def class_weights(class_weight: ClassWeight, labels: Array) -> Floats | None:
 
 
 def weighted_mean(values: Array, weights: Floats | None) -> float:
-    """Return the mean over samples, plain without weights or if all of them are 0."""
+    """Return the weighted mean, or the plain mean without weights or if all of them are 0."""
     if weights is None or not weights.any():
         return float(np.mean(values))
     return float(np.average(values, axis=0, weights=weights).mean())
 
 
-def presented(n_samples: int, weights: Floats | None, epoch: int, n_before: int = 0) -> Ints:
-    """Return the samples of an epoch: those of weight 2 twice, of 1/2 in every other epoch.
+def samples_of_epoch(n_samples: int, weights: Floats | None, epoch: int, n_before: int = 0) -> Ints:
+    """Return which samples an epoch presents: weight 2 twice, weight 1/2 in every other epoch.
 
     In a single epoch every other sample of weight 1/2 is presented. ``n_before`` is the number of
     samples of earlier calls.
 
-    >>> [presented(3, np.array([2.0, 0.5, 0.0]), epoch).tolist() for epoch in range(3)]
+    >>> [samples_of_epoch(3, np.array([2.0, 0.5, 0.0]), epoch).tolist() for epoch in range(3)]
     [[0, 0, 1], [0, 0], [0, 0, 1]]
     """
     in_order = np.arange(n_samples, dtype=np.int32)
@@ -136,10 +136,10 @@ def presented(n_samples: int, weights: Floats | None, epoch: int, n_before: int 
     return np.repeat(in_order, times.astype(np.int64))
 
 
-def presentations(weights: Floats | None) -> Floats | None:
-    """Return weights scaled to a mean of 1 if none of them reaches 1.
+def scaled_up(weights: Floats | None) -> Floats | None:
+    """Scale weights to a mean of 1 if all are below 1: an epoch would present too few samples.
 
-    >>> presentations(np.array([0.25, 0.75])).tolist()
+    >>> scaled_up(np.array([0.25, 0.75])).tolist()
     [0.5, 1.5]
     """
     if weights is None or not 0 < weights.max() < 1:
@@ -149,7 +149,7 @@ def presentations(weights: Floats | None) -> Floats | None:
 
 
 def epochs_to_present_all(weights: Floats | None) -> int:
-    """Return the number of epochs in which every sample of a weight above 0 is presented."""
+    """Return the number of epochs after which every sample with a weight was presented once."""
     if weights is None:
         return 1
     least = float(np.min(weights, where=weights > 0, initial=1.0))
@@ -157,14 +157,17 @@ def epochs_to_present_all(weights: Floats | None) -> int:
 
 
 def most_epochs(max_iter: int | None, n_samples: int) -> int:
-    """Return the largest number of epochs of a fit."""
+    """Return ``max_iter``, or by default the number of epochs for a sample of this size."""
     if max_iter is not None:
         return max_iter
     return min(MOST_EPOCHS, max(FEWEST_EPOCHS, MOST_PRESENTATIONS // n_samples))
 
 
 def held_out(share: float, random: np.random.RandomState, n_samples: int) -> tuple[Rows, Rows]:
-    """Return the rows of a share of the samples, drawn, and the others; ValueError if too few."""
+    """Draw a share of the samples to hold out; return its rows and the other rows.
+
+    ValueError if either would be empty.
+    """
     if share == 0.0:
         return np.empty(0, dtype=np.int64), np.arange(n_samples)
     n_held = max(1, round(share * n_samples))
@@ -174,7 +177,7 @@ def held_out(share: float, random: np.random.RandomState, n_samples: int) -> tup
     return np.sort(order[:n_held]), np.sort(order[n_held:])
 
 
-def averaged_every(n_samples: int) -> int:
+def epochs_between_averages(n_samples: int) -> int:
     """Return the number of epochs between averaged networks; consecutive ones are too similar."""
     return 1 if n_samples > LARGE_SAMPLE else 3
 
@@ -211,12 +214,12 @@ def run_epochs(
     """
     network = model.network_
     history = History(network)
-    weights = presentations(weights)
+    weights = scaled_up(weights)
     quiet, n_quiet = 0, epochs_to_present_all(weights)
     kept: deque[Network] = deque(maxlen=n_averaged_epochs - 1)
     with progress_bar(model.verbose, max_iter) as advance:
         for epoch in range(max_iter):
-            order = presented(n_samples, weights, epoch)
+            order = samples_of_epoch(n_samples, weights, epoch)
             if model.shuffle:
                 order = shuffled(order, random, in_blocks)
             n_corrected, _ = trainer.present(order)
@@ -233,7 +236,7 @@ def run_epochs(
             quiet = quiet + 1 if n_corrected == 0 else 0
             if quiet == n_quiet:
                 break
-            is_kept = (epoch + 1) % averaged_every(n_samples) == 0 and epoch + 1 < max_iter
+            is_kept = (epoch + 1) % epochs_between_averages(n_samples) == 0 and epoch + 1 < max_iter
             if n_averaged_epochs > 1 and is_kept:
                 trainer.synchronize()
                 kept.append(network.copy())

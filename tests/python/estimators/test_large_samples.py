@@ -60,7 +60,7 @@ def test_blocks_in_any_order_have_the_bits_of_single_samples():
     code = SDNNRegressor(RandomInverse(low=0, high=1), **{**OPTIONS, "max_iter": 1})
     network = code.fit(X, Y).network_
     bins = network.input_code.bins(X)
-    targets = code._in_counts(Y[:, None])
+    targets = code._counts_of_targets(Y[:, None])
     blocks = np.split(np.arange(len(X), dtype=np.int32), [512, 1024])
     orders = [
         np.concatenate([blocks[1], blocks[2], blocks[0]]),

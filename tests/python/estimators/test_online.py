@@ -13,7 +13,7 @@ from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import Circular, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators import OutOfRangeWarning
 from sdnn.estimators.network import FEW_SAMPLES, FEW_TO_PREDICT, Network
-from sdnn.estimators.training import presented
+from sdnn.estimators.training import samples_of_epoch
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (200, 4))
@@ -500,7 +500,7 @@ def test_river_metrics_and_multiclass_wrappers_accept_the_classifier(river):
 @pytest.mark.parametrize("size", [1, 7, 200])
 def test_fractional_sample_weights_are_presentations_in_any_portions(size):
     weights = np.tile([2.0, 0.5, 1.0, 0.25], 50)
-    model, times = regressor(), presented(200, weights, 0)
+    model, times = regressor(), samples_of_epoch(200, weights, 0)
     for begin in range(0, 200, size):
         part = slice(begin, begin + size)
         model.partial_fit(X[part], Y[part], sample_weight=weights[part])
