@@ -67,7 +67,7 @@ warm_up_steps, missing, history
         return self._values(observation, self._dimension(dimension))
 
     def value(self, observation: ArrayLike) -> float:
-        """Return V(observation), the expected discounted return; raises as above."""
+        """Return V(observation), the expected discounted return; RuntimeError in a warm-up."""
         variables = self._observations.vector("observation", observation)
         return self._require_warm().state_value(variables)
 
@@ -81,7 +81,7 @@ warm_up_steps, missing, history
 
     @property
     def epsilon(self) -> float:
-        """Always 0: the policy itself is random; ``learning.entropy`` keeps it so."""
+        """Always 0: the softmax policy explores; ``learning.entropy`` keeps it random."""
         return 0.0
 
     @epsilon.setter

@@ -30,7 +30,7 @@ from sdnn.support.files import Arrays
 from sdnn.training.callbacks import ProgressBarCallback
 from sdnn.training.files import read_agent, read_statistics
 from sdnn.training.interfaces import Transition, explained
-from sdnn.training.training import Callback, Training, TrainingResult, listed, shows_bar
+from sdnn.training.training import Callback, Training, TrainingResult, checked_callbacks, shows_bar
 
 
 class Agent(Displayed, BaseAgent[Approximator, Learning]):
@@ -103,7 +103,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
 
     @property
     def inputs(self) -> list[tuple[str, list[int]]]:
-        """Kinds of the inputs of a state, with the numbers of observed variables.
+        """The inputs of a state, each with its type and the numbers of the observed variables.
 
         ``("variable", [i])``, ``("circular", [i])``, ``("angle", [cosine, sine])`` or
         ``("symbol", [first, n])``. Empty until a warm-up is over.
@@ -112,7 +112,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
 
     @property
     def has_running_ranges(self) -> bool:
-        """Whether ranges of observations follow what is observed."""
+        """Whether the ranges of observations are adapted to each new observation."""
         return self._observation.running
 
     @property
@@ -124,7 +124,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         return whole("dimension", dimension, 0, self.n_dimensions - 1)
 
     def _imitate_step(self, transition: Transition, value: float, margin: float) -> None:
-        """Learn that a teacher chose an action and that its return was `value`; see `imitate`.
+        """Learn that a teacher chose an action whose return was `value`; see `imitate`.
 
         With Q(lambda) the values of other actions become lower by `margin` at least, in the unit of
         the rewards. RuntimeError while the agent is warming up; ValueError as `learn` does, and for
@@ -135,17 +135,17 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
 
     @property
     def _n_warm_up_steps_left(self) -> int:
-        """Number of transitions until the warm-up is over; 0 without one."""
+        """Number of transitions until the warm-up is over; 0 without a warm-up."""
         if not self.is_warming_up:
             return 0
         return self._warm_up_steps - len(self.state()["warm_up.rewards"])
 
     def _end_warm_up_of_teacher(self) -> None:
-        """End a warm-up in which a teacher acted; ranges become three times as wide and more."""
+        """End a warm-up from a teacher's log: ranges become at least three times as wide."""
         self._controller.end_warm_up_of_teacher()
 
     def _require_warm(self) -> _core.Controller:
-        """Return the controller; RuntimeError while it is warming up."""
+        """Return the core's controller; RuntimeError while the agent is warming up."""
         if self.is_warming_up:
             raise RuntimeError(
                 "the agent is still warming up: it has no ranges of its observations until it has"
@@ -154,7 +154,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         return self._controller
 
     def _values(self, observation: Element, dimension: int) -> NDArray[np.float64]:
-        """Return the values of a dimension's actions, or of fuzzy rules that of the observation."""
+        """Return the values of a dimension's actions; fuzzy rules give the observation's value."""
         variables = self._observations.vector("observation", observation)
         return self._require_warm().values(variables, dimension)
 
@@ -176,7 +176,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         deterministic: bool = True,
         action_masks: Any = None,
     ) -> tuple[Element, None]:
-        """Choose as Stable-Baselines3's models do, for its tools such as ``evaluate_policy``.
+        """Choose actions with the interface of Stable-Baselines3's models, such as for its tools.
 
         Parameters
         ----------
@@ -184,11 +184,11 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
             A batch is what a vector environment gives: arrays with one axis more, the first one,
             in a Dict or Tuple where the space is one.
         state, episode_start
-            Of recurrent models; not used.
+            Not used: Stable-Baselines3 has them for recurrent models.
         deterministic : bool
             False: explore, as `act` does, in environment 0.
         action_masks : optional
-            As the mask of `act`, of a batch one for each.
+            The mask of `act`, or for a batch a mask for each observation.
 
         Returns
         -------
@@ -250,7 +250,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         """
         if progress is None or flag("progress", progress):
             bar = ProgressBarCallback("learning", seconds=0.0 if progress else None)
-            callbacks = [*listed(callbacks), *([bar] if shows_bar() else [])]
+            callbacks = [*checked_callbacks(callbacks), *([bar] if shows_bar() else [])]
         training = Training(
             self,
             env,
@@ -270,7 +270,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
                 self._next_episode = training.next_episode
 
     def _state_of(self, part: str) -> Arrays:
-        """Return the arrays of a part, such as ``"agent"``, by their names in it."""
+        """Return the arrays of a part of the state, such as ``"agent"``, by name."""
         arrays, prefix = self.state().items(), f"{part}."
         return {name.removeprefix(prefix): a for name, a in arrays if name.startswith(prefix)}
 
@@ -302,7 +302,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         if "observation_space" in description:
             observations = space_of(description["observation_space"])
             actions = space_of(description["action_space"])
-        else:  # it was made in C++
+        else:  # the agent was made in C++
             observations = observation_space_of(agent._observation)
             actions = action_space_of(agent._action)
             agent.has_bounds = False
@@ -342,7 +342,7 @@ def load_agent(path: str | Path) -> AnyAgent:
 
 
 def unbatched(space: Space, observation: Element) -> Elements | None:
-    """Return the elements of a batch of observations; None if it is no batch."""
+    """Split a batch of observations into its elements; None if it is a single observation."""
     if isinstance(space, gym.spaces.Dict):
         if not isinstance(observation, Mapping) or set(observation) != set(space):
             return None
@@ -361,7 +361,7 @@ def unbatched(space: Space, observation: Element) -> Elements | None:
 
 
 def _columns(parts: Iterable[tuple[Space, Element]]) -> list[Elements] | None:
-    """Return the elements of each part of a batch; None if these are not equally many."""
+    """Split each part of a batch into its elements; None if the parts differ in length."""
     columns = [unbatched(space, part) for space, part in parts]
     present = [column for column in columns if column is not None]
     is_batch = len(present) == len(columns) and len({len(column) for column in present}) == 1

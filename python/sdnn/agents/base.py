@@ -71,7 +71,7 @@ class Preset(NamedTuple):
 
 
 def presets_of(listed: Mapping[str, Any], **more: Mapping[str, Any]) -> Mapping[str, Preset]:
-    """Return the settings that the core lists, by name, with more of some of them."""
+    """Return the presets of the core by name; ``more`` adds settings to some of them."""
     return MappingProxyType(
         {name: Preset(*settings, **more.get(name, {})) for name, settings in listed.items()}
     )
@@ -84,26 +84,26 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
     """
 
     kind: ClassVar[str]
-    """The word for this approximator and learning rule in files."""
+    """The name of this approximator and learning rule in files."""
     approximator_type: ClassVar[type[Any]]
     learning_type: ClassVar[type[Any]]
     presets: ClassVar[Mapping[str, Preset]]
     """Settings by name."""
     default_preset: ClassVar[str] = "general"
     default_range: ClassVar[Literal["running"] | None] = None
-    """The rule for ranges of observations where none are given."""
+    """The default of ``observation_range``."""
     narrows_ranges: ClassVar[bool] = False
-    """Whether a warm-up narrows bounds of the space that are far wider than what it sees."""
+    """Whether a warm-up replaces bounds of the space that are far wider than its observations."""
     wrappers: Sequence[Statistics] = ()
-    """Statistics of the wrappers of its training's environment; kept in files."""
+    """Statistics of the wrappers of the training environment; kept in the agent's file."""
     learning: Learning
     _approximator: Approximator
     _controller: _core.Controller
     _scaling: Scaling | None = None
-    _next_episode = 0  # of `train` without a seed
+    _next_episode = 0  # number of the next episode of `train` without a seed
     _has_warned = False
     has_bounds = True
-    """Whether its spaces are those of an environment: else it was made in C++, of ranges."""
+    """Whether the spaces have an environment's bounds; False for agents made in C++ from ranges."""
 
     @explained
     def __init__(
@@ -253,7 +253,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         self._controller.n_environments = whole("n_environments", n, 1, _MOST_ENVIRONMENTS)
 
     def _check_environment(self, environment: int) -> None:
-        if type(environment) is not int or environment:  # most agents have no other than 0
+        if type(environment) is not int or environment:  # fast path: most agents have only 0
             whole("environment", environment, 0, self.n_environments - 1)
 
     def begin_episode(self, environment: int = 0) -> None:
@@ -265,7 +265,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         self._controller.begin_episode(environment)
 
     def begin_greedy_episode(self) -> None:
-        """Note that the next acts without ``explore`` are of another episode: `evaluate` does."""
+        """Note that a greedy episode begins; `evaluate` calls this before each episode."""
         self._controller.begin_greedy_episode()
 
     @explained
@@ -339,7 +339,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         self._controller.check(*self._parts_of(transition, 0))
 
     def _parts_of(self, transition: Transition, environment: int) -> tuple[Any, ...]:
-        """Return a transition as the core takes it; TypeError or ValueError if it is none."""
+        """Convert a transition to the core's arguments; TypeError or ValueError if that fails."""
         if not isinstance(transition, Transition):
             raise TypeError(
                 f"transition must be a Transition, got {shown(transition)}: train(env, steps=...)"
@@ -357,7 +357,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         )
 
     def warn_of_refused_reward(self) -> None:
-        """Warn once if a reward was too large to be learned, as the glitch of a sensor is."""
+        """Warn once if a reward was too large to be learned, such as a sensor's glitch."""
         refused = self._controller.refused_reward
         if refused is None or self._has_warned:
             return
@@ -370,7 +370,10 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         )
 
     def core_parts(self) -> CoreParts | None:
-        """Return the core and functions around it, unless `act` or `learn` has been replaced."""
+        """Return what the training loop needs to call the core directly, which is faster.
+
+        None where a subclass or user has replaced `act` or `learn`, which must be called then.
+        """
         functions = [getattr(method, "__func__", None) for method in (self.act, self.learn)]
         actions = self._actions
         if functions != [BaseAgent.act, BaseAgent.learn]:
@@ -379,7 +382,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
 
     @property
     def scaling(self) -> Scaling | None:
-        """Scaling of the run's observations, with ``--noise`` or ``--redundant``; None without.
+        """Scaling of observations in a run with ``--noise`` or ``--redundant``; else None.
 
         May be set, and is kept in files. `train` and `evaluate` refuse environments that do not
         scale their observations then.

@@ -31,7 +31,7 @@ from sdnn.support.files import open_regular
 from sdnn.training.interfaces import Transition, explained
 
 _MOST_BYTES = 2**20
-"""The longest line of a file that is read, so that memory stays bounded."""
+"""Limit of a line's length when a file is read, so that memory stays bounded."""
 
 NAMES: Mapping[str, tuple[str, ...]] = {
     "observations": ("observation", "obs", "states", "state"),
@@ -42,7 +42,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     "truncations": ("truncated", "timeouts", "timeout"),
     "next_masks": ("next_mask",),
 }
-"""Names of columns, and others that stand for them: of D4RL, imitation and Stable-Baselines3."""
+"""Usual names of columns, and their names in D4RL, imitation and Stable-Baselines3."""
 
 _IGNORED = re.compile(r"(infos?|metadata|id|seed|total_steps)\b")
 _NUMBERED = re.compile(r"(.+?)[_.\[](\d+)\]?")
@@ -50,7 +50,7 @@ _ARRAYS = ("observations", "actions", "rewards")
 
 
 class Logged(NamedTuple):
-    """A transition, its place in the log, and whether its episode was cut off after it."""
+    """A transition, its place in the log, and whether the log truncates its episode there."""
 
     place: str
     transition: Transition
@@ -59,7 +59,7 @@ class Logged(NamedTuple):
 
 @cache
 def _columns_by_name() -> dict[str, str]:
-    """Return the usual name for each name."""
+    """Map each name of `NAMES` to the usual name of the column."""
     return {other: name for name, others in NAMES.items() for other in (name, *others)}
 
 
@@ -116,9 +116,9 @@ def _table_lines(path: Path) -> Iterator[tuple[str, Data]]:
 
 
 def _followed(rows: Iterable[tuple[str, Data]], *, is_episode: bool = False) -> Iterator[Logged]:
-    """Read rows; where they have no next observations these are the observations of the next row.
+    """Convert rows to transitions; a missing next observation is that of the next row.
 
-    The last step of an episode that was cut off has none then, and is left out.
+    The last step of a truncated episode then has no next observation, and is left out.
     """
     waiting: tuple[Data, str] | None = None
     for place, row in rows:
@@ -126,7 +126,7 @@ def _followed(rows: Iterable[tuple[str, Data]], *, is_episode: bool = False) -> 
             waiting[0]["next_observations"] = row["observations"]
             yield _logged(*waiting)
             waiting = None
-        if "rewards" not in row:  # only what follows the last step
+        if "rewards" not in row:  # only the observation after the last step
             continue
         if "next_observations" in row:
             yield _logged(row, place)
@@ -136,7 +136,7 @@ def _followed(rows: Iterable[tuple[str, Data]], *, is_episode: bool = False) -> 
         if is_episode or not (is_end or is_cut):
             waiting = row, place
         elif is_end:
-            row["next_observations"] = row["observations"]  # whose value is not asked for
+            row["next_observations"] = row["observations"]  # not used: no value follows
             yield _logged(row, place)
 
 
@@ -161,7 +161,7 @@ def _lines(path: Path) -> Iterator[tuple[int, bytes]]:
 
 
 def _items(items: Iterable[Any]) -> Iterator[Logged]:
-    """Read transitions or episodes, whatever each of them is."""
+    """Read items of an iterable, each of which is a transition or an episode."""
     for number, item in enumerate(items):
         if isinstance(item, Transition):
             yield Logged(f"transition {number}", item, False)
@@ -237,9 +237,9 @@ def _flag(name: str, value: Any) -> bool:
 
 
 def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = False) -> Data:
-    """Return arrays of n rows each by their usual names; ``observations`` may have one more.
+    """Return arrays of n rows by their usual names; ``observations`` may have n + 1 rows.
 
-    Columns such as ``observation_0`` are put together. Files mapped to memory are not read yet.
+    Columns such as ``observation_0`` are put together. Memory-mapped arrays stay on disk.
     """
     columns: Data = {}
     parts: dict[str, dict[int, Any]] = {}
@@ -284,8 +284,8 @@ def _column(name: str, column: Any) -> Any:
     if isinstance(column, tuple) and column and np.ndim(column[0]) > 0:
         return tuple(_column(f"{name}[{i}]", part) for i, part in enumerate(column))
     if getattr(getattr(column, "dtype", None), "kind", "") == "O" or _is_of_mappings(column):
-        return list(column)  # whose items the agent reads
-    if isinstance(column, np.ma.MaskedArray):  # missing readings, as the agent takes them
+        return list(column)  # rows of dictionaries or tuples, which the agent reads
+    if isinstance(column, np.ma.MaskedArray):  # the agent reads masks as missing values
         return list(column) if np.ma.is_masked(column) else column.data
     return array_of(name, column)
 
@@ -302,7 +302,7 @@ def _length(column: Any) -> int:
 
 
 def _rows(columns: Data, place: str, *, is_episode: bool = False) -> Iterator[tuple[str, Data]]:
-    """Yield rows of arrays with their places, and the observation that follows the last one."""
+    """Yield the rows of arrays with their places; last, an observation that follows them."""
     n, has_next = _length(columns["rewards"]), "next_observations" in columns
     for i in range(n if has_next else _length(columns["observations"])):
         names = columns if i < n else ("observations",)
@@ -313,7 +313,7 @@ def _rows(columns: Data, place: str, *, is_episode: bool = False) -> Iterator[tu
 
 
 def _at(values: Any, t: int) -> Any:
-    """Return number t of an array, or of each in dictionaries and tuples, as Gymnasium's spaces."""
+    """Return element t of an array, or of each array in nested dictionaries and tuples."""
     if isinstance(values, Mapping):
         return {name: _at(part, t) for name, part in values.items()}
     return tuple(_at(part, t) for part in values) if isinstance(values, tuple) else values[t]
@@ -392,12 +392,12 @@ def learn_from(agent: AnyAgent, dataset: Dataset, *, epochs: int = 1) -> int:
             agent.learn(transition)
             if logged.truncated or transition.terminated:
                 agent.begin_episode()
-        agent.begin_episode()  # learns what still waits
+        agent.begin_episode()  # learns the pending n-step returns
     return n * epochs
 
 
 def checked_length(agent: AnyAgent, log: Iterator[Logged]) -> int:
-    """Return the number of transitions; the error of one that cannot be learned has its place."""
+    """Count transitions after checking each; an error names the place in the log."""
     n = n_episodes = 0
     for place, transition, truncated in log:
         try:
@@ -411,7 +411,7 @@ def checked_length(agent: AnyAgent, log: Iterator[Logged]) -> int:
 
 
 def with_action(agent: AnyAgent, transition: Transition) -> Transition:
-    """Return a transition whose action, if it is a whole number in a float or an array, is one."""
+    """Return a transition whose action is an int if the log has it as a float or an array."""
     if not isinstance(agent.action_space, gym.spaces.Discrete) or type(transition.action) is int:
         return transition
     number = np.asarray(transition.action)

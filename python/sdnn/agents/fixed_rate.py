@@ -63,5 +63,5 @@ class FixedRate(_core.FixedRate):
         return self
 
     def __next__(self) -> int:
-        """Wait for the next tick and return its number: 0 at once, then the periods since."""
+        """Wait for the next tick and return its number, the periods since the first tick."""
         return self.wait()

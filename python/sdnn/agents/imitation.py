@@ -17,7 +17,7 @@ LinearAgent: TypeAlias = SDNNQLambda | SDNNActorCritic
 Steps: TypeAlias = Sequence[Transition]
 
 _MOST_STEPS = 10_000
-"""The most steps of an episode that are in memory at once."""
+"""The number of steps that are in memory at once; longer episodes are split."""
 
 
 @explained
@@ -86,7 +86,10 @@ def imitate(agent: SDNNQLambda | SDNNActorCritic, dataset: Dataset, *, epochs: i
 
 
 def _end_warm_up(agent: LinearAgent, log: Iterator[Logged]) -> None:
-    """Learn all transitions, or those that a warm-up needs except the last one, and end it."""
+    """Learn the log's first transitions, one fewer than the warm-up needs, then end the warm-up.
+
+    Learning the last one, too, would end it with the ranges of an agent without a teacher.
+    """
     agent.begin_episode()
     for logged in islice(log, max(1, agent._n_warm_up_steps_left - 1)):
         transition = with_action(agent, logged.transition)
@@ -98,7 +101,7 @@ def _end_warm_up(agent: LinearAgent, log: Iterator[Logged]) -> None:
 
 
 def _episodes(agent: LinearAgent, log: Iterator[Logged]) -> Iterator[tuple[Steps, bool]]:
-    """Yield the steps of each episode, of long ones in parts, and whether it terminated there."""
+    """Yield the steps of each episode and whether it terminated; long episodes come in parts."""
     steps: list[Transition] = []
     for logged in log:
         steps.append(with_action(agent, logged.transition))
@@ -111,7 +114,7 @@ def _episodes(agent: LinearAgent, log: Iterator[Logged]) -> Iterator[tuple[Steps
 
 
 def _returns(agent: LinearAgent, steps: Steps, value: float) -> list[float]:
-    """Return the discounted return from each step on; `value` is that after the last one."""
+    """Return the discounted return of each step; `value` is the return after the last step."""
     discount = agent.learning.discount
     returns = []
     for transition in reversed(steps):
@@ -121,7 +124,7 @@ def _returns(agent: LinearAgent, steps: Steps, value: float) -> list[float]:
 
 
 def _value(agent: LinearAgent, last: Transition) -> float:
-    """Return the agent's estimate of the value after a step."""
+    """Return the agent's estimate of the discounted return after a step."""
     if isinstance(agent, SDNNActorCritic):
         return agent.value(last.next_observation)
     values = [agent.q_values(last.next_observation, d) for d in range(agent.n_dimensions)]
@@ -131,7 +134,7 @@ def _value(agent: LinearAgent, last: Transition) -> float:
 def _margin(agent: LinearAgent, read: Callable[[], Iterator[Logged]]) -> float:
     """Return the root mean square of the returns, or 1 where all are 0.
 
-    It is the margin by which other actions are worse at least. A smaller margin would let the noise
+    Imitation makes other actions worse by at least this margin. Less would let the noise
     of later learning undo what was imitated.
     """
     total, n = 0.0, 0

@@ -84,7 +84,7 @@ AGENTS: dict[str, AgentEntry] = {}
 
 
 def register(entry: AgentEntry) -> None:
-    """Let an agent take part.
+    """Register an agent, so that runs and studies can choose it.
 
     ValueError if the id cannot be part of a file's name, or an agent has it already.
     """
@@ -96,7 +96,7 @@ def register(entry: AgentEntry) -> None:
 
 
 def label_of(agent_id: str, preset: str | None) -> str:
-    """Return the word for an agent with a preset.
+    """Return the label of an agent with a preset, as the command line has it.
 
     >>> label_of("sdnn-c", "robust"), label_of("sdnn-c", "paper")
     ('sdnn-c-robust', 'sdnn-c')
@@ -105,13 +105,13 @@ def label_of(agent_id: str, preset: str | None) -> str:
 
 
 def labels() -> tuple[str, ...]:
-    """Return the words for all agents: ids, and ``ID-PRESET`` for presets but ``"paper"``."""
+    """Return all labels: agents' ids, and ``ID-PRESET`` for every preset but ``"paper"``."""
     pairs = ((entry.id, preset) for entry in AGENTS.values() for preset in entry.presets)
     return tuple(dict.fromkeys((*AGENTS, *(label_of(*pair) for pair in pairs))))
 
 
 def split_label(label: str) -> tuple[str, str | None]:
-    """Return the agent and the preset that a word stands for; None: the default.
+    """Split a label into the agent's id and its preset; None for the default preset.
 
     ValueError if there is no such agent.
 
@@ -128,7 +128,7 @@ def split_label(label: str) -> tuple[str, str | None]:
 
 
 def agent_entry(label: str) -> AgentEntry:
-    """Look up an agent by its word; ValueError if there is no such agent.
+    """Look up an agent by its label; ValueError if there is no such agent.
 
     >>> agent_entry("sdnn-c-robust").title
     'SDNN-C'
@@ -137,7 +137,7 @@ def agent_entry(label: str) -> AgentEntry:
 
 
 def title_of(label: str) -> str:
-    """Return the title of an agent by its word; ValueError if there is no such agent.
+    """Return the title of a label for readers; ValueError if there is no such agent.
 
     >>> title_of("sdnn-c-robust")
     'SDNN-C, robust'
@@ -149,7 +149,7 @@ def title_of(label: str) -> str:
 def _register(
     agent: type[AnyAgent], title: str, presets: Mapping[str, Preset] | None = None, **options: Any
 ) -> None:
-    """Let an agent of this package take part, with the id that its files have."""
+    """Register an agent of this package; its id is the name in its files."""
     entry = AgentEntry(
         id=agent.kind,
         title=title,

@@ -13,7 +13,7 @@ from sdnn.support.arguments import real, require, whole
 
 
 def neighbours(n_variables: int, n_redundant: int) -> Iterator[tuple[int, int]]:
-    """Yield the pairs of variables whose means are redundant ones.
+    """Yield the pairs of neighbouring variables whose means are the redundant variables.
 
     >>> list(neighbours(3, 4))
     [(0, 1), (1, 2), (2, 0), (0, 1)]
@@ -57,14 +57,14 @@ class Scaling:
         return low, high
 
     def words(self) -> str:
-        """Return it as a line of text."""
+        """Describe the scaling in a line."""
         most = 8
         ranges = [f"{i} from {low:.6g} to {high:.6g}" for i, (low, high) in enumerate(self.ranges)]
         text = ", ".join(ranges[:most]) + (", ..." if len(ranges) > most else "")
         return text + (f", and means of neighbours ({self.n_redundant})" * (self.n_redundant > 0))
 
     def lines(self) -> Iterator[str]:
-        """Yield a line about each observed number."""
+        """Describe each observed variable in a line."""
         n_variables = len(self.ranges)
         for i, (low, high) in enumerate(self.ranges):
             yield f"observation[{i}]: variable {i}, from {low!r} to {high!r}"
@@ -73,12 +73,12 @@ class Scaling:
             yield f"observation[{n_variables + i}]: the mean of {means}"
 
     def values(self) -> Data:
-        """Return it as data that JSON can hold."""
+        """Return the scaling as data that JSON can hold."""
         return {"ranges": [list(pair) for pair in self.ranges], "redundant": self.n_redundant}
 
     @classmethod
     def of_values(cls, values: Data, n_variables: int) -> Scaling:
-        """Make it from `values`; ValueError if it does not fit their number."""
+        """Make a scaling from `values`; ValueError if the number of variables does not fit."""
         scaling = cls(ranges=values["ranges"], n_redundant=values["redundant"])
         n = len(scaling.ranges) + scaling.n_redundant
         if n != n_variables:

@@ -51,7 +51,7 @@ from sdnn.support.files import lock, open_to_append, remove_abandoned_files, wri
 from sdnn.support.interrupts import Interrupts
 from sdnn.support.machine import instruction_set
 from sdnn.training.loop import Row
-from sdnn.training.training import listed
+from sdnn.training.training import checked_callbacks
 
 CONFIG = "config.json"
 LOCK = ".lock"
@@ -322,7 +322,7 @@ class Run(Displayed):
             trial, self._checked = self._checked, None
             if trial is None or spec != self.spec:
                 trial = spec.make_training()
-            trial.training.callbacks = listed((*trial.training.callbacks, *callbacks))
+            trial.training.callbacks = checked_callbacks((*trial.training.callbacks, *callbacks))
             trial.training.steps, trial.training.episodes = self.goal.steps, self.goal.episodes
             return trial
         try:

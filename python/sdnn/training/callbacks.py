@@ -61,7 +61,7 @@ class StopTrainingOnRewardThreshold(Callback):
         self.patience = whole("patience", patience, 1, 2**53)
 
     def on_row(self, training: Training, row: Row) -> None:
-        """Check an evaluation and those before it."""
+        """Stop the training once the threshold is reached."""
         if row["kind"] == "evaluation" and self.is_reached(training):
             training.stop()
 
@@ -78,13 +78,13 @@ class SaveBestAgent(Callback):
         self.path = path_of("path", path)
 
     def on_row(self, training: Training, row: Row) -> None:
-        """Save after such an evaluation."""
+        """Save the agent after the best evaluation so far."""
         if row["kind"] == "evaluation" and n_since_best(training) == 0:
             training.agent.save(self.path)
 
 
 class StopTrainingOnNoImprovement(Callback):
-    """Stops when so many evaluations in a row were not better than the best before them."""
+    """Stops after ``max_evaluations`` evaluations in a row without a new best mean return."""
 
     def __init__(self, max_evaluations: int) -> None:
         self.max_evaluations = whole("max_evaluations", max_evaluations, 1, 2**53)
@@ -96,7 +96,7 @@ class StopTrainingOnNoImprovement(Callback):
 
 
 def n_since_best(training: Training) -> int:
-    """Return how many evaluations came after the first one with the highest mean return."""
+    """Count the evaluations after the best one, which has the highest mean return."""
     means = [mean_return for _, mean_return in training.evaluations]
     return len(means) - 1 - means.index(max(means))
 
@@ -174,12 +174,12 @@ class ProgressBarCallback(Callback):
         self._evaluation = ""
 
     def on_start(self, training: Training) -> None:
-        """Open the bar, where it need not wait."""
+        """Open the bar, unless it appears only after some seconds."""
         self._due = time.monotonic() + self._seconds
         self._open(training)
 
     def _open(self, training: Training) -> ProgressBars | None:
-        """Return the bar, opened where it is time; None before."""
+        """Return the bar, which opens after ``seconds``; None before."""
         if self._bars is None and time.monotonic() >= self._due:
             self._bars = ProgressBars(self._console)
             total = training.steps if training.steps is not None else training.episodes
@@ -189,7 +189,7 @@ class ProgressBarCallback(Callback):
         return self._bars
 
     def on_row(self, training: Training, row: Row) -> None:
-        """Remember what is new."""
+        """Keep the last returns or evaluation, to be shown with the bar."""
         if row["kind"] == "evaluation":
             self._evaluation = f", evaluation {row['mean_return']:.4g}"
         else:

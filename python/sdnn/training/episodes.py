@@ -26,10 +26,10 @@ _LEARNING, EVALUATION = 0, 1
 """The kinds of episodes that `episode_seed` gives seeds to."""
 
 _N_RECENT = 1024
-"""Actions that are gathered before they become an array."""
+"""Number of actions that are kept in a list before they become an array."""
 
 _SCALARS = (np.generic, int, float)
-"""Types of observations and actions that nobody can write to."""
+"""Immutable types of observations and actions, which need no copy."""
 
 _OLD_API = (
     "; an environment of Gym before 0.26 can be wrapped:"
@@ -107,13 +107,13 @@ def checked_outcome(reward: Any, terminated: object, truncated: object) -> tuple
 
 
 def copied(value: Element) -> Element:
-    """Copy what others may write to: environments may keep their state, or change an action."""
+    """Copy an observation or action that an environment or agent may change later."""
     if type(value) is np.ndarray:
         return value.copy()
     return value if isinstance(value, _SCALARS) else copy.deepcopy(value)
 
 
-class OneEnvironment(EnvironmentAdapter):
+class SingleEnvironment(EnvironmentAdapter):
     """A single environment."""
 
     n_environments = 1
@@ -125,14 +125,14 @@ class OneEnvironment(EnvironmentAdapter):
         self.masks = [None] if has_action_masks(env) else None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
-        """Begin its episode."""
+        """Begin an episode with the seed of environment 0."""
         first, info = reset_env(self._env, seeds[0], options)
         if self.masks is not None:
             self.masks = [mask_in(info)]
         return {0: first}
 
     def take(self, action: Element) -> tuple[Element, float, bool, bool]:
-        """Take an action; return what a step gives but for the info."""
+        """Step the environment; return observation, reward, terminated and truncated."""
         observation, reward, terminated, truncated, info = step_env(self._env, copied(action))
         reward, terminated, truncated = checked_outcome(reward, terminated, truncated)
         if self.masks is not None:
@@ -140,26 +140,26 @@ class OneEnvironment(EnvironmentAdapter):
         return observation, reward, terminated, truncated
 
     def step(self, actions: Elements) -> Elements:
-        """Take the only action."""
+        """Step the environment with the only action."""
         observation, self.rewards[0], self.terminated[0], self.truncated[0] = self.take(actions[0])
         return observation[np.newaxis] if type(observation) is np.ndarray else [observation]
 
 
 def episode_seed(seed: int, kind: int, episode: int) -> int:
-    """Return the seed of an episode's `reset`; learning and evaluation have their own."""
+    """Return the seed of an episode's `reset`; learning and evaluation draw different seeds."""
     word = np.random.SeedSequence(seed, spawn_key=(kind, episode)).generate_state(1, np.uint32)[0]
-    return int(word) % 2**31  # some environments take no larger ones
+    return int(word) % 2**31  # some environments refuse larger seeds
 
 
 class _ActionLog:
-    """The actions of an episode, which may have millions of them, in arrays of many each."""
+    """The actions of an episode, kept in arrays: a list of millions would need much more memory."""
 
     def __init__(self, actions: Array | None = None) -> None:
         self._arrays = [] if actions is None or not len(actions) else [actions]
         self._recent: list[Element] = []
 
     def array(self) -> Array:
-        """Return all of them, shape (n, ...)."""
+        """Return all actions, shape (n, ...)."""
         arrays = self._arrays + ([np.array(self._recent)] if self._recent else [])
         return np.concatenate(arrays) if arrays else np.empty(0)
 
@@ -235,17 +235,20 @@ class Episodes:
 
     @property
     def learned_before(self) -> list[Statistics]:
-        """Statistics of the wrappers before the present episodes began, or as they are now."""
+        """Statistics of the wrappers before the present episodes began, if there are any."""
         return self.learned if any(self.present) else statistics_of(self.wrappers)
 
-    def leave(self) -> None:
-        """Begin anew in every environment with the next step, with other seeds."""
+    def abandon(self) -> None:
+        """Abandon all present episodes: the next step begins new ones, with other seeds."""
         self.adapter = type(self.adapter)(self._env)
         self.present[:] = [None] * self.n_environments
         self.unlearned = []
 
     def begin(self) -> None:
-        """Begin episodes where none is present: now, or with the next step of some vectors."""
+        """Begin episodes where none is present.
+
+        Some vectors begin them with their next step only.
+        """
         present = self.present
         self.unlearned = self._environments.copy()
         self._begins_with_step = {}
@@ -258,14 +261,14 @@ class Episodes:
         first_observations = self._reset(numbers)
         for i in first_observations:
             present[i] = Episode(numbers.pop(i))
-        self._put(first_observations)
+        self._store_first_observations(first_observations)
         for i in first_observations:
             self._learner.begin_episode(i)
         self._begins_with_step = numbers
         self.unlearned = [i for i in self._environments if present[i] is not None]
 
     def step(self, actions: Elements) -> None:
-        """Take a step in every environment."""
+        """Step every environment; begin the episodes that some vectors begin with the step."""
         self.actions, self.previous_observations = actions, self.observations
         elements = self._learner.elements(actions)
         for i in self.unlearned:
@@ -288,8 +291,8 @@ class Episodes:
         adapter = self.adapter
         return adapter.terminated[environment] or adapter.truncated[environment]
 
-    def until_an_end(self, most: int) -> list[int]:
-        """Return at most so many environments to be learned from, none after an episode's end."""
+    def up_to_episode_end(self, most: int) -> list[int]:
+        """Return the next environments to learn from: at most `most`, up to an episode's end."""
         environments = self.unlearned[:most]
         for k, i in enumerate(environments, 1):
             if self.is_over(i):
@@ -297,29 +300,29 @@ class Episodes:
         return environments
 
     def terminated(self, limit_bootstraps: bool) -> list[bool]:
-        """Return which steps are learned as terminating, after which no value follows."""
+        """Return which steps are learned as terminal: truncated ones unless `limit_bootstraps`."""
         adapter = self.adapter
         if limit_bootstraps:
             return adapter.terminated
         return [a or b for a, b in zip(adapter.terminated, adapter.truncated, strict=True)]
 
     def note_learned(self, environments: list[int]) -> None:
-        """Note that the steps of these environments, the first of `unlearned`, are learned."""
+        """Remove environments from the beginning of `unlearned`, and add their rewards."""
         del self.unlearned[: len(environments)]
         for i in environments:
             episode: Any = self.present[i]
             episode.sum_of_rewards += self.adapter.rewards[i]
 
     def _reset(self, numbers: Mapping[int, int]) -> dict[int, Element]:
-        """Begin episodes of these numbers in some environments; return first observations."""
+        """Reset environments for the episodes of these numbers; return the first observations."""
         seeds = {
             i: None if self._seed is None else episode_seed(self._seed, _LEARNING, number)
             for i, number in numbers.items()
         }
         return self.adapter.reset(seeds, self._options(1 + max(numbers.values())))
 
-    def _put(self, first_observations: dict[int, Element]) -> None:
-        """Read the first observations of all, or some, environments."""
+    def _store_first_observations(self, first_observations: dict[int, Element]) -> None:
+        """Store the first observations of episodes that have begun, as the learner reads them."""
         if len(first_observations) == self.n_environments:
             observations = list(first_observations.values())
             self.observations = self._checked(self._learner.read, "observation", observations)
@@ -333,14 +336,14 @@ class Episodes:
             self.masks = self._checked(self._learner.masks, self.adapter.masks)
 
     def _checked(self, read: Callable[..., Any], *arguments: Any) -> Any:
-        """Read what an environment returned, or raise the error that names the step."""
+        """Read values of an environment; a ValueError becomes an error that names the step."""
         try:
             return read(*arguments)
         except ValueError as error:
             raise self._unusable(error, None) from error
 
     def saved(self, shape: tuple[int, ...]) -> list[SavedEpisode | None]:
-        """Return the present episodes for a file; ``shape`` is an action's."""
+        """Return the present episodes for a file; ``shape`` is the shape of an action."""
         return [
             None
             if episode is None
@@ -355,13 +358,13 @@ class Episodes:
         ]
 
     def repeat(self, saved: Sequence[SavedEpisode | None]) -> None:
-        """Bring every environment to where its episode was saved.
+        """Replay saved episodes, so that every environment is in the state in which it was saved.
 
         UnrepeatedEpisodeError if an environment does not repeat its episode; ValueError if the
         environments are others, or cannot be reset one by one with seeds.
         """
         self._require_repeatable(len(saved))
-        if self.wrappers and not isinstance(self.adapter, OneEnvironment) and any(saved):
+        if self.wrappers and not isinstance(self.adapter, SingleEnvironment) and any(saved):
             raise UnrepeatedEpisodeError(
                 f"env must repeat its episodes, but {type(self.wrappers[0]).__name__} has learned"
                 " from several environments at once: repeat_episodes=False begins new ones"
@@ -406,9 +409,10 @@ class Episodes:
             )
 
     def _replay(self) -> None:
-        """Take the actions of all present episodes again, so that all end at the same time.
+        """Take the actions of all present episodes again, so that all end with the same step.
 
-        Until its own episode begins, an environment takes any actions.
+        A vector steps all environments at once. Environments with shorter episodes therefore begin
+        with actions of the longest one, and are reset when their own episode has to begin.
         """
         present = {i: episode for i, episode in enumerate(self.present) if episode is not None}
         actions = {i: episode.actions.array() for i, episode in present.items()}
@@ -424,8 +428,8 @@ class Episodes:
                 numbers = {
                     i: present[i if i in own_episode else longest].number for i in sorted(beginning)
                 }
-                self._put(self._reset(numbers))
-            if t == n_rounds:  # only episodes without actions begin here
+                self._store_first_observations(self._reset(numbers))
+            if t == n_rounds:  # only episodes without actions begin after the last step
                 return
             self.actions = [
                 actions[i][t - n_rounds]

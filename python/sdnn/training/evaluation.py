@@ -25,15 +25,15 @@ from sdnn.training.episodes import (
     reset_env,
     step_env,
 )
-from sdnn.training.files import fixed
+from sdnn.training.files import fixed_statistics
 from sdnn.training.interfaces import UnusableStepError, explained
 
 _LONG = 100_000
 """Warn after this many steps in one episode."""
 
 
-class Acts(Protocol):
-    """The interface of what is evaluated."""
+class ActingAgent(Protocol):
+    """The interface of agents that can be evaluated."""
 
     def act(self, observation: Element, explore: bool = True) -> Element:
         """Choose an action."""
@@ -80,7 +80,7 @@ class Evaluation(Displayed):
 
 @explained
 def evaluate(
-    agent: Acts,
+    agent: ActingAgent,
     env: Env,
     episodes: int = 10,
     *,
@@ -152,18 +152,18 @@ class GreedyEpisode(NamedTuple):
 
 
 def greedy_episode(
-    agent: Acts,
+    agent: ActingAgent,
     env: Env,
     seed: int | None,
     number: int,
     options: Data | None = None,
 ) -> Iterator[GreedyEpisode]:
-    """Run an episode of an evaluation; yield how far it is, first after the reset.
+    """Run an episode of an evaluation; yield its state after the reset and after each step.
 
-    UnusableStepError as of `evaluate`.
+    UnusableStepError if a step or reset cannot be used, or the rewards' sum is not finite.
     """
     reset_seed = None if seed is None else episode_seed(seed, EVALUATION, number)
-    with fixed(env, getattr(agent, "wrappers", ())):
+    with fixed_statistics(env, getattr(agent, "wrappers", ())):
         observation, info = reset_env(env, reset_seed, options)
         has_masks = has_action_masks(env)
         if hasattr(agent, "begin_greedy_episode"):

@@ -25,7 +25,7 @@ _STATISTICS = ("obs_rms", "return_rms")
 _MOMENTS = ("mean", "var", "count")
 _SUMS = ("discounted_reward", "accumulated_reward")
 _FEW = 1.0
-"""The count of statistics without an observation is below it."""
+"""Statistics with a lower count have no observation yet: wrappers begin with a tiny count."""
 
 
 class _Numbers(msgspec.Struct, frozen=True):
@@ -103,7 +103,7 @@ def statistics_of(wrappers: Sequence[object]) -> list[Statistics]:
     return [
         Statistics(
             type(wrapper).__name__,
-            {name: _packed(getattr(owner, key)) for name, owner, key in _slots(wrapper)},
+            {name: _packed(getattr(owner, key)) for name, owner, key in _learned_numbers(wrapper)},
         )
         for wrapper in wrappers
     ]
@@ -113,10 +113,10 @@ def take_statistics(wrappers: Sequence[object], learned: Sequence[Statistics]) -
     """Give each wrapper, in order, the statistics of its name; return whether all match."""
     remaining = list(learned)
     for wrapper in wrappers:
-        statistics = next((s for s in remaining if _fits(wrapper, s)), None)
+        statistics = next((s for s in remaining if _has_shapes_of(wrapper, s)), None)
         if statistics is not None:
             remaining.remove(statistics)
-            for name, owner, key in _slots(wrapper):
+            for name, owner, key in _learned_numbers(wrapper):
                 value = _unpacked(statistics.numbers[name])
                 setattr(owner, key, value if value.ndim else value.item())
     return not remaining and len(wrappers) == len(learned)
@@ -128,8 +128,8 @@ def moments_of(wrapper: object, name: str) -> Any:
     return moments if all(hasattr(moments, moment) for moment in _MOMENTS) else None
 
 
-def _slots(wrapper: object) -> Iterator[tuple[str, object, str]]:
-    """Yield the names of all numbers that a wrapper has learned, and where each is kept."""
+def _learned_numbers(wrapper: object) -> Iterator[tuple[str, object, str]]:
+    """Yield the name of each number that a wrapper has learned, and its object and attribute."""
     for name in _STATISTICS:
         moments = moments_of(wrapper, name)
         for moment in _MOMENTS if moments is not None else ():
@@ -139,8 +139,8 @@ def _slots(wrapper: object) -> Iterator[tuple[str, object, str]]:
             yield name, wrapper, name
 
 
-def _fits(wrapper: object, learned: Statistics) -> bool:
-    shapes = {name: np.shape(getattr(owner, key)) for name, owner, key in _slots(wrapper)}
+def _has_shapes_of(wrapper: object, learned: Statistics) -> bool:
+    shapes = {name: np.shape(getattr(owner, key)) for name, owner, key in _learned_numbers(wrapper)}
     learned_shapes = {name: numbers.shape for name, numbers in learned.numbers.items()}
     return type(wrapper).__name__ == learned.wrapper and shapes == learned_shapes
 
@@ -157,7 +157,7 @@ def _unpacked(numbers: _Numbers) -> Array:
 
 
 @contextmanager
-def fixed(env: object, learned: Sequence[Statistics]) -> Iterator[None]:
+def fixed_statistics(env: object, learned: Sequence[Statistics]) -> Iterator[None]:
     """Keep the statistics of an environment's wrappers as they are, for greedy episodes.
 
     Wrappers without statistics take those that were learned; a warning names one that cannot.

@@ -46,14 +46,14 @@ class EnvironmentAdapter(abc.ABC):
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
         """Begin episodes in some environments, with seeds; return their first observations.
 
-        Where one is missing, the episode begins with the next `step`, which returns it.
+        Where an observation is missing, the episode begins with the next `step`, which returns it.
         """
 
     @abc.abstractmethod
     def step(self, actions: Elements) -> Elements:
-        """Take an action in each, any one where the episode has not begun.
+        """Step all environments; the action has no effect where the episode has not begun.
 
-        Returns what is observed, in an array or a list: the last observations where episodes end.
+        Returns the observations; where an episode ends, its last one.
         """
 
 
@@ -92,7 +92,7 @@ class Learner(Protocol):
 
 
 class ObservingLearner(Protocol):
-    """The part of a learner in all environments that their episodes call."""
+    """The methods that `Episodes` calls of a learner in several environments."""
 
     def begin_episode(self, environment: int) -> None:
         """Note that an episode begins."""
@@ -111,7 +111,7 @@ class ObservingLearner(Protocol):
 
 
 class CoreParts(NamedTuple):
-    """The core of an agent, and functions around it."""
+    """The C++ object of an agent, and the functions that convert to and from its numbers."""
 
     core: Controller
     read: Callable[[str, Elements], NDArray[np.float64]]
@@ -125,8 +125,8 @@ _OF_TRAIN = (
 )  # fmt: skip
 
 
-def _elsewhere(agent: Any) -> Mapping[str, str]:
-    """Return the settings of an agent or a class of agents, and how they are written."""
+def _spellings(agent: Any) -> Mapping[str, str]:
+    """Return how to write each argument that belongs to another call, such as `train`."""
     spellings = {name: f"train(env, {name}=...)" for name in _OF_TRAIN}
     agent_class = agent if isinstance(agent, type) else type(agent)
     if not hasattr(agent_class, "learning_type"):
@@ -142,5 +142,5 @@ def _elsewhere(agent: Any) -> Mapping[str, str]:
     return spellings
 
 
-explained = explains_names(_elsewhere)
-"""Decorator of agents' functions, which explains arguments that they do not have."""
+explained = explains_names(_spellings)
+"""Decorator for functions of agents: errors about unknown arguments say where these belong."""

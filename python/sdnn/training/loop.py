@@ -31,14 +31,17 @@ from sdnn.training.interfaces import (
 )
 
 Row: TypeAlias = Mapping[str, Any]
-"""An episode (``kind``, ``step``, ``episode``, ``return``, ``length``, ``terminated``, and with
-several environments ``environment``) or an evaluation (``kind``, ``step``, ``episode``,
+"""A row of results, about an episode or an evaluation.
+
+Episodes have ``kind``, ``step``, ``episode``, ``return``, ``length``, ``terminated``, and with
+several environments ``environment``. Evaluations have ``kind``, ``step``, ``episode``,
 ``mean_return``, ``mean_length``, ``share_terminated``, and lists ``returns``, ``lengths``,
-``terminated`` of its episodes). Steps and episodes are those learned until then."""
+``terminated`` of their episodes. Steps and episodes are those learned until then.
+"""
 
 
-class _EachLearner(ObservingLearner):
-    """A learner in all environments of a training: it acts and learns in one after the other."""
+class _LearnerForAll(ObservingLearner):
+    """Acts and learns in all environments of a training, by one call of the learner for each."""
 
     def __init__(self, learner: Any, n_environments: int) -> None:
         self._learner = learner
@@ -68,7 +71,7 @@ class _EachLearner(ObservingLearner):
         environments: list[int],
         masks: Masks | None = None,
     ) -> Elements:
-        """Return actions as `learn` takes them: new ones in these, the others as they were."""
+        """Choose new actions in these environments; the others keep their entry of ``actions``."""
         chosen = list(actions)
         for i in environments:
             mask = {} if masks is None else {"mask": masks[i]}
@@ -89,9 +92,9 @@ class _EachLearner(ObservingLearner):
         progress: list[float],
         next_masks: Masks | None = None,
     ) -> int:
-        """Learn steps in the first of these environments or more; return in how many.
+        """Learn the last step in the first of these environments; return the number of steps.
 
-        ``progress`` is the learner's between two of them; it may be empty.
+        Subclasses may learn in more environments, and set the learner's ``progress`` between two.
         """
         i = environments[0]
         reward, terminates, _ = checked_outcome(rewards[i], terminated[i], False)
@@ -103,8 +106,8 @@ class _EachLearner(ObservingLearner):
         return 1
 
 
-class _CoreLearner(_EachLearner):
-    """An agent of the core, which acts or learns in all environments with one call."""
+class _CoreLearnerForAll(_LearnerForAll):
+    """Acts and learns in all environments by one call of an agent in C++."""
 
     def __init__(self, learner: Learner, n_environments: int, parts: CoreParts) -> None:
         super().__init__(learner, n_environments)
@@ -135,7 +138,7 @@ class _CoreLearner(_EachLearner):
         chosen = self._core.act_each(observations, environments, masks)
         if len(environments) < len(chosen):
             for i in set(range(len(chosen))).difference(environments):
-                chosen[i] = np.ravel(actions[i])  # an element of the space after a replay
+                chosen[i] = np.ravel(actions[i])  # a replay leaves elements of the space, not rows
         return chosen
 
     def elements(self, actions: Any) -> Array:
@@ -145,12 +148,15 @@ class _CoreLearner(_EachLearner):
         return self._core.learn_each(*outcomes)
 
 
-def each_learner(learner: Learner, n_environments: int) -> _EachLearner:
-    """Return a learner in all environments; an agent of the core acts and learns in one call."""
+def learner_for_all(learner: Learner, n_environments: int) -> _LearnerForAll:
+    """Wrap a learner so that the loop can act and learn in all environments.
+
+    An agent in C++ does so in one call, other learners in one call per environment.
+    """
     core_parts: Callable[..., CoreParts | None] | None = getattr(type(learner), "core_parts", None)
     if core_parts and (parts := core_parts(learner)):
-        return _CoreLearner(learner, n_environments, parts)
-    return _EachLearner(learner, n_environments)
+        return _CoreLearnerForAll(learner, n_environments, parts)
+    return _LearnerForAll(learner, n_environments)
 
 
 class TrainingLoop(abc.ABC):
@@ -172,14 +178,14 @@ class TrainingLoop(abc.ABC):
     n_episodes = 0
     n_rows = 0
     evaluations: list[tuple[int, float]]
-    """Steps and mean returns of all evaluations so far, also of those before it was loaded."""
+    """Steps and mean returns of all evaluations so far, including those before `load`."""
     rows: list[Row]
-    """Rows since it was begun, or last loaded."""
+    """Rows since the training was begun, or last loaded."""
     is_within_step = False
     """Whether an error left a step half done, which cannot be saved."""
 
     _episodes: Episodes
-    _learner: _EachLearner
+    _learner: _LearnerForAll
     _listeners: Sequence[tuple[int, Any]]
     _stops = False
 
@@ -206,7 +212,7 @@ class TrainingLoop(abc.ABC):
                         self._act_and_step()
                     environment = self._learn()
                 except Exception:
-                    self._episodes.leave()
+                    self._episodes.abandon()
                     self.is_within_step = False
                     raise
                 failure = self._note_outcome(environment)
@@ -229,7 +235,7 @@ class TrainingLoop(abc.ABC):
         self._set_next_call()
 
     def _act_and_step(self) -> None:
-        """Reset environments whose episode is over, act, and step all environments."""
+        """Reset environments whose episode is over, choose actions, and step all environments."""
         episodes = self._episodes
         episodes.begin()
         try:
@@ -241,16 +247,16 @@ class TrainingLoop(abc.ABC):
         episodes.step(actions)
 
     def _learn(self) -> int:
-        """Learn outcomes up to the first end of an episode or the next call of a callback.
+        """Learn steps of environments in order, until an episode ended or a callback is due.
 
-        Returns the environment of the last one.
+        Returns the environment of the last step learned.
         """
         episodes, n = self._episodes, self.n_steps
         most, progress = self._next_call - n, []
         if episodes.n_environments > 1 and self.steps is not None:
             n_most = min(most, episodes.n_environments)
             progress = [(n + k) / self.steps for k in range(1, n_most)]
-        environments = episodes.until_an_end(most)
+        environments = episodes.up_to_episode_end(most)
         try:
             n_learned = self._learner.learn(
                 episodes.previous_observations,
@@ -269,9 +275,9 @@ class TrainingLoop(abc.ABC):
         return environments[n_learned - 1]
 
     def _note_outcome(self, environment: int) -> Exception | None:
-        """Count an episode that ended, evaluate where it is due, and call the callbacks.
+        """Count an episode that ended, evaluate if that is due, and call the callbacks.
 
-        Returns the error of an evaluation, without which the step is whole.
+        An error of the evaluation is returned, not raised: the step itself is complete.
         """
         rows: list[Row] = []
         failure: Exception | None = None
@@ -281,7 +287,7 @@ class TrainingLoop(abc.ABC):
             self._episodes.present[environment] = None
             self._warn_of_refused_reward()
             if self.evaluate_every_episodes is not None and self._lacks_evaluation:
-                self._learner.begin_episode(environment)  # learns n-step returns that are pending
+                self._learner.begin_episode(environment)  # learns the pending n-step returns first
         self._set_progress(is_over)
         is_called = self.n_steps >= self._next_call
         if (is_over or is_called) and self._lacks_evaluation:
@@ -299,7 +305,7 @@ class TrainingLoop(abc.ABC):
         return failure
 
     def _set_progress(self, is_episode_over: bool) -> None:
-        """Set the part of the training that is done, which the learner's schedules follow."""
+        """Set the learner's ``progress``, from which its schedules follow."""
         learner = self._learner.progressing
         if learner is None:
             return
@@ -309,7 +315,7 @@ class TrainingLoop(abc.ABC):
             learner.progress = self.n_episodes / max(self.episodes, self.n_episodes)
 
     def _set_next_call(self) -> None:
-        """Find the step after which callbacks are called or an evaluation is due, or the last."""
+        """Compute the next step after which a callback, an evaluation or the end is due."""
         n = self.n_steps
         intervals = [interval for interval, _ in self._listeners]
         intervals += [] if self.evaluate_every is None else [self.evaluate_every]
@@ -330,7 +336,7 @@ class TrainingLoop(abc.ABC):
 
     @property
     def _lacks_evaluation(self) -> bool:
-        """Whether an evaluation is due by now, and not made."""
+        """Whether an evaluation is due that has not been made yet."""
         if self.evaluate_every is not None:
             return len(self.evaluations) < self.n_steps // self.evaluate_every
         if self.evaluate_every_episodes is not None:
@@ -376,7 +382,7 @@ class TrainingLoop(abc.ABC):
             self.agent.warn_of_refused_reward()
 
     def _keep_statistics(self) -> None:
-        """Let the agent keep what the wrappers of its environment have learned."""
+        """Store the statistics of the environment's wrappers in the agent, for its file."""
         if hasattr(self.agent, "wrappers"):
             self.agent.wrappers = statistics_of(self._episodes.wrappers)
 
@@ -393,7 +399,7 @@ class TrainingLoop(abc.ABC):
         """Return the callbacks that are called after steps, each with its interval."""
 
     def _unusable(self, error: Exception, environment: int | None = None) -> UnusableStepError:
-        """Return the error that names step and episode, in an environment or in any."""
+        """Return the error about a step or reset, which names step, episode and environment."""
         where = ""
         n_environments = self._episodes.n_environments
         episode = self._episodes.present[environment or 0]

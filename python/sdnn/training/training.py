@@ -18,7 +18,7 @@ from sdnn.environments.space_kinds import require_same_kind
 from sdnn.environments.types import AnyEnv, Env, Info, VectorEnv
 from sdnn.support.arguments import flag, has_methods, path_of, require, shown, whole
 from sdnn.support.display import Displayed
-from sdnn.training.episodes import Episodes, OneEnvironment, require_single
+from sdnn.training.episodes import Episodes, SingleEnvironment, require_single
 from sdnn.training.files import (
     SavedTraining,
     read_training,
@@ -27,7 +27,7 @@ from sdnn.training.files import (
     write_training,
 )
 from sdnn.training.interfaces import EnvironmentAdapter, Learner, explained
-from sdnn.training.loop import Row, TrainingLoop, each_learner
+from sdnn.training.loop import Row, TrainingLoop, learner_for_all
 
 _SETTINGS = (
     "seed", "evaluate_every", "evaluate_every_episodes", "evaluation_episodes", "limit_bootstraps"
@@ -88,8 +88,8 @@ class Callback:
         """After the last step, also of a training that was interrupted."""
 
 
-def listed(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
-    """Check callbacks, of any class that has the methods; TypeError."""
+def checked_callbacks(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
+    """Return callbacks as a tuple; TypeError for an object without the methods of `Callback`."""
     try:
         checked = tuple(callbacks)
     except TypeError:
@@ -221,7 +221,7 @@ class Training(TrainingLoop):
         self.episodes = _optional("episodes", episodes)
         self.seed = None if seed is None else whole("seed", seed, 0, 2**64 - 1)
         first = whole("first_episode", first_episode, 0, 2**53)
-        self.callbacks = listed(callbacks)
+        self.callbacks = checked_callbacks(callbacks)
         self.evaluate_every = _optional("evaluate_every", evaluate_every)
         self.evaluate_every_episodes = _optional("evaluate_every_episodes", evaluate_every_episodes)
         if evaluation_env is None and not (evaluate_every is evaluate_every_episodes is None):
@@ -236,7 +236,7 @@ class Training(TrainingLoop):
         self.evaluations = []
         self.rows = []
         adapter = _adapter_for(env)
-        self._learner = each_learner(agent, adapter.n_environments)
+        self._learner = learner_for_all(agent, adapter.n_environments)
         self._episodes = Episodes(
             env, adapter, self._learner, self.seed, first, self._options, self._unusable
         )
@@ -250,7 +250,7 @@ class Training(TrainingLoop):
 
     @property
     def next_episode(self) -> int:
-        """The number of an episode that has not begun, nor any after it."""
+        """The number of the first episode that has not begun."""
         return self._episodes.next_number
 
     def run(self) -> TrainingResult:
@@ -355,7 +355,7 @@ class Training(TrainingLoop):
 class CheckpointCallback(Callback):
     """Saves agent and training at regular steps; `Training.load` resumes from there exactly.
 
-    ``n_saved`` is the number of steps when it was saved last; None: not yet.
+    ``n_saved`` is the number of steps at the last save; None before the first.
     """
 
     def __init__(self, path: str | Path, every: int = 10_000) -> None:
@@ -364,11 +364,11 @@ class CheckpointCallback(Callback):
         self.n_saved: int | None = None
 
     def on_step(self, training: Training) -> None:
-        """Save."""
+        """Save, as ``step_interval`` steps have passed."""
         self._save(training)
 
     def on_end(self, training: Training) -> None:
-        """Save where the training ends, be it by an environment's error, but not within a step."""
+        """Save at the end of the training, also after an error unless it left a step half done."""
         if not training.is_within_step:
             self._save(training)
 
@@ -386,7 +386,7 @@ def _optional(name: str, value: float | None) -> int | None:
 def _adapter_for(env: AnyEnv) -> EnvironmentAdapter:
     """Return the adapter for an environment, or for a vector of them."""
     if not isinstance(env, gym.vector.VectorEnv):
-        return OneEnvironment(env)
+        return SingleEnvironment(env)
     from sdnn.training.vectors import vector_adapter
 
     return vector_adapter(env)

@@ -13,42 +13,42 @@ from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 from sdnn.environments.spaces import has_mask
 from sdnn.environments.types import Element, Elements, Info, Mask, VectorEnv
 from sdnn.support.arguments import array_of
-from sdnn.training.episodes import OneEnvironment, has_action_masks, mask_in, reset_env, step_env
+from sdnn.training.episodes import SingleEnvironment, has_action_masks, mask_in, reset_env, step_env
 from sdnn.training.interfaces import EnvironmentAdapter, Options, Seeds, UnusableStepError
 
 
 def vector_adapter(env: VectorEnv) -> EnvironmentAdapter:
     """Return the adapter for a vector environment."""
     if type(env) is gym.vector.SyncVectorEnv and getattr(env, "observation_mode", "") == "same":
-        return _Listed(env)
-    return _SeparateResets(env) if _resets_each(env) else _OwnResets(env)
+        return _SyncEnvironments(env)
+    return _SeparateResets(env) if _resets_each(env) else _AutomaticResets(env)
 
 
-class _Listed(EnvironmentAdapter):
-    """The environments of a ``SyncVectorEnv``, without its own work in each step and reset."""
+class _SyncEnvironments(EnvironmentAdapter):
+    """The environments of a ``SyncVectorEnv``, stepped one by one: faster than the vector."""
 
     can_repeat = True
 
     def __init__(self, env: gym.vector.SyncVectorEnv) -> None:
         self._env = env
-        self._adapters = [OneEnvironment(single) for single in env.envs]
+        self._adapters = [SingleEnvironment(single) for single in env.envs]
         self.n_environments = env.num_envs
         self.masks = [None] * env.num_envs if has_action_masks(env) else None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
-        first = self._of_each(seeds, lambda env, i: env.reset({0: seeds[i]})[0])
+        first = self._call_each(seeds, lambda env, i: env.reset({0: seeds[i]})[0])
         return dict(zip(seeds, self._converted(first), strict=True))
 
     def step(self, actions: Elements) -> Elements:
-        steps = self._of_each(range(self.n_environments), lambda env, i: env.take(actions[i]))
+        steps = self._call_each(range(self.n_environments), lambda env, i: env.take(actions[i]))
         columns = map(list, zip(*steps, strict=True))
         observations, self.rewards, self.terminated, self.truncated = columns
         return self._converted(observations)
 
-    def _of_each(
-        self, numbers: Iterable[int], call: Callable[[OneEnvironment, int], Any]
+    def _call_each(
+        self, numbers: Iterable[int], call: Callable[[SingleEnvironment, int], Any]
     ) -> list[Any]:
-        """Return the result of the call for each environment; errors name the environment."""
+        """Return the results of a function for each environment; errors name the environment."""
         results = []
         for i in numbers:
             try:
@@ -60,9 +60,9 @@ class _Listed(EnvironmentAdapter):
         return results
 
     def _converted(self, observations: list[Element]) -> Elements:
-        """Return observations in the numbers of their space, as the vector itself does.
+        """Convert observations to the type of their space, as the vector itself does.
 
-        Others stay as they are: the agent refuses them by name.
+        Observations that do not fit are returned unchanged: the agent's error names them.
         """
         space = self._env.single_observation_space
         arrays = [x for x in observations if type(x) is np.ndarray]
@@ -73,28 +73,28 @@ class _Listed(EnvironmentAdapter):
             if rows.dtype == space.dtype:
                 return rows
         if any(has_mask(space, observation) for observation in observations):
-            return observations  # arrays of the vector have no mask
+            return observations  # the vector's arrays would drop the mask of a masked array
         batch: Any = create_empty_array(space, len(observations))
         try:
-            return _listed(self._env, concatenate(space, observations, batch))
+            return _split_batch(self._env, concatenate(space, observations, batch))
         except (LookupError, TypeError, ValueError):
             return observations
 
 
 class _Vector(EnvironmentAdapter, abc.ABC):
-    """A vector environment: lists in, lists out."""
+    """Base of adapters for vector environments: converts batches to lists and back."""
 
     def __init__(self, env: VectorEnv) -> None:
         self._env = env
         self._mode = _autoreset_mode(env)
         self.n_environments = env.num_envs
         self.masks = [None] * env.num_envs if has_action_masks(env) else None
-        self._begun: list[Mask] = []  # masks after resets in the same step
+        self._begun: list[Mask] = []  # masks of episodes that began within the last step
 
     def _step(self, actions: Elements) -> tuple[Elements, Elements]:
-        """Return what is observed, and what is after resets in the same step."""
+        """Step; return the observations, and those after resets (mode ``SAME_STEP``)."""
         batch, rewards, terminated, truncated, infos = step_env(self._env, self._batch(actions))
-        observations = _listed(self._env, batch)
+        observations = _split_batch(self._env, batch)
         self.rewards = self._column("reward", rewards, "fiub", "numbers")
         self.terminated = self._column("terminated", terminated, "b", "bools")
         self.truncated = self._column("truncated", truncated, "b", "bools")
@@ -112,10 +112,10 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         return observations, observations
 
     def _take_masks(self, infos: Info, terminated: Sequence[bool], ended: Sequence[bool]) -> None:
-        """Take the masks of what is observed: of episodes that ended, those of their ends."""
+        """Store the masks after a step; where an episode ended, the mask of its last state."""
         if self.masks is None:
             return
-        resets = self._mode == "SAME_STEP"  # infos are then of the next episodes
+        resets = self._mode == "SAME_STEP"  # infos then belong to the next episodes
         masks = self._masks_in(infos, [resets or not is_terminal for is_terminal in terminated])
         self._begun = list(masks)
         if resets and any(ended):
@@ -125,7 +125,7 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         self.masks = masks
 
     def _masks_in(self, infos: Info, needed: Sequence[bool]) -> list[Mask]:
-        """Return the masks of environments in infos, where needed; UnusableStepError without."""
+        """Return the masks in infos, None where not needed; UnusableStepError if one is missing."""
         if not any(needed):
             return [None] * self.n_environments
         masks: Any = mask_in(infos)
@@ -137,13 +137,13 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         return [rows[i] if is_needed else None for i, is_needed in enumerate(needed)]
 
     def _note_masks(self, infos: Info, begun: Collection[int]) -> None:
-        """Note the masks of the environments that were reset."""
+        """Store the masks of the environments that were reset."""
         if self.masks is not None:
             rows = self._masks_in(infos, [i in begun for i in range(self.n_environments)])
             self.masks = [rows[i] if i in begun else m for i, m in enumerate(self.masks)]
 
     def _batch(self, actions: Elements) -> Element:
-        """Return a copy of the actions as the environment takes them."""
+        """Copy the actions into the batch that the vector environment expects."""
         space: Any = self._env.single_action_space
         if type(actions) is np.ndarray:
             return np.array(actions, space.dtype).reshape(self.n_environments, *space.shape)
@@ -151,7 +151,7 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         return concatenate(space, actions, batch)
 
     def _column(self, name: str, values: object, kinds: str, what: str) -> list[Any]:
-        """Return one value for each environment; UnusableStepError if there are others."""
+        """Return a list with a value for each environment; UnusableStepError for anything else."""
         what = f"{self.n_environments} {what}"
         try:
             column = array_of(name, values, kinds, what)
@@ -167,27 +167,27 @@ class _Vector(EnvironmentAdapter, abc.ABC):
 class _SeparateResets(_Vector):
     """A vector in which each environment is reset by itself, whatever the autoreset mode.
 
-    A reset replaces the one that would come with the next step or came with the last.
+    A reset replaces the automatic one, whether that came with the last step or would come next.
     """
 
     can_repeat = True
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
         mask = np.array([i in seeds for i in range(self.n_environments)])
-        # Without the option where it is not needed: some wrappers have complete resets only.
+        # Some wrappers can only reset all environments: leave the option out where all are reset.
         options = None if mask.all() else {"reset_mask": mask}
         listed = [seeds.get(i) for i in range(self.n_environments)]
         observations, infos = reset_env(self._env, listed, options)
         self._note_masks(infos, seeds)
-        rows = _listed(self._env, observations)
+        rows = _split_batch(self._env, observations)
         return {i: rows[i] for i in seeds}
 
     def step(self, actions: Elements) -> Elements:
         return self._step(actions)[0]
 
 
-class _OwnResets(_Vector):
-    """A vector that resets itself; it is seeded at the beginning only."""
+class _AutomaticResets(_Vector):
+    """A vector that resets its environments itself, so only its first reset can have a seed."""
 
     can_repeat = False
 
@@ -199,7 +199,7 @@ class _OwnResets(_Vector):
         if self._after_resets is None:
             observations, infos = reset_env(self._env, seeds[0], None)
             self._note_masks(infos, range(self.n_environments))
-            self._after_resets = _listed(self._env, observations)
+            self._after_resets = _split_batch(self._env, observations)
         elif self._mode != "SAME_STEP":
             return {}
         elif self.masks is not None:
@@ -211,16 +211,16 @@ class _OwnResets(_Vector):
         return observations
 
 
-def _listed(env: VectorEnv, observations: Element) -> Elements:
-    """Return observations one by one, not copied."""
+def _split_batch(env: VectorEnv, observations: Element) -> Elements:
+    """Split a batch of observations into one per environment, without copying."""
     if type(observations) is np.ndarray:
         return observations
     return list(iterate(env.observation_space, observations))
 
 
 def _autoreset_mode(env: VectorEnv) -> str:
-    """Return the name in Gymnasium's ``AutoresetMode``."""
-    # Not by the metadata first: in Gymnasium 1.1 these may be another vector's.
+    """Return the name of the vector's autoreset mode, as in Gymnasium's ``AutoresetMode``."""
+    # The attribute comes first: in Gymnasium 1.1 the metadata may be those of another vector.
     mode = getattr(env.unwrapped, "autoreset_mode", env.metadata.get("autoreset_mode"))
     return "NEXT_STEP" if mode is None else str(gym.vector.AutoresetMode(mode).name)
 
@@ -230,7 +230,7 @@ def _resets_each(env: VectorEnv) -> bool:
     inner = env
     while isinstance(inner, gym.vector.VectorWrapper):
         if isinstance(inner, gym.wrappers.vector.NormalizeObservation):
-            return False  # it resets all or none
+            return False  # this wrapper resets all environments or none
         inner = inner.env
     if inner.metadata.get("reset_mask"):
         return True
