@@ -217,7 +217,7 @@ TEST(BinaryGroups, ActionsSteerWhatTheyDecide) {
   const std::vector<std::uint8_t> actions{0, 1, 0, 1};
   // With the action: 4 groups of 1^2 / 1. Without it: 2 groups of (1^2 + 1^2) / 2.
   EXPECT_EQ(detail::steering(group, actions, 0), 2.0);
-  // One step later each action is the other one, which tells as much; of equal actions nothing.
+  // A step later actions are swapped, which separates symbols as well; equal actions separate none.
   EXPECT_EQ(detail::steering(group, actions, 1), 2.0);
   EXPECT_EQ(detail::steering(group, std::vector<std::uint8_t>(4), 0), 0.0);
   // Actions 0, 0, 1, 1 follow from the symbols: 4 groups become the same 2.

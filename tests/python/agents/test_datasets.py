@@ -125,7 +125,7 @@ def test_lines_that_are_no_transition_are_refused_with_their_number(tmp_path, li
 
 
 def test_without_next_observations_the_next_row_has_them():
-    # Of the 40 transitions, the last of the truncated episode has no next observation.
+    # The 40 transitions lack one: the last of the truncated episode has no next observation.
     columns = arrays()
     following = {name: v for name, v in columns.items() if name != "next_observations"}
     agent, other = new_agent(), new_agent()

@@ -75,7 +75,7 @@ def test_actions_of_any_space_are_imitated_at_any_size_of_rewards(agent_class, s
     imitate(agent, log)
     is_clear = abs(points[:, 0] - 0.5) > 0.1
     equal = [
-        np.array_equal(agent.act(point, explore=False), action)
+        np.allclose(agent.act(point, explore=False), action, atol=0.25)  # half a bin
         for point, action in zip(points[is_clear], np.array(actions)[is_clear], strict=True)
     ]
     assert np.mean(equal) > 0.95

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/core/detail/floating_point.hpp"
+
 namespace sdnn::agents::detail {
 
 /// The rows of one input in which it has the larger of two values.
