@@ -20,6 +20,7 @@ from sdnn.training.interfaces import (
     Options,
     Seeds,
     UnusableStepError,
+    warn_of_endless_episode,
 )
 
 _LEARNING, EVALUATION = 0, 1
@@ -27,6 +28,9 @@ _LEARNING, EVALUATION = 0, 1
 
 _N_RECENT = 1024
 """Number of actions that are kept in a list before they become an array."""
+
+_ENDLESS = 10_000
+"""Steps after which an episode seems to have no end."""
 
 _SCALARS = (np.generic, int, float)
 """Immutable types of observations and actions, which need no copy."""
@@ -274,6 +278,8 @@ class Episodes:
         for i in self.unlearned:
             episode: Any = self.present[i]
             episode.n_steps += 1
+            if episode.n_steps == _ENDLESS:
+                warn_of_endless_episode(_ENDLESS)
             if self._seed is not None:
                 episode.actions.append(elements[i])
         try:

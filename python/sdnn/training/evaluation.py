@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -26,7 +25,7 @@ from sdnn.training.episodes import (
     step_env,
 )
 from sdnn.training.files import fixed_statistics
-from sdnn.training.interfaces import UnusableStepError, explained
+from sdnn.training.interfaces import UnusableStepError, explained, warn_of_endless_episode
 
 _LONG = 100_000
 """Warn after this many steps in one episode."""
@@ -129,12 +128,7 @@ def evaluate(
     for episode in range(n_episodes):
         for now in greedy_episode(agent, env, root, episode, options):
             if now.n_steps == _LONG:
-                warnings.warn(
-                    f"an evaluation's episode has had {_LONG:,} steps and continues; an environment"
-                    " whose episodes may never end needs a time limit (max_episode_steps)",
-                    RuntimeWarning,
-                    stacklevel=2,
-                )
+                warn_of_endless_episode(_LONG)
         returns.append(now.total_reward)
         lengths.append(now.n_steps)
         terminated.append(now.terminated)

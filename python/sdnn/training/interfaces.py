@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import inspect
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -144,3 +145,14 @@ def _spellings(agent: Any) -> Mapping[str, str]:
 
 explained = explains_names(_spellings)
 """Decorator for functions of agents: errors about unknown arguments say where these belong."""
+
+
+def warn_of_endless_episode(n_steps: int) -> None:
+    """Warn that an episode has had so many steps and continues."""
+    warnings.warn(
+        f"an episode has had {n_steps:,} steps and continues. If the task can begin anew, end"
+        " episodes by a time limit (max_episode_steps): an agent that stays in a few states learns"
+        " little of all others, and a greedy episode may never end",
+        RuntimeWarning,
+        stacklevel=3,
+    )

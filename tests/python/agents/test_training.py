@@ -19,6 +19,7 @@ from sdnn.agents import (
     JSONLines,
     QLearningConfig,
     RBFQLearning,
+    SDNNQLambda,
     SDNNQLearning,
     StopTrainingOnRewardThreshold,
     Training,
@@ -155,6 +156,14 @@ def test_an_evaluation_warns_of_an_episode_of_more_than_100_000_steps():
 
     with pytest.warns(RuntimeWarning, match="max_episode_steps"):
         assert evaluate(NullAgent(), Endless(), 1).lengths.tolist() == [100_001]
+
+
+def test_a_training_warns_once_of_an_episode_of_10_000_steps():
+    endless = gym.make("Pendulum-v1", max_episode_steps=20_001)
+    agent = SDNNQLambda(endless, warm_up_steps=10)
+    with pytest.warns(RuntimeWarning, match="max_episode_steps") as warned:
+        agent.train(endless, steps=10_002)
+    assert len(warned) == 1
 
 
 @pytest.mark.parametrize("reward", [np.float32(1), np.array([1]), Decimal(1), True, np.array(1.0)])
@@ -636,6 +645,7 @@ def test_n_step_transitions_of_an_abandoned_episode_are_learned_on_resuming(tmp_
     assert states_equal(with_training.agent, by_hand)
 
 
+@pytest.mark.filterwarnings("ignore:an episode has had")
 def test_an_endless_episode_takes_less_than_32_bytes_per_step(tmp_path):
     class Endless(Corridor):
         def step(self, action):
