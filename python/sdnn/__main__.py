@@ -3,8 +3,8 @@
 import os
 import sys
 
-if os.path.realpath(sys.path[0]) == os.getcwd():  # put there by -m
-    del sys.path[0]  # packages that are missing are not looked for in the present folder
+if os.path.realpath(sys.path[0]) == os.getcwd():  # the folder that -m adds
+    del sys.path[0]  # import no package from the present folder
 
 from sdnn.cli import main
 

@@ -38,7 +38,7 @@ class Field(NamedTuple):
 
     @property
     def type(self) -> Any:
-        """The type of its values."""
+        """The type of the setting's values."""
         return eval(self.hint, {"typing": typing})
 
 
@@ -59,7 +59,7 @@ def values_of(config: object) -> dict[str, object]:
 
 
 def _make_dataclass(config_class: Any) -> None:
-    """Give a class of the core what `dataclasses.replace`, `fields` and `asdict` need."""
+    """Add the attributes to a class of the core that functions of `dataclasses` need."""
     fields = [
         (field.name, field.type, dataclasses.field(default=field.default))
         for field in fields_of(config_class)

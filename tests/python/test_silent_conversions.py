@@ -9,7 +9,7 @@ from sdnn.coding import RandomInverse
 from sdnn.coding.kernel import AnalyticKernel
 from sdnn.environments import AcrobotSwingUpVectorEnv, NoisySensors, RedundantSensors, UnitSensors
 from sdnn.runs import RunSpec, trial_seed
-from sdnn.runs.settings import checked
+from sdnn.runs.settings import convert_value
 
 OTHERS = {
     "masked": lambda: np.ma.masked_array([0.1, 0.2], [False, True]),
@@ -103,7 +103,7 @@ BOOLS = {"True": True, "True of NumPy": np.True_, "an array": np.array(True)}
 def test_texts_dates_and_bools_are_refused_as_numbers(kind):
     for word, value in {**NUMBERS, **BOOLS, "not finite": np.nan}.items():
         with pytest.raises(Exception, match="must be"):
-            assert checked(kind, value, "key") is None, word
+            assert convert_value(kind, value, "key") is None, word
 
 
 def test_settings_of_wrong_types_are_refused_with_their_table():

@@ -18,7 +18,7 @@ __all__ = ["main"]
 
 
 def _check_instruction_set() -> None:
-    """Name the environment variable if it is wrong, before something else is blamed for it."""
+    """Check SDNN_INSTRUCTION_SET first: later, its error would look like one of an option."""
     from sdnn.support.machine import instruction_set
 
     try:
@@ -53,9 +53,9 @@ def _print_cmake_dir(context: click.Context, _parameter: click.Parameter, value:
 
 class _Commands(click.Group):
     def invoke(self, ctx: click.Context) -> object:
-        """Run a command; Ctrl-C has its exit code also while nothing has begun.
+        """Run a command; Ctrl-C has the same exit code at any time.
 
-        Errors in reading and writing files, also standard output, become a line.
+        Errors in reading and writing files and standard output become one line.
         """
         try:
             return super().invoke(ctx)
@@ -64,7 +64,7 @@ class _Commands(click.Group):
         except KeyboardInterrupt:
             exit_interrupted("Interrupted.")
         except OSError as error:
-            if error.errno == errno.EPIPE:  # the reader has ended: Click ends quietly
+            if error.errno == errno.EPIPE:  # the reader of a pipe has ended: Click exits quietly
                 raise
             raise click.ClickException(str(error)) from error
 

@@ -34,7 +34,7 @@ KEYS = (
     "agent.angle_pairs", "agent.inputs", "agent.missing", "agent.history",
     "output.checkpoint_every", "output.keep_best", "output.tensorboard",
 )  # fmt: skip
-"""Settings with an option of their own; ``--set KEY=VALUE`` sets any."""
+"""Settings with a dedicated option; ``--set KEY=VALUE`` sets any."""
 
 WARMING_UP = "the agent is still warming up: it acts at random and has learned nothing yet"
 
@@ -46,7 +46,7 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print the ou
 
 
 def option_of(key: str) -> str:
-    """Return the option that sets a key of a specification, or the argument."""
+    """Return how the command line sets a key of a specification: ENV_ID, or an option."""
     key = key.partition("[")[0]
     if key == "agent.name":
         return "--agent"
@@ -60,7 +60,7 @@ def option_of(key: str) -> str:
 
 
 def explained_option(error: click.NoSuchOption) -> click.UsageError:
-    """Return the error about an unknown option with the option or the key it may mean."""
+    """Return the error about an unknown option; it suggests a similar option or key."""
     context = error.ctx
     options = {} if context is None else {
         name.lstrip("-").replace("-", "_"): name
@@ -80,12 +80,15 @@ def explained_option(error: click.NoSuchOption) -> click.UsageError:
 
 
 def option_words(error: ConfigError) -> str:
-    """Return an error's message with the option that gave the value."""
+    """Return an error's message, with the option in place of the key."""
     return f"{option_of(error.key)}: {error.problem}"
 
 
 def words_of_run(folder: Path) -> Callable[[ConfigError], str]:
-    """Return the function for messages about a run's own configuration; its goal is an option."""
+    """Return a function for messages of errors: keys are those of the run's file.
+
+    Only ``steps`` and ``episodes``, the goal, are options.
+    """
 
     def words(error: ConfigError) -> str:
         if error.key in ("steps", "episodes"):
@@ -96,7 +99,7 @@ def words_of_run(folder: Path) -> Callable[[ConfigError], str]:
 
 
 def value_of(text: str) -> object:
-    """Read a value as TOML has it, such as 0.5, true or [1, 2], or True; others are texts."""
+    """Parse a value of TOML, such as 0.5, true or [1, 2]; any other text stays a text."""
     import msgspec
 
     if "\n" in text:
@@ -110,7 +113,7 @@ def value_of(text: str) -> object:
 
 
 def named_values(option: str, pairs: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Split texts like ``name=value``; UsageError with the option's name if one is none."""
+    """Split texts like ``name=value``; UsageError that names the option for other texts."""
     for pair in pairs:
         name, equals, text = pair.partition("=")
         if not equals or not name.strip():
@@ -123,10 +126,10 @@ def errors_in_a_line(
     words: Callable[[ConfigError], str] = str,
     then: Callable[[], str] = lambda: "; what was finished is stored",
 ) -> Iterator[None]:
-    """Make a line and an exit code of errors that users can correct, and of signals.
+    """Turn errors that users can correct, and signals, into one line and an exit code.
 
-    ``words`` returns the message about a configuration whose file is not known, ``then`` what
-    becomes of a run after a signal.
+    ``words`` returns the message of a `ConfigError` that names no file. ``then`` returns the end
+    of the line after a signal, such as how to resume.
     """
     try:
         yield
@@ -141,7 +144,7 @@ def errors_in_a_line(
 
 
 def exit_interrupted(message: str, number: int = SIGINT) -> NoReturn:
-    """Print what is kept, and exit as a command that a signal has ended, as shells have it."""
+    """Print a message and exit with a shell's code for a command that a signal has ended."""
     click.echo(message, err=True)
     raise click.exceptions.Exit(128 + number)
 
@@ -150,10 +153,10 @@ def exit_interrupted(message: str, number: int = SIGINT) -> NoReturn:
 def run_command(
     words: Callable[[ConfigError], str], *, folder: Path | None = None
 ) -> Iterator[None]:
-    """Let environments be modules of the present folder; make errors a line and an exit code.
+    """Run the block of a command: modules are also searched in the present folder.
 
-    ``words`` returns the message about a configuration whose file is not known. ``folder`` is the
-    run that is resumed after an interrupt.
+    Errors that users can correct become one line and an exit code, by `errors_in_a_line` with
+    ``words``. After other errors and signals a line says how to resume the run in ``folder``.
     """
     import gymnasium as gym
 
@@ -165,7 +168,7 @@ def run_command(
             yield
         except (RunError, click.ClickException, click.exceptions.Exit):
             raise
-        except Exception as error:  # of an environment, whose author needs the traceback, too
+        except Exception as error:  # an error in a user's environment needs its traceback
             frames = traceback.walk_tb(error.__traceback__)
             is_of_environment = any(isinstance(f.f_locals.get("self"), gym.Env) for f, _ in frames)
             is_of_file = isinstance(error, OSError) and not is_of_environment
@@ -188,7 +191,7 @@ def train_run(
     run: Run, as_json: bool, *, steps: int | None = None, episodes: int | None = None,
     repeat_episodes: bool = True,
 ) -> None:  # fmt: skip
-    """Train a run, with a line of progress on a terminal; print the result and what comes next."""
+    """Train a run with a progress bar on terminals; print the result and how to continue."""
     from sdnn.runs.run import resume_command
     from sdnn.training.training import shows_bar
 
@@ -206,7 +209,7 @@ def train_run(
         return
     report = outcome.learning_report
     within, beyond = [], []
-    if report is not None and not outcome.is_solved:  # else what does not suit does no harm
+    if report is not None and not outcome.is_solved:  # a solved task needs no other ranges
         shares = enumerate(report["share_of_range"])
         within = [i for i, s in shares if s and s < 0.1 and i not in report["fitted"]]
         beyond = [i for i, s in enumerate(report["share_beyond_range"]) if s and s > 0.1]
@@ -226,7 +229,7 @@ def train_run(
 
 
 def rendered(template: str, **values: object) -> str:
-    """Write values by a template of this package; without a line feed at the end."""
+    """Fill in a template of this package; without a line feed at the end."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -239,14 +242,14 @@ def rendered(template: str, **values: object) -> str:
 
 
 def json_text(values: object) -> str:
-    """Write values as JSON; numbers that it does not have, NaN and infinite ones, as null."""
+    """Write values as JSON; NaN and infinite numbers, which JSON lacks, become null."""
     import msgspec
 
     return msgspec.json.format(msgspec.json.encode(values), indent=2).decode()
 
 
 def make_console() -> Console:
-    """Make the console that tables are printed on: as wide as the terminal, if it is one."""
+    """Make the console for tables: as wide as a terminal, or `PLAIN_WIDTH` for files and pipes."""
     from rich.console import Console
 
     return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from sdnn.agents.agent import AnyAgent
 
 _MOST_ACTIONS = 2**16
-_LARGEST = 2**31  # of readings
+_LARGEST = 2**31  # limit of the ranges of observations and actions
 
 
 @click.command(short_help="Write an agent as a C header, for small processors.")
@@ -143,7 +143,7 @@ def export(
             raise click.UsageError(f"{option} needs --new: the agent of RUN has its own")
     learning = learning or new
     with run_command(option_words if source is None else words_of_run(source)):
-        agent = _new_agent(**options) if source is None else _known_agent(source)
+        agent = _new_agent(**options) if source is None else _read_agent_of(source)
         try:
             header = c_header(
                 agent,
@@ -180,7 +180,7 @@ def export(
             click.echo(f"  {line}")
 
 
-def _known_agent(source: Path) -> AnyAgent:
+def _read_agent_of(source: Path) -> AnyAgent:
     from sdnn.agents import load_agent
     from sdnn.runs.config_file import ConfigFile
     from sdnn.runs.run import CONFIG, agent_of
@@ -191,8 +191,8 @@ def _known_agent(source: Path) -> AnyAgent:
         raise click.ClickException(str(error)) from error
     environment: object = None
     if source.is_dir():
-        with suppress(ConfigError):  # of a damaged file, which the agent does not need
-            # No specification is made of it: that would import what it names.
+        with suppress(ConfigError):  # a damaged file: the agent does not need it
+            # Reading it as a specification would import the modules that it names.
             environment = ConfigFile.read(source / CONFIG).values.get("environment")
     if isinstance(environment, dict) and environment.get("action_masks"):
         raise click.ClickException(
@@ -216,10 +216,12 @@ def _new_agent(
 
     from sdnn.export import new_agent
     from sdnn.export.new import new_settings
-    from sdnn.runs.settings import changed
+    from sdnn.runs.settings import with_changes
     from sdnn.support.arguments import blamed
 
-    bounds = [(-math.pi, math.pi) if text == "angle" else _ends("--range", text) for text in ranges]
+    bounds = [
+        (-math.pi, math.pi) if text == "angle" else _bounds_in("--range", text) for text in ranges
+    ]
     tables: dict[str, dict[str, object]] = {"approximator": {}, "learning": {}}
     for name, text in named_values("--set", settings):
         table, _, key = name.partition(".")
@@ -228,7 +230,7 @@ def _new_agent(
             raise click.UsageError(f"--set {name}: must be {expected}")
         tables[table][key] = value_of(text)
     kind = kind or "q-lambda"
-    parts = {name: changed(new_settings(kind)[name], tables[name], name) for name in tables}
+    parts = {name: with_changes(new_settings(kind)[name], tables[name], name) for name in tables}
     low, high = np.array(bounds).T
     try:
         return new_agent(
@@ -257,7 +259,7 @@ def _action_space(texts: Sequence[str]) -> gym.Space[Any]:
     import numpy as np
 
     if all(":" in text for text in texts):
-        low, high = np.array([_ends("--actions", text) for text in texts]).T
+        low, high = np.array([_bounds_in("--actions", text) for text in texts]).T
         return gym.spaces.Box(low, high, dtype=np.float64)
     if any(not text.isdecimal() or not 2 <= float(text) <= _MOST_ACTIONS for text in texts):
         raise click.UsageError(
@@ -268,7 +270,7 @@ def _action_space(texts: Sequence[str]) -> gym.Space[Any]:
     return gym.spaces.Discrete(sizes[0]) if len(sizes) == 1 else gym.spaces.MultiDiscrete(sizes)
 
 
-def _ends(option: str, text: str) -> tuple[float, float]:
+def _bounds_in(option: str, text: str) -> tuple[float, float]:
     low, _, high = text.partition(":")
     try:
         bounds = float(low), float(high)

@@ -154,7 +154,7 @@ def record(folder: Path, out: Path, seed: int | None, steps: int | None) -> None
 
     It is the first episode of `sdnn evaluate` with the same seed.
     """
-    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # pictures need no screen
+    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # pygame needs no screen for pictures
     from sdnn.runs.recording import SUFFIXES, record as record_run
     from sdnn.runs.run import Run
 

@@ -70,7 +70,7 @@ _OPTIONS = (
 
 
 def study_command(make_study: Callable[..., Study]) -> Function:
-    """Make a command of a function that makes a study: it is run, or what is missing is counted.
+    """Make a command that runs the study which a function returns, or with --dry-run forecasts it.
 
     The command has the options of `_OPTIONS` besides those of the function.
     """

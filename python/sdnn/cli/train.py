@@ -28,10 +28,10 @@ from sdnn.support.arguments import advice
 
 
 class SpecCommand(click.Command):
-    """A command with the options of `KEYS`, which are made when they are first needed."""
+    """A command with the options of `KEYS`, made when used: other commands start faster."""
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Return all parameters; those of a specification come before the option for help."""
+        """Return all parameters, with those of `KEYS` before the help option."""
         *parameters, help_option = super().get_params(ctx)
         return [*parameters, *_options(), help_option]
 
@@ -139,7 +139,7 @@ def train(
     from sdnn.runs.settings import overridden
     from sdnn.runs.spec import RunSpec
 
-    settings = _given(env_id, options)
+    settings = _options_by_key(env_id, options)
     with run_command(option_words):
         source = None if file is None else ConfigFile.read(file)
 
@@ -165,8 +165,8 @@ def train(
         train_run(run, as_json)
 
 
-def _given(env_id: str | None, options: Options) -> Options:
-    """Return the values of the options by their keys; UsageError if two options set the same."""
+def _options_by_key(env_id: str | None, options: Options) -> Options:
+    """Return the values of options by keys of a specification; UsageError for a key set twice."""
     from sdnn.runs.settings import KEYS_BY_NAME
 
     by_key = {key: options.pop(key.replace(".", "_")) for key in KEYS}
@@ -189,7 +189,7 @@ def _given(env_id: str | None, options: Options) -> Options:
         if text in ("adaptive", "running"):
             give("--range", "agent.observation_range", text)
         else:
-            name, bounds = _range(text)
+            name, bounds = _named_range(text)
             give(f"--range {name}", f"environment.ranges.{name}", bounds)
     for name, text in named_values("--set", options["settings"]):
         if "." not in name:
@@ -199,7 +199,7 @@ def _given(env_id: str | None, options: Options) -> Options:
     return values
 
 
-def _range(text: str) -> tuple[str, list[float]]:
+def _named_range(text: str) -> tuple[str, list[float]]:
     name, _, bounds = text.rpartition("=")
     low, colon, high = bounds.partition(":")
     try:

@@ -20,13 +20,13 @@ _MARKUP = re.compile(r"[\\`*_#<|~&@$]|\](?=[(\[])|:(?=//)|(?<=www)\.", re.IGNORE
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts."""
+    """A table of a page; its cells are texts."""
 
     title: str
     header: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
     kinds: Mapping[str, str] = field(default_factory=dict)  # color of a text: good, bad, open, none
-    brief: Sequence[str] = ()  # columns that a terminal shows by default: all
+    brief: Sequence[str] = ()  # columns that a terminal shows by default; empty: all
 
     def print(self, console: Console, *, full: bool = True) -> None:
         """Print all columns, or the brief ones, which fit 80 characters."""
@@ -72,7 +72,7 @@ class Section:
 
     @property
     def picture_url(self) -> str:
-        """The figure as a data URL, so that its identifiers are separate from those of others."""
+        """The figure as a data URL: inlined SVGs of a page would share their identifiers."""
         return "data:image/svg+xml;base64," + base64.b64encode(self.picture).decode()
 
 

@@ -38,7 +38,7 @@ def color_of(index: int) -> str:
 
 
 def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
-    """Return a figure as PNG and as SVG; equal rows give equal bytes."""
+    """Return a figure as PNG and as SVG; equal figures give equal bytes."""
     from matplotlib import rc_context
 
     svg = BytesIO()

@@ -85,7 +85,7 @@ def estimate_contrast(
     others: ArrayLike,
     contrast: Callable[[FloatArray, FloatArray], FloatArray] = np.subtract,
 ) -> Estimate:
-    """Compare the medians of two groups of trials; each group is resampled by itself.
+    """Return the contrast of two groups' medians with its interval; each group is resampled.
 
     NaN gives NaN; ValueError if a group has no values or an infinite one.
 
@@ -98,10 +98,10 @@ def estimate_contrast(
     )
 
 
-def tails(distribution: FloatArray, confidence: float = CONFIDENCE) -> FloatArray:
-    """Return the values that limit the middle part of distributions over the last axis.
+def interval_limits(distribution: FloatArray, confidence: float = CONFIDENCE) -> FloatArray:
+    """Return the lower and upper limit of the middle part of distributions over the last axis.
 
-    >>> tails(np.arange(101.0), 0.9)
+    >>> interval_limits(np.arange(101.0), 0.9)
     array([ 5., 95.])
     """
     tail = (1 - confidence) / 2
@@ -119,7 +119,7 @@ def _estimate(statistic: Callable[..., FloatArray], *groups: ArrayLike) -> Estim
         return Estimate(value, math.nan, math.nan)
     generator = np.random.default_rng(BOOTSTRAP_SEED)
     drawn = [s[generator.integers(s.size, size=(_N_RESAMPLES, s.size))] for s in samples]
-    lower, upper = tails(statistic(*drawn))
+    lower, upper = interval_limits(statistic(*drawn))
     return Estimate(value, float(lower), float(upper))
 
 

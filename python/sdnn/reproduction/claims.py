@@ -40,8 +40,8 @@ from sdnn.reports.statistics import (
     Estimate,
     FloatArray,
     estimate_contrast,
+    interval_limits,
     json_number,
-    tails,
 )
 from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
 from sdnn.reproduction.cost import SERIES, CostConfig, CostRecord
@@ -304,7 +304,7 @@ class TenTrials:
                 return None
         met = zip(*map(self._met, checks), strict=True)
         drawn, redrawn = (np.logical_and.reduce(arrays) for arrays in met)
-        lower, upper = tails(redrawn.mean(axis=1))
+        lower, upper = interval_limits(redrawn.mean(axis=1))
         return Estimate(float(drawn.mean()), float(lower), float(upper))
 
     def _draw(self, subject: Subject) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

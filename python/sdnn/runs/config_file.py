@@ -31,7 +31,7 @@ MOST_BYTES = 2**20
 
 @dataclass(frozen=True)
 class ConfigFile:
-    """A file of settings, in TOML or JSON by its name's ending: its text, and the values in it."""
+    """A file of settings, its text and its values; TOML or JSON by its suffix."""
 
     path: Path
     text: str
@@ -63,7 +63,7 @@ class ConfigFile:
         return cls(path, text, values)
 
     def specification(self) -> dict[str, object]:
-        """Return the values of a specification: all but what only a run's configuration has.
+        """Return the values of a specification, without the keys that only a run's file has.
 
         ConfigError if it is the configuration of a run of another format.
         """
@@ -73,7 +73,7 @@ class ConfigFile:
         return {name: value for name, value in self.values.items() if name not in others}
 
     def located(self, error: ConfigError, options: Collection[str] = ()) -> ConfigError:
-        """Add file and line to an error, unless it is about one of the options, given by keys."""
+        """Add file and line to an error, unless a command-line option has set its key."""
         key = tuple(error.key.partition("[")[0].split("."))
         for name in (error.key, key[0] if key[0] not in self.values else error.key):
             if any(f"{name}.".startswith(f"{o}.") or o.startswith(f"{name}.") for o in options):
@@ -109,7 +109,7 @@ PAPER_ARGUMENTS: dict[str, type[object]] = get_type_hints(PaperSettings)
 
 
 def core_parts() -> dict[str, tuple[type[object], ...]]:
-    """Return the core's settings of the parts of agents, by their tables."""
+    """Return the classes of settings in the core, by the table of a specification."""
     return {
         part: tuple({getattr(entry, part): None for entry in AGENTS.values() if entry.core_trial})
         for part in ("approximator", "learning")
@@ -139,7 +139,7 @@ def spec_schema() -> Values:
     for table, core in parts.items():
         properties[table]["anyOf"] = [
             *({"$ref": f"#/$defs/{kind.__name__}"} for kind in core),
-            {"type": "object"},  # of an agent from elsewhere
+            {"type": "object"},  # settings of an agent that a user has registered
         ]
     arguments = {name: {"$ref": f"#/$defs/{c.__name__}"} for name, c in PAPER_ARGUMENTS.items()}
     components["EnvironmentSpec"]["if"] = {"properties": {"id": {"const": PAPER_ACROBOT}}}

@@ -23,7 +23,7 @@ from sdnn.support.interrupts import stay_interrupts
 from sdnn.training.loop import Row
 
 WINDOW = 20
-"""Episodes in the running median of the returns, or all so far where they are fewer."""
+"""Episodes in the running median of the returns, or all if there are fewer."""
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """Kinds of figures that the curves of runs may be written as."""
@@ -32,12 +32,12 @@ HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "hig
 
 Kind: TypeAlias = Literal["return", "running median", "evaluation"]
 
-_CHANGES_NOTHING = ("seed", "output", "budget.steps", "budget.episodes")  # but for the goals
+_IGNORED = ("seed", "output", "budget.steps", "budget.episodes")  # goals are compared separately
 
 
 @dataclass(frozen=True, kw_only=True)
 class Group:
-    """Runs that differ in their seeds only; no other group has both its task and its agent."""
+    """Runs that differ in their seeds only, labelled by task and agent."""
 
     task: str
     agent: str
@@ -45,13 +45,15 @@ class Group:
 
 
 def groups_of(runs: Sequence[Run]) -> list[Group]:
-    """Put runs together that differ in their seeds only, in the order of the first of each.
+    """Group runs that differ in their seeds only, in the order of their first runs.
 
-    Names of tasks and of their agents have the settings in which they differ.
+    Labels of tasks and agents contain the settings in which groups differ.
     """
     members: dict[tuple[tuple[str, str], ...], list[Run]] = {}
     for run in runs:
-        settings = dict(_flat(run.spec.full_values())) | {"goals": ", then ".join(_goals(run))}
+        settings = dict(_flat_settings(run.spec.full_values())) | {
+            "goals": ", then ".join(_goal_labels(run))
+        }
         members.setdefault(tuple(sorted(settings.items())), []).append(run)
     groups = []
     for key_values, same in members.items():
@@ -68,18 +70,18 @@ def groups_of(runs: Sequence[Run]) -> list[Group]:
     return groups
 
 
-def _flat(values: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
+def _flat_settings(values: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
     for name, value in values.items():
-        if f"{prefix}{name}" in _CHANGES_NOTHING:
+        if f"{prefix}{name}" in _IGNORED:
             continue
         if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{name}.")
+            yield from _flat_settings(value, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value if isinstance(value, str) else json.dumps(value)
 
 
-def _goals(run: Run) -> Iterator[str]:
-    """Write its goals, each after the step where it was given, if that was the user's choice."""
+def _goal_labels(run: Run) -> Iterator[str]:
+    """Describe a run's goals; later goals with the step at which the user has set them."""
     budget = run.spec.budget
     yield f"{budget.episodes} episodes" if budget.steps is None else f"{budget.steps} steps"
     due = None if budget.target_return is not None else budget.steps
@@ -91,20 +93,20 @@ def _goals(run: Run) -> Iterator[str]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curve:
-    """Numbers against steps, arrays (n,).
+    """A curve of numbers against steps, arrays (n,).
 
-    They are returns of episodes, the running median of these, or evaluations: of one run the mean,
-    of several that differ in their seeds the median of their means.
+    The numbers are returns of episodes, their running median, or evaluations: the mean return of
+    a single run, or the median over runs that differ in their seeds.
     """
 
     task: str
     agent: str
     kind: Kind
     n_runs: int = 1
-    run: str = ""  # folder of the run, if it is one
+    run: str = ""  # folder of the run; empty for several runs
     steps: NDArray[np.int64]
     values: NDArray[np.float64]
-    # Quartiles over the episodes of each evaluation of one run, or over runs.
+    # Quartiles over the episodes of an evaluation (single run), or over runs.
     low: NDArray[np.float64] | None = None
     high: NDArray[np.float64] | None = None
 
@@ -118,10 +120,10 @@ class Curve:
 
 
 def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
-    """Make the curves of runs; those that differ in their seeds only become one.
+    """Return the curves of runs, and notes about runs of which something could not be drawn.
 
-    With them comes a line about each run of which something could not be drawn. RunError if there
-    is nothing to draw yet, or rows cannot be read.
+    Runs that differ in their seeds only share a curve. RunError if there is nothing to draw yet,
+    or rows cannot be read.
     """
     made = [_curves_of_group(group) for group in groups_of(runs)]
     curves = [curve for run_curves, _ in made for curve in run_curves]
@@ -132,7 +134,7 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
 
 
 def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
-    """Make the curves of each run, or the one of several that have evaluations, and notes."""
+    """Return the curves of a group: the median over evaluated runs, or each run's; and notes."""
     rows = {run: run.rows() for run in group.runs}
     series = {run: _series(run_rows, "evaluation") for run, run_rows in rows.items()}
     evaluated = {run: pair for run, pair in series.items() if len(pair[0])}

@@ -31,44 +31,45 @@ from sdnn.support.files import read_bytes
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-ANSWER_SECONDS = 30.0  # a scheduler that leaves a question unanswered for so long is lost
-CONNECT_SECONDS = 5.0  # of one attempt
+ANSWER_SECONDS = 30.0  # a scheduler that does not answer within this time is lost
+CONNECT_SECONDS = 5.0  # length of one attempt to connect
 WORKERS_SECONDS = 1.0  # between checks of the list of workers
 RESULTS_SECONDS = 0.02  # between checks of results
-PROGRESS_SECONDS = 2.0  # at least between two reports of a trial's progress
+PROGRESS_SECONDS = 2.0  # least time between two reports of a trial's progress
 PROGRESS_TOPIC = "sdnn-progress"
 PROBE_EPISODES = 10  # few, but they use every part of the agent and the task
-MOST_SUBMISSIONS = 3  # of a trial that is lost with all the workers it may run on
+MOST_SUBMISSIONS = 3  # a trial that was lost this often has failed
 
 MISMATCH = f"__import__({__name__!r}, fromlist=['mismatch']).mismatch(version, probes)"
-"""An expression for `eval`, which workers without this library have, too."""
+"""Expression for `eval`: workers without this library can evaluate it, and report the error."""
 
 
 def probe(planned: PlannedTrial) -> str:
-    """Return settings and first rows of a trial, or its error: equal where all rows are equal.
+    """Return settings and a digest of the first rows of a trial, or the name of its error.
 
-    A trial in Python is only made: it may be long, and its libraries may round differently.
+    Builds that return the same give the same rows. A trial in Python is made but not run: it may
+    be long, and its libraries may round differently.
     """
     try:
         with opened(planned.spec.make_trial(planned.key.seed)) as trial:
             if planned.spec.is_compiled:
                 trial.advance(PROBE_EPISODES)
             return f"{planned.spec.canonical_json()}, {rows_of(trial).digest()}"
-    except Exception as error:  # reported when it is run, as with every executor
+    except Exception as error:  # running the trial will report it
         return type(error).__name__
 
 
 def probes_of(planned: Sequence[PlannedTrial]) -> list[tuple[bytes, str]]:
-    """Make probes of the first trial of each kind; ClusterError if one cannot be sent."""
+    """Pickle one trial per agent with its `probe`; ClusterError if one cannot be pickled."""
     kinds = {(trial.key.agent, trial.spec.is_compiled): trial for trial in reversed(planned)}
     try:
         return [(pickle.dumps(trial), probe(trial)) for trial in kinds.values()]
-    except Exception as error:  # of whatever settings an agent has
+    except Exception as error:  # settings of a user's agent may raise anything
         raise ClusterError(f"trials cannot be sent to workers: {error}") from error
 
 
 def mismatch(version: str, probes: Sequence[tuple[bytes, str]]) -> str:
-    """Return why this build gets no trials; nothing if it has the version and gives the probes."""
+    """Return why this worker's build may give other rows; "" if version and probes are equal."""
     if _core.__version__ != version:
         return f"it has sdnn {_core.__version__}, this is sdnn {version}"
     if any(probe(pickle.loads(trial)) != expected for trial, expected in probes):
@@ -77,7 +78,7 @@ def mismatch(version: str, probes: Sequence[tuple[bytes, str]]) -> str:
 
 
 def run_on_worker(planned: PlannedTrial) -> TrialRecord:
-    """Run a trial; Dask places it again if it was cancelled and is wanted once more."""
+    """Run a trial on a worker; stop if Dask has cancelled it, which may reschedule it."""
     from distributed import Reschedule, get_worker
 
     worker = get_worker()
@@ -127,7 +128,7 @@ class DaskExecutor:
         """
         from distributed.utils import silence_logging_cmgr
 
-        with silence_logging_cmgr(logging.CRITICAL):  # a lost connection ends with one message
+        with silence_logging_cmgr(logging.CRITICAL):  # Dask logs lost connections repeatedly
             client = yield from self._connect(stop)
             if client is None:
                 return
@@ -139,7 +140,7 @@ class DaskExecutor:
                 client.close(timeout=CONNECT_SECONDS)
 
     def _connect(self, stop: Event) -> Generator[Message, None, Client | None]:
-        """Connect, in short attempts, so that Ctrl-C ends them; None if it did."""
+        """Connect in short attempts, so that Ctrl-C can end them; None after Ctrl-C."""
         from distributed import Client
 
         end = time.monotonic() + self.scheduler_timeout
@@ -148,7 +149,7 @@ class DaskExecutor:
         while not stop.is_set():
             try:
                 return Client(self._address(), timeout=attempt, set_as_default=False)
-            except OSError as error:  # it may come, and its file, too
+            except OSError as error:  # scheduler or its file may not be there yet
                 if time.monotonic() > end:
                     raise self.failure(f"no scheduler at {self.scheduler}: {error}") from error
             except ValueError as error:
@@ -161,7 +162,7 @@ class DaskExecutor:
         return None
 
     def _address(self) -> str:
-        """Return the address, from a scheduler file if it is one."""
+        """Return the scheduler's address, read from its file if it has one."""
         path = Path(self.scheduler)
         if path.suffix != ".json" and not path.is_file():
             return self.scheduler
@@ -178,7 +179,7 @@ class DaskExecutor:
 
 
 class _Placed(NamedTuple):
-    """A trial that was submitted, for the n-th time, to any of some workers."""
+    """A submitted trial: the number of its submission, and the workers it may run on."""
 
     planned: PlannedTrial
     n: int
@@ -195,10 +196,10 @@ class _Run:
         self.executor = executor
         self.client = client
         self.probes = probes_of(planned)
-        self.waiting = deque((trial, 1) for trial in planned)  # with the number of the submission
-        self.placed: dict[str, _Placed] = {}  # by key
-        self.threads: dict[str, int] = {}  # of the workers that fit
-        self.problems: dict[str, str] = {}  # why workers get no trials; "" where they fit
+        self.waiting = deque((trial, 1) for trial in planned)  # trials and numbers of submissions
+        self.placed: dict[str, _Placed] = {}  # submitted trials by Dask's key
+        self.threads: dict[str, int] = {}  # number of threads of each admitted worker
+        self.problems: dict[str, str] = {}  # why a worker gets no trials; "" if it is admitted
         self.unserved_since: float | None = None
 
     def messages(self, stop: Event) -> Generator[Message, None, None]:
@@ -212,11 +213,11 @@ class _Run:
         while self.waiting or self.placed:
             if time.monotonic() - looked > WORKERS_SECONDS:
                 looked = time.monotonic()
-                yield from self.look_at_workers()
+                yield from self.update_workers()
             while self.waiting and len(self.placed) < sum(self.threads.values()):
                 planned, n = self.waiting.popleft()
-                # Drivers with the same trial share it, since its identity is its key; with the
-                # number of the submission, because Dask remembers how a key ended.
+                # The key is the trial's identity, so that several drivers share it. The number of
+                # the submission is part of it, because Dask never runs a key again.
                 key = "-".join(map(str, ("trial", _core.__version__, *planned.key, n)))
                 workers = list(self.threads)
                 future = self.client.submit(run_on_worker, planned, key=key, workers=workers)
@@ -233,8 +234,8 @@ class _Run:
                 if future.key in self.placed:
                     yield ended(self.placed.pop(future.key), result)
 
-    def look_at_workers(self) -> Generator[Message, None, None]:
-        """Admit new workers that fit, and take back what waits for lost ones only."""
+    def update_workers(self) -> Generator[Message, None, None]:
+        """Admit new workers with the same build; resubmit trials whose workers are all lost."""
         client = self.client
         threads = client.sync(client.scheduler.ncores, callback_timeout=ANSWER_SECONDS)
         self.problems = {worker: why for worker, why in self.problems.items() if worker in threads}
@@ -243,7 +244,7 @@ class _Run:
             build = {"version": _core.__version__, "probes": self.probes}
             answers = client.run(eval, MISMATCH, build, workers=new, on_error="return")
         for worker, answer in answers.items():
-            if isinstance(answer, OSError):  # it was lost meanwhile
+            if isinstance(answer, OSError):  # the worker was lost meanwhile
                 continue
             if isinstance(answer, BaseException):
                 answer = f"it cannot run these trials: {type(answer).__name__}: {answer}"
@@ -273,14 +274,14 @@ class _Run:
 
 
 def ended(placed: _Placed, result: Any) -> Message:
-    """Return how a trial ended."""
+    """Return the message about the end of a trial, finished or failed."""
     from distributed import KilledWorker
 
     if placed.future.status == "finished":
         planned = placed.planned
         identity = (result.version, result.key, result.config)
         if identity != (_core.__version__, planned.key, planned.spec.canonical_json()):
-            # Its worker began anew, with other code, after it had been admitted.
+            # The worker was restarted with other code after it had been admitted.
             problem = f"its worker's sdnn {result.version} ran other settings than were asked for"
             return Failed(planned, ClusterError(problem))
         return Finished(planned, result)

@@ -30,7 +30,7 @@ from sdnn.support.machine import instruction_set, n_cores
 from sdnn.support.progress import ProgressBars
 
 CHUNK_SECONDS = 0.1
-"""A trial reports about this often; it is also how long an interruption waits."""
+"""Time between two reports of a trial, and the longest time until an interrupt acts."""
 
 
 def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
@@ -55,14 +55,14 @@ def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
 
 @dataclass(frozen=True)
 class PlannedTrial:
-    """A trial that a run needs: where its result is stored, and what is run with the key's seed."""
+    """A trial of a study: the key of its result, which has the seed, and the specification."""
 
     key: TrialKey
     spec: RunSpec
 
     @property
     def title(self) -> str:
-        """Its name for a reader, such as ``"SDNN-C s4, trial 1"``; trials count from 1."""
+        """The trial's name for readers, such as ``"SDNN-C s4, trial 1"``; trials count from 1."""
         return f"{title_of(self.key.agent)} {self.key.case_id}, trial {self.key.trial + 1}"
 
 
@@ -70,7 +70,7 @@ class PlannedTrial:
 
 
 class Begun(NamedTuple):
-    """The run begins, with so many learning episodes before it."""
+    """The run begins, with this number of learning episodes to do."""
 
     n_planned: int
     n_reused: int
@@ -85,14 +85,14 @@ class Advanced(NamedTuple):
 
 
 class Finished(NamedTuple):
-    """A trial is done; for observers, it is stored."""
+    """A trial is finished; it is stored before observers receive the message."""
 
     planned: PlannedTrial
     record: TrialRecord
 
 
 class Failed(NamedTuple):
-    """A trial raised, or was lost too often."""
+    """A trial raised an error, or was lost with its worker too often."""
 
     planned: PlannedTrial
     error: Exception
@@ -124,7 +124,7 @@ class TrialBars(ProgressBars):
     _n_open = 0
 
     def __call__(self, message: Message) -> None:
-        """Show what happens."""
+        """Update the bars by a message."""
         match message:
             case Begun(n_planned, n_reused, n_episodes):
                 self._done = dict[TrialKey, int]()
@@ -132,7 +132,7 @@ class TrialBars(ProgressBars):
                 self.add("all", self._title(), n_episodes)
             case Advanced(planned, episode):
                 self._advance(planned, episode)
-            case Finished(planned, _) | Failed(planned, _):  # whose episodes count as passed
+            case Finished(planned, _) | Failed(planned, _):  # all of its episodes count as done
                 self._advance(planned, planned.spec.length)
                 self.remove(planned.key)
                 self._n_open -= 1
@@ -161,10 +161,10 @@ class Executor(Protocol):
     def run(
         self, planned: Sequence[PlannedTrial], stop: threading.Event
     ) -> Generator[Message, None, None]:
-        """Run the trials, and yield what happens until each is finished or failed.
+        """Run the trials, and yield messages until each is finished or failed.
 
-        The generator runs in the calling thread. Closing it gives up what is running. Once `stop`
-        is set, running trials are given up and no further one starts.
+        The generator runs in the calling thread. Closing it, or setting `stop`, abandons running
+        trials; no further trial starts.
 
         RunError if no trial can be run any more.
         """
@@ -217,7 +217,7 @@ def run_trials(
     n_run = 0
     signals = Interrupts(stop.set, (SIGINT, SIGTERM))
     if missing:
-        # An exception at any instruction could lose a result between queue and store.
+        # Signals only set `stop`: an exception could lose a result between queue and store.
         with signals, closing(executor.run(missing, stop)) as messages:
             for message in messages:
                 match message:
@@ -238,14 +238,14 @@ def run_trials(
 
 
 def run_to_end(planned: PlannedTrial) -> Generator[Advanced | Finished, None, None]:
-    """Run one trial, in pieces of about `CHUNK_SECONDS`; yield what happens.
+    """Run one trial; yield its progress about every `CHUNK_SECONDS`, and last `Finished`.
 
-    The last message is that it is finished. Closing the generator gives the trial up.
+    Closing the generator abandons the trial.
     """
     begin = time.thread_time()
     record = None
     with opened(planned.spec.make_trial(planned.key.seed)) as trial:
-        with closing(_pieces(trial)) as pieces:
+        with closing(_run_in_chunks(trial)) as pieces:
             for _ in pieces:
                 done = trial.done if isinstance(trial, TrainingTrial) else trial.episode
                 yield Advanced(planned, done)
@@ -265,10 +265,10 @@ def _record(planned: PlannedTrial, trial: Trial | TrainingTrial, seconds: float)
     )
 
 
-def _pieces(trial: Trial | TrainingTrial | Team) -> Generator[None, None, None]:
-    """Run a trial to its end; yield about every `CHUNK_SECONDS`, and first of all."""
+def _run_in_chunks(trial: Trial | TrainingTrial | Team) -> Generator[None, None, None]:
+    """Run a trial to its end; yield at the beginning and about every `CHUNK_SECONDS`."""
     yield
-    if isinstance(trial, TrainingTrial):  # whose episodes may be long
+    if isinstance(trial, TrainingTrial):  # its episodes may be longer than a chunk
         yield from trial.training.pieces(CHUNK_SECONDS)
         return
     chunk = 1
@@ -295,11 +295,11 @@ class Team:
 
     @property
     def finished(self) -> bool:
-        """Whether every trial was finished and taken."""
+        """Whether `take_finished` has yielded every trial."""
         return not self.trials
 
     def advance(self, n_decisions: int) -> None:
-        """Let every trial make ``n_decisions`` more; the time is divided by decisions made."""
+        """Make ``n_decisions`` in every trial; each gets a share of the time by its decisions."""
         begin = time.thread_time()
         trials = tuple(self.trials.values())
         trials[0].advance_together(trials, n_decisions)
@@ -310,7 +310,7 @@ class Team:
             self._seconds[key] += seconds * n / sum(n_new.values())
 
     def take_finished(self) -> Generator[Finished, None, None]:
-        """Yield every trial that has come to its end, and let it go."""
+        """Yield the finished trials and remove them from the team."""
         for planned, trial in tuple(self.trials.items()):
             if trial.finished:
                 yield Finished(planned, _record(planned, trial, self._seconds[planned]))
@@ -318,14 +318,14 @@ class Team:
 
 
 MOST_TOGETHER = 8
-"""Trials in a team: doubles in the widest register."""
+"""Largest number of trials in a team: the widest vector register holds 8 doubles."""
 
 MOST_TABLE_BYTES = 2**26
-"""Memory of the table of an agent that runs in a team."""
+"""Largest table of an agent that runs in a team, in bytes."""
 
 
 def teams_of(planned: Iterable[PlannedTrial], jobs: int) -> Iterable[list[PlannedTrial]]:
-    """Divide trials into teams for ``jobs`` threads, in the order of their first trials.
+    """Divide trials into teams that keep ``jobs`` threads busy, in the order of first trials.
 
     Trials that are not faster together are teams of one.
     """
@@ -363,7 +363,7 @@ class ThreadExecutor:
             try:
                 for team in teams_of(planned, self.jobs):
                     pool.submit(_run_team, team, messages, stop)
-                # Every trial sends one last message, None if it was given up after a stop.
+                # The last message of every trial is Finished, Failed, or None if it was abandoned.
                 n_open = len(planned)
                 while n_open:
                     message = messages.get()
@@ -378,12 +378,12 @@ class ThreadExecutor:
 def _run_team(
     planned: Sequence[PlannedTrial], messages: SimpleQueue[Message | None], stop: threading.Event
 ) -> None:
-    """Run trials together, and by itself what does not come to its end so; in a worker thread."""
+    """Run trials as a team in a worker thread; after an error, run each unfinished one alone."""
     left = dict.fromkeys(planned)
     if len(left) > 1 and not stop.is_set():
-        with suppress(BaseException):  # whoever it concerns raises it again
+        with suppress(BaseException):  # the trial that raised it raises it again alone
             team = Team(planned)
-            for _ in _pieces(team):
+            for _ in _run_in_chunks(team):
                 for member, running in team.trials.items():
                     messages.put(Advanced(member, running.episode))
                 for finished in team.take_finished():
@@ -398,7 +398,7 @@ def _run_team(
 def _run_one(
     planned: PlannedTrial, messages: SimpleQueue[Message | None], stop: threading.Event
 ) -> None:
-    """Run one trial in a worker thread; its last message is None where it was given up."""
+    """Run one trial in a worker thread; its last message is None if it was abandoned."""
     last: Message | None = None
     try:
         with closing(run_to_end(planned)) as happening:
@@ -411,7 +411,7 @@ def _run_one(
                     messages.put(message)
     except Exception as error:
         last = Failed(planned, error)
-    except BaseException as error:  # SystemExit and the like end a thread without a word
+    except BaseException as error:  # SystemExit would end the thread without any message
         failure = RuntimeError(f"the trial raised {error!r}")
         failure.__cause__ = error
         last = Failed(planned, failure)

@@ -32,15 +32,15 @@ from sdnn.environments.sensors import NoiseStream, in_own_units
 from sdnn.environments.space_kinds import flat_bounds
 from sdnn.environments.types import Array, Data, Env
 from sdnn.runs.errors import ConfigError, RunError
-from sdnn.runs.settings import Settings, changed, doc
+from sdnn.runs.settings import Settings, doc, with_changes
 from sdnn.support.arguments import blamed, shown
 
 ALL = "all"
-"""The key of the range of all variables that have no other."""
+"""The key of the range for all variables without a range."""
 
 
 class PaperSettings(NamedTuple):
-    """The arguments of the paper's acrobot as the core has them."""
+    """The arguments of the paper's acrobot as settings of the core."""
 
     acrobot: AcrobotConfig
     goal: GoalScheduleConfig
@@ -48,7 +48,7 @@ class PaperSettings(NamedTuple):
 
 
 def mean_of(first: int, second: int, observation: Array) -> float:
-    """Observe the mean of two variables, by their numbers: a redundant sensor."""
+    """Return the mean of variables number ``first`` and ``second``: a redundant sensor."""
     return 0.5 * (float(observation[first]) + float(observation[second]))
 
 
@@ -114,7 +114,9 @@ class EnvironmentSpec(Settings, frozen=True):
         if self.is_paper_acrobot:
             kwargs = dict(self.kwargs)
             for name, default in _PAPER_DEFAULTS._asdict().items():
-                kwargs[name] = values_of(changed(default, kwargs.get(name, {}), f"kwargs.{name}"))
+                kwargs[name] = values_of(
+                    with_changes(default, kwargs.get(name, {}), f"kwargs.{name}")
+                )
             msgspec.structs.force_setattr(self, "kwargs", kwargs)
         try:
             json.dumps(self.kwargs, allow_nan=False)
@@ -138,7 +140,7 @@ class EnvironmentSpec(Settings, frozen=True):
 
     @property
     def is_plain_paper_acrobot(self) -> bool:
-        """Whether it is the paper's acrobot, and nothing else changes what is observed of it."""
+        """Whether it is the paper's acrobot without additional noise, sensors or wrappers."""
         return (
             self.is_paper_acrobot
             and self.kwargs.keys() == set(PaperSettings._fields)
@@ -146,7 +148,7 @@ class EnvironmentSpec(Settings, frozen=True):
         )
 
     def paper_settings(self) -> PaperSettings:
-        """Return the arguments of the paper's acrobot as the core has them."""
+        """Return the arguments of the paper's acrobot as settings of the core."""
         acrobot, goal, sensors = (self.kwargs[name] for name in PaperSettings._fields)
         return PaperSettings(
             AcrobotConfig(**acrobot), GoalScheduleConfig(**goal), SensorConfig(**sensors)
@@ -170,7 +172,7 @@ class EnvironmentSpec(Settings, frozen=True):
         return self.noise > 0.0 or self.redundant > 0
 
     def make(self, stream: NoiseStream = "sensor_noise", render_mode: str | None = None) -> Env:
-        """Make the environment; every reset with a seed starts its noise, which is of a stream.
+        """Make the environment; every reset with a seed restarts its noise, drawn from ``stream``.
 
         ConfigError if there is no such environment, it cannot be made, or ranges are missing or
         wrong. RunError if it can be made, but not with this render mode.
@@ -212,7 +214,7 @@ class EnvironmentSpec(Settings, frozen=True):
             raise
 
     def imported(self) -> bool:
-        """Import the module that ``id`` names; False if there is none, or it was imported before.
+        """Import the module that ``id`` names; return whether a module was imported now.
 
         ConfigError if it cannot be imported.
         """
@@ -222,13 +224,13 @@ class EnvironmentSpec(Settings, frozen=True):
         find_module(module)
         try:
             importlib.import_module(module)
-        except Exception as error:  # whatever is in a user's module
+        except Exception as error:  # a user's module may raise anything
             problem = f"no environment {self.id!r}: {type(error).__name__}: {error}"
             raise ConfigError("environment.id", problem) from error
         return True
 
     def scaling(self, env: Env | None = None) -> Scaling | None:
-        """Return how observations are scaled; None: not at all.
+        """Return the scaling of observations; None without scaling.
 
         Where the agent acts without the noisy or redundant sensors of its run, it needs
         ``UnitSensors(env, *scaling.ends)``. ``env`` is one that `make` gave; by default one is
@@ -246,13 +248,13 @@ class EnvironmentSpec(Settings, frozen=True):
             with closing(self.make()) as made:
                 return self.scaling(made)
         while not isinstance(env, UnitSensors):
-            assert isinstance(env, gym.Wrapper)  # make puts it there
+            assert isinstance(env, gym.Wrapper)  # `make` adds wrappers
             env = env.env
         pairs = zip(env.observation_low.tolist(), env.observation_high.tolist(), strict=True)
         return Scaling(ranges=tuple(pairs), n_redundant=self.redundant)
 
     def ends(self, env: Env) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the lowest and highest values of the flattened observation; infinite: not known.
+        """Return the limits of the flattened observation's variables; infinite where not known.
 
         ConfigError if a range is given of a variable that is not there, or observations are no
         vector.
@@ -286,7 +288,7 @@ class EnvironmentSpec(Settings, frozen=True):
             raise ConfigError("environment.id", problem) from error
         except (gym.error.Error, ImportError) as error:
             raise ConfigError("environment.id", f"no environment {self.id!r}: {error}") from error
-        except Exception as error:  # whatever a user's environment raises
+        except Exception as error:  # a user's environment may raise anything
             if render_mode is not None:
                 self._bare(stream, None).close()
                 raise RunError(_no_pictures(self.id, render_mode)) from error
@@ -295,7 +297,7 @@ class EnvironmentSpec(Settings, frozen=True):
             raise ConfigError(self.key_of(blamed(error)[0]) or other, problem) from error
 
     def key_of(self, argument: str) -> str:
-        """Return the key of an argument, also in a table; an empty one of an unknown name."""
+        """Return the key of an argument of the environment, or "" for an unknown name."""
         for key, value in self.kwargs.items():
             if argument == key:
                 return f"environment.kwargs.{key}"
@@ -307,13 +309,13 @@ class EnvironmentSpec(Settings, frozen=True):
 _PAPER_DEFAULTS = PaperSettings(AcrobotConfig(), GoalScheduleConfig(), SensorConfig())
 
 
-def takes_episode(env: Env) -> bool:
-    """Return whether resets take the number of the learning episode as an option."""
+def has_episode_option(env: Env) -> bool:
+    """Return whether `reset` has the option ``"episode"``, the number of the learning episode."""
     return bool(env.metadata.get("reset_episode"))
 
 
 def episode_option(episode: int) -> Data:
-    """Return the option of resets that has the number of the learning episode, from 1."""
+    """Return the options of a reset for the learning episode of this number, from 1."""
     return {"episode": max(1, episode)}
 
 
@@ -335,16 +337,16 @@ _folders: list[str] = []
 
 
 def search_folder(folder: Path) -> None:
-    """Let modules that are named be found in a folder, after all others; see `find_module`."""
+    """Register a folder in which `find_module` searches modules that are nowhere else."""
     if str(folder) not in _folders:
         _folders.append(str(folder))
 
 
 def find_module(name: str) -> None:
-    """Search the folders of `search_folder` from now on, if a module is nowhere else.
+    """Add the folders of `search_folder` to ``sys.path`` if a module is nowhere else.
 
-    Packages that are merely missing are not looked for there: whoever puts a file into a folder
-    does not decide what is imported.
+    Only modules that a user names are searched there: otherwise, any file in the folder could
+    replace a missing package.
     """
     package = name.partition(".")[0]
     if package and package not in sys.modules and importlib.util.find_spec(package) is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class RunError(Exception):
-    """Base of the errors whose message alone is enough to correct them."""
+    """Base of errors that users can correct by the message alone, without a traceback."""
 
 
 class ConfigError(RunError):
@@ -27,7 +27,7 @@ class ConfigError(RunError):
         super().__init__(": ".join(part for part in (place, key, problem) if part))
 
     def __reduce__(self) -> tuple[type[ConfigError], tuple[str, str, str]]:
-        """Pickle it by its parts: exceptions come back from other processes."""
+        """Pickle the error by its parts, as exceptions come back from other processes."""
         return type(self), (self.key, self.problem, self.place)
 
 

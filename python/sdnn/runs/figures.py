@@ -14,9 +14,9 @@ from sdnn.runs.results import CaseResult, MeasureName
 from sdnn.runs.study import Comparison, Measured
 
 SMOOTHED_TESTS = 25
-"""Test episodes in the running median of a long run, which lies over the thin median curve."""
+"""Test episodes in the running median that is drawn over the thin median curve of long runs."""
 
-CASES_PER_ROW = 5  # more cases of a study continue below
+CASES_PER_ROW = 5  # further cases of a study are drawn in the next row
 _LINE_HEIGHT, _PANEL_WIDTH = 0.27, 2.9
 _SPREAD = 0.3  # half the height over which the dots of a variant are spread
 
@@ -30,7 +30,7 @@ _OF_STEPS, _OF_RETURNS = tuple(_TITLES)[:2], tuple(_TITLES)[2:]
 
 
 def agent_colors(agents: Iterable[str]) -> dict[str, str]:
-    """Return the colors of agents, each once, by their places in the registry."""
+    """Return a color for each agent by its position in the registry, the same in all figures."""
     return {agent: color_of(labels().index(agent)) for agent in agents}
 
 
@@ -126,13 +126,13 @@ def _draw_variant(
     result = measured.result
     scale = 100 if name == "final_share_solved" else 1
     values = scale * result.uncensored(name)
-    # By rank, so that equal values lie side by side and the picture is the same each time.
+    # Dots are spread by rank: equal values lie side by side, and every drawing is the same.
     order = np.argsort(np.argsort(values, kind="stable"))
     offsets = np.linspace(-_SPREAD, _SPREAD, values.size)[order] if values.size > 1 else np.zeros(1)
     axes.scatter(values, line + offsets, s=9, color=color, alpha=0.28, linewidths=0, zorder=2)
     estimate = result.medians[name]
     if name == "final_share_solved":
-        # Most trials end near 0 or 1: their median would jump from one to the other.
+        # Shares of most trials are near 0 or 1, between which a median would jump: take the mean.
         estimate = estimate_mean(result.values[name])
     value, lower, upper = (
         scale * (result.last_episode if np.isinf(end) else end) for end in vars(estimate).values()

@@ -13,15 +13,16 @@ BUSY_SECONDS = 60.0
 """Seconds to wait for another process that writes the same file."""
 
 _MAGIC_OF_JOURNAL = bytes.fromhex("d9d505f920a163d7")
-"""A journal begins with it, and ends with it if it names another file."""
+"""First bytes of a journal; also its last bytes if it names a super-journal."""
 
 
 def is_hot(path: Path, journal: Path) -> bool:
-    """Return whether a journal is of a transaction that no process continues.
+    """Return whether a journal holds a transaction that a killed process left unfinished.
 
-    One that names another file, which SQLite would remove, is refused; ours never do.
+    An error is raised for a journal that names another file, which SQLite would delete: this
+    library never writes such journals.
     """
-    # Another process may have finished with it.
+    # Another process may have finished its transaction meanwhile.
     with suppress(FileNotFoundError), journal.open("rb") as file:
         file.seek(max(0, file.seek(0, os.SEEK_END) - len(_MAGIC_OF_JOURNAL)))
         if file.read() == _MAGIC_OF_JOURNAL:
@@ -39,7 +40,7 @@ def is_hot(path: Path, journal: Path) -> bool:
 
 
 def has_rows(path: Path) -> bool:
-    """Return whether a file holds a run or a measurement, without its journal."""
+    """Return whether a file holds a run or a measurement; its journal is not applied."""
     place = f"{path.absolute().as_uri()}?mode=ro&immutable=1"
     with suppress(sqlite3.DatabaseError), closing(sqlite3.connect(place, uri=True)) as connection:
         tables = ("runs", "measurements")

@@ -23,13 +23,13 @@ from sdnn.training.evaluation import greedy_episode
 SUFFIXES = (".gif", ".mp4")
 
 _PALETTES = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"
-"""A palette for each picture: one for all would keep the pictures of an hour in the memory."""
+"""ffmpeg's filter for a palette per frame: a common one would keep all frames in memory."""
 
 FRAMES_PER_SECOND = 30
-"""Rate for environments that give none."""
+"""Frame rate for environments without one in their metadata."""
 
 _FASTEST_GIF = 50
-"""Largest rate: viewers slow faster ones down."""
+"""Largest frame rate: viewers slow faster GIFs down."""
 
 
 @dataclass
@@ -88,7 +88,7 @@ def record(
 
 
 def _rendered(env: Env) -> Iterator[NDArray[np.uint8]]:
-    """Yield the pictures of the present step, shape (height, width, 3)."""
+    """Yield the frames of the present step, shape (height, width, 3)."""
     try:
         rendered: object = env.render()
     except gym.error.DependencyNotInstalled as error:

@@ -25,12 +25,12 @@ NOTE = (
     " time of sensing, choosing, physics and learning."
 )
 MEASURE_END = ("decisions", "us/decision")
-"""Header of the last `measure_cells`."""
+"""Header of the last two cells that `measure_cells` returns."""
 
 
 @dataclass(frozen=True)
 class WrittenReport:
-    """The outcome of the trials, and what was written of them: page, files, JSON's content."""
+    """A written report: the outcome of its trials, its page, its files, and the JSON's content."""
 
     outcome: TrialsOutcome
     page: Page | None = None
@@ -40,9 +40,9 @@ class WrittenReport:
 
 @dataclass(frozen=True, kw_only=True)
 class Content:
-    """A report to be written: its page, its table, and files by their names.
+    """A report to be written: its page, the JSON's content, and its files by name.
 
-    ``shown`` are the trials that it is of.
+    ``shown`` are the trials that it describes.
     """
 
     page: Page
@@ -52,13 +52,13 @@ class Content:
 
 
 def require_matplotlib() -> None:
-    """Raise a `PlotUnavailableError` if it is not installed."""
+    """Raise a `PlotUnavailableError` if matplotlib is not installed."""
     if find_spec("matplotlib") is None:
         raise PlotUnavailableError("figures need another package: pip install matplotlib")
 
 
 def describe_call(outcome: TrialsOutcome, seconds: float, shown: Iterable[TrialRecord]) -> str:
-    """Write how a page came about: wall time of the call, processor time of the trials shown."""
+    """Describe the call that made a page: its wall time, processor time of the trials, machine."""
     processor_seconds = sum(record.seconds for record in shown)
     text = f"Processor time of the trials shown: {duration_words(processor_seconds)}."
     n_stored = outcome.n_planned - outcome.n_run
@@ -71,13 +71,13 @@ def describe_call(outcome: TrialsOutcome, seconds: float, shown: Iterable[TrialR
 
 
 def measures_section(names: Iterable[MeasureName], notes: Sequence[str] = ()) -> Section:
-    """Return the section that explains measures, on demand."""
+    """Return the folded section that explains measures."""
     terms = {name.replace("_", " "): MEASURES[name][0] for name in names}
     return Section(folded=[Section(title="What is measured", notes=[NOTE, *notes], terms=terms)])
 
 
 def settings_section(results: Iterable[tuple[str, CaseResult]]) -> Section:
-    """Return the section of what fixes the rows of results, each with a title."""
+    """Return the folded section with settings, versions and seeds of each titled result."""
     folded = [
         Section(
             title=f"{title} · configuration {result.config_hash}",
@@ -93,7 +93,10 @@ def settings_section(results: Iterable[tuple[str, CaseResult]]) -> Section:
 
 
 def measure_cells(result: CaseResult, names: Iterable[MeasureName]) -> tuple[str, ...]:
-    """Write the medians of measures, then `MEASURE_END`; what a result lacks is ``"-"``."""
+    """Return a row of cells: the medians of measures, decisions, and microseconds of each.
+
+    Measures that the result lacks are ``"-"``.
+    """
     medians, last = result.medians, result.last_episode
     cells = (format_estimate(medians.get(name), name, last) for name in names)
     return *cells, f"{result.n_decisions:,}", f"{result.microseconds_per_decision:.1f}"
@@ -103,9 +106,9 @@ def format_estimate(
     estimate: Estimate | None, measure: MeasureName = "final_share_solved",
     last_episode: int | None = None, sign: str = "",
 ) -> str:  # fmt: skip
-    """Write an estimate with its interval, or ``"-"``; what is censored becomes ``>last_episode``.
+    """Write an estimate with its interval; ``"-"`` without one, ``>last_episode`` if censored.
 
-    By default it is a share. A return has two digits of its interval, everything else one decimal.
+    Shares are in percent. Returns have two significant digits of the interval, others a decimal.
 
     >>> format_estimate(Estimate(120.0, 90.0, math.inf), "episodes_to_learn", 15000)
     '120 [90, >15,000]'

@@ -67,7 +67,7 @@ def episodes_to_learn(episode: ArrayLike, steps: ArrayLike) -> float:
 
 
 def episode_of_collapse(episode: ArrayLike, steps: ArrayLike, window: int = STABLE_WINDOW) -> float:
-    """Return the learning episodes after which the task is not mastered any more.
+    """Return the number of learning episodes after which the task is no longer mastered.
 
     The task is mastered in every run of `window` consecutive test episodes whose median is
     at most `GOOD_STEPS`. The result is the number of learning episodes done before the last test of
@@ -93,7 +93,7 @@ def episode_of_collapse(episode: ArrayLike, steps: ArrayLike, window: int = STAB
 
 
 def final_share_solved(solved: ArrayLike) -> float:
-    """Return the share solved of the last `FINAL_WINDOW` tests, or of all if there are fewer.
+    """Return the share of solved tests among the last `FINAL_WINDOW`, or all if there are fewer.
 
     >>> final_share_solved([False, True, True, True])
     0.75
@@ -102,7 +102,7 @@ def final_share_solved(solved: ArrayLike) -> float:
 
 
 def _medians_of_windows(steps: ArrayLike, window: int) -> FloatArray:
-    """Return the medians of all runs of tests, (n_tests - window + 1,), or (0,)."""
+    """Return the medians of all windows of consecutive tests, (n_tests - window + 1,), or (0,)."""
     numbers = np.asarray(steps, np.float64)
     if numbers.size < window:
         return np.empty(0)
@@ -176,9 +176,9 @@ class TrialMeasures:
         return {name: estimate_median(values) for name, values in self.values.items()}
 
     def uncensored(self, measure: MeasureName, last_episode: int | None = None) -> FloatArray:
-        """Return a measure of each trial, (n_trials,), censored ones as the last episode.
+        """Return a measure of each trial, (n_trials,); censored values become the last episode.
 
-        With another last episode it is as if the trials had ended there.
+        With an earlier ``last_episode``, values are computed as if the trials had ended there.
         """
         values = self.values[measure]
         if measure not in CENSORED_MEASURES:
@@ -225,7 +225,7 @@ class CaseResult(TrialMeasures):
         return 1e6 * seconds / self.n_decisions if self.n_decisions else math.nan
 
     def to_json(self) -> dict[str, object]:
-        """Return it as values that JSON can hold; censored ones are ``">last_episode"``."""
+        """Return the result as values that JSON can hold; censored ones are ``">last_episode"``."""
         last = self.last_episode
         of_median = episodes_to_learn(self.episode, self.quartiles[1])
         return {
@@ -251,7 +251,7 @@ class CaseResult(TrialMeasures):
 def measure(
     title: str, records: Sequence[TrialRecord], names: Iterable[MeasureName] = STEP_MEASURES
 ) -> CaseResult:
-    """Measure the trials of an agent in a case of some title.
+    """Measure the trials of an agent in a case with this title.
 
     Raises ValueError if there are no trials, or if their settings differ.
     """
@@ -271,15 +271,15 @@ def measure(
 
 
 def records_of(results: Iterable[CaseResult]) -> tuple[TrialRecord, ...]:
-    """Return all trials of results, each once, sorted: equal settings share them."""
+    """Return the trials of all results, sorted and without duplicates."""
     records = {record.key: record for result in results for record in result.records}
     return tuple(records[key] for key in sorted(records))
 
 
 def on_equal_terms(name: MeasureName, *measured: TrialMeasures) -> tuple[FloatArray, ...]:
-    """Return a measure of each trial of several, censored where the shortest trials end.
+    """Return a measure of each group's trials, all censored at the end of the shortest trials.
 
-    Otherwise what only lasts longer would seem to differ.
+    Otherwise groups would seem to differ where one only has longer trials.
     """
     last_episode = min(result.last_episode for result in measured)
     return tuple(result.uncensored(name, last_episode) for result in measured)

@@ -33,9 +33,9 @@ from sdnn.agents.q_learning import ValueAgent
 from sdnn.environments.space_kinds import require_same_kind
 from sdnn.environments.types import Data, Env
 from sdnn.runs.config_file import FORMAT, ConfigFile, read_spec
-from sdnn.runs.environment import episode_option, render_modes, takes_episode
+from sdnn.runs.environment import episode_option, has_episode_option, render_modes
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
-from sdnn.runs.settings import BudgetSpec, read
+from sdnn.runs.settings import BudgetSpec, read_table
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.trial import (
@@ -73,7 +73,7 @@ class Goal(BudgetSpec, frozen=True, kw_only=True):
 
 
 class Run(Displayed):
-    """A run in its folder, which `create` and `open` make.
+    """A run in its folder; made by `create` or `open`.
 
     ``spec`` is the specification it was begun with, ``goals`` are those it was given later.
     """
@@ -82,11 +82,11 @@ class Run(Displayed):
         self.folder = folder
         self.spec = spec
         self.goals = tuple(goals)
-        self._checked: TrainingTrial | None = None  # a training that has not begun
+        self._checked: TrainingTrial | None = None  # made by `check`, used by the first `train`
 
     @classmethod
     def create(cls, folder: str | Path, spec: RunSpec) -> Self:
-        """Begin a run: make its folder with its configuration, once all is known to work.
+        """Make the folder of a new run with its configuration, after checking that it can run.
 
         ConfigError, RunError or OSError if it cannot be made (no folder is made then), is there
         already, or cannot be written.
@@ -99,7 +99,7 @@ class Run(Displayed):
             raise RunError(f"{place} is there already, and no run: take another folder")
         run = cls(place, spec)
         run._checked = run._check()
-        weakref.finalize(run, run._checked.close)  # where it is not trained
+        weakref.finalize(run, run._checked.close)  # closes environments if `train` is never called
         place.mkdir(parents=True, exist_ok=True)
         run.write_config()
         return run
@@ -113,7 +113,7 @@ class Run(Displayed):
             raise RunError(f"{place} holds no run: there is no {path}")
         goals = ConfigFile.read(path).values.get("goals", [])
         try:
-            made = [read(Goal, goal) for goal in goals]
+            made = [read_table(Goal, goal) for goal in goals]
         except (ConfigError, TypeError) as error:
             raise ConfigError("goals", f"must be a list of goals: {error}", str(path)) from error
         return cls(place, read_spec(path), made)
@@ -127,11 +127,11 @@ class Run(Displayed):
         }
 
     def check(self) -> None:
-        """Make all that is needed once, to see that it works; ConfigError if not."""
+        """Make environment, agent and training as a check; ConfigError for a wrong setting."""
         self._check().close()
 
     def _check(self) -> TrainingTrial:
-        instruction_set()  # whose variable may be wrong
+        instruction_set()  # raises if the environment variable is wrong
         if not self.spec.protocol.seeded_episodes:
             raise ConfigError(
                 "protocol.seeded_episodes",
@@ -165,7 +165,7 @@ class Run(Displayed):
         elsewhere, or the environment has changed or gives what cannot be learned.
         """
         goal = {"steps": steps, "episodes": episodes}
-        BudgetSpec(**goal)  # refuses what is no goal
+        BudgetSpec(**goal)  # raises for an invalid goal
         with ExitStack() as stack:
             stack.enter_context(self._locked())
             remove_abandoned_files(self.folder)
@@ -200,7 +200,7 @@ class Run(Displayed):
             began_at = training.n_steps
             try:
                 with Interrupts(training.stop, (signal.SIGINT, signal.SIGTERM)) as signals:
-                    if trial.reason != "target":  # reached just before the run was killed
+                    if trial.reason != "target":  # "target": reached just before the run was killed
                         training.run()
             except UnusableStepError as error:
                 n_saved, resume = checkpoints.n_saved or began_at, resume_command(self.folder)
@@ -221,7 +221,7 @@ class Run(Displayed):
         evaluations = [row for row in self.rows() if row["kind"] == "evaluation"]
         has_report = isinstance(agent, ValueAgent) and not agent.is_warming_up
         single = env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env
-        assert isinstance(single, gym.Env)  # as a specification makes it
+        assert isinstance(single, gym.Env)
         threshold = single.spec.reward_threshold if single.spec else None
         last = evaluations[-1] if evaluations else None
         return RunOutcome(
@@ -262,26 +262,26 @@ class Run(Displayed):
         return RunEvaluation(**vars(evaluation), is_warming_up=agent.is_warming_up)
 
     def check_spaces(self, agent: AnyAgent, env: Env) -> None:
-        """Check that the environment still is what the agent learned in; RunError if not."""
+        """Check that the environment has the agent's spaces; RunError if it has changed."""
         try:
             require_same_kind(agent, env)
         except ValueError as error:
             raise RunError(f"{self.spec.task} has changed: {error}") from error
 
     def reset_options(self, env: Env) -> Data | None:
-        """Return the options of resets in an evaluation now, if the environment takes any."""
-        if not takes_episode(env):
+        """Return the options of resets in an evaluation at this point of the training, or None."""
+        if not has_episode_option(env):
             return None
         return episode_option(sum(row["kind"] == "episode" for row in self.rows()))
 
     @property
     def fresh_seed(self) -> int:
-        """A root of episodes that the run itself does not have."""
+        """A seed for evaluations whose episodes differ from all episodes of the run."""
         return (self.spec.seed + 2**63) % 2**64
 
     @property
     def key(self) -> TrialKey:
-        """Key of its rows in the store."""
+        """Key of the run's rows in the store."""
         spec = self.spec
         return TrialKey(spec.task, spec.label, 0, spec.seed, spec.config_hash)
 
@@ -305,7 +305,7 @@ class Run(Displayed):
 
     @contextmanager
     def _locked(self) -> Iterator[None]:
-        """Keep other processes from training the same run; a killed one's lock is gone with it."""
+        """Lock the run against training in other processes; a killed process loses its lock."""
         with open_to_append(self.folder / LOCK) as file:
             if lock(file.fileno()) is False:
                 raise RunError(f"{self.folder} is being trained by another process")
@@ -314,7 +314,7 @@ class Run(Displayed):
     def _trial(
         self, callbacks: list[Callback], *, has_goal: bool, repeat_episodes: bool
     ) -> TrainingTrial:
-        """Make the training, from the checkpoint if there is one; its budget is the goal."""
+        """Make the training up to the goal, resumed at the checkpoint if there is one."""
         spec = self.spec
         if self.goals or has_goal:
             spec = spec.replace(budget=spec.budget.replace(target_return=None))
@@ -336,7 +336,7 @@ class Run(Displayed):
             raise RunError(str(error)) from error
 
     def _set_goal(self, training: Training, goal: dict[str, int | None]) -> None:
-        """Note a new goal: in the checkpoint, which is followed, then in the configuration."""
+        """Save a new goal, first in the checkpoint, which decides, then in the configuration."""
         for name, value in goal.items():
             done: int = getattr(training, f"n_{name}")
             if value is not None and value < done:
@@ -364,7 +364,7 @@ class _StoredCheckpoints(CheckpointCallback):
         self._store(training)
 
     def on_row(self, training: Training, row: Row) -> None:
-        """Keep a row, and store those kept where some seconds have passed."""
+        """Collect a row; store the collected rows if `STORE_SECONDS` have passed."""
         self._rows.append(row)
         if time.monotonic() - self._stored_at > STORE_SECONDS:
             self._store(training)
@@ -399,7 +399,7 @@ class _StoredCheckpoints(CheckpointCallback):
 
 
 def agent_of(folder: Path, *, best: bool = False) -> AnyAgent:
-    """Load the agent of a run, as `Run.agent`, whatever the run's configuration has."""
+    """Load the agent of a run like `Run.agent`, even if the configuration is damaged."""
     if not (folder / CONFIG).exists():
         raise RunError(f"{folder} holds no run: there is no {folder / CONFIG}")
     names = (BEST,) if best else (CHECKPOINT, AGENT)

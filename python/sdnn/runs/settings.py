@@ -46,7 +46,7 @@ _WORDS = {
     "<": "less than",
     "Expected ": "",
 }
-"""Words for those of msgspec's messages."""
+"""Replacements for type names in msgspec's messages."""
 
 
 class PartSettings(Protocol):
@@ -57,7 +57,7 @@ class PartSettings(Protocol):
 
 @dataclasses.dataclass(frozen=True)
 class PresetSettings:
-    """Stands for the settings of an agent's preset."""
+    """Placeholder for the settings of an agent's preset."""
 
 
 def doc(text: str) -> Meta:
@@ -77,12 +77,12 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     def __post_init__(self) -> None:
         for name, kind in _kinds_of(type(self)).items():
             value = getattr(self, name)
-            made = checked(kind, value, name)
+            made = convert_value(kind, value, name)
             if made is not value:
                 msgspec.structs.force_setattr(self, name, made)
 
     def replace(self: AnySettings, **changes: object) -> AnySettings:
-        """Return a copy with other values of some fields, checked as a new one."""
+        """Return a copy with other values of some fields, which are checked."""
         return type(self)(**{**msgspec.structs.asdict(self), **changes})
 
 
@@ -90,13 +90,13 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 def _kinds_of(kind: type[object]) -> Mapping[str, Any]:
     try:
         hints = typing.get_type_hints(kind, include_extras=True)
-    except (NameError, TypeError):  # an agent from elsewhere: its values are taken as they are
+    except (NameError, TypeError):  # annotations of a user's agent: accept any value
         hints = {}
     return {name: hints.get(name, Any) for name in names_of(kind)}
 
 
 def schemas_of(*kinds: object) -> Values:
-    """Return the JSON Schemas of classes and of those in them, by name, as ``#/$defs/`` refers."""
+    """Return the JSON Schemas of classes and their nested classes, by name."""
     _, schemas = msgspec.json.schema_components(
         kinds, ref_template="#/$defs/{name}", schema_hook=lambda _: {"type": "object"}
     )
@@ -110,13 +110,13 @@ def names_of(kind: type[Any]) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(kind) if field.init)
 
 
-def checked(kind: object, value: object, key: str) -> Any:
-    """Return a value as its type has it: arrays as tuples, 1 as 1.0, tables as settings.
+def convert_value(kind: object, value: object, key: str) -> Any:
+    """Convert a value to a type: arrays to tuples, 1 to 1.0, tables to settings.
 
-    ConfigError if it does not fit.
+    ConfigError if that is impossible.
     """
     if _alternatives(kind) == (PartSettings,):
-        return value  # which follows from the agent: see `changed`
+        return value  # the agent decides about the type: see `with_changes`
     if isinstance(value, np.generic | np.ndarray):
         if isinstance(value, np.ma.MaskedArray) or value.dtype.kind not in "biufU":
             raise ConfigError(key, f"must be numbers or texts, got {shown(value)}")
@@ -124,13 +124,13 @@ def checked(kind: object, value: object, key: str) -> Any:
     if isinstance(value, Mapping):
         for form in _alternatives(kind):
             if isinstance(form, type) and issubclass(form, Settings):
-                return read(form, value, key)
+                return read_table(form, value, key)
             if get_origin(form) is dict:
                 for name, item in value.items():
-                    checked(get_args(form)[1], item, f"{key}.{name}")
+                    convert_value(get_args(form)[1], item, f"{key}.{name}")
     try:
         made = msgspec.convert(value, kind)
-    except (msgspec.ValidationError, UnicodeEncodeError) as error:  # any bytes of a command line
+    except (msgspec.ValidationError, UnicodeEncodeError) as error:  # a command line has any bytes
         text, _, path = str(error).partition(" - at `$")
         problem = _problem(_alternatives(kind) if not path else (), text)
         raise ConfigError(key + path[:-1], f"{problem}, got {shown(value)}") from None
@@ -140,7 +140,7 @@ def checked(kind: object, value: object, key: str) -> Any:
 
 
 def _alternatives(kind: object) -> tuple[object, ...]:
-    """Return the types of a union, or the only one, without annotations."""
+    """Return the members of a union, or the type itself, without `Annotated`."""
     origin, inner = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return _alternatives(inner[0])
@@ -163,7 +163,7 @@ def _problem(possible: Iterable[object], text: str) -> str:
 def check_names(
     values: object, possible: Iterable[str], where: str = "", hint: str = ""
 ) -> Mapping[str, Any]:
-    """Return a table, if it has no other keys than the possible ones; else ConfigError."""
+    """Check that a table has only possible keys, and return it; ConfigError if not."""
     if not isinstance(values, Mapping):
         raise ConfigError(where, f"must be a table, got {shown(values)}")
     known = tuple(possible)
@@ -175,10 +175,10 @@ def check_names(
     return values
 
 
-def read(kind: type[AnySettings], values: object, where: str = "") -> AnySettings:
-    """Make settings of a table as JSON or TOML has it, with the tables in it.
+def read_table(kind: type[AnySettings], values: object, where: str = "") -> AnySettings:
+    """Make settings from a table of JSON or TOML, including its nested tables.
 
-    What is missing has its default; ``where`` is the table's key. ConfigError if a key is unknown
+    Missing keys have their defaults; ``where`` is the table's key. ConfigError if a key is unknown
     or missing, or a value does not fit.
     """
     values = check_names(values, kind.__struct_fields__, where)
@@ -191,12 +191,12 @@ def read(kind: type[AnySettings], values: object, where: str = "") -> AnySetting
         raise ConfigError(_path(where, error.key), error.problem, error.place) from error
 
 
-def changed(base: AnyPart, values: object, where: str, hint: str = "") -> AnyPart:
-    """Return settings of an agent's part with the values of a table, whose key is ``where``.
+def with_changes(base: AnyPart, values: object, where: str, hint: str = "") -> AnyPart:
+    """Return settings of an agent's part with the values of a table replaced.
 
-    They are those of the core, which check themselves, or a frozen dataclass. Such settings may be
-    given instead. ConfigError if a key is unknown, follows from others, or a value does not fit;
-    ``hint`` ends one about unknown keys.
+    ``where`` is the table's key. ``base`` is of a class of the core, which checks its values, or a
+    frozen dataclass. ``values`` of its class are returned unchanged. ConfigError if a key is
+    unknown, follows from others, or a value does not fit; ``hint`` is added for unknown keys.
     """
     if isinstance(values, type(base)):
         return values
@@ -209,10 +209,12 @@ def changed(base: AnyPart, values: object, where: str, hint: str = "") -> AnyPar
     values = check_names(values, [name for name in names if name != "n_inputs"], where, hint)
     if not fields_of(type(base)):
         kinds = _kinds_of(base.__class__)
-        values = {name: checked(kinds[name], v, f"{where}.{name}") for name, v in values.items()}
+        values = {
+            name: convert_value(kinds[name], v, f"{where}.{name}") for name, v in values.items()
+        }
     try:
         return dataclasses.replace(base, **values)
-    except Exception as error:  # of whatever settings an agent has
+    except Exception as error:  # settings of a user's agent may raise anything
         name, problem = blamed(error)
         raise ConfigError(f"{where}.{name}" if name in names else where, problem) from error
 
@@ -220,7 +222,7 @@ def changed(base: AnyPart, values: object, where: str, hint: str = "") -> AnyPar
 def differences(
     values: Mapping[str, object], defaults: Mapping[str, object], always: Collection[str] = ()
 ) -> Values:
-    """Return the values, also in tables, that are not the default, and some by their names.
+    """Return the values that differ from the default, also in tables; ``always`` keeps names.
 
     Examples
     --------
@@ -238,8 +240,8 @@ def differences(
     return changes
 
 
-def changed_size(approximator: PartSettings, n_inputs: int) -> PartSettings:
-    """Return the settings of an approximator with a number of inputs, if it has that field."""
+def with_n_inputs(approximator: PartSettings, n_inputs: int) -> PartSettings:
+    """Return the settings of an approximator with ``n_inputs`` replaced, if it has that field."""
     if "n_inputs" not in names_of(type(approximator)):
         return approximator
     return dataclasses.replace(approximator, n_inputs=n_inputs)
@@ -406,7 +408,7 @@ KEYS_BY_NAME = {"environment": "environment", "agent": "agent", "seed": "seed"} 
     for kind in kinds
     for name in names_of(kind)
 }
-"""The keys of a specification, with dots between tables, by their last names."""
+"""The keys of a specification, with dots between tables, by their last part."""
 
 _REPLACED = {
     "budget.steps": "budget.episodes",
@@ -415,11 +417,11 @@ _REPLACED = {
     "protocol.evaluate_every_episodes": "protocol.evaluate_every",
     "agent.name": "agent.preset",
 }
-"""Keys of a file that an option replaces besides its own."""
+"""A key of a file that is removed when an option sets another key, since both conflict."""
 
 
 def overridden(values: Mapping[str, object], options: Mapping[str, object]) -> Values:
-    """Return the values of a file with the options, by dotted keys, in their place."""
+    """Return the values of a file with those of options, by dotted keys, in their place."""
     made: Values = copy.deepcopy(dict(values))
     for name, key in SHORTHANDS.items():
         if isinstance(made.get(name), str):

@@ -18,7 +18,12 @@ from sdnn.config import ProtocolConfig
 from sdnn.environments.sensors import NoiseStream
 from sdnn.environments.space_kinds import flat_bounds
 from sdnn.environments.types import Env
-from sdnn.runs.environment import EnvironmentSpec, SeedFirstReset, episode_option, takes_episode
+from sdnn.runs.environment import (
+    EnvironmentSpec,
+    SeedFirstReset,
+    episode_option,
+    has_episode_option,
+)
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.settings import (
     DEFAULT_AGENT,
@@ -31,12 +36,12 @@ from sdnn.runs.settings import (
     ProtocolSpec,
     Settings,
     Values,
-    changed,
-    changed_size,
     differences,
     doc,
     names_of,
-    read,
+    read_table,
+    with_changes,
+    with_n_inputs,
 )
 from sdnn.runs.trial import TrainingTrial, Trial, canonical_json, config_hash
 from sdnn.support.arguments import blamed, shown
@@ -45,7 +50,7 @@ from sdnn.training.interfaces import Learner
 DEFAULT_STEPS, DEFAULT_INTERVAL = 200_000, 10_000
 
 _ALWAYS = ("id", "name", "preset", "steps", "episodes")
-"""Settings that are written also where they are the default."""
+"""Settings that are written even if they have the default value."""
 
 _OPTIONAL = (
     "observation_range", "angles", "angle_pairs", "inputs", "warm_up_steps", "missing", "history",
@@ -111,7 +116,7 @@ class RunSpec(Settings, frozen=True):
             base: PartSettings = getattr(defaults, name)
             value: object = getattr(self, name)
             is_preset = value is None or isinstance(value, PresetSettings)
-            self._set(**{name: base if is_preset else changed(base, value, name, hint)})
+            self._set(**{name: base if is_preset else with_changes(base, value, name, hint)})
         pairs = "none" if self.environment.changes_observations else defaults.angle_pairs
         agent = self.agent
         self._set(
@@ -124,14 +129,14 @@ class RunSpec(Settings, frozen=True):
         )
 
     def _chosen_agent(self) -> tuple[AgentEntry, str | None]:
-        """Return the agent and the preset; a name such as ``"sdnn-c-robust"`` has both."""
+        """Return the agent's entry and preset; a name such as ``"sdnn-c-robust"`` has both."""
         label, preset = self.agent.name or DEFAULT_AGENT, self.agent.preset
         try:
             name, named = split_label(label)
         except ValueError as error:
             if not self.environment.imported():
                 raise ConfigError("agent.name", blamed(error)[1]) from None
-            return self._chosen_agent()  # which the environment's module may have registered
+            return self._chosen_agent()  # the environment's module may have registered the agent
         if named is not None and preset not in (None, named):
             raise ConfigError("agent.preset", f"must be that of {label!r}, got {shown(preset)}")
         return agent_entry(name), named or preset
@@ -178,7 +183,7 @@ class RunSpec(Settings, frozen=True):
 
     @property
     def entry(self) -> AgentEntry:
-        """The agent as it is registered."""
+        """The agent's entry in the registry."""
         return agent_entry(self.agent.name or "")
 
     @property
@@ -201,12 +206,12 @@ class RunSpec(Settings, frozen=True):
         paper = self.environment.paper_settings()
         return {
             **paper._asdict(),
-            "approximator": changed_size(self.approximator, paper.sensors.n_inputs),
+            "approximator": with_n_inputs(self.approximator, paper.sensors.n_inputs),
             "learning": self.learning,
         }
 
     def core_trial(self) -> Trial:
-        """Make the trial in C++: the rows of the training loop, bit for bit.
+        """Make the trial in C++, whose rows equal those of the training loop bit for bit.
 
         It releases the GIL while it advances. ValueError if a value is out of its range, or if it
         is not `is_compiled`.
@@ -229,7 +234,7 @@ class RunSpec(Settings, frozen=True):
         return self.budget.episodes or self.budget.steps or 0
 
     def make_trial(self, seed: int) -> Trial | TrainingTrial:
-        """Make the trial of a seed: in C++ if that can do the whole run, else a training.
+        """Make the trial of a seed: in C++ if `is_compiled`, else a training in Python.
 
         ConfigError if environment or agent cannot be made; ValueError if a value is out of range.
         """
@@ -258,12 +263,12 @@ class RunSpec(Settings, frozen=True):
             if self.is_evaluated:
                 try:
                     evaluation_env = self.make_env("evaluation_sensor_noise")
-                except ConfigError as error:  # there may be one robot only
+                except ConfigError as error:  # a robot has no second environment for evaluations
                     problem = f"needs a second environment, or must be 0: {error.problem}"
                     raise ConfigError("protocol.evaluate_every", problem) from error
                 environments.callback(evaluation_env.close)
             single: Env = env.envs[0] if isinstance(env, SyncVectorEnv) else env
-            options = episode_option if takes_episode(single) else None
+            options = episode_option if has_episode_option(single) else None
             if options is not None and protocol.n_envs > 1:
                 problem = f"must be 1: resets of {self.task} take the number of the episode"
                 raise ConfigError("protocol.n_envs", f"{problem}, got {protocol.n_envs}")
@@ -306,7 +311,7 @@ class RunSpec(Settings, frozen=True):
         return env if self.protocol.seeded_episodes else SeedFirstReset(env, self.seed)
 
     def make_training_env(self) -> Env | SyncVectorEnv:
-        """Make what the agent learns in, as `make_env`, or a vector of ``protocol.n_envs``."""
+        """Make the environment to learn in, or a vector of ``protocol.n_envs`` environments."""
         n_envs = self.protocol.n_envs
         return self.make_env() if n_envs == 1 else SyncVectorEnv([self.make_env] * n_envs)
 
@@ -320,7 +325,7 @@ class RunSpec(Settings, frozen=True):
         shape = env.observation_space.shape
         is_agent = _is_class_of(entry.agent, Agent)
         if not is_agent and shape is not None and len(shape) == 1:
-            approximator = changed_size(approximator, shape[0])  # others find it out themselves
+            approximator = with_n_inputs(approximator, shape[0])  # others count inputs themselves
         try:
             agent = entry.agent(
                 env.observation_space,
@@ -348,7 +353,7 @@ class RunSpec(Settings, frozen=True):
             arguments |= {"angle_pairs": self.agent.angle_pairs, "inputs": self.agent.inputs}
         if not environment.ranges:
             return arguments
-        if environment.has_other_sensors:  # given ranges are the space's then
+        if environment.has_other_sensors:  # the ranges are then the bounds of the space
             return {"observation_range": flat_bounds(env.observation_space), **arguments}
         if "observation_range" in arguments:
             problem = "must not be given together with agent.observation_range"
@@ -356,7 +361,7 @@ class RunSpec(Settings, frozen=True):
         return {**arguments, "observation_range": environment.ends(env)}
 
     def refusal(self, error: Exception) -> ConfigError:
-        """Return an error as one about the setting that it names, or about the task."""
+        """Convert an error to a ConfigError about the setting that it names, or about the task."""
         if isinstance(error, ConfigError):
             return error
         name, problem = blamed(error)
@@ -368,46 +373,46 @@ class RunSpec(Settings, frozen=True):
         return ConfigError("environment.id", str(error) or type(error).__name__)
 
     def values(self) -> Values:
-        """Return what is not the default as JSON has it; `from_values` reads it.
+        """Return the values that differ from the defaults, for JSON; `from_values` reads them.
 
-        The settings of the agent's parts are those that differ from its preset.
+        Settings of the agent's parts are compared with its preset.
         """
         defaults = RunSpec(
             environment=EnvironmentSpec(id=self.task),
             agent=AgentSpec(name=self.agent.name, preset=self.agent.preset),
         )
         values = differences(self.full_values(), defaults.full_values(), _ALWAYS)
-        for name in ("agent", "budget", "protocol"):  # None: as it follows from others
+        for name in ("agent", "budget", "protocol"):  # None: the value follows from others
             table = values.get(name, {})
             values[name] = {key: value for key, value in table.items() if value is not None}
         return {name: value for name, value in values.items() if value != {}}
 
     def full_values(self) -> Values:
-        """Return all values as JSON has them."""
+        """Return all values, for JSON."""
         values: Values = msgspec.to_builtins(self)
         values["approximator"].pop("n_inputs", None)
         return values
 
     @classmethod
     def from_values(cls, values: Mapping[str, object]) -> RunSpec:
-        """Make it of values as JSON or TOML has them.
+        """Make a specification from values of JSON or TOML.
 
         ``environment`` may be the id of one, and ``agent`` the name of one, perhaps with a preset:
         ``"sdnn-c-robust"``.
 
         ConfigError if a key is unknown or missing, or a value cannot be used.
         """
-        return read(cls, values)
+        return read_table(cls, values)
 
     def canonical_json(self) -> str:
-        """Return what fixes the rows but the seed, as one line of JSON: sorted keys, 1 for 1.0.
+        """Return all settings that fix the rows, except the seed, as one line of JSON.
 
-        Presets are resolved, so equal settings give equal text however they were typed. With the
-        agent's version, where its entry has one.
+        Presets are resolved and keys sorted, so equal settings give equal text however they were
+        typed. The text includes the version of the agent's entry, if any.
         """
         values = self.full_values()
         del values["seed"], values["output"], values["agent"]["preset"]
-        if self.agent.history == "none":  # as before there was any other
+        if self.agent.history == "none":  # keeps the text of versions without this setting
             del values["agent"]["history"]
         if version := self.entry.version:
             values["agent"]["version"] = version

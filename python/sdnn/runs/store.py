@@ -32,13 +32,13 @@ Rows = TypeVar("Rows")
 STORE_NAME = "results.sqlite"
 SCHEMA_VERSION = 6
 APPLICATION_ID = int.from_bytes(b"sdnn", "big")
-"""Marks a SQLite file as ours (SQLite's header field of that name)."""
+"""Value of SQLite's header field ``application_id`` in files of this library."""
 MOST_BYTES = 2**37
-"""Largest file; SQLite's check of it needs a bit for each page."""
+"""Largest file: SQLite's integrity check needs memory, a bit for each page."""
 
 MOST_BYTES_OF_VALUE = 2**24
 """Longest text in the file."""
-MOST_MEASUREMENTS = 10**5  # a report has some hundreds
+MOST_MEASUREMENTS = 10**5  # a report has only some hundreds
 _SCHEMA = files("sdnn.runs").joinpath("schema.sql").read_text("utf-8")
 
 _KEY = "case_id = ? AND agent = ? AND trial = ? AND seed = ? AND config_hash = ?"
@@ -68,19 +68,19 @@ class _Run(NamedTuple):
 
     @property
     def key(self) -> TrialKey:
-        """Its key, whose seed has no sign."""
+        """The key of the run, with the seed as an unsigned number."""
         key = TrialKey(*self[1:6])
         return key._replace(seed=key.seed % 2**64)
 
 
 class ResultStore(AbstractContextManager["ResultStore"]):
-    """The result file of a folder, made if it is not there; with ``read_only``, nothing is made.
+    """The result file of a folder, created if missing; with ``read_only``, nothing is written.
 
-    What is read is checked: the tables are those of this version, every value has its column's
-    type and the checksum beside it, and a configuration has its hash.
+    Everything read is checked: the schema is that of this version, values have the type of their
+    column, rows match the stored checksum, and configurations match their hash.
 
     StoreError if the folder is a file, or the file in it is a link, damaged, of another program or
-    of another version of this one's schema. Such a file is left as it is.
+    of another version of the schema. Such a file is left unchanged.
     """
 
     def __init__(self, folder: str | Path, *, read_only: bool = False) -> None:
@@ -88,7 +88,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         self.path = folder / STORE_NAME
         if folder.exists() and not folder.is_dir():
             raise StoreError(f"the output must be a folder, but {folder} is a file")
-        self._hashes: dict[int, Hash] = {}  # of the rows of runs in progress
+        self._hashes: dict[int, Hash] = {}  # hashes of the rows of runs in progress, by run
         with as_store_error(self.path), ExitStack() as on_error:
             if not read_only:
                 folder.mkdir(parents=True, exist_ok=True)
@@ -102,7 +102,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
                     return
                 recovered.close()
                 with closing(connect(self.path)) as connection:
-                    connection.execute("PRAGMA user_version").fetchone()  # which rolls back
+                    connection.execute("PRAGMA user_version").fetchone()  # rolls back a journal
             is_new = _inspect(self.path)
             if read_only and not is_new:
                 self._connection = connect(self.path, read_only=True)
@@ -113,7 +113,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             on_error.pop_all()
 
     def _recovered(self) -> sqlite3.Connection | None:
-        """Return a copy in memory without the transaction that a killed process left, if it did."""
+        """Return a copy in memory with an unfinished transaction rolled back; None without one."""
         journal, log = (self.path.with_name(self.path.name + end) for end in ("-journal", "-wal"))
         if is_there(log):
             raise sqlite3.DatabaseError(f"there is a log of another program, {log.name}")
@@ -141,7 +141,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("PRAGMA foreign_keys = ON")
         if is_new:
-            # A single transaction: a killed process leaves an empty file or a whole schema.
+            # In a single transaction, a killed process leaves an empty file or the whole schema.
             try:
                 connection.executescript(
                     f"BEGIN IMMEDIATE; {_SCHEMA} PRAGMA application_id = {APPLICATION_ID};"
@@ -160,7 +160,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         self._connection.close()
 
     def add(self, record: TrialRecord, *, is_exact: bool = True) -> None:
-        """Store a finished trial, or finish a run in progress, as a whole or not at all.
+        """Store a finished trial, or finish a run in progress, in one transaction.
 
         Storing the same trial again (after another process) changes nothing. With
         ``is_exact``, as for compiled trials, it must have the same rows each time.
@@ -214,7 +214,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             return TrialRows(np.zeros(0, ROW))
 
     def keys(self, *, unfinished: bool = False) -> set[TrialKey]:
-        """Return the keys of all finished trials, and if wanted of those in progress."""
+        """Return the keys of all finished trials; with ``unfinished``, also of runs in progress."""
         with as_store_error(self.path):
             return {run.key for run in self._runs() if unfinished or run.finished_at is not None}
 
@@ -287,7 +287,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         return run
 
     def _update(self, run: _Run) -> None:
-        """Store what may change of a run, as it will be read again: np.float64 as float."""
+        """Update the columns of a run that may change, in SQLite's types: np.float64 as float."""
         run = run._replace(n_decisions=int(run.n_decisions), seconds=float(run.seconds))
         self._connection.execute(
             "UPDATE runs SET version = ?, n_decisions = ?, seconds = ?, finished_at = ?,"
@@ -310,7 +310,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         return rows
 
     def _hash_before(self, run: _Run, first: int) -> Hash | None:
-        """Return the hash of a run's rows before a number, and remove the others."""
+        """Delete a run's rows from number ``first`` on; return the hash of the remaining rows."""
         hashed = self._hashes.get(run.id)
         later = "FROM rows WHERE run_id = ? AND number >= ?"
         query = f"SELECT count(*) {later}"
@@ -352,7 +352,7 @@ def _crc(values: tuple[object, ...]) -> int:
 
 @lru_cache(maxsize=1024)
 def _problem_of_config(config: str, config_hash: str) -> str:
-    """Say what is wrong with a configuration, or nothing."""
+    """Return the problem of a stored configuration, or ""."""
     if hash_of(config) != config_hash:
         return "config does not have the hash beside it, config_hash"
     try:
@@ -363,14 +363,14 @@ def _problem_of_config(config: str, config_hash: str) -> str:
 
 
 def _stored(key: TrialKey) -> TrialKey:
-    """Return a key as it is stored: SQLite's integers have a sign."""
+    """Return a key with the seed as a signed integer, the only integers that SQLite stores."""
     return key._replace(seed=key.seed - 2**64 if key.seed >= 2**63 else key.seed)
 
 
 def _inspect(path: Path) -> bool:
-    """Return whether the file has yet to be made; refuse damaged and foreign ones.
+    """Return whether the file is missing or empty; StoreError if it is damaged or foreign.
 
-    It stays as it is, to the byte.
+    The file is not changed.
     """
     if not is_there(path) or path.stat().st_size == 0:
         return True
@@ -385,7 +385,7 @@ def _inspect(path: Path) -> bool:
         version = connection.execute("PRAGMA user_version").fetchone()[0]
         objects = _objects(connection)
         if application_id == 0 and not objects:
-            return True  # killed before the schema was written
+            return True  # the process was killed before it wrote the schema
         if application_id != APPLICATION_ID:
             raise StoreError(
                 f"{path} is a SQLite file of another program; choose another output folder"
@@ -416,7 +416,7 @@ def _own_objects() -> set[tuple[str | None, ...]]:
 
 
 def connect(path: Path | None, *, read_only: bool = False) -> sqlite3.Connection:
-    """Open a file, or a database in memory, in which nothing but its data counts."""
+    """Open a file, or a database in memory, with SQLite's protection against hostile schemas."""
     place = ":memory:"
     if path is not None:
         place = f"{path.absolute().as_uri()}?mode={'ro' if read_only else 'rwc'}"
@@ -436,7 +436,7 @@ def connect(path: Path | None, *, read_only: bool = False) -> sqlite3.Connection
 
 @contextmanager
 def as_store_error(path: Path) -> Iterator[None]:
-    """Turn errors of SQLite and the file system into one that names the file."""
+    """Turn errors of SQLite and the file system into a StoreError that names the file."""
     try:
         yield
     except MemoryError as error:

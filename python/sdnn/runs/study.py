@@ -31,7 +31,7 @@ from sdnn.support.arguments import whole
 from sdnn.support.toml import KeyPath
 
 MIN_TRIALS_TO_DIFFER = 6
-"""Fewer paired trials are all on one side by chance more often than once in twenty times."""
+"""With fewer pairs, all differences have the same sign by chance in over 5 % of the cases."""
 
 
 class Setting(NamedTuple):
@@ -42,7 +42,7 @@ class Setting(NamedTuple):
 
 
 Layer: TypeAlias = dict[tuple[str, ...], Setting]
-"""Settings by their names: ``("learning", "discount")``."""
+"""Settings by the parts of their keys, such as ``("learning", "discount")``."""
 
 Pair: TypeAlias = tuple[str, str]
 """Ids of a case and of a variant."""
@@ -52,7 +52,7 @@ Pair: TypeAlias = tuple[str, str]
 class StudyCase:
     """A task, with settings that override those of the base and of the agent."""
 
-    id: str  # the word used in the result file; seeds are derived from it
+    id: str  # name in the result file; seeds are derived from it
     title: str
     settings: Layer = field(default_factory=dict)
     where: KeyPath = ()
@@ -66,12 +66,12 @@ class StudyVariant:
     title: str
     settings: Layer = field(default_factory=dict)
     where: KeyPath = ()
-    case_settings: Mapping[str, Layer] = field(default_factory=dict)  # override even these
-    only: tuple[str, ...] = ()  # ids of the cases in which it runs; none: all
+    case_settings: Mapping[str, Layer] = field(default_factory=dict)  # overrides by case id
+    only: tuple[str, ...] = ()  # ids of the cases in which it runs; empty: all
 
 
 class Combination(NamedTuple):
-    """A variant in a case, what is run of it, and the settings that made it."""
+    """A variant in a case: the specification that is run, and the settings that made it."""
 
     case: StudyCase
     variant: StudyVariant
@@ -92,7 +92,7 @@ class Study:
     shown, too. ``cases`` and ``variants`` are in the order in which they are first named.
     """
 
-    source, text = "", ""  # of the file that it is from
+    source, text = "", ""  # name and content of the study's file
 
     def __init__(
         self,
@@ -120,38 +120,38 @@ class Study:
         self.variants = tuple({c.variant.id: c.variant for c in combinations}.values())
 
     def keys(self, case_id: str, variant_id: str) -> tuple[TrialKey, ...]:
-        """List where the results of the trials of a variant in a case are stored."""
+        """Return the keys of the trials of a variant in a case in the store."""
         return tuple(planned.key for planned in self.combinations[case_id, variant_id].trials)
 
     def variants_of(self, key: TrialKey) -> tuple[str, ...]:
-        """List the ids of the variants that a trial is of."""
+        """Return the ids of the variants that a trial belongs to: equal variants share trials."""
         return tuple(variant for case, variant in self.pairs if key in self.keys(case, variant))
 
     def plan(self) -> tuple[PlannedTrial, ...]:
-        """List the trials of `pairs`, each once.
+        """Return the trials of `pairs`, without duplicates.
 
-        The first trial of each comes first, so an interrupted run covers all evenly.
+        The first trials of all variants come first, so an interrupted run covers all evenly.
         """
         rounds = zip(*(self.combinations[pair].trials for pair in self.pairs), strict=True)
         return tuple({trial.key: trial for trials in rounds for trial in trials}.values())
 
     def other_work(self, out: Path) -> dict[str, object]:
-        """Count what is asked for besides trials, as values that JSON can hold."""
+        """Return counts of work other than trials, such as measurements, as values for JSON."""
         return {}
 
     def measure(self, store: ResultStore, observe: Observer) -> None:
-        """Measure and store what is asked for besides trials."""
+        """Do and store the work other than trials, such as measurements."""
 
     def report(self, comparison: Comparison, store: ResultStore) -> Content | None:
-        """Make the report of what is complete; None if there is nothing."""
+        """Make the report of the complete parts; None if nothing is complete."""
         return None
 
     def file_name(self, name: str) -> str:
-        """Return the name of a file of the report in a folder that others share."""
+        """Return the name of a file of the report, unique in a folder shared by studies."""
         return name
 
     def copies(self) -> dict[str, str]:
-        """Map each variant that is the same as an earlier one in every case to the first such."""
+        """Map each variant that equals an earlier one in every case to the first equal one."""
         hashes: dict[str, list[TrialKey]] = {variant.id: [] for variant in self.variants}
         for case, variant in self.combinations:
             hashes[variant].append(self.keys(case, variant)[0])
@@ -160,9 +160,9 @@ class Study:
         return {name: first for name, first in first_of.items() if first != name}
 
     def check(self, stored: Collection[TrialKey] = ()) -> None:
-        """Make a trial of every specification once, so that nothing is run that could not be.
+        """Make a trial of every specification, so that an impossible one is found before any runs.
 
-        Those of which all trials are stored are not tried. ConfigError that names the place of the
+        Specifications whose trials are all stored are skipped. ConfigError names the place of the
         setting if one is refused.
         """
         tried: set[str] = set()
@@ -174,13 +174,13 @@ class Study:
             try:
                 with opened(spec.make_trial(first.seed)):
                     _require_comparable(spec)
-            except Exception as error:  # of whatever agent or environment
+            except Exception as error:  # a user's agent or environment may raise anything
                 raise self.refusal(case, variant, settings, spec.refusal(error)) from error
 
     def refusal(
         self, case: StudyCase, variant: StudyVariant, settings: Layer, error: ConfigError
     ) -> ConfigError:
-        """Return the error about a variant in a case, with its place in a file."""
+        """Return the error about a variant in a case, with the file and line of the setting."""
         return error
 
 
@@ -197,7 +197,7 @@ def _require_comparable(spec: RunSpec) -> None:
 
 @dataclass(frozen=True)
 class Measured:
-    """A variant in a case, measured.
+    """The measures of a variant in a case.
 
     `differences` are means over trials of a measure minus that of the reference's trial of the same
     number, with censored values as the last episode of the shorter one; there are none for the
@@ -235,7 +235,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Complete parts of a study, by ids of case and variant: those that have every trial."""
+    """The complete parts of a study, by ids of case and variant: all their trials are stored."""
 
     study: Study
     measured: Mapping[Pair, Measured]
@@ -247,23 +247,23 @@ class Comparison:
 
     @property
     def cases(self) -> tuple[StudyCase, ...]:
-        """Cases of which something is there."""
+        """Cases with at least one complete variant."""
         shown = {case for case, _ in self.measured}
         return tuple(case for case in self.study.cases if case.id in shown)
 
     @property
     def variants(self) -> tuple[StudyVariant, ...]:
-        """Variants of which something is there."""
+        """Variants that are complete in at least one case."""
         shown = {variant for _, variant in self.measured}
         return tuple(variant for variant in self.study.variants if variant.id in shown)
 
     def of_case(self, case_id: str) -> tuple[Measured, ...]:
-        """List what is measured in a case, in the order of the variants."""
+        """Return the measured variants of a case, in the order of the study."""
         return tuple(m for (case, _), m in self.measured.items() if case == case_id)
 
 
 def compare(study: Study, records: Iterable[TrialRecord]) -> Comparison:
-    """Measure every variant of a study in every case of which all trials are among the records."""
+    """Measure each variant in each case of a study whose trials are all among the records."""
     by_key = {record.key: record for record in records}
     results = {}
     for pair, combination in study.combinations.items():
@@ -276,7 +276,7 @@ def compare(study: Study, records: Iterable[TrialRecord]) -> Comparison:
     measured = {}
     for (case, variant), result in results.items():
         reference = None if variant == study.reference else results.get((case, study.reference))
-        # Trials of one number have the same seed.
+        # Trials with the same number have the same seed, so their differences are paired.
         differences = {
             name: estimate_mean(np.subtract(*on_equal_terms(name, result, reference)))
             for name in result.values

@@ -28,10 +28,10 @@ from sdnn.runs.settings import (
     Settings,
     Values,
     check_names,
-    checked,
+    convert_value,
     doc,
     overridden,
-    read,
+    read_table,
 )
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
@@ -41,9 +41,9 @@ from sdnn.support.arguments import advice
 from sdnn.support.toml import KeyPath, dotted
 
 DEFAULT = "default"
-"""The variant that others are compared with unless the file names another, if there is one."""
+"""The variant that others are compared with, if it exists and the file names no other."""
 BASE = "base"
-"""The variant without overrides, where axes are varied one at a time or nothing varies."""
+"""Name of the variant without overrides, if axes vary one at a time or nothing varies."""
 
 MOST_TRIALS = 100_000
 MOST_COMBINATIONS = 5_000
@@ -52,7 +52,7 @@ MOST_SETTINGS = 5_000
 """Most settings of a table."""
 
 _DEPTHS: dict[tuple[str, ...], int] = {("environment", "kwargs"): 4, ("environment", "ranges"): 3}
-"""Parts of the longest keys in tables with any keys; elsewhere keys have two."""
+"""Number of parts of keys in tables whose keys are not fixed; elsewhere keys have two parts."""
 
 
 class StudyHeader(Settings, frozen=True):
@@ -131,7 +131,7 @@ class StudyFile(Study):
         self.file = ConfigFile.read(path)
         self.source, self.text = path.name, self.file.text
         try:
-            self.tables = read(StudyTables, self.file.values)
+            self.tables = read_table(StudyTables, self.file.values)
             header = self.tables.study
             self._import()
             self.base = self._layer((BASE,), self.tables.base)
@@ -186,16 +186,16 @@ class StudyFile(Study):
         return f"{self.file.path.stem}-{name}"
 
     def spec(self, case: StudyCase, variant: StudyVariant) -> tuple[RunSpec, Layer]:
-        """Put the layers of a variant in a case together; returns the settings as well.
+        """Return the specification of a variant in a case, and the merged settings that made it.
 
-        ConfigError if a setting is unknown, has the wrong type or does not go with another.
+        ConfigError if a setting is unknown, has the wrong type or conflicts with another.
         """
         layers = (case.settings, variant.settings, variant.case_settings.get(case.id, {}))
         settings = reduce(or_, (self.base, *layers))
         try:
             label = self._values(case, settings).get("agent", {}).get("name", DEFAULT_AGENT)
             agents: list[Layer] = []
-            with suppress(ValueError):  # of another name, which the specification refuses
+            with suppress(ValueError):  # an unknown agent: the specification raises a clearer error
                 agents = [self.agents.get(name, {}) for name in (split_label(label)[0], label)]
             settings = reduce(or_, (self.base, *agents, *layers))
             return RunSpec.from_values(self._values(case, settings)), settings
@@ -207,7 +207,7 @@ class StudyFile(Study):
         return self.completed(case, overridden({}, values))
 
     def completed(self, case: StudyCase, values: Values) -> Values:
-        """Return the values of a specification with the defaults of its case."""
+        """Return the values of a specification with the defaults of its case filled in."""
         return values
 
     def refusal(
@@ -227,7 +227,7 @@ class StudyFile(Study):
         self, where: KeyPath, table: Mapping[str, object], prefix: tuple[str, ...] = (),
         layer: Layer | None = None,
     ) -> Layer:  # fmt: skip
-        """Read a table of settings: nested, with dotted keys, or with quoted dotted keys."""
+        """Return the settings of a table, whose keys may be nested, dotted, or quoted with dots."""
         layer = {} if layer is None else layer
         for key, value in table.items():
             name, place = (*prefix, *key.split(".")), (*where, key)
@@ -273,6 +273,7 @@ class StudyFile(Study):
             yield agent, layer
 
     def _read_cases(self) -> tuple[StudyCase, ...]:
+        """Return the cases of the file; without any, one for the environment of [base]."""
         tables, listed = self.tables.cases, self.tables.study.cases
         known = list(dict.fromkeys([*tables, *self.known_cases]))
         for number, case_id in enumerate(listed or ()):
@@ -287,7 +288,7 @@ class StudyFile(Study):
         if ids:
             return tuple(map(self._read_case, dict.fromkeys(ids)))
         if ("environment", "id") in self.base:
-            # A place for the only task there is.
+            # A case without settings of its own: [base] has the environment.
             name = str(self.base["environment", "id"].value)
             return (StudyCase(name, name),)
         raise self.file.error(
@@ -300,7 +301,7 @@ class StudyFile(Study):
         where: KeyPath = ("cases", case_id)
         table = dict(self.tables.cases.get(case_id, {}))
         known = self.known_cases.get(case_id, StudyCase(case_id, case_id))
-        title = checked(str, table.pop("title", known.title), dotted((*where, "title")))
+        title = convert_value(str, table.pop("title", known.title), dotted((*where, "title")))
         settings, fixed = self._layer(where, table), known.settings
         for name, setting in settings.items():
             if name in fixed and setting.value != fixed[name].value:
@@ -315,8 +316,8 @@ class StudyFile(Study):
         for name, given in self.tables.variants.items():
             where, table = ("variants", name), dict(given)
             of_cases = dotted((*where, "cases"))
-            tables = checked(dict[str, _Table], table.pop("cases", {}), of_cases)
-            only = checked(tuple[str, ...], table.pop("only", ()), dotted((*where, "only")))
+            tables = convert_value(dict[str, _Table], table.pop("cases", {}), of_cases)
+            only = convert_value(tuple[str, ...], table.pop("only", ()), dotted((*where, "only")))
             for number, case_id in enumerate(only):
                 if case_id not in known:
                     problem = f"no case {case_id!r}; {advice(case_id, known)}"
@@ -326,7 +327,7 @@ class StudyFile(Study):
                 case_id: self._layer((*where, "cases", case_id), table_of_case)
                 for case_id, table_of_case in tables.items()
             }
-            title = checked(str, table.pop("title", name), dotted((*where, "title")))
+            title = convert_value(str, table.pop("title", name), dotted((*where, "title")))
             settings = self._layer(where, table)
             variants[name] = StudyVariant(name, title, settings, where, in_cases, only)
         for variant in self._axis_variants():
@@ -340,7 +341,7 @@ class StudyFile(Study):
         """Make the variants of the axes: the base and every value alone, or all combinations."""
         table = dict(self.tables.axes)
         ways = Literal["one_at_a_time", "product"]
-        combine = checked(ways, table.pop("combine", "one_at_a_time"), "axes.combine")
+        combine = convert_value(ways, table.pop("combine", "one_at_a_time"), "axes.combine")
         axes = self._layer(("axes",), table)
         if not axes:
             return

@@ -50,10 +50,10 @@ SOLVED_NOTE = (
 def run_study(
     study: Study, out: Path, *, executor: Executor | None = None, observer: Observer | None = None
 ) -> WrittenReport:
-    """Run what is missing of a study, then write into a folder everything that is complete.
+    """Run the missing trials of a study, then write the report of its complete parts.
 
-    A variant in a case is complete when all its trials are stored, whether asked for now or not. A
-    trial that raises leaves its variant out of the report and nothing else. There is no report if
+    A variant in a case is complete when all its trials are stored, also by earlier calls. If a
+    trial raises an error, only its variant is missing in the report. There is no report if
     nothing is complete, or the run was interrupted.
 
     RunError before any trial if a configuration is refused, matplotlib is not installed or
@@ -64,7 +64,7 @@ def run_study(
     begin = time.monotonic()
     is_new = not (out / STORE_NAME).exists()
     if is_new:
-        study.check()  # before the folder is made
+        study.check()  # raises before the folder is made
     with ResultStore(out) as store:
         if not is_new:
             study.check(store.keys())
@@ -89,16 +89,15 @@ def run_study(
     return WrittenReport(outcome, content.page, tuple(files), content.table)
 
 
-PROBE_SECONDS = 0.3  # processor time of a probe, about
+PROBE_SECONDS = 0.3  # approximate processor time of a probe
 
 
 def forecast(study: Study, out: Path, jobs: int) -> dict[str, object]:
-    """Count what is to be run and estimate how long it takes, without making any file.
+    """Count the missing trials and estimate their time, without making any file.
 
-    Returns values that JSON can hold. Estimates from the start of a trial are too low where the
-    task gets harder: later episodes are longer. A RunError says that a configuration is refused,
-    that a trial that is begun to see how long it takes fails, or that the result file cannot be
-    used.
+    Returns values that JSON can hold. Times are estimated from the start of trials: they are too
+    low where later episodes are longer. RunError if a configuration is impossible, the start of a
+    trial raises an error, or the result file cannot be used.
     """
     stored: dict[TrialKey, float] = {}
     if (out / STORE_NAME).exists() or out.is_file():
@@ -106,7 +105,7 @@ def forecast(study: Study, out: Path, jobs: int) -> dict[str, object]:
             stored = store.seconds()
     study.check(stored)
     works: list[dict[str, object]] = []
-    missing: dict[TrialKey, tuple[float, bool]] = {}  # variants that are the same share trials
+    missing: dict[TrialKey, tuple[float, bool]] = {}  # equal variants share trials
     probes: dict[tuple[str, str, bool], tuple[float, int]] = {}
     for pair in study.pairs:
         keys, spec = study.keys(*pair), study.combinations[pair].spec
@@ -147,7 +146,7 @@ def forecast(study: Study, out: Path, jobs: int) -> dict[str, object]:
 
 
 def _probe(planned: PlannedTrial) -> tuple[float, int]:
-    """Run the start of a trial: processor time by its budget's unit, and how many episodes."""
+    """Run the start of a trial; return processor time per step or episode, and episodes run."""
     spec = planned.spec
     try:
         with opened(spec.make_trial(planned.key.seed)) as trial:
@@ -159,15 +158,15 @@ def _probe(planned: PlannedTrial) -> tuple[float, int]:
             n_episodes = int(trial.episode)
             amount = n_episodes if spec.budget.steps is None else int(trial.n_decisions)
             return seconds / amount, n_episodes
-    except Exception as error:  # whatever a trial raises
+    except Exception as error:  # a user's environment may raise anything
         raise RunError(f"{planned.title} fails: {type(error).__name__}: {error}") from error
 
 
 def wall_seconds(trials: list[tuple[float, bool]], jobs: int) -> float:
-    """Estimate the time that passes while trials run, from processor times and who is compiled.
+    """Estimate the wall time of trials from their processor times and whether they are compiled.
 
-    Those that are not share one core however many jobs there are, because they hold Python's lock;
-    no more jobs than cores are any help.
+    Trials in Python share one core whatever the number of jobs, because they hold Python's lock.
+    More jobs than cores do not help.
     """
     times = [seconds for seconds, _ in trials]
     locked = sum(seconds for seconds, is_compiled in trials if not is_compiled)
@@ -179,13 +178,13 @@ Addition: TypeAlias = tuple[Sequence[Section], Mapping[str, object]]
 
 
 def study_content(comparison: Comparison, addition: Addition) -> Content | None:
-    """Make the report of what is complete of a study that was read from a file."""
+    """Make the report of the complete parts of a study that was read from a file."""
     if not comparison.measured:
         return None
     digest, source = records_digest(comparison.records), comparison.study.source
     footer = f"{source}; sdnn {_core.__version__}; digest of the rows {digest[:16]}"
     png, svg = figure_bytes(draw_study(comparison, footer))
-    # Test episodes of variants that are the same come more than once.
+    # Equal variants repeat their test episodes here.
     tests = (
         (variant, *row)
         for (_, variant), measured in comparison.measured.items()
@@ -313,7 +312,7 @@ def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[
 
 
 def trial_table(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
-    """Header and rows of the measures of each trial; what a task does not have is empty."""
+    """Return header and rows with the measures of each trial; measures it lacks are empty."""
     pairs = comparison.measured.items()
     names = list(dict.fromkeys(name for _, pair in pairs for name in pair.result.values))
     header = (

@@ -44,7 +44,7 @@ class TrialKey(NamedTuple):
 
 
 Column: TypeAlias = NDArray[np.int32 | np.float64 | np.bool_]
-"""A column of rows: numbers of evaluations of one episode, or means of larger ones."""
+"""A column with a number for each evaluation: its only episode's, or the mean over episodes."""
 
 HASH_DIGITS = 16
 """Hexadecimal digits kept of a text's SHA-256: 64 bits."""
@@ -88,7 +88,7 @@ solved. ``environment`` is `UNKNOWN` where there is one only.
 UNKNOWN = -1
 
 _COLUMNS = {"episode": "<i4", "length": "<i4", "return": "<f8", "terminated": "u1"}
-"""Columns of test episodes, and the types under which they are hashed."""
+"""Columns of test episodes with the types in which they are hashed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class TrialRows:
     def of_tests(
         cls, episode: ArrayLike, steps: ArrayLike, episode_return: ArrayLike, solved: ArrayLike
     ) -> TrialRows:
-        """Make it from the columns of test episodes, each (n_tests,), of a compiled trial."""
+        """Make rows from the columns of a compiled trial's test episodes, each (n_tests,)."""
         columns = episode, steps, episode_return, solved
         shapes = set(map(np.shape, columns))
         if shapes != {(np.size(episode),)}:
@@ -120,7 +120,7 @@ class TrialRows:
 
     @classmethod
     def from_training(cls, rows: Sequence[Row], first: int = 0) -> TrialRows:
-        """Make it from rows of a `sdnn.agents.Training`, of which the first has this number."""
+        """Make rows from those of a `sdnn.agents.Training`, numbered from ``first`` on."""
         listed: list[tuple[object, ...]] = []
         for number, row in enumerate(rows, first):
             start = (row["kind"], row["episode"], row["step"])
@@ -133,7 +133,7 @@ class TrialRows:
         return cls(np.array(listed, ROW))
 
     def to_training(self) -> list[Row]:
-        """Return the rows that `from_training` received."""
+        """Return the rows in the form of a `sdnn.agents.Training`; inverts `from_training`."""
         rows: list[Row] = []
         starts = np.flatnonzero(self.table["part"] == 0)
         for episode in np.split(self.table, starts[1:]) if len(starts) else []:
@@ -207,7 +207,7 @@ class TrialRows:
         return str(self.hashed().hexdigest())
 
     def hashed(self, before: Hash | None = None) -> Hash:
-        """Return the hash whose digest is `checksum`, of rows that follow hashed ones if given."""
+        """Return the hash whose digest is `checksum`; ``before`` is the hash of earlier rows."""
         sha = hashlib.sha256() if before is None else before.copy()
         sha.update(self.table.astype(ROW.newbyteorder("<")).tobytes())
         return sha
@@ -246,7 +246,7 @@ def records_digest(records: Iterable[TrialRecord]) -> str:
 
 
 def trial_rows(records: Iterable[TrialRecord]) -> Iterator[tuple[object, ...]]:
-    """Yield all test episodes of trials, each once, under `ROW_HEADER`."""
+    """Yield the test episodes of trials without duplicates, as rows under `ROW_HEADER`."""
     for record in records:
         key, rows = record.key, record.rows
         start = (key.case_id, key.agent, key.trial, key.seed, key.config_hash, record.version)
@@ -256,14 +256,14 @@ def trial_rows(records: Iterable[TrialRecord]) -> Iterator[tuple[object, ...]]:
 
 
 Trial: TypeAlias = _core.AcrobotTrial
-"""A compiled trial; the sizes of the pieces in which it advances do not change the outcome."""
+"""A compiled trial; its outcome does not depend on the steps in which it advances."""
 
 _AnyTrial = TypeVar("_AnyTrial")
 
 
 @contextmanager
 def opened(trial: _AnyTrial) -> Iterator[_AnyTrial]:
-    """Close at the end what a trial has open; those in C++ have nothing to close."""
+    """Close a trial's environments at the end of the block; trials in C++ have none."""
     try:
         yield trial
     finally:
@@ -275,7 +275,7 @@ Reason: TypeAlias = Literal["done", "target", "stopped"]
 
 
 def rows_of(trial: Trial | TrainingTrial) -> TrialRows:
-    """Return the rows of a trial so far; of a compiled one, its test episodes."""
+    """Return the rows of a trial so far; compiled trials have rows of test episodes only."""
     if isinstance(trial, TrainingTrial):
         return trial.rows()
     return TrialRows.of_tests(**trial.test_rows())
@@ -332,19 +332,19 @@ class TrainingTrial:
 
     @property
     def done(self) -> int:
-        """Learning episodes or steps done, as its budget counts."""
+        """Learning episodes or steps done, whichever the budget counts."""
         return self.training.n_episodes if self.training.steps is None else self.training.n_steps
 
     @property
     def reason(self) -> Reason:
-        """Why it ended."""
+        """Why the trial ended."""
         if self._target is not None and self._target.is_reached(self.training):
             return "target"
         return "done" if self.training.is_finished else "stopped"
 
     @property
     def finished(self) -> bool:
-        """Whether all is learned, or the target is reached."""
+        """Whether the budget is used up, or the target is reached."""
         return self.reason != "stopped"
 
     @property
@@ -365,5 +365,5 @@ class TrainingTrial:
         return TrialRows.from_training(self.training.rows)
 
     def close(self) -> None:
-        """Close the environments, if they are open still."""
+        """Close the environments, if they are still open."""
         self._environments.close()
