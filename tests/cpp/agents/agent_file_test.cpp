@@ -21,7 +21,7 @@ using Numbers = std::vector<double>;
 
 constexpr std::uint64_t kSeed = 18446744073709551615U;  // the largest there is
 
-ControllerConfig sdnn_config() {
+ControllerConfig small_sdnn() {
   return {.approximator = approximators::SDNNCConfig{.n_pattern_units = 16,
                                                      .n_anchor_patterns = 3,
                                                      .n_interpolated = 3,
@@ -39,15 +39,15 @@ ControllerConfig sdnn_config() {
           .warm_up_steps = 20};
 }
 
-ControllerConfig fuzzy_config() {
-  ControllerConfig config = sdnn_config();
+ControllerConfig small_fuzzy() {
+  ControllerConfig config = small_sdnn();
   config.approximator = approximators::FuzzyRulesConfig{.n_sets = 4, .n_actions = 5};
   config.learning = FuzzyQLearningConfig{.trace_decay = 0.8};
   return config;
 }
 
-ControllerConfig rbf_config() {
-  ControllerConfig config = sdnn_config();
+ControllerConfig small_rbf() {
+  ControllerConfig config = small_sdnn();
   config.approximator = approximators::RBFNetworkConfig{.n_bases = 3, .n_actions = 7};
   return config;
 }
@@ -64,7 +64,7 @@ void learn(Agent& controller, int n_steps) {
 
 TEST(AgentFile, AReadControllerContinuesLikeTheWrittenOne) {
   const testing::Folder folder;
-  for (const ControllerConfig& config : {sdnn_config(), rbf_config(), fuzzy_config()}) {
+  for (const ControllerConfig& config : {small_sdnn(), small_rbf(), small_fuzzy()}) {
     for (const int n_steps : {10, 50}) {  // within the warm-up and after it
       AgentFile file{Controller(config)};
       learn(file.controller, n_steps);
@@ -81,7 +81,7 @@ TEST(AgentFile, AReadControllerContinuesLikeTheWrittenOne) {
 
 TEST(AgentFile, ASavedAgentActsAndLearnsLikeTheController) {
   const testing::Folder folder;
-  AgentFile file{Controller(sdnn_config())};
+  AgentFile file{Controller(small_sdnn())};
   learn(file.controller, 10);
   file.write(folder / "agent");
   SavedAgent saved(folder / "agent");
@@ -97,7 +97,7 @@ TEST(AgentFile, ASavedAgentActsAndLearnsLikeTheController) {
 }
 
 TEST(AgentFile, SettingsAreWrittenWithTheirNamesAndValues) {
-  const json description = AgentFile{Controller(sdnn_config())}.description();
+  const json description = AgentFile{Controller(small_sdnn())}.description();
   EXPECT_EQ(description["class"], "SDNNQLearning");
   EXPECT_EQ(description["kind"], "sdnn-c");
   EXPECT_EQ(description["seed"], kSeed);
@@ -114,15 +114,15 @@ TEST(AgentFile, SettingsAreWrittenWithTheirNamesAndValues) {
   EXPECT_EQ(description["observation"]["adaptive"], true);
   EXPECT_EQ(description["action"]["number"], "float32");
   const auto config = detail::controller_config_in(description);
-  EXPECT_EQ(config.approximator, sdnn_config().approximator);
-  EXPECT_EQ(config.learning, sdnn_config().learning);
-  EXPECT_EQ(config.observation, sdnn_config().observation);
-  EXPECT_EQ(config.action, sdnn_config().action);
+  EXPECT_EQ(config.approximator, small_sdnn().approximator);
+  EXPECT_EQ(config.learning, small_sdnn().learning);
+  EXPECT_EQ(config.observation, small_sdnn().observation);
+  EXPECT_EQ(config.action, small_sdnn().action);
 }
 
 TEST(AgentFile, DataOfATrainingIsKeptWhenAnAgentIsWrittenAgain) {
   const testing::Folder folder;
-  AgentFile{Controller(rbf_config())}.write(folder / "agent");
+  AgentFile{Controller(small_rbf())}.write(folder / "agent");
   core::FileContent content = core::read_file(folder / "agent", {"agent"});
   content.kind = "training";
   content.description["training"] = {{"note", "für später"}};
@@ -141,7 +141,7 @@ TEST(AgentFile, DataOfATrainingIsKeptWhenAnAgentIsWrittenAgain) {
 TEST(AgentFile, RefusesInvalidFieldsByName) {
   const testing::Folder folder;
   const auto path = folder / "agent";
-  AgentFile trained{Controller(sdnn_config())};
+  AgentFile trained{Controller(small_sdnn())};
   learn(trained.controller, 30);
   trained.write(path);
   const core::FileContent good = core::read_file(path, {"agent"});

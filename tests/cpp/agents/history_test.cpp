@@ -140,8 +140,7 @@ TEST(History, AutoSelectsNoneDifferencesOrObserver) {
 }
 
 TEST(History, AnObserverReducesTheErrorOfNoisySensors) {
-  const Mass learned = pushed_mass(1000, 0.05, false, 1),
-             restored = pushed_mass(1000, 0.05, false, 2);
+  const Mass learned = pushed_mass(1000, 0.05, false, 1), fresh = pushed_mass(1000, 0.05, false, 2);
   const HistoryFilter filter = fitted(History::observer, learned.experience);
   EXPECT_LT(filter.gain(), 1.0);
   HistoryFilter::Memory memory;
@@ -150,10 +149,10 @@ TEST(History, AnObserverReducesTheErrorOfNoisySensors) {
     return std::span(rows).subspan(2 * t, 2);
   };
   double of_estimates = 0.0, of_sensors = 0.0;
-  filter.begin(row(restored.experience.states, 0), memory, state);
+  filter.begin(row(fresh.experience.states, 0), memory, state);
   for (std::size_t t = 0; t < 1000; ++t) {
-    const auto sensed = row(restored.experience.next_states, t), exact = row(restored.exact, t);
-    filter.follow(Numbers{restored.experience.actions[0][t]}, sensed, memory, state);
+    const auto sensed = row(fresh.experience.next_states, t), exact = row(fresh.exact, t);
+    filter.follow(Numbers{fresh.experience.actions[0][t]}, sensed, memory, state);
     for (std::size_t i = 0; i < 2; ++i) {
       of_estimates += (state[i] - exact[i]) * (state[i] - exact[i]);
       of_sensors += (sensed[i] - exact[i]) * (sensed[i] - exact[i]);
@@ -268,8 +267,8 @@ TEST(History, GreedyEpisodesHaveASeparateMemory) {
                       controller.state_of(Numbers{0.5, 0.9}).end());
   EXPECT_GT(state[2], 0.5);  // it would have moved up from 0.3
   EXPECT_EQ(state[3], 0.5);
-  core::Random restored = random;
-  EXPECT_EQ(actions_of(controller, random, 50), actions_of(same, restored, 50));
+  core::Random same_random = random;
+  EXPECT_EQ(actions_of(controller, random, 50), actions_of(same, same_random, 50));
 }
 
 }  // namespace

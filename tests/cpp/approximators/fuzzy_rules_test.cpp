@@ -79,6 +79,7 @@ std::string refusal(const FuzzyRulesConfig& config) {
   return testing::message_of<std::length_error>([&] { FuzzyRules rules(config); });
 }
 
+// Each rule has 21 actions of 4 bytes.
 TEST(FuzzyRules, RefuseLargeTablesBeforeTheyAllocateMemory) {
   EXPECT_EQ(
       refusal({.n_inputs = 9}),

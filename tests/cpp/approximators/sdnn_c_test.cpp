@@ -151,13 +151,18 @@ TEST(SDNNC, ParametersCanBeMovedToAnotherNetworkOfTheSameWiring) {
   pupil.set_parameters(weights, thresholds);
   expect_equal_parameters(pupil, teacher);
   EXPECT_EQ(values(pupil, state), values(teacher, state));
+}
 
+TEST(SDNNC, RefusesParametersOfWrongValueOrNumberAndKeepsItsOwn) {
+  Network network(small(), 3);
+  const Network before = network;
+  const std::vector<std::int32_t> thresholds(network.hidden_layer().n_units(), 1);
+  std::vector<std::int32_t> weights(thresholds.size() * network.state_code().n_columns());
   weights.back() = 1 << 20;
-  thresholds.front() += 1;
-  EXPECT_THROW(pupil.set_parameters(weights, thresholds), std::invalid_argument);
-  expect_equal_parameters(pupil, teacher);
+  EXPECT_THROW(network.set_parameters(weights, thresholds), std::invalid_argument);
+  expect_equal_parameters(network, before);
   weights.pop_back();
-  EXPECT_THROW(pupil.set_parameters(weights, thresholds), std::invalid_argument);
+  EXPECT_THROW(network.set_parameters(weights, thresholds), std::invalid_argument);
 }
 
 TEST(SDNNC, WarmCachesChangeNothing) {

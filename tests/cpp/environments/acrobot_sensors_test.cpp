@@ -48,11 +48,14 @@ TEST(AcrobotSensors, HeightIsTheNormalizedTipHeight) {
   }
 }
 
-TEST(AcrobotSensors, AnglesNeverReachOne) {
+TEST(AcrobotSensors, AnglesJustBelowPiAreBelowOne) {
   const double below_pi = std::nextafter(kPi, 0.0);
   const auto seen = observe({4, 0.0}, {below_pi, below_pi, 0.0, 0.0});
   EXPECT_LT(seen[0], 1.0);
   EXPECT_LT(seen[1], 1.0);
+}
+
+TEST(UnitInterval, WrappedNumbersKeepTheirFractionAndSaturatedOnesStopAtItsEnds) {
   EXPECT_EQ(wrap_to_unit(-1e-20), 0.0);
   EXPECT_EQ(wrap_to_unit(1.0), 0.0);
   EXPECT_EQ(wrap_to_unit(-0.25), 0.75);

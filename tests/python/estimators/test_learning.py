@@ -301,8 +301,11 @@ def test_integer_sample_weights_equal_repeated_samples(make):
 def test_sample_weights_are_scaled_to_a_mean_of_one(make):
     targets = Y if make is SDNNRegressor else LABELS
     weights = RANDOM.uniform(0.5, 1.5, len(Y))
-    one = make(**GIVEN, max_iter=3).fit(X, targets, weights / weights.sum())
-    same(one, make(**GIVEN, max_iter=3).fit(X, targets, weights / weights.mean()))
+    model = make(**GIVEN, max_iter=3).fit(X, targets, weights / weights.sum())
+    same(model, make(**GIVEN, max_iter=3).fit(X, targets, weights / weights.mean()))
+
+
+def test_adaboost_boosts_classifiers_by_sample_weights():
     boosted = AdaBoostClassifier(SDNNClassifier(**GIVEN, max_iter=3), n_estimators=2)
     assert boosted.fit(X, Y > 0).score(X, Y > 0) > 0.9
 
@@ -380,15 +383,17 @@ def test_averaged_networks_count_towards_the_memory_limit():
     weights = 4 * model.weights_.size
     table_bytes = code_bytes(model.codings_, model.pairs_, model.network_.input_code.core.n_units)
     options = {**plain, "n_averaged_epochs": 5}
-    for more, n_networks in [
+    # Every third epoch is averaged: the last of 16 and four before it, of 9 only two. Early
+    # stopping keeps four before the best epoch as well, unless it refits.
+    for changes, n_networks in [
         ({"max_iter": 16}, 5),
         ({"max_iter": 9}, 3),
         ({"max_iter": 16, "early_stopping": True}, 9),
         ({"max_iter": 16, "early_stopping": True, "refit": True}, 5),
     ]:
-        room = n_networks * weights + table_bytes
-        SDNNRegressor(**options, **more, training="plain", memory_limit=room).fit(X, Y)
-        model = SDNNRegressor(**options, **more, training="plain", memory_limit=room - 1)
+        limit = n_networks * weights + table_bytes
+        SDNNRegressor(**options, **changes, training="plain", memory_limit=limit).fit(X, Y)
+        model = SDNNRegressor(**options, **changes, training="plain", memory_limit=limit - 1)
         with pytest.raises(ValueError, match=f"{n_networks} networks"):
             model.fit(X, Y)
         model.partial_fit(X, Y).learn_one(X[0], Y[0])  # which average nothing

@@ -154,7 +154,8 @@ def test_a_memory_error_states_the_size_of_the_network(monkeypatch):
         raise MemoryError("std::bad_alloc")
 
     monkeypatch.setattr(_core, "ParallelPerceptron", no_memory)
-    refuses("430080", SDNNRegressor(**SMALL).fit, X, Y, error=MemoryError)
+    # 4 bytes for each weight of 280 units, of 6 pairs of 64 columns.
+    refuses(str(4 * 280 * 6 * 64), SDNNRegressor(**SMALL).fit, X, Y, error=MemoryError)
 
 
 def test_feature_names_are_stored_and_compared(estimator):

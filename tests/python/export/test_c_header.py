@@ -252,6 +252,7 @@ def test_acting_does_not_change_the_header():
 
 
 def test_fraction_bits_are_reduced_until_numbers_fit_32_bits():
+    # 1e5 needs 17 bits and a sign, 40000 needs 16.
     wide = SDNNQLearning(box(1e5, 1.0), Discrete(2), approximator=SMALL)
     assert c_header(wide, "policy").fraction_bits == 14
     assert c_header(wide, "policy", fraction_bits=3).fraction_bits == 3
@@ -284,7 +285,7 @@ def test_the_header_has_at_most_three_characters_per_byte_of_flash():
     assert len(header.text) < 3 * header.flash_bytes
 
 
-def test_a_failed_export_leaves_no_file(tmp_path):
+def test_an_export_writes_the_header_and_a_failed_one_nothing(tmp_path):
     agent = lone_agent()
     header = export_c_header(agent, tmp_path / "one.h")
     assert (tmp_path / "one.h").read_text() == header.text

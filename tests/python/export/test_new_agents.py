@@ -14,6 +14,7 @@ from sdnn.export import c_header, new_agent
 SPACE = gym.spaces.Box(np.array([-2.0, -np.pi]), np.array([1.0, np.pi]), dtype=np.float64)
 TWO = gym.spaces.Discrete(2)
 GIVEN = ("--range", "-2:1", "--range", "angle")
+SDNN_C = (*GIVEN, "--actions", "2", "--agent", "sdnn-c")
 
 
 @pytest.fixture
@@ -138,24 +139,24 @@ def test_the_help_of_export_shows_an_example(invoke):
         ((), "--range"),
         (GIVEN, "--actions"),
         (("--actions", "2"), "--range"),
-        *((("--actions", 2, "--range", one), "--range") for one in ("1:1", "2:1", "nan:1", "0",
+        *((("--actions", 2, "--range", text), "--range") for text in ("1:1", "2:1", "nan:1", "0",
           "x:y", "0:inf", "-1e300:1", "0:1:2", "")),
-        *(((*GIVEN, "--actions", one), "--actions") for one in ("1", "0", "-3", "1.5", "99999999",
+        *(((*GIVEN, "--actions", text), "--actions") for text in ("1", "0", "-3", "1.5", "99999999",
           "9" * 400, "", "x", "1:0", "0:inf", "0:1:2", "\N{SUPERSCRIPT TWO}")),
         ((*GIVEN, "--actions", "2", "--actions", "0:1"), "--actions"),
         ((*GIVEN, "--actions", "2", "--ram", "500"), "--ram must be at least"),
         ((*GIVEN, "--actions", "2", "--ram", "x"), "--ram"),
         ((*GIVEN, "--actions", "2", "--agent", "rbf"), "--agent"),
-        ((*GIVEN, "--actions", "2", "--agent", "sdnn-c", "--ram", 5000), "--ram must be at least"),
+        ((*SDNN_C, "--ram", 5000), "--ram must be at least"),
         ((*GIVEN, "--actions", "2", "--seed", "-1"), "--seed"),
-        *(((*GIVEN, "--actions", "2", "--set", one), "--set") for one in ("learning",
+        *(((*GIVEN, "--actions", "2", "--set", text), "--set") for text in ("learning",
           "learning.x=1", "budget.steps=3", "learning.=3", "learning.discount=2",
           "learning.discount=x", "approximator.n_inputs=3", "approximator.n_pattern_units=-1")),
-        *(((*GIVEN, "--actions", "2", "--agent", "sdnn-c", "--set", one), named) for one, named in (
-          ("approximator.averaging_interval=9", "averaging_interval"),
-          ("approximator.weight_limit=0", "weight_limit"), ("learning.traces=dutch", "--set"))),
+        ((*SDNN_C, "--set", "approximator.averaging_interval=9"), "averaging_interval"),
+        ((*SDNN_C, "--set", "approximator.weight_limit=0"), "weight_limit"),
+        ((*SDNN_C, "--set", "learning.traces=dutch"), "--set"),
         ((*GIVEN, "--actions", "2", "--actions", "3", "--agent", "sdnn-c"), "--actions"),
-        *(((*GIVEN, "--actions", one), "--ram") for one in ("65536",)),
+        ((*GIVEN, "--actions", "65536"), "--ram"),
     ],
 )  # fmt: skip
 def test_bad_options_of_new_agents_are_refused_by_name(words, named, export, tmp_path):

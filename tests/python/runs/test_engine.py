@@ -99,7 +99,7 @@ def test_trials_of_another_seed_or_length_are_run_again(tmp_path, run, change):
 def test_the_observer_receives_begin_progress_and_end_of_every_trial(tmp_path, run):
     recorder = fake_trial.Recorder()
     run(tmp_path, fake_trial.make_plan(2), observer=recorder)
-    assert recorder.events[0] == ("begun", 4, 0, 1200)
+    assert recorder.events[0] == ("begun", 4, 0, 4 * 300)  # trials, stored ones, episodes
     for planned in fake_trial.make_plan(2):
         mine = [event for event in recorder.events[1:] if event[1] == planned.key]
         assert mine[0] == ("advanced", planned.key, 0)

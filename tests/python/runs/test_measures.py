@@ -69,7 +69,7 @@ def test_fewer_than_50_evaluations_have_no_episode_of_collapse():
     assert math.isnan(episode_of_collapse(episodes([7] * 49), [7] * 49))
 
 
-def test_early_steps_are_the_median_of_the_first_evaluations():
+def test_early_steps_are_the_median_of_the_tests_in_the_first_2500_episodes():
     steps = [4] * 150 + [8] * 100 + [50] * 750
     assert of_rows("early_steps", steps) == 4.0
     assert of_rows("early_steps", [50] * 251) == 50.0

@@ -337,14 +337,13 @@ def test_only_the_papers_protocol_runs_the_compiled_trial():
 
 
 def test_without_noisy_evaluations_their_sensors_have_no_noise():
-    protocol = ProtocolSpec(noisy_evaluations=False)
-    for spec in (
-        RunSpec(
-            environment=EnvironmentSpec(id=PAPER, kwargs={"sensors": {"noise": 0.1}}),
-            protocol=protocol,
-        ),
-        RunSpec(environment=EnvironmentSpec(id="MountainCar-v0", noise=0.1), protocol=protocol),
+    for name, noise in (
+        (PAPER, {"kwargs": {"sensors": {"noise": 0.1}}}),
+        ("MountainCar-v0", {"noise": 0.1}),
     ):
-        noisy, quiet = spec.make_env(), spec.make_env("evaluation_sensor_noise")
-        first = [env.reset(seed=1)[0].tolist() for env in (noisy, quiet)]
-        assert first[0] != first[1]
+        environment = EnvironmentSpec(id=name, **noise)
+        spec = RunSpec(environment=environment, protocol=ProtocolSpec(noisy_evaluations=False))
+        without_noise = EnvironmentSpec(id=name).make().reset(seed=1)[0].tolist()
+        assert spec.make_env().reset(seed=1)[0].tolist() != without_noise
+        evaluation_env = spec.make_env("evaluation_sensor_noise")
+        assert evaluation_env.reset(seed=1)[0].tolist() == without_noise
