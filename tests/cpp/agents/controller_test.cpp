@@ -237,10 +237,10 @@ TEST(Controller, LearnsTheIndexThatWasTakenOfEqualRoundedActions) {
 
 TEST(Controller, LearnsAnActionBetweenTwoAsTheNearest) {
   const Numbers observed = {1.0, 0.0, 4.0, 11.0};
-  Controller one(rbf_config()), other(rbf_config());
-  one.learn(observed, Numbers{0.9}, 1.0, observed, true);
-  other.learn(observed, Numbers{1.0}, 1.0, observed, true);
-  EXPECT_EQ(core::state_of(one), core::state_of(other));
+  Controller between(rbf_config()), nearest(rbf_config());
+  between.learn(observed, Numbers{0.9}, 1.0, observed, true);
+  nearest.learn(observed, Numbers{1.0}, 1.0, observed, true);
+  EXPECT_EQ(core::state_of(between), core::state_of(nearest));
 }
 
 TEST(Controller, RefusesBadArgumentsAndChangesNothing) {

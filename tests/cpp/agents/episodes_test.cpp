@@ -41,7 +41,7 @@ TEST(Episodes, AreAddedAndRemovedAtTheEnd) {
   EXPECT_EQ(episodes.of(2).steps, 8);
 }
 
-TEST(Episodes, OfTheFirstEnvironmentAreSavedWithoutANumber) {
+TEST(Episodes, AreSavedWithTheNumberOfTheirEnvironmentAndRestored) {
   Counting object;
   EXPECT_EQ(core::state_of(object).size(), 1U);
   EXPECT_EQ(testing::number_of<int>(core::state_of(object), "steps"), 5);

@@ -145,13 +145,13 @@ TEST(EpsilonGreedy, EvaluationDoesNotChangeTheActionsOfLearning) {
 }
 
 TEST(EpsilonGreedy, EqualSeedsGiveEqualActionsAndOtherSeedsDifferentOnes) {
-  EpsilonGreedy first({}, 1), same({}, 1), other({}, 2);
+  EpsilonGreedy first({}, 1), same({}, 1), other_seed({}, 2);
   const Row tied(601, 0.0);
   int differ = 0;
   for (int i = 0; i < 100; ++i) {
     const std::size_t action = first.select(tied, i, true);
     EXPECT_EQ(action, same.select(tied, i, true));
-    differ += action != other.select(tied, i, true);
+    differ += action != other_seed.select(tied, i, true);
   }
   EXPECT_GT(differ, 90);
 }

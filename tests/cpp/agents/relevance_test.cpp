@@ -158,17 +158,17 @@ RandomExperience two_walks(std::size_t n, std::size_t n_cells, std::uint64_t see
   core::Random random(seed, core::Stream::useless_inputs);
   RandomExperience experience{.n_inputs = 2 * n_cells, .circular = std::vector<bool>(2 * n_cells)};
   experience.actions.resize(1);
-  std::size_t cell = 0, other = 0;
+  std::size_t cell = 0, other_cell = 0;
   const auto note = [&](std::vector<double>& rows) {
     for (std::size_t i = 0; i < n_cells; ++i) rows.push_back(i == cell ? 1.0 : 0.0);
-    for (std::size_t i = 0; i < n_cells; ++i) rows.push_back(i == other ? 1.0 : 0.0);
+    for (std::size_t i = 0; i < n_cells; ++i) rows.push_back(i == other_cell ? 1.0 : 0.0);
   };
   for (std::size_t t = 0; t < n; ++t) {
     note(experience.states);
     const auto action = static_cast<double>(random.below(2));
     if (action > 0.0 && cell + 1 < n_cells) ++cell;
     if (action == 0.0 && cell > 0) --cell;
-    other = random.below(n_cells);
+    other_cell = random.below(n_cells);
     note(experience.next_states);
     experience.actions[0].push_back(action);
     experience.rewards.push_back(-1.0);

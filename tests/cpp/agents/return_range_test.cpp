@@ -117,9 +117,9 @@ TEST(ReturnRange, IsKnownFromTheFirstOfRareRewards) {
 
 TEST(ReturnRange, EnvironmentsHaveSeparateRewards) {
   ReturnRange range(1.0);
-  ReturnRange::Rewards environment = range.no_rewards(), other = range.no_rewards();
-  EXPECT_TRUE(range.note(8.0, false, environment));
-  EXPECT_FALSE(range.note(9.0, false, other));  // 17 if it were the same episode
+  ReturnRange::Rewards first = range.no_rewards(), second = range.no_rewards();
+  EXPECT_TRUE(range.note(8.0, false, first));
+  EXPECT_FALSE(range.note(9.0, false, second));  // 17 if it were the same episode
   expect_range(range, 0.0, 10.0);
 }
 
@@ -139,9 +139,9 @@ TEST(ReturnRange, StaysFiniteWithHugeRewards) {
     environment.note(1e300 * (i / 700 % 2 == 0 ? 1.0 : -1.0), i % 2000 == 0);
   EXPECT_LT(environment.range.high(), 1.7e300);
   EXPECT_GT(environment.range.low(), -1.7e300);
-  ReturnRange other(1.0);
-  core::restore(other, core::state_of(environment.range));  // a range this wide can be saved
-  EXPECT_EQ(core::state_of(other), core::state_of(environment.range));
+  ReturnRange restored(1.0);
+  core::restore(restored, core::state_of(environment.range));  // a range this wide can be saved
+  EXPECT_EQ(core::state_of(restored), core::state_of(environment.range));
 }
 
 TEST(ReturnRange, RefusesInconsistentStates) {

@@ -77,10 +77,10 @@ TEST(WarmUp, RemembersMasks) {
 }
 
 TEST(WarmUp, EvaluationDoesNotChangeItsActions) {
-  WarmUp one(2, 1, 100, 3, true), other = one;
+  WarmUp evaluated(2, 1, 100, 3, true), warm_up = evaluated;
   for (int t = 0; t < 50; ++t) {
-    (void)one.act(draw, always, false, 0);
-    EXPECT_EQ(one.act(draw, always, true, 0), other.act(draw, always, true, 0));
+    (void)evaluated.act(draw, always, false, 0);
+    EXPECT_EQ(evaluated.act(draw, always, true, 0), warm_up.act(draw, always, true, 0));
   }
 }
 

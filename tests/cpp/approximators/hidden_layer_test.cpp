@@ -235,11 +235,11 @@ TEST(HiddenLayer, AddingToAColumnEqualsSettingItsWeights) {
     }
   }
   const Input x{.plus = {0, 2}, .minus = {1}};
-  std::vector<std::int32_t> one(130);
-  std::vector<std::int32_t> other(130);
-  added.potentials(x, one);
-  set.potentials(x, other);
-  EXPECT_EQ(one, other);
+  std::vector<std::int32_t> of_added(130);
+  std::vector<std::int32_t> of_set(130);
+  added.potentials(x, of_added);
+  set.potentials(x, of_set);
+  EXPECT_EQ(of_added, of_set);
   EXPECT_EQ(added.n_high_columns(), set.n_high_columns());
   EXPECT_GT(added.n_high_columns(), 0U);
   std::fill(changes.begin(), changes.end(), 40000);

@@ -43,10 +43,10 @@ TEST(Pcg64, DrawsTheNumbersOfNumPy) {
 }
 
 TEST(Pcg64, ContinuesFromItsState) {
-  Pcg64 random(Seeds{1, 2}), other(Seeds{3});
+  Pcg64 random(Seeds{1, 2}), restored(Seeds{3});
   (void)random.below(5);  // half of 64 bits is left
-  restore(other, state_of(random));
-  for (int i = 0; i < 9; ++i) EXPECT_EQ(random.below(1000), other.below(1000));
+  restore(restored, state_of(random));
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(random.below(1000), restored.below(1000));
   testing::expect_that_damage_is_refused(random);
 }
 

@@ -55,10 +55,10 @@ void expect_plain_bits(const Problem& problem) {
   for (const auto& order : problem.orders) {
     const Problem stream = stream_of(problem, order);
     PDeltaRule rule = rule_for(stream);
-    const auto one = plain.present(order);
-    const auto other = online.present(stream.bins, rule);
-    ASSERT_EQ(one.n_samples, other.n_samples);
-    ASSERT_EQ(one.n_units, other.n_units);
+    const auto expected_counts = plain.present(order);
+    const auto counts = online.present(stream.bins, rule);
+    ASSERT_EQ(counts.n_samples, expected_counts.n_samples);
+    ASSERT_EQ(counts.n_units, expected_counts.n_units);
     plain_layer->potentials(problem.bins, 1, expected);
     online.potentials(problem.bins, potentials);
     ASSERT_EQ(potentials, expected);

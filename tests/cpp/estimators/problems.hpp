@@ -115,9 +115,9 @@ void compare_with_plain(const Problem& problem, estimators::TrainingForm form, i
   auto plain = trainer_for(problem, plain_layer, estimators::TrainingForm::plain);
   auto trainer = trainer_for(problem, layer, form, n_threads);
   for (std::size_t epoch = 0; epoch < problem.orders.size(); ++epoch) {
-    const auto one = plain.present(problem.orders[epoch]);
-    const auto other = trainer.present(problem.orders[epoch]);
-    expect(one.n_samples == other.n_samples && one.n_units == other.n_units);
+    const auto expected = plain.present(problem.orders[epoch]);
+    const auto corrections = trainer.present(problem.orders[epoch]);
+    expect(expected.n_samples == corrections.n_samples && expected.n_units == corrections.n_units);
     if (epoch % 2 == 0) continue;  // synchronized in the middle and at the end
     trainer.synchronize();
     expect(bits_of(*plain_layer) == bits_of(*layer));

@@ -129,7 +129,7 @@ TEST(AcrobotTrial, TrialsRunTogetherHaveTheRowsOfTrialsRunAlone) {
     together.push_back(make(i));
   }
   std::vector<decltype(make(0))*> team;
-  for (auto& one : together) team.push_back(&one);
+  for (auto& trial : together) team.push_back(&trial);
   using Trial = decltype(make(0));
   for (const int n : {0, 1, 200, 77}) Trial::advance_together(team, n);
   EXPECT_EQ(together[3].n_decisions(), 278);
@@ -265,14 +265,15 @@ TEST(AcrobotTrial, RefusesBadNumbersAndTrialsThatCannotRunTogether) {
             "n_inputs must be the number of inputs of the sensors, 4, got 5");
   EXPECT_EQ(message_of([] { table_trial({}).advance(-1); }),
             "n_episodes must be in [0, 1073741824], got -1");
-  auto one = table_trial({}), other = table_trial({.acrobot = {.gravity = 1.6}});
-  const auto together = [&](std::vector<decltype(one)*> trials, int n_decisions) {
-    return message_of([&] { decltype(one)::advance_together(trials, n_decisions); });
+  auto trial = table_trial({}), on_the_moon = table_trial({.acrobot = {.gravity = 1.6}});
+  const auto together = [&](std::vector<decltype(trial)*> trials, int n_decisions) {
+    return message_of([&] { decltype(trial)::advance_together(trials, n_decisions); });
   };
   EXPECT_EQ(together({}, 1), "number of trials must be in [1, 8], got 0");
-  EXPECT_EQ(together({&one}, -1), "n_decisions must be in [0, 1073741824], got -1");
-  EXPECT_EQ(together({&one, &one}, 1), "trials must be different ones, got one twice");
-  EXPECT_EQ(together({&one, &other}, 1), "trials must be of the same acrobot, got different ones");
+  EXPECT_EQ(together({&trial}, -1), "n_decisions must be in [0, 1073741824], got -1");
+  EXPECT_EQ(together({&trial, &trial}, 1), "trials must be different ones, got one twice");
+  EXPECT_EQ(together({&trial, &on_the_moon}, 1),
+            "trials must be of the same acrobot, got different ones");
 }
 
 }  // namespace

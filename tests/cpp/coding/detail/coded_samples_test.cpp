@@ -32,17 +32,17 @@ TEST(CodedSamples, SignsAreAsWorkedByHand) {
 TEST(CodedSamples, ProductsEqualThoseOfSigns) {
   const auto code = small_code(70);
   const std::vector<Bin> bins = {0, 1, 2, 3, 4, 0};
-  const std::vector<Bin> others = {4, 4, 1, 2};
-  std::vector<std::int8_t> one(3 * 140);
-  std::vector<std::int8_t> other(2 * 140);
-  write_signs(code, bins, one);
-  write_signs(code, others, other);
+  const std::vector<Bin> other_bins = {4, 4, 1, 2};
+  std::vector<std::int8_t> signs(3 * 140);
+  std::vector<std::int8_t> other_signs(2 * 140);
+  write_signs(code, bins, signs);
+  write_signs(code, other_bins, other_signs);
   std::vector<std::int32_t> products(6);
-  write_products(code, bins, others, products);
+  write_products(code, bins, other_bins, products);
   for (std::size_t t = 0; t < 3; ++t) {
     for (std::size_t s = 0; s < 2; ++s) {
       int sum = 0;
-      for (std::size_t j = 0; j < 140; ++j) sum += one[t * 140 + j] * other[s * 140 + j];
+      for (std::size_t j = 0; j < 140; ++j) sum += signs[t * 140 + j] * other_signs[s * 140 + j];
       EXPECT_EQ(products[t * 2 + s], sum);
     }
   }
