@@ -7,7 +7,7 @@
 
 #define SDNN_IMAGE_MAGIC UINT32_C(0x434e4453) /* "SDNC" */
 #define SDNN_N_RANDOMS 5
-#include "sdnn_learner.h"
+#include "sdnn_exploration.h"
 #include "sdnn_real.h"
 
 typedef uint32_t sdnn_score;

@@ -1,28 +1,8 @@
-/* Parts of all agents that learn: arithmetic without division, random numbers, images. */
+/* Parts of all agents that learn: random numbers, the scale of rewards, images. */
 #ifndef SDNN_LEARNER_H
 #define SDNN_LEARNER_H
 
-#include <stdint.h>
-
-/* Numbers below 0 are shifted to the right as all compilers do it: rounded down. */
-typedef char sdnn_needs_arithmetic_shifts[-1 >> 1 == -1 ? 1 : -1];
-
-/* a / b and the rest, without a division. Requires that b is above 0. */
-static inline uint64_t sdnn_quotient(uint64_t a, uint64_t b, uint64_t* rest) {
-  uint64_t quotient = 0;
-  uint32_t n = 0;
-  for (; b <= a >> 1; b <<= 1) ++n;
-  for (;; --n, b >>= 1) {
-    quotient <<= 1;
-    if (a >= b) {
-      a -= b;
-      quotient |= 1;
-    }
-    if (n == 0) break;
-  }
-  *rest = a;
-  return quotient;
-}
+#include "sdnn_integers.h"
 
 /* xoshiro256** of Blackman and Vigna. */
 typedef struct sdnn_random {
@@ -51,21 +31,6 @@ static inline uint64_t sdnn_below(sdnn_random* random, uint64_t n) {
   } while (drawn < rejected);
   sdnn_quotient(drawn, n, &rest);
   return rest;
-}
-
-/* Whether an action may be random in this step of an episode. */
-static inline int sdnn_may_explore(uint32_t step) {
-  const uint32_t n = SDNN_N_GREEDY_STEPS;
-  return step >= n;
-}
-
-/* The number of steps that a random action lasts: n with probability 1 / (n (n + 1)), at most
- * `longest`. */
-static inline uint32_t sdnn_repetitions(sdnn_random* random, uint32_t longest) {
-  const uint64_t whole = UINT64_C(1) << 53;
-  uint64_t rest;
-  const uint64_t n = sdnn_quotient(whole, whole - (sdnn_bits(random) >> 11), &rest);
-  return (uint32_t)(n < longest ? n : longest);
 }
 
 /* How large rewards are, in powers of two; INT32_MIN if all were 0. Rewards that are far larger

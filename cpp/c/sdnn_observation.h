@@ -7,7 +7,9 @@
 
 #include <stdint.h>
 
+#ifndef SDNN_N_COLUMNS
 #define SDNN_N_COLUMNS (UINT32_C(1) * SDNN_N_GROUPS * SDNN_N_PATTERN_UNITS)
+#endif
 #if SDNN_N_COLUMNS <= 65536
 typedef uint16_t sdnn_column;
 #else
