@@ -355,6 +355,16 @@ void bind_controller(py::module_& module) {
           },
           py::arg("observation"), py::arg("action"), py::arg("value"), py::arg("margin"),
           "Learns that a teacher chose an action whose return is `value`; values of others become "
-          "lower by `margin` at least");
+          "lower by `margin` at least")
+      .def(
+          "follow_teacher",
+          [](Controller& self, const ArrayArgument<double>& observation,
+             const ArrayArgument<double>& action) {
+            require_warm(self);
+            bindings::wait_for_readers(self);
+            self.follow_teacher(bindings::flat(observation), bindings::flat(action));
+          },
+          py::arg("observation"), py::arg("action"),
+          "Continues an episode with a teacher's action, and learns nothing");
   bindings::def_state(type);
 }

@@ -1906,6 +1906,10 @@ class Controller:
         """
         Ends a warm-up in which a teacher acted; ranges reach beyond its path
         """
+    def follow_teacher(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Continues an episode with a teacher's action, and learns nothing
+        """
     def imitate(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], value: typing.SupportsFloat | typing.SupportsIndex, margin: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         Learns that a teacher chose an action whose return is `value`; values of others become lower by `margin` at least

@@ -3,18 +3,22 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include "input.hpp"
 #include "sdnn/agents/actor_critic.hpp"
 #include "sdnn/agents/any_agent.hpp"
+#include "sdnn/agents/controller.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_lambda.hpp"
 #include "sdnn/agents/q_learning.hpp"
 #include "sdnn/approximators/linear_sdnn.hpp"
 #include "sdnn/approximators/rbf_network.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
+#include "sdnn/core/random.hpp"
 #include "sdnn/core/state.hpp"
 
 namespace {
@@ -171,12 +175,69 @@ void actor_critic(FuzzedDataProvider& input) {
   fuzz::expect(std::isfinite(agent.value(state)), "a value is not finite");
 }
 
+/// An agent in the units of its task, with a history and short warm-up.
+void controller(FuzzedDataProvider& input) {
+  using agents::History;
+  const std::size_t n_variables = input.ConsumeIntegralInRange<std::size_t>(1, 3);
+  agents::ControllerConfig config{
+      .approximator = approximators::LinearSDNNConfig{.n_pattern_units = 20, .n_interpolated = 4},
+      .learning = agents::QLambdaConfig{},
+      .observation = {.low = std::vector<std::optional<double>>(n_variables, 0.0),
+                      .high = std::vector<std::optional<double>>(n_variables, 1.0),
+                      .running = input.ConsumeBool(),
+                      .relevant_only = input.ConsumeBool(),
+                      .missing =
+                          input.ConsumeBool() ? agents::Missing::hold : agents::Missing::error,
+                      .history = static_cast<History>(input.ConsumeIntegralInRange(0, 4))},
+      .action = {.low = {0.0}, .high = {2.0}, .discrete = true},
+      .warm_up_steps = input.ConsumeIntegralInRange(1, 120)};
+  if (input.ConsumeBool()) config.learning = agents::ActorCriticConfig{};
+  if (input.ConsumeBool()) config.observation.angles = {0};
+  agents::Controller agent(config);
+  agent.begin_episode();
+  core::Random random(input.ConsumeIntegral<std::uint8_t>(), core::Stream::weights);
+  std::vector<double> observation(n_variables, 0.5);
+  for (int t = 0; t < 400 && input.remaining_bytes() > 0; ++t) {
+    std::vector<double> next = observation;
+    for (double& x : next) x += 0.2 * random.uniform() - 0.1;
+    if (input.ConsumeIntegralInRange(0, 15) == 0) {
+      next = fuzz::any_doubles(input, n_variables, 0.0, 1.0);
+    }
+    fuzz::accepted([&] { (void)agent.act(observation, false); });
+    fuzz::accepted([&] {
+      const double action = agent.act(observation)[0];
+      agent.learn(observation, {&action, 1}, random.uniform(), next, random.below(50) == 0);
+    });
+    switch (input.ConsumeIntegralInRange(0, 31)) {
+      case 0:
+        agent.begin_episode();
+        break;
+      case 1:
+        agent.begin_greedy_episode();
+        break;
+      case 2: {
+        const core::State saved = core::state_of(agent);
+        agent = agents::Controller::restored(config, saved);
+        fuzz::expect(core::state_of(agent) == saved, "a restored state differs");
+        break;
+      }
+      default:
+        break;
+    }
+    observation = next;
+  }
+  if (agent.is_warming_up() || !fuzz::accepted([&] { (void)agent.state_of(observation); })) return;
+  for (const double x : agent.state_of(observation)) {
+    fuzz::expect(x >= 0.0 && x <= 1.0, "a state out of range");
+  }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   FuzzedDataProvider input(data, size);
   sdnn::fuzz::accepted([&] {
-    switch (input.ConsumeIntegralInRange(0, 3)) {
+    switch (input.ConsumeIntegralInRange(0, 5)) {
       case 0:
         return sdnn_c(input);
       case 1:
@@ -185,6 +246,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         return linear(input);
       case 3:
         return actor_critic(input);
+      case 4:
+        return controller(input);
       default:
         return fuzzy(input);
     }

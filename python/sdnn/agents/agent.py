@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Self, TypeAlias, cast
@@ -31,6 +32,9 @@ from sdnn.training.callbacks import ProgressBarCallback
 from sdnn.training.files import read_agent, read_statistics
 from sdnn.training.interfaces import Transition, explained
 from sdnn.training.training import Callback, Training, TrainingResult, checked_callbacks, shows_bar
+
+_MOST_OBSERVED = 16
+"""The most numeric inputs of an observer."""
 
 
 class Agent(Displayed, BaseAgent[Approximator, Learning]):
@@ -92,6 +96,8 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         For spaces of another kind; for spaces, ranges or settings that are impossible.
     """
 
+    _has_warned_of_history = False
+
     @property
     def observation_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest and highest values of the observed variables, shapes (n_variables,), as used.
@@ -123,6 +129,23 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     def _dimension(self, dimension: int) -> int:
         return whole("dimension", dimension, 0, self.n_dimensions - 1)
 
+    def warn_of_history(self) -> None:
+        """Warn once if the warm-up could not fit the observer that was asked for."""
+        is_fitted = self._observation.history != "observer" or self.history != "none"
+        if is_fitted or self._has_warned_of_history:
+            return
+        self._has_warned_of_history = True
+        n_numbers = sum(kind != "symbol" for kind, _ in self._controller.inputs)
+        reason = (
+            f"{n_numbers} numeric inputs are more than {_MOST_OBSERVED}"
+            if n_numbers > _MOST_OBSERVED
+            else "the warm-up had fewer than 100 transitions"
+        )
+        warnings.warn(
+            f"history='observer' was not possible, as {reason}: states have no history",
+            stacklevel=2,
+        )
+
     def _imitate_step(self, transition: Transition, value: float, margin: float) -> None:
         """Learn that a teacher chose an action whose return was `value`; see `imitate`.
 
@@ -132,6 +155,16 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         """
         observation, action, *_ = self._parts_of(transition, 0)
         self._require_warm().imitate(observation, action, value, margin)
+
+    def _follow_teacher(self, transition: Transition) -> None:
+        """Continue an episode with a teacher's action, and learn nothing."""
+        observation, action, *_ = self._parts_of(transition, 0)
+        self._require_warm().follow_teacher(observation, action)
+
+    @property
+    def _remembers(self) -> bool:
+        """Whether a state depends on earlier observations of its episode."""
+        return self.history != "none" or self.missing == "hold"
 
     @property
     def _n_warm_up_steps_left(self) -> int:
@@ -143,6 +176,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     def _end_warm_up_of_teacher(self) -> None:
         """End a warm-up from a teacher's log: ranges become at least three times as wide."""
         self._controller.end_warm_up_of_teacher()
+        self.warn_of_history()
 
     def _require_warm(self) -> _core.Controller:
         """Return the core's controller; RuntimeError while the agent is warming up."""

@@ -333,6 +333,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         self._check_environment(environment)
         self._controller.learn(*self._parts_of(transition, environment))
         self.warn_of_refused_reward()
+        self.warn_of_history()
 
     def check(self, transition: Transition) -> None:
         """Raise what `learn` would for a transition that cannot be learned; learn nothing."""
@@ -368,6 +369,10 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             " recent ones: it was not learned. If such rewards are true and recur, they will be",
             stacklevel=2,
         )
+
+    @abc.abstractmethod
+    def warn_of_history(self) -> None:
+        """Warn once if the warm-up could not fit the observer that was asked for."""
 
     def core_parts(self) -> CoreParts | None:
         """Return what the training loop needs to call the core directly, which is faster.

@@ -77,7 +77,7 @@ def imitate(agent: SDNNQLambda | SDNNActorCritic, dataset: Dataset, *, epochs: i
     margin = _margin(agent, read)
     for _ in range(epochs):
         for steps, terminated in _episodes(agent, read()):
-            value = 0.0 if terminated else _value(agent, steps[-1])
+            value = 0.0 if terminated else _value(agent, steps)
             agent.begin_episode()
             for transition, target in zip(steps, _returns(agent, steps, value), strict=True):
                 agent._imitate_step(transition, target, margin)
@@ -123,8 +123,13 @@ def _returns(agent: LinearAgent, steps: Steps, value: float) -> list[float]:
     return returns[::-1]
 
 
-def _value(agent: LinearAgent, last: Transition) -> float:
-    """Return the agent's estimate of the discounted return after a step."""
+def _value(agent: LinearAgent, steps: Steps) -> float:
+    """Return the agent's estimate of the discounted return after the last step of an episode."""
+    last = steps[-1]
+    if agent._remembers:
+        agent.begin_episode()
+        for transition in steps:
+            agent._follow_teacher(transition)
     if isinstance(agent, SDNNActorCritic):
         return agent.value(last.next_observation)
     values = [agent.q_values(last.next_observation, d) for d in range(agent.n_dimensions)]

@@ -234,6 +234,7 @@ class Run(Displayed):
             is_solved=bool(last and threshold is not None and last["mean_return"] >= threshold),
             has_pictures="rgb_array" in render_modes(single),
             scaling=agent.scaling,
+            history=agent.history,
         )
 
     def agent(self) -> AnyAgent:

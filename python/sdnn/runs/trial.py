@@ -287,7 +287,8 @@ class RunOutcome:
 
     ``learning_report``: see `sdnn.agents.SDNNQLearning`, None for fuzzy agents and while one is
     warming up; ``is_solved``: whether the last evaluation reached the environment's reward
-    threshold; ``has_pictures``: whether `record` can render the environment.
+    threshold; ``has_pictures``: whether `record` can render the environment; ``history``: the part
+    of earlier observations in states.
     """
 
     n_steps: int
@@ -299,6 +300,7 @@ class RunOutcome:
     is_solved: bool
     has_pictures: bool
     scaling: Scaling | None
+    history: str
 
 
 @dataclass(frozen=True, kw_only=True)

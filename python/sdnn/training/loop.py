@@ -199,7 +199,7 @@ class TrainingLoop(abc.ABC):
         with Interrupts(self.stop) as interrupts, ExitStack() as stack:
             stack.callback(setattr, self, "_stops", False)
             stack.callback(self._keep_statistics)
-            stack.callback(self._warn_of_refused_reward)
+            stack.callback(self._warn_of_problems)
             for callback in self.callbacks:
                 callback.on_start(self)
                 stack.callback(callback.on_end, self)
@@ -285,7 +285,7 @@ class TrainingLoop(abc.ABC):
             rows.append(self._episode_row(environment))
             self.n_episodes += 1
             self._episodes.present[environment] = None
-            self._warn_of_refused_reward()
+            self._warn_of_problems()
             if self.evaluate_every_episodes is not None and self._lacks_evaluation:
                 self._learner.begin_episode(environment)  # learns the pending n-step returns first
         self._set_progress(is_over)
@@ -377,9 +377,11 @@ class TrainingLoop(abc.ABC):
             for callback in self.callbacks:
                 callback.on_row(self, row)
 
-    def _warn_of_refused_reward(self) -> None:
+    def _warn_of_problems(self) -> None:
         if hasattr(self.agent, "warn_of_refused_reward"):
             self.agent.warn_of_refused_reward()
+        if hasattr(self.agent, "warn_of_history"):
+            self.agent.warn_of_history()
 
     def _keep_statistics(self) -> None:
         """Store the statistics of the environment's wrappers in the agent, for its file."""

@@ -8,10 +8,14 @@
 #include <cstdint>
 #include <span>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
+#include "allocation_count.hpp"
 #include "sdnn/agents/controller.hpp"
 #include "sdnn/agents/detail/least_squares.hpp"
+#include "sdnn/approximators/fuzzy_rules.hpp"
+#include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/core/state.hpp"
 
@@ -80,8 +84,9 @@ TEST(History, NoneDoesNotChangeStates) {
   const HistoryFilter none(2);
   EXPECT_TRUE(none.is_none());
   HistoryFilter::Memory memory;
+  HistoryFilter::Room room;
   Numbers state(2);
-  none.begin(Numbers{0.25, 0.75}, memory, state);
+  none.begin(Numbers{0.25, 0.75}, memory, state, room);
   EXPECT_EQ(state, (Numbers{0.25, 0.75}));
   EXPECT_TRUE(memory.empty());
 }
@@ -100,13 +105,14 @@ TEST(History, DifferencesOfNumbersAndAnglesAreAppendedAsWorkedByHand) {
   EXPECT_EQ(filter.circular(), (std::vector<bool>{false, true, false, false, false}));
   EXPECT_EQ(filter.n_symbols(), (std::vector<int>{0, 0, 2, 0, 0}));
   HistoryFilter::Memory memory;
+  HistoryFilter::Room room;
   Numbers state(5);
-  filter.begin(Numbers{0.4, 0.98, 0.25}, memory, state);
+  filter.begin(Numbers{0.4, 0.98, 0.25}, memory, state, room);
   EXPECT_EQ(state, (Numbers{0.4, 0.98, 0.25, 0.5, 0.5}));
-  filter.follow(Numbers{0.0}, Numbers{0.55, 0.01, 0.75}, memory, state);
+  filter.follow(Numbers{0.0}, Numbers{0.55, 0.01, 0.75}, memory, state, room);
   EXPECT_DOUBLE_EQ(state[3], 0.5 + 0.15 / 0.3 / 2.0);  // one and a half times 0.2 is the largest
   EXPECT_NEAR(state[4], 0.5 + 0.03 / 0.15 / 2.0, 1e-12);
-  filter.follow(Numbers{0.0}, Numbers{0.0, 0.01, 0.75}, memory, state);
+  filter.follow(Numbers{0.0}, Numbers{0.0, 0.01, 0.75}, memory, state, room);
   EXPECT_DOUBLE_EQ(state[3], 0.0);  // beyond the largest one
 }
 
@@ -115,9 +121,10 @@ TEST(History, AveragesMoveByAHalfAndAFifthOfTheDistance) {
   const HistoryFilter filter(History::averages, experience, {0, 0}, 1);
   EXPECT_EQ(filter.circular(), (std::vector<bool>{false, true, false, true, false, true}));
   HistoryFilter::Memory memory;
+  HistoryFilter::Room room;
   Numbers state(6);
-  filter.begin(Numbers{0.2, 0.9}, memory, state);
-  filter.follow(Numbers{0.0}, Numbers{0.6, 0.1}, memory, state);
+  filter.begin(Numbers{0.2, 0.9}, memory, state, room);
+  filter.follow(Numbers{0.0}, Numbers{0.6, 0.1}, memory, state, room);
   const Numbers expected{0.6, 0.1, 0.4, 0.0, 0.28, 0.94};
   for (std::size_t k = 0; k < 6; ++k) {
     const double distance = std::abs(state[k] - expected[k]);
@@ -144,15 +151,16 @@ TEST(History, AnObserverReducesTheErrorOfNoisySensors) {
   const HistoryFilter filter = fitted(History::observer, learned.experience);
   EXPECT_LT(filter.gain(), 1.0);
   HistoryFilter::Memory memory;
+  HistoryFilter::Room room;
   Numbers state(2);
   const auto row = [](const Numbers& rows, std::size_t t) {
     return std::span(rows).subspan(2 * t, 2);
   };
   double of_estimates = 0.0, of_sensors = 0.0;
-  filter.begin(row(fresh.experience.states, 0), memory, state);
+  filter.begin(row(fresh.experience.states, 0), memory, state, room);
   for (std::size_t t = 0; t < 1000; ++t) {
     const auto sensed = row(fresh.experience.next_states, t), exact = row(fresh.exact, t);
-    filter.follow(Numbers{fresh.experience.actions[0][t]}, sensed, memory, state);
+    filter.follow(Numbers{fresh.experience.actions[0][t]}, sensed, memory, state, room);
     for (std::size_t i = 0; i < 2; ++i) {
       of_estimates += (state[i] - exact[i]) * (state[i] - exact[i]);
       of_sensors += (sensed[i] - exact[i]) * (sensed[i] - exact[i]);
@@ -269,6 +277,101 @@ TEST(History, GreedyEpisodesHaveASeparateMemory) {
   EXPECT_EQ(state[3], 0.5);
   core::Random same_random = random;
   EXPECT_EQ(actions_of(controller, random, 50), actions_of(same, same_random, 50));
+}
+
+TEST(History, AStepAllocatesNothing) {
+  for (const History history : {History::differences, History::averages, History::observer}) {
+    Controller controller(config_of(history));
+    core::Random random(5, core::Stream::weights);
+    (void)actions_of(controller, random, 400);
+    const Numbers first{0.3, 0.6}, second{0.4, 0.5};
+    const auto step = [&](const Numbers& observation, const Numbers& next) {
+      (void)controller.act(observation, false);
+      const double action = controller.act(observation)[0];
+      controller.learn(observation, {&action, 1}, 1.0, next, false);
+    };
+    step(first, second);
+    step(second, first);
+    const std::size_t before = testing::allocation_count();
+    for (int t = 0; t < 20; ++t) {
+      step(first, second);
+      step(second, first);
+    }
+    EXPECT_EQ(testing::allocation_count(), before) << static_cast<int>(history);
+  }
+}
+
+// A task of one number; its approximator needs two inputs.
+TEST(History, ASingleInputIsGivenOnceBesideWhatIsAdded) {
+  for (const auto& [history, n_inputs] :
+       {std::pair{History::differences, 2U}, {History::averages, 3U}, {History::observer, 2U}}) {
+    ControllerConfig config = config_of(history);
+    config.observation.low = {0.0};
+    config.observation.high = {1.0};
+    Controller controller(config);
+    core::Random random(5, core::Stream::weights);
+    controller.begin_episode();
+    for (int t = 0; t < 250; ++t) {
+      const double observation = random.uniform(), next = random.uniform();
+      const double action = controller.act({&observation, 1})[0];
+      controller.learn({&observation, 1}, {&action, 1}, next, {&next, 1}, false);
+    }
+    EXPECT_EQ(controller.history().n_inputs(), n_inputs);
+    const Controller same = Controller::restored(config, core::state_of(controller));
+    EXPECT_EQ(same.history().n_inputs(), n_inputs);
+    EXPECT_EQ(core::state_of(same), core::state_of(controller));
+  }
+}
+
+/// An agent with a grid of rules: 8^2 without a history, 8^4 with differences.
+ControllerConfig grid(History history) {
+  ControllerConfig config = config_of(history);
+  config.approximator =
+      approximators::FuzzyRulesConfig{.n_sets = 8, .n_actions = 3, .max_table_bytes = 1 << 14};
+  config.learning = FuzzyQLearningConfig{};
+  config.action = {.low = {0.0}, .high = {2.0}};
+  return config;
+}
+
+TEST(History, AGridThatIsTooLargeWithDifferencesIsRefusedOrHasNone) {
+  EXPECT_THROW(Controller(grid(History::differences)), std::length_error);
+  Controller controller(grid(History::automatic));
+  core::Random random(5, core::Stream::weights);
+  Numbers observation{0.5, 0.5}, velocity{0.0, 0.0};
+  controller.begin_episode();
+  for (int t = 0; t < 250; ++t) {  // velocities are hidden
+    const double action = controller.act(observation)[0];
+    Numbers next = observation;
+    for (std::size_t i = 0; i < 2; ++i) {
+      velocity[i] += 0.01 * (action - 1.0) - 0.1 * (observation[i] - 0.5) - 0.05 * velocity[i];
+      next[i] = std::clamp(observation[i] + velocity[i], 0.0, 1.0);
+    }
+    controller.learn(observation, {&action, 1}, 0.0, next, false);
+    observation = next;
+  }
+  EXPECT_FALSE(controller.is_warming_up());
+  EXPECT_EQ(controller.history().kind(), History::none);
+  EXPECT_NO_THROW((void)Controller::restored(grid(History::automatic), core::state_of(controller)));
+}
+
+TEST(History, SizesThatAHistoryMakesImpossibleAreRefusedAtOnce) {
+  ControllerConfig config = config_of(History::differences);
+  config.approximator = approximators::LinearSDNNConfig{.n_pattern_units = 2, .n_actions = 3};
+  const std::vector<std::int8_t> signs{1, 1, -1, 1, -1, -1};
+  const std::vector tables(2, coding::PatternTable::from_signs(signs, 3, 2));
+  EXPECT_THROW(Controller(config, tables), std::invalid_argument);
+  config.observation.history = History::automatic;
+  EXPECT_NO_THROW(Controller(config, tables));
+  config.observation.history = History::observer;
+  config.warm_up_steps = 99;
+  EXPECT_THROW(Controller{config}, std::invalid_argument);
+  config.warm_up_steps = 100;
+  EXPECT_NO_THROW(Controller{config});
+  config.observation.low.assign(17, 0.0);
+  config.observation.high.assign(17, 1.0);
+  EXPECT_THROW(Controller{config}, std::invalid_argument);
+  config.observation.relevant_only = true;  // some may be left out
+  EXPECT_NO_THROW(Controller{config});
 }
 
 }  // namespace

@@ -4,7 +4,15 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from sdnn.agents import SDNNActorCritic, SDNNQLambda, Transition, evaluate, load_agent
+from sdnn.agents import (
+    SDNNActorCritic,
+    SDNNQLambda,
+    Transition,
+    evaluate,
+    imitate,
+    load_agent,
+)
+from sdnn.agents.imitation import _value
 from sdnn.export import c_header
 
 RANDOM_STEPS = 1100
@@ -87,6 +95,46 @@ def test_environments_of_a_vector_have_separate_histories():
     assert {name.split(".")[1] for name in agent.state() if name.startswith("last_states.")} >= {
         "0", "1", "2",
     }  # fmt: skip
+
+
+def test_the_value_after_a_truncated_log_is_that_of_its_own_episode():
+    """What was imitated before does not matter for the values of later observations."""
+    agent = SDNNQLambda(positions(), seed=1, history="differences")
+    agent.train(positions(), steps=RANDOM_STEPS, seed=1)
+    first, second = ([Transition([x, 0.0], 0, 1.0, [x + 0.1, 0.0], False)] for x in (-2.0, 1.0))
+    values = []
+    for earlier in ([], first):
+        agent.begin_episode()
+        for transition in earlier:
+            agent._follow_teacher(transition)
+        values.append(_value(agent, second))
+    assert values[0] == values[1]
+
+
+def test_an_observer_that_cannot_be_fitted_is_refused_or_warned_of():
+    with pytest.raises(ValueError, match=r"history must be .* fewer than 100 warm_up_steps"):
+        SDNNQLambda(exact(), history="observer", warm_up_steps=50)
+    many = gym.spaces.Box(-1.0, 1.0, (17,))
+    with pytest.raises(ValueError, match=r"history must be .* more than 16 numeric inputs"):
+        SDNNQLambda(many, gym.spaces.Discrete(2), history="observer", inputs="all", angle_pairs=[])
+    with pytest.raises(ValueError, match=r"history must be .* discrete"):
+        SDNNQLambda(gym.spaces.Discrete(5), gym.spaces.Discrete(2), history="differences")
+    agent = SDNNQLambda(positions(), history="observer")
+    log = [Transition([0.0, 0.1 * i], i % 2, 1.0, [0.0, 0.1], False) for i in range(20)]
+    with pytest.warns(UserWarning, match="fewer than 100 transitions"):
+        imitate(agent, log)
+    assert agent.history == "none"
+
+
+def test_a_training_prints_the_history_that_was_found(invoke, tmp_path):
+    def lines(history):
+        folder = str(tmp_path / history)
+        options = ("--agent", "q-lambda", "--steps", "1200", "--seed", "1", "--out", folder)
+        return invoke("train", "CartPole-v1", *options, "--history", history).output.splitlines()
+
+    assert not any(line.startswith("history") for line in lines("none"))
+    assert "history of observations in states: none, as the warm-up found" in lines("auto")
+    assert "history of observations in states: averages" in lines("averages")
 
 
 def test_export_refuses_agents_with_a_history():

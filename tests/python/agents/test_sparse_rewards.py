@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import sdnn_q_lambda as page
 
-from sdnn.agents import QLambdaConfig, SDNNQLambda, Transition, evaluate
+from sdnn.agents import QLambdaConfig, SDNNQLambda, Transition, evaluate, learn_from
 from stopped_training import states_equal
 
 SQUARE = gym.spaces.Box(0.0, 1.0, (2,), np.float64)
@@ -46,6 +46,18 @@ def test_random_actions_are_not_repeated_in_discrete_spaces():
         actions.append(int(agent.act(2)))
         agent.learn(Transition(2, actions[-1], 0.0, 2, False))
     assert longest_run(actions) < 15
+
+
+@pytest.mark.parametrize("has_warm_up", [False, True])
+def test_transitions_of_a_log_do_not_count_as_steps_of_a_search(has_warm_up):
+    """After 20 steps of search a reward is read from a log; the search takes 40 more."""
+    agent = new_agent()
+    if has_warm_up:
+        agent = SDNNQLambda(SQUARE, gym.spaces.Discrete(4), warm_up_steps=300, seed=1)
+    act_and_learn(agent, [0.0] * 20)
+    log = [Transition(HERE, 1, 0.0, HERE, False)] * 400
+    learn_from(agent, [*log, Transition(HERE, 1, 1.0, HERE, True)])
+    assert n_random_left(agent) == 2 * 20
 
 
 def test_ends_of_episodes_are_counted_only_after_the_search():

@@ -57,6 +57,7 @@ class Controller : public WithRates<Controller> {
     AnyWorkspace agent;
     std::vector<double> state, action, held;
     std::vector<std::size_t> indices;
+    detail::LastStates::Room room;
   };
 
   /// With SDNN-C, `tables` are patterns of each input. Throws std::invalid_argument naming the
@@ -64,12 +65,10 @@ class Controller : public WithRates<Controller> {
   explicit Controller(ControllerConfig config, std::vector<coding::PatternTable> tables = {})
       : Controller(std::move(config), std::move(tables), PrivateTag()) {
     if (observations_.is_fitted()) {
-      fit();
+      fit(observations_, {});
       return;
     }
-    Controller trial = *this;  // finds impossible settings before the warm-up
-    trial.observations_.fit(std::vector<double>(n_variables()));
-    trial.fit();
+    try_to_fit();
     warm_up_.emplace(new_warm_up());
   }
 
@@ -179,7 +178,8 @@ class Controller : public WithRates<Controller> {
             std::vector<double>(state_.size()),
             std::vector<double>(n_dimensions()),
             {},
-            std::vector<std::size_t>(n_dimensions())};
+            std::vector<std::size_t>(n_dimensions()),
+            {}};
   }
   /// A number that no other controller has.
   std::uint64_t identity() const noexcept { return identity_.number(); }
@@ -258,13 +258,13 @@ class Controller : public WithRates<Controller> {
     const auto held = readings_.filled(observation, next_observation, environment);
     if (warm_up_) {
       remember({false, environment, observation, action, reward, next_observation, terminated,
-                next_mask});
+                next_mask, warm_up_->has_acted(environment)});
       return;
     }
     last_states_.start(observations_, environment, held.observation, state_);
     find_indices(action, environment);
     last_states_.follow(observations_, environment, action, held.next_observation, next_state_);
-    learn_scaled(reward, terminated, environment, next_mask);
+    learn_scaled(reward, terminated, environment, next_mask, has_acted(environment));
     readings_.note_step(environment);
     notes_.note(observation);
     const WarmUp::Step step{false,  environment,      observation, action,
@@ -286,9 +286,14 @@ class Controller : public WithRates<Controller> {
   void imitate(std::span<const double> observation, std::span<const double> action, double value,
                double margin);
 
+  /// Continues the episode of environment 0 with a teacher's action, and learns nothing: for the
+  /// value of a later observation. Throws as imitate.
+  void follow_teacher(std::span<const double> observation, std::span<const double> action);
+
   /// The state that the agent has for an observation. Valid until the next call. Throws as act.
   std::span<const double> state_of(std::span<const double> observation) {
-    last_states_.peek(observations_, 0, readings_.filled(observation, 0, true, held_), state_);
+    last_states_.peek(observations_, 0, readings_.filled(observation, 0, true, held_), state_,
+                      peeked_);
     return state_;
   }
 
@@ -320,12 +325,14 @@ class Controller : public WithRates<Controller> {
   }
 
   WarmUp new_warm_up() const;
-  void fit(const core::StateReader* reader = nullptr);
+  void try_to_fit() const;
+  void fit(Observations observations, detail::LastStates last_states,
+           const core::StateReader* reader = nullptr);
+  void fit_to_warm_up(History history, double headroom);
   void act_at_random(std::span<const double> observation, bool explore, std::size_t environment,
                      ActionMask mask);
   void remember(const WarmUp::Step& step);
   void end_warm_up(double headroom = Observations::kHeadroom);
-  std::size_t n_first_inputs() const noexcept;
   void watch();
   void add_inputs();
   void replay(const WarmUp::Step& step, LastReadings& readings);
@@ -364,7 +371,7 @@ class Controller : public WithRates<Controller> {
 
   void find_state(std::span<const double> observation, Workspace& workspace) const {
     last_states_.peek(observations_, 0, readings_.filled(observation, 0, true, workspace.held),
-                      workspace.state);
+                      workspace.state, workspace.room);
   }
 
   void require_environment(std::size_t environment) const {
@@ -400,30 +407,9 @@ class Controller : public WithRates<Controller> {
     return agent.last_action(environment);
   }
 
-  /// Learns the transition in state_, indices_ and next_state_.
-  void learn_scaled(double reward, bool terminated, std::size_t environment, ActionMask next_mask) {
-    RewardScale scale = reward_scale_;  // unchanged if the agent throws
-    if (!scale.accepts(reward)) {
-      reward_scale_ = scale;
-      return;
-    }
-    std::visit(
-        [&](auto& agent) {
-          agent.learn(state_, learned_action(agent, environment), reward, next_state_, terminated,
-                      environment, next_mask);
-        },
-        *agent_);
-    const auto size_in_window = scale.end_window();
-    reward_scale_ = scale;
-    if (!size_in_window) return;
-    std::visit(
-        [&](auto& agent) {
-          if constexpr (requires { agent.refine_unit(0, 0); }) {
-            agent.refine_unit(*size_in_window, *scale.size());
-          }
-        },
-        *agent_);
-  }
+  bool has_acted(std::size_t environment) const;
+  void learn_scaled(double reward, bool terminated, std::size_t environment, ActionMask next_mask,
+                    bool is_own);
 
   ControllerConfig config_;
   std::vector<coding::PatternTable> tables_;
@@ -439,6 +425,7 @@ class Controller : public WithRates<Controller> {
   std::vector<std::size_t> indices_;
   detail::TakenActions taken_;
   detail::LastStates last_states_;
+  detail::LastStates::Room peeked_;
   RewardScale reward_scale_;
   core::Identity identity_;
 };

@@ -12,6 +12,7 @@
 #include "sdnn/agents/detail/observer.hpp"
 #include "sdnn/agents/observation_config.hpp"
 #include "sdnn/agents/relevance.hpp"
+#include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::agents {
 
@@ -46,6 +47,37 @@ class HistoryFilter {
     if (kind_ == History::differences) find_largest_differences(experience);
   }
 
+  /// With the sizes that it will have: what is fitted is read, or never used. Requires that it is
+  /// not `automatic`.
+  HistoryFilter(History kind, std::vector<bool> circular, std::vector<int> n_symbols,
+                std::size_t n_dimensions)
+      : circular_(std::move(circular)),
+        n_symbols_(std::move(n_symbols)),
+        n_dimensions_(n_dimensions),
+        kind_(kind),
+        largest_(circular_.size(), 1.0) {}
+
+  /// Whether states have more inputs than observations where some are numbers.
+  static bool adds_inputs(History kind) noexcept {
+    return kind == History::differences || kind == History::averages;
+  }
+  /// Throws std::invalid_argument naming why no history of this kind can be fitted: to inputs with
+  /// `n_symbols`, unless some of them may be left out, in a warm-up of n_steps.
+  static void require_possible(History kind, const std::vector<int>& n_symbols, bool may_be_fewer,
+                               std::size_t n_steps) {
+    if (kind == History::none || kind == History::automatic) return;
+    const auto n_numbers = static_cast<std::size_t>(std::ranges::count(n_symbols, 0));
+    core::require(n_numbers > 0, "history", "'none' or 'auto' where all observations are discrete",
+                  "another one");
+    if (kind != History::observer) return;
+    core::require(n_steps >= detail::Observer::kFewestTransitions, "history",
+                  "'none', 'differences' or 'averages' with fewer than 100 warm_up_steps",
+                  "observer");
+    core::require(may_be_fewer || n_numbers <= detail::Observer::kMostInputs, "history",
+                  "'none', 'differences' or 'averages' with more than 16 numeric inputs",
+                  "observer");
+  }
+
   History kind() const noexcept { return kind_; }
   /// Whether states are the inputs of single observations.
   bool is_none() const noexcept { return kind_ == History::none; }
@@ -67,10 +99,15 @@ class HistoryFilter {
 
   /// The part of an episode that is remembered; empty before its first observation.
   using Memory = std::vector<double>;
+  /// Room for the next step of an episode.
+  struct Room {
+    std::vector<double> last = {}, numbers = {}, features = {};
+  };
 
   /// Begins an episode with its first observation's inputs, which may be beyond [0, 1] unless there
   /// is no history. Shapes: (n_observed,), (n_inputs,).
-  void begin(std::span<const double> inputs, Memory& memory, std::span<double> state) const {
+  void begin(std::span<const double> inputs, Memory& memory, std::span<double> state,
+             Room& room) const {
     if (is_none()) {
       std::ranges::copy(inputs, state.begin());
       return;
@@ -78,24 +115,25 @@ class HistoryFilter {
     memory.assign(inputs.begin(), inputs.end());
     if (kind_ == History::averages) memory.insert(memory.end(), inputs.begin(), inputs.end());
     if (kind_ == History::observer) {
-      const auto numbers = numbers_in(inputs);
+      find_numbers(inputs, room.numbers);
       memory.assign(observer_.n_inputs(), 0.0);
-      observer_.begin(numbers, memory);
+      observer_.begin(room.numbers, memory);
     }
-    find_state(inputs, inputs, memory, state);
+    find_state(inputs, inputs, memory, state, room);
   }
   /// Continues it with the inputs of the next observation, after an action. Shapes as before;
   /// action (n_dimensions,).
   void follow(std::span<const double> action, std::span<const double> inputs, Memory& memory,
-              std::span<double> state) const {
+              std::span<double> state, Room& room) const {
     if (is_none()) {
       std::ranges::copy(inputs, state.begin());
       return;
     }
-    const Memory last = memory;
+    room.last.assign(memory.begin(), memory.end());
     if (kind_ == History::differences) memory.assign(inputs.begin(), inputs.end());
     if (kind_ == History::observer) {
-      observer_.follow(action, numbers_in(inputs), memory);
+      find_numbers(inputs, room.numbers);
+      observer_.follow(action, room.numbers, memory, room.features);
     }
     for (std::size_t k = 0; kind_ == History::averages && k < memory.size(); ++k) {
       const std::size_t i = k % n_observed();
@@ -103,7 +141,7 @@ class HistoryFilter {
       const double average = memory[k] + rate * difference(inputs[i], memory[k], i);
       memory[k] = circular_[i] ? average - std::floor(average) : average;
     }
-    find_state(inputs, last, memory, state);
+    find_state(inputs, room.last, memory, state, room);
   }
 
   /// For each of the observation's inputs whether it matters, as its estimate or a difference does;
@@ -117,6 +155,7 @@ class HistoryFilter {
     states.states.clear();
     states.next_states.clear();
     Memory memory;
+    Room room;
     std::vector<double> state(n_inputs());
     const auto append = [&state](std::vector<double>& rows) {
       rows.insert(rows.end(), state.begin(), state.end());
@@ -127,9 +166,9 @@ class HistoryFilter {
       };
       std::vector<double> action;
       for (const auto& actions : experience.actions) action.push_back(actions[t]);
-      if (t == 0 || experience.ends[t - 1]) begin(row(experience.states), memory, state);
+      if (t == 0 || experience.ends[t - 1]) begin(row(experience.states), memory, state, room);
       append(states.states);
-      follow(action, row(experience.next_states), memory, state);
+      follow(action, row(experience.next_states), memory, state, room);
       append(states.next_states);
     }
     std::vector<std::size_t> origins;
@@ -157,15 +196,22 @@ class HistoryFilter {
             std::ranges::all_of(memory, [](double x) { return std::isfinite(x); }));
   }
 
-  /// Lists what was fitted; see core/state.hpp. What it reads into has the task's inputs.
+  /// Lists the kind, which `serialize` does not: other parts need it before.
+  template <class Archive>
+  static void serialize_kind(History& kind, Archive& archive) {
+    auto number = static_cast<std::int32_t>(kind);
+    archive.number("kind", number);
+    if constexpr (Archive::kReads) {
+      archive.expect(number >= 0 && number < static_cast<std::int32_t>(History::automatic), "kind",
+                     "in [0, 3]");
+      kind = static_cast<History>(number);
+    }
+  }
+  /// Lists what was fitted; see core/state.hpp. What it reads into has the kind, and the task's
+  /// inputs.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
-    auto kind = static_cast<std::int32_t>(self.kind_);
-    archive.number("kind", kind);
     if constexpr (Archive::kReads) {
-      archive.expect(kind >= 0 && kind < static_cast<std::int32_t>(History::automatic), "kind",
-                     "in [0, 3]");
-      self.kind_ = static_cast<History>(kind);
       if (self.kind_ == History::observer) {
         const RandomExperience shape =
             self.numbers_of({.n_inputs = self.n_observed(), .circular = self.circular_});
@@ -183,12 +229,6 @@ class HistoryFilter {
     }
     if (self.kind_ == History::observer) archive.part("observer", self.observer_);
   }
-  /// Takes the inputs of the task before the rest is read.
-  HistoryFilter(std::vector<bool> circular, std::vector<int> n_symbols, std::size_t n_dimensions)
-      : circular_(std::move(circular)),
-        n_symbols_(std::move(n_symbols)),
-        n_dimensions_(n_dimensions),
-        largest_(circular_.size(), 1.0) {}
 
  private:
   static constexpr double kLeastImprovement = 0.1;  // of the observer
@@ -219,10 +259,15 @@ class HistoryFilter {
 
   std::vector<double> numbers_in(std::span<const double> inputs) const {
     std::vector<double> numbers;
+    find_numbers(inputs, numbers);
+    return numbers;
+  }
+  /// Writes the inputs that are no symbols; of rows, those of each.
+  void find_numbers(std::span<const double> inputs, std::vector<double>& numbers) const {
+    numbers.clear();
     for (std::size_t i = 0; i < inputs.size(); ++i) {
       if (is_number(i % n_observed())) numbers.push_back(inputs[i]);
     }
-    return numbers;
   }
   /// The experience without inputs that are symbols.
   RandomExperience numbers_of(RandomExperience experience) const {
@@ -259,15 +304,15 @@ class HistoryFilter {
   }
 
   void find_state(std::span<const double> inputs, std::span<const double> last,
-                  const Memory& memory, std::span<double> state) const {
+                  const Memory& memory, std::span<double> state, Room& room) const {
     const auto clipped = [](double x) { return std::clamp(x, 0.0, 1.0); };
     std::ranges::transform(inputs, state.begin(), clipped);
     std::size_t next = n_observed();
     if (kind_ == History::observer) {
-      std::vector<double> estimates(observer_.n_inputs());
-      observer_.state_of(memory, estimates);
+      room.numbers.resize(observer_.n_inputs());
+      observer_.state_of(memory, room.numbers);
       for (std::size_t i = 0, k = 0; i < n_observed(); ++i) {
-        if (is_number(i)) state[i] = estimates[k++];
+        if (is_number(i)) state[i] = room.numbers[k++];
       }
     } else if (kind_ == History::differences) {
       for (std::size_t i = 0; i < n_observed(); ++i) {

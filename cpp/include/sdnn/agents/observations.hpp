@@ -92,6 +92,16 @@ class Observations {
     }
     return circular;
   }
+  /// Whether there is one input only, which may have to be given twice.
+  bool has_single_input() const { return inputs_with(pairs_).size() == 1; }
+  /// Whether a single input is given as often as the approximator needs inputs; if not, once. See
+  /// HistoryFilter, which adds others. Requires that nothing was left out.
+  void repeat_input(bool is_repeated) {
+    repeats_input_ = is_repeated;
+    if (scale_) take_inputs(inputs_with(pairs_));
+  }
+  /// Whether inputs may be fewer than variables that are no symbols.
+  bool may_have_fewer_inputs() const { return may_find_pairs() || config_.relevant_only; }
   /// How many symbols each input may be; 0: it is a number.
   std::vector<int> n_symbols() const {
     std::vector<int> n_symbols;
@@ -383,7 +393,8 @@ class Observations {
   }
 
   void take_inputs(std::vector<ObservedInput> inputs) {
-    while (!inputs.empty() && inputs.size() < least_inputs_) inputs.push_back(inputs.back());
+    const std::size_t least = repeats_input_ ? least_inputs_ : 1;
+    while (!inputs.empty() && inputs.size() < least) inputs.push_back(inputs.back());
     std::vector<std::size_t> n_bins;
     for (std::size_t k = 0; k < inputs.size() && codes_missing(); ++k) {
       const std::size_t of_number = n_bins_[std::min(k, n_bins_.size() - 1)];
@@ -395,6 +406,7 @@ class Observations {
 
   ObservationConfig config_;
   std::size_t least_inputs_;
+  bool repeats_input_ = true;
   std::vector<std::size_t> n_bins_;
   std::vector<Role> roles_;  ///< as the configuration has them
   bool needs_fit_ = false;

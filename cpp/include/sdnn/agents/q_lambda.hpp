@@ -146,8 +146,9 @@ class QLambda : public IndexAgent<QLambda> {
     episode.next_state.assign(next_state.begin(), next_state.end());
     episode.next_mask.assign(next_mask.begin(), next_mask.end());
     episode.waits = true;
-    if (reward != 0.0 && lacks_rewards()) exploration_.note_first_reward(n_learned_);
+    if (reward != 0.0 && lacks_rewards()) exploration_.note_first_reward(n_learned_ - n_logged_);
     td_.fit_unit(reward, episodes_);
+    if (readout().exponent()) n_logged_ = 0;
     ++n_learned_;
     apply_rates();
     if (terminated) {
@@ -183,6 +184,17 @@ class QLambda : public IndexAgent<QLambda> {
     td_.move_rows(episode, episodes_, errors, kSeparationRate);
   }
 
+  /// Whether the agent has acted in the present episode of an environment. Throws
+  /// std::invalid_argument if there is no such environment.
+  bool has_acted(std::size_t environment) const {
+    return episodes_.of(environment).exploration.step > 0;
+  }
+  /// Notes that the last transition was not a step of the agent itself: the search for more rewards
+  /// is twice as long as that for the first one, without what was read from a log.
+  void note_logged() noexcept {
+    if (!readout().exponent()) ++n_logged_;
+  }
+
   /// Makes the unit of values smaller where it is larger than it has to be; see LinearTD. Sizes of
   /// rewards are those of RewardScale, the last window's and the recent one.
   void refine_unit(std::int32_t size_in_window, std::int32_t size) {
@@ -199,6 +211,7 @@ class QLambda : public IndexAgent<QLambda> {
     exploration_ = std::move(fewer.exploration_);
     rates_ = fewer.rates_;
     n_learned_ = fewer.n_learned_;
+    n_logged_ = fewer.n_logged_;
     episodes_.resize(fewer.n_environments(), [this] { return new_episode(); });
     for (std::size_t i = 0; i < n_environments(); ++i) {
       episodes_.of(i).exploration = std::move(fewer.episodes_.of(i).exploration);
@@ -212,6 +225,9 @@ class QLambda : public IndexAgent<QLambda> {
     Exploration::serialize(self.exploration_, archive);
     QLambda::serialize_rates(self, archive);
     archive.number("n_learned", self.n_learned_);
+    std::optional<std::int64_t> n_logged;  // none where all were steps of the agent
+    if (self.n_logged_ > 0) n_logged = self.n_logged_;
+    archive.number("n_logged", n_logged);
     Episodes<Episode>::serialize(
         self.episodes_, archive, [&self] { return self.new_episode(); },
         [&](auto& episode) {
@@ -220,6 +236,9 @@ class QLambda : public IndexAgent<QLambda> {
     if constexpr (Archive::kReads) {
       archive.expect(self.n_learned_ >= 0 && self.n_learned_ <= kMostLearned, "n_learned",
                      "in [0, 2^45]");
+      self.n_logged_ = n_logged.value_or(0);
+      archive.expect(self.n_logged_ >= 0 && self.n_logged_ <= self.n_learned_, "n_logged",
+                     "in [0, n_learned]");
       self.apply_rates();
     }
   }
@@ -350,7 +369,8 @@ class QLambda : public IndexAgent<QLambda> {
   detail::LinearTD<Episode> td_;
   Exploration exploration_;
   std::int64_t n_learned_ = 0;
-  std::int32_t rate_ = 0;  ///< alpha, kOne for 1
+  std::int64_t n_logged_ = 0;  ///< of these, steps that the agent did not take; 0 after a reward
+  std::int32_t rate_ = 0;      ///< alpha, kOne for 1
   Workspace workspace_;
   Episodes<Episode> episodes_;
 };

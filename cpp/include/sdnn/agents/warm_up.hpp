@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <set>
 #include <span>
 #include <utility>
@@ -33,6 +34,7 @@ class WarmUp {
     std::span<const double> next_observation;
     bool terminated;
     ActionMask next_mask = {};
+    bool is_own = true;  ///< of an episode in which the agent acted
   };
 
   /// Where an agent cannot learn any transition, a warm-up is not over between acting and learning.
@@ -69,8 +71,10 @@ class WarmUp {
     Episode& episode = episodes_.of(environment);
     episode.begins = true;
     episode.n_kept = 0;
-    episode.acted = false;
+    episode.acted = episode.has_acted = false;
   }
+  /// Whether the agent has acted in an episode. Throws std::invalid_argument if there is none.
+  bool has_acted(std::size_t environment) const { return episodes_.of(environment).has_acted; }
 
   /// A random action: what `draw(generator, action)` writes, or one that is kept as long as it is
   /// allowed. Without `explore` from a stream of its own. Throws std::invalid_argument if there is
@@ -91,6 +95,7 @@ class WarmUp {
     }
     --episode.n_kept;
     episode.acted = !learns_any_transition_;
+    episode.has_acted = true;
     return episode.kept;
   }
 
@@ -101,6 +106,7 @@ class WarmUp {
       list.insert(list.end(), values.begin(), values.end());
     };
     note_mask(step.next_mask);
+    note_origin(step.is_own);
     append(observations_, step.observation);
     append(next_observations_, step.next_observation);
     append(actions_, step.action);
@@ -109,6 +115,7 @@ class WarmUp {
     begins_.push_back(episode.begins ? 1 : 0);
     environments_.push_back(static_cast<std::int64_t>(step.environment));
     episode.begins = episode.acted = false;
+    episode.has_acted = step.is_own;
   }
 
   /// All that was observed. Shape: (n, n_variables), row by row.
@@ -129,7 +136,8 @@ class WarmUp {
             rewards_[t],
             row(next_observations_, n_variables_),
             terminated_[t] != 0,
-            std::span(next_masks_).subspan(t * mask_size(), mask_size())};
+            std::span(next_masks_).subspan(t * mask_size(), mask_size()),
+            logged_.empty() || logged_[t] == 0};
   }
 
   template <class Self, class Archive>
@@ -140,6 +148,7 @@ class WarmUp {
     archive.numbers("next_observations", self.next_observations_);
     archive.numbers("terminated", self.terminated_);
     archive.some_numbers("next_masks", self.next_masks_);
+    archive.some_numbers("logged", self.logged_);
     archive.numbers("begins", self.begins_);
     archive.numbers("environments", self.environments_);
     archive.part("random", self.random_);
@@ -149,9 +158,13 @@ class WarmUp {
         [&](auto& episode) {
           archive.number("episode.begins", episode.begins);
           archive.number("episode.acted", episode.acted);
+          std::optional<bool> has_acted;  // none where an agent acts and learns in turn
+          if (episode.has_acted == episode.begins) has_acted = episode.has_acted;
+          archive.number("episode.has_acted", has_acted);
           archive.number("episode.n_kept", episode.n_kept);
           archive.numbers("episode.kept", episode.kept);
           if constexpr (Archive::kReads) {
+            episode.has_acted = has_acted.value_or(!episode.begins);
             archive.expect(episode.kept.size() == self.n_dimensions_, "episode.kept", "an action");
             archive.expect(episode.n_kept >= 0 && episode.n_kept <= 100, "episode.n_kept",
                            "in [0, 100]");
@@ -175,6 +188,7 @@ class WarmUp {
     explicit Episode(std::size_t n_dimensions) : kept(n_dimensions) {}
     bool begins = true;        ///< with its next transition
     bool acted = false;        ///< and must learn of it
+    bool has_acted = false;    ///< in the episode
     std::vector<double> kept;  ///< the random action
     std::int64_t n_kept = 0;   ///< steps that it will still last
   };
@@ -191,6 +205,13 @@ class WarmUp {
     next_masks_.resize((size() + 1) * n, 1);
   }
 
+  /// Appends whether the next transition was read from a log; none were where the list is empty.
+  void note_origin(bool is_own) {
+    if (is_own && logged_.empty()) return;
+    logged_.resize(size());
+    logged_.push_back(is_own ? 0 : 1);
+  }
+
   template <class Archive>
   void check(Archive& archive) const {
     const std::size_t n = size();
@@ -200,6 +221,7 @@ class WarmUp {
     archive.expect(actions_.size() == n * n_dimensions_, "actions", "one per reward");
     archive.expect(terminated_.size() == n, "terminated", "one per reward");
     archive.expect(next_masks_.size() == n * mask_size(), "next_masks", "as many of every reward");
+    archive.expect(logged_.empty() || logged_.size() == n, "logged", "one per reward, or none");
     archive.expect(begins_.size() == n, "begins", "one per reward");
     archive.expect(environments_.size() == n, "environments", "one per reward");
     archive.expect(!is_over(), "rewards", "fewer than the warm-up's steps");
@@ -214,7 +236,7 @@ class WarmUp {
   bool learns_any_transition_;
   core::Pcg64 random_, evaluation_;
   std::vector<double> observations_, next_observations_, actions_, rewards_;
-  std::vector<std::uint8_t> terminated_, begins_, next_masks_;
+  std::vector<std::uint8_t> terminated_, begins_, next_masks_, logged_;
   std::vector<std::int64_t> environments_;
   Episodes<Episode> episodes_;
 };

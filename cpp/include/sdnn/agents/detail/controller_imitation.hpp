@@ -1,4 +1,4 @@
-/// How a controller checks a transition, and learns from a teacher.
+/// How a controller checks and learns a transition, and learns from a teacher.
 #pragma once
 
 #include <span>
@@ -27,6 +27,48 @@ inline void Controller::check(std::span<const double> observation, std::span<con
   std::vector<double> state(observations_.n_inputs());
   observations_.scale(observation, state);
   observations_.scale(next_observation, state, "next_observation");
+}
+
+/// Whether the agent acts in an episode, so that its transitions are steps of a search; always
+/// where agents do not search.
+inline bool Controller::has_acted(std::size_t environment) const {
+  return std::visit(
+      [environment](const auto& agent) {
+        if constexpr (requires { agent.has_acted(environment); }) {
+          return agent.has_acted(environment);
+        }
+        return true;
+      },
+      *agent_);
+}
+
+/// Learns the transition in state_, indices_ and next_state_.
+inline void Controller::learn_scaled(double reward, bool terminated, std::size_t environment,
+                                     ActionMask next_mask, bool is_own) {
+  RewardScale scale = reward_scale_;  // unchanged if the agent throws
+  if (!scale.accepts(reward)) {
+    reward_scale_ = scale;
+    return;
+  }
+  std::visit(
+      [&](auto& agent) {
+        agent.learn(state_, learned_action(agent, environment), reward, next_state_, terminated,
+                    environment, next_mask);
+        if constexpr (requires { agent.note_logged(); }) {
+          if (!is_own) agent.note_logged();
+        }
+      },
+      *agent_);
+  const auto size_in_window = scale.end_window();
+  reward_scale_ = scale;
+  if (!size_in_window) return;
+  std::visit(
+      [&](auto& agent) {
+        if constexpr (requires { agent.refine_unit(0, 0); }) {
+          agent.refine_unit(*size_in_window, *scale.size());
+        }
+      },
+      *agent_);
 }
 
 inline void Controller::end_warm_up_of_teacher() {
@@ -59,6 +101,16 @@ inline void Controller::imitate(std::span<const double> observation, std::span<c
     last_states_.keep(observations_, 0, true);
     last_states_.note_action(0, action, true);
   }
+  readings_.note(held_, 0, false);
+}
+
+inline void Controller::follow_teacher(std::span<const double> observation,
+                                       std::span<const double> action) {
+  const auto held = readings_.filled(observation, 0, false, held_);
+  actions_.require_action(action);
+  last_states_.read(observations_, 0, held, state_, true);
+  last_states_.keep(observations_, 0, true);
+  last_states_.note_action(0, action, true);
   readings_.note(held_, 0, false);
 }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numeric>
-#include <optional>
+#include <stdexcept>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -13,6 +13,8 @@
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller.hpp"
 #include "sdnn/agents/detail/approximator_of.hpp"
+#include "sdnn/agents/detail/last_states.hpp"
+#include "sdnn/agents/history.hpp"
 #include "sdnn/agents/last_readings.hpp"
 #include "sdnn/agents/observations.hpp"
 #include "sdnn/agents/relevance.hpp"
@@ -21,6 +23,7 @@
 #include "sdnn/approximators/linear_sdnn_config.hpp"
 #include "sdnn/approximators/sdnn_c_config.hpp"
 #include "sdnn/core/detail/identity.hpp"
+#include "sdnn/core/errors.hpp"
 #include "sdnn/core/state.hpp"
 
 namespace sdnn::agents {
@@ -58,6 +61,12 @@ inline RandomExperience experience_of(const Observations& fitted, const WarmUp& 
   return experience;
 }
 
+/// The number of inputs that came first, where others were added; else 0.
+inline std::size_t n_first_inputs(const Observations& observations) noexcept {
+  const std::size_t n = observations.n_first_inputs();
+  return n < observations.n_inputs() ? n : 0;
+}
+
 }  // namespace detail
 
 inline WarmUp Controller::new_warm_up() const {
@@ -65,22 +74,48 @@ inline WarmUp Controller::new_warm_up() const {
           config_.seed, !is_on_policy(config_.learning)};
 }
 
-/// Makes the agent: all ranges are known. Of a state that is read, sizes are compared first.
-inline void Controller::fit(const core::StateReader* reader) {
-  last_states_.restart(observations_, n_dimensions());
-  approximator_ = detail::approximator_of(config_, observations_, history(), actions_, tables_);
-  const auto tables = detail::tables_of(config_, observations_, approximator_, tables_);
+/// Makes the agent: all ranges are known. Of a state that is read, sizes are compared first. Throws
+/// what the approximator does, and then nothing has changed.
+inline void Controller::fit(Observations observations, detail::LastStates last_states,
+                            const core::StateReader* reader) {
+  last_states.restart(observations, n_dimensions());
+  AnyApproximatorConfig approximator =
+      detail::approximator_of(config_, observations, last_states.history(), actions_, tables_);
+  const auto tables = detail::tables_of(config_, observations, approximator, tables_);
   if (reader != nullptr) {
-    expect_sizes(*reader, approximator_, config_.learning, actions_.n_actions(), !tables.empty());
+    expect_sizes(*reader, approximator, config_.learning, actions_.n_actions(), !tables.empty());
   }
-  agent_.emplace(make_agent(approximator_, config_.learning, actions_.n_actions(), config_.seed,
-                            tables, n_first_inputs(), observations_.codes_missing()));
+  agent_.emplace(make_agent(approximator, config_.learning, actions_.n_actions(), config_.seed,
+                            tables, detail::n_first_inputs(observations),
+                            observations.codes_missing()));
+  observations_ = std::move(observations);
+  last_states_ = std::move(last_states);
+  approximator_ = std::move(approximator);
   if (auto* const sdnn = std::get_if<approximators::SDNNCConfig>(&approximator_)) {
     if (n_dimensions() == 1) sdnn->n_actions = static_cast<int>(actions_.n_actions().front());
   }
   apply_rates([this](auto& agent) { agent.set_rates(rates_); });
   state_.resize(history().n_inputs());
   next_state_.resize(state_.size());
+}
+
+/// Finds impossible settings before the warm-up: those of an agent with all possible inputs.
+inline void Controller::try_to_fit() const {
+  const History history = config_.observation.history;
+  Controller trial = *this;
+  Observations observations = observations_;
+  observations.fit(std::vector<double>(n_variables()));
+  HistoryFilter::require_possible(history, observations.n_symbols(),
+                                  observations.may_have_fewer_inputs(),
+                                  static_cast<std::size_t>(config_.warm_up_steps));
+  if (history == History::none || history == History::automatic) {
+    trial.fit(std::move(observations), {});
+    return;
+  }
+  observations.repeat_input(!HistoryFilter::adds_inputs(history));
+  const HistoryFilter filter(history, observations.circular(), observations.n_symbols(),
+                             n_dimensions());
+  trial.fit(std::move(observations), detail::LastStates(filter));
 }
 
 /// Takes a random action.
@@ -107,22 +142,39 @@ inline void Controller::remember(const WarmUp::Step& step) {
   if (warm_up_->is_over()) end_warm_up();
 }
 
-inline void Controller::end_warm_up(double headroom) {
+/// Takes ranges, inputs and the history from the warm-up, and makes the agent.
+inline void Controller::fit_to_warm_up(History history, double headroom) {
   Observations fitted = observations_;
   fitted.fit(warm_up_->seen(), headroom);
-  History history = config_.observation.history;
+  detail::LastStates states;
   if (const bool has_choice = fitted.has_choice(); has_choice || history != History::none) {
     auto experience = detail::experience_of(fitted, *warm_up_, n_dimensions());
-    if (history != History::none) last_states_ = {history, experience, fitted};
-    if (has_choice) {
-      fitted.keep(this->history().relevant(experience, fitted.required()));
+    if (history != History::none) states = {history, experience, fitted};
+    const bool is_single =
+        HistoryFilter::adds_inputs(states.history().kind()) && fitted.has_single_input();
+    if (has_choice) fitted.keep(states.history().relevant(experience, fitted.required()));
+    if (is_single) fitted.repeat_input(false);
+    if (has_choice || is_single) {
       experience = detail::experience_of(fitted, *warm_up_, n_dimensions());
-      history = this->history().kind();
-      if (history != History::none) last_states_ = {history, experience, fitted};
+      history = states.history().kind();
+      if (history != History::none) states = {history, experience, fitted};
     }
   }
-  observations_ = std::move(fitted);
-  fit();
+  fit(std::move(fitted), std::move(states));
+}
+
+inline void Controller::end_warm_up(double headroom) {
+  const History history = config_.observation.history;
+#if SDNN_EXCEPTIONS
+  try {
+    fit_to_warm_up(history, headroom);
+  } catch (const std::logic_error&) {  // more inputs than the approximator can have
+    if (history != History::automatic) throw;
+    fit_to_warm_up(History::none, headroom);
+  }
+#else
+  fit_to_warm_up(history, headroom);
+#endif
   const WarmUp warm_up = std::move(*warm_up_);
   reward_scale_ = RewardScale(warm_up.rewards());
   warm_up_.reset();
@@ -135,12 +187,6 @@ inline void Controller::end_warm_up(double headroom) {
   }
   set_n_environments(warm_up.n_environments());
   watch();
-}
-
-/// The number of inputs that came first, where others were added; else 0.
-inline std::size_t Controller::n_first_inputs() const noexcept {
-  const std::size_t n = observations_.n_first_inputs();
-  return n < observations_.n_inputs() ? n : 0;
 }
 
 /// Looks for inputs that matter later, where some are left out and can be added.
@@ -164,9 +210,10 @@ inline void Controller::add_inputs() {
   const std::vector<bool> found = Relevance(latest, kCaution).inputs(kept);
   latest_->forget();
   if (found == kept) return;
-  observations_.keep(found);
+  Observations observations = observations_;
+  observations.keep(found);
   auto before = std::move(std::get<QLambda>(*agent_));
-  fit();
+  fit(std::move(observations), last_states_);
   std::get<QLambda>(*agent_).continue_from(std::move(before));
   identity_ = core::Identity();  // readers have workspaces for fewer inputs
 }
@@ -185,7 +232,7 @@ inline void Controller::replay(const WarmUp::Step& step, LastReadings& readings)
   for (std::size_t d = 0; d < n_dimensions(); ++d) {
     indices_[d] = actions_.index_of(step.action[d], d);
   }
-  learn_scaled(step.reward, step.terminated, step.environment, step.next_mask);
+  learn_scaled(step.reward, step.terminated, step.environment, step.next_mask, step.is_own);
 }
 
 template <class Archive>
@@ -234,13 +281,26 @@ void Controller::serialize(Self& self, Archive& archive) {
   if (is_warming_up) {
     archive.part("warm_up", *self.warm_up_);
   } else {
+    HistoryFilter history = self.history();
+    const bool may_have_history = self.config_.observation.history != History::none;
+    if (may_have_history) {
+      History kind = history.kind();
+      archive.within("history", [&] { HistoryFilter::serialize_kind(kind, archive); });
+      if constexpr (Archive::kReads) {
+        history = HistoryFilter(kind, std::vector<bool>(), {}, self.n_dimensions());
+        self.observations_.repeat_input(!HistoryFilter::adds_inputs(kind));
+      }
+    }
     archive.part("observations", self.observations_);
-    if (self.config_.observation.history != History::none) {
-      detail::LastStates::serialize_history(self.last_states_, self.observations_,
-                                            self.n_dimensions(), archive);
+    if (may_have_history) {
+      if constexpr (Archive::kReads) {
+        history = HistoryFilter(history.kind(), self.observations_.circular(),
+                                self.observations_.n_symbols(), self.n_dimensions());
+      }
+      archive.part("history", history);
     }
     if constexpr (Archive::kReads) {
-      self.fit(&archive);
+      self.fit(self.observations_, detail::LastStates(std::move(history)), &archive);
       self.watch();
     }
     if (self.latest_) archive.part("latest", *self.latest_);

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "sdnn/agents/history.hpp"
@@ -22,6 +22,12 @@ struct LastState {
   bool is_noted = false;  ///< whether ranges have followed it
   HistoryFilter::Memory memory = {};
   std::vector<double> action = {};  ///< in that state; empty: none yet
+
+  /// Makes it empty, and keeps the memory that was allocated.
+  void clear() noexcept {
+    for (std::vector<double>* values : {&observation, &state, &memory, &action}) values->clear();
+    is_noted = false;
+  }
 };
 
 /// In each environment the last observation and its state, which is the next transition's first: it
@@ -32,7 +38,15 @@ struct LastState {
 /// with those that are learned and is forgotten when one of these goes on.
 class LastStates {
  public:
+  /// Room for a state that is being found.
+  struct Room {
+    LastState next = {};
+    std::vector<double> inputs = {};
+    HistoryFilter::Room history = {};
+  };
+
   LastStates() = default;
+  explicit LastStates(HistoryFilter history) : history_(std::move(history)) {}
   /// Fits a history to the transitions of a warm-up.
   LastStates(History history, const RandomExperience& experience, const Observations& observations)
       : history_(history, experience, observations.n_symbols(), experience.actions.size()) {}
@@ -51,7 +65,7 @@ class LastStates {
   void read(const Observations& observations, std::size_t environment,
             std::span<const double> observation, std::span<double> state, bool is_learned) {
     if (!remembers(observations)) return observations.scale(observation, state);
-    find(observations, last(environment, !is_learned), observation, next_);
+    find(observations, last(environment, !is_learned), observation, next_, room_);
     std::ranges::copy(next_.state, state.begin());
   }
   /// Keeps the state that was read last.
@@ -59,33 +73,29 @@ class LastStates {
     const bool is_kept = !history_.is_none() || (is_learned && observations.is_running());
     if (!is_kept || environment >= kMostEnvironments) return;
     Environment& kept = of(environment);
-    if (is_learned) {
-      kept = {next_, {}};
-    } else {
-      kept.greedy = next_;
-    }
+    (is_learned ? kept.learned : kept.greedy) = next_;
+    kept.is_greedy = !is_learned;
   }
   /// Notes the action that was taken in the state that was kept last.
   void note_action(std::size_t environment, std::span<const double> action, bool is_learned) {
     if (history_.is_none() || environment >= last_.size()) return;
     Environment& kept = last_[environment];
-    if (is_learned || kept.greedy) {
-      (is_learned ? kept.learned : *kept.greedy).action.assign(action.begin(), action.end());
+    if (is_learned || kept.is_greedy) {
+      (is_learned ? kept.learned : kept.greedy).action.assign(action.begin(), action.end());
     }
   }
   /// Finds the state of an observation, in the order of greedy episodes, and keeps nothing: of the
-  /// last one as it is, of another one that of the next step.
+  /// last one as it is, of another one that of the next step. Many threads may, with a room each.
   void peek(const Observations& observations, std::size_t environment,
-            std::span<const double> observation, std::span<double> state) const {
+            std::span<const double> observation, std::span<double> state, Room& room) const {
     if (history_.is_none()) return observations.scale(observation, state);
     const LastState* const kept = last(environment, true);
-    LastState next;
     if (kept != nullptr && is_observation_of(*kept, observation)) {
-      next.state = kept->state;
-    } else {
-      find(observations, kept, observation, next);
+      std::ranges::copy(kept->state, state.begin());
+      return;
     }
-    std::ranges::copy(next.state, state.begin());
+    find(observations, kept, observation, room.next, room);
+    std::ranges::copy(room.next.state, state.begin());
   }
 
   /// Finds the state in which a transition starts; `follow` may come next. Throws as
@@ -97,7 +107,7 @@ class LastStates {
     if (before != nullptr && is_observation_of(*before, observation)) {
       first_ = *before;
     } else {
-      begin(observations, observation, first_);
+      begin(observations, observation, first_, room_);
     }
     std::ranges::copy(first_.state, state.begin());
   }
@@ -108,25 +118,32 @@ class LastStates {
               bool is_replayed = false) {
     constexpr auto kName = "next_observation";
     if (!remembers(observations)) return observations.scale(next_observation, next_state, kName);
-    continue_with(observations, first_, action, next_observation, next_, kName);
+    continue_with(observations, first_, action, next_observation, next_, kName, room_);
     const bool is_noted = observations.is_running() && !is_replayed;
     if (is_noted) {
       if (!first_.is_noted) observations.note(first_.observation);
       observations.note(next_observation);
-      continue_with(observations, first_, action, next_observation, next_, kName);
+      continue_with(observations, first_, action, next_observation, next_, kName, room_);
       next_.is_noted = true;
     }
     std::ranges::copy(next_.state, next_state.begin());
     const bool is_kept = is_noted || !history_.is_none();
-    if (is_kept && environment < kMostEnvironments) of(environment) = {next_, {}};
+    if (!is_kept || environment >= kMostEnvironments) return;
+    Environment& kept = of(environment);
+    kept.learned = next_;
+    kept.is_greedy = false;
   }
 
   void forget(std::size_t environment) {
-    if (environment < last_.size()) last_[environment] = {};
+    if (environment >= last_.size()) return;
+    last_[environment].learned.clear();
+    last_[environment].is_greedy = false;
   }
   /// Forgets greedy episodes: the next one begins with its first observation.
   void forget_greedy(std::size_t environment) {
-    if (!history_.is_none()) of(environment).greedy.emplace();
+    if (history_.is_none()) return;
+    of(environment).greedy.clear();
+    of(environment).is_greedy = true;
   }
   /// Forgets environments from this one on: others may come later.
   void forget_from(std::size_t environment) {
@@ -144,33 +161,19 @@ class LastStates {
     }
     for (std::size_t i = 0; i < self.last_.size(); ++i) {
       archive.within(std::to_string(i), [&] {
-        auto& greedy = self.last_[i].greedy;
-        self.list(self.last_[i].learned, archive);
+        auto& kept = self.last_[i];
+        self.list(kept.learned, archive);
         if (self.history_.is_none()) return;
-        bool is_greedy = greedy.has_value();
-        archive.number("is_greedy", is_greedy);
-        if constexpr (Archive::kReads) {
-          if (is_greedy) greedy.emplace();
-        }
-        if (is_greedy) archive.within("greedy", [&] { self.list(*greedy, archive); });
+        archive.number("is_greedy", kept.is_greedy);
+        if (kept.is_greedy) archive.within("greedy", [&] { self.list(kept.greedy, archive); });
       });
     }
-  }
-  /// Lists the history, of a task whose ranges are known.
-  template <class Self, class Archive>
-  static void serialize_history(Self& self, const Observations& observations,
-                                std::size_t n_dimensions, Archive& archive) {
-    if constexpr (Archive::kReads) {
-      self.history_ =
-          HistoryFilter(observations.circular(), observations.n_symbols(), n_dimensions);
-    }
-    archive.part("history", self.history_);
   }
 
  private:
   struct Environment {
-    LastState learned;
-    std::optional<LastState> greedy;
+    LastState learned = {}, greedy = {};
+    bool is_greedy = false;  ///< whether greedy episodes have a memory apart
   };
 
   static constexpr std::uint64_t kMostEnvironments = 1 << 14;
@@ -187,7 +190,7 @@ class LastStates {
   const LastState* last(std::size_t environment, bool is_greedy) const {
     if (environment >= last_.size()) return nullptr;
     const Environment& kept = last_[environment];
-    const LastState& last = is_greedy && kept.greedy ? *kept.greedy : kept.learned;
+    const LastState& last = is_greedy && kept.is_greedy ? kept.greedy : kept.learned;
     return last.state.empty() ? nullptr : &last;
   }
   /// Whether this is the observation of a state; missing readings are alike.
@@ -201,31 +204,37 @@ class LastStates {
   /// The state of an observation that comes after the last one: of the next step if the agent has
   /// acted there, else of the same one or, unless they are equal, of an episode that begins.
   void find(const Observations& observations, const LastState* last,
-            std::span<const double> observation, LastState& next) const {
+            std::span<const double> observation, LastState& next, Room& room) const {
     const bool is_same = last != nullptr && is_observation_of(*last, observation);
     if (last != nullptr && !last->action.empty()) {
-      continue_with(observations, *last, last->action, observation, next, "observation");
+      continue_with(observations, *last, last->action, observation, next, "observation", room);
     } else if (is_same) {
       next = *last;
     } else {
-      begin(observations, observation, next);
+      begin(observations, observation, next, room);
     }
   }
   void begin(const Observations& observations, std::span<const double> observation,
-             LastState& first) const {
-    std::vector<double> inputs(history_.n_observed());
-    observations.scale(observation, inputs, "observation", !history_.is_none());
-    first = {{observation.begin(), observation.end()}, std::vector<double>(history_.n_inputs())};
-    history_.begin(inputs, first.memory, first.state);
+             LastState& first, Room& room) const {
+    room.inputs.resize(history_.n_observed());
+    observations.scale(observation, room.inputs, "observation", !history_.is_none());
+    prepare(observation, first);
+    history_.begin(room.inputs, first.memory, first.state, room.history);
   }
   void continue_with(const Observations& observations, const LastState& before,
                      std::span<const double> action, std::span<const double> observation,
-                     LastState& next, const char* name) const {
-    std::vector<double> inputs(history_.n_observed());
-    observations.scale(observation, inputs, name, !history_.is_none());
-    next = {{observation.begin(), observation.end()}, std::vector<double>(history_.n_inputs())};
+                     LastState& next, const char* name, Room& room) const {
+    room.inputs.resize(history_.n_observed());
+    observations.scale(observation, room.inputs, name, !history_.is_none());
+    prepare(observation, next);
     next.memory = before.memory;
-    history_.follow(action, inputs, next.memory, next.state);
+    history_.follow(action, room.inputs, next.memory, next.state, room.history);
+  }
+  /// Makes room for the state of an observation.
+  void prepare(std::span<const double> observation, LastState& next) const {
+    next.clear();
+    next.observation.assign(observation.begin(), observation.end());
+    next.state.resize(history_.n_inputs());
   }
 
   void list(auto& last, auto& archive) const {
@@ -254,6 +263,7 @@ class LastStates {
   HistoryFilter history_;
   std::vector<Environment> last_;
   LastState first_, next_;  ///< of the transition or the state that is being found
+  Room room_;
 };
 
 }  // namespace sdnn::agents::detail

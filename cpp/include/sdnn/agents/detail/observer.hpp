@@ -69,10 +69,10 @@ class Observer {
   void begin(std::span<const double> state, std::span<double> estimates) const noexcept {
     for (std::size_t i = 0; i < n_inputs(); ++i) estimates[i] = coordinate(state[i], i);
   }
-  /// Moves estimates to the next state, after an action. Shapes: (n_dimensions,), (n_inputs,).
+  /// Moves estimates to the next state, after an action. Shapes: (n_dimensions,), (n_inputs,);
+  /// `features` is room.
   void follow(std::span<const double> action, std::span<const double> state,
-              std::span<double> estimates) const {
-    std::vector<double> features;
+              std::span<double> estimates, std::vector<double>& features) const {
     predict(action, estimates, features);
     for (std::size_t i = 0; i < n_inputs(); ++i) {
       estimates[i] += gain_ * difference(coordinate(state[i], i), estimates[i], i);
