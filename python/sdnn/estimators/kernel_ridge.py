@@ -1,19 +1,12 @@
-"""Ridge regression and classification with the kernel that the network approaches.
-
-The penalty is chosen by closed-form leave-one-out. In features in which the penalized problem is
-diagonal, with rows r and eigenvalues d, leaving a sample out divides its residual by 1 - h, where h
-is the sum of r^2 / (d + alpha). So one eigendecomposition gives the error of every alpha.
-"""
+"""Ridge regression and classification with the kernel that the network approaches."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
 from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 from scipy.special import log_softmax, softmax
 from sklearn.utils import check_random_state
@@ -23,148 +16,25 @@ from sklearn.utils.validation import check_is_fitted
 from sdnn.coding.kernel import N_UNITS, AnalyticKernel
 from sdnn.estimators.columns import Array, Floats, PairChoice, input_pairs
 from sdnn.estimators.inputs import CodedClassifier, CodedInputs, CodedRegressor
+from sdnn.estimators.intervals import coverage_of, error_bounds, log_sizes
 from sdnn.estimators.parameters import RandomState, documents, parameter, wholes, words
+from sdnn.estimators.ridge import (
+    Samples,
+    Solution,
+    diagonal,
+    low_rank_diagonal,
+    row_blocks,
+    solve,
+    solve_for,
+)
 from sdnn.estimators.training import Rows, class_weights, sample_weights
-from sdnn.support.arguments import explains_names, real
+from sdnn.support.arguments import explains_names, flag, real
 
 AUTO = words("auto")
 DEGREES = (1, 2, 3)
 LARGEST_TARGET = 1e140  # so that sums of squares are finite
 LOG_STEEPNESS = (0.0, 5.0)  # bounds, for the softmax of scores
-ALPHAS = np.logspace(-6, 0, 19)  # penalties to try, relative to the sum of eigenvalues
-NEGLIGIBLE = 1e-12  # eigenvalues, as shares of the largest
-ROWS_AT_ONCE = 4096
-MOST_LEFT_OUT = 8192  # samples used for leave-one-out with low rank
-
-
-@dataclasses.dataclass
-class Samples:
-    """Targets and weights of samples, and their counts for leave-one-out.
-
-    A sample of count 2 stands for two samples, so that leaving one out leaves half of its weight.
-    """
-
-    targets: Floats  # shape (n_samples, n_outputs)
-    weights: Floats
-    shares: Floats
-
-    def __getitem__(self, rows: Rows) -> Samples:
-        return Samples(self.targets[rows], self.weights[rows], self.shares[rows])
-
-    @property
-    def mean(self) -> Floats:
-        """Weighted mean targets, shape (n_outputs,)."""
-        mean: Floats = self.weights @ self.targets / self.weights.sum()
-        return mean
-
-
-@dataclasses.dataclass
-class Diagonal:
-    """The ridge problem in centered features whose normal equations are diagonal."""
-
-    values: Floats  # eigenvalues, shape (n_features,)
-    moments: Floats  # weighted sums of features times targets, shape (n_features, n_outputs)
-    to_dual: Floats  # shape (n_components, n_features)
-    kernel_mean: Floats  # weighted mean over the samples, shape (n_components,)
-    features: Floats  # features of samples to leave out, times the roots of weights
-    rows: Rows  # the numbers of these samples
-
-
-@dataclasses.dataclass
-class Solution:
-    """A solution of the ridge problem: outputs are ``kernel @ dual + intercept``."""
-
-    alpha: float
-    error: float  # mean square by leave-one-out, in variances of the targets
-    dual: Floats  # shape (n_components, n_outputs)
-    intercept: Floats  # shape (n_outputs,)
-    left_out: Floats  # outputs of samples by models without them
-    rows: Rows  # the numbers of these samples
-
-
-def row_blocks(n_samples: int) -> Iterator[Rows]:
-    """Yield the numbers of samples, `ROWS_AT_ONCE` at a time."""
-    for begin in range(0, n_samples, ROWS_AT_ONCE):
-        yield np.arange(begin, min(begin + ROWS_AT_ONCE, n_samples))
-
-
-def eigenvectors(matrix: Floats) -> tuple[Floats, Floats]:
-    """Return the eigenvalues that are not negligible and their vectors; overwrite the matrix."""
-    values, vectors = eigh(matrix, overwrite_a=True, check_finite=False, driver="evd")
-    kept = values > NEGLIGIBLE * values[-1]
-    return values[kept], vectors[:, kept]
-
-
-def diagonal(kernel: Floats, samples: Samples) -> Diagonal:
-    """Diagonalize the exact problem, in which every sample is a component; overwrites `kernel`."""
-    weights, roots = samples.weights, np.sqrt(samples.weights)[:, None]
-    mean = weights @ kernel / weights.sum()
-    kernel -= mean
-    kernel -= (mean - mean @ weights / weights.sum())[:, None]
-    kernel *= roots
-    kernel *= roots.T
-    values, vectors = eigenvectors(kernel)
-    scales = np.sqrt(values)
-    moments = scales[:, None] * (vectors.T @ (roots * (samples.targets - samples.mean)))
-    rows = np.arange(len(weights))
-    return Diagonal(values, moments, roots * (vectors / scales), mean, vectors * scales, rows)
-
-
-def low_rank_diagonal(
-    kernel_of: Callable[[Rows], Floats], components: Rows, samples: Samples
-) -> Diagonal:
-    """Diagonalize the low-rank problem in Nystroem's features, a block of samples at a time.
-
-    ``kernel_of`` returns the kernel of samples, given by number, and components.
-    """
-    values, vectors = eigenvectors(kernel_of(components))
-    to_features = vectors / np.sqrt(values)
-    n_samples, total = len(samples.weights), samples.weights.sum()
-    gram, sums = np.zeros((len(values), len(values))), np.zeros(len(values))
-    kernel_sums = np.zeros(len(components))
-    moments = np.zeros((len(values), samples.targets.shape[1]))
-    for rows in row_blocks(n_samples):
-        kernel, weights = kernel_of(rows), samples.weights[rows]
-        features = kernel @ to_features
-        kernel_sums += weights @ kernel
-        sums += weights @ features
-        features *= np.sqrt(weights)[:, None]
-        gram += features.T @ features
-        centered = samples.targets[rows] - samples.mean
-        moments += features.T @ (np.sqrt(weights)[:, None] * centered)
-    gram -= np.outer(sums, sums) / total
-    values, rotation = eigenvectors(gram)
-    to_dual = to_features @ rotation
-    rows = np.unique(np.linspace(0, n_samples - 1, MOST_LEFT_OUT).astype(np.int64))
-    features = np.concatenate([kernel_of(rows[part]) @ to_dual for part in row_blocks(len(rows))])
-    features -= sums @ rotation / total
-    features *= np.sqrt(samples.weights[rows])[:, None]
-    return Diagonal(values, rotation.T @ moments, to_dual, kernel_sums / total, features, rows)
-
-
-def solve(problem: Diagonal, samples: Samples, alpha: float | None) -> Solution:
-    """Solve the problem for an alpha, by default the one with the least leave-one-out error."""
-    left = samples[problem.rows]
-    total, roots = samples.weights.sum(), np.sqrt(left.weights)[:, None]
-    targets = roots * (left.targets - samples.mean)
-    variances = np.square(targets).sum(axis=0) / left.weights.sum()
-    variances[variances == 0] = 1.0
-    squares = np.square(problem.features)
-    best = np.inf, 0.0, problem.moments, targets
-    for penalty in problem.values.sum() * ALPHAS if alpha is None else [alpha]:
-        shrinkage = 1 / (problem.values + penalty)
-        coefficients = shrinkage[:, None] * problem.moments
-        leverages = squares @ shrinkage + left.weights / total
-        kept = np.maximum(1 - left.shares * leverages, NEGLIGIBLE)
-        residuals = (targets - problem.features @ coefficients) / kept[:, None]
-        error = float((np.square(residuals).sum(axis=0) / variances).mean() / left.weights.sum())
-        if error < best[0]:
-            best = error, float(penalty), coefficients, residuals
-    error, penalty, coefficients, residuals = best
-    dual = problem.to_dual @ coefficients
-    intercept = samples.mean - problem.kernel_mean @ dual
-    left_out = left.targets - residuals / np.where(roots > 0, roots, 1)
-    return Solution(penalty, error, dual, intercept, left_out, problem.rows)
+LOG_OF_TEN = np.log(10.0)
 
 
 def apply_degree(kernel: Floats, degree: int) -> Floats:
@@ -241,10 +111,13 @@ class BaseKernelRidge(CodedInputs):
         targets: Floats,
         counts: Floats,
         factors: Floats | None = None,
-    ) -> tuple[Floats, Rows]:
+        *,
+        models_errors: bool = False,
+    ) -> tuple[Floats, Rows, Solution | None]:
         """Learn ranges, kernel, settings and solution; samples weigh counts times factors.
 
-        Returns the outputs of samples by models without them, and the numbers of these samples.
+        Returns the outputs of samples by models without them, the numbers of these samples, and
+        with `models_errors` a model of the logarithms of the sizes of their errors.
         """
         if (largest := np.abs(targets).max()) > LARGEST_TARGET:
             raise ValueError(f"y must be within +-{LARGEST_TARGET:g}, got {largest:g}: scale it")
@@ -261,11 +134,14 @@ class BaseKernelRidge(CodedInputs):
             components = np.sort(random.choice(components, self.max_components, replace=False))
         self.X_fit_ = table[components]
         alpha = None if self.alpha == "auto" else real("alpha", self.alpha)
-        base = self.kernel_(self.X_fit_)
-        solutions = {}
+        base, part = self.kernel_(self.X_fit_), samples[components]
+        solutions, sizes = {}, {}
         for degree in DEGREES if self.degree == "auto" else (int(self.degree),):
-            problem = diagonal(apply_degree(base.copy(), degree), samples[components])
-            solutions[degree] = solve(problem, samples[components], alpha)
+            problem = diagonal(apply_degree(base.copy(), degree), part)
+            solutions[degree] = solve(problem, part, alpha)
+            if models_errors:
+                errors = log_sizes(part.targets - solutions[degree].left_out)
+                sizes[degree] = solve_for(problem, part, errors)
             del problem  # free its memory before the next degree needs as much
         self.degree_ = min(solutions, key=lambda degree: solutions[degree].error)
         solution = solutions[self.degree_]
@@ -275,7 +151,7 @@ class BaseKernelRidge(CodedInputs):
             solution = solve(problem, samples, alpha)
         self.alpha_, self.leave_one_out_error_ = solution.alpha, solution.error
         self.dual_coef_, self.intercept_ = solution.dual, solution.intercept
-        return solution.left_out, solution.rows
+        return solution.left_out, solution.rows, sizes.get(self.degree_)
 
     def _kernel(self, table: Array) -> Floats:
         """Return the kernel of samples and components."""
@@ -285,8 +161,12 @@ class BaseKernelRidge(CodedInputs):
         """Return the outputs of samples, shape (n_samples, n_outputs)."""
         check_is_fitted(self, "dual_coef_")
         table = self._validated(X, codings=self.kernel_.codings)
-        parts = [self._kernel(table[rows]) @ self.dual_coef_ for rows in row_blocks(len(table))]
-        return np.concatenate(parts) + self.intercept_
+        return self._sums(table, self.dual_coef_) + self.intercept_
+
+    def _sums(self, table: Array, dual: Floats) -> Floats:
+        """Return the kernel of samples times coefficients, a block of samples at a time."""
+        parts = [self._kernel(table[rows]) @ dual for rows in row_blocks(len(table))]
+        return np.concatenate(parts)
 
 
 @explains_names()
@@ -297,14 +177,23 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
 
     Its settings need no search. It does not learn online.
 
+    Attributes
+    ----------
+    leave_one_out_residuals_ : ndarray, shape (n_samples, n_outputs)
+        Targets minus the outputs of models without the sample: of samples of weight 0 none, of more
+        than ``max_components`` samples a part.
+
     Examples
     --------
     >>> import numpy as np
     >>> from sdnn import SDNNKernelRidge
     >>> X = np.random.RandomState(0).uniform(size=(200, 2))
     >>> y = np.sin(6 * X[:, 0]) * X[:, 1]
-    >>> bool(SDNNKernelRidge().fit(X[::2], y[::2]).score(X[1::2], y[1::2]) > 0.95)
+    >>> model = SDNNKernelRidge().fit(X[::2], y[::2])
+    >>> bool(model.score(X[1::2], y[1::2]) > 0.95)
     True
+    >>> model.predict_interval(X[1::2], coverage=0.8).shape
+    (100, 2)
     """
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
@@ -312,12 +201,64 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
         counts = self._sample_counts(sample_weight, len(table))
         self._flat = targets.ndim == 1
         targets = targets.reshape(len(table), -1)
-        self._solve(X, table, targets.clip(*self._ranges_of(targets)), counts)
+        clipped = targets.clip(*self._ranges_of(targets))
+        left_out, rows, sizes = self._solve(X, table, clipped, counts, models_errors=True)
+        assert sizes is not None  # as errors are modelled
+        self._sizes_of_errors = sizes
+        rows_used = counts[rows] > 0
+        rows, left_out = rows[rows_used], left_out[rows_used]
+        self.leave_one_out_residuals_ = targets[rows] - left_out
+        self._residual_counts = counts[rows]
+        self._mean_log_size = log_sizes(self.leave_one_out_residuals_).mean(axis=0)
+        is_exact = len(self.X_fit_) == len(table)
+        self._residual_sizes = (
+            self._bounded_sizes(sizes.left_out[rows_used])
+            if is_exact
+            else self._error_sizes(table[rows])
+        )
+
+    def _error_sizes(self, table: Array) -> Floats:
+        """Return the size of errors that is expected at samples, shape (n_samples, n_outputs)."""
+        sizes = self._sizes_of_errors
+        return self._bounded_sizes(self._sums(table, sizes.dual) + sizes.intercept)
+
+    def _bounded_sizes(self, logarithms: Floats) -> Floats:
+        """Return sizes of errors of these logarithms, at most ten times the mean or a tenth."""
+        excess = np.clip(logarithms - self._mean_log_size, -LOG_OF_TEN, LOG_OF_TEN)
+        sizes: Floats = np.exp(self._mean_log_size + excess)
+        return sizes
 
     def predict(self, X: ArrayLike) -> Floats:
         """Predict the outputs of samples, shape (n_samples,) or (n_samples, n_outputs)."""
         outputs = self._outputs(X)
         return outputs[:, 0] if self._flat else outputs
+
+    def predict_interval(
+        self, X: ArrayLike, coverage: float = 0.9, *, scaled: bool = False
+    ) -> Floats:
+        """Predict lower and upper bounds of targets, shape (n_samples, 2).
+
+        A target lies between them with a probability of about ``coverage``, if samples are drawn
+        like those of `fit`: bounds are those of the errors of each sample's prediction without it.
+        They have equal widths, or with ``scaled`` widths in proportion to a model of the sizes of
+        errors, for noise that depends on the inputs. Several outputs have a shape of (n_samples,
+        n_outputs, 2), and each the coverage apart.
+
+        Raises
+        ------
+        ValueError
+            If ``coverage`` is not within (0, 1), or needs more samples than were fitted.
+        """
+        outputs = self._outputs(X)
+        share, is_scaled = coverage_of(coverage), flag("scaled", scaled)
+        sizes = np.abs(self.leave_one_out_residuals_)
+        scales: Floats = np.ones(1)
+        if is_scaled:
+            sizes = sizes / self._residual_sizes
+            scales = self._error_sizes(self._validated(X, codings=self.kernel_.codings))
+        widths = error_bounds(sizes, self._residual_counts, share) * scales
+        bounds: Floats = np.stack([outputs - widths, outputs + widths], axis=-1)
+        return bounds[:, 0] if self._flat else bounds
 
 
 @explains_names()
@@ -355,7 +296,7 @@ class SDNNKernelClassifier(CodedClassifier, BaseKernelRidge):
         self._set_classes(labels)
         one_hot = (labels[:, None] == self.classes_).astype(np.float64)
         of_classes = class_weights(self.class_weight, labels)
-        left_out, rows = self._solve(X, table, one_hot, counts, of_classes)
+        left_out, rows, _ = self._solve(X, table, one_hot, counts, of_classes)
         weights = (counts if of_classes is None else counts * of_classes)[rows]
 
         def loss(log_steepness: float) -> float:

@@ -57,7 +57,7 @@ def test_transitions_of_a_log_do_not_count_as_steps_of_a_search(has_warm_up):
     act_and_learn(agent, [0.0] * 20)
     log = [Transition(HERE, 1, 0.0, HERE, False)] * 400
     learn_from(agent, [*log, Transition(HERE, 1, 1.0, HERE, True)])
-    assert n_random_left(agent) == 2 * 20
+    assert int(agent.state()["agent.n_random_left"]) == 2 * 20
 
 
 def test_ends_of_episodes_are_counted_only_after_the_search():

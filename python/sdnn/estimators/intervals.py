@@ -1,0 +1,55 @@
+"""Prediction intervals from errors of predictions that had not learned the samples.
+
+A new error is below the k-th smallest of n such errors with a probability of about k / (n + 1), if
+it is drawn like them. Source: Vovk, V., Gammerman, A., Shafer, G. (2005), Algorithmic learning in a
+random world; Barber, R., Candes, E., Ramdas, A., Tibshirani, R. (2021), Predictive inference with
+the jackknife+, Annals of Statistics 49 (the jackknife, of which this is the plain form).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sdnn.estimators.columns import Floats
+from sdnn.support.arguments import real
+
+LEAST_SHARE = 0.01
+"""Least size of an error for a model of sizes, as a share of the root mean square error."""
+
+
+def coverage_of(coverage: float) -> float:
+    """Check the share of targets that intervals are to contain; TypeError or ValueError."""
+    value = real("coverage", coverage)
+    if not 0.0 < value < 1.0:
+        raise ValueError(f"coverage must be above 0 and below 1, such as 0.9, got {value:g}")
+    return value
+
+
+def error_bounds(sizes: Floats, weights: Floats, coverage: float) -> Floats:
+    """Return the size of errors that a new error does not exceed with a probability of `coverage`.
+
+    Shapes: sizes (n_samples, n_outputs), weights (n_samples,), above 0; returns (n_outputs,). A
+    sample of weight 2 counts as two samples. ValueError if there are too few samples.
+    """
+    total = float(weights.sum())
+    needed = coverage * (total + 1.0)
+    if needed > total:
+        least = math.ceil(coverage / (1.0 - coverage))
+        raise ValueError(
+            f"coverage must be at most {total / (total + 1.0):.3g} with the errors of {total:g}"
+            f" samples, got {coverage:g}: fit at least {least} samples"
+        )
+    bounds = []
+    for column in sizes.T:
+        order = np.argsort(column, kind="stable")
+        place = int(np.searchsorted(np.cumsum(weights[order]), needed * (1.0 - 1e-12)))
+        bounds.append(column[order[min(place, len(order) - 1)]])
+    return np.array(bounds)
+
+
+def log_sizes(errors: Floats) -> Floats:
+    """Return logarithms of the sizes of errors, as targets of a model; shape as `errors`."""
+    least = LEAST_SHARE * np.sqrt(np.square(errors).mean(axis=0))
+    return np.log(np.maximum(np.abs(errors), np.where(least > 0, least, 1.0)))

@@ -1,0 +1,102 @@
+"""Prediction intervals: bounds worked by hand, coverage, and arguments."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from refusals import refuses
+from sdnn import SDNNKernelRidge
+from sdnn.estimators.intervals import error_bounds
+
+RNG = np.random.default_rng(3)
+X = RNG.uniform(-1.0, 1.0, (700, 2))
+
+
+def noisy(X, noise):
+    return np.sin(3.0 * X[:, 0]) + X[:, 1] + noise * np.random.default_rng(5).normal(size=len(X))
+
+
+def covered(bounds, y):
+    return np.mean((bounds[..., 0] <= y) & (y <= bounds[..., 1]))
+
+
+def test_the_bound_is_the_error_of_the_rank_that_coverage_needs():
+    # Nine errors: a new one exceeds at most k - 1 of them with probability k / 10.
+    sizes = np.array([[5.0], [1.0], [9.0], [3.0], [7.0], [2.0], [8.0], [4.0], [6.0]])
+    for coverage, bound in ((0.1, 1.0), (0.5, 5.0), (0.75, 8.0), (0.9, 9.0)):
+        assert error_bounds(sizes, np.ones(9), coverage).tolist() == [bound]
+    # A sample of weight 2 counts twice: 1, 1, 2, 3 have 5 ranks.
+    assert error_bounds(np.array([[2.0], [1.0], [3.0]]), np.array([1.0, 2.0, 1.0]), 0.4) == 1.0
+
+
+def test_residuals_are_those_of_models_without_the_sample():
+    y = noisy(X[:40], 0.1)
+    settings = {"alpha": 1.0, "degree": 1, "coding": "anchor"}
+    model = SDNNKernelRidge(**settings).fit(X[:40], y)
+    for left_out in (0, 17):
+        others = np.arange(40) != left_out
+        # The code's ranges must not change: it is the whole model's.
+        kernel = model.kernel_(X[:40], X[:40])
+        K, t = kernel[np.ix_(others, others)], y[others]
+        H = np.eye(39) - 1 / 39
+        dual = np.linalg.solve(H @ K @ H + np.eye(39), t - t.mean())
+        intercept = t.mean() - K.mean(axis=0) @ dual
+        expected = y[left_out] - (kernel[left_out, others] @ dual + intercept)
+        assert model.leave_one_out_residuals_[left_out, 0] == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("scaled", [False, True])
+@pytest.mark.parametrize("max_components", [2000, 150])
+def test_intervals_contain_their_share_of_new_targets(scaled, max_components):
+    y = noisy(X, 0.3)
+    model = SDNNKernelRidge(max_components=max_components, random_state=1).fit(X[:300], y[:300])
+    for coverage in (0.5, 0.9):
+        bounds = model.predict_interval(X[300:], coverage, scaled=scaled)
+        assert covered(bounds, y[300:]) == pytest.approx(coverage, abs=0.07)
+        np.testing.assert_allclose(bounds.mean(axis=1), model.predict(X[300:]))
+
+
+def test_scaled_widths_follow_noise_that_depends_on_an_input():
+    noise = np.where(X[:, 1] > 0, 0.6, 0.05)
+    y = noisy(X, noise)
+    model = SDNNKernelRidge().fit(X[:400], y[:400])
+    plain, scaled = (model.predict_interval(X[400:], scaled=s) for s in (False, True))
+    is_noisy = X[400:, 1] > 0.1
+    is_quiet = X[400:, 1] < -0.1
+    widths = np.diff(scaled)[:, 0]
+    assert np.ptp(np.diff(plain)) < 1e-9
+    assert np.median(widths[is_noisy]) > 4.0 * np.median(widths[is_quiet])
+    for rows in (is_noisy, is_quiet):
+        assert covered(scaled[rows], y[400:][rows]) == pytest.approx(0.9, abs=0.08)
+
+
+def test_several_outputs_have_the_intervals_of_single_ones_also_after_pickling():
+    y = np.stack([noisy(X, 0.1), 100.0 * X[:, 0]], axis=1)
+    settings = {"alpha": 0.5, "degree": 2}
+    model = pickle.loads(pickle.dumps(SDNNKernelRidge(**settings).fit(X[:90], y[:90])))
+    bounds = model.predict_interval(X[90:], 0.8)
+    assert bounds.shape == (610, 2, 2)
+    single = SDNNKernelRidge(**settings).fit(X[:90], y[:90, 1])
+    np.testing.assert_allclose(bounds[:, 1], single.predict_interval(X[90:], 0.8), atol=1e-8)
+
+
+def test_integer_weights_are_repetitions_and_weight_zero_is_absence():
+    y = noisy(X[:60], 0.2)
+    weights = np.arange(60) % 3
+    settings = {"alpha": 1.0, "degree": 1, "coding": "anchor"}
+    weighted = SDNNKernelRidge(**settings).fit(X[:60], y, sample_weight=weights)
+    repeated = SDNNKernelRidge(**settings).fit(X[:60].repeat(weights, 0), y.repeat(weights))
+    np.testing.assert_allclose(
+        weighted.predict_interval(X[60:], 0.8), repeated.predict_interval(X[60:], 0.8), atol=1e-9
+    )
+
+
+def test_coverage_within_0_and_1_with_enough_samples_is_required():
+    model = SDNNKernelRidge().fit(X[:20], X[:20, 0])
+    for coverage in (0.0, 1.0, np.nan):
+        refuses("coverage", model.predict_interval, X, coverage)
+    assert "99 samples" in str(refuses("coverage", model.predict_interval, X, 0.99))
+    refuses("scaled", model.predict_interval, X, scaled="yes", error=TypeError)
+    constant = SDNNKernelRidge().fit(X[:20], np.ones(20))
+    np.testing.assert_allclose(constant.predict_interval(X[:3], scaled=True), 1.0, atol=1e-6)
