@@ -26,9 +26,15 @@ class sdnn_learner {
 #ifdef SDNN_HAS_PROGRESS
   void set_progress(uint32_t progress) { sdnn_set_progress(&agent_, progress); }
 #endif
+#ifdef SDNN_IS_ACTOR_CRITIC
+  int64_t state_value(const int32_t (&observation)[SDNN_N_OBSERVED]) {
+    return sdnn_state_value(&agent_, observation);
+  }
+#else
   int64_t q(const int32_t (&observation)[SDNN_N_OBSERVED], action_type action) {
     return sdnn_q(&agent_, observation, action);
   }
+#endif
   void save(uint8_t (&image)[SDNN_IMAGE_BYTES]) const { sdnn_save(&agent_, image); }
   bool load(const uint8_t (&image)[SDNN_IMAGE_BYTES]) { return sdnn_load(&agent_, image) != 0; }
 

@@ -221,6 +221,15 @@ static inline int64_t sdnn_error(sdnn_agent* agent, const sdnn_code* code, const
   return target - value;
 }
 
+/* An action, of which numbers beyond the last count as the last. */
+static inline void sdnn_limit_action(const uint32_t* action, uint32_t* limited) {
+  uint32_t d;
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
+    const uint32_t last = sdnn_n_actions[d] - 1;
+    limited[d] = action[d] < last ? action[d] : last;
+  }
+}
+
 /* Begins new traces. */
 static inline void sdnn_end_traces(sdnn_agent* agent) {
   uint32_t row;

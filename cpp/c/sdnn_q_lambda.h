@@ -216,15 +216,6 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
   }
 }
 
-/* An action, of which numbers beyond the last count as the last. */
-static inline void sdnn_limit_action(const uint32_t* action, uint32_t* limited) {
-  uint32_t d;
-  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
-    const uint32_t last = sdnn_n_actions[d] - 1;
-    limited[d] = action[d] < last ? action[d] : last;
-  }
-}
-
 /* Q(observation, action) in units of 2 to the power of agent->exponent. */
 static inline int64_t sdnn_q_of_each(sdnn_agent* agent, const int32_t* observation,
                                      const uint32_t* action) {
@@ -283,23 +274,14 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   if (size != INT32_MIN) sdnn_refine_unit(agent, size);
 }
 
+#include "sdnn_act_and_learn.h"
+
 #if SDNN_N_DIMENSIONS == 1
-static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation, int explore) {
-  uint32_t action;
-  sdnn_act_in_each(agent, observation, explore, &action);
-  return action;
-}
 static inline int64_t sdnn_q(sdnn_agent* agent, const int32_t* observation, uint32_t action) {
   return sdnn_q_of_each(agent, observation, &action);
 }
-static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uint32_t action,
-                              int32_t reward, const int32_t* next_observation, int terminated) {
-  sdnn_learn_in_each(agent, observation, &action, reward, next_observation, terminated);
-}
 #else
-#define sdnn_act sdnn_act_in_each
 #define sdnn_q sdnn_q_of_each
-#define sdnn_learn sdnn_learn_in_each
 #endif
 
 /* An image holds the state as bytes, which the library reads and writes too. The episode is not

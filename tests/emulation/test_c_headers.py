@@ -51,7 +51,7 @@ def test_learning_compiles_for_microcontrollers_with_few_library_calls(name, kin
     needs("clang", "nm")
     (tmp_path / "agent.h").write_text(c_header(LEARNERS[name](), "agent", learning=True).text)
     act, action = "a[0] = agent_act(&agent, x, 1)", "a[0]"
-    if name == "several":
+    if name in ("several", "actor-vector", "actor-discrete"):
         act, action = "agent_act(&agent, x, 1, a)", "a"
     calls = f"""
         #include "agent.h"

@@ -50,7 +50,8 @@ _LARGEST = 2**31  # limit of the ranges of observations and actions
     "--learning",
     is_flag=True,
     help="The header has the agent itself, which continues to learn. For the agents q-lambda,"
-    " and sdnn-c with approximator.averaging_interval=0 and approximator.weight_limit=127.",
+    " actor-critic with an observation_range that is not running, and sdnn-c with"
+    " approximator.averaging_interval=0 and approximator.weight_limit=127.",
 )
 @click.option(
     "--new",
@@ -75,7 +76,7 @@ _LARGEST = 2**31  # limit of the ranges of observations and actions
 @click.option(
     "--agent",
     "kind",
-    type=click.Choice(["q-lambda", "sdnn-c"]),
+    type=click.Choice(["q-lambda", "actor-critic", "sdnn-c"]),
     help="With --new: which agent.  [default: q-lambda]",
 )
 @click.option(

@@ -7,8 +7,9 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from sdnn.agents import SDNNQLambda, SDNNQLearning
+from sdnn.agents import SDNNActorCritic, SDNNQLambda, SDNNQLearning
 from sdnn.agents.agent import AnyAgent
+from sdnn.export.actor_critic import ActorCriticLearner, ActorCriticWriter
 from sdnn.export.q_lambda import QLambdaLearner, QLambdaWriter
 from sdnn.export.sdnn_c import SDNNCLearner, SDNNCWriter
 from sdnn.export.writer import CHeader
@@ -60,7 +61,7 @@ def c_header(
 
     Parameters
     ----------
-    agent : SDNNQLearning or SDNNQLambda
+    agent : SDNNQLearning, SDNNQLambda or SDNNActorCritic
         With known ranges of its observations.
     name : str
         Prefix of all names in the header.
@@ -117,17 +118,29 @@ def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool)
     require(getattr(agent, "missing", "error") == "error", "agent", expected, agent)
     expected = "have history='none': states of a C header are those of single observations"
     require(getattr(agent, "history", "none") == "none", "agent", expected, agent)
-    expected = "have ranges of observations that stay, not running ones, to learn in C"
-    is_running = learns and getattr(agent, "has_running_ranges", False)
-    require(not is_running, "agent", expected, agent)
+    expected = (
+        "have ranges of observations that stay, not running ones, to learn in C: make it with"
+        " observation_range=(low, high)"
+    )
+    require(not (learns and _follows_ranges(agent)), "agent", expected, agent)
     if isinstance(agent, SDNNQLearning):
         return (SDNNCLearner if learns else SDNNCWriter)(agent, name, fraction_bits)
     if isinstance(agent, SDNNQLambda):
         return (QLambdaLearner if learns else QLambdaWriter)(agent, name, fraction_bits)
-    raise TypeError(f"agent must be an SDNNQLearning or SDNNQLambda, got {shown(agent)}")
+    if isinstance(agent, SDNNActorCritic):
+        return (ActorCriticLearner if learns else ActorCriticWriter)(agent, name, fraction_bits)
+    expected = "an SDNNQLearning, SDNNQLambda or SDNNActorCritic"
+    raise TypeError(f"agent must be {expected}, got {shown(agent)}")
 
 
-def save_image(agent: SDNNQLearning | SDNNQLambda) -> bytes:
+def _follows_ranges(agent: Any) -> bool:
+    """Return whether ranges of an agent's inputs are adapted to each new observation."""
+    if not getattr(agent, "has_running_ranges", False):
+        return False
+    return agent.is_warming_up or any(kind == "variable" for kind, _ in agent.inputs)
+
+
+def save_image(agent: SDNNQLearning | SDNNQLambda | SDNNActorCritic) -> bytes:
     """Return what an agent has learned, as ``NAME_load`` of its header with ``learning`` reads it.
 
     The present episode is not part of it: its last transition may still have to be learned.
@@ -136,7 +149,7 @@ def save_image(agent: SDNNQLearning | SDNNQLambda) -> bytes:
     return image
 
 
-def load_image(agent: SDNNQLearning | SDNNQLambda, image: bytes) -> None:
+def load_image(agent: SDNNQLearning | SDNNQLambda | SDNNActorCritic, image: bytes) -> None:
     """Give an agent the state that ``NAME_save`` of its header wrote; an episode begins.
 
     Raises

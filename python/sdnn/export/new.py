@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from sdnn.agents import SDNNQLambda, SDNNQLearning
+import gymnasium as gym
+
+from sdnn.agents import SDNNActorCritic, SDNNQLambda, SDNNQLearning
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.environments.types import Data, Space
 from sdnn.export.header import c_header
@@ -15,11 +17,13 @@ from sdnn.export.sdnn_c import MOST_WEIGHT
 from sdnn.support.arguments import argument_error, choice, shown, whole
 
 NewConfig = LinearSDNNConfig | SDNNCConfig
-_KINDS: dict[str, type[SDNNQLambda] | type[SDNNQLearning]] = {
+NewAgent = SDNNActorCritic | SDNNQLambda | SDNNQLearning
+_KINDS: dict[str, type[SDNNActorCritic] | type[SDNNQLambda] | type[SDNNQLearning]] = {
     "q-lambda": SDNNQLambda,
+    "actor-critic": SDNNActorCritic,
     "sdnn-c": SDNNQLearning,
 }
-_RAM_BYTES = {"q-lambda": 20_000, "sdnn-c": 60_000}
+_RAM_BYTES = {"q-lambda": 20_000, "actor-critic": 20_000, "sdnn-c": 60_000}
 
 
 def new_agent(
@@ -30,7 +34,7 @@ def new_agent(
     ram_bytes: int | None = None,
     approximator: NewConfig | None = None,
     **options: Any,
-) -> SDNNQLambda | SDNNQLearning:
+) -> NewAgent:
     """Return an agent that has learned nothing, as large as the memory of a processor allows.
 
     All of its sensors are inputs from the beginning, so it needs no warm-up; `c_header` with
@@ -40,21 +44,21 @@ def new_agent(
     ----------
     observation_space, action_space
         See `Agent`. Every range must be finite, or given as ``observation_range``.
-    kind : {"q-lambda", "sdnn-c"}
+    kind : {"q-lambda", "actor-critic", "sdnn-c"}
     ram_bytes : int, optional
         Most bytes that the agent may take in C; by default 20,000, or 60,000 for ``"sdnn-c"``, and
-        whatever it takes for a given number of ``n_pattern_units`` of Q(lambda).
+        whatever a linear agent takes for a given number of ``n_pattern_units``.
     approximator : LinearSDNNConfig or SDNNCConfig, optional
-        Q(lambda) gets as many ``n_pattern_units`` as fit, 32 to 768, unless there is a
-        number of them. SDNN-C gets the units given, by default those of its preset ``small``, or
-        fewer if they do not fit.
+        Linear agents, Q(lambda) and actor-critic, get as many ``n_pattern_units`` as fit, 32 to
+        768, unless there is a number of them. SDNN-C gets the units given, by default those of its
+        preset ``small``, or fewer if they do not fit.
     **options
-        Other arguments of `SDNNQLambda` or `SDNNQLearning`: ``seed``, ``learning``, ``angles``, ...
+        Other arguments of the agent's class: ``seed``, ``learning``, ``angles``, ...
 
     Raises
     ------
     ValueError
-        If no agent for these spaces is so small; from `SDNNQLambda` or `SDNNQLearning`.
+        If no agent for these spaces is so small; from the agent's class.
     RuntimeError
         If a range is not known.
 
@@ -69,6 +73,9 @@ def new_agent(
     agent_type = choice("kind", kind, _KINDS)
     most = _RAM_BYTES[kind] if ram_bytes is None else whole("ram_bytes", ram_bytes, 1, 2**31)
     settings = {**new_settings(kind), "inputs": "all", "angle_pairs": [], **options}
+    if agent_type.default_range == "running" and isinstance(observation_space, gym.spaces.Box):
+        bounds = observation_space.low.reshape(-1), observation_space.high.reshape(-1)
+        settings.setdefault("observation_range", bounds)  # in C ranges stay
     config = settings["approximator"] if approximator is None else approximator
     if not isinstance(config, agent_type.approximator_type):
         expected = agent_type.approximator_type.__name__
@@ -76,7 +83,7 @@ def new_agent(
             f"approximator must have the type {expected} for {kind}, got {shown(config)}"
         )
 
-    def made(size: NewConfig) -> SDNNQLambda | SDNNQLearning:
+    def made(size: NewConfig) -> NewAgent:
         return agent_type(observation_space, action_space, **{**settings, "approximator": size})
 
     def needed(size: NewConfig) -> int:
@@ -97,7 +104,7 @@ def new_agent(
 
 def new_settings(kind: str) -> Data:
     """Return the settings that a new agent begins with, ``approximator`` and ``learning``."""
-    agent_class, name = _KINDS[kind], "general" if kind == "q-lambda" else "small"
+    agent_class, name = _KINDS[kind], "small" if kind == "sdnn-c" else "general"
     preset = agent_class.presets[name]
     config = preset.approximator
     if isinstance(config, SDNNCConfig):

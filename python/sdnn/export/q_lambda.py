@@ -5,84 +5,33 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents import SDNNQLambda
 from sdnn.environments.types import Array, Data
-from sdnn.export.code import Code
-from sdnn.export.text import Tables
+from sdnn.export.linear import LinearWriter
 from sdnn.export.writer import (
     NONE,
     SCALE_FIELDS,
     CHeader,
     Field,
     Learner,
-    Writer,
     learning_needs,
-    require_few_weights,
 )
 
 _WEIGHTS = ("action_value.weights", "action_value.averaged_weights")
-_ONE = 1 << 16  # of rates
 _MOST_TOLERANCE = 2**62  # in units: above any difference of values
 
 
-class QLambdaWriter(Writer[_core.LinearSDNN]):
+class QLambdaWriter(LinearWriter):
     """Makes the header of an `SDNNQLambda` agent's greedy policy."""
 
     agent: SDNNQLambda
-
-    def code(self) -> Code:
-        """Return the code of its states."""
-        return Code(self.network, self.n_inputs)
-
-    def columns(self) -> NDArray[np.intp]:
-        """Return the places of the header's columns among those of the weights."""
-        m = self.agent.approximator.n_pattern_units
-        n_groups = len(self.network.pairs)
-        slots = np.arange(n_groups)[:, None] * (-(-m // 64) * 64) + np.arange(m)
-        return slots.reshape(-1)
-
-    def n_rows(self) -> list[int]:
-        """Return the number of readout units of each dimension."""
-        return [n + self.agent.approximator.action_window - 1 for n in self.n_actions()]
-
-    def n_weights(self) -> int:
-        """Return the number of weights; ValueError for too many."""
-        n_weights = sum(self.n_rows()) * self.code().n_columns
-        require_few_weights(n_weights, "n_actions")
-        return n_weights
-
-    def description(self) -> str:
-        """Return the sizes of the agent in words."""
-        return (
-            f"{self.n_inputs} inputs, {self.agent.approximator.n_pattern_units} units per pattern,"
-            f" {' x '.join(map(str, self.n_actions()))} actions"
-        )
-
-    def defines(self) -> Data:
-        """Return the sizes of the readout."""
-        return {
-            **self.code().defines(),
-            "ACTION_WINDOW": self.agent.approximator.action_window,
-            "N_ROWS": sum(self.n_rows()),
-            "MOST_ROWS": max(self.n_rows()),
-        }
 
     def tolerance(self) -> tuple[int, int]:
         """Return the tolerance of ties as a number below 2^62, times 2 to a power."""
         fraction, exponent = math.frexp(self.agent.learning.tie_tolerance)
         return int(fraction * _MOST_TOLERANCE), exponent - 62
-
-    def tables(self) -> Tables:
-        """Return the constants of the spaces, the code and the readout's rows."""
-        tables, first_rows = self.tables_of_spaces(), np.cumsum([0, *self.n_rows()])[:-1]
-        self.code().add_tables(tables)
-        n_actions = np.array(self.n_actions())
-        tables.add("uint32_t", "n_actions", n_actions, "Actions of each dimension.")
-        tables.add("uint32_t", "first_rows", first_rows, "Readout units of each dimension.")
-        return tables
 
     def header(self) -> CHeader:
         """Make the header."""
@@ -183,7 +132,7 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
         )
 
     def _learning_rule(self) -> Data:
-        learning, discount = self.agent.learning, round(self.agent.learning.discount * 32768)
+        learning = self.agent.learning
         number, exponent = self.tolerance()
         n_symbols = self.agent.approximator.n_symbols
         has_symbols_only = len(n_symbols) > 0 and all(n_symbols)
@@ -192,10 +141,7 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
             "IS_DUTCH": int(learning.traces == "dutch"),
             "IS_SARSA": int(learning.bootstrap == "sarsa"),
             "AVERAGING_INTERVAL": self.agent.approximator.averaging_interval,
-            "DISCOUNT": discount,
-            "HORIZON_BITS": 16 - max(32768 - discount, 1).bit_length(),
-            "TRACE_DECAY": round(learning.discount * learning.trace_decay * 8192),
-            "SCHEDULE_STEPS": learning.schedule_steps,
+            **self.rule_of_values(),
             **self._rates("RATE", "learning_rate"),
             **self._rates("EPSILON", "epsilon"),
             "TIE_TOLERANCE": f"INT64_C({number})",
@@ -211,14 +157,11 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
             first, last = getattr(learning, name), learning.final_learning_rate
             if name == "epsilon":
                 last = self.agent.final_epsilon
-        last = first if last is None else last
-        return {f"{macro}_FIRST": round(first * _ONE), f"{macro}_LAST": round(last * _ONE)}
+        return self.rates(macro, first, last)
 
     def _ram_bytes(self, n_weights: int) -> int:
         """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
-        code = self.code()
-        code_bytes = 8 + 4 * self.n_inputs + code.column_bytes * code.most_columns
         n_bytes = 8 * 3 + 24 + 32 * 4 + 4 * (2 + self.averages) * n_weights + 4 * 10
-        n_bytes += 4 * (2 * self.n_dimensions + self.n_inputs) + 2 * (-(-code_bytes // 4) * 4)
+        n_bytes += 4 * (2 * self.n_dimensions + self.n_inputs) + 2 * self.code_bytes()
         n_bytes += 3 + sum(self.n_rows())
         return -(-n_bytes // 8) * 8

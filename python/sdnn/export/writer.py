@@ -356,11 +356,12 @@ class Learner(Writer[Network]):
         (image,), state = np.frombuffer(whole, self.layout(), 1), self.agent._state_of("agent")
         for stream, words in zip(self.streams, image["words"], strict=True):
             state[f"{stream}.words"] = words.copy()
+        fields = image.dtype.names or ()
         state.pop("n_random_left", None)
-        if n_left := image["n_random_left"]:
+        if "n_random_left" in fields and (n_left := image["n_random_left"]):
             state["n_random_left"] = np.array(n_left, np.int32)
         self.recall(image, state)
-        names = [name for name in image.dtype.names or () if name.startswith(SCALE)]
+        names = [name for name in fields if name.startswith(SCALE)]
         kept = {name: np.array(image[name]) for name in names if image[name] != NONE}
         scale = {name.removeprefix(f"{SCALE}."): number for name, number in kept.items()}
         self.agent._restore(agent=state, reward_scale=scale)

@@ -24,8 +24,11 @@ from c_policies import (
     check_integer_path,
     check_symbols,
     discrete_agent,
+    learned,
     learning,
     lone_agent,
+    observations_of,
+    place_of,
     program,
     run,
     symbols_agent,
@@ -35,6 +38,7 @@ from sdnn.agents import (
     FuzzyQLearning,
     QLambdaConfig,
     RBFQLearning,
+    SDNNActorCritic,
     SDNNQLambda,
     SDNNQLearning,
     Transition,
@@ -66,6 +70,41 @@ def test_tie_tolerance_is_exported_in_integer_units_of_values(reward, tie_tolera
     agent = SDNNQLambda(Discrete(2), Discrete(2), learning=rule)
     agent.learn(Transition(0, 1, reward, 1, terminated=True))
     assert f"#define POLICY_TIE_TOLERANCE INT64_C({expected})\n" in c_header(agent, "policy").text
+
+
+@pytest.mark.parametrize("name", ["actor", "lone-actor"])
+def test_greedy_actions_between_those_of_a_box_are_those_of_the_agent(name, target, tmp_path):
+    lone = SDNNActorCritic(box(1.0, 2.0), box(2.0), seed=3)
+    agent = agents()["actor"] if name == "actor" else learned(lone)
+    n = agent.n_dimensions
+    header = export_c_header(agent, tmp_path / "policy.h")
+    call = "place[0] = policy_place_fixed(x)" if n == 1 else "policy_place_fixed(x, place)"
+    source = f"""
+        #include "policy.h"
+        #include <stdio.h>
+        int main(void) {{
+          int32_t x[POLICY_N_OBSERVED], action; uint32_t place[POLICY_N_DIMENSIONS], d;
+          while (fread(x, sizeof *x, POLICY_N_OBSERVED, stdin) == POLICY_N_OBSERVED) {{
+            {call};
+            for (d = 0; d < POLICY_N_DIMENSIONS; ++d) {{
+              action = policy_action_at(d, place[d]);
+              fwrite(&place[d], sizeof *place, 1, stdout);
+              fwrite(&action, sizeof action, 1, stdout);
+            }}
+          }}
+          return 0;
+        }}
+    """
+    executable = program(tmp_path, source, target.compiler, *STRICT)
+    scale = 2.0**header.fraction_bits
+    fixed = np.round(observations_of(agent, 300) * scale).astype("<i4")
+    written = np.frombuffer(run(executable, input=fixed.tobytes()), "<i4").reshape(-1, n, 2)
+    expected = np.array([agent.act(x / scale, explore=False) for x in fixed], float)
+    places = [
+        [place_of(agent.actions_of(d), one) for d, one in enumerate(action)] for action in expected
+    ]
+    assert written[..., 0].tolist() == places
+    np.testing.assert_allclose(written[..., 1] / scale, expected, atol=1.0 / scale)
 
 
 def test_discrete_observations_are_exported_as_one_hot_inputs(target, tmp_path):

@@ -13,9 +13,13 @@ import pytest
 from c_learners import (
     LEARNERS,
     SMALL,
+    actor,
+    actor_discrete,
+    actor_vector,
     build,
     check_learning,
     discrete,
+    lies_between,
     lines_of,
     network,
     paper_rule,
@@ -27,7 +31,14 @@ from c_learners import (
 )
 from c_policies import STRICT, STRICT_CPP, TARGETS, box, program, run
 from refusals import refuses
-from sdnn.agents import QLambdaConfig, RBFQLearning, SDNNQLambda, SDNNQLearning, Transition
+from sdnn.agents import (
+    QLambdaConfig,
+    RBFQLearning,
+    SDNNActorCritic,
+    SDNNQLambda,
+    SDNNQLearning,
+    Transition,
+)
 from sdnn.export import c_header, load_image, save_image
 
 SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all")
@@ -44,7 +55,7 @@ def test_an_agent_in_c_acts_and_learns_with_the_bits_of_the_agent(name, target, 
     check_learning(name, target, tmp_path, options=SANITIZED)
 
 
-@pytest.mark.parametrize("make", [discrete, network, small_steps])
+@pytest.mark.parametrize("make", [discrete, network, small_steps, actor])
 def test_a_trained_agent_continues_in_c(make, target, tmp_path):
     agent = make()
     run_agent(agent, lines_of(agent, 500, 3, 16), 16)
@@ -73,7 +84,7 @@ def test_an_agent_in_c_searches_for_a_first_reward_like_the_agent(target, tmp_pa
 
 def test_extreme_readings_and_rewards_have_defined_results(target, tmp_path):
     # Half of the numbers are extreme; acting, learning and new episodes come in any order.
-    for make in (discrete, sarsa, network, small_steps):
+    for make in (discrete, sarsa, network, small_steps, actor):
         folder = tmp_path / make.__name__
         folder.mkdir()
         agent = make()
@@ -86,7 +97,8 @@ def test_extreme_readings_and_rewards_have_defined_results(target, tmp_path):
         lines[:, 0] = random.integers(0, 3, len(lines))
         lines[:, -1] = random.random(len(lines)) < 0.1
         actions, image = run_program(command, save_image(agent), lines.astype("<i4"), 1)
-        assert np.max(actions) < len(agent.actions_of(0))
+        unit = 2**16 if lies_between(agent) else 1  # of places of greedy actions
+        assert np.max(actions) < len(agent.actions_of(0)) * unit
         load_image(agent, image)
 
 
@@ -110,7 +122,7 @@ int main(void) {
         if (i < 2 * AGENT_N_OBSERVED) x[i & 1][i / 2] = reward;
       }
       agent_learn(&agent, x[0], agent_act(&agent, x[0], step & 1), reward, x[1], step % 9 == 0);
-      agent_q(&agent, x[1], 0);
+      VALUE;
     }
     agent_begin_episode(&agent);
     agent_save(&agent, image);
@@ -122,14 +134,16 @@ int main(void) {
 """
 
 
-@pytest.mark.parametrize("make", [discrete, sarsa, network, small_steps])
+@pytest.mark.parametrize("make", [discrete, sarsa, network, small_steps, actor])
 def test_images_with_extreme_numbers_are_refused_or_saved_again(make, target, tmp_path):
     # The program fails if it cannot load an image that it saved.
     agent = make()
     run_agent(agent, lines_of(agent, 300, 1, 16), 16)
     (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
     options = (*STRICT, "-O1", *SANITIZED, "-fsanitize=address")
-    hostile = program(tmp_path, HOSTILE, target.compiler, *options)
+    is_actor = isinstance(agent, SDNNActorCritic)
+    value = "agent_state_value(&agent, x[1])" if is_actor else "agent_q(&agent, x[1], 0)"
+    hostile = program(tmp_path, HOSTILE.replace("VALUE", value), target.compiler, *options)
     random = np.random.default_rng(3)
     whole = [0, 1, 255, 2**31 - 1, 2**31, 2**32 - 1, 2**45, 2**62 - 1001, 2**63, 2**64 - 1]
     real = np.array([1.0, -1.0, 2.0**99, -(2.0**99), 5e-324, 1e300, np.inf, np.nan, -0.0])
@@ -142,7 +156,7 @@ def test_images_with_extreme_numbers_are_refused_or_saved_again(make, target, tm
             image[place : place + n_bytes] = random.choice(words).tobytes()[:n_bytes]
         if random.random() < 0.3:  # weights
             most = [b"\xff\xff\x7f\x00", b"\x01\x00\x80\xff"]
-            weights = most if isinstance(agent, SDNNQLambda) else [b"\xff", b"\x01"]
+            weights = [b"\xff", b"\x01"] if isinstance(agent, SDNNQLearning) else most
             one = weights[random.integers(2)]
             half = len(image) // 8 * 4
             image[-4 - half : -4] = one * (half // len(one))
@@ -187,11 +201,15 @@ def test_weights_that_leave_their_range_are_halved(target, tmp_path):
         (discrete, "const uint32_t a = one.act(x)"),
         (several, "uint32_t a[2]; one.act(x, a)"),
         (network, "one.set_progress(65536); const uint32_t a = one.act(x)"),
+        (actor, "const uint32_t a = one.act(x)"),
+        (actor_vector, "uint32_t a[2]; one.act(x, a)"),
     ],
 )
 def test_cpp_can_learn_save_and_load_by_the_learner_class(compiler, make, act, needs, tmp_path):
     needs(compiler)
-    (tmp_path / "agent.h").write_text(c_header(make(), "agent", learning=True).text)
+    agent = make()
+    (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
+    value = "state_value(x)" if isinstance(agent, SDNNActorCritic) else "q(x, a)"
     source = f"""
         #include "agent.h"
         static agent_learner one, same;
@@ -202,7 +220,7 @@ def test_cpp_can_learn_save_and_load_by_the_learner_class(compiler, make, act, n
           {act};
           one.learn(x, a, 1 << AGENT_FRACTION_BITS, x, true);
           one.save(image);
-          return one.q(x, a) != same.q(x, a) && same.load(image) && same.q(x, a) == one.q(x, a)
+          return one.{value} != same.{value} && same.load(image) && same.{value} == one.{value}
                      ? 0 : 1;
         }}
     """
@@ -218,7 +236,7 @@ def test_the_header_states_the_size_of_the_agent_in_memory(name, target, tmp_pat
     assert int(run(program(tmp_path, source, target.compiler, *STRICT))) == header.ram_bytes
 
 
-@pytest.mark.parametrize("make", [discrete, network])
+@pytest.mark.parametrize("make", [discrete, network, actor_discrete])
 def test_images_of_other_agents_are_refused_and_change_nothing(make):
     agent, loaded = make(), make()
     run_agent(agent, lines_of(agent, 300, 1, 16), 16)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn.agents import SDNNQLambda, SDNNQLearning
+from sdnn.agents import SDNNActorCritic, SDNNQLambda, SDNNQLearning
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.export import c_header, new_agent
 
@@ -22,14 +22,16 @@ def export(invoke):
     return lambda *arguments: invoke("export", *arguments, "--c-header", "agent.h")
 
 
-@pytest.mark.parametrize("ram_bytes", [6000, 20_000, 10**6])
+@pytest.mark.parametrize("ram_bytes", [14_000, 20_000, 10**6])
 @pytest.mark.parametrize("actions", [TWO, gym.spaces.MultiDiscrete([3, 4])])
-def test_a_new_linear_agent_is_the_largest_that_fits_the_memory(ram_bytes, actions):
-    agent = new_agent(SPACE, actions, ram_bytes=ram_bytes, seed=3)
+@pytest.mark.parametrize("kind", ["q-lambda", "actor-critic"])
+def test_a_new_linear_agent_is_the_largest_that_fits_the_memory(kind, ram_bytes, actions):
+    given = {"kind": kind, "seed": 3}
+    agent = new_agent(SPACE, actions, ram_bytes=ram_bytes, **given)
     n_units = agent.approximator.n_pattern_units
     assert c_header(agent, "agent", learning=True).ram_bytes <= ram_bytes
     larger = LinearSDNNConfig(n_pattern_units=n_units + 16)
-    header = c_header(new_agent(SPACE, actions, approximator=larger, seed=3), "a", learning=True)
+    header = c_header(new_agent(SPACE, actions, approximator=larger, **given), "a", learning=True)
     assert header.ram_bytes > ram_bytes or n_units == 768
 
 
@@ -95,6 +97,21 @@ def test_the_command_exports_the_same_linear_agent(export, tmp_path):
     expected = c_header(agent, "agent", learning=True)
     assert (tmp_path / "agent.h").read_text() == expected.text
     assert f"{expected.ram_bytes:,} bytes of memory" in done.stdout
+
+
+def test_the_command_exports_the_same_actor_critic(export, tmp_path):
+    settings = ("--set", "learning.discount=0.9", "--set", "approximator.n_actions=3")
+    done = export("--new", *GIVEN, "--actions", "-1:1", "--agent", "actor-critic", *settings)
+    assert done.exit_code == 0, done.output
+    preset = SDNNActorCritic.presets["general"]
+    agent = new_agent(
+        SPACE, gym.spaces.Box(-1.0, 1.0, (1,), np.float64), kind="actor-critic", angles=[1],
+        approximator=replace(preset.approximator, n_actions=3),
+        learning=replace(preset.learning, discount=0.9),
+    )  # fmt: skip
+    expected = c_header(agent, "agent", learning=True)
+    assert (tmp_path / "agent.h").read_text() == expected.text
+    assert 15_000 < expected.ram_bytes <= 20_000
 
 
 def test_the_command_exports_the_same_network(export, tmp_path):

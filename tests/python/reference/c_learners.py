@@ -8,8 +8,15 @@ import gymnasium as gym
 import numpy as np
 
 from bare_processors import BARE_TARGETS, STDIO
-from c_policies import STRICT, box, run
-from sdnn.agents import QLambdaConfig, SDNNQLambda, SDNNQLearning, Transition
+from c_policies import STRICT, box, place_of, run
+from sdnn.agents import (
+    ActorCriticConfig,
+    QLambdaConfig,
+    SDNNActorCritic,
+    SDNNQLambda,
+    SDNNQLearning,
+    Transition,
+)
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.export import export_c_header, load_image, save_image
 
@@ -116,12 +123,48 @@ def few_pairs():
     )  # fmt: skip
 
 
+def actor():
+    """An actor-critic with three inputs and torques; defaults of learning."""
+    given = _with(replace(SMALL, n_actions=5)) | _ranges(1.0, 2.0, 3.0)
+    return SDNNActorCritic(box(1.0, 2.0, 3.0), box(2.0), seed=11, **given)
+
+
+def actor_vector():
+    """Two dimensions of torques, an angle, and a strong entropy; wide patterns."""
+    learning = ActorCriticConfig(
+        entropy=0.5, trace_decay=1.0, discount=0.8, schedule_steps=100, learning_rate=0.9,
+        actor_learning_rate=0.7, final_learning_rate=None,
+    )  # fmt: skip
+    config = replace(SMALL, n_actions=3, n_pattern_units=70)
+    given = _with(config) | {"angle_pairs": [(0, 1)]} | _ranges(1.0, 1.0, 8.0)
+    spaces = box(1.0, 1.0, 8.0), box(2.0, 0.5)
+    return SDNNActorCritic(*spaces, seed=12, learning=learning, **given)
+
+
+def actor_discrete():
+    """Two dimensions of discrete actions, a circular angle, no thermometers."""
+    learning = ActorCriticConfig(thermometers=False, entropy=0.0, final_actor_learning_rate=None)
+    given = {"approximator": SMALL, "inputs": "all", "angles": [0]} | _ranges(np.pi, 2.0)
+    spaces = box(np.pi, 2.0), gym.spaces.MultiDiscrete([3, 5])
+    return SDNNActorCritic(*spaces, seed=13, learning=learning, **given)
+
+
+def actor_states():
+    """An actor-critic with a table of listed states."""
+    return SDNNActorCritic(gym.spaces.Discrete(9), gym.spaces.Discrete(4, start=2), seed=14)
+
+
 NETWORKS = {
     "network": network, "paper-rule": paper_rule, "small-steps": small_steps,
     "few-pairs": few_pairs,
 }  # fmt: skip
+ACTORS = {
+    "actor": actor, "actor-vector": actor_vector, "actor-discrete": actor_discrete,
+    "actor-states": actor_states,
+}  # fmt: skip
 LEARNERS = {
     **NETWORKS,
+    **ACTORS,
     "states": states,
     "discrete": discrete, "sarsa": sarsa, "dutch": dutch, "several": several, "circular": circular,
 }  # fmt: skip
@@ -129,6 +172,10 @@ LEARNERS = {
 
 def _with(config):
     return {"approximator": config, "inputs": "all", "angle_pairs": []}
+
+
+def _ranges(*sizes):
+    return {"observation_range": (-np.array(sizes), np.array(sizes))}
 
 
 # A line of input: what to do (0: begin an episode, 1: act and learn, 2: act greedily), observation,
@@ -147,7 +194,7 @@ int main(void) {
   if (!agent_load(&agent, image)) agent_begin(&agent);
   while (fread(line, sizeof *line, 2 * AGENT_N_OBSERVED + 3, stdin) == 2 * AGENT_N_OBSERVED + 3) {
     if (line[0] == 0) agent_begin_episode(&agent);
-    ACT(line[0] == 1);
+    ACT;
     fwrite(action, sizeof *action, AGENT_N_DIMENSIONS, stdout);
     if (line[0] == 1) LEARN;
   }
@@ -193,6 +240,11 @@ def lines_of(agent, n_steps, seed, fraction_bits):
     return table.astype("<i4")
 
 
+def lies_between(agent):
+    """Whether greedy actions of the agent lie between those that it learns."""
+    return isinstance(agent, SDNNActorCritic) and isinstance(agent.action_space, gym.spaces.Box)
+
+
 def run_agent(agent, lines, fraction_bits):
     """The indices of the actions that the library's agent takes for the lines."""
     n, scale = (lines.shape[1] - 3) // 2, 2.0**fraction_bits
@@ -205,9 +257,12 @@ def run_agent(agent, lines, fraction_bits):
         if line[0] == 0:
             agent.begin_episode()
         action = agent.act(now, explore=line[0] == 1)
-        actions.append(
-            [np.abs(agent.actions_of(d) - one).argmin() for d, one in enumerate(np.ravel(action))]
-        )
+        acts_between = line[0] != 1 and lies_between(agent)
+        actions.append([
+            place_of(agent.actions_of(d), one) if acts_between
+            else np.abs(agent.actions_of(d) - one).argmin()
+            for d, one in enumerate(np.ravel(action))
+        ])  # fmt: skip
         if line[0] == 1:
             agent.learn(Transition(now, action, line[n + 1] / scale, following, bool(line[-1])))
     agent.begin_episode()
@@ -218,18 +273,19 @@ def build(folder, agent, target, *options):
     """The header and its program, as a command."""
     header = export_c_header(agent, folder / "agent.h", learning=True)
     one = agent.n_dimensions == 1
-    act = (
-        "action[0] = agent_act(&agent, line + 1, %s)"
-        if one
-        else "agent_act(&agent, line + 1, %s, action)"
-    )
+    act = "agent_act(&agent, line + 1, line[0] == 1"
+    act = f"action[0] = {act})" if one else f"{act}, action)"
+    if lies_between(agent):
+        place = "agent_place(&agent, line + 1"
+        place = f"action[0] = {place})" if one else f"{place}, action)"
+        act = f"if (line[0] == 1) {act}; else {place}"
     learn = (
         f"agent_learn(&agent, line + 1, {'action[0]' if one else 'action'},"
         " line[1 + AGENT_N_OBSERVED], next, line[2 * AGENT_N_OBSERVED + 2])"
     )
     if target in BARE_TARGETS.values():
         (folder / "stdio.h").write_text(STDIO)
-    source = DRIVER.replace("ACT(line[0] == 1)", act % "line[0] == 1").replace("LEARN", learn)
+    source = DRIVER.replace("ACT;", f"{act};").replace("LEARN", learn)
     (folder / "steps.c").write_text(source)
     program = folder / "steps"
     run(

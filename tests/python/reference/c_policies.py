@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import gymnasium as gym
 import numpy as np
 
-from sdnn.agents import QLambdaConfig, SDNNQLambda, SDNNQLearning, Transition
+from sdnn.agents import QLambdaConfig, SDNNActorCritic, SDNNQLambda, SDNNQLearning, Transition
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.coding import RandomInverse
 from sdnn.export import c_header, export_c_header
@@ -183,7 +183,25 @@ def linear_vector_agent():
     )  # fmt: skip
 
 
+def actor_agent():
+    """An actor-critic with ranges that follow what is observed, two torques and an angle."""
+    return SDNNActorCritic(
+        box(1.0, 1.0, 8.0), box(1.0, 3.0), seed=11, angle_pairs=[(0, 1)], inputs="all",
+        approximator=LinearSDNNConfig(n_pattern_units=40, n_actions=5),
+    )  # fmt: skip
+
+
+def actor_discrete_agent():
+    """An actor-critic with discrete actions."""
+    return SDNNActorCritic(
+        box(2.0, 3.0), Discrete(3, start=-1), seed=12, angle_pairs=[], inputs="all",
+        approximator=LinearSDNNConfig(n_pattern_units=100),
+    )  # fmt: skip
+
+
 AGENTS = {
+    "actor": actor_agent,
+    "actor-discrete": actor_discrete_agent,
     "linear": linear_agent,
     "linear-vector": linear_vector_agent,
     "discrete": discrete_agent,
@@ -230,13 +248,17 @@ class Expected:
 
 def expected_of(agent, kind, given, observations):
     tied, chosen = [], []
-    tolerance = agent.learning.tie_tolerance
+    has_policy = isinstance(agent, SDNNActorCritic)
+    values_of = agent.action_probabilities if has_policy else agent.q_values
+    tolerance = 0.0 if has_policy else agent.learning.tie_tolerance
     for observation in observations:
         action = np.ravel(agent.act(observation, explore=False))
+        values = [values_of(observation, d) for d in range(agent.n_dimensions)]
+        if has_policy:  # whose greedy actions lie between those of a box
+            action = [agent.actions_of(d)[q.argmax()] for d, q in enumerate(values)]
         chosen.append(
             [np.abs(agent.actions_of(d) - one).argmin().item() for d, one in enumerate(action)]
         )
-        values = [agent.q_values(observation, d) for d in range(agent.n_dimensions)]
         tied.append([set(np.flatnonzero(q >= q.max() - tolerance).tolist()) for q in values])
     return Expected(kind, given, tied, chosen)
 
@@ -257,13 +279,19 @@ def all_expected(name, agent):
     ]
 
 
+def place_of(actions, action):
+    """The place of an action among actions at even distances, times 2^16."""
+    part = (float(action) - actions[0]) / (actions[-1] - actions[0])
+    return round(part * (len(actions) - 1) * 2**16)
+
+
 def check_actions(agent, expected, actions):
     """Each one the agent's, or one of those among which it draws."""
     n_unique = 0
     for tied, chosen, came in zip(expected.tied, expected.chosen, actions, strict=True):
         for among, own, action in zip(tied, chosen, came, strict=True):
             assert action in among
-            if len(among) == 1 or agent.learning.tie_rule != "uniform":
+            if len(among) == 1 or getattr(agent.learning, "tie_rule", "uniform") != "uniform":
                 assert action == own
                 n_unique += 1
     assert n_unique > len(actions) / 4

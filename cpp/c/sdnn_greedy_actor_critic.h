@@ -1,0 +1,59 @@
+/* The greedy policy of an actor-critic: a most probable action, or one between it and a neighbour.
+ *
+ * Where actions are a box, sdnn_place_fixed has the place of the greedy action among those of a
+ * dimension, times 2^16, and sdnn_action_at the action there, times 2^SDNN_FRACTION_BITS:
+ *
+ *   int32_t action = sdnn_action_at(0, sdnn_place_fixed(observation));
+ *
+ * With several dimensions: sdnn_place_fixed(observation, place), with an array of
+ * SDNN_N_DIMENSIONS numbers, and sdnn_action_at(d, place[d]). */
+#ifndef SDNN_GREEDY_ACTOR_CRITIC_H
+#define SDNN_GREEDY_ACTOR_CRITIC_H
+
+#include "sdnn_softmax.h"
+#include "sdnn_thermometers.h"
+
+typedef uint32_t sdnn_score;
+#include "sdnn_ties.h"
+
+/* The greedy action of dimension d, and its place. */
+static inline uint32_t sdnn_best(const sdnn_code* code, uint32_t d, uint32_t* place) {
+  int64_t sums[SDNN_MOST_ROWS];
+  uint32_t weights[SDNN_MOST_ROWS], action;
+  sdnn_sums(sdnn_weights, code, d, sums);
+  sdnn_weigh(sums, sdnn_n_actions[d], weights);
+  action =
+      sdnn_tied(weights, sdnn_n_actions[d], sdnn_largest_weight(weights, sdnn_n_actions[d]), 0);
+  if (place) *place = sdnn_mean_place(weights, sdnn_n_actions[d], action);
+  return action;
+}
+
+static inline void sdnn_act_in_each(const uint32_t* bins, uint32_t* action) {
+  sdnn_code code;
+  uint32_t d;
+  sdnn_encode_state(bins, &code);
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = sdnn_best(&code, d, 0);
+}
+
+#include "sdnn_policy.h"
+
+#if SDNN_IS_BOX
+static inline void sdnn_place_in_each(const int32_t* observation, uint32_t* place) {
+  uint32_t bins[SDNN_N_INPUTS], d;
+  sdnn_code code;
+  sdnn_bins_of_fixed(observation, bins);
+  sdnn_encode_state(bins, &code);
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) sdnn_best(&code, d, &place[d]);
+}
+#if SDNN_N_DIMENSIONS == 1
+static inline uint32_t sdnn_place_fixed(const int32_t* observation) {
+  uint32_t place;
+  sdnn_place_in_each(observation, &place);
+  return place;
+}
+#else
+#define sdnn_place_fixed sdnn_place_in_each
+#endif
+#endif
+
+#endif /* SDNN_GREEDY_ACTOR_CRITIC_H */

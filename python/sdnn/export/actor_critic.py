@@ -1,0 +1,254 @@
+"""SDNNActorCritic as a C header: its greedy policy, or the agent that learns."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn import _core
+from sdnn.agents import SDNNActorCritic
+from sdnn.environments.types import Array, Data
+from sdnn.export.code import Code
+from sdnn.export.linear import LinearWriter
+from sdnn.export.text import Tables
+from sdnn.export.writer import NONE, SCALE_FIELDS, CHeader, Field, Learner, learning_needs
+
+_CRITIC, _ACTOR = "action_value.weights", "actor.weights"
+_LARGEST = 2**31 - 1  # of readings
+
+
+class ThermometerCode(Code):
+    """The paired code, and after it the thermometers of some inputs."""
+
+    def __init__(self, network: _core.LinearSDNN, inputs: list[int], n_inputs: int) -> None:
+        self.thermometers: list[int] = []
+        self.n_units = 0
+        super().__init__(network, n_inputs)
+        self.n_pair_slots = len(self.groups) * (-(-self.m // 64) * 64)
+        """Columns of the groups in the agent's weights, where each fills whole words."""
+        n_thermometer_columns = network.weights().shape[1] - self.n_pair_slots
+        if n_thermometer_columns:
+            self.thermometers, self.n_units = inputs, n_thermometer_columns // len(inputs)
+
+    @property
+    def n_thermometer_columns(self) -> int:
+        """Number of columns of thermometers, none of which is ever 0."""
+        return len(self.thermometers) * self.n_units
+
+    @property
+    def n_columns(self) -> int:
+        """Number of columns."""
+        return super().n_columns + self.n_thermometer_columns
+
+    @property
+    def most_columns(self) -> int:
+        """Number of columns that a state can have at most."""
+        return super().most_columns + self.n_thermometer_columns
+
+    def defines(self) -> dict[str, int]:
+        """Return the sizes of a code."""
+        bins = [len(self.network.table(i)) for i in self.thermometers]
+        return {
+            **super().defines(),
+            "N_COLUMNS": self.n_columns,
+            "N_THERMOMETERS": len(self.thermometers),
+            "N_THERMOMETER_UNITS": self.n_units,
+            "N_THERMOMETER_BINS": max(bins, default=0),
+        }
+
+
+class ActorCriticWriter(LinearWriter):
+    """Makes the header of an `SDNNActorCritic` agent's greedy policy."""
+
+    agent: SDNNActorCritic
+
+    def code(self) -> ThermometerCode:
+        """Return the code of its states."""
+        variables = [i for i, source in enumerate(self.inputs) if source.kind == "variable"]
+        return ThermometerCode(self.network, variables, self.n_inputs)
+
+    @property
+    def action_window(self) -> int:
+        """The number of readout units of an action."""
+        return 1
+
+    def columns(self) -> NDArray[np.intp]:
+        """Return the places of the header's columns among those of the weights."""
+        code = self.code()
+        thermometers = code.n_pair_slots + np.arange(code.n_thermometer_columns)
+        return np.concatenate([super().columns(), thermometers])
+
+    def tables(self) -> Tables:
+        """Return the constants of the spaces, the code and the readout's rows."""
+        tables = super().tables()
+        thermometers = np.array(self.code().thermometers, np.int64)
+        tables.add("uint8_t", "thermometers", thermometers, "Inputs that have thermometers.")
+        return tables
+
+    def defines(self) -> Data:
+        """Return the sizes of the readout."""
+        n_slots = self.network.weights().shape[1]
+        n_unit_bits = min(40, 16 + (n_slots // 4).bit_length())
+        return {
+            **super().defines(),
+            "N_UNIT_BITS": n_unit_bits,
+            "IS_BOX": int(self.box is not None),
+        }
+
+    def tie_rule(self) -> str:
+        """Return how the header breaks ties: a greedy policy draws nothing."""
+        return "middle"
+
+    def tie_remark(self) -> list[str]:
+        """Describe how ties are broken, and the actions between those of a box."""
+        return [
+            "Of several most probable actions it takes the middle of the widest run of neighbours,",
+            "where the agent draws one.",
+            *self.place_remark("place_fixed(observation"),
+        ]
+
+    def place_remark(self, call: str) -> list[str]:
+        """Describe how the greedy actions of a box are called, which may lie between others."""
+        if self.box is None:
+            return []
+        array = ", place" if self.is_vector else ""
+        return [
+            f"{self.name}_{call}{array}) has the place of the agent's greedy action",
+            f"among these, times 2^16, and {self.name}_action_at(d, place) the action there,"
+            f" times 2^{self.fraction_bits}.",
+        ]
+
+    def weights(self, state: Data) -> NDArray[np.int32]:
+        """Return the weights of the critic and of the actor, as the header has them."""
+        rows = np.concatenate([state[_CRITIC], state[_ACTOR]])
+        weights: NDArray[np.int32] = rows[1 - self.n_critic_rows :, self.columns()]
+        return weights
+
+    def header(self) -> CHeader:
+        """Make the header."""
+        tables, code, n_weights = self.tables(), self.code(), self.n_weights()
+        tables.add("int32_t", "weights", self.weights(self.agent._state_of("agent")).reshape(-1))
+        ram_bytes = code.most_columns * code.column_bytes + 12 * max(self.n_rows())
+        ram_bytes += 12 * self.n_inputs
+        n_words = min(code.most_columns, code.n_columns) * sum(self.n_rows())
+        sizes = {"weight_bytes": 4 * n_weights, "ram_bytes": ram_bytes, "n_words": n_words}
+        description, needs = self.description(), self.needs(**sizes)
+        file = "sdnn_greedy_actor_critic.h"
+        return self.write(file, description, needs, self.defines(), tables, **sizes)
+
+
+class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
+    """Makes the header of an `SDNNActorCritic` agent that learns."""
+
+    magic = 0x414E4453  # "SDNA"
+    streams = ("exploration", "ties")
+    n_critic_rows = 1
+
+    def fields(self) -> list[Field]:
+        """Return names, types and shapes of an image."""
+        shape = self.n_critic_rows + sum(self.n_rows()), self.code().n_columns
+        return [
+            ("action_value.exponent", "<i4"),
+            ("error_scale.exponent", "<i4"),
+            ("error_scale.n_errors", "<u4"),
+            ("error_scale.mean_square", "<u8"),
+            ("n_learned", "<u8"),
+            *SCALE_FIELDS,
+            ("words", "<u8", (2, 4)),
+            ("weights", "<i4", shape),
+        ]
+
+    def remembered(self, state: Data) -> Data:
+        """Return the fields that are not the same in the core's state."""
+        return {"action_value.exponent": NONE, **state, "weights": self.weights(state)}
+
+    def recall(self, image: Array, state: Data) -> None:
+        """Put the fields of an image into the core's state; the episode before is over."""
+        for name in ("old_value", "has_acted"):
+            state[name] = np.zeros_like(state[name])
+        for name in ("trace.values", "actor_trace.values", "next_state", "mask"):
+            if name in state:
+                state[name] = state[name][:0]
+        for name in ("n_learned", "error_scale.mean_square", "error_scale.n_errors"):
+            state[name] = np.array(image[name], np.int64)
+        state["error_scale.exponent"] = np.array(image["error_scale.exponent"], np.int32)
+        state.pop("action_value.exponent", None)
+        if image["action_value.exponent"] != NONE:
+            state["action_value.exponent"] = np.array(image["action_value.exponent"], np.int32)
+        for name, rows in ((_CRITIC, image["weights"][:1]), (_ACTOR, image["weights"][1:])):
+            state[name] = np.zeros_like(state[name])
+            state[name][:, self.columns()] = rows
+
+    def tie_rule(self) -> str:
+        """Return how the agent breaks ties."""
+        return "uniform"
+
+    def tie_remark(self) -> list[str]:
+        """Describe how ties are broken, and the actions between those of a box."""
+        drawn = "Of several most probable actions it draws one, as the agent does."
+        return [drawn, *self.place_remark("place(&agent, observation")]
+
+    def header(self) -> CHeader:
+        """Make the header."""
+        state, tables = self.state(), self.tables()
+        n_weights = self.n_weights()
+        self.add_head(tables, "weights")
+        weights = self.weights(state)
+        first_weights = weights.reshape(-1) if weights.any() else np.zeros(0, np.int32)
+        tables.add("int32_t", "first_weights", first_weights)
+        about = "The range of each observed number, beyond which all are equal."
+        tables.add("int32_t", "limits", self._limits(), about)
+        defines = {
+            **self.defines(),
+            **self._learning_rule(),
+            "FINGERPRINT": f"UINT32_C(0x{self.fingerprint():08x})",
+            "N_FIRST_WEIGHTS": first_weights.size,
+        }
+        ram_bytes = self._ram_bytes(n_weights)
+        return self.write(
+            "sdnn_actor_critic.h",
+            self.description(),
+            learning_needs("7", f"{ram_bytes:,} bytes, in one struct that you place."),
+            defines,
+            tables,
+            weight_bytes=0,
+            ram_bytes=ram_bytes,
+            n_words=self.code().most_columns * sum(self.n_rows()),
+        )
+
+    def _limits(self) -> Array:
+        """Return the least and the largest reading that count, of each observed number."""
+        limits = np.zeros((self.n_observed, 2), np.int64)
+        scale = 2.0**self.fraction_bits
+        for source in self.inputs:
+            first = source.at[0]
+            if source.kind == "variable":
+                limits[first] = math.floor(source.low * scale), math.ceil(source.high * scale)
+            elif source.kind == "symbol":
+                limits[first : first + source.n_bins] = -_LARGEST, _LARGEST
+            else:
+                limits[list(source.at)] = -_LARGEST, _LARGEST
+        return limits
+
+    def _learning_rule(self) -> Data:
+        learning, state = self.agent.learning, self.agent._state_of("agent")
+        first, last = learning.learning_rate, learning.final_learning_rate
+        if "learning_rate" in state:
+            first, last = self.agent.learning_rate, None
+        return {
+            **self.rule_of_values(),
+            **self.rates("RATE", first, last),
+            **self.rates(
+                "ACTOR_RATE", learning.actor_learning_rate, learning.final_actor_learning_rate
+            ),
+            "ENTROPY": math.floor(learning.entropy * 65536 + 0.5),
+        }
+
+    def _ram_bytes(self, n_weights: int) -> int:
+        """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
+        n_bytes = 8 * 2 + 16 + 24 + 32 * 2 + 4 * 2 * n_weights + 4 * 3
+        n_bytes += 4 * self.n_observed + 2 * self.code_bytes()
+        n_bytes += 3 + self.n_critic_rows + sum(self.n_rows())
+        return -(-n_bytes // 8) * 8

@@ -1,0 +1,97 @@
+"""Parts of the headers of agents with a linear readout."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn import _core
+from sdnn.environments.types import Data
+from sdnn.export.code import Code
+from sdnn.export.text import Tables
+from sdnn.export.writer import Writer, require_few_weights
+
+_ONE = 1 << 16  # of rates
+
+
+class LinearWriter(Writer[_core.LinearSDNN]):
+    """Makes the header of an agent whose readout is linear."""
+
+    n_critic_rows: ClassVar[int] = 0
+    """Readout units before those of actions."""
+
+    def code(self) -> Code:
+        """Return the code of its states."""
+        return Code(self.network, self.n_inputs)
+
+    def columns(self) -> NDArray[np.intp]:
+        """Return the places of the header's columns among those of the weights."""
+        m = self.agent.approximator.n_pattern_units
+        n_groups = len(self.network.pairs)
+        slots = np.arange(n_groups)[:, None] * (-(-m // 64) * 64) + np.arange(m)
+        columns: NDArray[np.intp] = slots.reshape(-1)
+        return columns
+
+    @property
+    def action_window(self) -> int:
+        """The number of readout units of an action."""
+        return int(self.agent.approximator.action_window)
+
+    def n_rows(self) -> list[int]:
+        """Return the number of readout units of each dimension."""
+        return [n + self.action_window - 1 for n in self.n_actions()]
+
+    def n_weights(self) -> int:
+        """Return the number of weights; ValueError for too many."""
+        n_weights = (self.n_critic_rows + sum(self.n_rows())) * self.code().n_columns
+        require_few_weights(n_weights, "n_actions")
+        return n_weights
+
+    def description(self) -> str:
+        """Return the sizes of the agent in words."""
+        return (
+            f"{self.n_inputs} inputs, {self.agent.approximator.n_pattern_units} units per pattern,"
+            f" {' x '.join(map(str, self.n_actions()))} actions"
+        )
+
+    def defines(self) -> Data:
+        """Return the sizes of the readout."""
+        return {
+            **self.code().defines(),
+            "ACTION_WINDOW": self.action_window,
+            "N_ROWS": self.n_critic_rows + sum(self.n_rows()),
+            "MOST_ROWS": max(self.n_rows()),
+        }
+
+    def tables(self) -> Tables:
+        """Return the constants of the spaces, the code and the readout's rows."""
+        tables = self.tables_of_spaces()
+        first_rows = np.cumsum([self.n_critic_rows, *self.n_rows()])[:-1]
+        self.code().add_tables(tables)
+        n_actions = np.array(self.n_actions())
+        tables.add("uint32_t", "n_actions", n_actions, "Actions of each dimension.")
+        tables.add("uint32_t", "first_rows", first_rows, "Readout units of each dimension.")
+        return tables
+
+    def rule_of_values(self) -> Data:
+        """Return the settings by which an agent with traces learns values."""
+        learning, discount = self.agent.learning, round(self.agent.learning.discount * 32768)
+        return {
+            "DISCOUNT": discount,
+            "HORIZON_BITS": 16 - max(32768 - discount, 1).bit_length(),
+            "TRACE_DECAY": round(learning.discount * learning.trace_decay * 8192),
+            "SCHEDULE_STEPS": learning.schedule_steps,
+        }
+
+    def rates(self, macro: str, first: float, last: float | None) -> dict[str, int]:
+        """Return a rate at the beginning and at the end of the schedule."""
+        last = first if last is None else last
+        return {f"{macro}_FIRST": round(first * _ONE), f"{macro}_LAST": round(last * _ONE)}
+
+    def code_bytes(self) -> int:
+        """Return the bytes of a state's code in memory."""
+        code = self.code()
+        n_bytes = 8 + 4 * self.n_inputs + code.column_bytes * code.most_columns
+        return -(-n_bytes // 4) * 4
