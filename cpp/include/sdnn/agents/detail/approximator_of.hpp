@@ -109,8 +109,9 @@ inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
         }
         auto first = own;  // inputs that are added have as many units
         if (history.is_none()) first.n_inputs = static_cast<int>(observations.n_first_inputs());
-        if (own.max_pairs == 0)
+        if (own.max_pairs == 0) {
           own.max_pairs = first.max_pairs = most_pairs(config, first.n_inputs);
+        }
         own.n_pattern_units = approximators::with_pattern_units(first).n_pattern_units;
       }
       for (std::size_t i = 0; i < std::min(tables.size(), n_symbols.size()); ++i) {
