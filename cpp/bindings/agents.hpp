@@ -21,8 +21,8 @@ std::span<std::byte> memory_of_parts(agents::AnyAgent& agent);
 
 namespace sdnn::tools {
 
-/// An agent without a task, as trials run it: states in [0, 1]; each number of an action is an
-/// index or, of fuzzy rules, in [-1, 1].
+/// An agent without a task, which trials use: states are in [0, 1]; an action has an index for each
+/// dimension or, with fuzzy rules, a number in [-1, 1].
 class BareAgent {
  public:
   using Action = std::span<const double>;

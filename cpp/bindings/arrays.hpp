@@ -69,8 +69,7 @@ pybind11::array_t<T> filled(const std::vector<std::size_t>& shape, const Fill& f
   return array;
 }
 
-/// Throws std::length_error unless patterns fit in an array of 1 GiB. To be asked before they are
-/// made.
+/// Throws std::length_error unless patterns fit in an array of 1 GiB. Call it before making them.
 inline void require_room_for_signs(double n_bins, double n_units) {
   core::require_bytes("n_units or n_bins", "the patterns, a byte for each unit,", n_bins * n_units,
                       core::kDefaultMaxTableBytes);

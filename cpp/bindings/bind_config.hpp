@@ -1,5 +1,6 @@
-/// A configuration's Python class, from the list of its fields: frozen, with keyword arguments that
-/// are checked, and `fields`, from which options, schemas and documentation are made.
+/// Makes the Python class of a configuration from the list of its fields. It is frozen, checks its
+/// keyword arguments, and has `fields`, from which options, schemas and documentation are
+/// generated.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -90,9 +91,9 @@ struct ValueType {
   bool (*read)(pybind11::handle source, void* value, const Field& field);
 };
 
-/// A field of one configuration, with where its value is. The type of the value is erased, because
-/// code for every field of every configuration takes long to compile: what follows is compiled once
-/// for a type of values.
+/// A field of a configuration object, with the address of its value. The configuration's type is
+/// erased: code for every field of every configuration would take long to compile, whereas the
+/// functions below are compiled once per type of values.
 struct Field {
   const char* name;
   const char* doc;
@@ -219,8 +220,8 @@ inline pybind11::dict dictionary_of(std::span<const Field> fields) {
   return values;
 }
 
-/// Gives fields other values. Throws ArgumentTypeError for a value of another type, ArgumentError
-/// for an unknown word, ArgumentTypeError for unknown names.
+/// Changes the values of fields. Throws ArgumentTypeError for an unknown name or a value of another
+/// type, ArgumentError for an unknown word.
 inline void change(std::span<const Field> fields, const pybind11::kwargs& changes) {
   namespace py = pybind11;
   std::size_t n_known = 0;
@@ -242,8 +243,8 @@ inline void change(std::span<const Field> fields, const pybind11::kwargs& change
   }
 }
 
-/// The configuration with other values of some fields. Throws as change does, ArgumentError for a
-/// value out of its bounds.
+/// Returns the configuration with other values of some fields. Throws ArgumentTypeError for an
+/// unknown name or a value of another type, ArgumentError for a value out of its bounds.
 template <class Config>
 Config changed(Config config, const pybind11::kwargs& changes) {
   change(fields_of(config), changes);

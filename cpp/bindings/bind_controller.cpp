@@ -65,8 +65,8 @@ void require_warm(const Controller& controller) {
   if (controller.is_warming_up()) throw std::runtime_error("agent is still warming up");
 }
 
-/// The action of act without `explore`, after the warm-up. Other threads run meanwhile, and may
-/// read the same controller.
+/// Returns the greedy action after the warm-up, without the GIL: other threads may read the same
+/// controller meanwhile.
 std::span<const double> best_action(Controller& controller, std::span<const double> observation,
                                     std::size_t environment, agents::ActionMask mask) {
   const Controller& read = controller;

@@ -22,8 +22,8 @@ namespace {
 /// The thread in which Python handles signals.
 unsigned long main_thread = 0;
 
-/// Lets signal handlers run, as Python does between its instructions, and ends the work if one
-/// raises: KeyboardInterrupt of Ctrl-C.
+/// Runs Python's pending signal handlers, which Python itself does between its instructions, and
+/// throws if one raises, such as KeyboardInterrupt for Ctrl-C.
 void check_signals(bool at_once) {
   using Clock = std::chrono::steady_clock;
   constexpr std::chrono::milliseconds kInterval{50};

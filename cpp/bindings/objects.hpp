@@ -1,5 +1,5 @@
-/// How a call gets hold of the objects of Python: made ones only, and none that a call in another
-/// thread works on.
+/// Checks of Python's objects before a call uses them: they must be initialized, and no call in
+/// another thread may be changing them.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -17,8 +17,9 @@
 #include <utility>
 #include <vector>
 
-// Declared only to be found by the arguments' namespaces: one function, so that a class that is
-// made of classes of several of them finds no two.
+// This function marks the namespaces of the library: argument-dependent lookup finds it for their
+// classes. It is declared once and imported into each namespace, so that lookup is not ambiguous
+// for templates whose arguments are of several namespaces.
 namespace sdnn::library {
 void is_of_library(const void*);
 }
@@ -43,8 +44,8 @@ using library::is_of_library;
 
 namespace sdnn::bindings {
 
-/// Whether `T` is made of other types, as containers are. A template of the library that is bound
-/// needs a specialization.
+/// Whether `T` is a template over other types, such as a container. Bound templates of the library
+/// need a specialization that is false.
 template <class T>
 inline constexpr bool kIsComposed = false;
 template <template <class...> class Template, class... Types>
@@ -90,8 +91,8 @@ struct Use {
   }
 };
 
-/// Throws std::runtime_error if another call changes the memory, or uses it and this one is to
-/// change it.
+/// Throws std::runtime_error if another call is changing the memory, or is using it while this call
+/// wants to change it.
 inline void require_unused(const Use& wanted, const char* name) {
   for (const Use& use : Use::all()) {
     if ((use.changes || wanted.changes) && use.overlaps(wanted)) {
@@ -101,9 +102,10 @@ inline void require_unused(const Use& wanted, const char* name) {
   }
 }
 
-/// pybind11's gil_scoped_release, but for the end of the interpreter: before 3.14 Python then ends
-/// the threads that ask for the GIL by unwinding their stacks, which frames of C++ answer with
-/// std::terminate. Such a thread waits here for the end of the process.
+/// Releases the GIL like pybind11's gil_scoped_release, but is safe at the end of the interpreter.
+/// Before 3.14, Python then ends threads that request the GIL by unwinding their stacks, which
+/// calls std::terminate in frames of C++. Here such a thread waits for the end of the process
+/// instead.
 class ReleasedGIL {
  public:
   ReleasedGIL() : state_(PyEval_SaveThread()) {}
@@ -121,12 +123,12 @@ class ReleasedGIL {
   PyThreadState* state_;
 };
 
-/// Lets other threads run Python while objects are worked on.
+/// Releases the GIL while a call works on objects, so that other threads can run Python.
 ///
-/// Objects given as const are read, the others are changed, with all that they hold in themselves.
-/// While it lives, every use of an object that is being changed is refused with a
-/// RuntimeError, and every change of one that is being read. What a call reads of arrays must be a
-/// copy: arrays have no owner that could refuse.
+/// Objects passed as const are read, others are changed, including everything stored in them.
+/// During its lifetime any use of a changing object, and any change of an object that is being
+/// read, raises a RuntimeError. Arrays must be copied before: nothing prevents other threads from
+/// changing them.
 class WithoutGIL {
  public:
   /// Throws std::runtime_error if another thread's call is in the way.
@@ -167,8 +169,8 @@ class WithoutGIL {
   ReleasedGIL released_;  // last: the GIL is back before the list changes
 };
 
-/// Waits until no call in another thread reads the object, for a change with the GIL held. Only for
-/// objects whose readers take little time.
+/// Waits until no call in another thread reads the object, so that it can be changed with the GIL
+/// held. Use it only for objects that are read for short times.
 template <class Object>
 void wait_for_readers(Object& object) {
   const auto is_reader = [use = Use::of(nullptr, object)](const Use& other) {
@@ -180,8 +182,8 @@ void wait_for_readers(Object& object) {
   }
 }
 
-/// Lets all classes refuse to be pickled, unless they define how. For pickle's protocols 0 and 1
-/// pybind11 would throw through Python's frames.
+/// Makes pickling raise TypeError for all classes that do not define it. Otherwise, with pickle's
+/// protocols 0 and 1, pybind11 would throw a C++ exception through Python's frames.
 inline void refuse_pickling() {
   const pybind11::handle base(pybind11::detail::get_internals().instance_base);
   base.attr("__reduce__") = pybind11::cpp_function(
@@ -191,9 +193,9 @@ inline void refuse_pickling() {
       pybind11::is_method(base));
 }
 
-/// Throws TypeError if the object behind `held` was never made, std::runtime_error if another
-/// thread's call changes it. pybind11 would hand out fresh memory for the first, and knows nothing
-/// of the second.
+/// Throws TypeError if the object of `held` was never initialized, and std::runtime_error if
+/// another thread's call is changing it. pybind11 checks neither: it would allocate uninitialized
+/// memory for the former.
 inline void require_usable(const pybind11::detail::value_and_holder& held) {
   const auto name = [&held] {
     const pybind11::handle type(reinterpret_cast<PyObject*>(Py_TYPE(held.inst)));

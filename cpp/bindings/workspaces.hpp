@@ -8,8 +8,8 @@
 
 namespace sdnn::bindings {
 
-/// The calling thread's workspace for a network; the latest few are kept, so that a state that is
-/// asked for again is cheap.
+/// Returns the calling thread's workspace for a network. The workspaces of the latest few networks
+/// are kept, so that values of a repeated state are cheap.
 template <class Network>
 typename Network::Workspace& workspace_of(const Network& network) {
   constexpr std::size_t kKept = 8;

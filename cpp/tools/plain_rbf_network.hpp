@@ -16,13 +16,12 @@
 
 namespace sdnn::tools {
 
-/// An RBF network whose `values` are evaluated as the definition says: every joint basis of every
-/// action. They agree with those of RBFNetwork to 1e-12 of the largest |weight|: a second algorithm
-/// for its tests. It learns what RBFNetwork learns, up to rounding.
+/// An RBF network whose `values` are computed by the definition, from every joint basis of every
+/// action: a reference for tests of RBFNetwork, to which they are equal within 1e-12 of the largest
+/// |weight|. It learns what RBFNetwork learns, up to rounding.
 ///
-/// `value` and `update` concern a single action; they stay as they are, and cost less than the
-/// n_actions-th part of `values`. Throws as RBFNetwork does. Cost of `values` at d = 6: 601 x
-/// 16,384 exponentials.
+/// `value` and `update`, for a single action, are those of RBFNetwork and much cheaper. Errors are
+/// those of RBFNetwork. Cost of `values` at d = 6: 601 x 16,384 exponentials.
 class PlainRBFNetwork {
  public:
   explicit PlainRBFNetwork(approximators::RBFNetwork network) : network_(std::move(network)) {}
@@ -62,8 +61,8 @@ class PlainRBFNetwork {
   }
 
  private:
-  // exponents = logarithms of one dimension's Gaussians at x: -((x - centre) / width)^2 / 2, in
-  // units of the centres' spacing.
+  // Writes the logarithms of one dimension's Gaussians at x, -((x - centre) / width)^2 / 2, with
+  // lengths in units of the centres' spacing.
   void set_exponents(double x, std::vector<double>& exponents) const noexcept {
     const double n_gaps = static_cast<double>(exponents.size() - 1);
     for (std::size_t k = 0; k < exponents.size(); ++k) {
@@ -89,8 +88,9 @@ class PlainRBFNetwork {
     }
   }
 
-  // sum W G / sum G over all joint bases, with exponents state_exponents[j] + exponents[b]. A few
-  // exponentials at a time, so that the compiler can use vectors; the sums stay in order.
+  // Returns sum W G / sum G over all joint bases, with exponents state_exponents[j] + exponents[b].
+  // It computes a few exponentials at a time, so that the compiler can use vectors; the order of
+  // the sums does not change.
   double weighted_mean(const Workspace& workspace) const noexcept {
     const auto& [network, state_exponents, exponents] = workspace;
     const std::span<const double> weights = network_.weights();

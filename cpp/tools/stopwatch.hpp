@@ -32,8 +32,8 @@ void keep(const Value& value) noexcept {
 #endif
 }
 
-/// The time of every call of timed(i), i = 0 .. n_repetitions - 1, each after an untimed
-/// prepare(i).
+/// Measures the time of every call of timed(i), i = 0 .. n_repetitions - 1, each after an untimed
+/// call of prepare(i).
 ///
 /// Reading the clock costs some 30 ns, which are included. Throws std::invalid_argument unless
 /// n_repetitions is in [0, kMaxRepetitions].

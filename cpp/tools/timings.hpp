@@ -1,5 +1,5 @@
-/// Timings: of the parts of a decision that belong to the network, of the acrobot, of whole
-/// decisions in a trial, and of the steps of any agent.
+/// Timings of the network's parts of a decision, of the acrobot, of whole decisions in a trial, and
+/// of the steps of any agent.
 #pragma once
 
 #include <algorithm>
@@ -23,10 +23,10 @@
 
 namespace sdnn::tools {
 
-/// Times a network at random states, which are new to it: nothing it remembers helps.
+/// Times a network at random states, which its caches do not contain.
 ///
-/// It should have learned something before: a network that never learned has smaller weights than
-/// one at work, and small weights are added quicker.
+/// The network should have learned before: untrained weights are smaller, and small weights are
+/// added faster.
 class NetworkParts {
  public:
   /// A copy of `network` is timed, and learns. The states follow from `seed`.
@@ -55,9 +55,9 @@ class NetworkParts {
         [this](int) { network_.values(state_, workspace_, values_); });
   }
 
-  /// A learning step at a state the network was just asked about, as an agent takes it; Q moves up
-  /// or down in turn by `n_corrected` units of its window, wherever that many can change.
-  /// Throws std::invalid_argument unless n_corrected is in [1, n'].
+  /// Times a learning step at a state that was just evaluated, as in an agent. Q moves alternately
+  /// up and down by `n_corrected` units of its window, if so many units can change. Throws
+  /// std::invalid_argument unless n_corrected is in [1, n'].
   Times time_corrections(int n_repetitions, int n_corrected) {
     require_units("n_corrected", n_corrected);
     const auto& scale = network_.output_scale();
@@ -76,8 +76,8 @@ class NetworkParts {
         [&](int) { network_.update(state_, workspace_, action, target); });
   }
 
-  /// `n_selections` selections of units per repetition, each for a deficit of `n_selected` up or
-  /// down in a random action's window. Throws std::invalid_argument unless n_selected is in
+  /// Times `n_selections` selections of units per repetition, each for a deficit of + or -
+  /// `n_selected` in a random action's window. Throws std::invalid_argument unless n_selected is in
   /// [1, n'] and n_selections in [1, kMaxRepetitions].
   Times time_selections(int n_repetitions, int n_selections, int n_selected) {
     require_units("n_selected", n_selected);
@@ -129,11 +129,11 @@ class NetworkParts {
   std::vector<std::int32_t> potentials_;
 };
 
-/// The times of all decisions in the next `n_episodes` learning episodes of a trial: choosing an
-/// action, the acrobot, its sensors, and learning from it. Test episodes among them count too.
+/// Times all decisions in the next `n_episodes` learning episodes of a trial: choosing an action,
+/// the acrobot's step, its sensors, and learning. Test episodes among them count, too.
 ///
-/// Equal trials make the same decisions whenever it is run, so several runs can be compared
-/// decision by decision. Throws as the trial's advance does.
+/// Equal trials make the same decisions, so several runs can be compared decision by decision.
+/// Throws std::logic_error if the trial has ended by an error.
 template <agents::Agent Agent>
 Times time_decisions(AcrobotTrial<Agent>& trial, int n_episodes) {
   Times times;
@@ -187,14 +187,14 @@ class AcrobotDecisions {
   core::Random random_;
 };
 
-/// The times of `n_repetitions` whole steps at random states: learning the transition from the
-/// state before to a new one, then acting, with exploration, in the new one.
+/// Times `n_repetitions` whole steps at random states: learning the transition to a new state, then
+/// acting in it with exploration.
 ///
-/// States are uniform in [0, 1)^d and rewards in [-1, 1), both from `seed`; nothing terminates, and
-/// all steps are one episode. Drawing is not timed, nor is the first act. A new state is new to the
-/// agent's memory too: give each call a seed of its own. An agent that never learned can be quicker
-/// than one at work, so measure after an untimed call. Throws std::invalid_argument unless
-/// n_repetitions is in [0, kMaxRepetitions], and as the agent does.
+/// States are uniform in [0, 1)^d and rewards in [-1, 1), both drawn from `seed`, in a single
+/// episode that does not terminate. Drawing and the first act are not timed. Give each call another
+/// seed, so that no state is in the agent's caches. Make an untimed call first, because an
+/// untrained agent can be faster. Throws std::invalid_argument unless n_repetitions is in [0,
+/// kMaxRepetitions], and the agent's errors.
 template <agents::Agent Agent>
 Times time_agent_steps(Agent& agent, int n_repetitions, std::uint64_t seed) {
   core::Random random(seed, core::Stream::exploration);

@@ -59,10 +59,10 @@ struct TestRow {
 
 /// A learning agent on the acrobot swing-up; the same configs and seed give the same rows.
 ///
-/// The agent's action, normalized, is its part of the largest torque. The sensors' noise has
-/// streams of its own, so that the same seed gives every agent the same noise, observation by
-/// observation. Source: method.md, section 5.2. A test episode is greedy, learns nothing, uses the
-/// current lambda, and draws from random streams of its own.
+/// The agent's normalized action is the share of the largest torque. The sensors' noise has
+/// separate random streams, so that with the same seed every agent gets the same noise in each
+/// observation. A test episode is greedy, learns nothing, uses the current lambda, and draws from
+/// separate random streams. Source: method.md, section 5.2.
 template <agents::Agent Agent>
 class AcrobotTrial {
  public:
@@ -103,15 +103,15 @@ class AcrobotTrial {
   std::int64_t n_decisions() const noexcept { return n_decisions_; }
   std::span<const TestRow> rows() const noexcept { return rows_; }
   const Agent& agent() const noexcept { return agent_; }
-  /// To look inside while it learns: asking for values changes nothing that follows, acting and
-  /// learning do.
+  /// The agent, for inspection during the trial. Evaluating it does not change the trial; acting
+  /// and learning do.
   Agent& agent() noexcept { return agent_; }
 
-  /// Runs up to `n_episodes` more learning episodes, with the test episodes that fall due; an
-  /// episode under way is finished first.
+  /// Runs up to `n_episodes` more learning episodes, with the test episodes that are due; an
+  /// unfinished episode is finished first.
   ///
-  /// Long work: may be stopped between decisions and then resumed. Whatever is thrown within a
-  /// decision ends the trial: advance throws std::logic_error from then on.
+  /// It may be interrupted between decisions and then resumed. An exception within a decision ends
+  /// the trial: later calls throw std::logic_error.
   void advance(int n_episodes) {
     advance(n_episodes, [] {});
   }
@@ -128,12 +128,13 @@ class AcrobotTrial {
     }
   }
 
-  /// Advances several trials until each has made `n_decisions` more or is finished: faster than one
-  /// after another, as their acrobots move side by side. The rows are the same.
+  /// Advances several trials until each has made `n_decisions` more or is finished. This is faster
+  /// than one after another, because their acrobots are computed in the lanes of a vector register.
+  /// The rows are the same.
   ///
   /// Trials may stop within an episode. Throws std::invalid_argument unless there are 1 to
-  /// AcrobotTeam::kMaxMembers different trials of equal acrobots; whatever else is thrown may end
-  /// all of them.
+  /// AcrobotTeam::kMaxMembers different trials of equal acrobots. Any other exception may end all
+  /// of them.
   static void advance_together(std::span<AcrobotTrial* const> trials, int n_decisions) {
     core::require_in_range("n_decisions", n_decisions, 0, 1 << 30);
     core::require_in_range("number of trials", trials.size(), 1,

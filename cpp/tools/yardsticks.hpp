@@ -58,15 +58,15 @@ SDNN_WIDE_VECTORS_END
 
 }  // namespace detail
 
-/// out = weights . input, in 32-bit floats. Shapes: weights (n_rows, n_columns), input
-/// (n_columns,), out (n_rows,).
+/// Computes the product out = weights . input in 32-bit floats. Shapes: weights (n_rows,
+/// n_columns), input (n_columns,), out (n_rows,).
 SDNN_KERNEL(void, multiply,
             (const float* weights, std::size_t n_rows, std::size_t n_columns, const float* input,
              float* out),
             (weights, n_rows, n_columns, input, out))
 
-/// A dense float32 matrix-vector product, as quick as the processor makes it: what a hidden layer
-/// of this size costs in an ordinary network.
+/// A dense float32 matrix-vector product, optimized for the processor. Its time is that of a hidden
+/// layer of this size in an ordinary network.
 ///
 /// Eigen's product depends on the options of the compilation; this one is chosen at run time, like
 /// the kernels of the network. `bench/` compares the two.

@@ -14,8 +14,8 @@
 
 namespace sdnn::agents {
 
-/// 1 for each action that is allowed and 0 for others, one dimension after the other; empty: all
-/// are.
+/// A mask of actions: 1 for each allowed action and 0 for others, dimension by dimension. An empty
+/// mask allows all actions.
 using ActionMask = std::span<const std::uint8_t>;
 
 /// The part of the next dimension, of n actions, which is taken from the mask of those left.
@@ -54,8 +54,8 @@ inline void exclude(ActionMask part, std::span<double> values) noexcept {
   }
 }
 
-/// Throws std::invalid_argument unless a mask is empty, or has zeros and ones for all actions, in
-/// each dimension a one. `n_actions(d)` are those of dimension d.
+/// Throws std::invalid_argument unless a mask is empty, or has a 0 or 1 for each action and at
+/// least a 1 in each dimension. Dimension d has `n_actions(d)` actions.
 template <class NActions>
 void require_mask(std::string_view name, ActionMask mask, std::size_t n_dimensions,
                   const NActions& n_actions) {

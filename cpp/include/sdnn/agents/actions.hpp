@@ -52,15 +52,16 @@ struct ActionConfig {
 
 /// Converts actions between an agent and its task.
 ///
-/// In a box dimension d has n_actions[d] values evenly from low to high (coding::action_value), or,
-/// where n_actions[d] is 0, any: a in [-1, 1] is (low + high) / 2 + (high - low) / 2 a. All are
-/// rounded to numbers that the task takes. Otherwise an action is low and the index.
+/// In a box, dimension d has n_actions[d] values at even distances from low to high
+/// (coding::action_value). If n_actions[d] is 0, a number a in [-1, 1] stands for the value
+/// (low + high) / 2 + (high - low) / 2 a. Values are rounded to the type of the task's actions. A
+/// discrete action is low plus the index.
 class Actions {
  public:
   static constexpr std::size_t kMostDimensions = 1024;
   static constexpr double kMostActions = 1 << 20;
 
-  /// For a box with so many actions in each dimension; `n_in_box` 0: any. Throws
+  /// Divides each dimension of a box into `n_in_box` actions; 0 stands for real numbers. Throws
   /// std::invalid_argument naming the field that does not fit.
   Actions(ActionConfig config, std::size_t n_in_box) : config_(std::move(config)) {
     core::require_in_range("action.low", config_.low.size(), 1, kMostDimensions);
@@ -86,8 +87,7 @@ class Actions {
     if (config_.discrete) return config_.low[d] + static_cast<double>(index);
     return rounded(coding::action_value(index, n_actions_[d], config_.low[d], config_.high[d]), d);
   }
-  /// The action of a box that lies `offset` times the distance of neighbours beyond that with an
-  /// index; of discrete actions the one with the index.
+  /// The value of a box at a fractional index, index + offset; discrete actions ignore the offset.
   double beside_index(std::size_t index, double offset, std::size_t d) const noexcept {
     if (config_.discrete || n_actions_[d] == 1) return of_index(index, d);
     const double part =
@@ -107,8 +107,8 @@ class Actions {
     return static_cast<std::size_t>(std::nearbyint(part * static_cast<double>(n_actions_[d] - 1)));
   }
 
-  /// Writes an agent's action, an index, or a number in [-1, 1], for each dimension, in the units
-  /// of the task, and its indices.
+  /// Converts an agent's action, an index or a number in [-1, 1] for each dimension, to the units
+  /// of the task and to indices.
   template <class Number>
   void take(std::span<const Number> action, std::vector<double>& in_units,
             std::vector<std::size_t>& indices) const {

@@ -38,8 +38,8 @@ namespace sdnn::agents {
 ///     delta = r + gamma V(s') - V(s)
 ///
 /// where n is the number of columns of the code that are not 0, sigma the running root mean square
-/// of delta, and errors are clipped at 3. As n hardly changes, a step of beta moves preferences as
-/// far in every state, whatever the scale of rewards.
+/// of delta, and clip limits to [-3, 3]. Since errors are divided by sigma and n hardly changes, a
+/// step of beta moves preferences equally far in every state and for every scale of rewards.
 ///
 /// After the scaling of observations everything is an integer; see QLambda and SoftmaxPolicy.
 ///
@@ -130,8 +130,8 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     actor_.read(workspace.critic.code(), workspace.actor);
   }
 
-  /// Returns how far beyond a most probable action the mean of it and its neighbours lies, for the
-  /// state that was read last into the workspace, or by act; see SoftmaxPolicy.
+  /// Returns the offset from an action to the mean of it and its neighbours, weighted by their
+  /// probabilities in the state that the workspace holds; see SoftmaxPolicy.
   double mean_offset(const Workspace& workspace, std::size_t d, std::size_t action) const {
     return actor_.mean_offset(workspace.actor, d, action);
   }
@@ -139,9 +139,9 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     return mean_offset(workspace_, d, action);
   }
 
-  /// Learns one transition. One that does not begin where the last one ended begins traces anew.
-  /// Throws std::invalid_argument for a reward that is not finite or beyond +- 1e300 or an
-  /// environment that is none; then nothing has been learned.
+  /// Learns one transition. Traces are reset if it does not begin in the state in which the last
+  /// one ended. Throws std::invalid_argument for a reward that is not finite or beyond +- 1e300, or
+  /// an environment that does not exist; then nothing has been learned.
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
              ActionMask next_mask = {}) {
@@ -175,7 +175,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
 
   /// Learns that a teacher chose an action in a state, and that its return was `value`: the critic
   /// by its error, the actor by a step along the gradient of log pi(action | state). Ends the
-  /// episode of environment 0. Throws as `learn` does.
+  /// episode of environment 0. Throws std::invalid_argument for the same arguments as `learn`.
   void imitate(std::span<const double> state, Action action, double value,
                double /*margin*/ = 0.0) {
     require_transition(state, action, value, state, {});

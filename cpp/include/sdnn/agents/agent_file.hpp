@@ -136,8 +136,8 @@ nlohmann::json config_to_json(const Config& config) {
   return object;
 }
 
-/// The configuration in a JSON object; what is missing keeps its default. Throws
-/// std::invalid_argument naming a member, after `name`, that is unknown or of another type.
+/// Reads a configuration from a JSON object; missing members keep their defaults. Throws
+/// std::invalid_argument naming an unknown member or one of another type, prefixed by `name`.
 template <class Config>
 Config config_from_json(const nlohmann::json& object, const std::string& name) {
   if (!object.is_object()) detail::refuse(name, "an object", object);
@@ -166,8 +166,8 @@ Config config_from_json(const nlohmann::json& object, const std::string& name) {
 
 namespace detail {
 
-/// The names of the kinds of agents in files, and of their classes in Python: in the order of
-/// AnyApproximatorConfig, then the actor-critic.
+/// The name of a type of agent in files, and of its class in Python. The table below has the order
+/// of AnyApproximatorConfig, then the actor-critic.
 struct AgentKind {
   std::string_view name, class_in_python;
 };
@@ -250,8 +250,8 @@ class AgentFile {
   explicit AgentFile(const std::filesystem::path& path)
       : AgentFile(core::read_file(path, {"agent", "training"}), path.string()) {}
 
-  /// Writes a file, whole or not at all: with the controller as it is now, and all else as it was
-  /// read. Throws std::runtime_error naming the file.
+  /// Writes the file, whole or not at all: with the present state of the controller, and everything
+  /// else unchanged since it was read. Throws std::runtime_error naming the file.
   void write(const std::filesystem::path& path) const {
     core::FileContent content = content_;
     content.tensors.merge(core::state_of(controller));

@@ -102,8 +102,8 @@ void expect_code_room(const Config& config, double weight_bytes, double n_dimens
 
 }  // namespace detail
 
-/// Throws std::invalid_argument unless an agent's arrays in a state, called "agent." and so on, are
-/// as large as the settings make them: before memory is asked for.
+/// Throws std::invalid_argument unless the agent's arrays in a saved state have the sizes that
+/// follow from the settings: a damaged file must not cause large allocations.
 template <class Reader>
 void expect_sizes(const Reader& reader, const AnyApproximatorConfig& config,
                   const AnyLearningConfig& learning, const std::vector<std::size_t>& n_actions,
@@ -146,8 +146,8 @@ void expect_sizes(const Reader& reader, const AnyApproximatorConfig& config,
 
 namespace detail {
 
-/// Makes the approximator of each dimension of actions by `make(config, seed)`: alike but for their
-/// numbers of actions, and all random. Together they have the memory of one.
+/// Makes an approximator for each dimension of actions by `make(config, seed)`. They differ in
+/// their numbers of actions and in their seeds, and share one limit of memory.
 template <class Config, class Make>
 auto each_dimension(Config config, const std::vector<std::size_t>& n_actions, std::uint64_t seed,
                     const Make& make) {
@@ -163,10 +163,11 @@ auto each_dimension(Config config, const std::vector<std::size_t>& n_actions, st
 
 }  // namespace detail
 
-/// Makes an agent with n_actions[d] actions in each dimension d, and, with SDNN-C and actions of
-/// one dimension, separate patterns for each input. With a linear readout `n_first` inputs may have
-/// come first; see LinearSDNN. Where there are no tables, each input may have a pattern for missing
-/// readings beside the others, of symbols the last one. Throws as the parts do.
+/// Makes an agent with n_actions[d] actions in each dimension d. `tables` are the patterns of each
+/// input (with SDNN-C only for actions of one dimension); without them inputs may have an
+/// additional pattern for missing readings, which is the last one of symbols. `n_first` inputs of a
+/// linear readout existed before others were added; see LinearSDNN. Throws std::invalid_argument or
+/// std::length_error for impossible settings of a part.
 inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearningConfig& learning,
                            const std::vector<std::size_t>& n_actions, std::uint64_t seed,
                            const std::vector<coding::PatternTable>& tables = {},

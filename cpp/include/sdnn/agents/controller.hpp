@@ -45,9 +45,9 @@ namespace sdnn::agents {
 
 /// An agent of any kind that observes variables and chooses actions in the units of its task.
 ///
-/// Where ranges of observations are not known it begins with a *warm-up*: it acts at random for a
-/// while, takes the ranges from what it observed, and then learns what it did, in order, unless it
-/// learns its own actions only. From then on ranges stay, unless they are running.
+/// If the ranges of observations are not known, it begins with a *warm-up*: it acts at random, fits
+/// the ranges to the observations, and then learns its transitions in order (fuzzy Q-learning does
+/// not). Afterwards ranges are fixed, unless they are running ranges.
 ///
 /// Thread safety: const functions may be called by many threads at once, with a workspace each.
 class Controller : public WithRates<Controller> {
@@ -60,8 +60,8 @@ class Controller : public WithRates<Controller> {
     detail::LastStates::Room room;
   };
 
-  /// With SDNN-C, `tables` are patterns of each input. Throws std::invalid_argument naming the
-  /// field that is impossible; std::length_error as the approximator does.
+  /// `tables` are the patterns of each input. Throws std::invalid_argument naming the impossible
+  /// field; std::length_error if the approximator would exceed its limit of memory.
   explicit Controller(ControllerConfig config, std::vector<coding::PatternTable> tables = {})
       : Controller(std::move(config), std::move(tables), PrivateTag()) {
     if (observations_.is_fitted()) {
@@ -72,8 +72,8 @@ class Controller : public WithRates<Controller> {
     warm_up_.emplace(new_warm_up());
   }
 
-  /// A controller as it was when core::state_of wrote `state`. Throws std::invalid_argument naming
-  /// what does not fit, before much memory is asked for; and as the constructor does.
+  /// Restores a controller from a state that core::state_of wrote. Throws std::invalid_argument
+  /// naming the part that does not fit, before large allocations, and the constructor's errors.
   static Controller restored(ControllerConfig config, const core::State& state) {
     core::StateReader reader(state);
     Controller controller(std::move(config), detail::tables_in(state), PrivateTag());
@@ -109,8 +109,9 @@ class Controller : public WithRates<Controller> {
                 [this](const auto& config) { return rates_.epsilon(config); });
   }
 
-  /// How many robots, or environments, the agent learns from at once: each has an episode of its
-  /// own, and a number from 0. Throws as the agent does.
+  /// Sets the number of environments (or robots) from which the agent learns at once. Environments
+  /// are numbered from 0 and have separate episodes; the agent learns the pending transitions of
+  /// removed ones, then forgets them. Throws std::invalid_argument unless n is in [1, 2^14].
   void set_n_environments(std::size_t n) {
     if (warm_up_) {
       warm_up_->set_n_environments(n);
@@ -143,12 +144,11 @@ class Controller : public WithRates<Controller> {
     last_states_.forget_greedy(environment);
   }
 
-  /// The action to take; without `explore` a best one. The span is valid until the next act.
-  /// Where actions are discrete, `mask` may allow some of them only. Shapes: observation
-  /// (n_variables,), the action (n_dimensions,). Throws std::invalid_argument naming a number that
-  /// has no state (see ObservationScale) or a mask that does not fit, or if there is no such
-  /// environment; then nothing has changed. With Missing::hold last readings are noted, of greedy
-  /// episodes apart.
+  /// Returns the action to take, a best one without `explore`. The span is valid until the next
+  /// act. `mask` may restrict discrete actions. Shapes: observation (n_variables,), the action
+  /// (n_dimensions,). Throws std::invalid_argument naming an unusable number of the observation
+  /// (see ObservationScale), mask or environment; then nothing has changed. With Missing::hold
+  /// readings are stored, separately for greedy episodes.
   std::span<const double> act(std::span<const double> observation, bool explore = true,
                               std::size_t environment = 0, ActionMask mask = {}) {
     actions_.require_mask("mask", mask);
@@ -184,9 +184,9 @@ class Controller : public WithRates<Controller> {
   /// A number that no other controller has.
   std::uint64_t identity() const noexcept { return identity_.number(); }
 
-  /// The action of act without `explore`; `ties` decides between several best ones. Valid until
-  /// the workspace is used again. Requires that the warm-up is over. Missing readings are the last
-  /// ones noted in environment 0, and none is noted. Throws as act.
+  /// Returns the greedy action without changing the controller, so that several threads may call
+  /// it; `ties` draws among several best ones. The span is valid until the workspace is used again.
+  /// Requires that the warm-up is over. Missing readings are the last ones of environment 0.
   std::span<const double> best_action(std::span<const double> observation, Workspace& workspace,
                                       core::Random& ties, ActionMask mask = {}) const {
     actions_.require_mask("mask", mask);
@@ -201,9 +201,9 @@ class Controller : public WithRates<Controller> {
     return workspace.action;
   }
 
-  /// The three steps of act without `explore`: `prepare` gives the state of an observation, and
-  /// notes it; `read` takes the time and is for many threads; `best_of` gives the action, of those
-  /// that `mask` allows, for the state that was read last. Valid until the next call.
+  /// The three steps of a greedy act, of which threads can share the longest. `prepare` returns and
+  /// stores the state of an observation; `read` evaluates the approximator, in any thread;
+  /// `best_of` returns a best allowed action for it. Spans are valid until the next call.
   std::span<const double> prepare(std::span<const double> observation, std::size_t environment) {
     const auto held = readings_.filled(observation, environment, true, held_);
     last_states_.read(observations_, environment, held, state_, false);
@@ -227,9 +227,10 @@ class Controller : public WithRates<Controller> {
     return workspace.action;
   }
 
-  /// The values of all actions of dimension d, by which greedy actions are chosen; of fuzzy rules
-  /// the value of the observation alone. Valid until the workspace is used again. Requires that the
-  /// warm-up is over and d < n_dimensions(). Missing readings as in best_action; throws as act.
+  /// Returns the values of all actions of dimension d, which decide greedy actions; fuzzy rules
+  /// return only the value of the observation. The span is valid until the workspace is used again.
+  /// Requires that the warm-up is over and d < n_dimensions(). Missing readings as in best_action.
+  /// Throws std::invalid_argument for an unusable observation.
   std::span<const double> values(std::span<const double> observation, Workspace& workspace,
                                  std::size_t d) const {
     find_state(observation, workspace);
@@ -243,11 +244,11 @@ class Controller : public WithRates<Controller> {
   /// The size of rewards, and the one that was too large to be learned.
   const RewardScale& reward_scale() const noexcept { return reward_scale_; }
 
-  /// Learns a transition, unless its reward is far beyond the recent ones; see RewardScale. The
-  /// action is any of the task's, of a box the nearest one that can be taken; of fuzzy Q-learning,
-  /// that of the last act with `explore` in the environment. Of a state that is not terminal,
-  /// `next_mask` may allow some actions only. Shapes as in act. Throws std::invalid_argument for
-  /// others and for numbers that have no state, and then nothing has changed; as the agent does.
+  /// Learns a transition, unless its reward is far larger than the recent ones; see RewardScale.
+  /// The action may be any action of the task; in a box, the agent's nearest action is learned.
+  /// Fuzzy Q-learning accepts only the action of the last act with `explore` in the environment.
+  /// `next_mask` restricts the actions of the next state. Throws std::invalid_argument for unusable
+  /// arguments, and then nothing has changed; std::overflow_error for a weight beyond its range.
   void learn(std::span<const double> observation, std::span<const double> action, double reward,
              std::span<const double> next_observation, bool terminated, std::size_t environment = 0,
              ActionMask next_mask = {}) {
@@ -277,11 +278,11 @@ class Controller : public WithRates<Controller> {
              std::span<const double> next_observation, bool terminated, std::size_t environment,
              ActionMask next_mask) const;
 
-  /// Ends a warm-up in which a teacher acted, after some transitions. As the agent itself will
-  /// leave the teacher's path, ranges reach twice the width of what was observed beyond it.
+  /// Ends a warm-up in which a teacher acted. Ranges extend beyond the observations by twice their
+  /// width on each side, because the agent will leave the teacher's path.
   void end_warm_up_of_teacher();
   /// Learns an action that a teacher chose, and its return; see QLambda::imitate. Requires that the
-  /// warm-up is over. Throws std::invalid_argument for numbers that have no state and for agents
+  /// warm-up is over. Throws std::invalid_argument for an unusable observation and for agents
   /// without a linear readout; then nothing has changed.
   void imitate(std::span<const double> observation, std::span<const double> action, double value,
                double margin);
@@ -385,8 +386,8 @@ class Controller : public WithRates<Controller> {
     if (latest_) latest_->begin_episode(environment);
   }
 
-  /// Finds the indices of an action: those of the last exploring act where it is the same one. A
-  /// fuzzy agent knows that one only.
+  /// Finds the indices of an action: those of the last exploring act if it took the same action,
+  /// since rounding can make several indices one action. Fuzzy agents know only that action.
   void find_indices(std::span<const double> action, std::size_t environment) {
     actions_.require_action(action);
     if (auto* const fuzzy = std::get_if<FuzzyQLearning>(&*agent_)) {

@@ -33,8 +33,8 @@ class Episodes {
     return episodes_[environment];
   }
 
-  /// Changes to more environments, whose episodes `make()` makes, or of fewer. Throws
-  /// std::invalid_argument unless 1 <= n <= kMost.
+  /// Changes the number of environments: `make()` makes the episodes of new ones, and those of
+  /// removed ones are deleted. Throws std::invalid_argument unless 1 <= n <= kMost.
   template <class Make>
   void resize(std::size_t n, const Make& make) {
     core::require_in_range("n_environments", n, 1, kMost);
@@ -42,8 +42,9 @@ class Episodes {
     while (episodes_.size() < n) episodes_.push_back(make());
   }
 
-  /// Lists what `list(episode)` lists of each: the first one's as if there were no others, so that
-  /// the states of an agent that can have several environments and of one that cannot are alike.
+  /// Serializes the members that `list(episode)` lists, for each episode. Those of the first one
+  /// have no prefix, so that with one environment the state looks like that of an agent that cannot
+  /// have several.
   template <class Self, class Archive, class Make, class List>
   static void serialize(Self& self, Archive& archive, const Make& make, const List& list) {
     if constexpr (Archive::kReads) self.resize(archive.n_numbered("environment") + 1, make);

@@ -54,9 +54,10 @@ struct EpsilonGreedyConfig {
   bool operator==(const EpsilonGreedyConfig&) const = default;
 };
 
-/// The largest of `values`, not empty. A maximum has no rounding: its order does not matter.
+/// Returns the largest of `values`, which must not be empty. A maximum is exact in any order.
 ///
-/// Where some are NaN it is one of them all, of which Eigen leaves open; where all are, NaN.
+/// If some values are NaN, any of the values may be returned (Eigen leaves it open); NaN if all
+/// are.
 template <class Value>
 Value best_value(std::span<const Value> values) noexcept {
   // Eight at a time: quicker than maxCoeff of all, and compilers see that it stays inside.
@@ -112,16 +113,16 @@ class EpsilonGreedy {
   std::size_t random_action(std::size_t n_actions) noexcept {
     return static_cast<std::size_t>(exploration_.below(n_actions));
   }
-  /// Returns a best action; `ties` decides between several. Shape: values (n_actions,). Throws as
-  /// select does.
+  /// Returns a best action; `ties` draws among several. Shape: values (n_actions,). Throws
+  /// std::invalid_argument if `values` is empty or the best is NaN.
   std::size_t best_action(std::span<const double> values, core::Random& ties) const {
     return greedy(values, ties);
   }
   std::size_t best_action(std::span<const float> values, core::Random& ties) const {
     return greedy(values, ties);
   }
-  /// Returns a best action where numbers that rise with the values stand for them: `least` is the
-  /// least one that ties with the best.
+  /// Returns a best action by numbers that rise with the values, such as firing counts. All actions
+  /// whose number is at least `least` tie with the best one.
   template <class Number>
   std::size_t best_action(std::span<const Number> numbers, Number least, core::Random& ties) const {
     return one_of(numbers, least, ties);

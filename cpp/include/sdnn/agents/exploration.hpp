@@ -1,5 +1,5 @@
-/// Random actions: when they are taken, how they are drawn, and how long they are kept; and the
-/// part of agents whose actions are indices.
+/// Exploration: when random actions are taken, how they are drawn, and how long they are repeated;
+/// and the base of agents whose actions are indices.
 #pragma once
 
 #include <algorithm>
@@ -19,23 +19,24 @@
 
 namespace sdnn::agents {
 
-/// An epsilon-greedy policy for actions of any number of dimensions, which are random together.
+/// An epsilon-greedy policy for actions of any number of dimensions: all of them are random at
+/// once.
 ///
-/// With max_action_repeat = m > 1 a random action is kept for d steps, where d is at least k with
-/// probability 1 / k, and m at most: what single random steps do not reach, some of these do.
+/// With max_action_repeat = m > 1 a random action is repeated for d steps, where P(d >= k) = 1 / k
+/// for k <= m. Repeated actions reach states that single random steps do not reach.
 /// Source: Dabney, W., Ostrovski, G., Barreto, A. (2021). Temporally-extended epsilon-greedy
 /// exploration (with this distribution in the place of the zeta one, which it resembles).
 ///
-/// Who reports ends has shorter ones: each halves m, down to five. Where no episode terminates, an
-/// end that is hard to reach may be what matters; where many do, long actions only cut them short.
+/// Each terminated episode halves m, down to five. If no episode terminates, the goal may be a
+/// terminal state that only long actions reach; if many do, long actions only end them early.
 ///
-/// While no action is known to be better than another, and for a while after the first reward other
-/// than 0, an agent searches: all actions are random, and last for any number of steps up to half
-/// of m with the same probability. A rare reward mostly takes many steps in one direction.
+/// While no action is known to be better than another, and for some time after the first reward
+/// other than 0, an agent searches: all actions are random, and their lengths are uniform up to m /
+/// 2. A rare reward usually takes many steps in the same direction.
 ///
-/// In its first start_steps steps an agent takes random actions only: a rare success is found
-/// before the greedy ones have learned to do nothing. Source: the start_steps of Achiam, J. (2018),
-/// Spinning up in deep reinforcement learning, kept for some steps as above.
+/// In its first start_steps steps an agent takes random actions only, so that it finds a rare
+/// success before greedy actions have learned to avoid effort. Source: the start_steps of Achiam,
+/// J. (2018), Spinning up in deep reinforcement learning; here the actions are repeated as above.
 class Exploration {
  public:
   /// The state of the present episode in one environment.
@@ -63,23 +64,23 @@ class Exploration {
   EpsilonGreedy& policy() noexcept { return policy_; }
   const EpsilonGreedy& policy() const noexcept { return policy_; }
 
-  /// An episode terminated: from now on random actions are kept for half as long at most. In a
-  /// search for more rewards ends are what is searched for, and change nothing.
+  /// Notes that an episode terminated, which halves the largest number of repetitions. It has no
+  /// effect during a search, whose goal may be a terminal state.
   void note_end() noexcept {
     if (start_steps_ == 0 && n_random_left_ > 0) return;
     n_ended_ = std::min(n_ended_ + 1, kMostEnded);
   }
-  /// The first reward other than 0 came after so many steps: twice as many will be random, too, in
-  /// search of more.
+  /// Notes that the first reward other than 0 came after n_steps steps. The next 2 n_steps steps
+  /// are random, too, to find further rewards.
   void note_first_reward(std::int64_t n_steps) noexcept {
     if (start_steps_ > 0) return;  // the first steps are random in any case
     n_random_left_ = static_cast<int>(std::min<std::int64_t>(2 * n_steps, most_random_left_));
   }
 
-  /// Whether the next step is random: then episode.kept is the action, an allowed one of
-  /// n_actions(d) in each dimension d; else a best one is to be taken. An action that is no more
-  /// allowed is not kept.
-  /// `lacks_order`: no action is known to be better than another, so that each step is random.
+  /// Returns whether the next step takes a random action, which is written to episode.kept: an
+  /// index below n_actions(d) in each dimension d, allowed by `mask`. A repeated action ends early
+  /// if it is no longer allowed. `lacks_order` means that no action is known to be better than
+  /// another; every step is random then.
   template <class NActions>
   bool takes_random_action(Episode& episode, const NActions& n_actions, ActionMask mask = {},
                            bool lacks_order = false) {
@@ -185,9 +186,9 @@ inline constexpr double kLargestReward = 1e300;
 /// - new_episode();
 /// - read(state, workspace): reads a state for greedy actions;
 /// - best_of_read(workspace, ties, mask): a best action in the state that was read last.
-/// An epsilon-greedy one has `exploration_`, with a member `exploration` in each episode, and
-/// - read_to_explore(state, episode): reads one into workspace_ for actions of learning;
-/// another one hides epsilon, explore and evaluation_ties.
+/// An epsilon-greedy agent has `exploration_`, a member `exploration` in each episode, and
+/// - read_to_explore(state, episode): reads a state into workspace_ for exploring actions.
+/// Any other agent hides epsilon, explore and evaluation_ties.
 template <class Agent>
 class IndexAgent : public WithRates<Agent> {
  public:
@@ -195,9 +196,9 @@ class IndexAgent : public WithRates<Agent> {
 
   double epsilon() const noexcept { return agent().exploration_.policy().config().epsilon; }
 
-  /// In how many environments at once the agent learns: each has an episode of its own. Of those
-  /// that are no more, what waits is learned. Throws std::invalid_argument outside [1, 2^14], and
-  /// as learn does.
+  /// Sets the number of environments in which the agent learns at once; each has a separate
+  /// episode. Pending transitions of removed environments are learned first. Throws
+  /// std::invalid_argument outside [1, 2^14], and std::overflow_error if learning does.
   void set_n_environments(std::size_t n) {
     core::require_in_range("n_environments", n, 1, Episodes<int>::kMost);
     for (std::size_t i = n; i < n_environments(); ++i) agent().begin_episode(i);
@@ -205,9 +206,10 @@ class IndexAgent : public WithRates<Agent> {
   }
   std::size_t n_environments() const noexcept { return agent().episodes_.size(); }
 
-  /// Returns an allowed action to take in `state`; without `explore` a best one, by the average of
-  /// the weights where the approximator keeps one. Valid until the next act. Shapes: state (l,) in
-  /// [0, 1], mask as ActionMask has it. Throws std::invalid_argument.
+  /// Returns an allowed action to take in `state`. Without `explore` it is a best one, by the
+  /// average of the weights if the approximator keeps an average. The span is valid until the next
+  /// act. Shapes: state (l,) in [0, 1], mask as in ActionMask. Throws std::invalid_argument for
+  /// others.
   Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
              ActionMask mask = {}) {
     Agent& own = agent();
@@ -219,8 +221,8 @@ class IndexAgent : public WithRates<Agent> {
     return own.best_of_read(own.workspace_, own.evaluation_ties(), mask);
   }
 
-  /// Returns a best action, as act without `explore` does; `ties` decides between several. The span
-  /// is valid until the workspace is used again.
+  /// Returns a best action without changing the agent, so that several threads may call it; `ties`
+  /// draws among several. The span is valid until the workspace is used again.
   template <class Workspace>
   Action best_action(std::span<const double> state, Workspace& workspace, core::Random& ties,
                      ActionMask mask = {}) const {
@@ -228,8 +230,7 @@ class IndexAgent : public WithRates<Agent> {
     agent().read(state, workspace);
     return agent().best_of_read(workspace, ties, mask);
   }
-  /// The second step of act without `explore`, of which `read` is the first: the action in the
-  /// state that was read last.
+  /// Returns a best action in the state that `read` has read last: the second step of a greedy act.
   template <class Workspace>
   Action best_of(Workspace& workspace, ActionMask mask = {}) {
     require_mask("mask", mask);

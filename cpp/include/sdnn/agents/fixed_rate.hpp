@@ -13,20 +13,19 @@
 
 namespace sdnn::agents {
 
-/// Ticks `hz` times a second:
+/// A loop at a fixed rate, `hz` ticks a second:
 ///
 ///     FixedRate rate(50.0);
 ///     while (running) {
 ///       rate.wait();
-///       ...  // what is to be done by the next tick
+///       ...  // work that must be done before the next tick
 ///     }
 ///
-/// Tick k is at start + k / hz, whatever was before: nothing adds up, so the loop does not drift.
-/// The work after a tick has until the next one. If it takes longer, that is a miss: the ticks that
-/// have passed are left out, and the loop continues with the next one. It never catches up in
-/// a burst. A wait that ends too late by a whole period is a miss, too.
+/// Tick k is at start + k / hz, so delays do not add up and the loop does not drift. If the work
+/// after a tick takes longer than a period, that is a miss: the ticks that have passed are skipped,
+/// and the loop never catches up in a burst. A wait that ends a whole period late is a miss, too.
 ///
-/// The operating system decides when a sleeping thread runs again: times are as good as it is.
+/// The accuracy of ticks is that with which the operating system wakes a sleeping thread.
 class FixedRate {
  public:
   /// Seconds since any fixed moment; waits for so many seconds, or less.
@@ -54,8 +53,8 @@ class FixedRate {
 
   double hz() const noexcept { return hz_; }
 
-  /// Waits for the next tick and returns its number: 0 at once, at the first call, then the number
-  /// of periods since.
+  /// Waits for the next tick and returns its number, the periods since the first. The first call
+  /// returns 0 without waiting.
   std::int64_t wait() {
     if (tick_ < 0) {
       start_ = clock_();

@@ -53,9 +53,10 @@ class FuzzyQLearning {
     std::vector<double> action;
   };
 
-  /// With rules for each dimension of actions. Throws std::invalid_argument naming the field that
-  /// is out of range, or unless there are rules and all have the same inputs; std::length_error if
-  /// the rules that fire at once and their traces need more than max_table_bytes.
+  /// Takes the rules of each dimension of actions. Throws std::invalid_argument naming the field
+  /// that is out of range, or unless there are rules and all have the same inputs;
+  /// std::length_error if the rules that fire at once and their traces need more than
+  /// max_table_bytes.
   FuzzyQLearning(std::vector<approximators::FuzzyRules> rules, const FuzzyQLearningConfig& config,
                  std::uint64_t seed)
       : config_(config) {
@@ -90,19 +91,19 @@ class FuzzyQLearning {
   }
   std::size_t n_environments() const noexcept { return dimensions_.front().n_environments(); }
 
-  /// Starts counting the steps of an episode anew and forgets the traces. The caller decides when:
-  /// learning a terminated transition ends the traces only. Throws std::invalid_argument if there
-  /// is no such environment.
+  /// Begins an episode: resets its number of steps and its traces. The caller must call it, since
+  /// learning a terminated transition only resets the traces. Throws std::invalid_argument if the
+  /// environment does not exist.
   void begin_episode(std::size_t environment = 0) {
     for (auto& dimension : dimensions_) dimension.begin_episode(environment);
   }
 
   /// Returns the action to take in `state`, valid until the next act. Without `explore` every rule
-  /// picks a best action and nothing is remembered: the learning step uses the last exploring act.
-  /// Its actions are no indices, so there is no mask of them.
+  /// picks a best action and nothing is stored, because learning needs the last exploring act.
+  /// Masks are ignored: actions are real numbers.
   ///
-  /// Shapes: state (d,) in [0, 1], the action (n_dimensions,). Throws std::invalid_argument
-  /// otherwise, and nothing has changed.
+  /// Shapes: state (d,) in [0, 1], the action (n_dimensions,). For other states it throws
+  /// std::invalid_argument and changes nothing.
   Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
              ActionMask /*mask*/ = {}) {
     if (!explore) {
@@ -131,8 +132,8 @@ class FuzzyQLearning {
     return dimensions_.front().explored_in(state, environment);
   }
 
-  /// A workspace for a reader beside the agent itself: as long as the agent neither acts with
-  /// `explore` nor learns, many threads may call values and best_action, with one each.
+  /// Makes a workspace for values and best_action. Many threads may call these at once, each with a
+  /// separate workspace, while the agent neither explores nor learns.
   Workspace workspace() const {
     Workspace workspace;
     for (const auto& dimension : dimensions_) {
@@ -143,8 +144,8 @@ class FuzzyQLearning {
     return workspace;
   }
 
-  /// Returns the value of `state` by the rules of dimension d, the only number of the span, which
-  /// is valid until the workspace is used again. Throws as act does.
+  /// Returns the value of `state` by the rules of dimension d, as the only number of a span that is
+  /// valid until the workspace is used again. Throws std::invalid_argument for an unusable state.
   std::span<const double> values(std::span<const double> state, Workspace& workspace,
                                  std::size_t d = 0, bool /*averaged*/ = false) const {
     dimensions_[d].rules().fire(state, workspace.fired[d]);
@@ -152,8 +153,8 @@ class FuzzyQLearning {
     return workspace.values;
   }
 
-  /// Returns the action of act without `explore`; `ties` decides between several best ones of a
-  /// rule. The span is valid until the workspace is used again.
+  /// Returns the greedy action without changing the agent; `ties` draws among several best actions
+  /// of a rule. The span is valid until the workspace is used again.
   Action best_action(std::span<const double> state, Workspace& workspace, core::Random& ties,
                      ActionMask /*mask*/ = {}) const {
     read(state, workspace);
@@ -163,7 +164,7 @@ class FuzzyQLearning {
     return workspace.action;
   }
 
-  /// The two steps of act without `explore`: `read` is for many threads, as values is; `best_of`
+  /// The two steps of a greedy act: `read` finds the rules that fire, in any thread; `best_of`
   /// returns the action in the state that was read last.
   void read(std::span<const double> state, Workspace& workspace) const {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
@@ -180,10 +181,10 @@ class FuzzyQLearning {
 
   /// Learns the transition that began with the last exploring act in the environment.
   ///
-  /// Throws std::invalid_argument if `state` and `action` are not those of that act (which rule
-  /// picked which action is known of no other), for a bad next state or a reward that is not
-  /// finite; then nothing is learned. Throws std::overflow_error if a value would leave the floats:
-  /// the dimensions before have learned then.
+  /// Throws std::invalid_argument, and learns nothing, if `state` and `action` are not those of
+  /// that act, the only one of which it is known which rule picked which action; also for a bad
+  /// next state or a reward that is not finite. Throws std::overflow_error if a value would exceed
+  /// the range of floats; earlier dimensions have learned then.
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
              ActionMask /*next_mask*/ = {}) {

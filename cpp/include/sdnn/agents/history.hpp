@@ -16,12 +16,12 @@
 
 namespace sdnn::agents {
 
-/// From the inputs of single observations to states: either is in [0, 1].
+/// Makes states from the inputs of the present and earlier observations; all are in [0, 1].
 ///
-/// With `automatic`, estimates of an observer replace the inputs where they lower the errors of
-/// prediction by a tenth, as with noisy sensors; else differences are added where they explain a
-/// further 15 % of an input's changes, as where velocities are not observed. Symbols have no
-/// history; an agent has none where the experience is too small, or the inputs are too many.
+/// With `automatic`, an observer's estimates replace the inputs if they reduce prediction errors by
+/// a tenth, as with noisy sensors. Otherwise differences are added if they explain a further 15 %
+/// of an input's changes, as without observed velocities. Symbols have no history. There is no
+/// history if the experience is too small or there are too many inputs.
 class HistoryFilter {
  public:
   /// Without any history, for observations of `n` inputs.
@@ -121,8 +121,8 @@ class HistoryFilter {
     }
     find_state(inputs, inputs, memory, state, room);
   }
-  /// Continues it with the inputs of the next observation, after an action. Shapes as before;
-  /// action (n_dimensions,).
+  /// Continues an episode with an action and the inputs of the next observation, and writes the
+  /// state. Shapes: action (n_dimensions,), inputs (n_observed,), state (n_inputs,).
   void follow(std::span<const double> action, std::span<const double> inputs, Memory& memory,
               std::span<double> state, Room& room) const {
     if (is_none()) {
@@ -144,8 +144,8 @@ class HistoryFilter {
     find_state(inputs, room.last, memory, state, room);
   }
 
-  /// For each of the observation's inputs whether it matters, as its estimate or a difference does;
-  /// see Relevance. Shapes: (n_observed,).
+  /// Returns for each input of the observation whether it is relevant, by its estimate or by its
+  /// difference; see Relevance. Shapes: (n_observed,).
   std::vector<bool> relevant(const RandomExperience& experience,
                              const std::vector<bool>& required) const {
     if (is_none()) return Relevance(experience).inputs(required);

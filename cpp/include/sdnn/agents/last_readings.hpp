@@ -15,10 +15,11 @@
 
 namespace sdnn::agents {
 
-/// The last readings in the present episode of each environment.
+/// The last readings of all variables in the present episode of each environment, which replace
+/// missing ones.
 ///
-/// Greedy episodes may run beside those that are learned: they have last readings apart, which
-/// begin with those that are learned and are forgotten when one of these is noted.
+/// Greedy episodes may run between the steps of a learned episode. They have separate readings,
+/// which start as a copy of the learned episode's and are dropped when that continues.
 class LastReadings {
  public:
   /// An observation and the next one.
@@ -26,21 +27,22 @@ class LastReadings {
     std::span<const double> observation, next_observation;
   };
 
-  /// Without `is_held` all observations stay as they are. Of `symbols`, first variables and how
-  /// many there are, all variables are missing if one is.
+  /// Without `is_held` observations are not changed. Each of the `symbols` is a group of variables,
+  /// given by the first one and their number: all are missing if one is.
   LastReadings(bool is_held, std::size_t n_variables, std::vector<std::vector<int>> symbols)
       : is_held_(is_held), n_variables_(n_variables), symbols_(std::move(symbols)) {}
 
   /// Whether missing readings are replaced by the last ones.
   bool is_held() const noexcept { return is_held_; }
 
-  /// An observation with the last readings in place of missing ones, which stay NaN where there is
-  /// none, in `room`; one of another size as it is. Shape: (n_variables,).
+  /// Returns an observation whose missing readings are replaced by the last ones, or stay NaN
+  /// without a last one. The result is in `room`. An observation of a wrong size is returned
+  /// unchanged. Shape: (n_variables,).
   std::span<const double> filled(std::span<const double> observation, std::size_t environment,
                                  bool is_greedy, std::vector<double>& room) const {
     return filled(observation, readings(environment, is_greedy), room);
   }
-  /// Those of a transition that is learned. Valid until the next call.
+  /// Replaces missing readings in both observations of a transition. Valid until the next call.
   Step filled(std::span<const double> observation, std::span<const double> next_observation,
               std::size_t environment) {
     const auto before = filled(observation, environment, false, held_);

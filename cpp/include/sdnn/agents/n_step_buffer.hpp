@@ -14,8 +14,8 @@
 
 namespace sdnn::agents {
 
-/// Up to n steps (state, action, reward) of an episode, the oldest first. Allocates nothing after
-/// it is made. An action is one number or several: `n_dimensions`.
+/// A queue of up to n steps (state, action, reward) of an episode, the oldest first. Only the
+/// constructor allocates. An action has `n_dimensions` numbers.
 class NStepBuffer {
  public:
   struct Step {

@@ -27,7 +27,7 @@ constexpr std::array<std::string_view, 3> words_of(Missing) noexcept {
   return {"error", "hold", "code"};
 }
 
-/// The origin of an input of an agent; its value where x is what is observed:
+/// The way in which an agent's input is computed from an observation x:
 ///
 /// | kind     | first, second | value                                                          |
 /// |----------|---------------|----------------------------------------------------------------|
@@ -44,12 +44,12 @@ struct ObservedInput {
   std::size_t second;  ///< of an angle; how many variables encode a symbol
 };
 
-/// Scales what is observed, with a range for each observed variable.
+/// Scales observations to states in [0, 1], with a range for each observed variable.
 ///
-/// With Missing::hold a missing variable is in the middle of its range, and a symbol of which a
-/// variable is missing is the first one. With Missing::code an input that has n bins has one more,
-/// for missing readings, and values are the middles of n + 1 bins; an input is missing if one of
-/// its variables is.
+/// With Missing::hold a missing variable gets the middle of its range, and a symbol with a missing
+/// variable becomes the first symbol. With Missing::code an input with n bins has an additional bin
+/// for missing readings, and values are the middles of the n + 1 bins; an input is missing if one
+/// of its variables is.
 class ObservationScale {
  public:
   /// Shapes: low and high (n_observed,), n_bins (n_inputs,) with Missing::code. Throws
@@ -83,10 +83,10 @@ class ObservationScale {
   std::size_t n_observed() const noexcept { return low_.size(); }
   std::size_t n_inputs() const noexcept { return inputs_.size(); }
 
-  /// Shapes: observation (n_observed,), state (n_inputs,). Throws std::invalid_argument naming the
-  /// number of the observation, called `name`, that has no state: with Missing::error all must be
-  /// finite.
-  /// With `is_wide` variables are clipped to [-1, 2].
+  /// Writes the state of an observation. Shapes: observation (n_observed,), state (n_inputs,). With
+  /// `is_wide` variables are clipped to [-1, 2] instead of [0, 1]. Throws std::invalid_argument
+  /// naming the unusable number of the observation, which messages call `name`: with Missing::error
+  /// all must be finite.
   void operator()(std::span<const double> observation, std::span<double> state,
                   const char* name = "observation", bool is_wide = false) const {
     core::require_size(name, observation.size(), n_observed(), "numbers");
@@ -148,8 +148,8 @@ class ObservationScale {
     return (static_cast<double>(bin) + 0.5) / static_cast<double>(n + 1);
   }
 
-  /// The input's value; where a reading is missing, the middle of its range, of a symbol the first
-  /// one, of an angle the middle of the reading that is missing.
+  /// Returns the input's value. A missing reading counts as the middle of its range (for an angle,
+  /// the middle of the missing coordinate's range), and a missing symbol as the first one.
   double value_or_middle(const ObservedInput& input,
                          std::span<const double> observation) const noexcept {
     if (!is_missing(input, observation)) return value(input, observation);

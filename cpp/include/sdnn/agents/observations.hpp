@@ -26,19 +26,21 @@ namespace sdnn::agents {
 
 /// Scales observations to states in [0, 1]; see ObservationScale.
 ///
-/// A number's range is the fixed one, or fitted to observations: from the lowest to the highest,
-/// and a quarter more at each end. Adaptive ranges leave out one in twenty observations at each
-/// end and stay within the fixed range; narrowed ones are fitted where the fixed range is more than
-/// twice as wide and inputs are few: many would have too little data for finer bins. Pairs of
-/// neighbouring variables that lie and move on the unit circle, or around it by what is noise, can
-/// be found. Running ranges are those of RunningRanges, and change with each observation.
+/// The range of a variable is fixed, or fitted to observations: from the lowest to the highest,
+/// plus a quarter of the width at each end. Adaptive ranges leave out a twentieth of the
+/// observations at each end and stay within the fixed range. Narrowed ranges are fitted if the
+/// fixed range is more than twice as wide and there are few inputs; with many inputs, finer bins
+/// would get too little data. Running ranges (RunningRanges) change with each observation. Pairs of
+/// neighbouring variables that move on the unit circle, apart from noise, can be detected as
+/// angles.
 class Observations {
  public:
   static constexpr double kHeadroom = 0.25;
 
-  /// Symbols are inputs of their own where the approximator codes symbols; it gets `least_inputs`
-  /// inputs at least, the last one repeated. With Missing::code `n_bins` are those of each input
-  /// that is no symbol, or of all. Throws std::invalid_argument naming the field.
+  /// Symbols are separate inputs if the approximator codes symbols. The last input is repeated if
+  /// there are fewer than `least_inputs`. With Missing::code, `n_bins` has the number of bins of
+  /// each input that is not a symbol, or one number for all. Throws std::invalid_argument naming
+  /// the impossible field.
   Observations(ObservationConfig config, bool codes_symbols, std::size_t least_inputs,
                std::vector<std::size_t> n_bins = {})
       : config_(std::move(config)), least_inputs_(least_inputs), n_bins_(std::move(n_bins)) {
@@ -126,8 +128,9 @@ class Observations {
     return codes_missing() ? n_variables() + 1 : n_variables();
   }
 
-  /// Shapes: observation (n_variables,), state (n_inputs,). Throws std::invalid_argument naming the
-  /// number of the observation, called `name`, that has no state. Requires that it is fitted.
+  /// Writes the state of an observation. Shapes: observation (n_variables,), state (n_inputs,).
+  /// Throws std::invalid_argument naming the unusable number of the observation, which messages
+  /// call `name`. Requires fitted ranges.
   void scale(std::span<const double> observation, std::span<double> state,
              const char* name = "observation", bool is_wide = false) const {
     (*scale_)(observation, state, name, is_wide);
@@ -163,15 +166,16 @@ class Observations {
     if (config_.missing == Missing::error) ObservationScale::require_present(name, values);
   }
 
-  /// Takes unknown ranges and pairs from the readings that are not missing. Shape:
-  /// (n, n_variables), row by row: the first half what was observed before steps, the second what
-  /// was observed after them. On each side of what was observed there is `headroom` times its
-  /// width. A variable without any reading has the range of one that is always 0. Throws
-  /// std::invalid_argument where there is no range, and then nothing has changed.
+  /// Fits unknown ranges and pairs to the observations, ignoring missing readings. Shape: (n,
+  /// n_variables), row by row: the first half are the observations before steps, the second half
+  /// those after them. Ranges are wider than the observations by `headroom` times their width on
+  /// each side. A variable without any reading is treated as always 0. Throws
+  /// std::invalid_argument, and changes nothing, if a range is impossible.
   void fit(std::span<const double> seen, double headroom = kHeadroom);
 
-  /// Leaves out the other inputs, or, of those that were left out, adds some at the end. Shape: one
-  /// for each input that there is. Requires that it is fitted, and that one is kept.
+  /// Keeps the inputs whose entry is true, and drops the others; a later call may add dropped
+  /// inputs at the end. Shape: an entry for each possible input. Requires fitted ranges, and that
+  /// an input is kept.
   void keep(const std::vector<bool>& kept) {
     const std::vector<bool> present = kept_inputs();
     assert(kept.size() == present.size());

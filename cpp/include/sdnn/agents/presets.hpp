@@ -24,10 +24,9 @@ using ActorCriticPreset = Settings<approximators::LinearSDNNConfig, ActorCriticC
 /// The paper's settings (section 4.2): the defaults.
 inline Preset paper_preset(int n_inputs) { return {.approximator = {.n_inputs = n_inputs}}; }
 
-/// For any task: a full step each time, then, as progress is set, ever smaller ones, which
-/// rounding stills one by one; targets of five steps; exploration that goes somewhere; greedy
-/// actions by an average of the weights; values in steps half as large as the paper's
-/// (docs/evidence/benchmarks.md).
+/// Settings for any task: a learning rate of 1 that falls with the progress; five-step targets;
+/// repeated random actions; greedy actions by an average of the weights; values in steps half as
+/// large as the paper's (docs/evidence/benchmarks.md).
 inline Preset general_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs,
                            .max_pairs = 56,
@@ -45,7 +44,7 @@ inline Preset general_preset(int n_inputs) {
                        .value_range = ValueRange::adaptive}};
 }
 
-/// The general one with fewer units, so that the weights fit into the flash of a small processor
+/// The general preset with fewer units, so that the weights fit into the flash of a small processor
 /// (docs/how-to/small-processors.md).
 inline Preset small_preset(int n_inputs) {
   Preset preset = general_preset(n_inputs);
@@ -55,9 +54,9 @@ inline Preset small_preset(int n_inputs) {
   return preset;
 }
 
-/// Steady with noisy sensors in the paper's task: few actions part the best one from its neighbours
-/// by more than noise blurs, and a success that reaches the whole path at once is not forgotten
-/// (docs/explanation/collapse.md).
+/// Settings that do not collapse with noisy sensors in the paper's task
+/// (docs/explanation/collapse.md). With few actions the best one differs from its neighbours by
+/// more than the noise, and five-step targets pass a success on to earlier states at once.
 inline Preset robust_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs, .n_actions = 61}, .learning = {.n_steps = 5}};
 }
@@ -82,8 +81,8 @@ inline std::array<NamedPreset, 4> presets(int n_inputs) {
             small_preset(n_inputs)}}};
 }
 
-/// The paper's rule and rates, one-step Q-learning with alpha 0.5, in the paper's task: 61 torques
-/// that share no units, and patterns of 200 units.
+/// The paper's learning rule and rates for the paper's task: one-step Q-learning with alpha 0.5.
+/// The 61 torques share no units, and patterns have 200 units.
 inline QLambdaPreset paper_q_lambda_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs,
                            .n_pattern_units = 200,

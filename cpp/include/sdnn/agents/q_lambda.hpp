@@ -36,12 +36,12 @@ namespace sdnn::agents {
 ///     w <- w + alpha / n (delta + Q - Q_old) z - alpha / n (Q - Q_old) x
 ///     delta = r + gamma Q' - Q,  Q_old <- Q'
 ///
-/// Q' is the value of the action that is taken next (Sarsa), or the best one (Q-learning: then a
-/// worse action ends the trace). With Sarsa a transition waits until the next one begins where it
-/// ended, or the episode ends. A terminated one has Q' = 0, any other end the best value. With
-/// replacing traces z is x where x is not 0, and w moves along z alone. A step of alpha = 1
-/// corrects the whole error of a state that comes for the first time; it never overshoots, for <z,
-/// x> is bounded.
+/// Q' is the value of the next action (Sarsa), or of the best action (Q-learning, in which any
+/// other action ends the trace). With Sarsa a transition is pending until the next one begins in
+/// the state where it ended, or the episode ends. Q' is 0 after a terminated transition, and the
+/// best value at any other end of an episode. With replacing traces, z is x where x is not 0, and w
+/// moves along z alone. A step with alpha = 1 corrects the whole error of a new state; it never
+/// overshoots, because <z, x> is bounded.
 ///
 /// After the scaling of observations everything is an integer: alpha and epsilon in steps of 2^-16,
 /// gamma of 2^-15, gamma lambda of 2^-13, traces of 2^-12, values and weights in the readout's
@@ -51,9 +51,9 @@ namespace sdnn::agents {
 /// Source: van Seijen, H., Mahmood, A. R., Pilarski, P. M., Machado, M. C., Sutton, R. S. (2016).
 /// True online temporal-difference learning (algorithm 2); Watkins, C. (1989), Q(lambda).
 ///
-/// An agent may learn in several environments at once, numbered from 0: each has a trace of its
-/// own, a replacing one where there are several: Q - Q_old would hold what the others corrected,
-/// and dutch traces would carry it further.
+/// An agent may learn in several environments at once, numbered from 0, each with a separate trace.
+/// Traces are replacing ones then: for dutch traces, Q - Q_old would contain the corrections of the
+/// other environments.
 class QLambda : public IndexAgent<QLambda> {
  public:
   using Readout = approximators::LinearSDNN;
@@ -92,14 +92,15 @@ class QLambda : public IndexAgent<QLambda> {
 
   /// Alpha at present, as epsilon in steps of 2^-16.
   double learning_rate() const noexcept { return static_cast<double>(rate_) / kOne; }
-  /// Where epsilon goes with schedule_steps: by default to 0. Symbols tell nothing of each other:
-  /// where states have nothing else, epsilon stays, so that all of them are tried for good.
+  /// The value that epsilon approaches with schedule_steps, by default 0. With discrete states
+  /// only, epsilon stays constant by default, so that every state continues to be explored: nothing
+  /// is generalized between them.
   double final_epsilon() const {
     return config_.final_epsilon.value_or(has_symbols_only() ? config_.policy.epsilon : 0.0);
   }
 
-  /// Ends the trace, and learns the transition that still waits of an episode that did not
-  /// terminate. Throws std::invalid_argument if there is no such environment.
+  /// Begins an episode: learns the pending transition of the last one, if it did not terminate, and
+  /// ends its trace. Throws std::invalid_argument if the environment does not exist.
   void begin_episode(std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
     episode.exploration.begin();
@@ -112,9 +113,9 @@ class QLambda : public IndexAgent<QLambda> {
     return workspace;
   }
 
-  /// The dimension's part of Q(state, a) for each of its actions, from the average of the weights
-  /// where there is one and `averaged`. The span is valid until the workspace is used again. Shape:
-  /// state (l,) in [0, 1]. Throws std::invalid_argument.
+  /// Returns the dimension's part of Q(state, a) for each of its actions; `averaged` selects the
+  /// average of the weights, if there is one. The span is valid until the workspace is used again.
+  /// Shape: state (l,) in [0, 1]. Throws std::invalid_argument for others.
   std::span<const double> values(std::span<const double> state, Workspace& workspace,
                                  std::size_t d = 0, bool averaged = false) const {
     readout().values(state, workspace.readout, workspace.values[d], d, averaged);
@@ -127,10 +128,10 @@ class QLambda : public IndexAgent<QLambda> {
     take_values(workspace.readout, workspace.values, true);
   }
 
-  /// Learns one transition: with Sarsa when the next one is known, unless it terminated. The best
-  /// value of the next state is that of its allowed actions. Throws
-  /// std::invalid_argument for a reward that is not finite or beyond +- 1e300 or an environment
-  /// that is none; then nothing has been learned.
+  /// Learns one transition; with Sarsa it is pending until the next action is known, unless it
+  /// terminated. `next_mask` restricts the actions of the next state. Throws std::invalid_argument
+  /// for a reward that is not finite or beyond +- 1e300, or an environment that does not exist;
+  /// then nothing has been learned.
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
              ActionMask next_mask = {}) {
@@ -161,10 +162,10 @@ class QLambda : public IndexAgent<QLambda> {
   }
 
   /// Learns that a teacher chose an action in a state, and that its return was `value`. The values
-  /// of all actions move by the error of the action's value; and where the best other action of a
-  /// dimension is less than `margin` below the teacher's, both move apart by equal parts. Thus
-  /// errors of the returns leave the order of actions as it is. Ends the episode of environment 0.
-  /// Throws as `learn` does, also for a margin that is not above 0.
+  /// of all actions move by the error of the action's value, so that errors of the returns do not
+  /// change the order of actions. If the best other action of a dimension is less than `margin`
+  /// below the teacher's, both move apart equally. Ends the episode of environment 0. Throws
+  /// std::invalid_argument for a bad state, value or margin.
   void imitate(std::span<const double> state, Action action, double value, double margin) {
     require_transition(state, action, value, state, {});
     core::require_in_range("margin", margin, std::numeric_limits<double>::min(), kLargestReward);
@@ -201,8 +202,8 @@ class QLambda : public IndexAgent<QLambda> {
     td_.refine_unit(size_in_window, size, episodes_);
   }
 
-  /// Takes over what an agent with fewer inputs has learned; see LinearSDNN. In each environment
-  /// the transition that waits is learned, and the trace ends.
+  /// Takes over the weights of an agent with fewer inputs; see LinearSDNN. In each environment the
+  /// pending transition is learned first, and the trace ends.
   void continue_from(QLambda fewer) {
     for (std::size_t i = 0; i < fewer.n_environments(); ++i) {
       if (fewer.episodes_.of(i).waits) fewer.finish_at_end(fewer.episodes_.of(i));
@@ -247,9 +248,9 @@ class QLambda : public IndexAgent<QLambda> {
   friend class WithRates<QLambda>;
   friend class IndexAgent<QLambda>;
 
-  /// Whether there were rewards and all of them were 0, and with them all values. Random actions
-  /// that last reach further than random ties, so a first reward comes sooner; symbols are in no
-  /// direction.
+  /// Whether all rewards so far were 0, and therefore all values. The agent then repeats random
+  /// actions, which find a first reward sooner than random ties do. With discrete states only it
+  /// does not, because repeating an action does not lead in one direction there.
   bool lacks_rewards() const noexcept {
     const bool may_search = config_.max_action_repeat > 1 && epsilon() > 0.0;
     return may_search && n_learned_ > 0 && !readout().exponent() && !has_symbols_only();
@@ -309,8 +310,8 @@ class QLambda : public IndexAgent<QLambda> {
     }
   }
 
-  /// Returns a best one of the allowed actions in the state that was read last. The tolerance is in
-  /// whole units, as values are.
+  /// Returns a best allowed action in the state that was read last. The tolerance for ties is
+  /// rounded to whole units, as values are.
   Action best_of_read(Workspace& workspace, core::Random& ties, ActionMask mask) const {
     for (std::vector<double>& row : workspace.values) exclude(take_part(mask, row.size()), row);
     const EpsilonGreedy& policy = exploration_.policy();

@@ -30,8 +30,8 @@ constexpr std::array<std::string_view, 2> words_of(TraceKind) noexcept {
   return {"dutch", "replacing"};
 }
 
-/// The agent's parameters; the defaults are those we recommend for any task. They were chosen with
-/// seeds from 1000 on; docs/evidence/benchmarks.md has the tasks.
+/// The agent's parameters, with defaults for any task. The defaults were tuned with seeds from 1000
+/// on, on the tasks of docs/evidence/benchmarks.md.
 struct QLambdaConfig {
   double learning_rate = 1.0;
   double discount = 0.99;

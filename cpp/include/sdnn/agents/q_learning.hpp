@@ -40,17 +40,17 @@ namespace sdnn::agents {
 /// the others is noise. A correction moves every Q_d by the error of the mean. Source: Seyde, T. et
 /// al. (2022). Solving continuous control via Q-learning (Eqs. 2 and 3).
 ///
-/// With n_steps = n > 1 the target is r_1 + gamma r_2 + ... + gamma^n max_a' Q: a transition waits
-/// until n steps are known, or the episode ends, and is then corrected, once, as before. A success
-/// thus reaches the n states before it in the episode that had it. A transition that does not begin
-/// where the one before it ended begins anew: what waits is then learned with the steps it has.
+/// With n_steps = n > 1 the target is r_1 + gamma r_2 + ... + gamma^n max_a' Q. A transition is
+/// pending until n steps are known or the episode ends, and is then learned once, as above. A
+/// success thus reaches the n states before it at once. If a transition does not begin in the state
+/// where the one before it ended, the pending ones are learned with the steps that are known.
 /// Targets are not corrected for actions taken at random in between. Source: Watkins, C. (1989).
 /// Learning from delayed rewards (corrected n-step returns); Sutton, R., Barto, A. (2018).
 /// Reinforcement learning, section 7.1.
 ///
-/// An agent may learn in several environments at once, numbered from 0: what belongs to an episode
-/// (the steps that wait, the kept action, the number of its steps, its rewards) is then
-/// kept for each, all else is shared. Which of them acts or learns when is the caller's choice.
+/// An agent may learn in several environments at once, numbered from 0. Each has a separate episode
+/// (its pending steps, repeated action, number of steps and rewards); everything else is shared.
+/// The caller may act and learn in them in any order.
 template <approximators::ActionValue Q>
 class QLearning : public IndexAgent<QLearning<Q>> {
  public:
@@ -63,8 +63,8 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     std::vector<std::size_t> action;
   };
 
-  /// With an approximator for each dimension of actions. Throws std::invalid_argument naming the
-  /// field that is out of range, or unless there is an approximator and all have the same inputs.
+  /// Takes an approximator for each dimension of actions. Throws std::invalid_argument naming the
+  /// field that is out of range, if there is no approximator, or if they differ in their inputs.
   QLearning(std::vector<Q> networks, const QLearningConfig& config, std::uint64_t seed)
       : config_(checked_schedule(config)),
         networks_(of_same_inputs(std::move(networks))),
@@ -94,10 +94,10 @@ class QLearning : public IndexAgent<QLearning<Q>> {
   /// Alpha, as set, or as progress has made it.
   double learning_rate() const noexcept { return learning_rate_; }
 
-  /// Starts counting the steps of an episode anew, for the greedy first steps, and learns what
-  /// still waits of an episode that did not terminate. The caller decides when: learning a
-  /// terminated transition does not. Throws std::invalid_argument if there is no such environment,
-  /// and as learn does.
+  /// Begins an episode: learns the pending transitions of the last one, and resets the number of
+  /// steps, which decides about the greedy first steps. The caller must call it, since learning a
+  /// terminated transition does not. Throws std::invalid_argument if the environment does not
+  /// exist, and std::overflow_error if learning does.
   void begin_episode(std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
     episode.exploration.begin();
@@ -113,8 +113,8 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     }
   }
 
-  /// A workspace for a reader beside the agent itself: as long as the agent neither acts with
-  /// `explore` nor learns, many threads may call values and best_action, with one each.
+  /// Makes a workspace for values and best_action. Many threads may call these at once, each with a
+  /// separate workspace, while the agent neither explores nor learns.
   Workspace workspace() const {
     Workspace workspace;
     for (const Q& network : networks_) {
@@ -125,9 +125,9 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     return workspace;
   }
 
-  /// Q_d(state, a) for every action a of dimension d, from the average of the weights where the
-  /// approximator keeps one and `averaged`. The span is valid until the workspace is used again.
-  /// Shape: state (l,) in [0, 1]. Throws as the approximator does.
+  /// Returns Q_d(state, a) for every action a of dimension d; `averaged` selects the average of the
+  /// weights, if the approximator keeps one. The span is valid until the workspace is used again.
+  /// Shape: state (l,) in [0, 1]. Throws std::invalid_argument for others.
   std::span<const double> values(std::span<const double> state, Workspace& workspace,
                                  std::size_t d = 0, bool averaged = false) const {
     const Q& q = networks_[d];
@@ -147,10 +147,10 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     for (std::size_t d = 0; d < n_dimensions(); ++d) read(state, workspace, d, true);
   }
 
-  /// Learns one transition; the best value of the next state is that of its allowed actions.
-  /// Throws std::invalid_argument for a reward that is not finite or beyond
-  /// +- 1e300 or an environment that is none; then nothing has been learned. Throws
-  /// std::overflow_error as the approximator does; then it may have been learned in part.
+  /// Learns one transition; `next_mask` restricts the actions of the next state. Throws
+  /// std::invalid_argument for a reward that is not finite or beyond +- 1e300, or an environment
+  /// that does not exist; then nothing has been learned. Throws std::overflow_error if a weight of
+  /// the approximator would leave its range; then the transition may have been learned in part.
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
              ActionMask next_mask = {}) {
@@ -259,8 +259,9 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     return networks;
   }
 
-  /// Reads the values of a dimension; `averaged`: by the average of the weights where the
-  /// approximator keeps one.
+  /// Computes the values of all actions of dimension d, or only their firing counts if these have
+  /// the same order, into the workspace; `averaged` selects the average of the weights, if there is
+  /// one.
   void read(std::span<const double> state, Workspace& workspace, std::size_t d,
             bool averaged) const {
     if constexpr (kCounts) {

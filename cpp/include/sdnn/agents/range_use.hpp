@@ -43,8 +43,8 @@ class RangeNotes {
     }
   }
 
-  /// The use of each variable; none for parts of angles and symbols, and before there are enough
-  /// notes.
+  /// Returns for each variable the part of its range that is in use; nothing for variables of
+  /// angles and symbols, and before there are enough observations.
   std::vector<std::optional<RangeUse>> use(const Observations& observations) const {
     std::vector<std::optional<RangeUse>> use(n_variables_);
     for (const ObservedInput& input : observations.inputs()) {

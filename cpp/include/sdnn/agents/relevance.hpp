@@ -27,20 +27,22 @@ struct RandomExperience {
   std::size_t size() const noexcept { return rewards.size(); }
 };
 
-/// Finds the inputs that matter: those that the next rewards depend on, those that actions change,
-/// and all that these depend on, however far back.
+/// Selects the relevant inputs: those on which the next rewards depend, those that actions change,
+/// and all inputs on which these depend, directly or through others.
 ///
-/// An input matters by itself if the next reward, or the sum of the next 20, differs between its
-/// values, or if its change in a step differs between actions. Then every input counts on which the
-/// change of one that matters depends. So a velocity that says nothing about the reward is found by
-/// the position that it moves, also where no reward was met at all; noise, whatever its own
-/// dynamics, is not found, as it moves nothing but itself. Last, two inputs count together if these
-/// rewards differ between pairs of their values, beyond what either tells by itself.
+/// An input is relevant by itself if the next reward, or the sum of the next 20 rewards, differs
+/// between its values, or if its change in a step differs between actions. Then every input is
+/// relevant on which the change of a relevant one depends. A velocity that says nothing about the
+/// reward is thus selected because it moves a position, even without any reward. Noise is not
+/// selected, whatever its dynamics, because it changes only itself. Last, two inputs are relevant
+/// together if these rewards differ between pairs of their values more than between the values of
+/// each.
 ///
-/// "Depends" compares the F statistic over eight bins of equal counts with that of the same series
-/// against each other when one is shifted in time, by 40 different lengths: 1.5 times the largest
-/// of these must be exceeded, of pairs twice. Shifts leave each series as it is, so slow noise,
-/// which seems to depend on everything, is compared with itself.
+/// A dependence is a large F statistic over eight bins of equal counts. It is compared with the
+/// statistics of the same two series with one of them shifted in time, by 40 different lengths: it
+/// must exceed 1.5 times the largest of these, for pairs of inputs twice. Shifts preserve the
+/// dynamics of each series, so slow noise, which seems to depend on everything, does so after
+/// shifts, too.
 ///
 /// There are about n^2 comparisons of n inputs, so with many inputs some exceed that by chance.
 /// With more than 24 inputs the cube root of F, which is nearly normal, must also lie sqrt(2 log(10
@@ -52,12 +54,12 @@ struct RandomExperience {
 /// inputs is on next.
 class Relevance {
  public:
-  /// With more `caution` than 1 as many times more evidence is needed: for who looks often.
+  /// `caution` multiplies the required evidence: above 1 for callers that repeat the selection.
   explicit Relevance(const RandomExperience& experience, double caution = 1.0)
       : experience_(experience), caution_(caution) {}
 
-  /// For each input whether it matters, as those that are `known` to do; all do where fewer than
-  /// two are found. Shapes: (n_inputs,).
+  /// Returns for each input whether it is relevant; those that are `known` to be relevant stay so.
+  /// All inputs are relevant if fewer than two are found. Shapes: (n_inputs,).
   std::vector<bool> inputs(const std::vector<bool>& known) const {
     const std::size_t n_inputs = experience_.n_inputs;
     if (experience_.size() < kLeast) return std::vector<bool>(n_inputs, true);
@@ -217,8 +219,9 @@ class Relevance {
     return bins;
   }
 
-  /// Between the bins' means and within the bins; 0 where nothing varies. Bin t + shift, with bin t
-  /// of `beside` where it is given, belongs to value t.
+  /// Returns the F statistic: the variance between the means of bins divided by that within bins; 0
+  /// if nothing varies. Value t belongs to bin t + shift or, with `beside`, to the pair of this bin
+  /// and bin t of `beside`.
   static double f_statistic(const std::vector<double>& values, const Bins& bins, std::size_t shift,
                             const Bins* beside) {
     double sums[kMostBins] = {};
@@ -286,8 +289,8 @@ class Relevance {
     return static_cast<double>(std::ranges::count(is_used, true));
   }
 
-  /// The number of values that are not the usual one, in bins that are not the fullest one: a few
-  /// coincidences of rare events make any statistic large.
+  /// Counts the values on which a dependence rests: those that differ from the most frequent value
+  /// and are not in the fullest bin. If they are few, coincidences make any statistic large.
   static std::size_t n_deciding(const std::vector<double>& values, const Bins& bins) {
     std::size_t counts[kMostBins] = {};
     for (const std::uint8_t bin : bins) ++counts[bin];
@@ -335,9 +338,10 @@ class Relevance {
     });
   }
 
-  /// Whether a statistic is larger than n^2 normal numbers with the mean and the variance of those
-  /// `by_chance`. With a `least_variance` above 0 it is the cube root of F, whose mean and variance
-  /// are never below those of independent normal values, 1 - least_variance and least_variance.
+  /// Returns whether a statistic is probably larger than all of n^2 normal numbers with the mean
+  /// and variance of the statistics `by_chance`. With a `least_variance` above 0 it is the cube
+  /// root of F, whose mean and variance are at least those for independent normal values, 1 -
+  /// least_variance and least_variance.
   bool stands_out(double statistic, const std::vector<double>& by_chance,
                   double least_variance) const {
     double mean = 0.0, variance = 0.0;

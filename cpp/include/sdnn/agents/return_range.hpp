@@ -12,21 +12,22 @@
 
 namespace sdnn::agents {
 
-/// A range that holds 0 and most returns of late.
+/// A range of values that contains 0 and most of the recent returns.
 ///
-/// The return of a step is known when its episode terminates or, but for little, 2 / (1 - gamma)
-/// steps later; what is missing is taken to be like what is there. A time limit is no end: the next
-/// episode's rewards follow. The range is that of 256 returns, spread over the last half of all,
-/// without the lowest twentieth and the highest fiftieth, with room for better ones above. It has
-/// no room below: actions that were never tried have its lowest value, and what is worse than usual
-/// should not be better than they are. It moves when it no longer holds the returns or has become
-/// twice as wide as it need be.
+/// The return of a step is known when its episode terminates, or approximately 2 / (1 - gamma)
+/// steps later, with the missing rest assumed to be like the known part. A time limit does not end
+/// a return: the rewards of the next episode follow. The range is that of 256 returns, spread over
+/// the last half of all, without the lowest twentieth and the highest fiftieth. It has a margin
+/// above for better returns, but none below: untried actions have the lowest value, and should not
+/// look worse than actions that are worse than usual. The range changes when it no longer contains
+/// the returns or is twice as wide as necessary.
 ///
-/// Rare sums are thus outside, and sums are clipped one width beyond the range: otherwise a
-/// single huge reward would be in many returns, one for each step before it.
+/// Returns are clipped one width beyond the range: otherwise a single huge reward would dominate
+/// the returns of all steps before it.
 ///
-/// Until 32 returns are known, and any reward other than 0, the range grows to hold the discounted
-/// sums of past rewards, z = r + gamma z: their extremes are those of returns, and known at once.
+/// Until 32 returns and a reward other than 0 are known, the range grows to contain the discounted
+/// sums of past rewards, z = r + gamma z: they have the same extremes as returns, and are known at
+/// once.
 class ReturnRange {
  public:
   /// The rewards of one environment.

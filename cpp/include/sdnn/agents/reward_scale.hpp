@@ -13,21 +13,21 @@
 
 namespace sdnn::agents {
 
-/// Follows the size of rewards in powers of two, and refuses a reward that is far beyond it, as the
-/// glitch of a sensor is: it would make the units of an agent in integers so large that all other
-/// rewards vanish.
+/// Follows the size of rewards in powers of two, and refuses rewards that are far larger, such as a
+/// sensor's glitch: they would make the units of an integer agent so large that all other rewards
+/// would be rounded to 0.
 ///
-/// The size is the floor of the logarithm, to base 2, of the largest recent reward: at the end of a
-/// window of 1,024 rewards, some of them not 0, a size that none of these reached falls to at most
-/// 16 above the largest of them, and then a quarter of the rest. A reward is refused if its own
-/// size is above the recent one by more than the headroom. That begins with 16, and each refusal
-/// adds 4, so that rewards whose scale is truly so large are learned after some; 64 windows take 1
-/// away.
+/// The size of a reward is the floor of its logarithm to base 2; the recent size is that of the
+/// largest recent reward. After each window of 1,024 rewards that are not all 0, a larger recent
+/// size falls: to at most 16 above the largest size in the window, and then by a quarter of the
+/// difference. A reward is refused if its size exceeds the recent one by more than the headroom.
+/// The headroom begins with 16. Each refusal adds 4, so that truly larger rewards are learned after
+/// some refusals, and every 64 windows subtract 1.
 class RewardScale {
  public:
   RewardScale() = default;
-  /// Begins with what is known of the rewards: three quarters of those that are not 0 have this
-  /// size, or a smaller one.
+  /// Starts with the size of the known rewards: that which three quarters of those that are not 0
+  /// do not exceed.
   explicit RewardScale(std::span<const double> rewards) {
     std::vector<std::int32_t> sizes;
     for (const double reward : rewards) {
@@ -53,8 +53,8 @@ class RewardScale {
     return true;
   }
 
-  /// Ends the window if it is over. Returns the size of the rewards in it; none if it is not over,
-  /// or all of them are 0.
+  /// Ends the window if it has 1,024 rewards, and returns the size of its rewards. Returns nothing
+  /// if it has fewer, or all of them are 0.
   std::optional<std::int32_t> end_window() noexcept {
     if (n_rewards_ % kWindow != 0) return std::nullopt;
     if (n_rewards_ % (kWindow * kWindowsOfRise) == 0 && headroom_ > kLeastHeadroom) --headroom_;

@@ -13,7 +13,8 @@
 
 namespace sdnn::agents {
 
-/// The mean of each variable, minus and plus 2.5 standard deviations of all that was observed.
+/// Ranges of variables that change with each observation: the mean of all observations so far, plus
+/// and minus 2.5 standard deviations.
 ///
 /// Source: Welford, B. (1962), for the moments; normalized observations of streaming learners, as
 /// in Elsayed, M., Vasan, G., Mahmood, A. R. (2024), with bounded ends.

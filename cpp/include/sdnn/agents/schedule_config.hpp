@@ -85,8 +85,8 @@ bool follows_progress(const Config& config) noexcept {
 
 }  // namespace detail
 
-/// Alpha and epsilon at a progress in [0, 1]; the first values where they do not follow it. Epsilon
-/// is 0 where no policy is epsilon-greedy.
+/// Returns alpha or epsilon at a progress in [0, 1]; without a schedule, the initial value. Epsilon
+/// is 0 if the policy is not epsilon-greedy.
 template <class Config>
 double learning_rate_at(const Config& config, double progress) noexcept {
   if constexpr (requires { config.schedule; }) {
@@ -141,21 +141,21 @@ struct Rates {
   }
 };
 
-/// Base of agents that follow rates. After each change `apply_rates(change)` is called, where
-/// change(agent) makes the same change of another agent.
+/// Base of agents whose learning rate and epsilon may change. Each change calls
+/// `apply_rates(change)`, where change(agent) makes the same change in another agent.
 template <class Agent>
 class WithRates {
  public:
-  /// How much of the learning is done, in [0, 1], where alpha and epsilon go from one value to
-  /// another with it. Throws std::invalid_argument outside.
+  /// Sets the share of the training that is done, in [0, 1], which scheduled alpha and epsilon
+  /// follow. Throws std::invalid_argument outside.
   void set_progress(double progress) {
     core::require_in_range("progress", progress, 0.0, 1.0);
     rates_.progress = progress;
     apply([progress](auto& other) { other.set_progress(progress); });
   }
   double progress() const noexcept { return rates_.progress; }
-  /// Sets alpha or epsilon, whatever the progress, until it is set anew; none: it follows the
-  /// schedule again. Throws std::invalid_argument outside (0, 1] and [0, 1].
+  /// Sets alpha or epsilon to a constant that does not depend on the progress; without a value, it
+  /// follows the schedule again. Throws std::invalid_argument outside (0, 1] and [0, 1].
   void set_learning_rate(std::optional<double> rate) {
     const double tried = rate.value_or(1.0);
     core::require(tried > 0.0 && tried <= 1.0, "learning_rate", "in (0, 1], or None", tried);

@@ -16,11 +16,11 @@
 
 namespace sdnn::agents {
 
-/// pi(a | s) = exp h(s, a) / sum of exp h(s, b), for each dimension of the action apart; h(s, a) is
-/// the inner product of the action's weights and the code of s.
+/// A softmax policy for each dimension of the action: pi(a | s) = exp h(s, a) / sum_b exp h(s, b).
+/// The preference h(s, a) is the inner product of the action's weights and the code of s.
 ///
-/// A preference is an integer in units of 2^-n_unit_bits(); weights have 23 bits. Weights that
-/// would need more are clipped: the preferences of a code reach +-64 at least.
+/// A preference is an integer in units of 2^-n_unit_bits(). Weights are clipped to 23 bits, with
+/// which preferences reach at least +-64.
 class SoftmaxPolicy {
  public:
   using Code = approximators::LinearCode;
@@ -107,8 +107,8 @@ class SoftmaxPolicy {
     }
   }
 
-  /// Returns how far beyond an action the mean of it and its neighbours lies, weighted by their
-  /// probabilities: a multiple of 2^-16 in [-0.5, 0.5] for a most probable action.
+  /// Returns the offset from an action's index to the mean index of it and its neighbours, weighted
+  /// by their probabilities: a multiple of 2^-16, within [-0.5, 0.5] for a most probable action.
   double mean_offset(const Workspace& workspace, std::size_t d, std::size_t action) const {
     const auto dimension = terms(workspace, d);
     const std::int64_t below = action > 0 ? dimension[action - 1].weight : 0;

@@ -19,10 +19,10 @@
 
 namespace sdnn::agents {
 
-/// Acts at random and remembers transitions, which the agent learns when the warm-up is over.
+/// Acts at random and stores transitions, which the agent learns when the warm-up is over.
 ///
-/// A random action is kept for at least k steps with probability 1 / k, so that more is observed
-/// than by trembling around the start. Each environment has an action of its own.
+/// A random action is repeated for at least k steps with probability 1 / k, because single random
+/// steps would stay near the start. Each environment has a separate action.
 class WarmUp {
  public:
   /// A transition as it came: observation and action in the units of the task.
@@ -76,9 +76,9 @@ class WarmUp {
   /// Whether the agent has acted in an episode. Throws std::invalid_argument if there is none.
   bool has_acted(std::size_t environment) const { return episodes_.of(environment).has_acted; }
 
-  /// A random action: what `draw(generator, action)` writes, or one that is kept as long as it is
-  /// allowed. Without `explore` from a stream of its own. Throws std::invalid_argument if there is
-  /// no such environment.
+  /// Returns a random action: a repeated one while it is allowed, else one that
+  /// `draw(generator, action)` writes. Without `explore` it is drawn from a separate stream. Throws
+  /// std::invalid_argument if the environment does not exist.
   template <class Draw, class IsAllowed>
   std::vector<double> act(const Draw& draw, const IsAllowed& is_allowed, bool explore,
                           std::size_t environment) {

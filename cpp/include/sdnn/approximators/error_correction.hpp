@@ -20,8 +20,9 @@ namespace sdnn::approximators {
 
 namespace detail {
 
-/// The distance of a unit from its threshold is h ^ flip + offset: h - 1 if active units are to be
-/// found, -h if inactive ones are, and at least 2^31 for all other units.
+/// Computes the distance of a unit with potential h from its threshold as h ^ flip + offset, an
+/// unsigned number: h - 1 in a search for active units, -h in one for inactive units, and at least
+/// 2^31 for all other units, which are thus never nearest.
 struct DistanceOf {
   explicit DistanceOf(bool active) noexcept : flip(active ? 0 : -1), offset(active ? -1 : 1) {}
 
@@ -85,8 +86,8 @@ SDNN_KERNEL_NEON(std::size_t, nearest_unit,
                  (const std::int32_t* potentials, std::size_t size, const detail::DistanceOf& of),
                  (potentials, size, of))
 
-/// The first of the active or inactive units that is nearest to its threshold; `size` if there is
-/// none.
+/// Returns the first of the active (or inactive) units that are nearest to their threshold; `size`
+/// if there are no such units.
 SDNN_DISPATCH(std::size_t, nearest_unit,
               (const std::int32_t* potentials, std::size_t size, const detail::DistanceOf& of),
               (potentials, size, of))

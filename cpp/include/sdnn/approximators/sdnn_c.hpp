@@ -343,8 +343,8 @@ class SDNNC {
                            [this](std::int32_t count) { return value_of_count(count); });
   }
 
-  /// The hidden layer with weights averaged over the corrections so far; made when it is first
-  /// asked for after a correction.
+  /// Returns the hidden layer with the averaged weights. It is computed when it is first needed
+  /// after a correction.
   std::shared_ptr<const AveragedLayer> averaged_layer() const {
     return averaged_.get([this] {
       return AveragedLayer(*average_, *code_, actions_.n_hidden_units(),
@@ -371,8 +371,8 @@ class SDNNC {
     counts_.mean_error += (error - counts_.mean_error) / n_counted;
   }
 
-  /// Lets `deficit` units more of the action's window fire, or fewer if it is negative, as far as
-  /// there are any; returns whether there are.
+  /// Corrects units so that `deficit` more units of the action's window fire, or fewer if it is
+  /// negative, as far as there are such units. Returns whether there are any.
   bool move_count(const Cached& entry, Workspace& workspace, std::size_t action, int deficit) {
     const std::size_t first = actions_.first_unit(action);
     std::vector<std::uint32_t>& selected = workspace.selected_;

@@ -67,8 +67,8 @@ SDNN_INLINE BasicSinCos<Real> sin_cos(const Real& x) noexcept {
   const Real poison =
       select(a <= kSinCosLimit, Real(0.0), Real(std::numeric_limits<double>::quiet_NaN()));
 
-  // |x| = n pi/2 + r + tail, |r| <= pi/4. n kHalfPi1 and n kHalfPi2 have at most 51 bits, so they
-  // and the first difference are exact.
+  // Reduces |x| to n pi/2 + r + tail with |r| <= pi/4. The products n kHalfPi1 and n kHalfPi2 have
+  // at most 51 bits, so they and the first difference are exact.
   const Real shifted = a * kTwoOverPi + kRounder;
   const Real n = shifted - kRounder;
   const auto quadrant = bits_of(shifted);

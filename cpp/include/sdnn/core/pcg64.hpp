@@ -12,7 +12,8 @@
 
 namespace sdnn::core {
 
-/// PCG64 with a SeedSequence: the numbers of numpy.random.Generator(PCG64(SeedSequence(seeds))).
+/// PCG64 with a SeedSequence; it gives the numbers of NumPy's
+/// Generator(PCG64(SeedSequence(seeds))).
 ///
 /// Only warm-ups use this generator, to reproduce results that were recorded with NumPy; everything
 /// else uses Random.

@@ -41,9 +41,9 @@ struct FileContent {
 /// The number of the only supported format.
 inline constexpr int kFileFormat = 1;
 
-/// The JSON value in `text`. Throws std::runtime_error for a text that is not JSON, has a member of
-/// the outermost object twice, or exceeds the size or depth of headers; it is refused before it is
-/// built.
+/// Parses JSON. Throws std::runtime_error for a text that is not JSON, has a member of the
+/// outermost object twice, or exceeds the size or depth of headers; such a text is refused before
+/// the value is built.
 inline nlohmann::json parse_json(std::string_view text) {
   constexpr int kMostLevels = 32;
   constexpr std::size_t kMostValues = 1'000'000;
@@ -133,8 +133,8 @@ struct Safetensors {
   State tensors;
 };
 
-/// `read(begin, into)` gives the bytes of a file of `size` bytes. All sizes are checked before any
-/// allocation. Source: https://huggingface.co/docs/safetensors, "Format".
+/// Parses a file of `size` bytes, of which `read(begin, into)` reads a part. All sizes are checked
+/// before any allocation. Source: https://huggingface.co/docs/safetensors, "Format".
 template <class Read>
 Safetensors parse_safetensors(std::uint64_t size, const Read& read) {
   std::uint64_t header_size = 0;

@@ -40,8 +40,8 @@ constexpr TensorType tensor_type() noexcept {
   if constexpr (std::is_same_v<T, std::uint64_t>) return TensorType::u64;
 }
 
-/// The name of a type in files and in NumPy, the bytes of a number, and the place of its tensors
-/// among those of other types in a file.
+/// Facts about a type of tensors: its name in files and in NumPy, the bytes of a number, and the
+/// rank by which tensors of different types are sorted in a file.
 struct TensorTypeFacts {
   const char* name;
   const char* dtype;

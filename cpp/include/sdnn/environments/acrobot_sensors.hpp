@@ -64,7 +64,7 @@ inline double height_sensor(double s1, double s2) noexcept {
 /// Independent Gaussian noise on every channel of an observation.
 class SensorNoise {
  public:
-  /// `sigma` is the standard deviation, `edges` has one entry per channel. Throws
+  /// Makes noise with the standard deviation `sigma`; `edges` has an entry per channel. Throws
   /// std::invalid_argument unless sigma is finite and not negative.
   SensorNoise(double sigma, std::vector<SensorEdge> edges, std::uint64_t seed, core::Stream stream)
       : sigma_(sigma), edges_(std::move(edges)), random_(seed, stream) {

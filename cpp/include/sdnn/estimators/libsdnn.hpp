@@ -1,4 +1,4 @@
-/// The random numbers of LIBSDNN, to reproduce the weights of its users or to continue their
+/// The random numbers of LIBSDNN, to reproduce networks that were made with it or to resume their
 /// training.
 #pragma once
 

@@ -101,8 +101,8 @@ class Trainer {
       std::variant<PlainTraining, BlockTraining<std::int16_t>, BlockTraining<std::int32_t>,
                    DualTraining<std::int16_t>, DualTraining<std::int32_t>>;
 
-  /// A presentation increases a unit's norm by at most 1 for each active column and 1 for the
-  /// threshold.
+  /// Computes how many presentations are safe before potentials could overflow: each increases a
+  /// unit's norm by at most 1 for each active column and 1 for the threshold.
   void renew_headroom() {
     const std::int64_t left = std::numeric_limits<std::int32_t>::max() - layer_->check_norms();
     headroom_ = static_cast<std::size_t>(left) / (layer_->code().max_active() + 1);

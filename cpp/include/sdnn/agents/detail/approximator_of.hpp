@@ -23,8 +23,9 @@
 
 namespace sdnn::agents::detail {
 
-/// Whether a linear readout has weights of their own for every state: where these are listed and
-/// not more than other codes have columns, and neither units nor patterns are given.
+/// Whether a linear readout becomes a table with separate weights for every state: if the states
+/// can be listed, are not more than other codes have columns, and neither units nor patterns are
+/// set.
 inline bool is_table(const ControllerConfig& config, const Observations& observations,
                      const std::vector<coding::PatternTable>& tables) noexcept {
   constexpr std::size_t kMostStates = 1536;
@@ -52,8 +53,8 @@ inline std::vector<std::size_t> n_bins_of_inputs(const AnyApproximatorConfig& ap
   return n_bins;
 }
 
-/// The patterns of each input where they do not follow from the approximator, which is filled in:
-/// a table of states, or those that were passed, with one more for missing readings.
+/// Returns the patterns of each input if they do not follow from the approximator's settings: the
+/// one-hot patterns of a table of states, or the passed ones plus a pattern for missing readings.
 inline std::vector<coding::PatternTable> tables_of(const ControllerConfig& config,
                                                    const Observations& observations,
                                                    const AnyApproximatorConfig& approximator,
@@ -73,16 +74,17 @@ inline std::vector<coding::PatternTable> tables_of(const ControllerConfig& confi
       approximator);
 }
 
-/// The most pairs where the number is not set, so that a step of a linear readout stays short: all
-/// pairs of 32 inputs, and a share of them if inputs were chosen and more remain. 0: all.
+/// The default limit of the number of pairs, which bounds the time of a linear readout's step: it
+/// allows all pairs of 32 inputs, and applies only if inputs were selected. 0: no limit.
 inline int most_pairs(const ControllerConfig& config, std::int64_t n_inputs) noexcept {
   constexpr int kMost = 1024;
   const bool is_chosen = is_linear(config.approximator) && config.observation.relevant_only;
   return is_chosen && n_inputs * (n_inputs - 1) > kMost ? kMost : 0;
 }
 
-/// The approximator with the sizes, circles and symbols of a task whose ranges are known. Throws
-/// std::invalid_argument for tables that do not fit its symbols.
+/// Returns the approximator's settings with the numbers of inputs and actions, circular inputs and
+/// symbols of a task whose ranges are known. Throws std::invalid_argument for tables that do not
+/// fit its symbols.
 inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
                                              const Observations& observations,
                                              const HistoryFilter& history, const Actions& actions,

@@ -19,8 +19,8 @@ struct BinaryInput {
   std::vector<bool> is_on = {};
 };
 
-/// Looks at an input's values before and after each step; one row of `n_inputs` values a step. An
-/// input that never changed is binary if it lies at an end of its range.
+/// Returns whether an input is binary, from its values before and after each step; rows have
+/// `n_inputs` values. An input that never changed counts as binary if it is 0 or 1.
 inline BinaryInput binary_input(std::span<const double> states, std::span<const double> next_states,
                                 std::size_t n_inputs, std::size_t input) {
   double low = states[input], high = low;
@@ -49,9 +49,9 @@ struct BinaryGroup {
 
 /// Groups of three or more binary inputs.
 ///
-/// Inputs of which at most one is on at a time form a group, as a one-hot vector does: each joins
-/// the first group whose inputs it never meets. All that belong to no group of three form the last
-/// one. Two binary inputs are no group. Shapes: (n, n_inputs), n > 0.
+/// Inputs of which at most one is on at a time form a group, like a one-hot vector: each input
+/// joins the first group with whose inputs it is never on together. Inputs without a group of at
+/// least three form a common last group, if they are at least three. Shapes: (n, n_inputs), n > 0.
 inline std::vector<BinaryGroup> binary_groups(std::span<const double> states,
                                               std::span<const double> next_states,
                                               std::size_t n_inputs) {
@@ -92,9 +92,10 @@ inline std::vector<BinaryGroup> binary_groups(std::span<const double> states,
   return groups;
 }
 
-/// Measures how much better the next symbol is known from this one and an action than from this one
-/// alone: by the sum, over what is known, of the squared counts of next symbols, in parts of how
-/// often it was known. Action t + shift belongs to symbol t. Shapes: (n,).
+/// Measures how much an action improves the prediction of the next symbol from the present one. A
+/// prediction is measured by the sum, over its conditions, of the squared counts of next symbols
+/// divided by the number of times the condition occurred. Action t + shift belongs to symbol t, so
+/// that shifted series show the improvement by chance. Shapes: (n,).
 inline double steering(const BinaryGroup& group, std::span<const std::uint8_t> actions,
                        std::size_t shift) {
   using Transition = std::tuple<std::uint16_t, std::uint8_t, std::uint16_t>;

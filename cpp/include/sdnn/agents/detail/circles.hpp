@@ -13,8 +13,9 @@
 namespace sdnn::agents::detail {
 
 inline constexpr double kNearCircle = 1e-3;  // single precision and some rounding
-// Around the circle: with noise of a tenth of the range the correlation of squares is -0.65, and
-// that of a radius that moves smoothly is above 0.5.
+// Thresholds for points around a circle. With noise of a tenth of the range, the squares of both
+// coordinates have a correlation of -0.65. A radius that really moves has an autocorrelation above
+// 0.5.
 inline constexpr std::size_t kFewest = 200;  // steps
 inline constexpr double kLargestBias = 0.15, kLeastOpposed = 0.5, kMostAlike = 0.2;
 
@@ -62,8 +63,9 @@ inline bool is_on_circle(const std::vector<double>& cosines, const std::vector<d
   return moves(cosines) && moves(sines);
 }
 
-/// With noise: the squares are opposed, and their sum is 1 on the average and not, as that of a
-/// radius that moves would be, alike before and after a step.
+/// Whether points lie on the unit circle apart from noise: the squares of both coordinates have a
+/// negative correlation, their sum is 1 on average, and the deviations of the sum before and after
+/// a step are uncorrelated, unlike those of a radius that moves.
 inline bool is_around_circle(const std::vector<double>& cosines, const std::vector<double>& sines) {
   const std::size_t n = cosines.size() / 2;
   if (n < kFewest) return false;

@@ -18,8 +18,8 @@ inline std::uint64_t seed_of_dimension(std::uint64_t seed, std::size_t d) noexce
 
 namespace detail {
 
-/// The parts of an agent. Assignment keeps their addresses, which others may hold, where there are
-/// as many parts as before.
+/// The parts of an agent, one per dimension. Assigning the same number of parts keeps their
+/// addresses, to which Python objects may refer.
 template <class Part>
 class Parts : public std::vector<Part> {
  public:

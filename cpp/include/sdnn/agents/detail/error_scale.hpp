@@ -21,8 +21,7 @@ constexpr std::uint64_t square_root(std::uint64_t x) noexcept {
   return root;
 }
 
-/// Divides errors by their root mean square, of all errors until there are 1,024, then of about the
-/// last 1,024.
+/// Divides errors by their running root mean square, over about the last 1,024 errors.
 class ErrorScale {
  public:
   /// Divides an error, an integer in units of 2^exponent, by the root mean square of the errors so

@@ -53,8 +53,8 @@ inline std::pair<double, double> Observations::widened(double low, double high,
   return {low - headroom * width, high + headroom * width};
 }
 
-/// Adaptive ranges leave out rare observations; a variable that hardly moves has its
-/// fixed range.
+/// Returns the range of variable i that fits its observed values. Adaptive ranges leave out the
+/// most extreme twentieth at each end; a variable that hardly moves keeps its fixed range.
 inline std::pair<double, double> Observations::fitted_range(std::vector<double> seen, std::size_t i,
                                                             double headroom) const {
   std::ranges::sort(seen);

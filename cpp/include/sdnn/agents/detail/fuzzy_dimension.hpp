@@ -32,8 +32,8 @@ class FuzzyDimension {
   /// Smaller eligibilities count as 0.
   static constexpr double kForgottenTrace = 1e-3;
 
-  /// Throws std::invalid_argument naming the field that is out of range; std::length_error if what
-  /// fires at once and its traces need more than max_table_bytes.
+  /// Throws std::invalid_argument naming the field that is out of range; std::length_error if the
+  /// rules that fire at once and their traces need more than max_table_bytes.
   FuzzyDimension(approximators::FuzzyRules rules, const FuzzyQLearningConfig& config,
                  std::uint64_t seed)
       : config_(checked(config)),
@@ -74,8 +74,8 @@ class FuzzyDimension {
     episode.traces.clear();
   }
 
-  /// Returns the number to take in `state`, which is remembered. Throws std::invalid_argument for
-  /// another shape than (d,) in [0, 1], and nothing has changed.
+  /// Returns the number to take in `state`, and remembers both for `learn`. Throws
+  /// std::invalid_argument, and changes nothing, unless the state has d numbers in [0, 1].
   double explore(std::span<const double> state, std::size_t environment) {
     Episode& episode = episodes_.of(environment);
     rules_.fire(state, episode.fired);
@@ -89,8 +89,8 @@ class FuzzyDimension {
     return episode.action;
   }
 
-  /// Returns the mean of the best actions of rules that fired; `ties` decides between several best
-  /// ones of a rule.
+  /// Returns the weighted mean of the best actions of the rules that fired; `ties` draws among
+  /// several best actions of a rule.
   double best_of(const approximators::FiredRules& fired, core::Random& ties) const {
     return clamped_mean(fired, [&](std::size_t i) {
       return policy_.best_action(rules_.values(fired.rules[i]), ties);
@@ -105,9 +105,9 @@ class FuzzyDimension {
         fired, [&](std::size_t i) -> double { return best_value(rules_.values(fired.rules[i])); });
   }
 
-  /// Learns the outcome of the last exploring act in the environment: a reward, and the value of
-  /// the next state, which is 0 after the end of an episode. Throws std::overflow_error if a value
-  /// would leave the floats; nothing is learned then.
+  /// Learns the outcome of the last exploring act in the environment from the reward and the value
+  /// of the next state, which is 0 if the episode terminated. Throws std::overflow_error, and
+  /// learns nothing, if a value would exceed the range of floats.
   void learn(double reward, std::span<const double> next_state, bool terminated,
              std::size_t environment, approximators::FiredRules& fired) {
     Episode& episode = episodes_.of(environment);

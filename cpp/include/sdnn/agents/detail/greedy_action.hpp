@@ -8,10 +8,9 @@
 
 namespace sdnn::agents::detail {
 
-/// Moves the greedy action of an agent with a policy, in the units of a box, from the most probable
-/// one to the mean of it and its neighbours: an action may be better between two that are learned.
-/// `read` are the arguments of the agent's `mean_offset` that name the state. Shapes:
-/// (n_dimensions,).
+/// Moves the greedy action of a softmax policy in a box from the most probable action to the mean
+/// of it and its neighbours, because the best action may lie between two of the learned ones.
+/// `read` is the workspace of the state for the agent's `mean_offset`. Shapes: (n_dimensions,).
 template <class Agent, class... Read>
 void move_to_mean(const Actions& actions, const Agent& agent, std::vector<double>& in_units,
                   const std::vector<std::size_t>& indices, const Read&... read) {
@@ -22,8 +21,8 @@ void move_to_mean(const Actions& actions, const Agent& agent, std::vector<double
   }
 }
 
-/// Writes the greedy action of an agent, for the state that was read into its own workspace `read`,
-/// into a controller's workspace.
+/// Writes an agent's greedy action, in the units of the task, into a controller's workspace; `read`
+/// is the agent's workspace with the state.
 template <class Agent, class Action, class Workspace, class Read>
 void take_greedy(const Actions& actions, const Agent& agent, const Action& action,
                  Workspace& workspace, const Read& read) {

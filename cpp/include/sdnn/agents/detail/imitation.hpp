@@ -11,9 +11,9 @@
 
 namespace sdnn::agents::detail {
 
-/// Computes the errors of rows that move the teacher's action and the best other one of each
-/// dimension apart, where the other one is less than `margin` below. All are in units. Shape:
-/// errors (n_rows,).
+/// Computes the errors of rows by which imitation separates actions: in each dimension, if the best
+/// other action is less than `margin` below the teacher's action, both move apart. All numbers are
+/// in the readout's units. Shape: errors (n_rows,).
 inline void separate(const approximators::LinearSDNN& readout,
                      approximators::LinearSDNN::Workspace& read,
                      std::span<const std::size_t> action, std::int64_t margin,

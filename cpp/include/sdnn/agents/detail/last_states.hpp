@@ -30,12 +30,12 @@ struct LastState {
   }
 };
 
-/// In each environment the last observation and its state, which is the next transition's first: it
-/// stays as it was where ranges change, so that traces go on, and it holds what a history
-/// remembers.
+/// The last observation of each environment with its state, in which the next transition starts.
+/// The state is kept and not computed again: changed ranges would make it another state and end the
+/// traces, and a history depends on the earlier observations.
 ///
-/// Greedy episodes may run beside those that are learned: they have a memory apart, which begins
-/// with those that are learned and is forgotten when one of these goes on.
+/// Greedy episodes may run between the steps of a learned episode. They have separate memories,
+/// which start as a copy of the learned episode's and are dropped when that continues.
 class LastStates {
  public:
   /// Room for a state that is being found.
@@ -60,8 +60,8 @@ class LastStates {
     last_.clear();
   }
 
-  /// Finds the state of an observation in which an agent acts; `keep` and `note_action` may follow.
-  /// Throws as Observations::scale.
+  /// Computes the state of an observation in which an agent acts; `keep` and `note_action` may
+  /// follow. Throws std::invalid_argument for an unusable observation.
   void read(const Observations& observations, std::size_t environment,
             std::span<const double> observation, std::span<double> state, bool is_learned) {
     if (!remembers(observations)) return observations.scale(observation, state);
@@ -98,8 +98,8 @@ class LastStates {
     std::ranges::copy(room.next.state, state.begin());
   }
 
-  /// Finds the state in which a transition starts; `follow` may come next. Throws as
-  /// Observations::scale.
+  /// Computes the state in which a transition starts; `follow` may be called next. Throws
+  /// std::invalid_argument for an unusable observation.
   void start(const Observations& observations, std::size_t environment,
              std::span<const double> observation, std::span<double> state) {
     if (!remembers(observations)) return observations.scale(observation, state);
@@ -111,8 +111,9 @@ class LastStates {
     }
     std::ranges::copy(first_.state, state.begin());
   }
-  /// Finds the state in which it ends. Running ranges follow both observations, each once, unless
-  /// the transition is replayed. Throws as Observations::scale.
+  /// Computes the state in which the transition ends. Running ranges are updated by each
+  /// observation once, except in a replay. Throws std::invalid_argument for an unusable
+  /// observation.
   void follow(Observations& observations, std::size_t environment, std::span<const double> action,
               std::span<const double> next_observation, std::span<double> next_state,
               bool is_replayed = false) {
@@ -201,8 +202,9 @@ class LastStates {
     return std::ranges::equal(last.observation, observation, are_alike);
   }
 
-  /// The state of an observation that comes after the last one: of the next step if the agent has
-  /// acted there, else of the same one or, unless they are equal, of an episode that begins.
+  /// Computes the state of an observation after the `last` one. If the agent has acted in the last
+  /// state, it belongs to the next step. Otherwise an equal observation is the same state, and any
+  /// other begins an episode.
   void find(const Observations& observations, const LastState* last,
             std::span<const double> observation, LastState& next, Room& room) const {
     const bool is_same = last != nullptr && is_observation_of(*last, observation);

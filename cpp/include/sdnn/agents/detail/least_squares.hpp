@@ -10,8 +10,8 @@
 
 namespace sdnn::agents::detail {
 
-/// The weights, shape (n_features, n_targets), with the least squared errors of n rows of features
-/// and targets, and a ridge of a millionth. Requires that n > 0 divides the sizes.
+/// Returns the weights, shape (n_features, n_targets), that fit n rows of features to n rows of
+/// targets by least squares, with a ridge of a millionth. Requires that n > 0 divides the sizes.
 ///
 /// Source: the normal equations, by a Cholesky decomposition; Golub, G., Van Loan, C. (1996), 4.2.
 inline std::vector<double> least_squares(const std::vector<double>& features,

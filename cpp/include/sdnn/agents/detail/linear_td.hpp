@@ -15,9 +15,9 @@
 
 namespace sdnn::agents::detail {
 
-/// A readout that learns from episodes. An episode has a trace, a workspace for its present state,
-/// and old_value, the Q_old of true-online TD. All are integers: gamma in units of 2^-15, gamma *
-/// lambda of 2^-13, values in the readout's unit.
+/// Temporal-difference learning of a linear readout. An episode has a trace, a workspace for its
+/// present state, and old_value, the Q_old of true-online TD. All numbers are integers: gamma in
+/// units of 2^-15, gamma * lambda in units of 2^-13, values in the readout's unit.
 template <class Episode>
 class LinearTD {
  public:
@@ -46,8 +46,8 @@ class LinearTD {
     halve_old_values(readout_.fit_unit(reward), episodes);
   }
 
-  /// A value that `compute` returns, in units that are large enough for it; `other` is in units
-  /// too.
+  /// Returns the value that `compute` computes, after doubling the readout's unit until the value
+  /// fits; `other` is a value in units that is converted, too.
   template <class Compute>
   std::int64_t in_range(Episodes<Episode>& episodes, const Compute& compute,
                         std::int64_t* other = nullptr) {
@@ -61,8 +61,8 @@ class LinearTD {
     return value;
   }
 
-  /// Returns the error of the present state's action, and notes Q', `next` in units, for the
-  /// episode's next step. Without `is_dutch` there is no drift.
+  /// Returns the TD error of the present state's action, and stores the next value Q', `next` in
+  /// units, as Q_old of the next step. The term Q - Q_old of true-online TD is 0 unless `is_dutch`.
   Error error_of(Episode& episode, Episodes<Episode>& episodes, Action action, double reward,
                  std::int64_t next, bool is_dutch) {
     const std::int64_t value =
@@ -92,10 +92,10 @@ class LinearTD {
     halve_old_values(readout_.move_rows(episode.present.code(), errors, rate), episodes);
   }
 
-  /// Makes the unit of values smaller where it is larger than it has to be: while no weight needs
-  /// its 8 upper bits; and where recent rewards have so few bits that values 1,024 times those they
-  /// could sum up to would fit. Then weights of larger values are clipped. Sizes of rewards are
-  /// those of RewardScale, the last window's and the recent one.
+  /// Makes the unit of values smaller, and thus more precise, in two cases: if no weight needs its
+  /// 8 upper bits; or if values 1,024 times the largest possible sum of recent rewards would still
+  /// fit, and then larger weights are clipped. The arguments are sizes of RewardScale, that of the
+  /// last window and the recent one.
   void refine_unit(std::int32_t size_in_window, std::int32_t size, Episodes<Episode>& episodes) {
     if (!readout_.exponent()) return;
     const std::int32_t exponent = *readout_.exponent();

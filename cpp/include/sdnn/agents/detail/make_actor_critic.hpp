@@ -20,9 +20,9 @@
 
 namespace sdnn::agents::detail {
 
-/// The thermometers of all inputs but circular ones and symbols. Together they have at most half as
-/// many columns as are not 0 in the code of pairs, but for one word of each input. Throws
-/// std::invalid_argument naming the field that is out of range.
+/// Makes the thermometers of all inputs except circular ones and symbols. Their total number of
+/// columns is at most half of the columns that are not 0 in the code of pairs, except that each
+/// input has at least 64. Throws std::invalid_argument naming the field that is out of range.
 inline approximators::Thermometers thermometers_of(approximators::LinearSDNNConfig config,
                                                    const ActorCriticConfig& learning) {
   if (!learning.thermometers) return {};
@@ -53,8 +53,9 @@ inline double n_rows_of(const std::vector<std::size_t>& n_actions) {
   return std::accumulate(n_actions.begin(), n_actions.end(), 0.0);
 }
 
-/// Makes an actor-critic; action_window and averaging_interval are those of Q(lambda) alone. Throws
-/// as the critic does, and std::length_error for an actor that is too large.
+/// Makes an actor-critic, which ignores action_window and averaging_interval. Throws
+/// std::invalid_argument naming an impossible field, and std::length_error for a critic or an actor
+/// that is too large.
 inline ActorCritic make_actor_critic(approximators::LinearSDNNConfig config,
                                      const ActorCriticConfig& learning,
                                      const std::vector<std::size_t>& n_actions,

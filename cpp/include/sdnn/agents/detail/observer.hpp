@@ -17,13 +17,14 @@
 
 namespace sdnn::agents::detail {
 
-/// Predicts the change of each input, by least squares from the inputs, of angles the cosine and
-/// the sine, and the action; and moves each estimate from its prediction towards what was observed
-/// by a constant part, the gain: the one of eight with the smallest errors of prediction in the
-/// experience, so it is 1 where sensors are exact.
+/// An observer that estimates inputs from noisy observations. It predicts the change of each input
+/// by least squares from the inputs (of angles, cosine and sine) and the action. Each estimate then
+/// moves from its prediction towards the observation by a constant share, the gain: the one of
+/// eight candidates with the smallest prediction errors in the experience, so it is 1 for exact
+/// sensors.
 ///
-/// Estimates are in coordinates of the model: an angle in radians; of other inputs, standard
-/// deviations from the mean.
+/// Estimates are in coordinates of the model: angles in radians, other inputs in standard
+/// deviations from their mean.
 ///
 /// Source: Luenberger, D. (1964), for observers of constant gain; the model is fitted to the
 /// estimates of the model before, as in Ljung, L., Soderstrom, T. (1983), pseudo-linear regression.
@@ -90,8 +91,9 @@ class Observer {
     }
   }
 
-  /// The share of the changes of inputs that their last changes explain beyond the present state
-  /// and action: of the input with the largest one, in the second half of the experience.
+  /// Returns the share of an input's squared changes that the last changes explain in addition to
+  /// the present state and action, for the input with the largest share, in the second half of the
+  /// experience.
   double share_of_last_changes(const RandomExperience& experience) const {
     const Series series = coordinates_of(experience);
     std::vector<double> with, without, changes, features;
@@ -194,8 +196,8 @@ class Observer {
     }
   }
 
-  /// Estimates vary less than what noisy sensors observe: a quarter of their range is added at
-  /// each end.
+  /// Fits the ranges of the estimates, with a quarter of their width added at each end. Estimates
+  /// need ranges of their own because they vary less than noisy observations.
   void find_range(const std::vector<double>& estimates) {
     low_.assign(n_inputs(), kFarthest);
     high_.assign(n_inputs(), -kFarthest);
@@ -296,8 +298,8 @@ class Observer {
     weights_ = least_squares(features, changes, series.size());
   }
 
-  /// Calls `with(estimates)` before every transition, and then `error(i, difference)` for the error
-  /// of each prediction.
+  /// Runs the observer over a series. It calls `with(estimates)` before every transition, then
+  /// `error(i, difference)` with the error of the prediction of each input i.
   void run(const Series& series, const auto& with, const auto& error) const {
     std::vector<double> estimates(n_inputs()), features;
     for (std::size_t t = 0; t < series.size(); ++t) {
@@ -333,8 +335,8 @@ class Observer {
     return sum;
   }
 
-  /// For each input the share of squared changes that features explain, fitted to the first half
-  /// of the transitions, in the second.
+  /// Returns for each input the share of squared changes that a linear model of the features
+  /// explains: it is fitted to the first half of the transitions and tested on the second.
   std::vector<double> explained(const std::vector<double>& features,
                                 const std::vector<double>& changes) const {
     const std::size_t n = changes.size() / n_inputs(), width = features.size() / n, half = n / 2;

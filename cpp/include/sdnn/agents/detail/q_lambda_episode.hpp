@@ -84,8 +84,8 @@ std::int64_t best_sum(const Readout& readout, typename Readout::Workspace& read,
   return total;
 }
 
-/// Returns a value on the way from `first` to `last`, after n_done steps, in whole numbers, halves
-/// up: half of the way is done after n_steps.
+/// Returns the value of a schedule from `first` to `last` after n_done steps, as an integer with
+/// halves rounded up. The share n_done / (n_done + n_steps) of the way to `last` is done.
 inline std::int32_t scheduled(double first, double last, std::int64_t n_done, std::int64_t n_steps,
                               std::int32_t one) noexcept {
   const std::int64_t from = std::lround(first * one);

@@ -49,7 +49,7 @@ constexpr std::int64_t log2_of(std::uint64_t x) noexcept {
 }
 
 /// Computes the softmax of preferences, integers in units of 2^-n_unit_bits, n_unit_bits >= 20.
-/// Shapes: equal; `allowed` may be empty. Requires that one action is allowed.
+/// All spans have equal sizes, but `allowed` may be empty. Requires that an action is allowed.
 inline void softmax(std::span<const std::int64_t> preferences, ActionMask allowed, int n_unit_bits,
                     std::span<SoftmaxTerm> terms) noexcept {
   constexpr std::int64_t kLog2E = 1549082005;  // log2(e), 2^30 for 1

@@ -13,7 +13,7 @@
 namespace sdnn::agents::detail {
 
 /// The indices of the last exploring act in each environment. Where actions are rounded, several
-/// indices are one action, which does not tell them apart.
+/// indices give the same action, so the indices cannot be computed from it.
 class TakenActions {
  public:
   explicit TakenActions(std::size_t n_dimensions) : n_dimensions_(n_dimensions) {}
@@ -25,7 +25,7 @@ class TakenActions {
     taken_[environment].indices = indices;
   }
 
-  /// Writes the indices where it is the action that was explored last.
+  /// Writes the indices and returns true if `action` is that of the last exploring act.
   bool find(std::size_t environment, std::span<const double> action,
             std::vector<std::size_t>& indices) const {
     if (environment >= taken_.size() || !std::ranges::equal(taken_[environment].action, action)) {
@@ -35,7 +35,7 @@ class TakenActions {
     return true;
   }
 
-  /// Forgets environments from this one on: others may come later.
+  /// Forgets the environments from this number on, as other environments may get the numbers later.
   void forget_from(std::size_t environment) {
     if (taken_.size() > environment) taken_.resize(environment);
   }

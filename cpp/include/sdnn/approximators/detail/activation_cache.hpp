@@ -118,7 +118,7 @@ SDNN_KERNEL(void, add_up_distances,
              detail::Distances& distances),
             (cached, bins, distances))
 
-/// The inner potentials of the states that a user of a network evaluated last.
+/// A cache of the inner potentials of the states that were evaluated last with a workspace.
 ///
 /// Most states of a network are equal or near to earlier ones. Two exact identities use this: a
 /// correction of w_i by step * x_SD(s) moves h_i(s') by step * (<x_SD(s), x_SD(s')> + 1), so a

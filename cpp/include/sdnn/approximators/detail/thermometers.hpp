@@ -17,8 +17,8 @@ namespace sdnn::approximators {
 /// thresholds at even distances over its bins.
 ///
 /// The inner product of two such codes falls linearly with the distance of the inputs, from n_units
-/// to -n_units at opposite ends. So a readout of them learns trends over the whole range at once,
-/// as one of the plain inputs does, and no other arithmetic is needed.
+/// to -n_units at opposite ends. A readout of these codes learns trends over the whole range at
+/// once, like a linear function of the inputs, with the integer arithmetic of other codes.
 class Thermometers {
  public:
   /// No columns.

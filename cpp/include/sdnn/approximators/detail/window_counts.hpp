@@ -17,8 +17,8 @@ namespace sdnn::approximators {
 
 namespace detail {
 
-/// Bytes of 0 and 1 times 0x01...01 give prefix sums of the bytes. Loops are vectorized only where
-/// the bytes cannot alias other memory.
+/// The body of count_windows. Multiplying eight bytes of 0 and 1 by 0x01...01 gives their prefix
+/// sums. The bytes are __restrict, because compilers vectorize the loops only without aliasing.
 SDNN_INLINE std::int32_t count_windows_body(std::span<const std::int32_t> potentials,
                                             std::size_t size, std::uint8_t* __restrict firing,
                                             std::int32_t* __restrict of_groups,

@@ -72,8 +72,8 @@ constexpr long long crc_power_of_x(int n) noexcept {
   return _mm_loadu_si128(reinterpret_cast<const __m128i*>(bytes));
 }
 
-/// A block that has the remainder of `block` with n zero bits after it, plus `next`; `powers` are
-/// those of x to n + 32 and n - 32.
+/// Folds a block into a later one: returns a block with the same remainder as `block` followed by n
+/// zero bits, plus `next`. `powers` holds the remainders of x^(n + 32) and x^(n - 32).
 [[SDNN_TARGET_CLMUL]] inline __m128i crc_folded(__m128i block, __m128i powers,
                                                 __m128i next) noexcept {
   return _mm_xor_si128(_mm_xor_si128(_mm_clmulepi64_si128(block, powers, 0x00),
@@ -81,8 +81,8 @@ constexpr long long crc_power_of_x(int n) noexcept {
                        next);
 }
 
-/// The remainder after 64 bytes or more. Source: Gopal, V. et al. (2009). Fast CRC Computation for
-/// Generic Polynomials Using PCLMULQDQ Instruction. Intel.
+/// Returns the CRC of at least 64 bytes, by folding. Source: Gopal, V. et al. (2009). Fast CRC
+/// Computation for Generic Polynomials Using PCLMULQDQ Instruction. Intel.
 [[SDNN_TARGET_CLMUL]] inline std::uint32_t crc_by_folding(std::span<const std::byte> bytes,
                                                           std::uint32_t crc) noexcept {
   constexpr long long k544 = crc_power_of_x(512 + 32), k480 = crc_power_of_x(512 - 32);

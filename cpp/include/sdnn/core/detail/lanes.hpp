@@ -17,8 +17,9 @@
 #if defined(__clang__) || \
     (defined(__GNUC__) && __GNUC__ >= 12)  // the first with shuffles as clang's
 #define SDNN_LANES 1
-/// Lanes wider than the registers of the baseline must not be passed to a call that is not inlined:
-/// a kernel for another instruction set must inline everything that it uses.
+/// SDNN_INLINE forces inlining. A kernel for an instruction set must inline everything that it
+/// uses: other functions are compiled for the baseline, whose registers are too narrow for wide
+/// lanes.
 #define SDNN_INLINE __attribute__((always_inline)) inline
 #define SDNN_INLINE_LAMBDA __attribute__((always_inline))
 #else
@@ -27,8 +28,8 @@
 #define SDNN_INLINE_LAMBDA
 #endif
 
-// Around functions of wide vectors, which are all inlined: GCC's convention for passing them does
-// not matter.
+// These macros enclose functions with wide vectors and silence GCC's warning about the convention
+// for passing them, which has no effect because all are inlined.
 #if SDNN_LANES && !defined(__clang__)
 #define SDNN_WIDE_VECTORS_BEGIN \
   _Pragma("GCC diagnostic push") _Pragma("GCC diagnostic ignored \"-Wpsabi\"")

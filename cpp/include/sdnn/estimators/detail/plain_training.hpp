@@ -16,8 +16,8 @@
 
 namespace sdnn::estimators {
 
-/// The reference for the other forms. It works on the layer's weights directly, with a constant
-/// amount of memory.
+/// The plain form of training, to which the results of other forms are equal. It corrects the
+/// layer's weights directly, with a constant amount of memory.
 class PlainTraining {
  public:
   PlainTraining(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins,
