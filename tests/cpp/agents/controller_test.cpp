@@ -324,7 +324,7 @@ TEST(Controller, KeepsRatesSetDuringItsWarmUp) {
   ASSERT_FALSE(controller.is_warming_up());
   EXPECT_EQ(std::get<QLearning<RBFNetwork>>(controller.agent()).epsilon(), 0.75);
   EXPECT_EQ(controller.progress(), 0.5);
-  EXPECT_EQ(controller.learning_rate(), 0.5);
+  EXPECT_EQ(controller.learning_rate(), 0.5);  // the default, as none was set
 }
 
 TEST(Controller, RefusesInconsistentStates) {

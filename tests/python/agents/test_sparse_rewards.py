@@ -50,7 +50,7 @@ def test_random_actions_are_not_repeated_in_discrete_spaces():
 
 @pytest.mark.parametrize("has_warm_up", [False, True])
 def test_transitions_of_a_log_do_not_count_as_steps_of_a_search(has_warm_up):
-    """After 20 steps of search a reward is read from a log; the search takes 40 more."""
+    # After 20 steps of search a reward is read from a log: the search takes twice as many more.
     agent = new_agent()
     if has_warm_up:
         agent = SDNNQLambda(SQUARE, gym.spaces.Discrete(4), warm_up_steps=300, seed=1)

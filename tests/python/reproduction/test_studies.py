@@ -348,7 +348,7 @@ def test_tables_have_a_row_for_each_variant_in_each_case(mixed):
     assert "| b | +10 [+10, +10] | +10 [+10, +10] |" in text
 
 
-def test_the_table_of_a_study_is_valid_json(mixed):
+def test_the_json_table_of_a_study_has_variants_measures_and_differences(mixed):
     table = json.loads(json.dumps(json_of(mixed), allow_nan=False))
     assert [(r["case"], r["variant"], r["n_end_solved"]) for r in table["results"]] == [
         ("s4", "a", 2), ("s4", "b", 2), ("s4", "c", 2),
