@@ -32,10 +32,10 @@ from sdnn.support.machine import (
 
 Nanoseconds: TypeAlias = NDArray[np.int64]
 Run: TypeAlias = Callable[[int], Nanoseconds]
-"""Makes n repetitions and returns the time of each, shape (n,)."""
+"""A function that makes n repetitions and returns the time of each, shape (n,)."""
 
 SEED = 1
-NETWORK_INPUTS = (4, 6)  # of the paper's smallest and largest network
+NETWORK_INPUTS = (4, 6)  # numbers of inputs of the paper's smallest and largest network
 CASES = ((4, 0.0), (4, 0.02), (6, 0.02))  # inputs and noise of trials whose decisions are timed
 THREADS_CASE = (6, 0.02)
 N_THREADS = 2
@@ -43,17 +43,17 @@ N_CORRECTED = 5
 """Units corrected by the learning steps that are timed: the mean over those that correct any."""
 SELECTIONS_PER_REPETITION = 100
 N_COLD = 2
-"""Repetitions after which a turn has the caches it would have without the others."""
+"""First repetitions of a turn, which refill the caches after other measurements."""
 
 
 @dataclass(frozen=True)
 class Effort:
     """Number and length of measurements."""
 
-    n_rounds: int = 30  # turns that everything compared takes
-    n_repetitions: int = 10  # per turn; N_COLD more go before them and are not counted
+    n_rounds: int = 30  # turns of each measurement that is compared
+    n_repetitions: int = 10  # per turn, after N_COLD more that are not counted
     n_episodes: int = 300  # learning episodes of a short trial
-    n_runs: int = 7  # of the same trial
+    n_runs: int = 7  # repetitions of the same trial
 
 
 QUICK = Effort(n_rounds=3, n_repetitions=2, n_episodes=10, n_runs=2)
@@ -92,7 +92,7 @@ def describe_machine() -> dict[str, object]:
 
 
 def in_turns(runs: Mapping[str, Run], effort: Effort) -> dict[str, Nanoseconds]:
-    """Let everything take turns, and return times by name, (n_rounds * n_repetitions,) each.
+    """Interleave the measurements in turns; return their times, (n_rounds * n_repetitions,) each.
 
     The first repetitions of a turn find cold caches and are dropped.
     """
@@ -129,7 +129,7 @@ def measure_network(n_inputs: int, effort: Effort) -> dict[str, object]:
         "selection": lambda n: parts.time_selections(n, SELECTIONS_PER_REPETITION, N_CORRECTED),
     }
     times = in_turns(runs, effort)
-    # Afterwards, because corrections change the weights.
+    # Corrections come last, because they change the weights.
     corrected = in_turns({"": lambda n: parts.time_corrections(n, N_CORRECTED)}, effort)
     return {
         "n_inputs": n_inputs,
@@ -241,7 +241,7 @@ def _short_trial(n_inputs: int, noise: float, n_episodes: int) -> _core.AcrobotT
 
 
 def at_level(level: str, run: Run) -> Run:
-    """Return a run with another instruction set."""
+    """Return a run that is measured with another instruction set."""
 
     def _run(n: int) -> Nanoseconds:
         before = instruction_set()

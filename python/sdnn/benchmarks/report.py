@@ -12,7 +12,7 @@ Results: TypeAlias = Mapping[str, Any]
 
 QUICK_WARNING = "QUICK LOOK: too few repetitions to mean anything."
 
-_OF_THREADS = (("alone_s", 3), ("together_s", 3), ("speedup", 2))  # with their decimals
+_OF_THREADS = (("alone_s", 3), ("together_s", 3), ("speedup", 2))  # columns and decimals
 
 
 def describe_run(results: Results) -> list[str]:

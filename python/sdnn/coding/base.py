@@ -30,7 +30,7 @@ class Coding(abc.ABC):
 
     @abc.abstractmethod
     def fit(self, column: Column, n_units: int) -> Coding:
-        """Return a copy whose fields that are None are learned from a column.
+        """Return a copy with the fields that are None learned from a column.
 
         Parameters
         ----------
@@ -64,7 +64,7 @@ class Coding(abc.ABC):
         return None
 
     def even_range(self) -> tuple[float, float] | None:
-        """Return the range if all bins are equal parts of it, else None."""
+        """Return the range (low, high) if it is divided into bins of equal width, else None."""
         return None
 
     @abc.abstractmethod
@@ -76,15 +76,15 @@ class Coding(abc.ABC):
         """Return the expected correlations of patterns, shape (n_bins, n_bins)."""
 
 
-def known(value: Value | None) -> Value:
-    """Return an attribute that ``fit`` fills in; ValueError if it is still None."""
+def fitted_field(value: Value | None) -> Value:
+    """Return a field that ``fit`` sets; ValueError if it is None, as the coding is not fitted."""
     if value is None:
         raise ValueError("this coding is not fitted yet: call fit first")
     return value
 
 
 def coding_named(coding: str | Coding) -> Coding:
-    """Return a coding unchanged, or the coding of a name with default values.
+    """Return the coding of a name with default values; a coding is returned unchanged.
 
     >>> coding_named("anchor").n_anchor_patterns
     9
@@ -113,7 +113,7 @@ def to_dict(coding: Coding) -> dict[str, object]:
 
 
 def json_value(value: object) -> object:
-    """Replace codings by descriptions and NumPy numbers by Python's, also in tuples."""
+    """Convert a field to JSON data: codings to descriptions, NumPy's numbers to Python's."""
     if isinstance(value, Coding):
         return to_dict(value)
     if isinstance(value, tuple):
@@ -127,12 +127,12 @@ def from_dict(data: Mapping[str, object]) -> Coding:
     >>> from_dict({"coding": "circular", "period": 24.0}).period
     24.0
     """
-    fields = {name: restored(value) for name, value in data.items() if name != "coding"}
+    fields = {name: from_json_value(value) for name, value in data.items() if name != "coding"}
     return CODINGS[str(data["coding"])](**fields)
 
 
-def restored(value: object) -> object:
-    """Return the value that `json_value` described; lists become tuples."""
+def from_json_value(value: object) -> object:
+    """Convert JSON data back to a field: the inverse of `json_value`. Lists become tuples."""
     if isinstance(value, Mapping):
         return from_dict(value)
-    return tuple(map(restored, value)) if isinstance(value, list | tuple) else value
+    return tuple(map(from_json_value, value)) if isinstance(value, list | tuple) else value

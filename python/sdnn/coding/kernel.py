@@ -39,17 +39,17 @@ ENTRIES_AT_ONCE = 2**18  # entries of a kernel matrix computed at a time
 
 
 def fitted(coding: str | Coding, n_units: int) -> Coding:
-    """Return a fitted coding, on [0, 1] unless it has a range."""
+    """Return a coding that is fitted; without a range, to [0, 1]."""
     whole("n_units", n_units, 2, 2**16)
     coding = coding_named(coding)
     limits = None if coding.learns else coding.ends()
-    # A coding of a constant column has a range of a single point, and can only be fitted to it.
+    # The range of a constant column is a single value: fit to that value.
     is_constant = limits is not None and limits[0] == limits[1]
     return coding.fit(np.array(limits if is_constant else [0.0, 1.0]), n_units)
 
 
 def pattern_key(coding: Coding) -> Hashable:
-    """Return the fields that decide the correlations: all but the range or categories.
+    """Return the fields on which correlations depend: all except the range and categories.
 
     >>> from sdnn.coding import Symbolic
     >>> letters, numbers = Symbolic(categories=("a", "b")), Symbolic(categories=(1, 2))
@@ -144,14 +144,14 @@ class AnalyticKernel:
                 matrix[np.ix_(of_first[rows], of_second)]
                 for matrix, (of_first, of_second) in zip(self._correlations, bins, strict=True)
             )
-            kernel[rows] = self._of_correlations(of_inputs, np.zeros_like(kernel[rows]))
+            kernel[rows] = self._kernel_of_correlations(of_inputs, np.zeros_like(kernel[rows]))
         return kernel
 
-    def _of_correlations(
+    def _kernel_of_correlations(
         self, of_inputs: Iterator[NDArray[np.float64]], total: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the kernel from each input's correlations; ``total`` is a zeroed buffer."""
-        if self._every and len(self.codings) > 2:  # the sum over nu != mu by the sums over all
+        """Combine the correlations of each input to the kernel; ``total`` is a zeroed buffer."""
+        if self._every and len(self.codings) > 2:  # sum over nu != mu = sum over all - diagonal
             squares = np.zeros_like(total)
             for of_input in of_inputs:
                 total += of_input

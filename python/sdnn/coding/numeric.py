@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
-from sdnn.coding.base import Coding, Column, known
+from sdnn.coding.base import Coding, Column, fitted_field
 from sdnn.support.arguments import array_of, one_of, real, require, shown, whole
 
 MAX_BINS = 65535
@@ -25,7 +25,7 @@ Knots = tuple[tuple[float, float], ...]
 
 
 class CoarseCodeWarning(UserWarning):
-    """A length scale leaves few bins: neighbouring patterns differ in at least one unit."""
+    """A length scale gives few bins, because neighbouring patterns differ in at least one unit."""
 
 
 def numbers(column: Column) -> NDArray[np.float64]:
@@ -39,7 +39,7 @@ def numbers(column: Column) -> NDArray[np.float64]:
 
 
 def quantile_knots(column: NDArray[np.float64]) -> Knots:
-    """Return at most `MAX_KNOTS` values with their mean ranks, scaled to [0, 1].
+    """Return at most `MAX_KNOTS` pairs of a value and its mean rank in the column, in [0, 1].
 
     >>> quantile_knots(np.array([1.0, 2.0, 2.0, 50.0]))
     ((1.0, 0.0), (2.0, 0.5), (50.0, 1.0))
@@ -56,7 +56,7 @@ def quantile_knots(column: NDArray[np.float64]) -> Knots:
 
 
 def checked_knots(knots: object, low: float, high: float) -> Knots:
-    """Return knots after checking that they rise from (low, 0) to (high, 1)."""
+    """Return knots as floats; ValueError unless they rise from (low, 0) to (high, 1)."""
     last = 1.0 if low < high else 0.0
     with contextlib.suppress(IndexError, TypeError, ValueError):
         values, levels = array_of("knots", knots).astype(np.float64).T
@@ -75,7 +75,7 @@ def _interpolated(
     """Return the levels of values between knots, linearly interpolated."""
     positions = np.interp(values, knots, levels)
     is_infinite = np.isinf(positions)
-    if is_infinite.any():  # between subnormal knots, where the slope overflows
+    if is_infinite.any():  # the slope between subnormal knots overflows
         positions[is_infinite] = levels[np.searchsorted(knots, values[is_infinite])]
     return positions
 
@@ -92,7 +92,7 @@ class Ranged(Coding):
         return self.low is None or self.high is None
 
     def ends(self) -> tuple[float, float]:
-        return known(self.low), known(self.high)
+        return fitted_field(self.low), fitted_field(self.high)
 
     def even_range(self) -> tuple[float, float] | None:
         return self.ends() if self.knots is None else None
@@ -103,7 +103,7 @@ class Ranged(Coding):
             positions = np.zeros(len(values))
         elif self.knots is not None:
             positions = _interpolated(values, *np.array(self.knots).T)
-        else:  # halves, so that the width of the widest range is still a number
+        else:  # halves, because the width of the widest range would overflow
             positions = (np.clip(values, low, high) / 2 - low / 2) / (high / 2 - low / 2)
         # Bins are equal half-open parts of [0, 1]; the last one includes 1.
         return np.minimum((positions * self.size).astype(np.int32), np.int32(self.size - 1))
@@ -199,14 +199,16 @@ class RandomInverse(Ranged):
 
     @property
     def size(self) -> int:
-        return known(self.n_bins)
+        return fitted_field(self.n_bins)
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
-        return _core.random_inverse_patterns(n_units, self.size, known(self.n_flipped), seed)
+        return _core.random_inverse_patterns(n_units, self.size, fitted_field(self.n_flipped), seed)
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        of_distances = np.power(1 - 4 * known(self.n_flipped) / n_units, np.arange(self.size))
-        # The result is a view, as every diagonal has a single value.
+        of_distances = np.power(
+            1 - 4 * fitted_field(self.n_flipped) / n_units, np.arange(self.size)
+        )
+        # A strided view: all entries of a diagonal are equal.
         both_ways = np.concatenate([of_distances[:0:-1], of_distances])
         return np.lib.stride_tricks.sliding_window_view(both_ways, self.size)[::-1]
 
@@ -233,8 +235,8 @@ class Anchored(Coding):
         )
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        # Within a stretch between two anchors the correlation falls linearly. Between neighbouring
-        # stretches it is the product of both patterns' shares of the anchor between them.
+        # Between the same two anchors the correlation falls linearly with the distance. Patterns on
+        # two sides of an anchor correlate by the product of their shares of that anchor.
         n_stretches, n_portions = self.n_anchor_patterns - 1, self.n_interpolated + 1
         stretch, portion = np.divmod(np.arange(self.size), n_portions)
         share = portion / n_portions
@@ -242,7 +244,7 @@ class Anchored(Coding):
         same = 1 - np.abs(np.subtract.outer(share, share))
         across = np.multiply.outer(1 - share, share)
         if self.is_circular and n_stretches == 1:
-            return np.ones_like(same)  # both ends are the same anchor
+            return np.ones_like(same)  # a circle with a single anchor: all patterns are equal
         is_next = step % n_stretches == 1 if self.is_circular else step == 1
         result: NDArray[np.float64] = (step == 0) * same + is_next * across + is_next.T * across.T
         return result
@@ -309,6 +311,6 @@ class Circular(Anchored):
         if np.isinf(values).any():
             raise ValueError("Input contains infinity, which has no place on a circle")
         turns = (values - self.origin) / self.period
-        # Rounding puts values a period apart into the same bin, even where bins meet.
+        # Rounding puts values a period apart into the same bin, also at the limits of bins.
         positions = np.round((turns - np.floor(turns)) * self.size, 9)
         return positions.astype(np.int32) % np.int32(self.size)

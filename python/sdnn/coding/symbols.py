@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.coding.base import Coding, Column, known
+from sdnn.coding.base import Coding, Column, fitted_field
 from sdnn.coding.numeric import RandomInverse
 from sdnn.support.arguments import array_of, one_of, require, seed_of, shown
 
@@ -48,7 +48,9 @@ class Categorical(Coding):
         if not isinstance(categories, Iterable) or isinstance(categories, str | bytes):
             raise ValueError(f"categories must be a tuple of values, got {shown(categories)}")
         object.__setattr__(self, "categories", tuple(categories))
-        are_hashable = all(isinstance(category, Hashable) for category in known(self.categories))
+        are_hashable = all(
+            isinstance(category, Hashable) for category in fitted_field(self.categories)
+        )
         require(are_hashable, "categories", "be words or numbers", self.categories)
 
     @property
@@ -57,10 +59,12 @@ class Categorical(Coding):
 
     @property
     def size(self) -> int:
-        return len(known(self.categories))
+        return len(fitted_field(self.categories))
 
     def bins(self, column: Column) -> NDArray[np.int32]:
-        numbers = {category: number for number, category in enumerate(known(self.categories))}
+        numbers = {
+            category: number for number, category in enumerate(fitted_field(self.categories))
+        }
         try:
             return np.array([numbers[value] for value in column.tolist()], dtype=np.int32)
         except (KeyError, TypeError):
@@ -70,7 +74,7 @@ class Categorical(Coding):
 
     def knows(self, column: Column) -> NDArray[np.bool_]:
         """Return whether each value is one of the categories."""
-        categories = set(known(self.categories))
+        categories = set(fitted_field(self.categories))
 
         def is_known(value: object) -> bool:
             try:
@@ -193,13 +197,13 @@ class WithMissing(Coding):
     """
 
     name: ClassVar[str] = "with-missing"
-    is_numeric: ClassVar[bool] = False  # so that scikit-learn lets NaN through
+    is_numeric: ClassVar[bool] = False  # makes scikit-learn's checks accept NaN
     base: Coding = dataclasses.field(default_factory=RandomInverse)
     unknown: Literal["missing", "error"] = "missing"
 
     def fit(self, column: Column, n_units: int) -> WithMissing:
         one_of("unknown", self.unknown, ("missing", "error"))
-        learns = self.learns  # first, because it checks that the base is a coding
+        learns = self.learns  # raises first if the base is not a coding
         values = self._values(column[self._is_present(column)])
         if learns and len(values) == 0:
             raise ValueError("every value of an input is missing: there is nothing to learn")
@@ -241,7 +245,7 @@ class WithMissing(Coding):
         return np.array([not is_missing(value) for value in column.tolist()], dtype=bool)
 
     def _values(self, column: Column) -> Column:
-        """Return values in the type of the base coding; numbers must be finite."""
+        """Convert present values to the base coding's type; ValueError for infinite numbers."""
         if not self.base.is_numeric:
             return column
         values = missing_as_nan(column)
@@ -251,5 +255,5 @@ class WithMissing(Coding):
 
 
 def present(coding: Coding) -> Coding:
-    """Return the coding of values that are not missing."""
+    """Return the coding of present values: the base of `WithMissing`, else the coding itself."""
     return coding.base if isinstance(coding, WithMissing) else coding

@@ -12,7 +12,7 @@ from sdnn.support.arguments import has_methods, shown
 
 
 class ActionMasks(gym.Wrapper[Element, Element, Element, Element], gym.utils.RecordConstructorArgs):
-    """Lets agents take the allowed actions only: its ``info["action_mask"]`` has 1 for each.
+    """Adds ``info["action_mask"]``, with 1 for each allowed action, which agents follow.
 
     `sdnn.agents.Agent.train` and `sdnn.agents.evaluate` follow the masks of environments, or
     vectors of such, whose ``metadata["action_masks"]`` is True, as this wrapper makes it.

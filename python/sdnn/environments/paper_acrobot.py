@@ -39,7 +39,7 @@ class GoalSchedule:
         return float(self._core(whole("episode", episode, 1, 2**31 - 1)))
 
     def __reduce__(self) -> tuple[type[GoalSchedule], tuple[GoalScheduleConfig]]:
-        return GoalSchedule, (self.config,)  # environments are copied with their schedule
+        return GoalSchedule, (self.config,)  # for `copy.deepcopy` of environments
 
     def __repr__(self) -> str:
         return f"GoalSchedule({self.config})"
@@ -178,7 +178,7 @@ class PaperAcrobotEnv(AcrobotSwingUpEnv):
 def _config(
     name: str, config_type: type[AnyConfig], value: AnyConfig | Mapping[str, object] | None
 ) -> AnyConfig:
-    """Return settings as they are, or the defaults with those of a mapping."""
+    """Return settings; a mapping has the settings that differ from the defaults."""
     make: Callable[..., AnyConfig] = config_type
     if value is None:
         return make()

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Colour = tuple[int, int, int]
 
 _SIZE = 500  # pixels
-_FINE = 3  # drawn this much larger, then shrunk: smooth edges
+_FINE = 3  # pictures are drawn larger by this factor, then shrunk, for smooth edges
 _PAPER = (250, 249, 246)
 _INK = (52, 58, 70)
 _FAINT = (216, 214, 208)
@@ -30,7 +30,7 @@ _LINK_1 = (44, 92, 138)
 _LINK_2 = (92, 152, 199)
 _TORQUE = (224, 122, 47)
 _FULL_TORQUE_ARC = 1.5 * math.pi  # the arc of the largest torque
-_LONGEST = 0.04  # seconds between pictures that look like one movement
+_LONGEST = 0.04  # longest seconds between pictures of a smooth movement
 
 
 class AcrobotMotion:

@@ -47,7 +47,7 @@ class _Sensors(
         self._float: Any = np.float64 if space.dtype == np.float64 else np.float32
 
     def _read(self, observation: Observation) -> Observation:
-        """Return an observation of the environment; ValueError if it is of another shape."""
+        """Return an observation as an array; ValueError if it has another shape than the space."""
         values = array_of("observation", observation)
         if values.shape != self._space.shape:
             raise ValueError(f"observation must have shape {self._space.shape}, got {values.shape}")
@@ -263,13 +263,13 @@ class AcrobotSensors(_RandomSensors):
 
 
 def _float_of(observation: Observation) -> np.dtype[Any]:
-    """Return the dtype of a float observation, else float32."""
+    """Return the dtype of an observation if it is floating-point, else float32."""
     dtype = observation.dtype
     return dtype if dtype.kind == "f" else np.dtype(np.float32)
 
 
 def _ends(name: str, given: ArrayLike | None, bounds: Array) -> NDArray[np.float64]:
-    """Return the lower or upper ends of all ranges, shape (l,)."""
+    """Return the lower or upper limits of all ranges, as given or from the space, shape (l,)."""
     numbers = bounds if given is None else array_of(name, given)
     ends = with_infinities(numbers.astype(np.float64))
     expected = f"have {bounds.size} numbers, one per observed variable"
@@ -285,9 +285,10 @@ def _ends(name: str, given: ArrayLike | None, bounds: Array) -> NDArray[np.float
 
 
 def in_own_units(env: Env, low: NDArray[np.float64], high: NDArray[np.float64]) -> Env:
-    """Undo `UnitSensors`, whose ranges are ``low`` to ``high``, (l,), above other sensors.
+    """Wrap an environment with `UnitSensors` so that observations have their original units again.
 
-    What these have appended to the observation has the range [-1, 1].
+    The ranges ``low`` to ``high``, (l,), are those of `UnitSensors`; variables that other sensors
+    have appended are scaled to [-1, 1].
     """
     n_redundant = env.observation_space.shape[0] - low.size  # type: ignore[index]
     low = np.append(low, np.full(n_redundant, -1.0))

@@ -14,7 +14,7 @@ from sdnn.support.arguments import require, shown
 
 _MOST_VARIABLES = 2**20
 _LEAST_INTEGER_BYTES = 4
-"""Least size of whole numbers whose limits are those of the type, not of the observations."""
+"""From this size on, bounds equal to the limits of an integer type mean that it is unbounded."""
 
 
 def with_infinities(bounds: Array) -> NDArray[np.float64]:
@@ -37,7 +37,7 @@ def flat_bounds(space: Space) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     n_variables = _n_variables(space)
     if n_variables == 0:
         return np.empty(0), np.empty(0)
-    if n_variables > _MOST_VARIABLES:  # before memory is allocated
+    if n_variables > _MOST_VARIABLES:  # checked before memory is allocated
         raise ValueError(
             f"observation_space must have at most {_MOST_VARIABLES} variables, got {n_variables}"
         )
@@ -57,7 +57,7 @@ def _bounds_of_parts(space: Space) -> Iterator[tuple[Array, Array]]:
     flat: Any = gym.spaces.flatten_space(space)
     low, high = with_infinities(flat.low), with_infinities(flat.high)
     if flat.dtype.kind in "iu" and flat.dtype.itemsize >= _LEAST_INTEGER_BYTES:
-        # Gymnasium writes infinity as the last integer of the type, or up to two before it.
+        # Gymnasium writes infinity as the type's largest integer, minus at most two.
         limits = np.iinfo(flat.dtype)
         high[flat.high >= limits.max - 2] = np.inf
         if limits.min < 0:
@@ -85,7 +85,7 @@ def _no_vector(space: Space) -> str:
 
 
 def wholes_of(space: Space) -> list[tuple[int, int]] | None:
-    """Return the first and the last whole number of each dimension; None for other spaces."""
+    """Return the smallest and largest integer of each dimension; None for spaces of reals."""
     if isinstance(space, gym.spaces.Discrete):
         return [(int(space.start), int(space.start) + int(space.n) - 1)]
     if isinstance(space, gym.spaces.MultiDiscrete):
@@ -97,7 +97,7 @@ def wholes_of(space: Space) -> list[tuple[int, int]] | None:
 
 
 def in_a_line(space: Space) -> str:
-    """Return a space in one line, for a message."""
+    """Return the text of a space in one line, for a message."""
     return " ".join(str(space).split())
 
 
@@ -125,7 +125,7 @@ def space_data(space: Space) -> Data:
 
 
 def _key(key: Any) -> Any:
-    """Return a key of a Dict as JSON has it: a tuple as a list; TypeError for others."""
+    """Convert a key of a Dict to JSON data: tuples become lists; TypeError for other types."""
     if type(key) is tuple:
         return [_key(part) for part in key]
     if type(key) not in (str, int, bool):
@@ -142,16 +142,16 @@ def _key_of(data: object) -> Any:
 
 _TYPES = ["|b1", "|i1", "<i2", "<i4", "<i8", "|u1", "<u2", "<u4", "<u8", "<f2", "<f4", "<f8"]
 _MOST_VALUES = 2**20
-"""Most values of a space in a file: more would only take memory."""
+"""Largest number of values of a space in a file, so that a damaged file takes no memory."""
 
 
 def _finite(values: Array) -> list[Any]:
-    """Return numbers in a row, infinite ones as words: JSON has none."""
+    """Return numbers as a flat list, with infinite ones as texts, which JSON lacks."""
     return [str(x) if np.isinf(x) else x for x in values.reshape(-1).tolist()]
 
 
 def space_of(data: Mapping[str, Any]) -> Space:
-    """Make the space that `space_data` described; ValueError if there is none."""
+    """Make the space that `space_data` described; ValueError if the data is invalid."""
     kind = data.get("dtype", "<f4")
     require(kind in _TYPES, "dtype", "be that of numbers", kind)
     sizes = [data.get("discrete", 0), *np.ravel(data.get("multi_discrete", 0)).tolist()]
@@ -171,7 +171,7 @@ def space_of(data: Mapping[str, Any]) -> Space:
         shape = data["shape"]
         return gym.spaces.Box(low.reshape(shape), high.reshape(shape), dtype=dtype.type)
     if "discrete" in data:
-        options = {} if dtype == np.int64 else {"dtype": dtype.type}  # Gymnasium 1.1 has no dtype
+        options = {} if dtype == np.int64 else {"dtype": dtype.type}  # missing in Gymnasium 1.1
         return gym.spaces.Discrete(data["discrete"], start=data["start"], **options)
     if "multi_discrete" in data:
         n, start = np.array(data["multi_discrete"]), np.array(data["start"])
@@ -194,13 +194,13 @@ _WAYS_OUT = {
     " gymnasium.wrappers.TransformAction(env, lambda action: action, agent.action_space)",
 }
 _ROUNDING = 1e-5
-"""Largest difference of bounds, relative to the variable's larger one, that is rounding."""
+"""Bounds whose relative difference is at most this are equal apart from rounding."""
 _MOST_SHOWN = 3
-"""Most variables with other bounds in a message."""
+"""Largest number of variables that a message lists."""
 
 
 def spaces_of(observed: Observed, actions: Space | None) -> tuple[Space, Space]:
-    """Return the spaces of observations and actions: as given, or those of an environment."""
+    """Return the observation and action space, of an environment if ``observed`` is one."""
     has_spaces = _space_of(observed, "observation_space") is not None
     expected = "be a Gymnasium space, or an environment in its place such as gymnasium.make(id)"
     is_space = isinstance(observed, gym.Space) or (has_spaces and actions is None)
@@ -276,7 +276,7 @@ def require_same_kind(agent: object, env: object) -> None:
 
 
 def _other_bounds(space: Any, other_space: Any, part: str = "") -> Iterator[str]:
-    """Yield the variables whose bounds differ, with both; the spaces fit otherwise."""
+    """Yield a text for each variable whose bounds differ, with both bounds."""
     if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
         keys: Any = space.keys() if isinstance(space, gym.spaces.Dict) else range(len(space))
         for key in keys:
@@ -287,7 +287,7 @@ def _other_bounds(space: Any, other_space: Any, part: str = "") -> Iterator[str]
     types = [np.dtype(box.dtype) for box in (space, other_space)]
     rounding = max(_ROUNDING, *(np.finfo(t).eps for t in types if t.kind == "f"), 0.0)
     size = np.where(np.isfinite(bounds), np.abs(bounds), 0.0).max(axis=1, keepdims=True)
-    with np.errstate(invalid="ignore", over="ignore"):  # of two infinite bounds
+    with np.errstate(invalid="ignore", over="ignore"):  # infinite bounds give NaN
         is_alike = (bounds == other) | (np.abs(bounds - other) <= rounding * size)
     for i in np.flatnonzero(~is_alike.all(axis=1)):
         variable = f"variable {i}{part and f' of {part}'}"

@@ -15,13 +15,13 @@ from sdnn.environments.types import Array, Element, Space
 from sdnn.support.arguments import argument_error, array_of, blamed, require, shown
 
 Inputs: TypeAlias = Literal["all", "relevant"] | Sequence[int]
-"""The inputs of a state; a list of variables is used in any case, beside the relevant ones."""
+"""The inputs of a state: all, or the relevant ones and always those of the list."""
 
 AnglePairs: TypeAlias = Literal["none", "find"] | Sequence[tuple[int, int]]
 """Pairs of variables that are the cosine and the sine of one angle."""
 
 Ranges: TypeAlias = Literal["adaptive", "running"] | tuple[ArrayLike, ArrayLike]
-"""Lowest and highest values, a number for all variables or one for each; or a rule for them."""
+"""Ranges: a rule, or lowest and highest values, a number for all variables or one for each."""
 
 Missing: TypeAlias = Literal["error", "hold", "code"]
 """The treatment of missing readings."""
@@ -68,7 +68,7 @@ class Observations:
         """Return the core's settings for these arguments of `sdnn.agents.Agent`."""
         rule = ranges if isinstance(ranges, str) and ranges in ("adaptive", "running") else None
         low, high = self._low, self._high
-        if rule == "running":  # bounds have no effect; those of a constant are none
+        if rule == "running":  # bounds have no effect, and equal bounds would be refused
             is_range = low < high
             low, high = (np.where(is_range, bound, np.nan) for bound in (low, high))
         low, high = _ranges(low, high, None if rule else ranges)
@@ -96,7 +96,7 @@ class Observations:
         )
 
     def vector(self, name: str, observation: Element) -> Array:
-        """Return the variables of an observation, in any shape; ValueError if it is none.
+        """Return the variables of an observation as an array; ValueError if it does not fit.
 
         Masked ones are NaN.
         """
@@ -114,7 +114,7 @@ class Observations:
         return values
 
     def rows(self, name: str, observations: Any) -> NDArray[np.float64]:
-        """Return a copy of several ones, shape (n, n_variables); ValueError as of `vector`."""
+        """Copy several observations, (n, n_variables); ValueError if one of them does not fit."""
         is_array = type(observations) is np.ndarray and observations.dtype.kind in "fiub"
         if is_array and observations.shape[1:] == self._shape:
             rows: NDArray[np.float64] = observations.astype(np.float64)
@@ -148,9 +148,10 @@ def _readings(name: str, values: Any, kinds: str = "fiub") -> Array:
 
 
 def _flat_parts(space: Space, observation: Element) -> Iterator[Array]:
-    """Yield the variables of each part as Gymnasium flattens them; of missing symbols NaN.
+    """Yield the variables of each part of an observation as Gymnasium flattens them.
 
-    ValueError, or what looking raises, for an observation that is not of the space.
+    Missing symbols become NaN. An observation that is not of the space raises ValueError, or
+    another error of the attempt to read it.
     """
     if isinstance(space, gym.spaces.Dict):
         for key, part in space.spaces.items():
@@ -198,7 +199,7 @@ def _symbols_of(space: Space, first: int = 0) -> Iterator[tuple[int, int]]:
 def _ranges(
     low: NDArray[np.float64], high: NDArray[np.float64], ranges: Any
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the range of each variable, as given or from the bounds; NaN: not known."""
+    """Return the range of each variable, from the argument or the bounds; NaN if unknown."""
     if ranges is not None:
         is_pair = isinstance(ranges, Sequence) and not isinstance(ranges, str) and len(ranges) == 2
         require(is_pair, "observation_range", "be (low, high), 'adaptive' or 'running'", ranges)
@@ -283,11 +284,11 @@ class Actions:
         )
 
     def elements(self, numbers: NDArray[np.float64]) -> Array:
-        """Make the elements of the space that have these numbers, one of each row."""
+        """Make an element of the space from each row of numbers."""
         return numbers.astype(self._dtype).reshape(self._rows)
 
     def hold(self, rows: Array) -> bool:
-        """Return whether all rows of an array are elements: environments may not check them."""
+        """Return whether all rows of an array are elements of the space."""
         if rows.ndim == 0 or rows.shape[1:] != self._rows[1:]:
             return False
         is_alike = rows.dtype.kind == self._dtype.kind or np.can_cast(rows.dtype, self._dtype)
@@ -296,7 +297,7 @@ class Actions:
         return len(rows) == 0 or (is_alike and bool(are_within.all()))
 
     def mask(self, name: str, mask: Any) -> NDArray[np.uint8] | None:
-        """Return which actions are allowed, 1 or 0 for each; ValueError if it is no mask.
+        """Convert a mask to a flat array, with 1 for allowed actions; ValueError if it is none.
 
         One array of all actions, or one for each dimension; None: all actions are allowed.
         """
@@ -316,7 +317,7 @@ class Actions:
         return allowed.astype(np.uint8)
 
     def numbers(self, action: Element) -> Array:
-        """Return the numbers of an element, in any shape; ValueError if they are none."""
+        """Return the numbers of an element as an array; ValueError if it has other values."""
         if type(action) is np.ndarray and action.dtype is self._dtype:
             return action
         try:
@@ -326,7 +327,7 @@ class Actions:
 
 
 def space_of_error(error: ValueError, observations: Observations, actions: Actions) -> str:
-    """Name the space that an agent's size follows from, if the error is about one."""
+    """Return a remark that names the space from which the size in an error follows, or ""."""
     reasons = {"n_inputs": "n_inputs follows from observation_space"}
     if observations.n_variables > _MANY_VARIABLES:
         reasons["n_inputs"] += (

@@ -125,9 +125,9 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[Array, ArrayLike, Array]):
     def step(
         self, actions: ArrayLike
     ) -> tuple[Array, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Data]:
-        """Hold torques, shape (num_envs, 1), for one decision interval; reset what has ended.
+        """Hold torques, shape (num_envs, 1), for one decision interval; reset ended environments.
 
-        Raises ValueError unless each action is in [-1, 1]; then nothing has moved.
+        Raises ValueError, and moves nothing, unless each action is in [-1, 1].
         """
         if not self._was_reset.all():
             raise gym.error.ResetNeeded("call reset before step")
@@ -198,7 +198,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[Array, ArrayLike, Array]):
         return self._batch.observations().astype(self._dtype)
 
     def _infos(self, mask: NDArray[np.bool_]) -> Data:
-        """Return arrays over the environments, 0 outside the mask, and the masks."""
+        """Return infos as arrays over environments, 0 outside the mask, and Gymnasium's masks."""
         infos: Data = {
             "state": self._batch.states(),
             "tip_height": self._batch.tip_heights(),

@@ -16,8 +16,8 @@ Pair = tuple[int, int]
 class Code:
     """The paired code of a network: groups of columns by the input that modifies them.
 
-    Two groups that an input modifies are taken as half their sum and half their difference, of
-    which one is 0: see cpp/include/sdnn/coding/state_code.hpp.
+    Two groups that an input modifies are stored as half their sum and half their difference, one
+    of which is 0: see cpp/include/sdnn/coding/state_code.hpp.
     """
 
     def __init__(self, network: _core.SDNNC | _core.LinearSDNN, n_inputs: int) -> None:
@@ -28,7 +28,7 @@ class Code:
         self.groups, self.n_double = self._layout()
 
     def _layout(self) -> tuple[list[Pair], int]:
-        """Return the groups (mu, nu) in the order of the code, and how many are taken in twos."""
+        """Return the groups (mu, nu) in the order of the code, and the number of paired groups."""
         pairs: Sequence[Pair] = self.network.pairs
         n_partners = len(pairs) // self.n_inputs
         ranks, n_before = [], dict[int, int]()
@@ -48,23 +48,23 @@ class Code:
 
     @property
     def units(self) -> list[NDArray[np.intp]]:
-        """The modified units of each group, in the order of those that modify them."""
+        """The modified units of each group, in the order of their modifying units."""
         return [np.argsort(self.network.permutation(*group)) for group in self.groups]
 
     @property
     def most_columns(self) -> int:
-        """Number of columns that a state can have at most."""
+        """Largest number of columns that are not 0 for a state."""
         n_ones = [int((self.network.table(i) > 0).sum(axis=1).max()) for i in range(self.n_inputs)]
         modifiers = [*self.groups[: self.n_double : 2], *self.groups[self.n_double :]]
         return sum(n_ones[nu] for _, nu in modifiers)
 
     @property
     def column_bytes(self) -> int:
-        """Bytes of the number of a column."""
+        """Bytes of an integer that holds the number of any column."""
         return 2 if self.n_columns <= 2**16 else 4
 
     def defines(self) -> dict[str, int]:
-        """Return the sizes of a code."""
+        """Return the macros with the sizes of the code."""
         return {
             "N_PATTERN_UNITS": self.m,
             "N_GROUPS": len(self.groups),
@@ -73,7 +73,7 @@ class Code:
         }
 
     def add_tables(self, tables: Tables, ending: str = "") -> list[str]:
-        """Add the constants that the code is made of; return their names without the prefix."""
+        """Add the tables that the header computes codes from; return their names without prefix."""
         inputs = range(self.n_inputs)
         patterns = [
             np.packbits(self.network.table(i) > 0, axis=1, bitorder="little") for i in inputs
@@ -89,7 +89,7 @@ class Code:
         return [f"{part}{ending}" for part in parts]
 
     def paired(self, weights: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Arrange weights (n, D) of the paper's order as those of the columns."""
+        """Convert weights (n, D) from the paper's order to the paired columns."""
         rows = weights[:, self._order()].reshape(len(weights), len(self.groups), self.m)
         first, second = rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2]
         rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2] = (
@@ -99,7 +99,7 @@ class Code:
         return rows.reshape(len(weights), -1)
 
     def unpaired(self, columns: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Undo `paired`; ValueError for columns that are no sums and differences."""
+        """Convert paired columns back to weights; ValueError for impossible sums or differences."""
         rows = columns.reshape(len(columns), len(self.groups), self.m).copy()
         first, second = rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2]
         if ((first ^ second) & 1).any():
@@ -113,7 +113,7 @@ class Code:
         return weights
 
     def _order(self) -> NDArray[np.intp]:
-        """Return the place of each column in the paper's order."""
+        """Return the index of each column in the paper's order."""
         places = {pair: g for g, pair in enumerate(self.network.pairs)}
         starts = [places[group] * self.m for group in self.groups]
         return np.concatenate(

@@ -109,10 +109,10 @@ def c_header(
 
 
 def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool) -> Any:
-    """Return the writer of an agent's header, a `Learner` if it learns; TypeError for others.
+    """Return the writer of an agent's header, a `Learner` if it learns.
 
-    ValueError for an agent that takes missing readings, has a history, or would learn with running
-    ranges.
+    TypeError for agents without a header. ValueError for an agent that accepts missing readings,
+    has a history, or would learn with running ranges.
     """
     expected = "have missing='error': a C header has no other treatment of missing readings"
     require(getattr(agent, "missing", "error") == "error", "agent", expected, agent)

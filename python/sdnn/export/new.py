@@ -86,20 +86,20 @@ def new_agent(
     def made(size: NewConfig) -> NewAgent:
         return agent_type(observation_space, action_space, **{**settings, "approximator": size})
 
-    def needed(size: NewConfig) -> int:
-        return c_header(made(size), "agent", learning=True).ram_bytes
+    def ram_bytes_of(size: NewConfig) -> int:
+        return c_header(make_agent(size), "agent", learning=True).ram_bytes
 
     sizes = _sizes(config)
     if len(sizes) == 1 and ram_bytes is None:
-        return made(config)
-    n_fitting = bisect_right(sizes, most, key=needed)
+        return make_agent(config)
+    n_fitting = bisect_right(sizes, most, key=ram_bytes_of)
     if n_fitting == 0:
         raise argument_error(
             "ram_bytes",
-            f"must be at least {needed(sizes[0])} for these spaces, got {most}: with fewer"
+            f"must be at least {ram_bytes_of(sizes[0])} for these spaces, got {most}: with fewer"
             " variables, actions, units or max_pairs an agent needs less",
         )
-    return made(sizes[n_fitting - 1])
+    return make_agent(sizes[n_fitting - 1])
 
 
 def new_settings(kind: str) -> Data:
@@ -113,12 +113,12 @@ def new_settings(kind: str) -> Data:
 
 
 def _sizes(config: NewConfig) -> Sequence[NewConfig]:
-    """Return the sizes to choose from, the smallest first."""
+    """Return candidate settings in ascending order of their memory."""
     if isinstance(config, LinearSDNNConfig):
         if config.n_pattern_units > 0:
             return [config]
         return [replace(config, n_pattern_units=n) for n in range(32, 769, 16)]
-    # Long patterns are worth more than many hidden units.
+    # Longer patterns improve learning more than further hidden units.
     parts = [*((m, 1) for m in range(3, 8)), *((8, n) for n in range(1, 13))]
     return [
         replace(

@@ -29,7 +29,7 @@ class QLambdaWriter(LinearWriter):
     agent: SDNNQLambda
 
     def tolerance(self) -> tuple[int, int]:
-        """Return the tolerance of ties as a number below 2^62, times 2 to a power."""
+        """Return the tolerance of ties as (number, exponent): the number is below 2^62."""
         fraction, exponent = math.frexp(self.agent.learning.tie_tolerance)
         return int(fraction * _MOST_TOLERANCE), exponent - 62
 
@@ -81,13 +81,13 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
         return self.agent.approximator.averaging_interval > 0
 
     def remembered(self, state: Data) -> Data:
-        """Return the fields that are not the same in the core's state."""
+        """Return the fields that are not in the core's state, or differ there."""
         columns = self.columns()
         rows = {name: state[name][:, columns] for name in _WEIGHTS if name in state}
         return {"action_value.exponent": NONE, **state, **rows}
 
     def recall(self, image: Array, state: Data) -> None:
-        """Put the fields of an image into the core's state; the episode before is over."""
+        """Write the fields of an image into the core's state, in which a new episode begins."""
         for name in ("waits", "reward", "old_value"):
             state[name] = np.zeros_like(state[name])
         state["trace.values"] = state["trace.values"][:0]

@@ -24,8 +24,8 @@ from sdnn.export.writer import (
 )
 from sdnn.support.arguments import argument_error, whole
 
-MOST_UNITS = 65535  # whose numbers fit 16 bits
-_BYTES_OF_NETWORK = 40  # a struct of eight pointers and two sizes, where pointers have 32 bits
+MOST_UNITS = 65535  # largest number of units: their indices have 16 bits
+_BYTES_OF_NETWORK = 40  # a struct of eight pointers and two sizes, 32 bits each
 
 
 class SDNNCWriter(Writer[_core.SDNNC]):
@@ -42,13 +42,13 @@ class SDNNCWriter(Writer[_core.SDNNC]):
         require_few_weights(self.n_dimensions * n_units * n_columns, "n_hidden_units")
 
     def units(self, network: _core.SDNNC) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Return the hidden units that are in a window, and where among them the windows begin."""
+        """Return the hidden units of all windows, and the position of each window's first unit."""
         first = network.first_units().astype(np.intp)
         used = np.unique(first[:, None] + np.arange(self.agent.approximator.n_active_units))
         return used, np.searchsorted(used, first)
 
     def describe(self, n_units: str) -> str:
-        """Return what the header is of; ``n_units`` are the hidden units in use."""
+        """Describe the network in the header; ``n_units`` is the text of its hidden units."""
         return (
             f"{self.n_inputs} inputs, {self.agent.approximator.n_pattern_units} units per"
             f" pattern, {n_units} hidden units in use, {' x '.join(map(str, self.n_actions()))}"
@@ -118,7 +118,7 @@ class SDNNCWriter(Writer[_core.SDNNC]):
 _WEIGHTS_STREAM = 3  # see cpp/include/sdnn/core/random.hpp
 _MOST_RETURNS = 256
 MOST_WEIGHT = 127
-_LARGEST = 2.0**100  # of real numbers
+_LARGEST = 2.0**100  # largest magnitude of real settings
 _WORD = 2**64 - 1
 _ROUNDING = {"away": "AWAY", "half_up": "HALF_UP", "random": "AT_RANDOM"}
 
@@ -149,11 +149,11 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         self._check_values()
         self.n_words = self.n_units // 4 * self.code.n_columns
         self.horizon = int(2.0 / max(1.0 - agent.learning.discount, 0.004))
-        """Rewards until a return is known; see cpp/include/sdnn/agents/return_range.hpp."""
+        """Number of rewards of a return; see cpp/include/sdnn/agents/return_range.hpp."""
         self.adapts = agent.learning.value_range == "adaptive"
 
     def _check_settings(self) -> None:
-        """Raise ValueError for settings that the header cannot have."""
+        """Raise ValueError for settings that the header does not support."""
         learning, sizes = self.agent.learning, self.agent.approximator
         has_finals = learning.final_learning_rate is not None or learning.final_epsilon is not None
         ranges = {"weight_limit": f"1 to {MOST_WEIGHT}"}
@@ -173,7 +173,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
                 )
 
     def _check_values(self) -> None:
-        """Raise ValueError for values that the header could not tell apart."""
+        """Raise ValueError if the header could not distinguish values of neighbouring counts."""
         network = self.network
         low, high = network.output_range
         steps = np.diff(network.output_values()[network.u_low : network.u_high + 1])
@@ -195,7 +195,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         return columns
 
     def thresholds(self) -> NDArray[np.int32]:
-        """Return the thresholds of the used units, filled up with zeros."""
+        """Return the thresholds of the used units, padded with zeros."""
         thresholds: NDArray[np.int32] = self.network.thresholds()[self.used]
         return np.pad(thresholds, (0, self.n_units - self.used.size))
 
@@ -223,7 +223,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         ]
 
     def remembered(self, state: Data) -> Data:
-        """Return the fields that are not the same in the core's state."""
+        """Return the fields that are not in the core's state, or differ there."""
         of_range: Data = {}
         if self.adapts:
             rewards, returns = self._rewards(state), state["range.returns"]
@@ -241,7 +241,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         }
 
     def recall(self, image: Array, state: Data) -> None:
-        """Put the fields of an image into the core's state; the episode before is over."""
+        """Write the fields of an image into the core's state, in which a new episode begins."""
         fraction_bits = whole("fraction_bits", int(image["fraction_bits"]), 0, MOST_FRACTION_BITS)
         state["action_value.output_range"] = image["action_value.output_range"].copy()
         if self.adapts:
@@ -264,7 +264,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
             part[self.used] = values[: self.used.size]
 
     def restore(self, whole: bytes) -> None:
-        """Give the agent the state of an image, whole and of this agent."""
+        """Set the agent's state from an image; ValueError if it is damaged or another agent's."""
         super().restore(whole)
         self.agent.progress = float(np.frombuffer(whole, self.layout(), 1)["progress"][0])
 
@@ -274,7 +274,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         return clipped
 
     def _is_new(self) -> bool:
-        """Whether weights and thresholds are those that the header can draw."""
+        """Whether weights and thresholds are the initial ones, which the header draws by itself."""
         sizes, network = self.agent.approximator, self.network
         if sizes.initial_weights != "ternary":
             return False
@@ -284,7 +284,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         )
 
     def _rates(self, state: Data) -> dict[str, str]:
-        """Return how alpha and epsilon follow the progress, those that do."""
+        """Return the C code by which scheduled rates, alpha and epsilon, follow the progress."""
         learning, defines = self.agent.learning, dict[str, str]()
         fractions = {"learning_rate": 1.0, "epsilon": learning.exploration_fraction}
         for macro, name in (("RATE", "learning_rate"), ("EPSILON", "epsilon")):
@@ -348,7 +348,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         }
 
     def _add_weights(self, tables: Tables, is_new: bool) -> dict[str, int]:
-        """Add the weights, or ranges of used units where the agent draws weights."""
+        """Add the weights, or the ranges of used units if the header draws initial weights."""
         if not is_new:
             words = weight_words(self.columns())[0]
             tables.add("uint32_t", "first_weights", words)
@@ -372,7 +372,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         }
 
     def _ram_bytes(self) -> int:
-        """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
+        """Return the size of the C struct, with numbers aligned to their sizes."""
         n_steps, code = self.agent.learning.n_steps, self.code
         columns = -(-code.column_bytes * code.most_columns // 4) * 4
         state_bytes = 8 + 4 * self.n_inputs + columns + 4 + 4 * self.n_units
@@ -384,18 +384,18 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         return int(-(-n_bytes // 8) * 8)
 
     def _stack_bytes(self) -> int:
-        """Return the bytes of the largest arrays that are there at one time."""
+        """Return the bytes of the largest arrays that are on the stack at the same time."""
         changes = 2 * self.code.column_bytes * self.code.most_columns + self.code.n_columns
         return int(changes + 4 * self.network.n_actions + 8 * self.n_inputs)
 
 
 def _real(value: Any) -> str:
-    """Write a number as its bits."""
+    """Write a number as a C macro with its bits."""
     return f"UINT64_C(0x{np.float64(value).view(np.uint64):x})"
 
 
 def _seeded(seed: int, stream: int) -> list[int]:
-    """Return the words that a random stream begins with; see cpp/include/sdnn/core/random.hpp."""
+    """Return the initial state of a random stream; see cpp/include/sdnn/core/random.hpp."""
     mixed = seed
 
     def split_mix() -> int:

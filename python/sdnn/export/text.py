@@ -24,7 +24,7 @@ _INCLUDE = re.compile(r'#include "(\w+\.h)"\n')
 
 
 def c_source(file: str, name: str) -> str:
-    """Return a C file and those that it includes, with ``name`` instead of the prefix sdnn."""
+    """Return a C file with its includes inserted, and the prefix sdnn replaced by ``name``."""
     text = re.sub(r"\bsdnn_", f"{name}_", _with_includes(file, set()))
     return re.sub(r"\bSDNN_", f"{name.upper()}_", text)
 
@@ -68,7 +68,7 @@ class Tables:
         form = {"uint64_t": "UINT64_C({})"}.get(kind, "{}")
         if kind == "uint32_t" and "weights" in name:
             form = "0x{:x}"
-        stored = values if values.size else np.zeros(1, np.int64)  # C has no empty tables
+        stored = values if values.size else np.zeros(1, np.int64)  # C has no empty arrays
         self.lines += table_lines(f"static const {kind} {self.prefix}_{name}", stored, form)
 
 
@@ -122,11 +122,11 @@ def weight_words(weights: NDArray[np.int32]) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Input:
-    """An input of the network, and the observed numbers that it is made of."""
+    """An input of the network, and the observed variables from which it is computed."""
 
     kind: str  # "variable", "circular", "angle" or "symbol"
-    at: Sequence[int]  # numbers of the observation
-    low: float  # the range of a variable or a circular one
+    at: Sequence[int]  # indices of observed variables
+    low: float  # lower limit of the range, if it has one
     high: float
     n_bins: int
 
@@ -146,7 +146,7 @@ class Input:
 
 
 def conversions(inputs: Sequence[Input], name: str, fraction_bits: int) -> tuple[Tables, list[str]]:
-    """Return the tables that find the bins of observations, and a macro call for each input.
+    """Return tables and macro calls, one per input, that compute the bins of observations in C.
 
     Inputs of the same type and range share a table. The macros are those of sdnn_observation.h.
     """
@@ -180,13 +180,13 @@ def conversions(inputs: Sequence[Input], name: str, fraction_bits: int) -> tuple
 
 
 def _fixed_bounds(low: float, high: float, n_bins: int, fraction_bits: int) -> Array:
-    """Find the least observations in bins 1, 2, ... n_bins - 1, integers times 2^-fraction_bits.
+    """Return the smallest fixed-point observations in bins 1, 2, ... n_bins - 1.
 
-    Bins are calculated as for observations, rounding included.
+    They are found by bisection with the agent's own bins, so that rounding is the same.
     """
     wanted = np.arange(1, n_bins)
-    below = np.full(wanted.shape, -(2**31) - 1)  # not in the bin, or not among the readings
-    least = np.full(wanted.shape, 2**31 - 1)  # in the bin: ranges end before
+    below = np.full(wanted.shape, -(2**31) - 1)  # lower limits of the bisection, not in the bin
+    least = np.full(wanted.shape, 2**31 - 1)  # upper limits, in the bin or a later one
     while (least - below > 1).any():
         middle = (below + least) // 2
         unit = np.clip((middle / 2.0**fraction_bits - low) / (high - low), 0.0, 1.0)
@@ -196,9 +196,9 @@ def _fixed_bounds(low: float, high: float, n_bins: int, fraction_bits: int) -> A
 
 
 def _turns(low: float, high: float, fraction_bits: int) -> tuple[int, int]:
-    """Return an observation's unit as a part of a turn, and the place of 0 in it; times 2^64.
+    """Return the unit and the offset of a circular observation in turns, times 2^64.
 
-    Rounding must not lead from the beginning of a bin into the one before: 2^31 are added.
+    The offset has 2^31 added, so that rounding never moves the start of a bin into the one before.
     """
     width = Fraction(high) - Fraction(low)
     rate = round(2**64 / (width * 2**fraction_bits)) % 2**64
@@ -206,7 +206,7 @@ def _turns(low: float, high: float, fraction_bits: int) -> tuple[int, int]:
 
 
 def _directions(n_bins: int) -> Array:
-    """Return cosine and sine of the angles where bins 1, 2, ... begin, shape (n_bins - 1, 2)."""
+    """Return cosine and sine of the angles at which bins 1, 2, ... begin, (n_bins - 1, 2)."""
     angles = [math.pi * (2 * b - n_bins) / n_bins for b in range(1, n_bins)]
     ends = np.array([(math.cos(angle), math.sin(angle)) for angle in angles])
     rounded: Array = np.round(ends.reshape(-1, 2) * 2**_DIRECTION_BITS).astype(np.int64)

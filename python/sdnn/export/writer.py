@@ -33,7 +33,7 @@ from sdnn.support.arguments import argument_error, whole
 _DEFAULT_FRACTION_BITS = 16
 MOST_FRACTION_BITS = 30
 NONE = -(2**31)
-"""A number in an image that stands for none."""
+"""Number in an image that stands for a missing value."""
 SCALE = "reward_scale"
 SCALE_FIELDS = [
     (f"{SCALE}.n_rewards", "<u8"),
@@ -42,7 +42,7 @@ SCALE_FIELDS = [
     (f"{SCALE}.headroom", "<i4"),
 ]
 _TIES = {"lowest": "LOWEST", "middle": "MIDDLE", "uniform": "DRAWN"}
-MOST_WEIGHTS = 2**26  # some hundred megabytes of text
+MOST_WEIGHTS = 2**26  # larger headers would have hundreds of megabytes
 Field: TypeAlias = tuple[str, str] | tuple[str, str, tuple[int, ...]]
 """Name and type of a field of an image, and its shape."""
 Network = TypeVar("Network", bound=_core.SDNNC | _core.LinearSDNN)
@@ -72,7 +72,7 @@ class Writer(ABC, Generic[Network]):
 
     def __init__(self, agent: ValueAgent[Any, Any], name: str, fraction_bits: int | None) -> None:
         self.agent, self.name = agent, name
-        self.networks: list[Network] = agent.networks  # RuntimeError while warming up
+        self.networks: list[Network] = agent.networks  # raises RuntimeError in a warm-up
         self.n_dimensions = agent.n_dimensions
         self.is_vector = self.n_dimensions > 1
         self.box = self._box()
@@ -151,7 +151,7 @@ class Writer(ABC, Generic[Network]):
         return [len(self.agent.actions_of(d)) for d in range(self.n_dimensions)]
 
     def fingerprint(self) -> int:
-        """Return a number that agents of other settings or another seed do not have."""
+        """Return a hash of the agent's settings and seed, by which images are recognized."""
         learning, approximator = self.agent.learning, self.agent.approximator
         about = [
             str(approximator),
@@ -175,7 +175,7 @@ class Writer(ABC, Generic[Network]):
         tables: Tables,
         **sizes: int,
     ) -> CHeader:
-        """Write settings and tables before the C code of a file, with this agent's names.
+        """Return the header: settings, tables, and the C code of ``file`` with the agent's prefix.
 
         ``needs`` are lines about memory, and ``sizes`` the other attributes of the `CHeader`.
         """
@@ -232,7 +232,7 @@ class Writer(ABC, Generic[Network]):
         )
 
     def _scaling(self) -> list[str]:
-        """Return a comment on observations of a run with noise or redundant variables."""
+        """Return comment lines about the scaling of a run's noisy or redundant observations."""
         scaling = self.agent.scaling
         if scaling is None:
             return []
@@ -254,7 +254,7 @@ class Writer(ABC, Generic[Network]):
         ]
 
     def needs(self, weight_bytes: int, ram_bytes: int, n_words: int) -> list[str]:
-        """Return lines about the memory and time of a greedy policy."""
+        """Return comment lines about the memory and time of a greedy policy."""
         return [
             f"Flash: {{flash}} bytes of constants, of which {weight_bytes:,} are weights; the code",
             "       comes to 1 to 2 kB.",
@@ -265,7 +265,7 @@ class Writer(ABC, Generic[Network]):
         ]
 
     def calls(self) -> list[str]:
-        """Return lines of C that take an action."""
+        """Return example lines of C that choose an action."""
         if not self.is_vector:
             return [f"uint32_t action = {self.name}_act_fixed(observation);"]
         array = f"uint32_t action[{self.name.upper()}_N_DIMENSIONS];"
@@ -289,7 +289,7 @@ class Writer(ABC, Generic[Network]):
         return [condition, "/* The actions. */", *lines, "#endif"]
 
     def tie_rule(self) -> str:
-        """Return how the header breaks ties: a greedy policy draws nothing."""
+        """Return the tie rule of the header: a greedy policy has no random draws."""
         rule = self.agent.learning.tie_rule
         return "middle" if rule == "uniform" else rule
 
@@ -315,7 +315,7 @@ class Learner(Writer[Network]):
     title = "an agent that learns"
     magic: ClassVar[int]
     streams: ClassVar[tuple[str, ...]]
-    """Random generators, in the order of the image."""
+    """Names of the random generators, in the order of the image."""
 
     @abstractmethod
     def fields(self) -> list[Field]:
@@ -323,11 +323,11 @@ class Learner(Writer[Network]):
 
     @abstractmethod
     def remembered(self, state: Data) -> Data:
-        """Return the fields that are not the same in the core's state."""
+        """Return the fields that are not in the core's state, or differ there."""
 
     @abstractmethod
     def recall(self, image: Array, state: Data) -> None:
-        """Put the fields of an image into the core's state; ValueError for impossible ones."""
+        """Write the fields of an image into the core's state; ValueError for impossible values."""
 
     def layout(self) -> np.dtype[Any]:
         """Return the type of an image without its checksum."""
@@ -352,7 +352,7 @@ class Learner(Writer[Network]):
         return content + zlib.crc32(content).to_bytes(4, "little")
 
     def restore(self, whole: bytes) -> None:
-        """Give the agent the state of an image, whole and of this agent."""
+        """Set the agent's state from an image; ValueError if it is damaged or another agent's."""
         (image,), state = np.frombuffer(whole, self.layout(), 1), self.agent._state_of("agent")
         for stream, words in zip(self.streams, image["words"], strict=True):
             state[f"{stream}.words"] = words.copy()
@@ -371,7 +371,7 @@ class Learner(Writer[Network]):
         return str(self.agent.learning.tie_rule)
 
     def calls(self) -> list[str]:
-        """Return lines of C in which the agent acts and learns."""
+        """Return example lines of C in which the agent acts and learns."""
         name, arguments = self.name, "observation, action, reward, next_observation, terminated"
         action = [f"uint32_t action = {name}_act(&agent, observation, 1); // 0: the best one"]
         if self.is_vector:
@@ -396,7 +396,7 @@ class Learner(Writer[Network]):
         )
 
     def learning_defines(self) -> Data:
-        """Return the settings of all agents that learn."""
+        """Return the macros that all headers of learning agents have."""
         learning = self.agent.learning
         return {
             "FINGERPRINT": f"UINT32_C(0x{self.fingerprint():08x})",
@@ -407,7 +407,7 @@ class Learner(Writer[Network]):
 
 
 def learning_needs(code_kilobytes: str, memory: str) -> list[str]:
-    """Return lines about the memory of an agent that learns."""
+    """Return comment lines about the memory of an agent that learns."""
     return [
         f"Flash: {{flash}} bytes of constants; the code comes to some {code_kilobytes} kB.",
         f"RAM:   {memory}",

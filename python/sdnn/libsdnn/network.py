@@ -20,7 +20,7 @@ from sdnn.support.arguments import one_of, path_of, require
 from sdnn.support.files import read_bytes
 
 Library = Literal["msvc", "libstdc++"]
-MOST_DRAWN = 2**27  # flips and 64-unit words of code tables: some seconds
+MOST_DRAWN = 2**27  # limit of drawn flips and words of tables, which take some seconds
 MOST_BYTES = 2**20  # size of a parameter file
 MOST_BYTES_OF_MODEL = 2**31
 MOST_ITEMS = 100_000  # length of a list
@@ -148,7 +148,7 @@ class LibsdnnModel:
             counts = self.layer.counts(bins, n_threads=n_threads)[:, 0]
             return np.asarray(parameters.step_size * counts + parameters.output_range[0])
         potentials = self.layer.potentials(bins, n_threads=n_threads)
-        if parameters.scheme == "one_vs_rest":  # class 0 if no unit fires
+        if parameters.scheme == "one_vs_rest":  # argmax gives class 0 if no unit fires
             return np.asarray(np.maximum(potentials, 0).argmax(axis=1))
         n_classes = parameters.n_classes
         votes = np.zeros((len(bins), n_classes), dtype=np.int64)
@@ -160,7 +160,7 @@ class LibsdnnModel:
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Name the file in errors about its content."""
+    """Add the name of the file to errors about its content."""
     try:
         yield
     except ValueError as error:
@@ -168,7 +168,7 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def number_of(text: str, what: str) -> float:
-    """Return the value of a formula of numbers, ``+ - * / ^`` and parentheses."""
+    """Evaluate a formula of numbers, ``+ - * / ^`` and parentheses."""
 
     def value(node: ast.AST) -> float:
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
@@ -176,7 +176,7 @@ def number_of(text: str, what: str) -> float:
         if isinstance(node, ast.UnaryOp):
             return OPERATORS[type(node.op)](value(node.operand))
         if isinstance(node, ast.BinOp):
-            # A power of numbers below 0 may be complex, which float refuses.
+            # A power of a negative number may be complex: float raises TypeError.
             return float(OPERATORS[type(node.op)](value(node.left), value(node.right)))
         raise ValueError
 
@@ -189,7 +189,7 @@ def number_of(text: str, what: str) -> float:
 
 
 def whole_of(text: str, what: str, low: int, high: int = 2**31 - 1) -> int:
-    """Return the value of a formula that must be a whole number within bounds."""
+    """Evaluate a formula whose value must be a whole number within bounds."""
     value = number_of(text, what)
     if value != int(value) or not low <= value <= high:
         raise ValueError(f"{what} must be a whole number in [{low}, {high}], got {text[:80]}")

@@ -16,7 +16,7 @@ PAPER_EPISODES = 15_000  # learning episodes per trial
 PAPER_INTERVAL = 10  # learning episodes between evaluations
 
 MOST_EPISODES = 10**8
-"""Learning episodes per trial at most: the rows of more test episodes fill the memory."""
+"""Largest number of learning episodes per trial: rows of more tests would fill the memory."""
 
 SENSOR_NOISE = 0.02
 """Standard deviation of the noise in the paper's Cases II to IV."""
@@ -56,11 +56,11 @@ class Experiment:
 
     @property
     def pairs(self) -> frozenset[tuple[str, str]]:
-        """Ids of case and agent whose trials it needs."""
+        """Ids of the cases and agents whose trials the experiment needs."""
         return frozenset((case.id, agent) for case in self.cases for agent in case.agents)
 
     def with_agents(self, agents: Iterable[str], presets: Iterable[str] = ()) -> Experiment:
-        """Return it with other agents, if any, in all cases, and SDNN-C under presets beside."""
+        """Return the experiment with other agents, if any, and additional presets of SDNN-C."""
         chosen = tuple(agents)
         names = [f"sdnn-c-{name}".removesuffix("-paper") for name in presets]
         cases = (
@@ -98,10 +98,10 @@ PAPER_CASES: dict[str, Case] = {case.id: case for e in EXPERIMENTS for case in e
 """The paper's cases by their ids; a case of two figures has the title of the later one."""
 
 COST = "cost"
-"""The word on the command line for the measurement of costs, which has no trials."""
+"""Name on the command line of the measurement of costs, which has no trials."""
 
 WORDS = (*(experiment.id for experiment in EXPERIMENTS), COST, "all")
-"""Words on the command line for what may be reproduced."""
+"""Names on the command line of everything that can be reproduced."""
 
 
 def select_experiments(word: str) -> tuple[Experiment, ...]:

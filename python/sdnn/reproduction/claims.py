@@ -58,7 +58,7 @@ Subject: TypeAlias = tuple[str, str]
 
 
 def subject_words(subject: Subject) -> str:
-    """Return a subject for a reader."""
+    """Return the text of a subject for readers."""
     case = PAPER_CASES[subject[0]]
     noisy = "noisy " if case.noise else ""
     return f"{title_of(subject[1])}, {case.n_sensors} {noisy}inputs"
@@ -98,7 +98,7 @@ class Check(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     @property
     def subjects(self) -> tuple[Subject, ...]:
-        """Whose trials are compared; none for times."""
+        """The agents and cases whose trials are compared; empty for times."""
         return tuple((case, self.agent) for case in (self.case, self.minus) if case)
 
     def samples(self, measured: Mapping[Subject, TrialMeasures]) -> tuple[FloatArray, ...]:
@@ -110,16 +110,16 @@ class Check(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return (results[0].values[self.measure],)
 
     def contains(self, values: FloatArray) -> NDArray[np.bool_]:
-        """Return where values lie in the range."""
+        """Return which values lie in the range."""
         return np.asarray((values >= self.at_least) & (values <= self.at_most))
 
     def excludes(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.bool_]:
-        """Return where whole intervals lie outside of the range on one side."""
+        """Return which intervals lie completely outside of the range, on one side."""
         return np.asarray((upper < self.at_least) | (lower > self.at_most))
 
 
 class Claim(msgspec.Struct, frozen=True):
-    """A claim of the paper: its number in REPRODUCTION.md, its text, and what has to hold."""
+    """A claim of the paper: its number in REPRODUCTION.md, its text, and its checks."""
 
     number: int
     text: str
@@ -133,7 +133,7 @@ CLAIMS = msgspec.toml.decode(
 
 
 class Verdict(Enum):
-    """Outcome for a claim; the value is the word for a reader."""
+    """Outcome for a claim; the value is the word for readers."""
 
     HOLDS = "holds"
     FAILS = "does not hold"
@@ -144,13 +144,13 @@ class Verdict(Enum):
 
 
 ALWAYS, NEVER = 0.95, 0.05
-"""Shares of draws of ten trials from which on, and up to which, a claim holds, and does not."""
+"""A claim holds from the first share of draws of ten trials on, and does not up to the second."""
 
 _DECISIVE = (Verdict.FAILS, Verdict.NOT_RUN, Verdict.NOT_JUDGED, Verdict.UNDECIDED)
 
 
 def is_paper_scale(measured: TrialMeasures) -> bool:
-    """Return whether there are as many trials and episodes as in the paper, to be judged."""
+    """Return whether there are at least as many trials and episodes as in the paper."""
     return measured.n_trials >= PAPER_TRIALS and measured.last_episode >= PAPER_EPISODES
 
 
@@ -190,9 +190,9 @@ class CheckOutcome:
 
 @dataclass(frozen=True)
 class ClaimOutcome:
-    """A claim with its checks' outcomes, and what more trials say of it, if there are any.
+    """A claim with its checks' outcomes, and its outcome by the larger reference results, if any.
 
-    `chance` is the share of draws of ten trials, from the most there are, in which it is shown.
+    `chance` is the share of draws of ten trials, from the largest results, that show the claim.
     """
 
     claim: Claim
@@ -202,13 +202,13 @@ class ClaimOutcome:
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict by these checks alone."""
+        """The verdict by the checks of these trials alone."""
         verdicts = {outcome.verdict for outcome in self.checks}
         return next((verdict for verdict in _DECISIVE if verdict in verdicts), Verdict.HOLDS)
 
     @property
     def decided(self) -> Verdict:
-        """The verdict by the whole rule of this module."""
+        """The verdict by the whole rule of this module, including reference results."""
         if self.verdict in (Verdict.NOT_JUDGED, Verdict.NOT_RUN):
             return self.verdict
         best = (self.more or self).verdict
@@ -233,10 +233,10 @@ def judge_claims(
     costs: Sequence[CostRecord] = (),
     reference: Iterable[TrialMeasures] = (),
 ) -> tuple[ClaimOutcome, ...]:
-    """Judge the claims that the given results speak about, at least in part.
+    """Judge the claims with at least one check that the results contain.
 
-    A case that experiments share may come more than once. Beside each claim comes what more trials
-    say, if all that it speaks of is among the reference results.
+    Results may repeat a case that experiments share. Each claim is also judged by the reference
+    results, if these contain all of its checks.
     """
     by_subject = {(result.case_id, result.agent): result for result in measured}
     more = {(result.case_id, result.agent): result for result in reference}
@@ -280,11 +280,11 @@ def _judge(
 
 
 class TenTrials:
-    """Experiments of ten trials, drawn from more, with replacement: all claims share the draws.
+    """Simulated experiments of ten trials, drawn with replacement from a larger number.
 
-    The paper's ten trials are one draw. A draw shows a claim if the medians lie in the ranges of
-    all its checks, so a claim that the trials leave undecided has a chance, too. This takes the
-    trials for ones like those to come.
+    The paper's ten trials are one such draw. A draw shows a claim if the medians lie in the ranges
+    of all its checks. The share of draws that show it estimates the chance of an experiment to
+    show the claim, also where the trials leave it undecided. All claims share the draws.
     """
 
     def __init__(self, measured: Iterable[TrialMeasures]) -> None:
@@ -293,10 +293,10 @@ class TenTrials:
         self._met = cache(self._is_met)
 
     def chance(self, *claims: Claim) -> Estimate | None:
-        """Return in which share of the draws all the claims are shown.
+        """Return the share of the draws that show all the claims.
 
-        The interval is a bootstrap over the trials that are drawn from. It is None where trials of
-        one that a claim speaks of are missing, or a claim is about costs.
+        The interval is a bootstrap over the trials that are drawn from. None if trials of a check
+        are missing, or a claim is about costs.
         """
         checks = [check for claim in claims for check in claim.checks]
         for check in checks:
@@ -308,9 +308,9 @@ class TenTrials:
         return Estimate(float(drawn.mean()), float(lower), float(upper))
 
     def _draw(self, subject: Subject) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Draw from the trials, (N_DRAWS, 10), and from resamples of them, (..., 10).
+        """Draw indices from the trials, (N_DRAWS, 10), and from resamples of them, (..., 10).
 
-        Each subject has a generator of its own.
+        Each subject has a separate generator.
         """
         generator = np.random.default_rng([BOOTSTRAP_SEED, *subject_words(subject).encode()])
         size = self._measured[subject].n_trials
@@ -321,7 +321,7 @@ class TenTrials:
         return drawn, redrawn.reshape(_N_RESAMPLES, _N_DRAWS_OF_EACH, PAPER_TRIALS)
 
     def _is_met(self, check: Check) -> tuple[NDArray[np.bool_], ...]:
-        """Find in which draws a check is met, (N_DRAWS,), and in which of resamples."""
+        """Return which draws meet a check, (N_DRAWS,), and which draws from resamples do."""
         samples = zip(check.subjects, check.samples(self._measured), strict=True)
         medians = [
             [np.median(values[drawn], axis=-1) for drawn in self._draws(subject)]
@@ -351,7 +351,7 @@ class ReferenceResult(TrialMeasures):
 
 @cache
 def reference_results() -> tuple[ReferenceResult, ...]:
-    """Read the reference results, those of a case and agent together."""
+    """Read the reference results, grouped by case and agent."""
     text = _FILES.joinpath(FILE_NAME).read_text("utf-8")
     groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
     for row in csv.DictReader(text.splitlines()):
@@ -371,7 +371,7 @@ def reference_results() -> tuple[ReferenceResult, ...]:
 
 
 def more_trials(results: Iterable[CaseResult]) -> tuple[ReferenceResult, ...]:
-    """Return the reference results that have more trials of the same settings than given ones."""
+    """Return the reference results with the same settings as, and more trials than, a result."""
     run = {(r.case_id, r.agent, r.config_hash): r.n_trials for r in results}
     return tuple(
         result

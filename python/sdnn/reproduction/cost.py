@@ -21,7 +21,7 @@ from sdnn.runs.trial import canonical_json, config_hash
 from sdnn.support import machine
 
 SEED = 1
-KIND = "cost"  # of these measurements in a result file
+KIND = "cost"  # the type of these measurements in a result file
 
 COST_ROW_HEADER = (
     "series", "n_inputs", "round", "microseconds", "n_steps", "table_bytes", "version", "machine"
@@ -83,7 +83,7 @@ class CostRecord(msgspec.Struct, frozen=True):
 
 
 def round_rows(costs: Iterable[CostRecord]) -> Iterator[tuple[object, ...]]:
-    """All rounds of cost measurements under `COST_ROW_HEADER`."""
+    """Yield all rounds of cost measurements, as rows under `COST_ROW_HEADER`."""
     for cost in costs:
         end = (cost.n_steps, cost.table_bytes, cost.version, cost.machine)
         for number, microseconds in enumerate(cost.microseconds):
@@ -107,9 +107,9 @@ class CostConfig:
     n_inputs: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 8)
     n_rounds: int = 5
     round_seconds: float = 0.1
-    n_slow_rounds: int = 3  # where a step takes longer than that: each is a round
-    n_learned: int = 500  # steps before the first round, so that no weights are fresh
-    most_plain_inputs: int = 8  # of plain evaluations, seconds a step with 8 inputs
+    n_slow_rounds: int = 3  # rounds of a single step, if a step takes longer than that
+    n_learned: int = 500  # steps before the first round: untrained weights are faster
+    most_plain_inputs: int = 8  # limit of plain evaluations: a step with 8 takes seconds
 
     @property
     def config_hash(self) -> str:
@@ -127,9 +127,9 @@ QUICK_COST = CostConfig(n_rounds=3, round_seconds=0.01, most_plain_inputs=5)
 def planned_costs(
     config: CostConfig, agents: Iterable[str] | None = None
 ) -> dict[str, tuple[CostSeries, int]]:
-    """Return the measurements of some agents (default: all): series and number of inputs.
+    """Return the measurements of some agents (default: all) by their keys in the store.
 
-    They are by their keys in the store: equal ones are stored and measured once.
+    Each is a series and a number of inputs. Equal measurements have equal keys and run once.
     """
     config_hash = config.config_hash
     return {
@@ -146,7 +146,7 @@ def measure_costs(
     store: ResultStore,
     observe: Observer,
 ) -> None:
-    """Measure what is not stored yet, one after another, and store each at once."""
+    """Run the measurements that are not stored, and store each immediately."""
     stored = store.measurements(KIND)
     missing = [key for key in planned if key not in stored]
     for number, key in enumerate(missing):
@@ -163,7 +163,7 @@ def measure_costs(
 def measure_steps(
     series: CostSeries, n_inputs: int, config: CostConfig
 ) -> tuple[tuple[float, ...], int, int] | None:
-    """Measure a step of an agent of the paper's sizes: acting in a new state and learning.
+    """Measure a step, acting in a new state and learning, of an agent of the paper's sizes.
 
     Returns microseconds in each round, steps in a round, and bytes of what the agent learns; None
     where there is no memory for the agent.

@@ -13,7 +13,7 @@ from sdnn.runs.figures import SMOOTHED_TESTS, agent_colors, draw_steps
 from sdnn.runs.results import CaseResult
 
 MAX_STEPS = 50  # an episode's limit: the upper end of the steps axis
-LONG_EPISODES = 2_000  # learning episodes from which running medians lie over the curves
+LONG_EPISODES = 2_000  # from this number of learning episodes on, running medians are drawn
 _PANEL_HEIGHT = 3.3
 _WARNING_COLOR = "#a31515"
 _MARKERS = ("o", "s", "^", "v")
@@ -24,7 +24,7 @@ def draw_experiment(
 ) -> Figure:
     """Draw an experiment: a panel per case, a line and an interquartile band per agent.
 
-    With `quick` the figure is marked as a quick look, not a result.
+    With `quick` the figure is marked as preliminary.
     """
     n_columns = min(2, len(experiment.cases))
     n_rows = -(-len(experiment.cases) // n_columns)

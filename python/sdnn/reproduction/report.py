@@ -98,11 +98,11 @@ class Report:
 
     @cached_property
     def claims(self) -> tuple[ClaimOutcome, ...]:
-        """The claims that these results speak about, with what reference results say of them."""
+        """The claims about which there are results, judged by these and by reference results."""
         return judge_claims(self.results, self.costs, self.reference)
 
     def page(self, pictures: Mapping[str, bytes]) -> Page:
-        """Return the page, with the SVG of figures by the names of their files without suffix."""
+        """Return the page; ``pictures`` are figures as SVG, by file name without suffix."""
         warnings = []
         if self.quick:
             warnings.append(QUICK_WARNING)
@@ -211,7 +211,7 @@ class Report:
 
 
 def _claim_table(claims: Iterable[ClaimOutcome]) -> Table:
-    """Return a line for each claim, with its verdict by the whole rule where one is judged."""
+    """Return a row for each claim, with its verdict by the whole rule."""
     claims = list(claims)
     is_judged = any(claim.decided not in (Verdict.NOT_JUDGED, Verdict.NOT_RUN) for claim in claims)
     rows = []
@@ -235,7 +235,7 @@ def _claim_table(claims: Iterable[ClaimOutcome]) -> Table:
 
 
 def _name(check: Check) -> str:
-    """Name a quantity where its claim says about whom it is."""
+    """Return the name of a check's quantity, without the agents that the claim's text names."""
     if check.measure is None:
         return f"{check.n_inputs} inputs / {check.n_fewer}"
     return check.measure.replace("_", " ") + (", difference" if check.minus else "")
@@ -245,7 +245,7 @@ CHECKS_HEADER = ("claim", "measured", "paper", "ours", "verdict")
 
 
 def check_rows(claims: Iterable[ClaimOutcome]) -> Iterator[tuple[str, ...]]:
-    """Yield the verdict on each check by these trials alone, under `CHECKS_HEADER`."""
+    """Yield a row under `CHECKS_HEADER` for each check, with its verdict by these trials alone."""
     for claim in claims:
         for check in claim.checks:
             cells = (str(claim.claim.number), str(check.check), check.check.paper)
@@ -253,7 +253,7 @@ def check_rows(claims: Iterable[ClaimOutcome]) -> Iterator[tuple[str, ...]]:
 
 
 def _more_table(claims: Iterable[ClaimOutcome]) -> Table:
-    """Return verdicts by reference results: of each claim by the whole rule, then of its checks."""
+    """Return the table of verdicts by reference results, on each claim and on its checks."""
     rows: list[tuple[str, ...]] = []
     for claim in claims:
         if claim.more is None:
@@ -276,7 +276,7 @@ def _case_json(experiment: Experiment, result: CaseResult) -> dict[str, object]:
 
 
 def format_quantity(checked: CheckOutcome) -> str:
-    """Write what our data give of a check's quantity, with its interval."""
+    """Write the estimate of a check's quantity with its interval."""
     measure, estimate = checked.check.measure, checked.estimate
     if estimate is None:
         return "-"

@@ -111,7 +111,7 @@ class PaperStudy(Study):
             )
         self._marks = [
             *self.agents,
-            *(["with"] if self.agents and presets else []),  # else as an agent with a preset
+            *(["with"] if self.agents and presets else []),  # else "rbf-robust" is a preset
             *presets,
             *([f"{trials}-trials"] if trials != defaults[0] else []),
             *([f"{episodes}-episodes"] if episodes != defaults[1] else []),
@@ -133,7 +133,7 @@ class PaperStudy(Study):
         return {"costs": {"planned": len(self.costs), "stored": n_stored}}
 
     def file_name(self, name: str) -> str:
-        """Return a name such as ``table-rbf-3-trials-quick.json``: other results, another name."""
+        """Return a file name with the settings that differ, such as ``table-rbf-quick.json``."""
         stem, _, kind = name.rpartition(".")
         return "-".join([stem, *self._marks]) + f".{kind}"
 
@@ -172,7 +172,7 @@ class PaperStudy(Study):
 
 
 def collect(experiment: Experiment, comparison: Comparison) -> tuple[CaseResult, ...]:
-    """Return the results of each agent in each case of an experiment, with the titles there."""
+    """Return the results of each agent in each case, with the titles of this experiment."""
     return tuple(
         replace(comparison.measured[case.id, agent].result, title=case.title)
         for case in experiment.cases
@@ -181,7 +181,7 @@ def collect(experiment: Experiment, comparison: Comparison) -> tuple[CaseResult,
 
 
 def with_paper_defaults(values: Values) -> Values:
-    """Return the values of a specification with the paper's where others are missing.
+    """Fill in the paper's values where the values of a specification are missing.
 
     The agent is SDNN-C, with the settings of the paper unless a preset is named; it learns 15,000
     episodes, with a test episode after every ten, and the noise runs on over episodes.
@@ -193,7 +193,7 @@ def with_paper_defaults(values: Values) -> Values:
         name, preset = split_label(agent["name"])
         if preset is None and "paper" in agent_entry(name).presets:
             agent.setdefault("preset", "paper")
-    except ValueError:  # refused with the specification
+    except ValueError:  # the specification raises the error
         pass
     if not budget.keys() & {"steps", "episodes"}:
         budget["episodes"] = PAPER_EPISODES
@@ -205,7 +205,7 @@ def with_paper_defaults(values: Values) -> Values:
 
 
 def paper_spec(**tables: object) -> RunSpec:
-    """Return a specification of the paper's task, with the given tables or values of them.
+    """Return a specification of the paper's task, with some tables, or values in them, replaced.
 
     Examples
     --------
@@ -249,7 +249,7 @@ def plan_trials(
 
 
 MIN_TRIALS_TO_DRAW = 2 * PAPER_TRIALS
-"""Fewer trials are too few to draw ten from."""
+"""Smallest number of trials from which draws of ten are made."""
 
 CLAIMS_NOTE = "A claim is shown where the study has every case and agent that it speaks of."
 CHANCES_NOTE = (
@@ -260,7 +260,7 @@ CHANCES_NOTE = (
 
 
 def settings_of(case: Case) -> Layer:
-    """Return the settings of a case, which are those of its table in a study."""
+    """Return the settings of a case, as if they were a case's table in a study's file."""
     settings = case.settings.items()
     return {tuple(key.split(".")): Setting(value, ("cases", case.id)) for key, value in settings}
 
@@ -273,11 +273,11 @@ class ClaimStudy(StudyFile):
     }
 
     def completed(self, case: StudyCase, values: Values) -> Values:
-        """Return the values of a specification, in the paper's cases with the paper's defaults."""
+        """Fill in the paper's defaults in the paper's cases."""
         return with_paper_defaults(values) if case.id in PAPER_CASES else values
 
     def additions(self, comparison: Comparison) -> Addition:
-        """Make verdicts about all claims, how often ten trials show them, and the quantities."""
+        """Make tables of verdicts on claims, of their chances in ten trials, and of quantities."""
         judged = judge_variants(comparison)
         values = [
             {
@@ -321,8 +321,9 @@ class ClaimStudy(StudyFile):
 def judge_variants(comparison: Comparison) -> dict[str, dict[int, ClaimOutcome]]:
     """Judge the paper's claims about each variant of a study, by its id and the claim's number.
 
-    A case counts as the paper's by its id, an agent by its own: what a variant has changed is what
-    is judged. Claims of which a quantity is not measured are left out.
+    Cases and agents are those of the paper if they have their ids, whatever settings a variant
+    changes: the effect of these changes is judged. Claims with a quantity that is not measured
+    are left out.
     """
     judged = {}
     for variant in comparison.variants:

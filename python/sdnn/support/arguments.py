@@ -33,12 +33,12 @@ def shown(value: object) -> str:
     """
     try:
         return _REPR.repr(value)
-    except Exception:  # a whole number of 5,000 digits, a class of a user
+    except Exception:  # such as an int of 5,000 digits, or a user's class
         return object.__repr__(value)
 
 
 def array_of(name: str, value: object, types: str = "fiub", what: str = "numbers") -> NDArray[Any]:
-    """Read an array of any library, a number, or lists of such; ValueError for others.
+    """Convert arrays of any library, numbers, or lists of them to NumPy; ValueError for others.
 
     ``types`` are letters of the possible types, as in ``numpy.dtype.kind``, and ``what`` their word
     in messages. Masked arrays are refused: their mask would be lost.
@@ -47,7 +47,7 @@ def array_of(name: str, value: object, types: str = "fiub", what: str = "numbers
     Traceback (most recent call last):
     ValueError: levels must be numbers, got [0.5, 'a']
     """
-    import numpy as np  # takes longer than all else that `import sdnn` loads
+    import numpy as np  # slow to import: not at the start of `import sdnn`
 
     is_plain = type(value) is np.ndarray or isinstance(value, np.generic)
     if is_plain and (array := np.asarray(value)).dtype.kind in types:
@@ -57,21 +57,21 @@ def array_of(name: str, value: object, types: str = "fiub", what: str = "numbers
     require(not has_mask, name, f"be {what} without a mask", value)
     try:
         array = np.asarray(value)
-    except Exception:  # lists of several lengths, or errors of other libraries
+    except Exception:  # such as lists of different lengths, or another library's error
         array = np.empty(0, object)
     require(array.dtype.kind in types, name, f"be {what}", value)
     return array
 
 
 def argument_error(name: str, problem: str, error_class: type[Exception] = ValueError) -> Exception:
-    """Make an error about an argument, whose name is its attribute ``argument``.
+    """Make an error about an argument; its attribute ``argument`` is the argument's name.
 
     Errors of the core have this attribute, too.
 
     >>> argument_error("n_bins", "must be at least 2, got 1")
     ValueError('n_bins must be at least 2, got 1')
     """
-    is_named = problem.startswith(f"{name},")  # with others, as the core does
+    is_named = problem.startswith(f"{name},")  # the core names several arguments
     error = error_class(problem if is_named else f"{name} {problem}")
     error.argument = name  # type: ignore[attr-defined]
     return error
@@ -107,7 +107,7 @@ def blamed(error: BaseException) -> tuple[str, str]:
 
 
 def choice(name: str, word: object, members: Mapping[str, Member]) -> Member:
-    """Find the member called ``word``; ValueError if none is.
+    """Return the member called ``word``; ValueError that lists the members if there is none.
 
     >>> choice("direction", "left", {"up": 1, "down": -1})
     Traceback (most recent call last):
@@ -149,7 +149,7 @@ def whole(name: str, value: object, low: int, high: int) -> int:
 
 
 def seed_of(value: object) -> int:
-    """Check that a seed is one that the core takes, in [0, 2**64); ValueError if not."""
+    """Check that a seed is a whole number in [0, 2**64), as the core needs; ValueError if not."""
     return whole("seed", value, 0, 2**64 - 1)
 
 
@@ -167,8 +167,8 @@ def real(name: str, value: object) -> float:
 
 
 def reward_of(reward: object) -> float:
-    """Read a reward: a number of any library, an array of one or a bool; else ValueError."""
-    if isinstance(reward, float):  # NumPy's, too
+    """Convert a reward, a number, bool or array with a single number; ValueError for others."""
+    if isinstance(reward, float):  # includes np.float64
         return float(reward)
     import numpy as np
 
@@ -181,8 +181,8 @@ def reward_of(reward: object) -> float:
         with suppress(OverflowError, TypeError, ValueError):
             return float(reward)
     try:
-        return real("reward", reward)  # for its message
-    except OverflowError as error:  # which would say of `Agent.learn` that a weight left its range
+        return real("reward", reward)  # raises the error
+    except OverflowError as error:  # callers of `Agent.learn` would take it for that of a weight
         raise ValueError(str(error)) from None
 
 
@@ -203,7 +203,7 @@ def path_of(name: str, value: object) -> Path:
 
 
 def is_of_class(value: object, expected: type) -> bool:
-    """Return whether a value is of a class, or of a class with the same name and fields.
+    """Return whether a value is of a class, or of an equal class with the same name and fields.
 
     A cell of a notebook that runs again defines its classes again.
     """
@@ -216,7 +216,7 @@ def is_of_class(value: object, expected: type) -> bool:
 
 
 def has_methods(name: str, value: object, what: str, *methods: str) -> None:
-    """Check that an argument, called ``what`` in messages, has some methods; TypeError if not."""
+    """Check that an argument has methods; TypeError that calls it ``what`` if not."""
     has_all = all(callable(getattr(value, method, None)) for method in methods)
     require(has_all and not isinstance(value, type), name, f"be {what}", value, TypeError)
 
@@ -276,7 +276,7 @@ _MEANINGS: Mapping[tuple[str, ...], tuple[str, ...]] = {
      "clip_range", "max_grad_norm", "normalize_advantage", "metrics", "solver"): (_NO_GRADIENT,),
     ("device", "cuda", "gpu"): ("everything runs on the CPU: omit it",),
 }  # fmt: skip
-"""Names that users of other libraries type, and names or advice here, the best first.
+"""Names in other libraries, and the corresponding names or advice here, the best first.
 
 Stable-Baselines3, CleanRL, scikit-learn and Keras have them.
 """
@@ -286,7 +286,7 @@ HABITS = {habit: meaning for habits, meaning in _MEANINGS.items() for habit in h
 def advice(
     name: str, possible: Iterable[str], elsewhere: Mapping[str, str] = MappingProxyType({})
 ) -> str:
-    """Suggest a meaning of an unknown name, and list the possible names, the most similar first.
+    """Return a hint for an unknown name: a suggestion, and all possible names by similarity.
 
     ``elsewhere`` has names that are possible in other places, and how they are written there.
 
@@ -313,9 +313,9 @@ def advice(
 def explains_names(
     elsewhere: Callable[[Any], Mapping[str, str]] = lambda _: {},
 ) -> Callable[[Called], Called]:
-    """Make a decorator of functions and classes that explains arguments that they do not have.
+    """Make a decorator that adds hints to the errors of calls with unknown arguments.
 
-    ``elsewhere`` returns arguments of other functions as of `advice`, from the first argument.
+    ``elsewhere`` maps the first argument of a call to names in other places, as in `advice`.
 
     >>> @explains_names()
     ... def wait(seconds):
@@ -336,9 +336,9 @@ def explains_names(
                 return called(*arguments, **options)
             except TypeError as error:
                 if error.__traceback__ is None or error.__traceback__.tb_next is not None:
-                    raise  # by the function itself
+                    raise  # the function itself raised the TypeError
                 first = arguments[0] if arguments else None
-                problem = _misfit(called, arguments, options, elsewhere(first))
+                problem = _error_of_call(called, arguments, options, elsewhere(first))
                 if problem is None:
                     raise
                 raise problem from None
@@ -348,16 +348,16 @@ def explains_names(
     return decorate
 
 
-def _misfit(
+def _error_of_call(
     called: Callable[..., object], arguments: tuple[object, ...], options: Mapping[str, object],
     elsewhere: Mapping[str, str],
 ) -> Exception | None:  # fmt: skip
-    """Return the error that explains why a function cannot be called so; None if it can."""
+    """Return the error that explains why arguments do not fit a function; None if they fit."""
     is_made = called.__name__ == "__init__"
     who = type(arguments[0]).__name__ if is_made else called.__name__
     try:
         signature = inspect.signature(called)
-    except ValueError:  # a class of the core has the signature
+    except ValueError:  # in the core, a class has the signature, not its `__init__`
         signature = inspect.signature(type(arguments[0]))
         arguments = arguments[1:]
     parameters = signature.parameters.values()

@@ -15,7 +15,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """First characters of cells that a spreadsheet runs, unless they are numbers."""
 _NUMBER = re.compile(r"[+-]?\.?\d[\d.]*(e[+-]?\d+)?")
 _GZIP = 31
-"""A window of 2**15 bytes, with the header of gzip."""
+"""zlib's ``wbits`` for a window of 2**15 bytes and gzip's header."""
 
 
 def csv_bytes(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
@@ -31,7 +31,7 @@ def csv_pieces(header: Sequence[str], rows: Iterable[Sequence[object]]) -> Itera
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     for row in chain([header], rows):
-        writer.writerow([_harmless(cell) if isinstance(cell, str) else cell for cell in row])
+        writer.writerow([_escape_formula(cell) if isinstance(cell, str) else cell for cell in row])
         if text.tell() >= _PIECE_CHARACTERS:
             yield text.getvalue().encode()
             text.seek(0)
@@ -40,7 +40,7 @@ def csv_pieces(header: Sequence[str], rows: Iterable[Sequence[object]]) -> Itera
 
 
 @lru_cache
-def _harmless(text: str) -> str:
+def _escape_formula(text: str) -> str:
     is_formula = text.startswith(_FORMULA) and not _NUMBER.fullmatch(text)
     return f"'{text}" if is_formula else text
 

@@ -31,7 +31,7 @@ PARTIAL_SUFFIX = ".partial"
 """Suffix of a file that is being written."""
 _NAME_OF_PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 _ABANDONED_SECONDS = 60
-"""Age from which a partial file counts as abandoned, where files cannot be locked."""
+"""Age of a partial file that counts as abandoned, on file systems without locks."""
 
 _FOLDERS_OF_DEVICES = tuple(map(Path, ("/dev", "/dev/fd", "/proc/self/fd")))
 """Names in these folders, such as ``/dev/stdout``, are written to and never replaced."""
@@ -39,10 +39,10 @@ _FOLDERS_OF_DEVICES = tuple(map(Path, ("/dev", "/dev/fd", "/proc/self/fd")))
 FORMAT = 1
 MAX_BYTES = 2**34
 MOST_EMPTY_ARRAYS = 1024
-"""Arrays that a file may have beyond one for two bytes of all of them."""
+"""Number of arrays that a file may have in addition to one per two bytes of content."""
 
 _BEGINNING = b'{"__metadata__":{"sdnn":"{\\"checksum\\":\\"'
-"""Start of the header, which follows 8 bytes that hold its length."""
+"""Start of the header; 8 bytes with the header's length precede it."""
 _CHECKSUM = slice(8 + len(_BEGINNING), 16 + len(_BEGINNING))
 
 _TYPES = ("BOOL", "I8", "I16", "I32", "I64", "U8", "U16", "U32", "U64", "F16", "F32", "F64")
@@ -58,11 +58,10 @@ _NO_WAITING = getattr(os, "O_NONBLOCK", 0)
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[BinaryIO]:
-    """Open a new file in the same folder; at the end it takes the place of ``path``.
+    """Open a temporary file in the same folder; at the end of the block it replaces ``path``.
 
-    Its name is unpredictable. A link or a pipe of the name ``path`` is replaced:
-    its target stays as it was. OSError if the file cannot be written; one that was there
-    before stays as it was.
+    Its name is unpredictable. A link or a pipe called ``path`` is replaced, and its target stays
+    unchanged. OSError if the file cannot be written; an earlier file then stays unchanged.
     """
     if path.absolute().parent in _FOLDERS_OF_DEVICES:
         with naming(path), path.open("wb") as device:
@@ -75,7 +74,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
             yield file
             file.flush()
             os.fsync(file.fileno())
-            if os.name == "nt":  # where an open file cannot be given another name
+            if os.name == "nt":  # Windows cannot rename an open file
                 file.close()
             partial.replace(path)
         _sync_folder(path.parent)
@@ -97,7 +96,7 @@ def naming(path: Path) -> Iterator[None]:
 def write_whole(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:
     """Write a file whole or not at all; ``content`` may be made while it is written.
 
-    OSError if the file cannot be written; one that was there before stays as it was.
+    OSError if the file cannot be written; an earlier file then stays unchanged.
     """
     with whole_file(path) as file:
         file.writelines([content] if isinstance(content, bytes) else content)
@@ -124,13 +123,13 @@ def _open_at_once(name: str, flags: int) -> int:
 
 
 def read_bytes(path: Path, max_bytes: int) -> bytes:
-    """Read a regular file of limited size; OSError as of `open_regular`."""
+    """Read a regular file; OSError if it cannot be opened, is not regular or is too large."""
     with open_regular(path, max_bytes) as file:
         return file.read(os.fstat(file.fileno()).st_size)
 
 
 def open_to_append(path: Path) -> TextIO:
-    """Open a regular file, made if it is not there, for lines at its end.
+    """Open a regular file to append lines; create it if missing.
 
     OSError if it cannot be opened, or is a link, a folder, a device or a pipe.
     """
@@ -165,31 +164,31 @@ def lock(descriptor: int) -> bool | None:
     Returns whether it is locked now: False if another process holds it, None where files cannot be
     locked.
     """
-    import filelock  # which reads much more than locking files needs
+    import filelock  # slow to import
 
     try:
         return filelock.lock_descriptor(descriptor, blocking=False)
-    except OSError:  # not in this folder
+    except OSError:  # the folder's file system has no locks
         return None
 
 
 def _new_file(path: Path) -> BinaryIO:
-    """Create the partial file, locked while it is open: it does not count as abandoned."""
+    """Create the partial file; its lock shows other processes that it is not abandoned."""
     while True:
         name = f"{path.name}.{secrets.token_hex(8)}{PARTIAL_SUFFIX}"
         try:
-            file = path.with_name(name).open("xb")  # O_EXCL, which follows no link
+            file = path.with_name(name).open("xb")  # O_EXCL follows no link
         except OSError as error:
             error.filename = str(path)  # the one that the caller knows
             raise
-        # Another process may have removed it before it was locked.
+        # Another process may have removed the file before it was locked.
         if lock(file.fileno()) is not False and os.path.exists(file.name):
             return file
         file.close()
 
 
 def _sync_folder(folder: Path) -> None:
-    """Synchronize the names in a folder, if the system and the folder's rights allow it."""
+    """Write the names in a folder to disk, if the system and the folder's permissions allow it."""
     if not hasattr(os, "O_DIRECTORY"):
         return
     with suppress(OSError):
@@ -205,10 +204,10 @@ def remove_abandoned_files(folder: Path) -> None:
     for path in folder.glob(f"*{PARTIAL_SUFFIX}"):
         if not _NAME_OF_PARTIAL.search(path.name):
             continue
-        with suppress(OSError):  # another process may have removed it, or given it its own name
+        with suppress(OSError):  # another process may have removed or renamed it
             with open(path, "rb+", opener=_open_itself) as file:
                 is_abandoned = lock(file.fileno())
-                if is_abandoned and os.name != "nt":  # where an open file cannot be removed
+                if is_abandoned and os.name != "nt":  # Windows cannot remove an open file
                     path.unlink()
             age = 0.0 if is_abandoned is False else time.time() - path.stat().st_mtime
             if age > _ABANDONED_SECONDS:
@@ -242,10 +241,10 @@ def write_file(
 
 
 def read_file(path: Path, *contents: str) -> tuple[Description, Arrays]:
-    """Read the description and the arrays of a file that holds one of these contents.
+    """Read the description and the arrays of a file whose content is one of ``contents``.
 
-    OSError as of `open_regular`; ValueError if it is damaged, of another program or kind, or of
-    another version of the format.
+    OSError if it cannot be opened or is not a regular file; ValueError if it is damaged, of
+    another program, or has another content or format.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load

@@ -14,7 +14,7 @@ Handler: TypeAlias = Callable[[int, FrameType | None], object] | int | None
 
 
 class Interrupts:
-    """A context in which a first signal calls ``ask_to_stop``; a second one acts as usual.
+    """A context in which the first signal calls ``ask_to_stop``; a second one acts as usual.
 
     Signals with other handlers, and threads other than the main one, are left alone.
     ``received`` is the received signal, or None.
@@ -48,7 +48,7 @@ class Interrupts:
 
 @contextmanager
 def stay_interrupts() -> Iterator[None]:
-    """Delay a Ctrl-C to the end of the block, and raise KeyboardInterrupt there.
+    """Delay Ctrl-C until the end of the block, then raise KeyboardInterrupt.
 
     Extensions replace the exceptions of the Python code that they call, or forget them: matplotlib
     reports a Ctrl-C as "Invalid affine transformation matrix". A second one acts as usual.

@@ -10,7 +10,7 @@ from typing import Any
 def attach(
     package: str, names: Mapping[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """Make ``__getattr__``, ``__dir__`` and ``__all__`` of a package.
+    """Make ``__getattr__``, ``__dir__`` and ``__all__`` of a package that imports names on demand.
 
     ``names`` has the names of each module, with spaces between them; those of the package are its
     modules. Type checkers read them in the stub beside the package, which a frozen program lacks.

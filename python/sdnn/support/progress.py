@@ -35,7 +35,7 @@ class ProgressBars:
 
         console = Console(stderr=True) if console is None else console
         self._is_notebook = console.is_jupyter
-        self._output: Any = None  # output of a notebook, where rich would need ipywidgets
+        self._output: Any = None  # the notebook's output: rich would need ipywidgets
         self._due = 0.0
         self._progress = Progress(
             TextColumn("{task.description}"),
@@ -57,7 +57,7 @@ class ProgressBars:
         return self
 
     def __exit__(self, *_error: object) -> None:
-        if not self._progress.disable:  # else rich 14.2 and older print an empty line
+        if not self._progress.disable:  # rich 14.2 and older would print an empty line
             self._progress.stop()
         self._due = 0.0
         self._draw()
@@ -75,12 +75,12 @@ class ProgressBars:
             self._output.update(self._progress, include=["text/html"])
 
     def add(self, key: Hashable, title: str, total: int | None) -> None:
-        """Open the bar of a task, if it is not there."""
+        """Open the bar of a task, unless it is open."""
         if key not in self._tasks:
             self._tasks[key] = self._progress.add_task(title, total=total, news="")
 
     def update(self, key: Hashable, done: int, **fields: Any) -> None:
-        """Move a bar; ``description`` is another title, ``news`` the text behind it."""
+        """Move a bar; ``description`` changes its title, ``news`` the text after it."""
         if key in self._tasks:
             self._progress.update(self._tasks[key], completed=done, **fields)
             self._draw()

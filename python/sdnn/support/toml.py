@@ -13,7 +13,7 @@ from typing import TypeAlias, cast
 import msgspec
 
 MOST_LEVELS = 32
-"""Most levels of tables and arrays within each other."""
+"""Largest depth of nested tables and arrays."""
 TOO_DEEP = f"must have at most {MOST_LEVELS} tables and arrays within each other"
 _MOST_PARSED = 2**21
 """Bytes that are parsed to find a line; in larger files none is found."""
@@ -25,13 +25,13 @@ KeyPath: TypeAlias = tuple[str | int, ...]
 def line_of(text: str, key: KeyPath) -> int | None:
     """Return the line, from 1, of a key in TOML, or of the nearest table around it.
 
-    It is the first line with which the text's beginning has the key.
+    The result is the smallest number of lines that, parsed alone, contain the key.
     """
     lines = text.splitlines()
     n_left = _MOST_PARSED
 
     def begins(last: int) -> bool:
-        """Return whether the first lines, with the rest of their last value, have the key."""
+        """Return whether the lines up to index ``last``, with their last value, have the key."""
         nonlocal n_left
         for end in range(last + 1, len(lines) + 1):
             beginning = "\n".join(lines[:end])
@@ -57,7 +57,7 @@ def line_of(text: str, key: KeyPath) -> int | None:
 
 
 def parse_toml(text: str) -> dict[str, object]:
-    """Parse TOML; ValueError for a key of many parts, which would take unlimited time."""
+    """Parse TOML; ValueError for keys of many parts, whose parsing takes quadratic time."""
     for part in re.split(r"[={},\n]", text):
         if part.count(".") > MOST_LEVELS:
             raise ValueError(f"a key must have at most {MOST_LEVELS} parts, got {part[:40]!r}...")
@@ -66,7 +66,7 @@ def parse_toml(text: str) -> dict[str, object]:
 
 
 def deep_key(value: object, key: KeyPath = ()) -> KeyPath | None:
-    """Return the key of a table or array that is too deep in a value, or None."""
+    """Return the key of a table or array nested deeper than `MOST_LEVELS`, or None."""
     if len(key) == MOST_LEVELS:
         return key
     items = value.items() if isinstance(value, dict) else enumerate(cast("list[object]", value))
