@@ -27,7 +27,7 @@ class BareAgent {
  public:
   using Action = std::span<const double>;
 
-  /// With n_actions[d] actions in each dimension d. Throws as agents::make_agent does.
+  /// Makes an agent with n_actions[d] actions in each dimension d; see agents::make_agent.
   BareAgent(const agents::AnyApproximatorConfig& approximator,
             const agents::AnyLearningConfig& learning, const std::vector<std::size_t>& n_actions,
             std::uint64_t seed);

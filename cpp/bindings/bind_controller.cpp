@@ -109,7 +109,7 @@ agents::ActionMask mask_of(const MaskArgument& masks, const char* name, std::siz
   return rows.subspan(n * environment, n);
 }
 
-/// Row i of an array with so many numbers in each. Throws std::invalid_argument if there is none.
+/// Row i of an array with `n_columns` columns. Throws std::invalid_argument if there is no row i.
 std::span<const double> row(const ArrayArgument<double>& rows, const char* name,
                             std::size_t n_columns, std::size_t i) {
   const auto numbers = bindings::flat(rows);

@@ -150,7 +150,7 @@ Times time_decisions(AcrobotTrial<Agent>& trial, int n_episodes) {
 /// integration steps.
 class AcrobotDecisions {
  public:
-  /// The goal and the number of decisions of `config` are not used. Throws as Acrobot does.
+  /// The goal and the number of decisions of `config` are not used.
   AcrobotDecisions(environments::AcrobotConfig config, std::uint64_t seed)
       : acrobot_(endless(config)), random_(seed, core::Stream::exploration) {}
 

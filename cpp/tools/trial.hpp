@@ -85,7 +85,7 @@ class AcrobotTrial {
     core::require(agent_.n_inputs() == observed_.size(), "n_inputs",
                   "the number of inputs of the sensors, " + std::to_string(observed_.size()),
                   agent_.n_inputs());
-    // No decision is to wait for memory it is the first to use: that of the agent, room for rows.
+    // Touch the memory of the agent and the rows, so that no decision waits for new pages.
     if constexpr (requires { agent_.warm_caches(); }) agent_.warm_caches();
     core::require_bytes(
         "episodes / evaluate_every_episodes", "the rows of the test episodes",

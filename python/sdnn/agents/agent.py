@@ -150,8 +150,8 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         """Learn that a teacher chose an action whose return was `value`; see `imitate`.
 
         With Q(lambda) the values of other actions become lower by `margin` at least, in the unit of
-        the rewards. RuntimeError while the agent is warming up; ValueError as `learn` does, and for
-        agents without a linear readout.
+        the rewards. RuntimeError while the agent is warming up; ValueError for bad arguments and
+        for agents without a linear readout.
         """
         observation, action, *_ = self._parts_of(transition, 0)
         self._require_warm().imitate(observation, action, value, margin)
@@ -347,7 +347,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
             description["seed"],
             description["warm_up_steps"],
         )
-        agent._make(state=dict(arrays))
+        agent._make_controller(state=dict(arrays))
         n_variables = Observations(observations).n_variables
         if agent._controller.n_variables != n_variables:
             raise ValueError(f"observation must be of {n_variables} variables")

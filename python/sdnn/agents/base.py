@@ -149,7 +149,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             narrows=self.narrows_ranges,
         )
         self._action = self._actions.config
-        self._make(tables=list(made_of))
+        self._make_controller(tables=list(made_of))
 
     def _take_spaces(self, observations: Space, actions: Space) -> None:
         self._observations = Observations(observations)
@@ -182,7 +182,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         self.seed = secrets.randbits(63) if seed is None else seed_of(seed)
         self._warm_up_steps = whole("warm_up_steps", steps, int(WARM_UP.low), int(WARM_UP.high))
 
-    def _make(self, **made_of: Any) -> None:
+    def _make_controller(self, **made_of: Any) -> None:
         approximator: Any = self._approximator
         learning: Any = self.learning
         try:
@@ -243,8 +243,8 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
     def n_environments(self) -> int:
         """Number of environments in which the agent learns at once, from 1 to 2**14; may be set.
 
-        Each, from number 0, has an episode of its own; all else is shared. Where there are fewer
-        than before, the transitions that wait in the others are learned. `train` sets it.
+        Each, from number 0, has a separate episode; everything else is shared. Pending transitions
+        of removed environments are learned first. `train` sets it.
         """
         return self._controller.n_environments
 
@@ -259,7 +259,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
     def begin_episode(self, environment: int = 0) -> None:
         """Note that an episode begins: `learn` never does.
 
-        Starts the greedy first steps of an episode anew, and learns the transitions that wait.
+        Resets the count of greedy first steps, and learns the pending transitions.
         """
         self._check_environment(environment)
         self._controller.begin_episode(environment)
@@ -279,7 +279,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         observation : element of the observation space
         explore : bool
             False: always a best action, and no effect on the agent's later learning. Several
-            threads may call it so at once; `learn` waits for them.
+            threads may do so at the same time; `learn` waits for them.
         environment : int
             In which environment, below `n_environments`.
         mask : array_like, optional
@@ -317,9 +317,9 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
 
         Any action of the space can be learned, not only that of the last `act` (except by
         `FuzzyQLearning`); of a ``Box`` the nearest one is. A terminated transition begins no
-        episode. With ``n_steps`` above 1 a transition waits for the next ones in its environment.
-        One that does not begin where the last one ended starts anew; `begin_episode` learns what
-        still waits.
+        episode. With ``n_steps`` above 1 a transition is pending until the next ones are known.
+        If a transition does not begin where the last one ended, or at `begin_episode`, the pending
+        ones are learned first.
 
         Raises
         ------

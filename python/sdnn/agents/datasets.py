@@ -71,23 +71,25 @@ def reader_of(dataset: Any) -> Callable[[], Iterator[Logged]]:
     if isinstance(dataset, str | Path):
         path = path_of("dataset", dataset)
         is_table = path.suffix.lower() == ".csv"
-        return lambda: _followed(_table_lines(path)) if is_table else _json_lines(path)
+        return lambda: (
+            _with_next_observations(_table_lines(path)) if is_table else _json_lines(path)
+        )
     if hasattr(dataset, "columns") and hasattr(dataset, "iloc"):  # a table of pandas
         dataset = {str(name): dataset[name].to_numpy() for name in dataset.columns}
     if isinstance(dataset, Mapping):
         columns = _columns_of(dataset)
-        return lambda: _followed(_rows(columns, "row"))
+        return lambda: _with_next_observations(_rows(columns, "row"))
     if callable(getattr(dataset, "iterate_episodes", None)):
-        return lambda: _items(dataset.iterate_episodes())
+        return lambda: _transitions_of_items(dataset.iterate_episodes())
     if isinstance(dataset, Iterable):
         items = [*dataset] if isinstance(dataset, Iterator) else dataset
-        return lambda: _items(items)
+        return lambda: _transitions_of_items(items)
     expected = "must be a path, arrays by name, a table, a Minari dataset, transitions or episodes"
     raise argument_error("dataset", f"{expected}, got {shown(dataset)}", TypeError)
 
 
 def _json_lines(path: Path) -> Iterator[Logged]:
-    for number, line in _lines(path):
+    for number, line in _numbered_lines(path):
         try:
             values = json.loads(line)
         except (ValueError, RecursionError) as error:
@@ -100,7 +102,7 @@ def _json_lines(path: Path) -> Iterator[Logged]:
 def _table_lines(path: Path) -> Iterator[tuple[str, Data]]:
     """Read a file of comma-separated values, whose first line has the names."""
     names: list[str] = []
-    for number, line in _lines(path):
+    for number, line in _numbered_lines(path):
         try:
             cells = next(csv.reader(io.StringIO(line.decode())), [])
         except (UnicodeDecodeError, csv.Error) as error:
@@ -110,12 +112,14 @@ def _table_lines(path: Path) -> Iterator[tuple[str, Data]]:
             continue
         expected = f"have {len(names)} cells, as many as there are names"
         require(len(cells) == len(names), f"dataset, line {number}", expected, cells)
-        values = {name: [_cell(cell)] for name, cell in zip(names, cells, strict=True)}
+        values = {name: [_parse_cell(cell)] for name, cell in zip(names, cells, strict=True)}
         for _, row in _rows(_columns_of(values, f"dataset, line {number}"), ""):
             yield f"line {number}", row
 
 
-def _followed(rows: Iterable[tuple[str, Data]], *, is_episode: bool = False) -> Iterator[Logged]:
+def _with_next_observations(
+    rows: Iterable[tuple[str, Data]], *, is_episode: bool = False
+) -> Iterator[Logged]:
     """Convert rows to transitions; a missing next observation is that of the next row.
 
     The last step of a truncated episode then has no next observation, and is left out.
@@ -140,7 +144,7 @@ def _followed(rows: Iterable[tuple[str, Data]], *, is_episode: bool = False) -> 
             yield _logged(row, place)
 
 
-def _cell(text: str) -> Any:
+def _parse_cell(text: str) -> Any:
     word = text.strip()
     if word.lower() in ("true", "false"):
         return word.lower() == "true"
@@ -150,7 +154,7 @@ def _cell(text: str) -> Any:
         return word
 
 
-def _lines(path: Path) -> Iterator[tuple[int, bytes]]:
+def _numbered_lines(path: Path) -> Iterator[tuple[int, bytes]]:
     with open_regular(path, 2**62) as file:
         number = 0
         while line := file.readline(_MOST_BYTES + 1):
@@ -160,7 +164,7 @@ def _lines(path: Path) -> Iterator[tuple[int, bytes]]:
             yield number, line
 
 
-def _items(items: Iterable[Any]) -> Iterator[Logged]:
+def _transitions_of_items(items: Iterable[Any]) -> Iterator[Logged]:
     """Read items of an iterable, each of which is a transition or an episode."""
     for number, item in enumerate(items):
         if isinstance(item, Transition):
@@ -178,7 +182,7 @@ def _items(items: Iterable[Any]) -> Iterator[Logged]:
             else:
                 columns = _columns_of(values, f"dataset, episode {number}", is_episode=True)
                 rows = _rows(columns, f"episode {number}, step", is_episode=True)
-                yield from _followed(rows, is_episode=True)
+                yield from _with_next_observations(rows, is_episode=True)
 
 
 _ROW = ("observations", "actions", "rewards", "next_observations", "terminations", "truncations")
@@ -253,7 +257,7 @@ def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = Fals
             parts.setdefault(part, {})[int(numbered[2])] = array_of(f"{where}[{name!r}]", column)
         elif whole is not None:
             require(whole not in columns, where, f"have {whole} once", [*values])
-            columns[whole] = _column(f"{where}[{name!r}]", column)
+            columns[whole] = _checked_column(f"{where}[{name!r}]", column)
         else:
             raise argument_error(
                 where, f"must have no {name!r}: {advice(str(name), NAMES)}; got {[*values]}"
@@ -264,8 +268,8 @@ def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = Fals
         columns[name] = np.stack([numbers[i] for i in range(len(numbers))], axis=-1)
     missing = [name for name in _ARRAYS if name not in columns]
     require(not missing, where, f"have {', '.join(missing)}", [*values])
-    n = _length(columns["rewards"])
-    lengths = {name: _length(column) for name, column in columns.items()}
+    n = _n_rows_of(columns["rewards"])
+    lengths = {name: _n_rows_of(column) for name, column in columns.items()}
     one_more = ("observations",) if "next_observations" not in columns else ()
     expected = f"have {n} rows of each, as of rewards" + " (of observations one more)" * bool(
         one_more
@@ -278,11 +282,11 @@ def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = Fals
     return columns
 
 
-def _column(name: str, column: Any) -> Any:
+def _checked_column(name: str, column: Any) -> Any:
     if isinstance(column, Mapping):
-        return {key: _column(f"{name}[{key!r}]", part) for key, part in column.items()}
+        return {key: _checked_column(f"{name}[{key!r}]", part) for key, part in column.items()}
     if isinstance(column, tuple) and column and np.ndim(column[0]) > 0:
-        return tuple(_column(f"{name}[{i}]", part) for i, part in enumerate(column))
+        return tuple(_checked_column(f"{name}[{i}]", part) for i, part in enumerate(column))
     if getattr(getattr(column, "dtype", None), "kind", "") == "O" or _is_of_mappings(column):
         return list(column)  # rows of dictionaries or tuples, which the agent reads
     if isinstance(column, np.ma.MaskedArray):  # the agent reads masks as missing values
@@ -294,29 +298,31 @@ def _is_of_mappings(column: Any) -> bool:
     return isinstance(column, list) and bool(column) and isinstance(column[0], Mapping)
 
 
-def _length(column: Any) -> int:
+def _n_rows_of(column: Any) -> int:
     if isinstance(column, Mapping | tuple):
         parts = column.values() if isinstance(column, Mapping) else column
-        return min((_length(part) for part in parts), default=0)
+        return min((_n_rows_of(part) for part in parts), default=0)
     return len(column) if np.ndim(column) or isinstance(column, list) else 0
 
 
 def _rows(columns: Data, place: str, *, is_episode: bool = False) -> Iterator[tuple[str, Data]]:
     """Yield the rows of arrays with their places; last, an observation that follows them."""
-    n, has_next = _length(columns["rewards"]), "next_observations" in columns
-    for i in range(n if has_next else _length(columns["observations"])):
+    n, has_next = _n_rows_of(columns["rewards"]), "next_observations" in columns
+    for i in range(n if has_next else _n_rows_of(columns["observations"])):
         names = columns if i < n else ("observations",)
-        row = {name: _at(columns[name], i) for name in names}
+        row = {name: _element_at(columns[name], i) for name in names}
         if is_episode and i == n - 1 and not _flag("terminations", row.get("terminations", False)):
             row["truncations"] = True
         yield f"{place} {i}", row
 
 
-def _at(values: Any, t: int) -> Any:
+def _element_at(values: Any, t: int) -> Any:
     """Return element t of an array, or of each array in nested dictionaries and tuples."""
     if isinstance(values, Mapping):
-        return {name: _at(part, t) for name, part in values.items()}
-    return tuple(_at(part, t) for part in values) if isinstance(values, tuple) else values[t]
+        return {name: _element_at(part, t) for name, part in values.items()}
+    return (
+        tuple(_element_at(part, t) for part in values) if isinstance(values, tuple) else values[t]
+    )
 
 
 class MinariDataset(Protocol):

@@ -42,7 +42,7 @@ def flat_bounds(space: Space) -> tuple[NDArray[np.float64], NDArray[np.float64]]
             f"observation_space must have at most {_MOST_VARIABLES} variables, got {n_variables}"
         )
     if not isinstance(gym.spaces.flatten_space(space), gym.spaces.Box):
-        raise TypeError(_no_vector(space))
+        raise TypeError(_problem_of_space(space))
     low, high = map(np.concatenate, zip(*_bounds_of_parts(space), strict=True))
     return low, high
 
@@ -74,10 +74,10 @@ def _n_variables(space: Space) -> int:
     try:
         return gym.spaces.flatdim(space)
     except (NotImplementedError, ValueError):
-        raise TypeError(_no_vector(space)) from None
+        raise TypeError(_problem_of_space(space)) from None
 
 
-def _no_vector(space: Space) -> str:
+def _problem_of_space(space: Space) -> str:
     return (
         "observation_space must be a space that Gymnasium flattens to a vector,"
         f" got {type(space).__name__}"
@@ -105,7 +105,7 @@ def space_data(space: Space) -> Data:
     """Return a space as data that JSON can hold; TypeError for other kinds of spaces."""
     dtype = np.dtype(space.dtype).str
     if isinstance(space, gym.spaces.Box):
-        ends = [_finite(space.low), _finite(space.high)]
+        ends = [_finite_or_text(space.low), _finite_or_text(space.high)]
         return {"box": ends, "shape": list(space.shape), "dtype": dtype}
     if isinstance(space, gym.spaces.Discrete):
         return {"discrete": int(space.n), "start": int(space.start), "dtype": dtype}
@@ -145,7 +145,7 @@ _MOST_VALUES = 2**20
 """Largest number of values of a space in a file, so that a damaged file takes no memory."""
 
 
-def _finite(values: Array) -> list[Any]:
+def _finite_or_text(values: Array) -> list[Any]:
     """Return numbers as a flat list, with infinite ones as texts, which JSON lacks."""
     return [str(x) if np.isinf(x) else x for x in values.reshape(-1).tolist()]
 
@@ -258,7 +258,7 @@ def require_same_kind(agent: object, env: object) -> None:
             " *agent.scaling.ends) of sdnn.environments, or Run.open(folder).config.environment"
             " of sdnn.runs"
         )
-    for name, fits in (("observation_space", _can_observe), ("action_space", _acts_alike)):
+    for name, fits in (("observation_space", _can_observe), ("action_space", _has_equal_actions)):
         space, other_space = getattr(agent, name, None), _space_of(env, name)
         if space is not None and other_space is not None and not fits(space, other_space):
             raise ValueError(
@@ -343,7 +343,7 @@ def _can_observe(space: Space, other_space: Space) -> bool:
     )
 
 
-def _acts_alike(space: Space, other_space: Space) -> bool:
+def _has_equal_actions(space: Space, other_space: Space) -> bool:
     if isinstance(space, gym.spaces.Box) and isinstance(other_space, gym.spaces.Box):
         return space.low.size == other_space.low.size
     return wholes_of(space) is not None and wholes_of(space) == wholes_of(other_space)

@@ -80,7 +80,7 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
     ) -> Self:
         """Present the samples once, in order, as `SDNNRegressor.partial_fit` does.
 
-        ``classes``, all labels that can occur, must be given in the first call. Raises as `fit`.
+        ``classes``, all labels that can occur, must be given in the first call. Errors: see `fit`.
         """
         self._require_classes(classes)
         return self._partial_fit(X, y, classes, sample_weight)

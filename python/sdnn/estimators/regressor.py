@@ -83,7 +83,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
 
         The weights equal those of `fit` with ``max_iter=1, shuffle=False`` if ranges and categories
         are given; otherwise the first call learns them. With ``out_of_range="widen"`` targets widen
-        the range one after the other, not all at once as in `fit`. Raises as `fit`.
+        the range one after the other, not all at once as in `fit`. Errors: see `fit`.
         """
         return self._partial_fit(X, y, None, sample_weight)
 
@@ -134,7 +134,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         self._flat = targets.ndim == 1
         targets = targets.reshape(len(targets), -1)
         self.n_outputs_ = targets.shape[1]
-        self.output_range_ = self._range_of(targets)
+        self.output_range_ = self._fitted_output_range(targets)
         self.n_outputs_out_of_range_ = 0
         self._counts_of_range = self.n_output_units
         return self.n_outputs_ * self.n_output_units
@@ -167,7 +167,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         counts = self.network_.counts(bins, self.n_outputs_, self._n_threads())
         return -weighted_mean((targets - counts) ** 2, weights)
 
-    def _range_of(self, targets: Floats) -> Floats:
+    def _fitted_output_range(self, targets: Floats) -> Floats:
         if self.output_range is not None:
             try:
                 ranges = array_of("output_range", self.output_range, "iuf").astype(np.float64)

@@ -272,7 +272,7 @@ def read_parameter_file(path: str | Path) -> LibsdnnParameters:
     """
     path = path_of("path", path)
     with naming(path):
-        return _parameters(read_bytes(path, MOST_BYTES).decode("latin-1"), path)
+        return _parse_parameters(read_bytes(path, MOST_BYTES).decode("latin-1"), path)
 
 
 def read_model_file(
@@ -302,7 +302,7 @@ def read_model_file(
         length = struct.unpack_from("<i", content)[0] if len(content) >= 4 else -1
         if not 0 < length <= len(content) - 4:
             raise ValueError(f"it must begin with the length of its parameters, got {length}")
-        parameters = _parameters(content[4 : 4 + length].decode("latin-1"), path)
+        parameters = _parse_parameters(content[4 : 4 + length].decode("latin-1"), path)
         n_units = parameters.n_output_units
         n_columns = len(parameters.pairs) * parameters.n_units
         expected = 4 * n_units * (n_columns + 1)
@@ -330,7 +330,7 @@ def read_model_file(
         return LibsdnnModel(parameters=parameters, layer=layer)
 
 
-def _input(text: str, n_units: int) -> LibsdnnInput:
+def _parse_input(text: str, n_units: int) -> LibsdnnInput:
     match = re.fullmatch(r"(NUMERICAL|SYMBOLIC)\(RANDOM_INVERSE\(([^,]*),([^,]*)\)\)", text)
     if match is None:
         raise ValueError(
@@ -345,7 +345,7 @@ def _input(text: str, n_units: int) -> LibsdnnInput:
     )
 
 
-def _pairs(entries: Entries, n_inputs: int) -> tuple[tuple[int, int], ...]:
+def _parse_pairs(entries: Entries, n_inputs: int) -> tuple[tuple[int, int], ...]:
     method = entries.one_of("SDNN/SD/combination_setting", "mutual", "saved", "file")
     if method == "mutual":
         if n_inputs * (n_inputs - 1) > MOST_PAIRS:
@@ -374,7 +374,7 @@ def _pairs(entries: Entries, n_inputs: int) -> tuple[tuple[int, int], ...]:
     return tuple(pairs)
 
 
-def _parameters(text: str, path: Path) -> LibsdnnParameters:
+def _parse_parameters(text: str, path: Path) -> LibsdnnParameters:
     entries = Entries(text, path)
     task = entries.one_of("ISSUE/type", "function_approximation", "pattern_recognition")
     n_inputs = entries.whole("ISSUE/input_number", 1, 10000)
@@ -382,7 +382,7 @@ def _parameters(text: str, path: Path) -> LibsdnnParameters:
     if n_units % 2 != 0:
         raise ValueError(f"n must be even, got {n_units}")
     name = "SDNN/PC/input_type_and_creation_method"
-    inputs = tuple(_input(item, n_units) for item in entries.list_of(name))
+    inputs = tuple(_parse_input(item, n_units) for item in entries.list_of(name))
     if len(inputs) != n_inputs:
         raise ValueError(f"{name} must have input_number = {n_inputs} items, got {len(inputs)}")
     name = "initial_value_range"
@@ -394,7 +394,7 @@ def _parameters(text: str, path: Path) -> LibsdnnParameters:
         task="regression" if task == "function_approximation" else "classification",
         n_units=n_units,
         inputs=inputs,
-        pairs=_pairs(entries, n_inputs),
+        pairs=_parse_pairs(entries, n_inputs),
         pattern_seed=entries.seed("SDNN/PC/random_seed"),
         weight_seed=entries.seed("SDNN/NN/random_seed"),
         initial_range=(low, high),

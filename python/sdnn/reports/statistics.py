@@ -65,7 +65,7 @@ def estimate_median(values: ArrayLike) -> Estimate:
     >>> estimate_median([4.0, 4.0, 4.0])
     Estimate(value=4.0, lower=4.0, upper=4.0)
     """
-    return _estimate(_median, values)
+    return _bootstrap(_median, values)
 
 
 def estimate_mean(values: ArrayLike) -> Estimate:
@@ -77,7 +77,7 @@ def estimate_mean(values: ArrayLike) -> Estimate:
     Estimate(value=3.0, lower=3.0, upper=3.0)
     """
     _check_finite("averaged", values)
-    return _estimate(lambda sample: np.asarray(np.mean(sample, axis=-1)), values)
+    return _bootstrap(lambda sample: np.asarray(np.mean(sample, axis=-1)), values)
 
 
 def estimate_contrast(
@@ -93,7 +93,7 @@ def estimate_contrast(
     Estimate(value=3.0, lower=3.0, upper=3.0)
     """
     _check_finite("compared", values, others)
-    return _estimate(
+    return _bootstrap(
         lambda first, second: contrast(_median(first), _median(second)), values, others
     )
 
@@ -109,7 +109,7 @@ def interval_limits(distribution: FloatArray, confidence: float = CONFIDENCE) ->
     return np.asarray(limits, np.float64)
 
 
-def _estimate(statistic: Callable[..., FloatArray], *groups: ArrayLike) -> Estimate:
+def _bootstrap(statistic: Callable[..., FloatArray], *groups: ArrayLike) -> Estimate:
     samples = [np.asarray(values, np.float64) for values in groups]
     for sample in samples:
         if sample.ndim != 1 or sample.size == 0:

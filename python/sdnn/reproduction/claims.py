@@ -243,16 +243,16 @@ def judge_claims(
     draws = TenTrials(more.values())
     outcomes = []
     for claim in CLAIMS:
-        checks = tuple(_judge(check, by_subject, costs) for check in claim.checks)
+        checks = tuple(_judge_check(check, by_subject, costs) for check in claim.checks)
         outcome = ClaimOutcome(claim, checks)
-        better = ClaimOutcome(claim, tuple(_judge(check, more, ()) for check in claim.checks))
+        better = ClaimOutcome(claim, tuple(_judge_check(check, more, ()) for check in claim.checks))
         if better.verdict is not Verdict.NOT_RUN:
             outcome = replace(outcome, more=better, chance=draws.chance(claim))
         outcomes.append(outcome)
     return tuple(o for o in outcomes if any(check.estimate is not None for check in o.checks))
 
 
-def _judge(
+def _judge_check(
     check: Check, measured: Mapping[Subject, TrialMeasures], costs: Sequence[CostRecord]
 ) -> CheckOutcome:
     if check.measure is None:

@@ -219,7 +219,7 @@ def _claim_table(claims: Iterable[ClaimOutcome]) -> Table:
         quantities: dict[str, list[str]] = {}
         for check in claim.checks:
             if (text := format_quantity(check)) != "-":
-                quantities.setdefault(_name(check.check), []).append(text)
+                quantities.setdefault(_quantity_name(check.check), []).append(text)
         ours = "; ".join(f"{name}: {', '.join(values)}" for name, values in quantities.items())
         paper = "; ".join(dict.fromkeys(check.check.paper for check in claim.checks))
         row = (str(claim.claim.number), claim.claim.text, paper, ours or "-")
@@ -234,7 +234,7 @@ def _claim_table(claims: Iterable[ClaimOutcome]) -> Table:
     )
 
 
-def _name(check: Check) -> str:
+def _quantity_name(check: Check) -> str:
     """Return the name of a check's quantity, without the agents that the claim's text names."""
     if check.measure is None:
         return f"{check.n_inputs} inputs / {check.n_fewer}"
@@ -294,12 +294,12 @@ def cost_table(costs: Sequence[CostRecord]) -> Table:
         table = by_key.get(("fuzzy", n_inputs))
         size = "-" if table is None else f"{table.table_bytes / 1e6:,.3g} MB"
         pairs = [(by_key.get((s.id, n_inputs)), by_key.get((s.id, n_inputs - 1))) for s in SERIES]
-        rows.append((str(n_inputs), *(_cost(*pair) for pair in pairs), size))
+        rows.append((str(n_inputs), *(_cost_cell(*pair) for pair in pairs), size))
     header = ("inputs", *(series.title for series in SERIES), "FQL's table")
     return Table("Cost of a step", header, rows)
 
 
-def _cost(cost: CostRecord | None, with_one_less: CostRecord | None) -> str:
+def _cost_cell(cost: CostRecord | None, with_one_less: CostRecord | None) -> str:
     if cost is None:
         return "-"
     lower, middle, upper = np.percentile(cost.microseconds, (25, 50, 75))

@@ -129,7 +129,11 @@ def spec_schema() -> Values:
     structs = [
         msgspec.defstruct(
             config.__name__,
-            [(f.name, _type(f), f.default) for f in fields_of(config) if f.name != "n_inputs"],
+            [
+                (f.name, _schema_of_type(f), f.default)
+                for f in fields_of(config)
+                if f.name != "n_inputs"
+            ],
             forbid_unknown_fields=True,
         )
         for config in (*configs, *PAPER_ARGUMENTS.values())
@@ -155,7 +159,7 @@ def spec_schema() -> Values:
             "$ref": "#/$defs/RunSpec", "$defs": components}  # fmt: skip
 
 
-def _type(field: Field) -> object:
+def _schema_of_type(field: Field) -> object:
     limits: Values = {}
     if field.hint in ("int", "float"):
         number = int if field.hint == "int" else float

@@ -136,7 +136,7 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
 def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
     """Return the curves of a group: the median over evaluated runs, or each run's; and notes."""
     rows = {run: run.rows() for run in group.runs}
-    series = {run: _series(run_rows, "evaluation") for run, run_rows in rows.items()}
+    series = {run: _steps_and_values(run_rows, "evaluation") for run, run_rows in rows.items()}
     evaluated = {run: pair for run, pair in series.items() if len(pair[0])}
     what = "no evaluation" if evaluated else "no episode and no evaluation"
     shown = [*evaluated] or [run for run, run_rows in rows.items() if run_rows]
@@ -160,7 +160,7 @@ def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
 
 def _curves_of_run(group: Group, run: Run, rows: Sequence[Row]) -> Iterator[Curve]:
     for kind in get_args(Kind):
-        steps, values = _series(rows, kind)
+        steps, values = _steps_and_values(rows, kind)
         bounds = {}
         if kind == "evaluation" and len(steps):
             evaluations = (row["returns"] for row in rows if row["kind"] == "evaluation")
@@ -173,7 +173,9 @@ def _curves_of_run(group: Group, run: Run, rows: Sequence[Row]) -> Iterator[Curv
             )  # fmt: skip
 
 
-def _series(rows: Sequence[Row], kind: Kind) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _steps_and_values(
+    rows: Sequence[Row], kind: Kind
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     wanted, name = "episode", "return"
     if kind == "evaluation":
         wanted, name = "evaluation", "mean_return"

@@ -250,12 +250,14 @@ def run_to_end(planned: PlannedTrial) -> Generator[Advanced | Finished, None, No
                 done = trial.done if isinstance(trial, TrainingTrial) else trial.episode
                 yield Advanced(planned, done)
         if trial.finished:
-            record = _record(planned, trial, time.thread_time() - begin)
+            record = _make_record(planned, trial, time.thread_time() - begin)
     if record is not None:
         yield Finished(planned, record)
 
 
-def _record(planned: PlannedTrial, trial: Trial | TrainingTrial, seconds: float) -> TrialRecord:
+def _make_record(
+    planned: PlannedTrial, trial: Trial | TrainingTrial, seconds: float
+) -> TrialRecord:
     return TrialRecord(
         key=planned.key,
         config=planned.spec.canonical_json(),
@@ -313,7 +315,7 @@ class Team:
         """Yield the finished trials and remove them from the team."""
         for planned, trial in tuple(self.trials.items()):
             if trial.finished:
-                yield Finished(planned, _record(planned, trial, self._seconds[planned]))
+                yield Finished(planned, _make_record(planned, trial, self._seconds[planned]))
                 del self.trials[planned]
 
 

@@ -177,10 +177,10 @@ class EnvironmentSpec(Settings, frozen=True):
         ConfigError if there is no such environment, it cannot be made, or ranges are missing or
         wrong. RunError if it can be made, but not with this render mode.
         """
-        env = self._bare(stream, render_mode)
+        env = self._make_unwrapped(stream, render_mode)
         try:
             if render_mode is not None and env.render_mode != render_mode:
-                raise RunError(_no_pictures(self.id, render_mode))
+                raise RunError(_problem_of_render_mode(self.id, render_mode))
             if self.action_masks:
                 try:
                     env = ActionMasks(env)
@@ -234,7 +234,7 @@ class EnvironmentSpec(Settings, frozen=True):
 
         Where the agent acts without the noisy or redundant sensors of its run, it needs
         ``UnitSensors(env, *scaling.ends)``. ``env`` is one that `make` gave; by default one is
-        made. ConfigError as `make`.
+        made. ConfigError if that is impossible.
 
         Examples
         --------
@@ -274,7 +274,7 @@ class EnvironmentSpec(Settings, frozen=True):
             low[int(key)], high[int(key)] = self.ranges[key]
         return low, high
 
-    def _bare(self, stream: NoiseStream, render_mode: str | None) -> Env:
+    def _make_unwrapped(self, stream: NoiseStream, render_mode: str | None) -> Env:
         options = {"disable_env_checker": True, **self.kwargs}
         if self.is_paper_acrobot:
             options["stream"] = stream
@@ -290,8 +290,8 @@ class EnvironmentSpec(Settings, frozen=True):
             raise ConfigError("environment.id", f"no environment {self.id!r}: {error}") from error
         except Exception as error:  # a user's environment may raise anything
             if render_mode is not None:
-                self._bare(stream, None).close()
-                raise RunError(_no_pictures(self.id, render_mode)) from error
+                self._make_unwrapped(stream, None).close()
+                raise RunError(_problem_of_render_mode(self.id, render_mode)) from error
             problem = f"{self.id} cannot be made: {type(error).__name__}: {error}"
             other = "environment.kwargs" if self.kwargs else "environment.id"
             raise ConfigError(self.key_of(blamed(error)[0]) or other, problem) from error
@@ -354,9 +354,9 @@ def find_module(name: str) -> None:
 
 
 def render_modes(env: Env) -> tuple[str, ...]:
-    """Return the render modes in the metadata of an environment; none where there are none."""
+    """Return the render modes in the metadata of an environment, or an empty tuple."""
     return tuple((env.metadata or {}).get("render_modes") or ())
 
 
-def _no_pictures(name: str, render_mode: str) -> str:
+def _problem_of_render_mode(name: str, render_mode: str) -> str:
     return f"{name} cannot be rendered as pictures ({render_mode})"

@@ -81,7 +81,7 @@ def record(
         rate = float((env.metadata or {}).get("render_fps") or FRAMES_PER_SECOND)
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            _write(path, frames(), rate)
+            _write_frames(path, frames(), rate)
         except UnusableStepError as error:
             raise RunError(f"{run.spec.task}: {error}") from error
     return recording
@@ -101,7 +101,7 @@ def _rendered(env: Env) -> Iterator[NDArray[np.uint8]]:
         yield frame
 
 
-def _write(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:
+def _write_frames(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:
     import imageio_ffmpeg
 
     is_gif = path.suffix == ".gif"

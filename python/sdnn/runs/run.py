@@ -362,16 +362,16 @@ class _StoredCheckpoints(CheckpointCallback):
 
     def on_start(self, training: Training) -> None:
         """Remove the rows that were stored after the checkpoint."""
-        self._store(training)
+        self._store_rows(training)
 
     def on_row(self, training: Training, row: Row) -> None:
         """Collect a row; store the collected rows if `STORE_SECONDS` have passed."""
         self._rows.append(row)
         if time.monotonic() - self._stored_at > STORE_SECONDS:
-            self._store(training)
+            self._store_rows(training)
 
     def finish(self, training: Training) -> None:
-        """Note in the store that the run is finished."""
+        """Mark the run as finished in the store."""
         record = TrialRecord(
             key=self._key,
             config=self._config,
@@ -382,10 +382,10 @@ class _StoredCheckpoints(CheckpointCallback):
         self._results.add(record, is_exact=False)
 
     def _save(self, training: Training) -> None:
-        self._store(training)
+        self._store_rows(training)
         super()._save(training)
 
-    def _store(self, training: Training) -> None:
+    def _store_rows(self, training: Training) -> None:
         first = training.n_rows - len(self._rows)
         rows = TrialRows.from_training(self._rows, first)
         self._results.extend(

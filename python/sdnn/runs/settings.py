@@ -75,7 +75,7 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """
 
     def __post_init__(self) -> None:
-        for name, kind in _kinds_of(type(self)).items():
+        for name, kind in _types_of_fields(type(self)).items():
             value = getattr(self, name)
             made = convert_value(kind, value, name)
             if made is not value:
@@ -87,7 +87,7 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 @functools.cache
-def _kinds_of(kind: type[object]) -> Mapping[str, Any]:
+def _types_of_fields(kind: type[object]) -> Mapping[str, Any]:
     try:
         hints = typing.get_type_hints(kind, include_extras=True)
     except (NameError, TypeError):  # annotations of a user's agent: accept any value
@@ -132,7 +132,7 @@ def convert_value(kind: object, value: object, key: str) -> Any:
         made = msgspec.convert(value, kind)
     except (msgspec.ValidationError, UnicodeEncodeError) as error:  # a command line has any bytes
         text, _, path = str(error).partition(" - at `$")
-        problem = _problem(_alternatives(kind) if not path else (), text)
+        problem = _expected_value(_alternatives(kind) if not path else (), text)
         raise ConfigError(key + path[:-1], f"{problem}, got {shown(value)}") from None
     if isinstance(made, float) and not math.isfinite(made):
         raise ConfigError(key, f"must be finite, got {made}")
@@ -149,7 +149,7 @@ def _alternatives(kind: object) -> tuple[object, ...]:
     return (kind,)
 
 
-def _problem(possible: Iterable[object], text: str) -> str:
+def _expected_value(possible: Iterable[object], text: str) -> str:
     choices = [repr(w) for form in possible if get_origin(form) is Literal for w in get_args(form)]
     if choices:
         others = " or an array" if any(get_origin(form) is tuple for form in possible) else ""
@@ -208,7 +208,7 @@ def with_changes(base: AnyPart, values: object, where: str, hint: str = "") -> A
         raise ConfigError(f"{where}.n_inputs", "follows from the observations: omit it")
     values = check_names(values, [name for name in names if name != "n_inputs"], where, hint)
     if not fields_of(type(base)):
-        kinds = _kinds_of(base.__class__)
+        kinds = _types_of_fields(base.__class__)
         values = {
             name: convert_value(kinds[name], v, f"{where}.{name}") for name, v in values.items()
         }

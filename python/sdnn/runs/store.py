@@ -168,7 +168,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         StoreError if the file cannot be written, or holds other rows of an exact trial.
         """
         with self._writing():
-            run = self._begun(record.key, record.config, record.version)
+            run = self._run_in_progress(record.key, record.config, record.version)
             if run.finished_at is not None:
                 if is_exact and run.checksum != record.rows.checksum():
                     raise StoreError(
@@ -198,7 +198,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         again.
         """
         with self._writing():
-            run = self._begun(key, config, version)
+            run = self._run_in_progress(key, config, version)
             hashed = rows.hashed(self._hash_before(run, first))
             self._insert(run.id, rows)
             seconds += run.seconds
@@ -233,9 +233,9 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         with as_store_error(self.path):
             finished = {run.key: run for run in self._runs() if run.finished_at is not None}
             wanted = sorted(finished if keys is None else finished.keys() & set(keys))
-            return tuple(self._record(finished[key]) for key in wanted)
+            return tuple(self._make_record(finished[key]) for key in wanted)
 
-    def _record(self, run: _Run) -> TrialRecord:
+    def _make_record(self, run: _Run) -> TrialRecord:
         return TrialRecord(
             key=run.key,
             config=run.config,
@@ -275,7 +275,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
                 raise StoreError(f"{self.path} is damaged: runs, id {run.id}: {problem}")
         return runs
 
-    def _begun(self, key: TrialKey, config: str, version: str) -> _Run:
+    def _run_in_progress(self, key: TrialKey, config: str, version: str) -> _Run:
         for run in self._runs(key):
             return run
         nothing = (0, 0.0, None, TrialRows(np.zeros(0, ROW)).checksum())

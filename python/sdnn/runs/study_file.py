@@ -133,7 +133,7 @@ class StudyFile(Study):
         try:
             self.tables = read_table(StudyTables, self.file.values)
             header = self.tables.study
-            self._import()
+            self._import_modules()
             self.base = self._layer((BASE,), self.tables.base)
             self.agents = dict(self._read_agents())
             cases = self._read_cases()
@@ -251,7 +251,7 @@ class StudyFile(Study):
             layer[name] = Setting(value, place)
         return layer
 
-    def _import(self) -> None:
+    def _import_modules(self) -> None:
         search_folder(self.file.path.resolve().parent)
         for number, module in enumerate(self.tables.study.imports):
             find_module(module)

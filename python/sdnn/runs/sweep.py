@@ -229,7 +229,7 @@ def study_page(comparison: Comparison, digest: str, addition: Addition, picture:
             Section(title="At a glance", picture=picture, alt=alt),
             *addition[0],
             *_case_sections(comparison),
-            _measures(comparison),
+            _measures_section(comparison),
             Section(title="The study", folded=[file]),
             settings_section(titles),
         ],
@@ -269,7 +269,7 @@ def _difference(measured: Measured, name: MeasureName) -> str:
     return text + (" *" if measured.differs(name) else "")
 
 
-def _measures(comparison: Comparison) -> Section:
+def _measures_section(comparison: Comparison) -> Section:
     measured, study = comparison.measured.values(), comparison.study
     copies = study.copies().items()
     notes = [f"The variant {variant} is the same as {first}." for variant, first in copies]

@@ -144,7 +144,7 @@ class SingleEnvironment(EnvironmentAdapter):
         return observation, reward, terminated, truncated
 
     def step(self, actions: Elements) -> Elements:
-        """Step the environment with the only action."""
+        """Step the environment with the action of environment 0, and return a batch of one."""
         observation, self.rewards[0], self.terminated[0], self.truncated[0] = self.take(actions[0])
         return observation[np.newaxis] if type(observation) is np.ndarray else [observation]
 

@@ -87,7 +87,7 @@ def share_statistics(env: object, evaluation_env: object) -> None:
 
 
 def read_statistics(values: object) -> list[Statistics]:
-    """Make statistics of plain data; ValueError if they are none."""
+    """Make statistics from plain data; ValueError if the data is invalid."""
     try:
         learned = msgspec.convert(values, list[Statistics])
     except msgspec.ValidationError as error:
@@ -281,7 +281,10 @@ def _without_arrays(value: Any) -> Any:
 
 
 def read_training(path: Path) -> tuple[Any, SavedTraining]:
-    """Read an agent and its training; errors as of `read_agent`."""
+    """Read an agent and its training.
+
+    OSError if the file cannot be read; ValueError if it is damaged or holds no training.
+    """
     agent, description, arrays = read_agent(path, "training")
 
     takes_missing = agent.missing != "error"

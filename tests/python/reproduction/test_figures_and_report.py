@@ -109,7 +109,7 @@ def test_a_reproduction_reads_each_trial_once(monkeypatch, tmp_path, use_trial):
 
         return call
 
-    monkeypatch.setattr(ResultStore, "_record", counted("trial", ResultStore._record))
+    monkeypatch.setattr(ResultStore, "_make_record", counted("trial", ResultStore._make_record))
     done = run_study(PaperStudy(quick=True), tmp_path)
     # SDNN-C in Case I belongs to both figures.
     assert [len(one["cases"]) for one in done.table["experiments"]] == [2, 8]

@@ -152,7 +152,7 @@ class Actions {
     return true;
   }
 
-  /// Throws as agents::require_mask, and for a mask of a box.
+  /// Throws std::invalid_argument for a mask of a box, or one that does not fit the actions.
   void require_mask(std::string_view name, ActionMask mask) const {
     if (mask.empty()) return;
     core::require(config_.discrete, name, "None where actions are a box", mask.size());

@@ -55,7 +55,7 @@ using AnyLearningConfig =
 inline bool is_fuzzy(const AnyApproximatorConfig& config) noexcept {
   return std::holds_alternative<approximators::FuzzyRulesConfig>(config);
 }
-/// Whether an agent learns from actions of its own policy alone: not what a warm-up did.
+/// Whether an agent can learn only its own policy's actions, and not those of a warm-up.
 inline bool is_on_policy(const AnyLearningConfig& config) noexcept {
   return std::holds_alternative<FuzzyQLearningConfig>(config) ||
          std::holds_alternative<ActorCriticConfig>(config);

@@ -128,7 +128,7 @@ class Controller : public WithRates<Controller> {
     return std::visit([](const auto& agent) { return agent.n_environments(); }, *agent_);
   }
 
-  /// The next act in the environment is an episode's first. Throws as the agent does.
+  /// Begins an episode in the environment. Throws std::invalid_argument if it does not exist.
   void begin_episode(std::size_t environment = 0) {
     if (warm_up_) {
       warm_up_->begin_episode(environment);
@@ -287,11 +287,11 @@ class Controller : public WithRates<Controller> {
   void imitate(std::span<const double> observation, std::span<const double> action, double value,
                double margin);
 
-  /// Continues the episode of environment 0 with a teacher's action, and learns nothing: for the
-  /// value of a later observation. Throws as imitate.
+  /// Continues the episode of environment 0 with a teacher's action, and learns nothing, so that
+  /// later observations get their values. Throws std::invalid_argument like imitate.
   void follow_teacher(std::span<const double> observation, std::span<const double> action);
 
-  /// The state that the agent has for an observation. Valid until the next call. Throws as act.
+  /// The state of an observation, valid until the next call. Throws std::invalid_argument.
   std::span<const double> state_of(std::span<const double> observation) {
     last_states_.peek(observations_, 0, readings_.filled(observation, 0, true, held_), state_,
                       peeked_);

@@ -23,7 +23,7 @@ class Episodes {
   auto begin() const noexcept { return episodes_.begin(); }
   auto end() const noexcept { return episodes_.end(); }
 
-  /// The episode of an environment, from 0. Throws std::invalid_argument if there is none.
+  /// The episode of an environment, from 0. Throws std::invalid_argument if it does not exist.
   Episode& of(std::size_t environment) {
     core::require_below("environment", environment, size());
     return episodes_[environment];

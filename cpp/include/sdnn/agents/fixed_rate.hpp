@@ -28,7 +28,7 @@ namespace sdnn::agents {
 /// The accuracy of ticks is that with which the operating system wakes a sleeping thread.
 class FixedRate {
  public:
-  /// Seconds since any fixed moment; waits for so many seconds, or less.
+  /// A clock, in seconds since any fixed moment; and a function that waits some seconds, or less.
   using Clock = std::function<double()>;
   using Sleep = std::function<void(double)>;
 

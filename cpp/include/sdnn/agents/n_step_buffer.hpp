@@ -36,7 +36,7 @@ class NStepBuffer {
   bool is_full() const noexcept { return n_steps_ == steps_.size(); }
   /// Where the newest step led.
   std::span<const double> next_state() const noexcept { return next_state_; }
-  /// Whether `state` is where the newest step led, or there is none.
+  /// Whether `state` is the state after the newest step, or the buffer is empty.
   bool is_continued_by(std::span<const double> state) const noexcept {
     return n_steps_ == 0 || std::ranges::equal(state, next_state_);
   }

@@ -343,7 +343,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     networks_[d].update(step.state, workspace_.networks[d], step.action[d], target, learning_rate_);
   }
 
-  /// Learns the steps that wait, by the best value of the state where the newest one led.
+  /// Learns the pending steps, with the best value of the state after the newest one.
   void learn_waiting(Episode& episode) {
     learn_all(episode.buffer, state_value(episode.buffer.next_state(), episode.next_mask));
   }

@@ -16,7 +16,7 @@
 
 namespace sdnn::agents {
 
-/// How much of its range an observed variable has used of late.
+/// The part of its range that an observed variable has recently used.
 struct RangeUse {
   double share_used;    ///< the part of the range in which it was for nine tenths of the time
   double share_beyond;  ///< how often it was outside the range

@@ -1,4 +1,4 @@
-/// How large values can be: from the returns of late.
+/// The range of values, estimated from recent returns.
 #pragma once
 
 #include <algorithm>

@@ -97,7 +97,8 @@ class HiddenLayer {
     }
     store(unit, column, value);
   }
-  /// Adds sign * changes to the weights of a column. Shape: changes (n,). Throws like set_weight.
+  /// Adds sign * changes to the weights of a column. Shape: changes (n,). Throws
+  /// std::invalid_argument if a weight would exceed weight_limit().
   void add_to_column(std::size_t column, std::span<const std::int32_t> changes, int sign) {
     assert(changes.size() == n_units_);
     const std::int32_t limit = std::min(kByteLimit, weight_limit_);

@@ -70,7 +70,8 @@ class LinearSDNN {
                    n_first) {}
 
   /// Takes code books of any coding, a table per input, and adds the columns of `thermometers`.
-  /// Throws like the other constructor.
+  /// Throws std::invalid_argument naming the impossible field, and std::length_error beyond
+  /// max_table_bytes.
   LinearSDNN(const LinearSDNNConfig& config, std::span<const std::size_t> n_actions,
              std::vector<coding::PatternTable> tables, std::uint64_t seed, std::size_t n_first = 0,
              Thermometers thermometers = {})

@@ -151,7 +151,7 @@ class RBFNetwork {
     for (Eigen::Index b = 0; b < mixed.size(); ++b) q += mixed[b] * action_bases_.col(b);
   }
 
-  /// Q(state, action). Throws like values, and std::invalid_argument for an action out of range.
+  /// Q(state, action). Throws std::invalid_argument for a bad state or action.
   double value(std::span<const double> state, Workspace& workspace, std::size_t action) const {
     core::require_below("action", action, n_actions());
     const Eigen::ArrayXd& mixed = mix(state, workspace);
@@ -164,9 +164,9 @@ class RBFNetwork {
   /// Takes a gradient step of Q = Q(state, action) towards q_hat = (1 - rate) Q + rate target: W +=
   /// gradient_rate (q_hat - Q) phi(state, action).
   ///
-  /// Throws std::invalid_argument like value, and for a NaN target or a rate outside (0, 1];
+  /// Throws std::invalid_argument for a bad state or action, a NaN target or a rate outside (0, 1];
   /// std::overflow_error if the step exceeds 1e305 (the network has diverged, or target is
-  /// infinite): weights stay finite, and so do values. Nothing has changed then.
+  /// infinite), so that weights and values stay finite. Nothing has changed then.
   void update(std::span<const double> state, Workspace& workspace, std::size_t action,
               double target, double rate = 1.0) {
     core::require(!std::isnan(target), "target", "a number", target);

@@ -97,8 +97,8 @@ class SDNNC {
 
   /// Takes code books of any coding, a table per input: the range [0, 1] is divided into equal
   /// bins, one for each pattern of the table. The config's fields about anchors and symbols are
-  /// ignored. Throws std::invalid_argument if n_inputs or n_pattern_units do not fit the tables,
-  /// and like the other constructor.
+  /// ignored. Throws std::invalid_argument naming an impossible field, or if n_inputs or
+  /// n_pattern_units do not fit the tables; std::length_error beyond max_table_bytes.
   SDNNC(const SDNNCConfig& config, std::vector<coding::PatternTable> tables, std::uint64_t seed)
       : config_(config),
         code_(wiring_of(config, std::move(tables), seed)),
@@ -139,8 +139,8 @@ class SDNNC {
   }
 
   /// Writes the values by the average of the weights, rounded to steps of the lattice, if there is
-  /// an average. The first call after a change of the average takes some milliseconds. Throws like
-  /// values.
+  /// an average. The first call after a change of the average takes some milliseconds. Throws
+  /// std::invalid_argument for a state of wrong size or outside [0, 1].
   void averaged_values(std::span<const double> state, Workspace& workspace,
                        std::span<double> out) const {
     fill_values(state, workspace, out, true);
@@ -148,7 +148,7 @@ class SDNNC {
 
   /// Counts the firing units in the window of every action. workspace.counts() then has the counts,
   /// and value_of_count gives their values. `averaged` selects the average of the weights, as in
-  /// averaged_values. Throws like values.
+  /// averaged_values. Throws std::invalid_argument for a state of wrong size or outside [0, 1].
   void count(std::span<const double> state, Workspace& workspace, bool averaged) const {
     assert(fits(workspace));
     code_->bins_of(state, workspace.bins_);
@@ -181,7 +181,7 @@ class SDNNC {
     return approximators::averaged_threshold(*average_, unit);
   }
 
-  /// Q(state, action). Throws like values, and std::invalid_argument for an action out of range.
+  /// Q(state, action). Throws std::invalid_argument for a bad state or action.
   double value(std::span<const double> state, Workspace& workspace, std::size_t action) const {
     return scale_(count_in_window(recall(state, workspace).potentials, action));
   }

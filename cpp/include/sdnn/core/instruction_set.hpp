@@ -111,7 +111,7 @@ inline InstructionSet instruction_set() {
   return detail::active_level().load(std::memory_order_relaxed);
 }
 
-/// Forces a level, for the whole process. Throws like instruction_set_named.
+/// Forces a level for the whole process. Throws std::invalid_argument if it is not available.
 inline void set_instruction_set(std::string_view name) {
   detail::active_level().store(instruction_set_named(name), std::memory_order_relaxed);
 }

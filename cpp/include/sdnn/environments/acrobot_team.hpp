@@ -18,7 +18,7 @@ class AcrobotTeam {
   static constexpr std::size_t kMaxMembers = kAcrobotLanes;
 
   /// Adds `acrobot` to the next step as number `i`, below kMaxMembers; it must exist until then.
-  /// Throws like Acrobot::step.
+  /// Throws std::invalid_argument or std::logic_error if Acrobot::step would.
   void join(std::size_t i, Acrobot& acrobot, double torque, double goal_tolerance) {
     acrobot.check_step(torque, goal_tolerance);
     members_[i] = &acrobot;

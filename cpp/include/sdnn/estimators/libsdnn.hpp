@@ -129,7 +129,7 @@ struct LibsdnnTables {
 /// Draws the tables in LIBSDNN's order.
 ///
 /// Shapes: inputs, one configuration per input. Throws std::invalid_argument for a pair of an
-/// unknown input, and like libsdnn_patterns.
+/// unknown input, or where LIBSDNN would refuse a setting or not terminate.
 inline LibsdnnTables libsdnn_tables(std::span<const coding::RandomInverseConfig> inputs,
                                     std::span<const coding::InputPair> pairs,
                                     LibsdnnRandom& random) {

@@ -227,7 +227,7 @@ class ParallelPerceptron {
   }
 
   /// Writes the potentials in the order of the queries. Shapes: bins (n_queries, n_inputs), out
-  /// (n_queries, n_units). Throws like for_each_query, and if `out` has another size.
+  /// (n_queries, n_units). Throws std::invalid_argument for other sizes or bins out of range.
   void potentials(std::span<const std::int32_t> bins, int n_threads,
                   std::span<std::int32_t> out) const {
     require_size(out, bins.size() / code_->n_inputs() * n_units());
@@ -247,7 +247,7 @@ class ParallelPerceptron {
 
   /// Counts the firing units of each layer in each of `n_groups` equal groups. Shapes: bins
   /// (n_queries, n_inputs), out (n_layers, n_queries, n_groups). Throws std::invalid_argument
-  /// unless n_groups divides n_units and `out` fits, and like for_each_query.
+  /// unless n_groups divides n_units, the sizes fit and bins are in range.
   static void counts(Layers layers, std::span<const std::int32_t> bins, std::size_t n_groups,
                      int n_threads, std::span<std::int32_t> out) {
     core::require(!layers.empty(), "layers", "at least one layer", layers.size());

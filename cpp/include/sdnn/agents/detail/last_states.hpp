@@ -187,7 +187,7 @@ class LastStates {
     if (last_.size() <= environment) last_.resize(environment + 1);
     return last_[environment];
   }
-  /// The last state of an episode that goes on, or null.
+  /// The last state of an unfinished episode, or null.
   const LastState* last(std::size_t environment, bool is_greedy) const {
     if (environment >= last_.size()) return nullptr;
     const Environment& kept = last_[environment];

@@ -31,8 +31,8 @@ std::size_t checked_inputs(const Config& config) {
   return static_cast<std::size_t>(config.n_inputs);
 }
 
-/// The patterns of every input, by anchors or of symbols. Throws std::invalid_argument naming the
-/// impossible field, and like require_room before an allocation.
+/// Draws the patterns of every input, by anchors or of symbols. Throws std::invalid_argument naming
+/// the impossible field, and std::length_error, before an allocation, beyond max_table_bytes.
 template <class Config>
 std::vector<coding::PatternTable> code_books_of(const Config& config, std::uint64_t seed) {
   const std::size_t l = checked_inputs(config);
@@ -108,9 +108,10 @@ inline std::size_t stream_of_pair(std::size_t mu, std::size_t nu, std::size_t n_
   return last * (last - 1) + 2 * std::min(mu, nu) + (mu > nu ? 1 : 0);
 }
 
-/// Makes the code over these tables, with a permutation for each pair. If `n_first` is not 0, which
-/// needs all pairs, the first `n_first` inputs are wired as without the others. Throws
-/// std::invalid_argument if the tables do not fit the config, and like require_room.
+/// Makes the code over these tables, with a random permutation for each pair. If `n_first` is not
+/// 0, which needs all pairs, the permutations among the first `n_first` inputs are the same as
+/// without the other inputs. Throws std::invalid_argument if the tables do not fit the config, and
+/// std::length_error beyond max_table_bytes.
 template <class Config>
 std::shared_ptr<const coding::StateCode> wiring_of(const Config& config,
                                                    std::vector<coding::PatternTable> tables,
