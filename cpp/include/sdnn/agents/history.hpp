@@ -104,8 +104,8 @@ class HistoryFilter {
     std::vector<double> last = {}, numbers = {}, features = {};
   };
 
-  /// Begins an episode with its first observation's inputs, which may be beyond [0, 1] unless there
-  /// is no history. Shapes: (n_observed,), (n_inputs,).
+  /// Begins an episode with the inputs of its first observation, and writes the state. With a
+  /// history the inputs may be outside [0, 1]. Shapes: inputs (n_observed,), state (n_inputs,).
   void begin(std::span<const double> inputs, Memory& memory, std::span<double> state,
              Room& room) const {
     if (is_none()) {

@@ -186,18 +186,18 @@ class QLambda : public IndexAgent<QLambda> {
   }
 
   /// Whether the agent has acted in the present episode of an environment. Throws
-  /// std::invalid_argument if there is no such environment.
+  /// std::invalid_argument if the environment does not exist.
   bool has_acted(std::size_t environment) const {
     return episodes_.of(environment).exploration.step > 0;
   }
-  /// Notes that the last transition was not a step of the agent itself: the search for more rewards
-  /// is twice as long as that for the first one, without what was read from a log.
+  /// Notes that the last transition was read from a log and not made by the agent: such transitions
+  /// do not count in the length of the search for further rewards.
   void note_logged() noexcept {
     if (!readout().exponent()) ++n_logged_;
   }
 
-  /// Makes the unit of values smaller where it is larger than it has to be; see LinearTD. Sizes of
-  /// rewards are those of RewardScale, the last window's and the recent one.
+  /// Makes the unit of values smaller if it is larger than necessary; see LinearTD. The arguments
+  /// are sizes of RewardScale, that of the last window and the recent one.
   void refine_unit(std::int32_t size_in_window, std::int32_t size) {
     td_.refine_unit(size_in_window, size, episodes_);
   }

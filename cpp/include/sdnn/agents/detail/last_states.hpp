@@ -84,8 +84,9 @@ class LastStates {
       (is_learned ? kept.learned : kept.greedy).action.assign(action.begin(), action.end());
     }
   }
-  /// Finds the state of an observation, in the order of greedy episodes, and keeps nothing: of the
-  /// last one as it is, of another one that of the next step. Many threads may, with a room each.
+  /// Computes the state of an observation in a greedy episode, and keeps nothing. The observation
+  /// is the last one, whose state is returned unchanged, or that of the next step. Many threads may
+  /// call it at once, with a room each.
   void peek(const Observations& observations, std::size_t environment,
             std::span<const double> observation, std::span<double> state, Room& room) const {
     if (history_.is_none()) return observations.scale(observation, state);
