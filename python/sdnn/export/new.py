@@ -83,7 +83,7 @@ def new_agent(
             f"approximator must have the type {expected} for {kind}, got {shown(config)}"
         )
 
-    def made(size: NewConfig) -> NewAgent:
+    def make_agent(size: NewConfig) -> NewAgent:
         return agent_type(observation_space, action_space, **{**settings, "approximator": size})
 
     def ram_bytes_of(size: NewConfig) -> int:
