@@ -27,7 +27,7 @@ typedef struct {
   int32_t exponent;    /* of the unit of errors */
 } sdnn_error_scale;
 
-/* Everything that the agent remembers. All functions take its address. */
+/* The state of the agent. All functions take its address. */
 typedef struct {
   int64_t n_learned;
   int64_t old_value; /* of the present state, before the last step of learning */
@@ -218,8 +218,8 @@ static inline uint32_t sdnn_drawn(const uint32_t* weights, uint64_t sum, sdnn_ra
   return action;
 }
 
-/* The action to take in each dimension: without `explore` a most probable one. Writes the places of
- * most probable actions unless `place` is null. */
+/* The action to take in each dimension; without `explore` a most probable one. Unless `place` is
+ * null, the fractional indices of greedy actions are written to it. */
 static inline void sdnn_choose(sdnn_agent* agent, const int32_t* observation, int explore,
                                uint32_t* action, uint32_t* place) {
   const sdnn_code* const code = sdnn_read(agent, observation);
@@ -247,8 +247,8 @@ static inline int64_t sdnn_state_value(sdnn_agent* agent, const int32_t* observa
   return sdnn_best_sum(agent, sdnn_read(agent, observation));
 }
 
-/* Notes an observation as that where a transition ends; returns whether it was noted before.
- * Readings outside their ranges are equal. */
+/* Stores the observation in which a transition ends, clipped to the ranges. Returns whether it is
+ * the observation that was stored before. */
 static inline int sdnn_note_next(sdnn_agent* agent, const int32_t* observation) {
   int is_same = agent->has_next;
   uint32_t i;
@@ -262,9 +262,9 @@ static inline int sdnn_note_next(sdnn_agent* agent, const int32_t* observation) 
   return is_same;
 }
 
-/* Learns a transition, whose reward is times 2^SDNN_FRACTION_BITS. `terminated` says that nothing
- * follows it; running out of time is no such end. If it begins elsewhere than the last one ended,
- * traces begin anew. */
+/* Learns a transition. Its reward is a number times 2^SDNN_FRACTION_BITS; `terminated` means that
+ * the episode ended in a terminal state, not by a time limit. Traces are reset if the transition
+ * does not begin where the last one ended. */
 static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observation,
                                       const uint32_t* action, int32_t reward,
                                       const int32_t* next_observation, int terminated) {
@@ -296,8 +296,8 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
 #include "sdnn_act_and_learn.h"
 
 #if SDNN_IS_BOX
-/* The place of a greedy action among those of each dimension, times 2^16; sdnn_action_at has the
- * action there. */
+/* The fractional index of the greedy action in each dimension, times 2^16; sdnn_action_at converts
+ * it to the action. */
 static inline void sdnn_place_in_each(sdnn_agent* agent, const int32_t* observation,
                                       uint32_t* place) {
   uint32_t action[SDNN_N_DIMENSIONS];

@@ -46,7 +46,7 @@ typedef struct {
   int32_t reward;
 } sdnn_transition;
 
-/* Everything that the agent remembers. Place it where you like: all functions take its address. */
+/* The state of the agent. It may be in any memory: all functions take its address. */
 typedef struct {
   sdnn_random randoms[SDNN_N_RANDOMS];
   sdnn_scale scale;
@@ -79,8 +79,8 @@ typedef struct {
 #include "sdnn_return_range.h"
 #endif
 
-/* The columns in which the codes of two states differ: those to add, and at the end those to take
- * away. What changes from -1 to 1 is there twice. */
+/* Lists the columns in which the codes of two states differ: those to add, and from the end those
+ * to subtract. A column that changes by 2 is listed twice. */
 static inline void sdnn_changes(const sdnn_code* from, const sdnn_code* to, sdnn_column* columns,
                                 uint32_t* n_positive, uint32_t* n_negative) {
   const sdnn_code* const codes[2] = {from, to};
@@ -106,7 +106,7 @@ static inline void sdnn_changes(const sdnn_code* from, const sdnn_code* to, sdnn
   }
 }
 
-/* The potentials of a state: from those of a state nearby, or from nothing. */
+/* Computes the potentials of a state from those of a similar state, or by all columns. */
 static inline void sdnn_evaluate(const sdnn_agent* agent, sdnn_state* state,
                                  const sdnn_state* from) {
   sdnn_column changes[2 * SDNN_MOST_COLUMNS];
@@ -135,13 +135,13 @@ static inline void sdnn_evaluate(const sdnn_agent* agent, sdnn_state* state,
   }
 }
 
-/* A transition that waits, the oldest first. */
+/* A pending transition; number 0 is the oldest. */
 static inline sdnn_transition* sdnn_waiting(sdnn_agent* agent, uint32_t i) {
   i += agent->first;
   return &agent->waiting[i < SDNN_N_STEPS ? i : i - SDNN_N_STEPS];
 }
 
-/* The state with these bins, in the place of the one that was not used for longest. */
+/* The cached state with these bins; it replaces the least recently used one. */
 static inline sdnn_state* sdnn_state_of(sdnn_agent* agent, const uint32_t* bins) {
   const sdnn_state* const from = &agent->states[agent->latest];
   sdnn_state* chosen = 0;
@@ -190,8 +190,8 @@ static inline sdnn_real sdnn_value(const sdnn_agent* agent, uint32_t n_firing) {
                    sdnn_real_of(SDNN_U_HIGH - SDNN_U_LOW, 0));
 }
 
-/* Values have ranks: 2 n + 1, and where they no longer grow 2 more or less, or the same: rounding
- * may part the ends of the line from q_low and q_high. */
+/* Sets the range of values, and the ranks by which values are compared. The value of n firing units
+ * has the rank 2 n + 1; for counts outside of the line's ends rounding decides the rank. */
 static inline void sdnn_set_range(sdnn_agent* agent, sdnn_real low, sdnn_real high) {
   sdnn_real end;
   agent->q_low = low;
@@ -231,7 +231,7 @@ static inline sdnn_real sdnn_state_value(sdnn_agent* agent, const uint32_t* bins
   return sdnn_value(agent, sdnn_rank(agent, sdnn_state_of(agent, bins), ranks));
 }
 
-/* The number of units to fire for a value, where `n_firing` do. */
+/* The number of units that must fire for a value; `n_firing` fire now. */
 static inline uint32_t sdnn_wanted(sdnn_agent* agent, sdnn_real value, uint32_t n_firing) {
   const sdnn_real clipped = sdnn_between(value, agent->q_low, agent->q_high);
   const sdnn_real part =
@@ -253,8 +253,8 @@ static inline uint32_t sdnn_wanted(sdnn_agent* agent, sdnn_real value, uint32_t 
   return (uint32_t)sdnn_whole(sdnn_plus(exact, nothing));
 }
 
-/* The weights of a unit move by `step` times the code, those of halves by twice that, unless one
- * of them would exceed the limit. Returns whether they did. */
+/* Moves the weights of a unit by `step` times the code, or twice that for half sums and half
+ * differences. Returns whether it did: not if a weight would exceed the limit. */
 static inline int sdnn_correct_unit(sdnn_agent* agent, const sdnn_code* code, uint32_t unit,
                                     int32_t step) {
   uint32_t* const row = agent->weights + (unit >> 2) * SDNN_N_COLUMNS;
@@ -306,8 +306,8 @@ static inline void sdnn_products(const sdnn_agent* agent, const sdnn_code* code,
   }
 }
 
-/* Lets `n` units more of an action's window fire, or fewer: in each of n parts the one that is
- * nearest to its threshold. */
+/* Makes `n` more or fewer units of an action's window fire: in each of n parts of the window, the
+ * unit that is nearest to its threshold is corrected. */
 static inline void sdnn_move_count(sdnn_agent* agent, sdnn_state* state, uint32_t action,
                                    uint32_t n, int is_more) {
   const uint32_t first = sdnn_first_units[action];
@@ -338,7 +338,7 @@ static inline void sdnn_move_count(sdnn_agent* agent, sdnn_state* state, uint32_
   }
 }
 
-/* Learns the oldest transition that waits; `value` is that of what followed the newest. */
+/* Learns the oldest pending transition; `value` is that of the state after the newest one. */
 static inline void sdnn_learn_oldest(sdnn_agent* agent, sdnn_real value) {
   const sdnn_transition* const oldest = sdnn_waiting(agent, 0);
   sdnn_state* const state = &agent->states[oldest->state];
@@ -369,8 +369,8 @@ static inline void sdnn_begin_episode(sdnn_agent* agent) {
   if (agent->n_waiting > 0) sdnn_learn_all(agent, sdnn_state_value(agent, agent->next_bins));
 }
 
-/* A rate that moves from `first` to `last` while the progress moves from 0 to `fraction`; where
- * that is 0 it stays `first`. */
+/* A rate that moves from `first` to `last` while the progress moves from 0 to `fraction`; it is
+ * constant if `fraction` is 0. */
 static inline sdnn_real sdnn_scheduled(sdnn_real progress, sdnn_real fraction, sdnn_real first,
                                        sdnn_real last) {
   sdnn_real part = progress;
@@ -387,7 +387,7 @@ static inline void sdnn_follow_progress(sdnn_agent* agent, sdnn_real progress) {
       sdnn_scheduled(progress, SDNN_EPSILON_FRACTION, SDNN_EPSILON_FIRST, SDNN_EPSILON_LAST);
 }
 
-/* How much of the learning is done, from 0 to 65536: alpha and epsilon follow it. */
+/* Sets the share of the training that is done, 0 to 65536, which alpha and epsilon follow. */
 static inline void sdnn_set_progress(sdnn_agent* agent, uint32_t progress) {
   sdnn_follow_progress(agent, sdnn_real_of(progress < 65536 ? (int64_t)progress : 65536, -16));
 }
@@ -481,9 +481,9 @@ static inline int64_t sdnn_q(sdnn_agent* agent, const int32_t* observation, uint
   return value >> 63 ? -(int64_t)fraction : (int64_t)fraction;
 }
 
-/* Learns a transition: its reward is a number times 2^SDNN_FRACTION_BITS, and `terminated` says
- * that nothing follows it (running out of time is no such end). If the next transition does not
- * begin with the same readings, this one was the last of its episode. */
+/* Learns a transition. Its reward is a number times 2^SDNN_FRACTION_BITS; `terminated` means that
+ * the episode ended in a terminal state, not by a time limit. If the next transition does not begin
+ * with the same readings, this one was the last of its episode. */
 static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uint32_t action,
                               int32_t reward, const int32_t* next_observation, int terminated) {
   uint32_t bins[SDNN_N_INPUTS], next_bins[SDNN_N_INPUTS], i, is_next = 1;
@@ -528,7 +528,7 @@ static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uin
 #define SDNN_WEIGHTS_AT (SDNN_THRESHOLDS_AT + UINT32_C(4) * SDNN_N_UNITS)
 #define SDNN_IMAGE_BYTES (SDNN_WEIGHTS_AT + 4 * SDNN_N_WORDS + 4)
 
-/* Reads the head of an image, or writes it: all numbers before rewards, returns, thresholds and
+/* Reads or writes the head of an image: all numbers except rewards, returns, thresholds and
  * weights. */
 static inline void sdnn_carry_head(sdnn_agent* agent, uint8_t* image, int reads) {
   uint8_t* at = sdnn_carry_32(image + 12, &agent->n_random_left, 1, reads);

@@ -33,8 +33,8 @@ static inline uint64_t sdnn_below(sdnn_random* random, uint64_t n) {
   return rest;
 }
 
-/* How large rewards are, in powers of two; INT32_MIN if all were 0. Rewards that are far larger
- * than recent ones are not learned. See cpp/include/sdnn/agents/reward_scale.hpp. */
+/* The size of rewards in powers of two; INT32_MIN if all were 0. Rewards that are far larger than
+ * recent ones are not learned. See cpp/include/sdnn/agents/reward_scale.hpp. */
 typedef struct {
   uint64_t n_rewards;
   int32_t size, size_in_window, headroom;

@@ -56,8 +56,8 @@ static inline int32_t sdnn_log2(uint32_t x) {
   return log;
 }
 
-/* Makes units smaller if they are larger than they have to be for rewards of 2^size, which is the
- * size in a window: see refine_unit of cpp/include/sdnn/agents/q_lambda.hpp. */
+/* Makes units smaller if they are larger than necessary for rewards of 2^size, the size of the last
+ * window: see refine_unit in cpp/include/sdnn/agents/q_lambda.hpp. */
 static inline void sdnn_refine_unit(sdnn_agent* agent, int32_t size) {
   const sdnn_code* const code = &agent->codes[agent->pending];
   const uint32_t n = sdnn_n_active_weights(code);
@@ -210,8 +210,8 @@ static inline void sdnn_move(sdnn_agent* agent, const sdnn_code* code, const uin
   }
 }
 
-/* The error r + gamma Q' - Q of a transition from the state of a code, and the drift Q - Q_old of
- * its value. Notes `next`, the value Q' of the state after it, for the episode's next step. */
+/* Computes the error r + gamma Q' - Q of a transition from the state of a code, and the drift
+ * Q - Q_old of its value. Stores `next`, the value Q' of the next state, as the next Q_old. */
 static inline int64_t sdnn_error(sdnn_agent* agent, const sdnn_code* code, const uint32_t* action,
                                  int32_t reward, int64_t next, int64_t* drift) {
   const int64_t value = sdnn_value(agent, code, action, &next);

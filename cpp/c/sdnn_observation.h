@@ -1,4 +1,4 @@
-/* From readings to the code of a state. All exported agents share it.
+/* Converts readings to the code of a state. All exported agents share it.
  *
  * The exporter writes the sizes (SDNN_N_INPUTS, ...) and tables before this file, and replaces the
  * prefixes sdnn_ and SDNN_ by the name of the header. SDNN_INPUTS lists the inputs. */
@@ -30,8 +30,8 @@ typedef struct {
   const sdnn_unit* units;    /* of each group: units of the modified pattern, one a column */
 } sdnn_coding;
 
-/* A state: its bins, and the columns of its code that are not 0. Those that are 1 come first, those
- * that are -1 are at the end. */
+/* A state: its bins, and the columns of its code that are not 0. Columns that are 1 are listed from
+ * the beginning, columns that are -1 from the end. */
 typedef struct {
   uint32_t n_positive, n_negative;
   uint32_t bins[SDNN_N_INPUTS];
@@ -48,9 +48,9 @@ static inline uint32_t sdnn_is_double(uint32_t group) {
   return n == SDNN_N_GROUPS || group < n;
 }
 
-/* The desensitized code: for each pair of inputs the pattern of one, neutral where the pattern of
- * the other is -1. Of two patterns with the same modifier, half their sum and half their difference
- * are taken: one of the two is neutral. */
+/* Computes the selectively desensitized code: for each pair of inputs the pattern of one, neutral
+ * (0) where the pattern of the other is -1. Two patterns with the same modifier are stored as half
+ * their sum and half their difference, one of which is 0. */
 static inline void sdnn_encode(const sdnn_coding* coding, const uint32_t* bins, sdnn_code* code) {
   const uint8_t* patterns[SDNN_N_INPUTS];
   const uint8_t* first = coding->patterns;

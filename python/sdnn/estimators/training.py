@@ -137,7 +137,7 @@ def samples_of_epoch(n_samples: int, weights: Floats | None, epoch: int, n_befor
 
 
 def scaled_up(weights: Floats | None) -> Floats | None:
-    """Scale weights to a mean of 1 if all are below 1: an epoch would present too few samples.
+    """Scale weights to a mean of 1 if all are below 1, so that epochs present enough samples.
 
     >>> scaled_up(np.array([0.25, 0.75])).tolist()
     [0.5, 1.5]

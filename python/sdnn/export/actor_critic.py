@@ -147,7 +147,7 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
     n_critic_rows = 1
 
     def fields(self) -> list[Field]:
-        """Return names, types and shapes of an image."""
+        """Return the fields of an image: names, types and shapes."""
         shape = self.n_critic_rows + sum(self.n_rows()), self.code().n_columns
         return [
             ("action_value.exponent", "<i4"),

@@ -155,7 +155,7 @@ def is_paper_scale(measured: TrialMeasures) -> bool:
 
 
 def verdict_of(check: Check, estimate: Estimate) -> Verdict:
-    """Judge one check by the rule of this module."""
+    """Judge a check by its interval: holds inside the range, fails outside, else undecided."""
     interval = np.array([estimate.lower, estimate.upper])
     if check.contains(interval).all():
         return Verdict.HOLDS
