@@ -27,7 +27,7 @@ HERE = Path(__file__).parent
 EPISODES = 100
 COUNTED = (2000, 4000)
 """Steps of two runs whose instructions are compared."""
-AGENTS = ("q-lambda", "sdnn-c")
+AGENTS = ("q-lambda", "actor-critic", "sdnn-c")
 ARM = "arm-linux-gnueabihf-gcc"
 CHIP = ("-mthumb", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 

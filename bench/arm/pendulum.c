@@ -68,10 +68,14 @@ static int64_t episode(int learns, uint32_t most) {
   pole_begin_episode(&agent);
   for (step = 0; step < most; ++step) {
     uint32_t action;
-    int32_t reward;
+    int32_t torque, reward;
     observe(&it, now);
     action = pole_act(&agent, now, learns);
-    reward = push(&it, pole_action_fixed[action] * (1 << (24 - POLE_FRACTION_BITS)));
+    torque = pole_action_fixed[action];
+#ifdef POLE_IS_ACTOR_CRITIC
+    if (!learns) torque = pole_action_at(0, pole_place(&agent, now));
+#endif
+    reward = push(&it, torque * (1 << (24 - POLE_FRACTION_BITS)));
     observe(&it, next);
     total += reward;
     if (learns) pole_learn(&agent, now, action, reading(reward), next, 0);

@@ -232,7 +232,7 @@ static inline void sdnn_choose(sdnn_agent* agent, const int32_t* observation, in
     if (explore) {
       action[d] = sdnn_drawn(weights, sum, &agent->randoms[0]);
     } else {
-      action[d] = sdnn_tied(weights, n, sdnn_largest_weight(weights, n), &agent->randoms[1]);
+      action[d] = sdnn_tied(weights, n, SDNN_LARGEST_PART, &agent->randoms[1]);
     }
     if (place) place[d] = sdnn_mean_place(weights, n, action[d]);
   }

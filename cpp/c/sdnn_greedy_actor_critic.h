@@ -22,8 +22,7 @@ static inline uint32_t sdnn_best(const sdnn_code* code, uint32_t d, uint32_t* pl
   uint32_t weights[SDNN_MOST_ROWS], action;
   sdnn_sums(sdnn_weights, code, d, sums);
   sdnn_weigh(sums, sdnn_n_actions[d], weights);
-  action =
-      sdnn_tied(weights, sdnn_n_actions[d], sdnn_largest_weight(weights, sdnn_n_actions[d]), 0);
+  action = sdnn_tied(weights, sdnn_n_actions[d], SDNN_LARGEST_PART, 0);
   if (place) *place = sdnn_mean_place(weights, sdnn_n_actions[d], action);
   return action;
 }

@@ -4,7 +4,8 @@
 
 #include "sdnn_integers.h"
 
-#define SDNN_MOST_BITS (INT64_C(40) << 20) /* below the most probable action */
+#define SDNN_LARGEST_PART (UINT32_C(1) << 30) /* the weight of the most probable action */
+#define SDNN_MOST_BITS (INT64_C(40) << 20)    /* below the most probable action */
 
 /* 2^-x, 2^30 for 1, by a polynomial of degree 4; x is below 64 and has 20 fractional bits. */
 static inline uint32_t sdnn_power_of_half(int64_t x) {
@@ -37,15 +38,6 @@ static inline uint64_t sdnn_weigh(int64_t* preferences, uint32_t n, uint32_t* we
     sum += weights[a];
   }
   return sum;
-}
-
-/* The largest of n weights. */
-static inline uint32_t sdnn_largest_weight(const uint32_t* weights, uint32_t n) {
-  uint32_t largest = weights[0], a;
-  for (a = 1; a < n; ++a) {
-    if (weights[a] > largest) largest = weights[a];
-  }
-  return largest;
 }
 
 /* The place of the mean of a most probable action and its neighbours among the actions, times 2^16:

@@ -8,7 +8,7 @@
 
 /* The number of units of an input's thermometer that are 1, in a bin. */
 static inline uint32_t sdnn_n_units_above(uint32_t bin) {
-  const uint32_t last = SDNN_N_THERMOMETER_BINS > 2 ? SDNN_N_THERMOMETER_BINS - 1 : 1;
+  const uint32_t last = SDNN_LAST_THERMOMETER_BIN;
   uint64_t rest;
   return (uint32_t)sdnn_quotient((uint64_t)bin * 2 * SDNN_N_THERMOMETER_UNITS + last, 2 * last,
                                  &rest);

@@ -55,7 +55,7 @@ class ThermometerCode(Code):
             "N_COLUMNS": self.n_columns,
             "N_THERMOMETERS": len(self.thermometers),
             "N_THERMOMETER_UNITS": self.n_units,
-            "N_THERMOMETER_BINS": max(bins, default=0),
+            "LAST_THERMOMETER_BIN": max([*bins, 2]) - 1,
         }
 
 
