@@ -53,6 +53,14 @@ def test_history_auto_selects_what_a_task_needs(agent_class, task, history):
     assert agent.approximator.n_inputs == n_inputs
 
 
+@pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
+@pytest.mark.parametrize("task", ["Acrobot-v1", "Pendulum-v1", "MountainCar-v0"])
+def test_auto_finds_no_history_where_observations_show_the_state(agent_class, task):
+    agent = agent_class(gym.make(task), seed=1004, history="auto")
+    agent.train(gym.make(task), steps=RANDOM_STEPS, seed=1004)
+    assert agent.history == "none"
+
+
 @pytest.mark.parametrize("history", ["differences", "averages", "observer"])
 def test_a_loaded_agent_with_a_history_acts_and_learns_as_the_saved_one(history, tmp_path):
     agent = SDNNQLambda(positions(), seed=1, history=history)

@@ -19,7 +19,7 @@ namespace sdnn::agents {
 /// Makes states from the inputs of the present and earlier observations; all are in [0, 1].
 ///
 /// With `automatic`, an observer's estimates replace the inputs if they reduce prediction errors by
-/// a tenth, as with noisy sensors. Otherwise differences are added if they explain a further 15 %
+/// a tenth, as with noisy sensors. Otherwise differences are added if they explain a further 20 %
 /// of an input's changes, as without observed velocities. Symbols have no history. There is no
 /// history if the experience is too small or there are too many inputs.
 class HistoryFilter {
@@ -232,7 +232,7 @@ class HistoryFilter {
 
  private:
   static constexpr double kLeastImprovement = 0.1;  // of the observer
-  static constexpr double kLeastShare = 0.15;       // of changes, explained by differences
+  static constexpr double kLeastShare = 0.2;        // of changes, explained by differences
   static constexpr double kFastRate = 0.5, kSlowRate = 0.2;
   static constexpr double kHeadroom = 1.5;
   static constexpr double kLeastDifference = 1e-9;
@@ -329,7 +329,7 @@ class HistoryFilter {
 
   std::vector<bool> circular_;  ///< of the observation's inputs
   std::vector<int> n_symbols_;
-  std::size_t n_dimensions_ = 0;  ///< of actions
+  [[maybe_unused]] std::size_t n_dimensions_ = 0;  ///< of actions
   History kind_ = History::none;
   std::vector<double> largest_ = {};  ///< differences, in which a state's input is 1
   detail::Observer observer_ = {};

@@ -92,15 +92,20 @@ class Observer {
   }
 
   /// Returns the share of an input's squared changes that the last changes explain in addition to
-  /// the present state and action, for the input with the largest share, in the second half of the
-  /// experience.
+  /// the present state and action and products of two of these, for the input with the largest
+  /// share. Each half of the experience is explained by a fit to the other one, and the smaller of
+  /// both shares counts. Returns 0 where there would be too many products to fit.
   double share_of_last_changes(const RandomExperience& experience) const {
     const Series series = coordinates_of(experience);
     std::vector<double> with, without, changes, features;
+    if (n_features() > kMostFeaturesWithProducts) return 0.0;
     for (std::size_t t = 1; t < series.size(); ++t) {
       if (series.begins[t]) continue;
       const auto state = series.row(series.observed, t);
       find_features(series.actions_at(t), state, features);
+      for (std::size_t i = 1, n = features.size(); i < n; ++i) {
+        for (std::size_t j = i; j < n; ++j) features.push_back(features[i] * features[j]);
+      }
       without.insert(without.end(), features.begin(), features.end());
       with.insert(with.end(), features.begin(), features.end());
       const auto last = series.row(series.observed, t - 1), next = series.row(series.next, t);
@@ -110,12 +115,15 @@ class Observer {
       }
     }
     if (changes.size() < kFewestTransitions * n_inputs()) return 0.0;
-    const auto before = explained(without, changes), after = explained(with, changes);
-    double most = 0.0;
-    for (std::size_t i = 0; i < n_inputs(); ++i) {
-      most = std::max(most, after[i] - std::max(before[i], 0.0));
+    std::vector<double> shares(n_inputs(), 1.0);
+    for (const bool is_first : {true, false}) {
+      const auto before = explained(without, changes, is_first);
+      const auto after = explained(with, changes, is_first);
+      for (std::size_t i = 0; i < n_inputs(); ++i) {
+        shares[i] = std::min(shares[i], after[i] - std::max(before[i], 0.0));
+      }
     }
-    return most;
+    return std::ranges::max(shares);
   }
 
   /// Lists what was fitted; see core/state.hpp. Inputs that are angles are those of the task.
@@ -160,6 +168,7 @@ class Observer {
   static constexpr int kRounds = 3;
   static constexpr std::size_t kMostTransitions = 20'000;
   static constexpr std::size_t kMostLevels = 8;
+  static constexpr std::size_t kMostFeaturesWithProducts = 17;
   static constexpr double kFarthest = 6.0;  // in deviations
   static constexpr double kLargestChange = 3.0;
   static constexpr double kLeastError = 1e-6;
@@ -336,15 +345,19 @@ class Observer {
   }
 
   /// Returns for each input the share of squared changes that a linear model of the features
-  /// explains: it is fitted to the first half of the transitions and tested on the second.
+  /// explains in one half of the transitions, if it is fitted to the other: to the first half, or
+  /// to the second.
   std::vector<double> explained(const std::vector<double>& features,
-                                const std::vector<double>& changes) const {
+                                const std::vector<double>& changes, bool is_first) const {
     const std::size_t n = changes.size() / n_inputs(), width = features.size() / n, half = n / 2;
-    const auto weights =
-        least_squares({features.begin(), features.begin() + offset(half * width)},
-                      {changes.begin(), changes.begin() + offset(half * n_inputs())}, half);
+    const std::size_t begin = is_first ? 0 : n - half, first = is_first ? n - half : 0;
+    const auto rows = [begin, half](const std::vector<double>& values, std::size_t n_columns) {
+      const auto start = values.begin() + offset(begin * n_columns);
+      return std::vector<double>(start, start + offset(half * n_columns));
+    };
+    const auto weights = least_squares(rows(features, width), rows(changes, n_inputs()), half);
     std::vector<double> errors(n_inputs()), squares(n_inputs()), shares;
-    for (std::size_t t = half; t < n; ++t) {
+    for (std::size_t t = first; t < first + half; ++t) {
       for (std::size_t i = 0; i < n_inputs(); ++i) {
         double error = changes[t * n_inputs() + i];
         squares[i] += error * error;
