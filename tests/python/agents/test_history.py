@@ -106,7 +106,7 @@ def test_environments_of_a_vector_have_separate_histories():
 
 
 def test_the_value_after_a_truncated_log_is_that_of_its_own_episode():
-    """What was imitated before does not matter for the values of later observations."""
+    """Values of later observations do not depend on what was imitated before."""
     agent = SDNNQLambda(positions(), seed=1, history="differences")
     agent.train(positions(), steps=RANDOM_STEPS, seed=1)
     first, second = ([Transition([x, 0.0], 0, 1.0, [x + 0.1, 0.0], False)] for x in (-2.0, 1.0))

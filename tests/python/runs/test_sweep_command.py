@@ -70,7 +70,7 @@ def test_the_rows_and_trials_of_all_variants_are_written(invoke, tmp_path):
 def test_sweep_and_reproduce_share_stored_trials(invoke):
     invoke("reproduce", "a", "--trials", 2, "--episodes", 300)
     result = invoke("sweep", "mine.toml")
-    # Of 8 trials the 4 with the base's discount are stored.
+    # The 4 of 8 trials with the base's discount are stored.
     assert re.search(r"\b8 of 8 .* results \(4 ", result.stdout)
     again = invoke("reproduce", "a", "--trials", 2, "--episodes", 300)
     assert "(0 " in again.stdout
