@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <limits>
 #include <stdexcept>
 #include <vector>
 
@@ -10,6 +12,8 @@ namespace {
 
 using namespace sdnn;
 using estimators::TrainingForm;
+
+constexpr auto kAnyMemory = std::numeric_limits<std::size_t>::max();
 
 /// The demonstration problem's sizes: two pairs of n = 2000 units, half of them on.
 coding::SelectiveDesensitization demonstration_code(std::size_t n_pattern_units = 2000) {
@@ -49,8 +53,7 @@ TEST(TrainingForm, MemoryOfEachFormIsAsWorkedByHand) {
 TEST(TrainingForm, IsBlockForManySamplesOfLongCodes) {
   const auto code = demonstration_code(8000);
   const auto chosen = [&](std::size_t n_samples, std::size_t n_units) {
-    return estimators::choose_form(TrainingForm::automatic, n_units, code, n_samples,
-                                   std::size_t{64} << 30);
+    return estimators::choose_form(TrainingForm::automatic, n_units, code, n_samples, kAnyMemory);
   };
   EXPECT_EQ(chosen(2000, 60), TrainingForm::dual);
   EXPECT_EQ(chosen(6000, 280), TrainingForm::dual);
@@ -84,7 +87,7 @@ TEST(TrainingForm, IsTheFasterFormByMeasuredTimes) {
       const double block = at.block_once + epochs * at.block_epoch;
       if (std::max(dual, block) < 1.3 * std::min(dual, block)) continue;
       EXPECT_EQ(estimators::choose_form(TrainingForm::automatic, 280, code, at.n_samples,
-                                        std::size_t{8} << 30, n_epochs),
+                                        kAnyMemory, n_epochs),
                 dual < block ? TrainingForm::dual : TrainingForm::block)
           << at.n_samples << " samples, " << n_epochs << " epochs";
     }
@@ -101,7 +104,7 @@ TEST(TrainingForm, DependsOnTheSamplesAndTheMemoryLimit) {
   EXPECT_EQ(chosen(2000, 1 << 20), TrainingForm::plain);
   EXPECT_EQ(chosen(6000, 1 << 30), TrainingForm::dual);
   EXPECT_EQ(chosen(7000, 1 << 30), TrainingForm::block);
-  EXPECT_EQ(chosen(50000, std::size_t{64} << 30), TrainingForm::block);
+  EXPECT_EQ(chosen(50000, kAnyMemory), TrainingForm::block);
   EXPECT_THROW(estimators::choose_form(TrainingForm::dual, 280, code, 2000, 10 << 20),
                std::length_error);
 }
