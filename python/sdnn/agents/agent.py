@@ -129,10 +129,10 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     def _dimension(self, dimension: int) -> int:
         return whole("dimension", dimension, 0, self.n_dimensions - 1)
 
-    def warn_of_history(self) -> None:
+    def _warn_of_history(self) -> None:
         """Warn once if the warm-up could not fit the observer that was asked for."""
-        is_fitted = self._observation.history != "observer" or self.history != "none"
-        if is_fitted or self._has_warned_of_history:
+        is_missing = self._observation.history == "observer" and self.history == "none"
+        if not is_missing or self._has_warned_of_history:
             return
         self._has_warned_of_history = True
         n_numbers = sum(kind != "symbol" for kind, _ in self._controller.inputs)
@@ -176,7 +176,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     def _end_warm_up_of_teacher(self) -> None:
         """End a warm-up from a teacher's log: ranges become at least three times as wide."""
         self._controller.end_warm_up_of_teacher()
-        self.warn_of_history()
+        self._warn_of_history()
 
     def _require_warm(self) -> _core.Controller:
         """Return the core's controller; RuntimeError while the agent is warming up."""

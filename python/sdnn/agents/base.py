@@ -332,8 +332,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         """
         self._check_environment(environment)
         self._controller.learn(*self._parts_of(transition, environment))
-        self.warn_of_refused_reward()
-        self.warn_of_history()
+        self.warn_of_problems()
 
     def check(self, transition: Transition) -> None:
         """Raise what `learn` would for a transition that cannot be learned; learn nothing."""
@@ -357,8 +356,10 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             self._actions.mask("next_mask", next_mask),
         )
 
-    def warn_of_refused_reward(self) -> None:
-        """Warn once if a reward was too large to be learned, such as a sensor's glitch."""
+    def warn_of_problems(self) -> None:
+        """Warn once of a reward that was too large to be learned, and of an impossible history."""
+        if self._observation.history == "observer":
+            self._warn_of_history()
         refused = self._controller.refused_reward
         if refused is None or self._has_warned:
             return
@@ -371,7 +372,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         )
 
     @abc.abstractmethod
-    def warn_of_history(self) -> None:
+    def _warn_of_history(self) -> None:
         """Warn once if the warm-up could not fit the observer that was asked for."""
 
     def core_parts(self) -> CoreParts | None:

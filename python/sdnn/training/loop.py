@@ -378,10 +378,8 @@ class TrainingLoop(abc.ABC):
                 callback.on_row(self, row)
 
     def _warn_of_problems(self) -> None:
-        if hasattr(self.agent, "warn_of_refused_reward"):
-            self.agent.warn_of_refused_reward()
-        if hasattr(self.agent, "warn_of_history"):
-            self.agent.warn_of_history()
+        if hasattr(self.agent, "warn_of_problems"):
+            self.agent.warn_of_problems()
 
     def _keep_statistics(self) -> None:
         """Store the statistics of the environment's wrappers in the agent, for its file."""
