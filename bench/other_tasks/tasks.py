@@ -70,6 +70,9 @@ GOALS = {
     "Pendulum irrelevant-8": Goal(120_000, -200.0, 0.9),
     "Pendulum correlated-8": Goal(120_000, -200.0, 0.9),
     "Pendulum noise-05-copies": Goal(100_000, -230.0, 0.9),
+    "Cells": Goal(50_000, -30.0, 0.9),
+    "CartPole irrelevant-100": Goal(100_000, 475.0, 1.0),
+    "Pendulum irrelevant-32": Goal(120_000, -200.0, 0.9),
 }
 """By case."""
 MILESTONES.update({case: goal.steps for case, goal in GOALS.items()})
