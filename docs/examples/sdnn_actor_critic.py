@@ -26,6 +26,7 @@ class Settings(sdnn_q_lambda.Settings):
     steps: int = 10_000
     n_box_actions: int = 5
     learning_rate: float = 0.5  # of the critic
+    trace_decay: float = 0.9  # lambda
     actor_learning_rate: float = 0.1
     final_actor_learning_rate: float = 0.02
     entropy: float = 0.01
