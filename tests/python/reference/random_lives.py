@@ -294,7 +294,13 @@ def _soak_cell(number):
             is_grid = agent_class in (RBFQLearning, FuzzyQLearning)  # with few inputs
             histories = ["none", "observer"] if is_grid else HISTORIES
             settings["history"] = str(random.choice(histories))
-        agent = agent_class(space, actions, seed=number, **settings)
+        try:
+            agent = agent_class(space, actions, seed=number, **settings)
+        except ValueError as error:  # such as an observer after too short a warm-up
+            if not str(error).startswith("history must be"):
+                raise
+            settings["history"] = "none"
+            agent = agent_class(space, actions, seed=number, **settings)
         return live(agent, env, settings["warm_up_steps"], n_steps)
 
     return run
