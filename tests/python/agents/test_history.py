@@ -155,3 +155,22 @@ def test_export_refuses_agents_with_a_history():
 def test_missing_codes_and_a_history_exclude_each_other():
     with pytest.raises(ValueError, match="history"):
         SDNNQLambda(exact(), history="auto", missing="code")
+
+
+def test_an_agent_with_differences_of_a_single_relevant_input_is_saved(tmp_path):
+    rng = np.random.default_rng(1)
+    box = gym.spaces.Box(-1.0, 1.0, (4,), np.float64)
+    agent = SDNNQLambda(
+        box, gym.spaces.Discrete(2), seed=1, history="differences", warm_up_steps=400
+    )
+    observation = rng.uniform(-1.0, 1.0, 4)
+    for _ in range(420):
+        action = int(agent.act(observation))
+        following = rng.uniform(-1.0, 1.0, 4)  # noise, but for the first one
+        following[0] = np.clip(observation[0] + 0.2 * (2 * action - 1), -1.0, 1.0)
+        agent.learn(Transition(observation, action, following[0], following, False))
+        observation = following
+    assert [numbers for _, numbers in agent.inputs][:1] == [[0]]
+    agent.save(tmp_path / "agent")
+    loaded = SDNNQLambda.load(tmp_path / "agent")
+    np.testing.assert_array_equal(loaded.q_values(observation), agent.q_values(observation))

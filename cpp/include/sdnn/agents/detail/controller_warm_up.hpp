@@ -288,12 +288,14 @@ void Controller::serialize(Self& self, Archive& archive) {
       archive.within("history", [&] { HistoryFilter::serialize_kind(kind, archive); });
       if constexpr (Archive::kReads) {
         history = HistoryFilter(kind, std::vector<bool>(), {}, self.n_dimensions());
-        self.observations_.repeat_input(!HistoryFilter::adds_inputs(kind));
       }
     }
     archive.part("observations", self.observations_);
     if (may_have_history) {
       if constexpr (Archive::kReads) {
+        if (HistoryFilter::adds_inputs(history.kind()) && self.observations_.has_single_input()) {
+          self.observations_.repeat_input(false);
+        }
         history = HistoryFilter(history.kind(), self.observations_.circular(),
                                 self.observations_.n_symbols(), self.n_dimensions());
       }
