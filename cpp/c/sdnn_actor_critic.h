@@ -293,8 +293,6 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   if (size != INT32_MIN) sdnn_refine_unit(agent, size);
 }
 
-#include "sdnn_act_and_learn.h"
-
 #if SDNN_IS_BOX
 /* The fractional index of the greedy action in each dimension, times 2^16; sdnn_action_at converts
  * it to the action. */
@@ -342,17 +340,7 @@ static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
   sdnn_apply_rates(agent);
 }
 
-/* Makes the agent as it was exported. */
-static inline void sdnn_begin(sdnn_agent* agent) {
-  sdnn_begin_as(agent, sdnn_first_head);
-  sdnn_copy_32(agent->weights, sdnn_first_weights, SDNN_N_FIRST_WEIGHTS);
-}
-
-static inline void sdnn_save(const sdnn_agent* agent, uint8_t* image) {
-  sdnn_carry_head((sdnn_agent*)agent, image, 0);
-  sdnn_carry_32(image + SDNN_IMAGE_HEAD, (int32_t*)agent->weights, SDNN_N_ALL_WEIGHTS, 0);
-  sdnn_seal(image, SDNN_IMAGE_BYTES);
-}
+#include "sdnn_linear_agent.h"
 
 static inline int sdnn_is_exponent(int32_t exponent) {
   return exponent >= -1100 && exponent <= 1100;

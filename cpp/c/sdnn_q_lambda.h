@@ -17,6 +17,7 @@ typedef int64_t sdnn_score;
 #define SDNN_AVERAGES (SDNN_AVERAGING_INTERVAL > 0)
 #define SDNN_N_WEIGHTS (UINT32_C(1) * SDNN_N_ROWS * SDNN_N_COLUMNS)
 #define SDNN_N_AVERAGED (SDNN_AVERAGES * SDNN_N_WEIGHTS)
+#define SDNN_N_ALL_WEIGHTS (SDNN_N_WEIGHTS + SDNN_N_AVERAGED)
 
 /* Everything that the agent remembers. All functions take its address. */
 typedef struct {
@@ -25,7 +26,7 @@ typedef struct {
   int64_t old_value; /* of the pending state, before the last step of learning */
   sdnn_scale scale;
   sdnn_random randoms[SDNN_N_RANDOMS];
-  int32_t weights[SDNN_N_WEIGHTS + SDNN_N_AVERAGED]; /* and after them their averages, if any */
+  int32_t weights[SDNN_N_ALL_WEIGHTS]; /* and after them their averages, if any */
   int32_t traces[SDNN_N_WEIGHTS];
   int32_t exponent; /* values and weights count units of 2 to this power */
   int32_t reward;
@@ -274,8 +275,6 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   if (size != INT32_MIN) sdnn_refine_unit(agent, size);
 }
 
-#include "sdnn_act_and_learn.h"
-
 #if SDNN_N_DIMENSIONS == 1
 static inline int64_t sdnn_q(sdnn_agent* agent, const int32_t* observation, uint32_t action) {
   return sdnn_q_of_each(agent, observation, &action);
@@ -287,7 +286,7 @@ static inline int64_t sdnn_q(sdnn_agent* agent, const int32_t* observation, uint
 /* An image holds the state as bytes, which the library reads and writes too. The episode is not
  * part of it: call sdnn_begin_episode before, so that its last transition is learned. */
 #define SDNN_IMAGE_HEAD 188
-#define SDNN_IMAGE_BYTES (SDNN_IMAGE_HEAD + 4 * (SDNN_N_WEIGHTS + SDNN_N_AVERAGED) + 4)
+#define SDNN_IMAGE_BYTES (SDNN_IMAGE_HEAD + 4 * SDNN_N_ALL_WEIGHTS + 4)
 
 /* Reads the head of an image, or writes it. */
 static inline void sdnn_carry_head(sdnn_agent* agent, uint8_t* image, int reads) {
@@ -316,18 +315,7 @@ static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
   sdnn_apply_rates(agent);
 }
 
-/* Makes the agent as it was exported. */
-static inline void sdnn_begin(sdnn_agent* agent) {
-  sdnn_begin_as(agent, sdnn_first_head);
-  sdnn_copy_32(agent->weights, sdnn_first_weights, SDNN_N_FIRST_WEIGHTS);
-}
-
-static inline void sdnn_save(const sdnn_agent* agent, uint8_t* image) {
-  sdnn_carry_head((sdnn_agent*)agent, image, 0);
-  sdnn_carry_32(image + SDNN_IMAGE_HEAD, (int32_t*)agent->weights, SDNN_N_WEIGHTS + SDNN_N_AVERAGED,
-                0);
-  sdnn_seal(image, SDNN_IMAGE_BYTES);
-}
+#include "sdnn_linear_agent.h"
 
 /* Returns whether the image is one of this agent, whole and in range; if not, nothing changes. */
 static inline int sdnn_load(sdnn_agent* agent, const uint8_t* image) {
@@ -341,11 +329,11 @@ static inline int sdnn_load(sdnn_agent* agent, const uint8_t* image) {
       sdnn_get(image + 32, 8) >> 62 || !sdnn_is_scale(image + 40)) {
     return 0;
   }
-  for (j = 0; j < SDNN_N_WEIGHTS + SDNN_N_AVERAGED; ++j) {
+  for (j = 0; j < SDNN_N_ALL_WEIGHTS; ++j) {
     if (sdnn_size(sdnn_get_32(weights + 4 * j)) >= SDNN_LARGEST_WEIGHT) return 0;
   }
   sdnn_begin_as(agent, image);
-  sdnn_carry_32((uint8_t*)weights, agent->weights, SDNN_N_WEIGHTS + SDNN_N_AVERAGED, 1);
+  sdnn_carry_32((uint8_t*)weights, agent->weights, SDNN_N_ALL_WEIGHTS, 1);
   return 1;
 }
 

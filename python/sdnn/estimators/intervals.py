@@ -15,6 +15,9 @@ import numpy as np
 from sdnn.estimators.columns import Floats
 from sdnn.support.arguments import real
 
+ROUNDED_DOWN = 1.0 - 1e-12
+"""Factor against rounding, as 0.9 * 10 may be more than 9."""
+
 LEAST_SHARE = 0.01
 """Least size of an error for a model of sizes, as a share of the root mean square error."""
 
@@ -27,29 +30,34 @@ def coverage_of(coverage: float) -> float:
     return value
 
 
-def error_bounds(sizes: Floats, weights: Floats, coverage: float) -> Floats:
+def error_bounds(sizes: Floats, counts: Floats, coverage: float) -> Floats:
     """Return the size of errors that a new error does not exceed with a probability of `coverage`.
 
-    Shapes: sizes (n_samples, n_outputs), weights (n_samples,), above 0; returns (n_outputs,). A
-    sample of weight 2 counts as two samples. ValueError if there are too few samples.
+    Shapes: sizes (n_samples, n_outputs), counts (n_samples,), above 0; returns (n_outputs,). A
+    sample of count 2 counts as two samples. ValueError if there are too few samples.
     """
-    total = float(weights.sum())
-    needed = coverage * (total + 1.0)
+    total = float(counts.sum())
+    needed = coverage * (total + 1.0) * ROUNDED_DOWN
     if needed > total:
-        least = math.ceil(coverage / (1.0 - coverage))
+        least = math.ceil(coverage / (1.0 - coverage) * ROUNDED_DOWN)
         raise ValueError(
-            f"coverage must be at most {total / (total + 1.0):.3g} with the errors of {total:g}"
-            f" samples, got {coverage:g}: fit at least {least} samples"
+            f"coverage must be at most {total / (total + 1.0)} with the errors of {total:g} samples"
+            f" (the sum of their weights), got {coverage}, which needs {least} samples"
         )
     bounds = []
     for column in sizes.T:
         order = np.argsort(column, kind="stable")
-        place = int(np.searchsorted(np.cumsum(weights[order]), needed * (1.0 - 1e-12)))
-        bounds.append(column[order[min(place, len(order) - 1)]])
+        place = int(np.searchsorted(np.cumsum(counts[order]), needed))
+        bounds.append(column[order[min(place, len(order) - 1)]])  # sums may be rounded
     return np.array(bounds)
 
 
 def log_sizes(errors: Floats) -> Floats:
     """Return logarithms of the sizes of errors, as targets of a model; shape as `errors`."""
-    least = LEAST_SHARE * np.sqrt(np.square(errors).mean(axis=0))
-    return np.log(np.maximum(np.abs(errors), np.where(least > 0, least, 1.0)))
+    sizes = np.abs(errors)
+    unit = sizes.max(axis=0)
+    unit[unit == 0.0] = 1.0
+    shares = sizes / unit  # whose squares stay finite
+    least = LEAST_SHARE * np.sqrt(np.square(shares).mean(axis=0))
+    logarithms: Floats = np.log(unit) + np.log(np.maximum(shares, np.where(least > 0, least, 1.0)))
+    return logarithms

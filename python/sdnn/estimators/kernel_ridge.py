@@ -141,7 +141,8 @@ class BaseKernelRidge(CodedInputs):
             solutions[degree] = solve(problem, part, alpha)
             if models_errors:
                 errors = log_sizes(part.targets - solutions[degree].left_out)
-                sizes[degree] = solve_for(problem, part, errors)
+                model = solve_for(problem, part, errors)
+                sizes[degree] = dataclasses.replace(model, rows=components)
             del problem  # free its memory before the next degree needs as much
         self.degree_ = min(solutions, key=lambda degree: solutions[degree].error)
         solution = solutions[self.degree_]
@@ -205,28 +206,26 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
         left_out, rows, sizes = self._solve(X, table, clipped, counts, models_errors=True)
         assert sizes is not None  # as errors are modelled
         self._sizes_of_errors = sizes
-        rows_used = counts[rows] > 0
-        rows, left_out = rows[rows_used], left_out[rows_used]
         self.leave_one_out_residuals_ = targets[rows] - left_out
         self._residual_counts = counts[rows]
-        self._mean_log_size = log_sizes(self.leave_one_out_residuals_).mean(axis=0)
-        is_exact = len(self.X_fit_) == len(table)
-        self._residual_sizes = (
-            self._bounded_sizes(sizes.left_out[rows_used])
-            if is_exact
-            else self._error_sizes(table[rows])
-        )
+        is_component = np.isin(rows, sizes.rows)
+        logarithms = np.empty_like(left_out)
+        places = np.searchsorted(sizes.rows, rows[is_component])
+        logarithms[is_component] = sizes.left_out[places]
+        if not is_component.all():
+            logarithms[~is_component] = self._log_error_sizes(table[rows[~is_component]])
+        self._residual_scales = self._error_scales(logarithms)
 
-    def _error_sizes(self, table: Array) -> Floats:
-        """Return the size of errors that is expected at samples, shape (n_samples, n_outputs)."""
+    def _log_error_sizes(self, table: Array) -> Floats:
+        """Predict the logarithms of the sizes of errors, shape (n_samples, n_outputs)."""
         sizes = self._sizes_of_errors
-        return self._bounded_sizes(self._sums(table, sizes.dual) + sizes.intercept)
+        return self._sums(table, sizes.dual) + sizes.intercept
 
-    def _bounded_sizes(self, logarithms: Floats) -> Floats:
-        """Return sizes of errors of these logarithms, at most ten times the mean or a tenth."""
-        excess = np.clip(logarithms - self._mean_log_size, -LOG_OF_TEN, LOG_OF_TEN)
-        sizes: Floats = np.exp(self._mean_log_size + excess)
-        return sizes
+    def _error_scales(self, log_sizes: Floats) -> Floats:
+        """Return sizes of errors in units of the usual one, within a tenth and ten times of it."""
+        excess = log_sizes - self._sizes_of_errors.left_out.mean(axis=0)
+        scales: Floats = np.exp(excess.clip(-LOG_OF_TEN, LOG_OF_TEN))
+        return scales
 
     def predict(self, X: ArrayLike) -> Floats:
         """Predict the outputs of samples, shape (n_samples,) or (n_samples, n_outputs)."""
@@ -242,20 +241,21 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
         like those of `fit`: bounds are those of the errors of each sample's prediction without it.
         They have equal widths, or with ``scaled`` widths in proportion to a model of the sizes of
         errors, for noise that depends on the inputs. Several outputs have a shape of (n_samples,
-        n_outputs, 2), and each the coverage apart.
+        n_outputs, 2), and each the coverage apart. Weights of samples count as numbers of samples.
 
         Raises
         ------
         ValueError
             If ``coverage`` is not within (0, 1), or needs more samples than were fitted.
         """
-        outputs = self._outputs(X)
         share, is_scaled = coverage_of(coverage), flag("scaled", scaled)
+        outputs = self._outputs(X)
         sizes = np.abs(self.leave_one_out_residuals_)
         scales: Floats = np.ones(1)
         if is_scaled:
-            sizes = sizes / self._residual_sizes
-            scales = self._error_sizes(self._validated(X, codings=self.kernel_.codings))
+            sizes = sizes / self._residual_scales
+            table = self._validated(X, codings=self.kernel_.codings)
+            scales = self._error_scales(self._log_error_sizes(table))
         widths = error_bounds(sizes, self._residual_counts, share) * scales
         bounds: Floats = np.stack([outputs - widths, outputs + widths], axis=-1)
         return bounds[:, 0] if self._flat else bounds

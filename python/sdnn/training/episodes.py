@@ -278,8 +278,6 @@ class Episodes:
         for i in self.unlearned:
             episode: Any = self.present[i]
             episode.n_steps += 1
-            if episode.n_steps == _ENDLESS:
-                warn_of_endless_episode(_ENDLESS)
             if self._seed is not None:
                 episode.actions.append(elements[i])
         try:
@@ -313,11 +311,13 @@ class Episodes:
         return [a or b for a, b in zip(adapter.terminated, adapter.truncated, strict=True)]
 
     def note_learned(self, environments: list[int]) -> None:
-        """Remove environments from the beginning of `unlearned`, and add their rewards."""
+        """Remove environments from the beginning of `unlearned`; add their rewards."""
         del self.unlearned[: len(environments)]
         for i in environments:
             episode: Any = self.present[i]
             episode.sum_of_rewards += self.adapter.rewards[i]
+            if episode.n_steps == _ENDLESS and not self.is_over(i):
+                warn_of_endless_episode(_ENDLESS)
 
     def _reset(self, numbers: Mapping[int, int]) -> dict[int, Element]:
         """Reset environments for the episodes of these numbers; return the first observations."""

@@ -158,12 +158,14 @@ def test_an_evaluation_warns_of_an_episode_of_more_than_100_000_steps():
         assert evaluate(NullAgent(), Endless(), 1).lengths.tolist() == [100_001]
 
 
-def test_a_training_warns_once_of_an_episode_of_10_000_steps():
+def test_a_training_warns_once_of_an_episode_that_continues_after_10_000_steps():
     endless = gym.make("Pendulum-v1", max_episode_steps=20_001)
     agent = SDNNQLambda(endless, warm_up_steps=10)
     with pytest.warns(RuntimeWarning, match="max_episode_steps") as warned:
         agent.train(endless, steps=10_002)
     assert len(warned) == 1
+    limited = gym.make("Pendulum-v1", max_episode_steps=10_000)
+    assert agent.train(limited, steps=10_001).n_episodes == 1  # without a warning
 
 
 @pytest.mark.parametrize("reward", [np.float32(1), np.array([1]), Decimal(1), True, np.array(1.0)])

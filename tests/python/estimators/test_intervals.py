@@ -7,7 +7,7 @@ import pytest
 
 from refusals import refuses
 from sdnn import SDNNKernelRidge
-from sdnn.estimators.intervals import error_bounds
+from sdnn.estimators.intervals import error_bounds, log_sizes
 
 RNG = np.random.default_rng(3)
 X = RNG.uniform(-1.0, 1.0, (700, 2))
@@ -28,6 +28,13 @@ def test_the_bound_is_the_error_of_the_rank_that_coverage_needs():
         assert error_bounds(sizes, np.ones(9), coverage).tolist() == [bound]
     # A sample of weight 2 counts twice: 1, 1, 2, 3 have 5 ranks.
     assert error_bounds(np.array([[2.0], [1.0], [3.0]]), np.array([1.0, 2.0, 1.0]), 0.4) == 1.0
+
+
+@pytest.mark.parametrize("unit", [1e-200, 1.0, 1e200])
+def test_sizes_of_errors_have_a_floor_of_a_hundredth_in_any_unit(unit):
+    # Root mean square 2, so sizes below 0.02 count as 0.02.
+    sizes = log_sizes(unit * np.array([[-2.0], [2.0], [np.sqrt(8.0)], [0.0]]))[:, 0]
+    np.testing.assert_allclose(sizes - np.log(unit), np.log([2.0, 2.0, np.sqrt(8.0), 0.02]))
 
 
 def test_residuals_are_those_of_models_without_the_sample():
@@ -71,6 +78,21 @@ def test_scaled_widths_follow_noise_that_depends_on_an_input():
         assert covered(scaled[rows], y[400:][rows]) == pytest.approx(0.9, abs=0.08)
 
 
+def test_scaled_widths_do_not_depend_on_the_rank_of_the_solution():
+    noise = np.where(X[:, 1] > 0, 0.06, 0.005)  # much smaller than the error of 150 samples
+    y = noisy(X, noise)
+    exact, low_rank = (
+        SDNNKernelRidge(max_components=n, random_state=1).fit(X[:500], y[:500]) for n in (500, 150)
+    )
+    is_noisy = X[500:, 1] > 0
+    ratios = []
+    for model in (exact, low_rank):
+        widths = np.diff(model.predict_interval(X[500:], scaled=True))[:, 0]
+        ratios.append(np.median(widths[is_noisy]) / np.median(widths[~is_noisy]))
+        assert covered(model.predict_interval(X[500:], scaled=True), y[500:]) > 0.82
+    assert min(ratios) > 1.2
+
+
 def test_several_outputs_have_the_intervals_of_single_ones_also_after_pickling():
     y = np.stack([noisy(X, 0.1), 100.0 * X[:, 0]], axis=1)
     settings = {"alpha": 0.5, "degree": 2}
@@ -96,6 +118,9 @@ def test_coverage_within_0_and_1_with_enough_samples_is_required():
     model = SDNNKernelRidge().fit(X[:20], X[:20, 0])
     for coverage in (0.0, 1.0, np.nan):
         refuses("coverage", model.predict_interval, X, coverage)
+    nine = model.fit(X[:9], X[:9, 0])  # 9 is the least for 0.9, and 10 for 0.91
+    assert nine.predict_interval(X[:2], 0.9).shape == (2, 2)
+    refuses("coverage", nine.predict_interval, X, 0.91)
     assert "99 samples" in str(refuses("coverage", model.predict_interval, X, 0.99))
     refuses("scaled", model.predict_interval, X, scaled="yes", error=TypeError)
     constant = SDNNKernelRidge().fit(X[:20], np.ones(20))

@@ -1,0 +1,33 @@
+/* Calls of a learning agent with a linear readout: acting and learning with actions of one
+ * dimension or of several, beginning, saving. */
+#ifndef SDNN_LINEAR_AGENT_H
+#define SDNN_LINEAR_AGENT_H
+
+#if SDNN_N_DIMENSIONS == 1
+static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation, int explore) {
+  uint32_t action;
+  sdnn_act_in_each(agent, observation, explore, &action);
+  return action;
+}
+static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uint32_t action,
+                              int32_t reward, const int32_t* next_observation, int terminated) {
+  sdnn_learn_in_each(agent, observation, &action, reward, next_observation, terminated);
+}
+#else
+#define sdnn_act sdnn_act_in_each
+#define sdnn_learn sdnn_learn_in_each
+#endif
+
+/* Makes the agent as it was exported. */
+static inline void sdnn_begin(sdnn_agent* agent) {
+  sdnn_begin_as(agent, sdnn_first_head);
+  sdnn_copy_32(agent->weights, sdnn_first_weights, SDNN_N_FIRST_WEIGHTS);
+}
+
+static inline void sdnn_save(const sdnn_agent* agent, uint8_t* image) {
+  sdnn_carry_head((sdnn_agent*)agent, image, 0);
+  sdnn_carry_32(image + SDNN_IMAGE_HEAD, (int32_t*)agent->weights, SDNN_N_ALL_WEIGHTS, 0);
+  sdnn_seal(image, SDNN_IMAGE_BYTES);
+}
+
+#endif /* SDNN_LINEAR_AGENT_H */
