@@ -40,8 +40,8 @@ def test_errors_equal_their_copies_and_pickles(copied):
     }
     for error_class in classes:
         has_own = inspect.isfunction(error_class.__init__)
-        words = list(inspect.signature(error_class).parameters) if has_own else ["message"]
-        error = error_class(*(f"{word} of it" for word in words))
+        arguments = list(inspect.signature(error_class).parameters) if has_own else ["message"]
+        error = error_class(*(f"{word} of it" for word in arguments))
         copy_ = copied(error)
         assert type(copy_) is error_class
         assert str(copy_) == str(error), error_class

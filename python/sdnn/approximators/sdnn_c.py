@@ -123,7 +123,7 @@ class SDNNC:
         self._core.update(state, action, target, rate)
 
     def weights(self) -> NDArray[np.float64]:
-        """Copy the weights in the paper's units, shape (n, D)."""
+        """Copy the weights in the paper's units, shape (n hidden units, D code columns)."""
         return self._core.weights() * self._lattice_step
 
     def thresholds(self) -> NDArray[np.float64]:

@@ -178,7 +178,7 @@ class PaperAcrobotEnv(AcrobotSwingUpEnv):
 def _config(
     name: str, config_type: type[AnyConfig], value: AnyConfig | Mapping[str, object] | None
 ) -> AnyConfig:
-    """Return settings; a mapping has the settings that differ from the defaults."""
+    """Return settings: the defaults for None; a mapping has those that differ from them."""
     make: Callable[..., AnyConfig] = config_type
     if value is None:
         return make()

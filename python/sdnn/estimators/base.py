@@ -181,7 +181,7 @@ class BaseSDNN(Fitted, CodedInputs):
         return targets
 
     def _presentations(self, targets: Array, weights: Floats | None) -> Floats | None:
-        """Return the mean number of presentations per epoch of each sample; None for once."""
+        """Return how often an epoch presents each sample on average; None: each sample once."""
         return weights
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:

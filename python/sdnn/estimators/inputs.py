@@ -193,7 +193,7 @@ class CodedInputs(BaseEstimator):
         return validated
 
     def _check_numbers(self, table: Array, codings: Sequence[Coding]) -> None:
-        """Raise ValueError for missing values without `WithMissing`, infinity and words."""
+        """Raise ValueError unless the columns of numeric codings hold only finite numbers."""
         if table.dtype == np.float64 and np.isfinite(table).all():
             return
         names = self._feature_names() or range(len(codings))

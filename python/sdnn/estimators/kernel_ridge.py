@@ -300,8 +300,9 @@ class SDNNKernelClassifier(CodedClassifier, BaseKernelRidge):
         weights = (counts if of_classes is None else counts * of_classes)[rows]
 
         def loss(log_steepness: float) -> float:
-            logarithms = log_softmax(np.exp(log_steepness) * left_out, axis=1)
-            return -float(weights @ (one_hot[rows] * logarithms).sum(axis=1))
+            """Return the weighted log loss of the outputs of models without the sample."""
+            log_probabilities = log_softmax(np.exp(log_steepness) * left_out, axis=1)
+            return -float(weights @ (one_hot[rows] * log_probabilities).sum(axis=1))
 
         best = minimize_scalar(loss, bounds=LOG_STEEPNESS, method="bounded").x
         self.steepness_ = float(np.exp(best))

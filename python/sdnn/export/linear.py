@@ -66,13 +66,13 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         }
 
     def tables(self) -> Tables:
-        """Return the constants of the spaces, the code and the readout's rows."""
+        """Return the constants of the spaces, the code, the actions and the readout's rows."""
         tables = self.tables_of_spaces()
         first_rows = np.cumsum([self.n_critic_rows, *self.n_rows()])[:-1]
         self.code().add_tables(tables)
         n_actions = np.array(self.n_actions())
-        tables.add("uint32_t", "n_actions", n_actions, "Actions of each dimension.")
-        tables.add("uint32_t", "first_rows", first_rows, "Readout units of each dimension.")
+        tables.add("uint32_t", "n_actions", n_actions, "Number of actions of each dimension.")
+        tables.add("uint32_t", "first_rows", first_rows, "First readout unit of each dimension.")
         return tables
 
     def rule_of_values(self) -> Data:

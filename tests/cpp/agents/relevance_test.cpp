@@ -136,12 +136,14 @@ RandomExperience permuted(const RandomExperience& experience,
 }
 
 TEST(Relevance, DoesNotDependOnTheOrderOfInputs) {
-  for (const std::size_t n_noise : {5U, 40U}) {
-    const RandomExperience experience = pushed_mass(600, n_noise, 0.9, true, 4);
+  for (const std::size_t n_noise : {5U, 40U}) {  // below 25 inputs, and with stricter evidence
+    const RandomExperience experience =
+        pushed_mass(600, n_noise, /*memory=*/0.9, /*is_rewarded=*/true, /*seed=*/4);
     const std::vector<bool> kept = relevant(experience);
     core::Random random(2, core::Stream::useless_inputs);
     std::vector<std::size_t> order(experience.n_inputs);
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    // Not std::shuffle, whose order depends on the standard library.
     for (std::size_t i = order.size() - 1; i > 0; --i) {
       std::swap(order[i], order[random.below(i + 1)]);
     }

@@ -18,8 +18,8 @@ double correlation(const coding::PatternTable& table, std::size_t i, std::size_t
   return sum / static_cast<double>(table.n_units());
 }
 
-TEST(CorrelationMatrix, ApproachesTheCorrelationsOfAngles) {
-  constexpr std::size_t kBins = 12;
+TEST(CorrelationMatrix, HasHalfOfTheUnitsOnAndApproachesTheCorrelationsOfAngles) {
+  constexpr std::size_t kBins = 12, kUnits = 1000;
   std::vector<double> wanted(kBins * kBins);
   for (std::size_t i = 0; i < kBins; ++i) {
     for (std::size_t j = 0; j < kBins; ++j) {
@@ -28,13 +28,13 @@ TEST(CorrelationMatrix, ApproachesTheCorrelationsOfAngles) {
     }
   }
   core::Random random(2, core::Stream::code_books);
-  const auto table = coding::correlation_matrix_patterns(1000, wanted, kBins, random);
+  const auto table = coding::correlation_matrix_patterns(kUnits, wanted, kBins, random);
   for (std::size_t i = 0; i < kBins; ++i) {
-    int n_on = 0;
-    for (std::size_t k = 0; k < 1000; ++k) n_on += table.sign(i, k) > 0 ? 1 : 0;
-    EXPECT_EQ(n_on, 500);
+    std::size_t n_on = 0;
+    for (std::size_t k = 0; k < kUnits; ++k) n_on += table.sign(i, k) > 0 ? 1 : 0;
+    EXPECT_EQ(n_on, kUnits / 2);
     for (std::size_t j = 0; j < kBins; ++j) {
-      EXPECT_NEAR(correlation(table, i, j), wanted[i * kBins + j], 0.02) << i << ' ' << j;
+      EXPECT_NEAR(correlation(table, i, j), wanted[i * kBins + j], 20.0 / kUnits) << i << ' ' << j;
     }
   }
 }

@@ -38,10 +38,14 @@ TEST(RandomInverse, FlipsEveryUnitWhenAllMayFlip) {
 
 TEST(RandomInverse, RefusesImpossibleSettings) {
   core::Random random(1, core::Stream::code_books);
-  EXPECT_THROW(coding::random_inverse_patterns({41, 5, 1}, random), std::invalid_argument);
-  EXPECT_THROW(coding::random_inverse_patterns({40, 0, 1}, random), std::invalid_argument);
-  EXPECT_THROW(coding::random_inverse_patterns({40, 5, 21}, random), std::invalid_argument);
-  EXPECT_THROW(coding::random_inverse_patterns({40, 5, -1}, random), std::invalid_argument);
+  EXPECT_THROW(coding::random_inverse_patterns({41, 5, 1}, random),
+               std::invalid_argument);  // odd units
+  EXPECT_THROW(coding::random_inverse_patterns({40, 0, 1}, random),
+               std::invalid_argument);  // no bins
+  EXPECT_THROW(coding::random_inverse_patterns({40, 5, 21}, random),
+               std::invalid_argument);  // too many
+  EXPECT_THROW(coding::random_inverse_patterns({40, 5, -1}, random),
+               std::invalid_argument);  // too few
 }
 
 }  // namespace

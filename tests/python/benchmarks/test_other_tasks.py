@@ -164,8 +164,8 @@ def test_processor_time_excludes_evaluations(scripts, monkeypatch):
     clock = scripts.studies.Clock(trial.training)
     began = time.process_time()
     trial.training.run()
-    assert time.process_time() - began > 0.6  # 3 episodes of 200 steps
-    assert clock.curve["cpu_seconds"][-1] < 0.3
+    assert time.process_time() - began > 0.6  # 3 evaluation episodes of 200 steps of 1 ms
+    assert clock.curve["cpu_seconds"][-1] < 0.3  # far less than the evaluations took
 
 
 def fail_in_store(measured, folder):

@@ -36,6 +36,10 @@ def test_columns_are_selected_as_in_a_column_transformer():
         (lambda table: [table.shape[1] - 1], [2]),
     ]:
         assert column_indices(columns, names, 3, np.zeros((4, 3))) == expected
+
+
+def test_columns_that_do_not_exist_are_refused():
+    names = ["a", "b", "c"]
     for bad, error in [(3, "3"), ("d", "'d'"), (1.5, "1.5")]:
         refuses(error, column_indices, bad, names, 3)
     refuses("mask", column_indices, [True], names, 3)

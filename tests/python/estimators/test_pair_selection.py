@@ -75,10 +75,13 @@ def test_pairs_can_be_selected_with_a_category_that_occurs_once(name):
 
 
 @pytest.mark.parametrize("n_rare", [1, 3])
-def test_pairs_can_be_selected_with_a_class_that_occurs_once(n_rare):
+def test_pairs_can_be_selected_with_a_rare_class(n_rare):
     labels = np.repeat([0, 1], [40 - n_rare, n_rare])
     model = SDNNClassifier(**OPTIONS, n_units_per_class=4, pairs="auto").fit(X[:40, :3], labels)
-    assert set(model.pairs_) <= {(0, 1), (1, 0), (0, 2), (2, 0), (1, 2), (2, 1)}
+    assert model.pairs_  # which ones chance decides, with so few samples
+
+
+def test_a_class_that_occurs_once_is_learned_with_selected_pairs():
     rest = XOR[:40].copy()
     rest[0] = 2
     model = SDNNClassifier(**OPTIONS, pairs="auto", correction_share=1.0).fit(X[:40, :3], rest)

@@ -51,7 +51,7 @@ def target(needs):
 
 
 @pytest.mark.parametrize("name", LEARNERS)
-def test_an_agent_in_c_acts_and_learns_with_the_bits_of_the_agent(name, target, tmp_path):
+def test_an_exported_agent_acts_and_learns_bit_for_bit_as_in_python(name, target, tmp_path):
     check_learning(name, target, tmp_path, options=SANITIZED)
 
 

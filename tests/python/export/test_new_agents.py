@@ -26,12 +26,14 @@ def export(invoke):
 @pytest.mark.parametrize("actions", [TWO, gym.spaces.MultiDiscrete([3, 4])])
 @pytest.mark.parametrize("kind", ["q-lambda", "actor-critic"])
 def test_a_new_linear_agent_is_the_largest_that_fits_the_memory(kind, ram_bytes, actions):
-    given = {"kind": kind, "seed": 3}
-    agent = new_agent(SPACE, actions, ram_bytes=ram_bytes, **given)
+    settings = {"kind": kind, "seed": 3}
+    agent = new_agent(SPACE, actions, ram_bytes=ram_bytes, **settings)
     n_units = agent.approximator.n_pattern_units
     assert c_header(agent, "agent", learning=True).ram_bytes <= ram_bytes
     larger = LinearSDNNConfig(n_pattern_units=n_units + 16)
-    header = c_header(new_agent(SPACE, actions, approximator=larger, **given), "a", learning=True)
+    header = c_header(
+        new_agent(SPACE, actions, approximator=larger, **settings), "a", learning=True
+    )
     assert header.ram_bytes > ram_bytes or n_units == 768
 
 
@@ -45,8 +47,8 @@ def test_a_new_network_is_the_largest_that_fits_the_memory(ram_bytes, n_hidden):
 
 
 def test_a_new_network_keeps_its_sizes_and_draws_first_weights_in_c():
-    given = SDNNQLearning.presets["small"].approximator
-    config = replace(given, n_pattern_units=16, averaging_interval=0, weight_limit=127)
+    small = SDNNQLearning.presets["small"].approximator
+    config = replace(small, n_pattern_units=16, averaging_interval=0, weight_limit=127)
     agent = new_agent(SPACE, TWO, kind="sdnn-c", ram_bytes=10**6, approximator=config)
     assert agent.approximator.n_pattern_units == 16
     assert agent.learning == SDNNQLearning.presets["small"].learning
@@ -76,8 +78,8 @@ def test_new_agents_without_memory_or_ranges_are_refused():
     refuses("ram_bytes", new_agent, SPACE, TWO, ram_bytes=20_000, approximator=larger)
     refuses("kind", new_agent, SPACE, TWO, kind="rbf")
     for kind, config in (("q-lambda", SDNNCConfig()), ("sdnn-c", LinearSDNNConfig())):
-        given = {"kind": kind, "approximator": config}
-        refuses("approximator", new_agent, SPACE, TWO, **given, error=TypeError)
+        settings = {"kind": kind, "approximator": config}
+        refuses("approximator", new_agent, SPACE, TWO, **settings, error=TypeError)
     unknown = gym.spaces.Box(-np.inf, np.inf, (2,))
     refuses("observation_range", new_agent, unknown, TWO, error=RuntimeError)
     known = new_agent(unknown, TWO, observation_range=([-1, -1], [1, 1]))

@@ -49,8 +49,8 @@ def dutch():
         schedule_steps=100, tie_rule="lowest", epsilon=0.9, final_epsilon=0.3,
     )  # fmt: skip
     config = replace(SMALL, n_actions=9, action_window=4)
-    given = _with(config) | {"angle_pairs": [(0, 1)]}
-    return SDNNQLambda(box(1.0, 1.0, 8.0), box(2.0), seed=3, learning=learning, **given)
+    settings = _with(config) | {"angle_pairs": [(0, 1)]}
+    return SDNNQLambda(box(1.0, 1.0, 8.0), box(2.0), seed=3, learning=learning, **settings)
 
 
 def several():
@@ -125,8 +125,8 @@ def few_pairs():
 
 def actor():
     """An actor-critic with three inputs and torques; defaults of learning."""
-    given = _with(replace(SMALL, n_actions=5)) | _ranges(1.0, 2.0, 3.0)
-    return SDNNActorCritic(box(1.0, 2.0, 3.0), box(2.0), seed=11, **given)
+    settings = _with(replace(SMALL, n_actions=5)) | _ranges(1.0, 2.0, 3.0)
+    return SDNNActorCritic(box(1.0, 2.0, 3.0), box(2.0), seed=11, **settings)
 
 
 def actor_vector():
@@ -136,17 +136,17 @@ def actor_vector():
         actor_learning_rate=0.7, final_learning_rate=None,
     )  # fmt: skip
     config = replace(SMALL, n_actions=3, n_pattern_units=70)
-    given = _with(config) | {"angle_pairs": [(0, 1)]} | _ranges(1.0, 1.0, 8.0)
+    settings = _with(config) | {"angle_pairs": [(0, 1)]} | _ranges(1.0, 1.0, 8.0)
     spaces = box(1.0, 1.0, 8.0), box(2.0, 0.5)
-    return SDNNActorCritic(*spaces, seed=12, learning=learning, **given)
+    return SDNNActorCritic(*spaces, seed=12, learning=learning, **settings)
 
 
 def actor_discrete():
     """Two dimensions of discrete actions, a circular angle, no thermometers."""
     learning = ActorCriticConfig(thermometers=False, entropy=0.0, final_actor_learning_rate=None)
-    given = {"approximator": SMALL, "inputs": "all", "angles": [0]} | _ranges(np.pi, 2.0)
+    settings = {"approximator": SMALL, "inputs": "all", "angles": [0]} | _ranges(np.pi, 2.0)
     spaces = box(np.pi, 2.0), gym.spaces.MultiDiscrete([3, 5])
-    return SDNNActorCritic(*spaces, seed=13, learning=learning, **given)
+    return SDNNActorCritic(*spaces, seed=13, learning=learning, **settings)
 
 
 def actor_states():

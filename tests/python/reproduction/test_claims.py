@@ -45,18 +45,18 @@ def verdicts(summaries, costs=()):
 
 
 @pytest.mark.parametrize(
-    ("interval", "verdict"),
+    ("estimate_low_high", "verdict"),
     [
-        ((100, 80, 150), Verdict.HOLDS),
-        ((140, 120, 160), Verdict.UNDECIDED),
+        ((100, 80, 150), Verdict.HOLDS),  # the limit itself is allowed
+        ((140, 120, 160), Verdict.UNDECIDED),  # 150 is inside
         ((300, 160, math.inf), Verdict.FAILS),
-        ((math.inf, math.inf, math.inf), Verdict.FAILS),
-        ((10, math.nan, math.nan), Verdict.UNDECIDED),
+        ((math.inf, math.inf, math.inf), Verdict.FAILS),  # never learned
+        ((10, math.nan, math.nan), Verdict.UNDECIDED),  # no interval
     ],
 )
-def test_a_check_holds_or_fails_with_its_whole_interval(interval, verdict):
+def test_a_check_holds_or_fails_with_its_whole_interval(estimate_low_high, verdict):
     check = Check(measure="episodes_to_learn", case="s4", paper="about 150", at_most=150)
-    assert verdict_of(check, Estimate(*interval)) == verdict
+    assert verdict_of(check, Estimate(*estimate_low_high)) == verdict
 
 
 def test_a_check_may_have_a_lower_and_an_upper_limit():

@@ -85,7 +85,10 @@ def test_a_figure_states_its_trials_and_configurations(results):
     assert "3 trials x 3,000 episodes instead of 10 x 15,000" in text
     assert "quick" not in text.lower()
     for result in results:
-        assert result.config_hash[:8] in text
+        assert result.config_hash[:8] in text  # figures show 8 digits
+
+
+def test_a_quick_figure_says_so_in_its_title_and_panels(results):
     quick = all_text(draw_experiment(EXPERIMENT, results, quick=True))
     assert "QUICK LOOK, not the result" in quick
     assert quick.count("quick") == 2  # a watermark in each panel

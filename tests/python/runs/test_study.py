@@ -327,14 +327,18 @@ PRODUCT = "[cases.s4]\n[axes]\ncombine = 'product'\n" + "".join(
     [
         *wrong_studies("wrong.txt"),
         (PRODUCT, 3, "axes.combine: must give at most 5000 combinations"),
-        ("[base]\nenvironment.kwargs.a = " + 99 * "[" + 99 * "]", 0, "base.environment"),
+        (
+            "[base]\nenvironment.kwargs.a = " + 99 * "[" + 99 * "]",
+            0,
+            "base.environment",
+        ),  # too deep: without a line
         ("[base]\n" + 99 * "a." + "a = 1", 0, "must be TOML: a key must have"),
     ],
 )
 def test_errors_in_a_study_file_name_file_line_and_key(study, tmp_path, text, line, message):
     with pytest.raises(ConfigError) as caught:
         study(text)
-    place = f"{tmp_path / 'mine.toml'}:{line or ''}".rstrip(":")
+    place = f"{tmp_path / 'mine.toml'}:{line or ''}".rstrip(":")  # line 0: the file only
     assert str(caught.value).startswith(f"{place}: {message}")
 
 

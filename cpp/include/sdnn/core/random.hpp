@@ -36,7 +36,8 @@ enum class Stream : std::uint64_t {
 
 /// xoshiro256** (Blackman, Vigna 2018), seeded by SplitMix64 from (seed, stream, index).
 ///
-/// Unlike std::shuffle and std::normal_distribution, it does not depend on the standard library.
+/// Its results are the same with every standard library, unlike those of std::shuffle and
+/// std::normal_distribution.
 class Random {
  public:
   /// The generator number `index` of `stream` under the root `seed`.

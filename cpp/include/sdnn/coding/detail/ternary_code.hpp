@@ -328,8 +328,8 @@ class ColumnLists {
  public:
   /// Columns numbered by bits: column j is bit j % 64 of word j / 64.
   explicit ColumnLists(std::size_t n_words) : ColumnLists(n_words, 1, 64) {}
-  /// Columns numbered without the unused bits of words: every `words_per_group` words hold
-  /// `columns_per_group` columns.
+  /// Columns numbered consecutively over groups of `words_per_group` words, which hold
+  /// `columns_per_group` columns each: the unused bits at the end of a group have no number.
   ColumnLists(std::size_t n_words, std::size_t words_per_group, std::size_t columns_per_group)
       : first_columns_(n_words),
         words_(n_words + 1),

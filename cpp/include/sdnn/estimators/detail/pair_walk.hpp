@@ -35,8 +35,8 @@ struct PairChunk {
   std::size_t place = 0;  ///< position of its first word among those of all chunks
 };
 
-/// Divides all words of a code into chunks, large chunks first; both pairs of two inputs are
-/// together.
+/// Divides all words of a code into chunks, large chunks first. The pairs (a, b) and (b, a)
+/// of two inputs share chunks.
 inline std::vector<PairChunk> pair_chunks(const coding::SelectiveDesensitization& code) {
   std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> words;
   for (std::size_t p = 0; p < code.n_pairs(); ++p) {
@@ -58,8 +58,8 @@ inline std::vector<PairChunk> pair_chunks(const coding::SelectiveDesensitization
   return chunks;
 }
 
-/// Walks of samples through the codes of each two inputs: in strips of equal bins of one input,
-/// alternating in direction along the other.
+/// An order of the samples for each two inputs, in which successive codes differ in few units: in
+/// strips of the same bin of one input, alternately up and down the bins of the other.
 class PairWalks {
  public:
   /// Shapes: bins (n_samples, n_inputs), at most CodeWalk::kMostSamples.
