@@ -72,15 +72,50 @@ class StopTrainingOnRewardThreshold(Callback):
 
 
 class SaveBestAgent(Callback):
-    """Saves the agent whenever an evaluation has a higher mean return than all before it."""
+    """Saves the agent whenever it was better than ever before.
 
-    def __init__(self, path: str | Path) -> None:
+    Without ``episodes`` after an evaluation with the highest mean return so far. With ``episodes``
+    after a block of so many learned episodes whose mean return is the highest: that costs no
+    steps, but the returns are those of the agent that still learned and explored. Blocks do not
+    overlap, so that three numbers are enough to remember; a resumed training continues its block.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the file, which is written over.
+    episodes : int, optional
+        Learned episodes in a block.
+    """
+
+    def __init__(self, path: str | Path, episodes: int | None = None) -> None:
         self.path = path_of("path", path)
+        self.episodes = None if episodes is None else whole("episodes", episodes, 1, 2**31)
+
+    def on_start(self, training: Training) -> None:
+        """Forget the blocks of another training."""
+        if training.n_rows == 0:
+            self.state = {}
 
     def on_row(self, training: Training, row: Row) -> None:
-        """Save the agent after the best evaluation so far."""
-        if row["kind"] == "evaluation" and n_since_best(training) == 0:
+        """Save the agent after the best evaluation or block of episodes so far."""
+        is_evaluation = row["kind"] == "evaluation"
+        if self.episodes is None:
+            is_best = is_evaluation and n_since_best(training) == 0
+        else:
+            is_best = not is_evaluation and self._ends_best_block(self.episodes, row["return"])
+        if is_best:
             training.agent.save(self.path)
+
+    def _ends_best_block(self, n_episodes: int, episode_return: float) -> bool:
+        n = self.state.get("episodes", 0) + 1
+        total = self.state.get("sum", 0.0) + episode_return
+        best = self.state.get("best", -math.inf)
+        if n < n_episodes:
+            self.state = {**self.state, "episodes": n, "sum": total}
+            return False
+        is_best = best < total < math.inf
+        self.state = {"best": total} if is_best else {"best": best} if best > -math.inf else {}
+        return is_best
 
 
 class StopTrainingOnNoImprovement(Callback):

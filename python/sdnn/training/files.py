@@ -237,7 +237,8 @@ class SavedEpisode(msgspec.Struct, frozen=True, kw_only=True):
 class SavedTraining(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The state that `sdnn.agents.Training` resumes.
 
-    ``present`` has an entry for each environment, ``evaluations`` steps and mean returns;
+    ``present`` has an entry for each environment, ``evaluations`` steps and mean returns,
+    ``callbacks`` the class and the numbers of each that has some;
     ``next_episode`` is the number of the first that has not begun; ``wrappers`` have learned as
     much when the present episode began.
     """
@@ -255,6 +256,7 @@ class SavedTraining(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
     limit_bootstraps: bool
     evaluations: list[tuple[_Count, float]]
     present: list[SavedEpisode | None]
+    callbacks: dict[str, dict[str, float]] = msgspec.field(default_factory=dict)
     wrappers: list[Statistics] = msgspec.field(default_factory=list)
 
     def __post_init__(self) -> None:

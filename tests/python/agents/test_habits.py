@@ -183,6 +183,65 @@ def test_save_best_agent_saves_at_each_better_evaluation(tmp_path):
     assert isinstance(load_agent(path), SDNNQLambda)
 
 
+class ScriptedReturns(gym.Env):
+    """Has episodes of one step, with these returns in turn, from the first episode's seed on."""
+
+    observation_space, action_space = gym.spaces.Box(0, 1, (1,)), gym.spaces.Discrete(2)
+
+    def __init__(self, returns):
+        self.returns = iter(returns)
+
+    def reset(self, *, seed=None, options=None):
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action):
+        return np.zeros(1, np.float32), next(self.returns), True, False, {}
+
+
+class BestSteps(SaveBestAgent):
+    """Notes the steps after which the best agent was saved."""
+
+    def on_start(self, training):
+        super().on_start(training)
+        self.steps = []
+
+    def on_row(self, training, row):
+        self.path.unlink(missing_ok=True)
+        super().on_row(training, row)
+        self.steps += [training.n_steps] if self.path.exists() else []
+
+
+RETURNS_OF_PAIRS = [1, 3, 4, -1, 2, 3, 0, 5, 9, 8]
+"""Their sums in pairs are 4, 3, 5, 5 and 17: better than all before after 2, 6 and 10 episodes."""
+
+
+def test_save_best_agent_compares_blocks_of_learned_episodes(tmp_path):
+    env = ScriptedReturns(RETURNS_OF_PAIRS)
+    best = BestSteps(tmp_path / "best.safetensors", episodes=2)
+    SDNNQLambda(env, inputs="all").train(env, steps=10, callbacks=[best])
+    assert best.steps == [2, 6, 10]
+    refuses("episodes", SaveBestAgent, best.path, episodes=0)
+
+
+def test_a_resumed_training_continues_its_block_of_episodes(tmp_path):
+    env = ScriptedReturns(RETURNS_OF_PAIRS)
+    by_evaluations = SaveBestAgent(tmp_path / "unused")
+    best = BestSteps(tmp_path / "best.safetensors", episodes=2)
+    callbacks = [by_evaluations, best]
+    training = Training(SDNNQLambda(env, inputs="all"), env, steps=5, callbacks=callbacks)
+    training.run()
+    assert best.steps == [2]
+    training.save(tmp_path / "training.safetensors")
+    best = BestSteps(best.path, episodes=2)
+    callbacks = [by_evaluations, best]
+    resumed = tmp_path / "training.safetensors"
+    Training.load(resumed, env, steps=10, callbacks=callbacks).run()
+    assert best.steps == [6, 10]
+    other = ScriptedReturns([-1, -2])
+    SDNNQLambda(other, inputs="all").train(other, steps=2, callbacks=callbacks)
+    assert best.steps == [2], "another training begins anew"
+
+
 def test_two_evaluations_without_improvement_stop_a_training(tmp_path):
     stop = StopTrainingOnNoImprovement(max_evaluations=2)
     assert run(tmp_path, [1.0, 3.0, 2.0, 3.0, 9.0, 9.0], stop).n_steps == 40
