@@ -156,12 +156,23 @@ class AnalyticKernel:
             for of_input in of_inputs:
                 total += of_input
                 squares += of_input**2
-            n_inputs = len(self.codings)
-            return ((n_inputs - 1) * total + total**2 - squares) / (2 * n_inputs * (n_inputs - 1))
+            return kernel_of_sums(total, squares, len(self.codings))
         rho = list(of_inputs)
         for mu, nu in self.pairs:
             total += 2 * rho[mu] if mu == nu else (1 + rho[nu]) / 2 * rho[mu]
         return total / sum(2 if mu == nu else 1 for mu, nu in self.pairs)
+
+
+def kernel_of_sums(
+    total: NDArray[np.float64], squares: NDArray[np.float64], n_inputs: int
+) -> NDArray[np.float64]:
+    """Return the kernel of all pairs from the sums of correlations and of their squares.
+
+    A single input has a plain pattern.
+    """
+    if n_inputs == 1:
+        return total.copy()
+    return ((n_inputs - 1) * total + total**2 - squares) / (2 * n_inputs * (n_inputs - 1))
 
 
 def _read_pairs(pairs: Sequence[tuple[int, int]], n_inputs: int) -> tuple[tuple[int, int], ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from numbers import Real
 
 import numpy as np
@@ -13,14 +14,17 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
+from sdnn.coding import RandomInverse
 from sdnn.coding.kernel import N_UNITS, AnalyticKernel
 from sdnn.estimators.columns import Array, Floats, PairChoice, input_pairs
+from sdnn.estimators.input_choice import Inputs, all_inputs, inputs_to_compare, squared_losses
 from sdnn.estimators.inputs import CodedClassifier, CodedInputs, CodedRegressor
 from sdnn.estimators.intervals import coverage_of, error_bounds, log_sizes
 from sdnn.estimators.parameters import RandomState, documents, parameter, wholes, words
 from sdnn.estimators.ridge import (
     Samples,
     Solution,
+    apply_degree,
     diagonal,
     low_rank_diagonal,
     row_blocks,
@@ -37,13 +41,20 @@ LOG_STEEPNESS = (0.0, 5.0)  # bounds, for the softmax of scores
 LOG_OF_TEN = np.log(10.0)
 
 
-def apply_degree(kernel: Floats, degree: int) -> Floats:
-    """Turn a kernel, in place, into the kernel of functions of up to ``2 * degree`` inputs."""
-    if degree == 2:
-        kernel *= 0.5 + 0.5 * kernel
-    elif degree == 3:
-        kernel *= kernel * kernel
-    return kernel
+def log_losses(samples: Samples, left_out: Floats, steepness: float) -> Floats:
+    """Return the log loss of each sample by the outputs of the model without it."""
+    log_probabilities = log_softmax(steepness * left_out, axis=1)
+    losses: Floats = -(samples.targets * log_probabilities).sum(axis=1)
+    return losses
+
+
+def steepness_of(samples: Samples, left_out: Floats) -> float:
+    """Return the steepness of the softmax with the smallest weighted log loss."""
+
+    def loss(log_steepness: float) -> float:
+        return float(samples.weights @ log_losses(samples, left_out, np.exp(log_steepness)))
+
+    return float(np.exp(minimize_scalar(loss, bounds=LOG_STEEPNESS, method="bounded").x))
 
 
 @dataclasses.dataclass(kw_only=True, eq=False, repr=False)
@@ -63,6 +74,10 @@ class BaseKernelRidge(CodedInputs):
     degree : {1, 2, 3} or "auto", default="auto"
         The kernel k itself, (k + k^2) / 2 or k^3: functions of up to 2, 4 or 6 inputs. "auto" takes
         the degree with the smallest leave-one-out error.
+    inputs : {"auto", "all"}, default="auto"
+        Whether the kernel has all features as inputs. "auto" keeps the more important half of them,
+        half of these and so on, and adds up to two directions that mix numeric features, as far as
+        that makes the leave-one-out error clearly smaller. With listed ``pairs`` all are inputs.
     pairs : "all" or list of (modified, modifier), default="all"
         Pairs of features, by number or name; a modifier of None leaves a pattern plain. All pairs
         are as fast as one per feature.
@@ -80,7 +95,14 @@ class BaseKernelRidge(CodedInputs):
         The penalty and the degree in use.
     leave_one_out_error_ : float
         Mean squared error when each sample is left out, in variances of the targets.
-    X_fit_ : ndarray, shape (n_components, n_features)
+    codings_ : tuple of Coding
+        The fitted coding of each feature.
+    selected_features_ : ndarray of int
+        The features that are inputs of the kernel.
+    directions_ : ndarray, shape (n_directions, n_features)
+        Weights by which features, clipped to their ranges, are mixed to further inputs.
+    X_fit_ : ndarray, shape (n_components, n_inputs)
+        Selected features, and directions in units of ranges.
     dual_coef_, intercept_ : ndarray, shapes (n_components, n_outputs) and (n_outputs,)
         Outputs are ``kernel @ dual_coef_ + intercept_``, with the kernel of the degree.
     n_features_in_, feature_names_in_ : int, ndarray of str
@@ -89,15 +111,50 @@ class BaseKernelRidge(CodedInputs):
     Notes
     -----
     For m components, or m samples if these are fewer, `fit` takes ``48 m^2`` bytes, ``98304 m``
-    more with low rank, `predict` ``65536 m``, and both ``8 n_bins^2`` per different coding. Time
+    more with low rank, 16 MB to choose inputs, `predict` ``65536 m``, and both ``8 n_bins^2`` per
+    different coding. Time
     grows with the cube of m, and beyond that with the number of samples.
     """
 
     alpha: float | str = parameter("auto", Interval(Real, 0, np.inf, closed="neither"), AUTO)
     degree: int | str = parameter("auto", wholes(1, 3), AUTO)
+    inputs: str = parameter("auto", words("auto", "all"))
     pairs: PairChoice = parameter("all", words("all"), "array-like")
     max_components: int = parameter(2000, wholes(10, 2**15))
     random_state: RandomState = parameter(None, "random_state")
+
+    @property
+    def selected_features_(self) -> Rows:
+        """Numbers of the features that are inputs of the kernel."""
+        check_is_fitted(self, "dual_coef_")
+        return self._inputs.features
+
+    @property
+    def directions_(self) -> Floats:
+        """Weights by which features are mixed, shape (n_directions, n_features)."""
+        check_is_fitted(self, "dual_coef_")
+        return self._inputs.weights(self.codings_)
+
+    def describe_inputs(self) -> str:
+        """Return lines of text about the kernel's inputs: features, then mixtures of features.
+
+        Features of mixtures are in units of their ranges, the largest weights are first.
+        """
+        selected, directions = self.selected_features_, self._inputs.directions
+        numbers = range(len(self.codings_))
+        names = self._feature_names() or [f"x{number}" for number in numbers]
+        lines = [f"{len(selected)} of {len(names)} features", *(names[i] for i in selected)]
+        for number, weights in enumerate(directions):
+            order = np.argsort(-np.abs(weights), kind="stable")
+            largest = np.abs(weights).max()
+            parts = (f"{weights[i] / largest:+.2f} {names[i]}" for i in order if weights[i])
+            lines.append(f"direction {number}: {' '.join(parts)}")
+        return "\n".join(lines)
+
+    @staticmethod
+    def _losses(samples: Samples, left_out: Floats) -> Floats:
+        """Return each sample's loss from the output without it, by which inputs are chosen."""
+        return squared_losses(samples, left_out)
 
     @staticmethod
     def _sample_counts(sample_weight: ArrayLike | None, n_samples: int) -> Floats:
@@ -123,45 +180,67 @@ class BaseKernelRidge(CodedInputs):
             raise ValueError(f"y must be within +-{LARGEST_TARGET:g}, got {largest:g}: scale it")
         weights = counts if factors is None else counts * factors
         samples = Samples(targets, weights, 1 / np.maximum(counts, 1))
-        codings = self._codings(X, table)
-        pairs = None
-        if not isinstance(self.pairs, str):
-            pairs = input_pairs(self.pairs, self._feature_names(), table.shape[1])
-        self.kernel_ = AnalyticKernel(self._fit_codings(codings, table, N_UNITS), pairs=pairs)
+        degrees = DEGREES if self.degree == "auto" else (int(self.degree),)
+        codings = self._fit_codings(self._codings(X, table), table, N_UNITS)
+        self.codings_, possible = tuple(codings), [all_inputs(len(codings))]
+        if self.pairs == "all" and self.inputs == "auto":
+            possible = inputs_to_compare(codings, table, samples, degrees, self._losses)
         components = np.arange(len(table))
         if len(table) > self.max_components:
             random = check_random_state(self.random_state)
             components = np.sort(random.choice(components, self.max_components, replace=False))
-        self.X_fit_ = table[components]
         alpha = None if self.alpha == "auto" else real("alpha", self.alpha)
-        base, part = self.kernel_(self.X_fit_), samples[components]
-        solutions, sizes = {}, {}
-        for degree in DEGREES if self.degree == "auto" else (int(self.degree),):
-            problem = diagonal(apply_degree(base.copy(), degree), part)
-            solutions[degree] = solve(problem, part, alpha)
-            if models_errors:
-                errors = log_sizes(part.targets - solutions[degree].left_out)
-                model = solve_for(problem, part, errors)
-                sizes[degree] = dataclasses.replace(model, rows=components)
-            del problem  # free its memory before the next degree needs as much
-        self.degree_ = min(solutions, key=lambda degree: solutions[degree].error)
-        solution = solutions[self.degree_]
+        part, least = samples[components], math.inf
+        for inputs in possible:
+            kernel, values = self._kernel_of(inputs, table)
+            base = kernel(values[components])
+            solutions, models = {}, {}
+            for degree in degrees:
+                problem = diagonal(apply_degree(base.copy(), degree), part)
+                solutions[degree] = solve(problem, part, alpha)
+                if models_errors:
+                    errors = log_sizes(part.targets - solutions[degree].left_out)
+                    model = solve_for(problem, part, errors)
+                    models[degree] = dataclasses.replace(model, rows=components)
+                del problem  # free its memory before the next degree needs as much
+            best = min(solutions, key=lambda degree: solutions[degree].error)
+            loss = float(part.weights @ self._losses(part, solutions[best].left_out))
+            if loss < least or inputs is possible[0]:
+                least, solution, sizes = loss, solutions[best], models.get(best)
+                self._inputs, self.kernel_, self.degree_ = inputs, kernel, best
+                self.X_fit_ = values[components]
         if len(table) > len(components):
             del base
+            table = self._inputs.of(table, codings)
             problem = low_rank_diagonal(lambda rows: self._kernel(table[rows]), components, samples)
             solution = solve(problem, samples, alpha)
         self.alpha_, self.leave_one_out_error_ = solution.alpha, solution.error
         self.dual_coef_, self.intercept_ = solution.dual, solution.intercept
-        return solution.left_out, solution.rows, sizes.get(self.degree_)
+        return solution.left_out, solution.rows, sizes
+
+    def _kernel_of(self, inputs: Inputs, table: Array) -> tuple[AnalyticKernel, Array]:
+        """Return the kernel of inputs and the inputs of samples, from all their features."""
+        pairs = None
+        if not isinstance(self.pairs, str):
+            pairs = input_pairs(self.pairs, self._feature_names(), table.shape[1])
+        table = inputs.of(table, self.codings_)
+        directions = table[:, len(inputs.features) :].astype(np.float64)
+        codings = [self.codings_[feature] for feature in inputs.features]
+        codings += [RandomInverse().fit(column, N_UNITS) for column in directions.T]
+        return AnalyticKernel(codings, pairs=pairs), table
 
     def _kernel(self, table: Array) -> Floats:
         """Return the kernel of samples and components."""
         return apply_degree(self.kernel_(table, self.X_fit_), self.degree_)
 
+    def _inputs_of(self, X: ArrayLike) -> Array:
+        """Return the kernel's inputs of samples, checked, shape (n_samples, n_inputs)."""
+        check_is_fitted(self, "dual_coef_")
+        return self._inputs.of(self._validated(X, codings=self.codings_), self.codings_)
+
     def _outputs(self, X: ArrayLike) -> Floats:
         """Return the outputs of samples, shape (n_samples, n_outputs)."""
-        check_is_fitted(self, "dual_coef_")
-        table = self._validated(X, codings=self.kernel_.codings)
+        table = self._inputs_of(X)
         return self._sums(table, self.dual_coef_) + self.intercept_
 
     def _sums(self, table: Array, dual: Floats) -> Floats:
@@ -213,7 +292,8 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
         places = np.searchsorted(sizes.rows, rows[is_component])
         logarithms[is_component] = sizes.left_out[places]
         if not is_component.all():
-            logarithms[~is_component] = self._log_error_sizes(table[rows[~is_component]])
+            others = self._inputs.of(table[rows[~is_component]], self.codings_)
+            logarithms[~is_component] = self._log_error_sizes(others)
         self._residual_scales = self._error_scales(logarithms)
 
     def _log_error_sizes(self, table: Array) -> Floats:
@@ -254,7 +334,7 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
         scales: Floats = np.ones(1)
         if is_scaled:
             sizes = sizes / self._residual_scales
-            table = self._validated(X, codings=self.kernel_.codings)
+            table = self._inputs_of(X)
             scales = self._error_scales(self._log_error_sizes(table))
         widths = error_bounds(sizes, self._residual_counts, share) * scales
         bounds: Floats = np.stack([outputs - widths, outputs + widths], axis=-1)
@@ -298,14 +378,11 @@ class SDNNKernelClassifier(CodedClassifier, BaseKernelRidge):
         of_classes = class_weights(self.class_weight, labels)
         left_out, rows, _ = self._solve(X, table, one_hot, counts, of_classes)
         weights = (counts if of_classes is None else counts * of_classes)[rows]
+        self.steepness_ = steepness_of(Samples(one_hot[rows], weights, weights), left_out)
 
-        def loss(log_steepness: float) -> float:
-            """Return the weighted log loss of the outputs of models without the sample."""
-            log_probabilities = log_softmax(np.exp(log_steepness) * left_out, axis=1)
-            return -float(weights @ (one_hot[rows] * log_probabilities).sum(axis=1))
-
-        best = minimize_scalar(loss, bounds=LOG_STEEPNESS, method="bounded").x
-        self.steepness_ = float(np.exp(best))
+    @staticmethod
+    def _losses(samples: Samples, left_out: Floats) -> Floats:
+        return log_losses(samples, left_out, steepness_of(samples, left_out))
 
     def decision_function(self, X: ArrayLike) -> Floats:
         """Return the score of each class, about 1 for its own samples and 0 for others.

@@ -67,6 +67,15 @@ class Solution:
     rows: Rows  # the numbers of these samples
 
 
+def apply_degree(kernel: Floats, degree: int) -> Floats:
+    """Turn a kernel, in place, into the kernel of functions of up to ``2 * degree`` inputs."""
+    if degree == 2:
+        kernel *= 0.5 + 0.5 * kernel
+    elif degree == 3:
+        kernel *= kernel * kernel
+    return kernel
+
+
 def row_blocks(n_samples: int) -> Iterator[Rows]:
     """Yield the numbers of samples, `ROWS_AT_ONCE` at a time."""
     for begin in range(0, n_samples, ROWS_AT_ONCE):

@@ -123,9 +123,9 @@ def test_low_rank_fits_keep_to_the_documented_memory():
         tracemalloc.stop()
     assert low.X_fit_.shape == (100, 2)
     assert low.score(samples, y) > 0.98  # it has learned
-    # The class documents 98,304 bytes for each component, and a matrix of 1000 x 1000 bins for each
-    # of the two codings.
-    assert peak < 98304 * 100 + 2 * 8 * 1000**2
+    # The class documents 98,304 bytes for each component, 16 MB to choose inputs, and a matrix of
+    # 1000 x 1000 bins for each of the two codings.
+    assert peak < 98304 * 100 + 16e6 + 2 * 8 * 1000**2
 
 
 @pytest.mark.parametrize("max_components", [30, 2000])
@@ -261,5 +261,5 @@ def test_five_hundred_columns_are_fitted_within_two_seconds(coding):
     begin = time.process_time()
     SDNNKernelRidge(coding).fit(wide, wide[:, 0]).predict(wide)
     assert time.process_time() - begin < 2
-    few = SDNNKernelRidge(coding).fit(wide[:, :2], wide[:, 0])
+    few = SDNNKernelRidge(coding, inputs="all").fit(wide[:, :2], wide[:, 0])
     assert len({id(matrix) for matrix in few.kernel_._correlations}) == 1
