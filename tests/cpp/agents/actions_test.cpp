@@ -40,24 +40,14 @@ TEST(Actions, AnOffsetMovesActionsOfABoxButNotDiscreteOnes) {
   EXPECT_EQ(discrete.beside_index(1, 0.25, 0), 4.0);
 }
 
-TEST(Actions, OfANormalizedNumberAreScaledToTheRange) {
+TEST(Actions, OfANormalizedNumberAreScaledToTheRangeAndRoundedToIntegers) {
   const Actions actions({.low = {-2.0, 0.0}, .high = {6.0, 1.0}}, 0);
   EXPECT_EQ(actions.of_normalized(-1.0, 0), -2.0);
   EXPECT_EQ(actions.of_normalized(-0.5, 0), 0.0);
   EXPECT_EQ(actions.of_normalized(1.0, 0), 6.0);
   EXPECT_EQ(actions.of_normalized(-0.5, 1), 0.25);
-}
-
-TEST(Actions, OfABoxOfIntegersAreRoundedToTheNearestInteger) {
-  const ActionConfig bytes{.low = {0.0}, .high = {255.0}, .number = ActionNumber::whole};
-  const Actions actions(bytes, 5);
-  const Numbers expected = {0.0, 64.0, 128.0, 191.0, 255.0};
-  for (std::size_t index = 0; index < 5; ++index) {
-    EXPECT_EQ(actions.of_index(index, 0), expected[index]);
-    EXPECT_EQ(actions.index_of(expected[index], 0), index);
-  }
-  EXPECT_EQ(Actions(bytes, 0).of_normalized(0.001, 0), 128.0);
-  EXPECT_EQ(Actions(bytes, 0).of_normalized(1.0, 0), 255.0);
+  const Actions bytes({.low = {0.0}, .high = {255.0}, .number = ActionNumber::whole}, 0);
+  EXPECT_EQ(bytes.of_normalized(0.001, 0), 128.0);  // 127.6 rounded to an integer
 }
 
 // The numbers are numpy.float32(0.1) and so on.
@@ -70,14 +60,6 @@ TEST(Actions, AreRoundedToTheFloatingPointTypeOfTheTask) {
   EXPECT_EQ(middle(0.0, 0.2, ActionNumber::float16), 0.0999755859375);
   EXPECT_EQ(middle(60000.0, 60002.0, ActionNumber::float16), 60000.0);
   EXPECT_EQ(middle(0.0, 0x1.8p-23, ActionNumber::float16), 0x1.0p-23);  // a tie goes to the even
-}
-
-TEST(Actions, OfADiscreteSpaceAreConsecutiveIntegersFromItsFirst) {
-  const Actions actions({.low = {-1.0, 10.0}, .high = {1.0, 10.0}, .discrete = true}, 99);
-  EXPECT_EQ(actions.n_actions(), (std::vector<std::size_t>{3, 1}));
-  EXPECT_EQ(actions.of_index(2, 0), 1.0);
-  EXPECT_EQ(actions.of_index(0, 1), 10.0);
-  EXPECT_EQ(actions.index_of(1.0, 0), 2U);
 }
 
 TEST(Actions, OutsideTheSpaceAreRefused) {

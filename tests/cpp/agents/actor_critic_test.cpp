@@ -49,12 +49,6 @@ void learn_at_random(ActorCritic& agent, int n_steps, std::uint64_t seed) {
   }
 }
 
-TEST(ActorCritic, StartsWithUniformProbabilitiesAndValueZero) {
-  ActorCritic agent = actor_critic_of({});
-  for (const double p : probabilities(agent, {0.2, 0.7})) EXPECT_NEAR(p, 1.0 / 3.0, 1e-9);
-  EXPECT_EQ(agent.value(State{0.2, 0.7}), 0.0);
-}
-
 // A critic with alpha = 1 and no trace has the reward of a terminal transition at once.
 TEST(ActorCritic, WithRateOneTheCriticLearnsRewardPlusDiscountedValue) {
   ActorCritic agent = actor_critic_of(

@@ -148,7 +148,7 @@ TEST(Controller, ActsAndLearnsLikeItsAgent) {
             core::state_of(agent));
 }
 
-// Each with a workspace and random numbers of its own; and what the controller itself would do.
+// Each reader has a separate workspace and random numbers.
 TEST(Controller, GivesTheSameActionsToConcurrentReaders) {
   for (const ControllerConfig& config :
        {rbf_config(), rbf_of_vectors(), sdnn(), fuzzy_config(), fuzzy_of_vectors()}) {
@@ -210,7 +210,9 @@ TEST(Controller, WithSeveralEnvironmentsActsAndLearnsLikeItsAgent) {
   EXPECT_THROW(controller.begin_episode(3), std::invalid_argument);
 }
 
-// With 5 actions on 0, 1 and 2 the second and the third are 1; alone it is the third, the nearest.
+// Five actions from 0 to 2 are rounded to 0, 1, 1, 2, 2. An action of 1 that the controller has
+// taken as index 1 is learned as such; otherwise it is learned as index 2, whose value is 1
+// exactly.
 TEST(Controller, LearnsTheIndexThatWasTakenOfEqualRoundedActions) {
   const Numbers observed = {1.0, 0.0, 4.0, 11.0}, state = {0.5, 0.75, 0.25};
   for (const bool leaves : {false, true}) {

@@ -51,20 +51,6 @@ TEST(FuzzyQLearning, AStepMovesValuesOfFiredRulesAsWorkedByHand) {
   for (const std::size_t untouched : {0U, 1U}) EXPECT_EQ(agent.rules().values(0)[untouched], 0.0F);
 }
 
-TEST(FuzzyQLearning, LearnsOnlyTheChosenActionsOfFiredRules) {
-  Fuzzy agent(FuzzyRules({.n_inputs = 3}), {}, 1);
-  const State state = {0.3, 0.5, 0.9};
-  const double action = agent.act(state);
-  agent.learn(state, action, 1.0, {{0.4, 0.5, 0.6}}, false);
-  EXPECT_EQ(agent.dimension().fired().size(), 4U);  // 0.5 is a centre
-  EXPECT_EQ((agent.rules().table() != 0.0F).count(), 4);
-  for (std::size_t i = 0; i < 4; ++i) {
-    EXPECT_EQ(
-        agent.rules().values(agent.dimension().fired().rules[i])[agent.dimension().picked()[i]],
-        static_cast<float>(0.5 * agent.dimension().fired().truth_values[i]));
-  }
-}
-
 // Every rule explores for itself: with 16 rules and epsilon 0.1 most late steps hold a random pick.
 TEST(FuzzyQLearning, RulesExploreIndependentlyAfterTheGreedyFirstSteps) {
   FuzzyRules rules({.n_inputs = 4});
@@ -181,11 +167,6 @@ TEST(FuzzyQLearning, ARefusedRewardDoesNotChangeTraces) {
     without_refusals.learn(state, action, 1.0, next, false);
   }
   EXPECT_EQ(table(agent), table(without_refusals));
-}
-
-TEST(FuzzyQLearning, ContinuesExactlyAfterItWasSavedAtAnyStep) {
-  testing::expect_exact_resume(traced_agent);
-  testing::expect_exact_resume(traced_agent, 3);
 }
 
 // Where two environments fire different rules, each goes as if it were alone, but for what is
@@ -317,11 +298,6 @@ TEST(FuzzyQLearning, DimensionsOfAnActionLearnLikeSeparateAgents) {
   }
   EXPECT_EQ(core::state_of(both.dimensions()[0]), core::state_of(first));
   EXPECT_EQ(core::state_of(both.dimensions()[1]), core::state_of(second));
-}
-
-TEST(FuzzyQLearning, WithTwoDimensionsContinuesExactlyAfterItWasSaved) {
-  testing::expect_exact_resume(agent_of_two);
-  testing::expect_exact_resume(agent_of_two, 3);
 }
 
 TEST(FuzzyQLearning, RefusesRulesOfDifferentInputs) {

@@ -110,7 +110,8 @@ TEST(History, DifferencesOfNumbersAndAnglesAreAppendedAsWorkedByHand) {
   filter.begin(Numbers{0.4, 0.98, 0.25}, memory, state, room);
   EXPECT_EQ(state, (Numbers{0.4, 0.98, 0.25, 0.5, 0.5}));
   filter.follow(Numbers{0.0}, Numbers{0.55, 0.01, 0.75}, memory, state, room);
-  EXPECT_DOUBLE_EQ(state[3], 0.5 + 0.15 / 0.3 / 2.0);  // one and a half times 0.2 is the largest
+  // Differences are scaled by one and a half times those of the experience: 0.3 and 0.15.
+  EXPECT_DOUBLE_EQ(state[3], 0.5 + 0.15 / 0.3 / 2.0);
   EXPECT_NEAR(state[4], 0.5 + 0.03 / 0.15 / 2.0, 1e-12);
   filter.follow(Numbers{0.0}, Numbers{0.0, 0.01, 0.75}, memory, state, room);
   EXPECT_DOUBLE_EQ(state[3], 0.0);  // beyond the largest one
@@ -125,7 +126,8 @@ TEST(History, AveragesMoveByAHalfAndAFifthOfTheDistance) {
   Numbers state(6);
   filter.begin(Numbers{0.2, 0.9}, memory, state, room);
   filter.follow(Numbers{0.0}, Numbers{0.6, 0.1}, memory, state, room);
-  const Numbers expected{0.6, 0.1, 0.4, 0.0, 0.28, 0.94};
+  // From 0.2 to 0.6, and from 0.9 to 1.1, which is 0.1 on the circle.
+  const Numbers expected{0.6, 0.1, 0.2 + 0.4 / 2, 0.0, 0.2 + 0.4 / 5, 0.9 + 0.2 / 5};
   for (std::size_t k = 0; k < 6; ++k) {
     const double distance = std::abs(state[k] - expected[k]);
     EXPECT_LT(std::min(distance, 1.0 - distance), 1e-12) << k;
@@ -182,7 +184,7 @@ ControllerConfig config_of(History history, bool is_running = false) {
           .warm_up_steps = 200};
 }
 
-/// Lives on in noisy observations of the mass; returns the actions.
+/// Lets the agent act and learn for some steps in noisy observations; returns its actions.
 Numbers actions_of(Controller& controller, core::Random& random, int n_steps) {
   Numbers actions, observation{0.5, 0.5};
   controller.begin_episode();
@@ -242,7 +244,6 @@ TEST(History, RefusesInconsistentStates) {
   EXPECT_THROW((void)Controller::restored(config, more), std::invalid_argument);
 }
 
-// The transitions of an agent, read by another one that never acts.
 TEST(History, ReadingTransitionsLearnsTheSameWeightsAsActing) {
   Controller actor(config_of(History::differences)), reader(config_of(History::differences));
   core::Random random(5, core::Stream::weights);
@@ -273,8 +274,8 @@ TEST(History, GreedyEpisodesHaveASeparateMemory) {
   (void)controller.act(Numbers{0.3, 0.9}, false);
   const Numbers state(controller.state_of(Numbers{0.5, 0.9}).begin(),
                       controller.state_of(Numbers{0.5, 0.9}).end());
-  EXPECT_GT(state[2], 0.5);  // it would have moved up from 0.3
-  EXPECT_EQ(state[3], 0.5);
+  EXPECT_GT(state[2], 0.5);  // input 0 has risen from 0.3 to 0.5
+  EXPECT_EQ(state[3], 0.5);  // input 1 has not changed
   core::Random same_random = random;
   EXPECT_EQ(actions_of(controller, random, 50), actions_of(same, same_random, 50));
 }
@@ -301,8 +302,8 @@ TEST(History, AStepAllocatesNothing) {
   }
 }
 
-// A task of one number; its approximator needs two inputs.
-TEST(History, ASingleInputIsGivenOnceBesideWhatIsAdded) {
+// Its approximator needs two inputs; without a history the single one would be repeated.
+TEST(History, ASingleInputIsNotRepeatedBesideInputsOfAHistory) {
   for (const auto& [history, n_inputs] :
        {std::pair{History::differences, 2U}, {History::averages, 3U}, {History::observer, 2U}}) {
     ControllerConfig config = config_of(history);
@@ -339,7 +340,7 @@ TEST(History, AGridThatIsTooLargeWithDifferencesIsRefusedOrHasNone) {
   core::Random random(5, core::Stream::weights);
   Numbers observation{0.5, 0.5}, velocity{0.0, 0.0};
   controller.begin_episode();
-  for (int t = 0; t < 250; ++t) {  // velocities are hidden
+  for (int t = 0; t < 250; ++t) {  // hidden velocities, for which differences would be selected
     const double action = controller.act(observation)[0];
     Numbers next = observation;
     for (std::size_t i = 0; i < 2; ++i) {

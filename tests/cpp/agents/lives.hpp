@@ -1,4 +1,4 @@
-/// Random lives of agents, which may be cut anywhere.
+/// Random lives of agents.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "instruction_sets.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/core/state.hpp"
 
@@ -39,7 +38,7 @@ Number copied(Number action) {
   return action;
 }
 
-/// A world of random states and rewards. Copies go on alike.
+/// A world of random states and rewards, in which copies of an agent have the same life.
 template <class Agent>
 class World {
  public:
@@ -96,41 +95,6 @@ class World {
   bool has_acted_ = false;  // and not learned yet
   bool begins_ = true;
 };
-
-/// Expects that a life that was cut and taken up by another agent made by `make` ends as the whole
-/// one, for 120 random cuts, wherever it is cut and under whatever instruction sets. With several
-/// environments these take turns.
-template <class Make>
-void expect_exact_resume(const Make& make, std::size_t n_environments = 1) {
-  using Agent = decltype(make());
-  constexpr std::size_t kSteps = 400;
-  Agent whole = make();
-  whole.set_n_environments(n_environments);
-  std::vector<World<Agent>> worlds;
-  for (std::size_t i = 0; i < n_environments; ++i) worlds.emplace_back(whole.n_inputs(), 7 + i, i);
-  struct Cut {
-    core::State state;
-    std::vector<World<Agent>> worlds;
-  };
-  std::vector<Cut> cuts;
-  for (std::size_t t = 0; t < kSteps; ++t) {
-    cuts.push_back({core::state_of(whole), worlds});
-    worlds[t % n_environments].step(whole);
-  }
-  const core::State end = core::state_of(whole);
-  core::Random random(11, core::Stream::weights);
-  on_every_instruction_set([&](auto) {
-    for (int i = 0; i < 120; ++i) {
-      const std::size_t at = random.below(kSteps);
-      Agent resumed = make();
-      core::restore(resumed, cuts[at].state);
-      ASSERT_EQ(core::state_of(resumed), cuts[at].state) << at;
-      std::vector<World<Agent>> rest = cuts[at].worlds;
-      for (std::size_t t = at; t < kSteps; ++t) rest[t % n_environments].step(resumed);
-      ASSERT_EQ(core::state_of(resumed), end) << at;
-    }
-  });
-}
 
 /// Expects that the agent allocates nothing when it continues from a restored state, where
 /// acting and learning do not.

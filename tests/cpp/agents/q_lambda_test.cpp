@@ -36,7 +36,7 @@ double q(const QLambda& agent, const State& state, std::size_t action) {
   return agent.values(state, workspace)[action];
 }
 
-/// Steps of a random walk, in `n_environments` in turn.
+/// Steps between random states, with random rewards; a tenth of them terminates.
 void learn_at_random(QLambda& agent, int n_steps, std::uint64_t seed) {
   core::Random random(seed, core::Stream::useless_inputs);
   State state{random.uniform(), random.uniform()};
@@ -50,7 +50,7 @@ void learn_at_random(QLambda& agent, int n_steps, std::uint64_t seed) {
   }
 }
 
-// gamma = 1/2, alpha = 1, no trace: the value of what follows halves.
+// With a discount of 1/2, a learning rate of 1 and no trace: Q(a, 0) = 1 + 8 / 2.
 TEST(QLambda, TargetsOfOneStepAreAsWorkedByHand) {
   QLambda agent = agent_of({.learning_rate = 1.0,
                             .discount = 0.5,
@@ -104,6 +104,7 @@ TEST(QLambda, TheToleranceOfTiesIsInUnitsOfValues) {
     agent.learn(a, Indices{2}, scale, a, true);
     EXPECT_EQ(first_after(0.8), 0U);
     EXPECT_EQ(first_after(0.7), 2U);
+    // A value of 100 makes the unit of values at least 2^4 times as large.
     const auto exponent = agent.readout().exponent();
     agent.learn(a, Indices{1}, 100.0 * scale, a, true);
     EXPECT_EQ(agent.act(a).front(), 1U);
@@ -171,7 +172,7 @@ TEST(QLambda, LearnsTheSameBitsOnEveryInstructionSet) {
   }
 }
 
-/// Steps that the longest one lasted after so many ends.
+/// The number of steps of the longest random action, after `n_ended` episodes have ended.
 int longest_action(QLambda agent, int n_ended) {
   const State state{0.5, 0.5};
   for (int i = 0; i < n_ended; ++i) agent.learn(state, Indices{0, 0}, 1.0, state, true);
@@ -181,7 +182,7 @@ int longest_action(QLambda agent, int n_ended) {
   for (int i = 0; i < 5000; ++i) {
     const auto span = agent.act(state);
     const Indices action(span.begin(), span.end());
-    n = action == last ? n + 1 : 1;  // the next one is another
+    n = action == last ? n + 1 : 1;  // of 250^2 actions, two successive ones are hardly ever equal
     last = action;
     longest = std::max(longest, n);
   }
@@ -233,7 +234,7 @@ TEST(QLambda, EnvironmentsHaveSeparateTraces) {
   together.set_n_environments(2);
   const State a{0.1, 0.1}, b{0.5, 0.5};
   together.learn(a, Indices{0}, 0.0, b, false, 0);
-  together.learn(b, Indices{1}, 1.0, b, true, 1);  // nobody else's trace carries it back
+  together.learn(b, Indices{1}, 1.0, b, true, 1);  // no trace of environment 0 carries it back
   EXPECT_NEAR(q(together, a, 0), 0.0, 0.3);
   together.set_n_environments(1);
   EXPECT_THROW(together.learn(a, Indices{0}, 0.0, b, false, 1), std::invalid_argument);

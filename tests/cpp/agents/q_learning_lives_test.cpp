@@ -16,14 +16,6 @@
 namespace sdnn::agents::small_q_learning {
 namespace {
 
-TEST(QLearning, ContinuesExactlyAfterItWasSavedAtAnyStep) {
-  testing::expect_exact_resume(sdnn_agent);
-  testing::expect_exact_resume(rbf_agent);
-  testing::expect_exact_resume(vector_agent);
-  testing::expect_exact_resume(rbf_agent, 2);
-  testing::expect_exact_resume(vector_agent, 3);
-}
-
 // Rewards 1 and 2 in the first environment, 8 and 8 in the second; gamma = 1/2, alpha = 1.
 TEST(QLearning, EnvironmentsHaveSeparatePendingSteps) {
   LookupTable table(2, 5, 2);

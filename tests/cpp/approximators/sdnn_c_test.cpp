@@ -81,20 +81,6 @@ TEST(SDNNC, RoundingDecidesOnFractionsOfAUnit) {
   EXPECT_NEAR(down, 1.75 * kNetworks, 5 * sigma);
 }
 
-TEST(SDNNC, PopcountsOfWindowsEqualTheSlidingCount) {
-  core::Random random(4, core::Stream::weights);
-  for (const int n_actions : {0, 2, 7, 141}) {
-    SDNNCConfig config = small();
-    config.n_actions = n_actions;
-    Network network(config, 9);
-    for (int i = 0; i < 40; ++i) {
-      const State state = random_state(3, random);
-      network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
-      EXPECT_EQ(values(network, state), values_by_masks(network, state));
-    }
-  }
-}
-
 // Weights that need two bytes take another way; it must not allocate on its first use either.
 TEST(SDNNC, LargeWeightsAllocateNothing) {
   SDNNCConfig config = small();
@@ -131,26 +117,6 @@ TEST(SDNNC, CopiesShareNothingThatIsLearned) {
   EXPECT_EQ(potentials(original, state), potentials_before);
   original = copy;
   EXPECT_EQ(values(original, state), values(copy, state));
-}
-
-TEST(SDNNC, ParametersCanBeMovedToAnotherNetworkOfTheSameWiring) {
-  Network teacher(small(), 3);
-  Network pupil(small(), 3);
-  const State state = {0.2, 0.4, 0.6};
-  for (int i = 0; i < 100; ++i) teacher.update(state, 5, 12.0);
-  (void)pupil.value(state, 5);  // remembered: must be forgotten
-  const HiddenLayer& p = teacher.hidden_layer();
-  std::vector<std::int32_t> weights;
-  std::vector<std::int32_t> thresholds;
-  for (std::size_t i = 0; i < p.n_units(); ++i) {
-    thresholds.push_back(p.threshold(i));
-    for (std::size_t j = 0; j < teacher.state_code().n_columns(); ++j) {
-      weights.push_back(teacher.weight(i, j));
-    }
-  }
-  pupil.set_parameters(weights, thresholds);
-  expect_equal_parameters(pupil, teacher);
-  EXPECT_EQ(values(pupil, state), values(teacher, state));
 }
 
 TEST(SDNNC, RefusesParametersOfWrongValueOrNumberAndKeepsItsOwn) {
