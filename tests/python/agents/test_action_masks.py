@@ -103,14 +103,10 @@ def test_masked_vectors_of_every_autoreset_mode_learn_the_same(actions, mode):
     assert states_equal(trained(1, mode), single)
 
 
-class Opaque(gym.vector.SyncVectorEnv):
-    """A vector whose environments are not stepped one by one."""
-
-
 @pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP"])
 def test_masked_vectors_without_separate_resets_take_allowed_actions(mode, monkeypatch):
     monkeypatch.setattr("sdnn.training.vectors._resets_each", lambda env: False)
-    env = Opaque([new_env] * 3, autoreset_mode=gym.vector.AutoresetMode[mode])
+    env = gym.vector.SyncVectorEnv([new_env] * 3, autoreset_mode=gym.vector.AutoresetMode[mode])
     agent = new_agent(SDNNQLambda, env)
     assert agent.train(env, steps=200).n_steps == 200
 
@@ -259,10 +255,6 @@ class Forgetful(gym.Wrapper):
         return (*results, {} if self.n % 5 == 4 else info)
 
 
-def forgetful():
-    return Forgetful(new_env())
-
-
 def test_missing_or_misshapen_masks_of_environments_are_unusable_steps():
     env = ActionMasks(gym.make("CartPole-v1"))  # has none
     agent = SDNNQLambda(env.observation_space, env.action_space)
@@ -270,8 +262,8 @@ def test_missing_or_misshapen_masks_of_environments_are_unusable_steps():
         agent.train(env, steps=3)
     with pytest.raises(UnusableStepError, match="action_mask"):
         evaluate(agent, env)
-    for masked in (forgetful, gym.vector.SyncVectorEnv([forgetful, forgetful])):
-        env = masked if masked is not forgetful else forgetful()
+    forgetful = Forgetful(new_env())
+    for env in (forgetful, gym.vector.SyncVectorEnv([lambda: Forgetful(new_env())] * 2)):
         with pytest.raises(UnusableStepError, match="action_mask"):
             new_agent(SDNNQLambda, env).train(env, steps=40)
     long = ActionMasks(Masked(), lambda env: [1] * 6)

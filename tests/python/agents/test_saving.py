@@ -1,4 +1,4 @@
-"""Saved agents go on exactly as they would have; damaged files are refused."""
+"""Saved agents resume exactly; damaged files are refused."""
 
 import copy
 import inspect
@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 
 import gymnasium as gym
 import numpy as np
@@ -48,48 +49,27 @@ GENERAL = QLearningConfig(
     start_steps=15,
     value_range="adaptive",
 )
-RANDOMLY = SDNNCConfig(
-    n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5, rounding="random",
-    averaging_interval=7,
-)  # fmt: skip
+RANDOMLY = replace(SMALL, rounding="random", averaging_interval=7)
 FALLING = QLearningConfig(learning_rate=1.0, final_learning_rate=0.2)
 TRACES = FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3)
 
+sdnn = partial(SDNNQLearning, approximator=SMALL, learning=GENERAL)
 AGENTS = {
-    "sdnn": lambda: SDNNQLearning(PLANE, TORQUE, approximator=RANDOMLY, learning=GENERAL, seed=5),
-    "sdnn, vector": lambda: SDNNQLearning(
-        PLANE, TWO_TORQUES, approximator=SMALL, learning=GENERAL, seed=5
+    "sdnn": lambda: sdnn(PLANE, TORQUE, approximator=RANDOMLY, seed=5),
+    "sdnn, vector": lambda: sdnn(PLANE, TWO_TORQUES, seed=5),
+    "sdnn, buttons": lambda: sdnn(MIXED, BUTTONS),
+    "sdnn, switches": lambda: sdnn(PLANE, gym.spaces.MultiDiscrete([2, 3])),
+    "sdnn, whole numbers": lambda: sdnn(PLANE, GEARS, seed=5),
+    "sdnn, warm-up": lambda: sdnn(UNBOUNDED, TORQUE, warm_up_steps=60),
+    "sdnn, adaptive ranges": lambda: sdnn(
+        PLANE, TORQUE, observation_range="adaptive", warm_up_steps=60
     ),
-    "sdnn, buttons": lambda: SDNNQLearning(MIXED, BUTTONS, approximator=SMALL, learning=GENERAL),
-    "sdnn, switches": lambda: SDNNQLearning(
-        PLANE, gym.spaces.MultiDiscrete([2, 3]), approximator=SMALL, learning=GENERAL
+    "sdnn, some pairs": lambda: sdnn(WIDE, TORQUE, approximator=replace(SMALL, max_pairs=12)),
+    "sdnn, tables": lambda: sdnn(PLANE, TORQUE, tables=[np.sign(np.eye(20) - 0.5)] * 2),
+    "sdnn, one circular variable": lambda: sdnn(
+        gym.spaces.Box(-1.0, 1.0, (1,)), TORQUE, angles=[0]
     ),
-    "sdnn, whole numbers": lambda: SDNNQLearning(
-        PLANE, GEARS, approximator=SMALL, learning=GENERAL, seed=5
-    ),
-    "sdnn, warm-up": lambda: SDNNQLearning(
-        UNBOUNDED, TORQUE, approximator=SMALL, learning=GENERAL, warm_up_steps=60
-    ),
-    "sdnn, ranges seen": lambda: SDNNQLearning(
-        PLANE,
-        TORQUE,
-        approximator=SMALL,
-        learning=GENERAL,
-        observation_range="adaptive",
-        warm_up_steps=60,
-    ),
-    "sdnn, some pairs": lambda: SDNNQLearning(
-        WIDE, TORQUE, approximator=replace(SMALL, max_pairs=12), learning=GENERAL
-    ),
-    "sdnn, tables": lambda: SDNNQLearning(
-        PLANE, TORQUE, approximator=SMALL, tables=[np.sign(np.eye(20) - 0.5)] * 2
-    ),
-    "sdnn, one circular variable": lambda: SDNNQLearning(
-        gym.spaces.Box(-1.0, 1.0, (1,)), TORQUE, approximator=SMALL, angles=[0]
-    ),
-    "sdnn, one angle pair": lambda: SDNNQLearning(
-        PLANE, TORQUE, approximator=SMALL, angle_pairs=[(1, 0)]
-    ),
+    "sdnn, one angle pair": lambda: sdnn(PLANE, TORQUE, angle_pairs=[(1, 0)]),
     "q-lambda": lambda: SDNNQLambda(UNBOUNDED, BUTTONS, warm_up_steps=60, seed=3),
     "actor-critic": lambda: SDNNActorCritic(UNBOUNDED, TWO_TORQUES, seed=1),
     "rbf": lambda: RBFQLearning(
@@ -232,7 +212,7 @@ def test_an_unchanged_class_that_is_defined_again_replaces_the_first(tmp_path):
     "name", ["sdnn", "sdnn, vector", "fuzzy", "sdnn, switches", "sdnn, warm-up"]
 )
 def test_a_file_without_gymnasium_spaces_is_read(name, n_steps, tmp_path):
-    """C++ says all of an agent but Gymnasium's spaces."""
+    # C++ saves agents without Gymnasium's spaces.
     agent = run_steps(AGENTS[name](), 0, n_steps)
     agent.save(tmp_path / "python")
 
@@ -242,13 +222,13 @@ def test_a_file_without_gymnasium_spaces_is_read(name, n_steps, tmp_path):
     again = load_agent(changed(tmp_path / "python", tmp_path / "cpp", change))
     assert again.action_space == agent.action_space
     assert again.observation_space == agent.observation_space
-    for one in (agent, again):
-        run_steps(one, n_steps, 90)
+    for continued in (agent, again):
+        run_steps(continued, n_steps, 90)
     assert states_equal(agent, again)
 
 
 def test_progress_is_read_from_the_arrays_of_the_file(tmp_path):
-    """C++ keeps the description of the file it read, and writes the progress that it came to."""
+    # C++ writes the description of the file that it has read, with the new progress in an array.
     agent = SDNNQLearning(PLANE, TORQUE, approximator=SMALL, learning=FALLING)
     agent.save(tmp_path / "old")
 
@@ -256,7 +236,7 @@ def test_progress_is_read_from_the_arrays_of_the_file(tmp_path):
         arrays["agent.progress"] = np.array(0.5)
 
     again = load_agent(changed(tmp_path / "old", tmp_path / "new", change))
-    assert (again.progress, again.learning_rate) == (0.5, 0.6)
+    assert (again.progress, again.learning_rate) == (0.5, 0.6)  # half way from 1 to 0.2
 
 
 @pytest.fixture(scope="module")

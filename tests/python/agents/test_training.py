@@ -491,11 +491,15 @@ def test_further_trainings_of_an_agent_and_its_copies_continue_the_episode_seeds
     assert whole.seeds == env.seeds[:5]
 
 
-def test_trainings_with_the_same_seed_have_the_same_episode_seeds():
-    env, agent = Corridor(), corridor_agent()
+def test_episode_seeds_are_unique_reproducible_and_apart_from_those_of_evaluations():
+    n_episodes, seed = 30, 4
+    env, evaluation_env, agent = Corridor(), Corridor(), corridor_agent()
     for _ in range(2):
-        agent.train(env, episodes=2, seed=4)
-    assert env.seeds[:2] == env.seeds[2:]
+        agent.train(env, episodes=n_episodes, seed=seed)
+    evaluate(agent, evaluation_env, n_episodes, seed=seed)
+    first, second = env.seeds[:n_episodes], env.seeds[n_episodes:]
+    assert first == second
+    assert len({*first, *evaluation_env.seeds}) == 2 * n_episodes
 
 
 def test_sdnn_q_learning_learns_the_shortest_way_through_a_corridor():
@@ -509,18 +513,7 @@ def test_sdnn_q_learning_learns_the_shortest_way_through_a_corridor():
     assert evaluation.mean_return == evaluation.returns.mean() > 0.6, "1 minus 0.1 for each step"
 
 
-def test_episode_seeds_are_unique_reproducible_and_apart_from_those_of_evaluations():
-    env, other = Corridor(), Corridor()
-    corridor_agent().train(env, episodes=30, seed=4)
-    corridor_agent().train(other, episodes=30, seed=4)
-    assert env.seeds == other.seeds
-    assert len(set(env.seeds)) == 30
-    third = Corridor()
-    evaluate(corridor_agent(), third, 30, seed=4)
-    assert not set(third.seeds) & set(env.seeds)
-
-
-def test_evaluations_do_not_change_what_is_learned(tmp_path):
+def test_evaluations_report_mean_returns_and_do_not_change_what_is_learned():
     plain = Training(corridor_agent(), Corridor(), steps=300)
     tested = Training(
         corridor_agent(), Corridor(), steps=300, evaluate_every=50, evaluation_env=Corridor()
@@ -528,6 +521,7 @@ def test_evaluations_do_not_change_what_is_learned(tmp_path):
     plain.run()
     result = tested.run()
     expected, state = plain.agent.state(), tested.agent.state()
+    # Only the generator that breaks ties in evaluations has drawn numbers.
     differ = {name for name in state if not np.array_equal(state[name], expected[name])}
     assert differ <= {"agent.policy.evaluation_ties.words"}
     assert result.evaluations[:, 0].tolist() == [50, 100, 150, 200, 250, 300]
@@ -557,13 +551,15 @@ def test_a_training_stopped_before_or_after_the_end_of_its_warm_up_resumes_exact
         agent = SDNNQLearning(env, approximator=SMALL, warm_up_steps=200)
         return Training(agent, env, steps=500, callbacks=callbacks)
 
-    young = begun().agent
-    assert young.is_warming_up
-    refuses("observation_range", young.q_values, env.reset()[0], error=RuntimeError)
+    agent = begun().agent
+    assert agent.is_warming_up
+    refuses("observation_range", agent.q_values, env.reset()[0], error=RuntimeError)
     cuts = (1, 150, 199, 200, 201, 350)
     whole = check_exact_resume(begun, lambda: env, tmp_path / "t", cuts)
     assert not whole.agent.is_warming_up
-    assert whole.agent.learning_report()["n_corrections"] > 480
+    assert whole.agent.learning_report()["n_corrections"] > 480, (
+        "also in the warm-up's 200 of 500 steps"
+    )
 
 
 @pytest.mark.parametrize("missing", ["hold", "code"])
@@ -648,7 +644,7 @@ def test_n_step_transitions_of_an_abandoned_episode_are_learned_on_resuming(tmp_
 
 
 @pytest.mark.filterwarnings("ignore:an episode has had")
-def test_an_endless_episode_takes_less_than_32_bytes_per_step(tmp_path):
+def test_an_endless_episode_takes_less_than_32_bytes_per_step_and_resumes_exactly(tmp_path):
     class Endless(Corridor):
         def step(self, action):
             self._at = int(np.clip(self._at + (1 if action else -1), 0, 4))
@@ -793,32 +789,25 @@ def test_a_reward_threshold_with_patience_2_stops_after_two_good_evaluations():
     assert (result.evaluations[-2:, 1] >= 0.6).all()
 
 
-@pytest.mark.parametrize("cut", [15, 20, 25, 29])
-def test_patience_counts_evaluations_from_before_a_training_was_loaded(tmp_path, cut):
-    def training(goal, agent):
-        stop = StopTrainingOnRewardThreshold(mean_return=-1e9, patience=3)
+def test_patience_counts_evaluations_from_before_a_training_was_loaded(tmp_path):
+    # Every evaluation, after each 10 steps, reaches the threshold: the third one stops.
+    stop = StopTrainingOnRewardThreshold(mean_return=-np.inf, patience=3)
+
+    def begun(*callbacks):
         return Training(
-            agent, Corridor(), steps=goal, callbacks=[stop],
+            corridor_agent(), Corridor(), steps=100, callbacks=[stop, *callbacks],
             evaluate_every=10, evaluation_env=Corridor(),
         )  # fmt: skip
 
-    whole = training(100, corridor_agent())
-    whole.run()
-    assert whole.n_steps == 30, "the third evaluation, one every 10 steps"
-    first = training(100, corridor_agent())
-    first.callbacks += (Stop(cut, tmp_path / "c"),)
-    first.run()
-    again = Training.load(
-        tmp_path / "c",
-        Corridor(),
-        callbacks=[StopTrainingOnRewardThreshold(mean_return=-1e9, patience=3)],
+    whole = check_exact_resume(
+        begun,
+        Corridor,
+        tmp_path / "t",
+        (15, 20, 25, 29),
+        callbacks=[stop],
         evaluation_env=Corridor(),
     )
-    assert again.evaluations == first.evaluations
-    result = again.run()
-    assert again.n_steps == 30
-    assert again.evaluations == whole.evaluations
-    assert len(result.evaluations) == 3 - cut // 10
+    assert whole.n_steps == 30
 
 
 def test_the_result_of_a_continued_training_has_all_of_its_episodes():

@@ -54,14 +54,9 @@ class Walk(gym.Env):
         assert abs(self._at) <= 1.0, "the episode is over"
         self._at += 0.3 * float(action[0]) + self.np_random.normal(0.0, 0.1)
         self._steps += 1
-        ends = abs(self._at) > 1.0
-        return (
-            self._observation(),
-            -abs(self._at),
-            ends,
-            self._steps == self._limit and not ends,
-            {},
-        )
+        terminated = abs(self._at) > 1.0
+        truncated = self._steps == self._limit and not terminated
+        return self._observation(), -abs(self._at), terminated, truncated, {}
 
     def _observation(self):
         shift = np.random.default_rng().uniform() if self._drifts else 0.0
@@ -130,7 +125,7 @@ def test_a_vector_of_one_environment_has_the_bits_of_a_single_environment(name):
 
 @pytest.mark.parametrize("name", KINDS)
 def test_a_training_in_a_vector_equals_a_loop_by_hand(name):
-    # In each round all environments act, all step, and all are learned in order.
+    # All environments act, all step, and all transitions are learned in order.
     env_type, make = KINDS[name]
     n = 3
     by_hand, trained = make(), make()
@@ -188,7 +183,7 @@ def test_a_training_stopped_at_any_step_resumes_exactly(name, tmp_path):
     whole = Training(make(), sync(3, env), steps=150, seed=9)
     rows = whole.run().rows
     for cut in np.random.default_rng(5).permutation(np.arange(1, 150))[:40]:
-        # Interruptions may come within a round, and while episodes of any length go on.
+        # Cuts come before and after any of the three environments, in episodes of any length.
         first = Training(make(), sync(3, env), steps=150, seed=9, callbacks=[Stop(cut, path)])
         before = first.run()
         assert not before.is_finished
@@ -232,18 +227,17 @@ def test_batched_acrobots_have_the_bits_of_single_ones_and_resume_exactly(tmp_pa
 
 
 def test_steps_callbacks_and_evaluations_count_transitions(tmp_path):
-    seen = []
+    progress_after = {}
 
     class Note(Callback):
         def on_step(self, training):
-            seen.append((training.n_steps, training.agent.progress))
+            progress_after[training.n_steps] = training.agent.progress
 
     path = tmp_path / "rows.jsonl"
     callbacks = [JSONLines(path), CheckpointCallback(tmp_path / "c", 7), Note()]
     result = sdnn_agent().train(sync(4), steps=50, callbacks=callbacks)
     assert result.n_steps == 50
-    assert [step for step, _ in seen] == list(range(1, 51))
-    assert [progress for _, progress in seen] == [step / 50 for step in range(1, 51)]
+    assert progress_after == {step: step / 50 for step in range(1, 51)}
     assert len(path.read_text().splitlines()) == result.n_episodes
     assert sdnn_agent().train(sync(4), episodes=9).n_episodes == 9
     rows = sdnn_agent().train(sync(2), steps=60, evaluate_every=25, evaluation_env=Walk()).rows
