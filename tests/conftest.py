@@ -128,6 +128,19 @@ def invoke(monkeypatch, tmp_path, use_trial):
 
 
 @pytest.fixture
+def refused(invoke):
+    """Call a command that must fail with an exit code and print no result; return its error."""
+
+    def _refused(*arguments, code):
+        result = invoke(*arguments)
+        assert (result.exit_code, result.stdout) == (code, ""), result.output
+        assert code == 2 or result.stderr.count("\n") == 1, "errors of usage only have more lines"
+        return result.stderr
+
+    return _refused
+
+
+@pytest.fixture
 def run(use_trial):
     """Run a plan into the store of a folder, with fake trials; returns outcome and digest."""
     from fake_trial import FakeTrial, make_plan

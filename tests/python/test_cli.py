@@ -41,24 +41,19 @@ def test_help_lists_commands_and_version_the_environment(invoke):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("command", "words"),
     [
-        (["reproduce", "z"], "'z'"),
-        (["reproduce", "a", "--episodes", 9], "episodes"),
-        (["reproduce", "a", "--episodes", 3_000_000_000], "--episodes"),
-        (["reproduce", "a", "--episodes", 10**8 + 1, "--dry-run"], "--episodes"),
-        (["reproduce", "a", "--fast"], "--fast"),
-        (["reproduce", "a", "--agent", "dqn"], "sdnn-c-robust"),
-        (["learn"], "learn"),
+        ("reproduce z", "'z'"),
+        ("reproduce a --episodes 9", "episodes"),  # fewer than between two evaluations
+        ("reproduce a --episodes 3000000000", "--episodes"),
+        (f"reproduce a --episodes {MOST_EPISODES + 1} --dry-run", "--episodes"),
+        ("reproduce a --fast", "--fast"),
+        ("reproduce a --agent dqn", "sdnn-c-robust"),
+        ("learn", "learn"),
     ],
 )
-def test_bad_arguments_of_reproduce_exit_with_2_and_write_nothing(
-    invoke, tmp_path, arguments, words
-):
-    result = invoke(*arguments)
-    assert result.exit_code == 2
-    assert words in result.stderr
-    assert result.stdout == ""
+def test_bad_arguments_exit_with_2_and_write_nothing(refused, tmp_path, command, words):
+    assert words in refused(*command.split(), code=2)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -131,18 +126,18 @@ def test_a_trial_of_the_most_episodes_is_accepted_and_of_more_refused():
 
 @pytest.fixture
 def no_costs(monkeypatch):
-    """Costs that take no time, and a list of what was asked."""
+    """Let measurements of costs take no time; returns the list of those that were requested."""
     from sdnn.reproduction import cost
 
-    asked = []
+    requested = []
 
     def measure(series, n_inputs, config):
-        asked.append((series.id, n_inputs))
+        requested.append((series.id, n_inputs))
         times = float(n_inputs) * np.ones(config.n_rounds)
         return tuple(times.tolist()), 1, 1
 
     monkeypatch.setattr(cost, "measure_steps", measure)
-    return asked
+    return requested
 
 
 def test_reproduce_without_arguments_runs_everything_that_is_not_stored(invoke, tmp_path, no_costs):
@@ -277,20 +272,20 @@ def test_costs_are_measured_for_the_selected_agent_only(invoke, no_costs):
 
 @dataclass(frozen=True)
 class PumpingConfig:
-    """No settings but those of every agent."""
+    """The only setting that every agent has."""
 
     n_inputs: int = 4
 
 
 @dataclass(frozen=True)
 class ThresholdConfig:
-    """From where on it pushes the other way."""
+    """The position of the first link's sensor at which the push changes its direction."""
 
     threshold: float = 0.5
 
 
 class Pumping:
-    """Pushes the elbow the way the first link swings; learns nothing."""
+    """An agent that pushes the elbow the way the first link swings and learns nothing."""
 
     def __init__(self, observation_space, action_space, *, approximator, learning, seed):
         assert observation_space.shape == (approximator.n_inputs,)
@@ -309,19 +304,14 @@ class Pumping:
 
 @pytest.fixture
 def pumping():
-    entry = AgentEntry(
-        id="pumping",
-        title="Pumping",
-        approximator=PumpingConfig,
-        learning=ThresholdConfig,
-        agent=Pumping,
-    )
-    register(entry)
-    yield entry
+    parts = {"approximator": PumpingConfig, "learning": ThresholdConfig, "agent": Pumping}
+    register(AgentEntry(id="pumping", title="Pumping", **parts))
+    yield
     del AGENTS["pumping"]
 
 
-def test_a_registered_agent_class_is_reproduced_with_figures_and_reports(pumping, tmp_path, invoke):
+@pytest.mark.usefixtures("pumping")
+def test_a_registered_agent_class_is_reproduced_with_figures_and_reports(invoke, refused, tmp_path):
     call = partial(invoke, "reproduce", trial=None)
     done = call("b", "--quick", "--agent", "pumping")
     assert done.exit_code == 0
@@ -329,19 +319,15 @@ def test_a_registered_agent_class_is_reproduced_with_figures_and_reports(pumping
     folder = tmp_path / "results"
     text = (folder / "results-pumping-quick.csv").read_text()
     rows = list(csv.DictReader(text.splitlines()))
-    assert len(rows) == 4 * 2 * 30
+    assert len(rows) == 4 * 2 * 30  # cases, trials, evaluations
     assert {row["agent"] for row in rows} == {"pumping"}
     assert {row["case"] for row in rows} == {"s4", "s4-noise", "s5-noise", "s6-noise"}
     in_time = [row["solved"] == "1" for row in rows if row["case"] == "s4"]
     assert 0 < sum(in_time) < len(in_time)  # easy while the goal is wide
-    # It has no chance in it, so trials differ by their sensors' noise alone.
-    steps = {
-        (case, trial): [
-            row["steps"] for row in rows if (row["case"], row["trial"]) == (case, trial)
-        ]
-        for case in ("s4", "s4-noise")
-        for trial in ("0", "1")
-    }
+    # The agent is deterministic, so trials differ by the noise of their sensors alone.
+    steps = {}
+    for row in rows:
+        steps.setdefault((row["case"], row["trial"]), []).append(row["steps"])
     assert steps["s4", "0"] == steps["s4", "1"]
     assert steps["s4-noise", "0"] != steps["s4-noise", "1"]
     assert (folder / "experiment-b-pumping-quick.png").read_bytes().startswith(b"\x89PNG")
@@ -353,35 +339,28 @@ def test_a_registered_agent_class_is_reproduced_with_figures_and_reports(pumping
     table = json.loads((folder / "table-pumping-quick.json").read_text())
     assert table["claims"] == []  # the paper says nothing about it
     assert "(0 " in call("b", "--quick", "--agent", "pumping").stdout
-    refused = call("cost", "--agent", "pumping")
-    assert refused.exit_code == 2
-    assert "agents whose cost is measured are sdnn-c, fuzzy, rbf, got pumping" in refused.stderr
+    error = refused("reproduce", "cost", "--agent", "pumping", code=2)
+    assert "agents whose cost is measured are sdnn-c, fuzzy, rbf, got pumping" in error
 
 
-def test_an_output_folder_that_is_a_file_is_refused(invoke, tmp_path):
+def test_an_output_folder_that_is_a_file_is_refused(refused, tmp_path):
     (tmp_path / "out").write_text("mine")
-    result = invoke("reproduce", "a", "--quick", "--out", "out")
-    assert result.exit_code == 2
-    assert "'out' is a file" in result.stderr
+    assert "'out' is a file" in refused("reproduce", "a", "--quick", "--out", "out", code=2)
     assert (tmp_path / "out").read_text() == "mine"
 
 
 @pytest.mark.parametrize("options", [[], ["--dry-run"]])
-def test_a_damaged_result_file_is_reported_in_one_line(invoke, tmp_path, options):
+def test_a_damaged_result_file_is_reported_in_one_line(refused, tmp_path, options):
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "results.sqlite").write_bytes(b"not a database")
-    result = invoke("reproduce", "a", "--quick", *options)
-    assert result.exit_code == 1
-    assert result.stderr.count("\n") == 1
-    assert result.stderr.startswith("Error: ")
-    assert str(Path("results/results.sqlite")) in result.stderr
+    error = refused("reproduce", "a", "--quick", *options, code=1)
+    assert error.startswith("Error: ")
+    assert str(Path("results/results.sqlite")) in error
 
 
-def test_a_missing_matplotlib_is_reported_in_one_line(invoke, tmp_path, monkeypatch):
+def test_a_missing_matplotlib_is_reported_in_one_line(refused, tmp_path, monkeypatch):
     monkeypatch.setattr("sdnn.runs.report.find_spec", lambda name: None)
-    result = invoke("reproduce", "a", "--quick")
-    assert result.exit_code == 1
-    assert "pip install matplotlib" in result.stderr
+    assert "pip install matplotlib" in refused("reproduce", "a", "--quick", code=1)
     assert list(tmp_path.iterdir()) == []
 
 
