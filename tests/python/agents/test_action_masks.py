@@ -135,7 +135,7 @@ def test_targets_bootstrap_from_allowed_actions_only(agent_class):
         discount=0.5, learning_rate=1.0, final_learning_rate=None, **settings
     )
     agent = new_agent(agent_class, Masked(), learning=learning)
-    for _ in range(30):
+    for _ in range(30):  # with a learning rate of 1, so that values become rewards
         for action, value in ((-1, 0.0), (0, 8.0), (1, 2.0), (2, 0.0), (3, 0.0)):
             agent.learn(Transition(next_x, action, value, next_x, True))
             agent.begin_episode()
@@ -150,10 +150,10 @@ def test_targets_bootstrap_from_allowed_actions_only(agent_class):
         return masked.q_values(x)[1], masked.q_values(next_x)
 
     step = 1.2 if agent_class is SDNNQLearning else 0.05  # SDNN-C with few units has coarse values
-    value, then = learned(None)
-    assert value == pytest.approx(0.5 * then.max(), abs=step)
-    value, then = learned([0, 0, 1, 0, 0])
-    assert value == pytest.approx(0.5 * then[2], abs=step)
+    value, next_values = learned(None)
+    assert value == pytest.approx(0.5 * next_values.max(), abs=step)
+    value, next_values = learned([0, 0, 1, 0, 0])
+    assert value == pytest.approx(0.5 * next_values[2], abs=step)
 
 
 @pytest.mark.parametrize("unbounded", [False, True], ids=["bounds", "warm-up"])

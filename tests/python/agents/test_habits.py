@@ -60,8 +60,8 @@ def test_predict_accepts_batches_of_dict_and_tuple_observations(kind):
     agent = SDNNQLambda(space, gym.spaces.Discrete(9), inputs="all", angle_pairs="none")
     space.seed(1)
     several = [space.sample() for _ in range(4)]
-    for one in several:
-        agent.learn(Transition(one, 7, 1.0, one, False))  # now no action is as good as this one
+    for observation in several:
+        agent.learn(Transition(observation, 7, 1.0, observation, False))  # 7 becomes the best
     batch = gym.vector.utils.create_empty_array(space, 4)
     batch = gym.vector.utils.concatenate(space, several, batch)
     assert agent.predict(batch)[0].tolist() == [7] * 4
@@ -177,7 +177,7 @@ def test_save_best_agent_saves_at_each_better_evaluation(tmp_path):
                 if not self.saved or self.saved[-1][1] != bytes_now:
                     self.saved.append((training.n_steps, bytes_now))
 
-    note = Note()
+    note = Note()  # evaluations every 10 steps, the first, second and fifth of which are the best
     run(tmp_path, [1.0, 3.0, 2.0, 3.0, 4.0, 0.0], SaveBestAgent(path), note)
     assert [steps for steps, _ in note.saved] == [10, 20, 50]
     assert isinstance(load_agent(path), SDNNQLambda)
@@ -244,6 +244,7 @@ def test_a_resumed_training_continues_its_block_of_episodes(tmp_path):
 
 def test_two_evaluations_without_improvement_stop_a_training(tmp_path):
     stop = StopTrainingOnNoImprovement(max_evaluations=2)
+    # Evaluations every 10 steps: the third and fourth are no better than the second one.
     assert run(tmp_path, [1.0, 3.0, 2.0, 3.0, 9.0, 9.0], stop).n_steps == 40
     assert run(tmp_path, [1.0, 3.0, 2.0, 4.0, 3.0, 5.0], stop).n_steps == 60
     refuses("max_evaluations", StopTrainingOnNoImprovement, 0)

@@ -14,6 +14,7 @@ from sdnn.agents import (
 )
 from sdnn.agents.imitation import _value
 from sdnn.export import c_header
+from stopped_training import states_equal
 
 RANDOM_STEPS = 1100
 """More than the steps of a warm-up."""
@@ -68,20 +69,9 @@ def test_a_loaded_agent_with_a_history_acts_and_learns_as_the_saved_one(history,
     agent.save(tmp_path / "agent.safetensors")
     same = load_agent(tmp_path / "agent.safetensors")
     assert same.history == history
-    env = positions()
-    observation, _ = env.reset(seed=2)
-    for learner in (agent, same):
-        learner.begin_episode()
-    for _ in range(20):
-        action = agent.act(observation)
-        assert same.act(observation) == action
-        next_observation, reward, terminated, _, _ = env.step(action)
-        for learner in (agent, same):
-            learner.learn(Transition(observation, action, reward, next_observation, terminated))
-        observation = next_observation
-        if terminated:
-            break
-    assert all(np.array_equal(a, same.state()[name]) for name, a in agent.state().items())
+    for resumed in (agent, same):
+        resumed.train(positions(), steps=20, seed=2)
+    assert states_equal(agent, same)
 
 
 def test_evaluations_do_not_change_the_history_of_the_current_episode():
@@ -106,7 +96,7 @@ def test_environments_of_a_vector_have_separate_histories():
 
 
 def test_the_value_after_a_truncated_log_is_that_of_its_own_episode():
-    """Values of later observations do not depend on what was imitated before."""
+    # It does not depend on the episode that was imitated before.
     agent = SDNNQLambda(positions(), seed=1, history="differences")
     agent.train(positions(), steps=RANDOM_STEPS, seed=1)
     first, second = ([Transition([x, 0.0], 0, 1.0, [x + 0.1, 0.0], False)] for x in (-2.0, 1.0))

@@ -35,26 +35,27 @@ def new_agent(space=PLANE, **learning):
     )
 
 
-@pytest.mark.parametrize("space", [PLANE, UNBOUNDED], ids=["born", "warming up"])
+@pytest.mark.parametrize("space", [PLANE, UNBOUNDED], ids=["no warm-up", "warm-up"])
 def test_rates_set_by_hand_stay_until_set_to_none_and_are_saved(space, tmp_path):
     agent = new_agent(space, **FALLING)
     agent.learning_rate, agent.epsilon = 0.25, 0
     agent.progress = 1.0
     agent.save(tmp_path / "agent")
-    ways = (load_agent(tmp_path / "agent"), copy.deepcopy(agent), pickle.loads(pickle.dumps(agent)))
-    for one in (agent, *ways):
-        assert (one.learning_rate, one.epsilon) == (0.25, 0.0)
-        seen = np.zeros(2)
+    loaded = load_agent(tmp_path / "agent")
+    x = np.zeros(2)
+    for same in (agent, loaded, copy.deepcopy(agent), pickle.loads(pickle.dumps(agent))):
+        assert (same.learning_rate, same.epsilon) == (0.25, 0.0)
         for _ in range(40):
-            one.learn(Transition(seen, one.act(seen), 1.0, seen + 0.1, False))
-        assert not one.is_warming_up
-        assert (one.learning_rate, one.epsilon) == (0.25, 0.0)
-        one.learning_rate = one.epsilon = None
-        assert (one.learning_rate, one.epsilon) == (0.05, 0.02)
+            same.learn(Transition(x, same.act(x), 1.0, x + 0.1, False))
+        assert not same.is_warming_up
+        assert (same.learning_rate, same.epsilon) == (0.25, 0.0)
+        same.learning_rate = same.epsilon = None
+        final_rates = (FALLING["final_learning_rate"], FALLING["final_epsilon"])
+        assert (same.learning_rate, same.epsilon) == final_rates
 
 
 class Anneal(Callback):
-    """The spelling of users: from the last value to the next."""
+    """Multiplies the present rates, as user code often does."""
 
     def on_step(self, training):
         training.agent.epsilon *= 0.97
@@ -85,7 +86,7 @@ def test_a_training_with_rates_set_by_callbacks_resumes_exactly(make, env_id, tm
 
 
 def test_a_schedule_sets_the_rates_before_every_step():
-    seen = []
+    rates = []
 
     class Note(Callback):
         def on_start(self, training):
@@ -93,15 +94,15 @@ def test_a_schedule_sets_the_rates_before_every_step():
 
         def on_step(self, training):
             agent = training.agent
-            seen.append((agent.progress, agent.learning_rate, agent.epsilon))
+            rates.append((agent.progress, agent.learning_rate, agent.epsilon))
 
     env = gym.make("Pendulum-v1")
     agent = RBFQLearning(
         env.observation_space, env.action_space, approximator=RBFNetworkConfig(n_actions=5)
     )
     agent.train(env, steps=20, callbacks=[waves(), Note()])
-    assert len(seen) == 21
-    for progress, rate, epsilon in seen:
+    assert len(rates) == 1 + 20  # at the start and after every step
+    for progress, rate, epsilon in rates:
         assert rate == 0.6 + 0.4 * np.sin(9 * progress)
         assert epsilon == 1 - progress
 

@@ -51,8 +51,8 @@ def others(field, value):
     if isinstance(value, tuple):  # of each input
         return [(True, False, False) if bool in kinds else (3, 0, 0)]
     kind = int if int in kinds else float
-    tried = [kind(one) for one in (0.3, 0.9, 1, 2, 5, 20)]
-    return [one for one in dict.fromkeys([kind((value or 0) * 2), *tried]) if one != value]
+    numbers = [kind(number) for number in ((value or 0) * 2, 0.3, 0.9, 1, 2, 5, 20)]
+    return [number for number in dict.fromkeys(numbers) if number != value]
 
 
 def actions_and_values(entry, n_dimensions, approximator, learning):
@@ -116,15 +116,16 @@ def test_every_setting_changes_what_an_agent_does_unless_listed(name, n_dimensio
     assert without == listed.keys() & {field.name for _, field in fields}
 
 
-def test_settings_of_schedules_are_refused_without_schedule_steps():
+def test_schedules_need_schedule_steps_or_follow_the_progress():
     def agent(**learning):
         space = gym.spaces.Box(-1.0, 1.0, (3,), np.float64)
         return SDNNQLambda(space, gym.spaces.Discrete(2), learning=QLambdaConfig(**learning))
 
     refuses("schedule", agent, schedule="exponential", final_epsilon=0.1)
     refuses("exploration_fraction", agent, exploration_fraction=0.5)
+    # From 1 to 0.1: half way by the progress; or unchanged, as no step has been learned.
     for schedule_steps, expected in ((0, 0.55), (100, 1.0)):
-        one = agent(schedule_steps=schedule_steps, final_learning_rate=0.1)
-        one.progress = 0.5
-        assert one.is_warming_up
-        assert one.learning_rate == pytest.approx(expected)
+        warming_up = agent(schedule_steps=schedule_steps, final_learning_rate=0.1)
+        warming_up.progress = 0.5
+        assert warming_up.is_warming_up
+        assert warming_up.learning_rate == pytest.approx(expected)

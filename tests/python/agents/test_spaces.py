@@ -23,7 +23,7 @@ class Spaces:
 
 OBSERVED = [
     (PLANE, Box(-1.0, 1.0, (2,), np.float16), True),
-    (PLANE, Box(-1.0, 1.000001, (2,), np.float64), True),
+    (PLANE, Box(-1.0, 1.000001, (2,), np.float64), True),  # bounds that are equal as floats
     (PLANE, Box(-1.0, 1.001, (2,)), False),
     (PLANE, Box(-np.inf, 3.0, (2,), np.float64), False),
     (Box(np.finfo(np.float32).min, np.inf, (2,)), Box(-np.inf, np.inf, (2,), np.float64), True),
@@ -134,7 +134,7 @@ def test_batched_spaces_of_a_vector_are_refused_with_the_single_ones(name, n):
     assert RBFQLearning(envs.single_observation_space, envs.single_action_space)
 
 
-def test_matrix_shaped_spaces_that_are_no_batches_are_accepted():
+def test_matrix_shaped_spaces_with_other_rows_or_actions_than_a_batch_are_accepted():
     for observations, actions in (
         (Box(-1.0, 1.0, (3, 2)), PLANE),
         (Box(-1.0, 1.0, (2, 2)), PLANE),
