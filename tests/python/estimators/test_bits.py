@@ -13,14 +13,12 @@ pytestmark = pytest.mark.filterwarnings("ignore::sdnn.estimators.OutlierWarning"
 
 
 def transcribed(model):
-    """The slow layer with the tables and first weights of the core's."""
+    """The transcribed layer with the tables and first weights of the core's."""
     code = model.network_.input_code
     plain = estimator_transcription.SelectiveDesensitization(
         code.modified, code.modifiers, code.core_pairs
     )
-    return estimator_transcription.ParallelPerceptron(
-        plain, model.network_.n_units, weights=model.weights_, thresholds=model.thresholds_
-    )
+    return estimator_transcription.ParallelPerceptron(plain, model.weights_, model.thresholds_)
 
 
 def untrained(model, X, y):
