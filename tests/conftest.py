@@ -122,7 +122,7 @@ def invoke(monkeypatch, tmp_path, use_trial):
         if trial is not None:
             use_trial(trial)
         options = {"catch_exceptions": False} | options
-        return CliRunner().invoke(main, [str(one) for one in arguments], **options)
+        return CliRunner().invoke(main, [str(argument) for argument in arguments], **options)
 
     return _invoke
 
@@ -166,7 +166,7 @@ def collected():
 
     def _collected(experiment, folder, n_trials, n_episodes=15_000):
         study = Study("", specs_of(experiment.cases, n_episodes), n_trials=n_trials, seed=0)
-        keys = [one.key for one in plan_trials(experiment.cases, n_trials, 0, n_episodes)]
+        keys = [planned.key for planned in plan_trials(experiment.cases, n_trials, 0, n_episodes)]
         with ResultStore(folder) as store:
             return collect(experiment, compare(study, store.load(keys)))
 

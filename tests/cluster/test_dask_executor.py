@@ -132,7 +132,7 @@ def test_an_agent_unknown_to_workers_is_refused_by_name(pair, tmp_path, monkeypa
     entry = replace(AGENTS["sdnn-c"], id="mine", core_trial=None)
     monkeypatch.setitem(AGENTS, "mine", entry)
     plan = []
-    for key, spec in ((one.key, one.spec) for one in make_plan(1, 10)):
+    for key, spec in ((planned.key, planned.spec) for planned in make_plan(1, 10)):
         other = spec.replace(agent=AgentSpec(name="mine", preset=spec.agent.preset))
         plan.append(PlannedTrial(key._replace(agent="mine", config_hash=other.config_hash), other))
     with pytest.raises(ClusterError, match="mine"):

@@ -32,8 +32,8 @@ def learned(space, action):
 
 
 def learns_alike(space, action, same):
-    one, other = learned(space, action), learned(space, same)
-    return all(np.array_equal(one[name], other[name]) for name in one)
+    weights, same_weights = learned(space, action), learned(space, same)
+    return all(np.array_equal(weights[name], same_weights[name]) for name in weights)
 
 
 def test_each_dimension_of_a_box_has_evenly_spaced_actions():

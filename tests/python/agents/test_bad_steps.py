@@ -49,15 +49,15 @@ class Points(gym.vector.VectorEnv):
     observation_space = gym.spaces.Box(-1.0, 1.0, (2, 2), np.float64)
     action_space = gym.spaces.MultiDiscrete([2, 2])
 
-    def __init__(self, **given):
-        self._given = given
+    def __init__(self, **columns):
+        self._columns = columns
 
     def reset(self, *, seed=None, options=None):
         return np.zeros((2, 2)), {}
 
     def step(self, actions):
         columns = {"reward": np.zeros(2), **dict.fromkeys(PARTS[1:], np.zeros(2, bool))}
-        return np.zeros((2, 2)), *(columns | self._given).values(), {}
+        return np.zeros((2, 2)), *(columns | self._columns).values(), {}
 
 
 def trained(env):
@@ -101,9 +101,9 @@ def test_numpy_bools_end_an_episode_like_python_bools(part):
 @pytest.mark.parametrize("part", PARTS)
 def test_rewards_and_flags_of_a_vector_need_a_valid_value_for_each_environment(part):
     for word, value in bad_values(part).items():
-        for given in (value, [value] * 3 if word == "0-d" else [value] * 2):
+        for column in (value, [value] * 3 if word == "0-d" else [value] * 2):
             with pytest.raises(UnusableStepError, match=rf"\b{part}\b"):
-                trained(Points(**{part: given}))
+                trained(Points(**{part: column}))
     assert trained(Points(**{part: [False, False]})).n_steps == 20
 
 

@@ -19,8 +19,8 @@ SMALL = LinearSDNNConfig(n_pattern_units=20, n_anchor_patterns=4, n_interpolated
 
 
 def new_agent(space=PLACE, **options):
-    given = {"inputs": "all", "angle_pairs": "none"} | options
-    return SDNNQLambda(space, BUTTONS, approximator=SMALL, seed=1, **given)
+    settings = {"inputs": "all", "angle_pairs": "none"} | options
+    return SDNNQLambda(space, BUTTONS, approximator=SMALL, seed=1, **settings)
 
 
 def logged(seed=1, n_episodes=4, length=10):

@@ -35,7 +35,7 @@ def test_predict_accepts_one_observation_or_a_batch(trained):
     several = np.stack([env.reset(seed=n)[0] for n in range(5)])
     actions, state = agent.predict(several, None, np.ones(5, bool), deterministic=True)
     assert state is None
-    assert actions.tolist() == [agent.act(one, explore=False) for one in several]
+    assert actions.tolist() == [agent.act(observation, explore=False) for observation in several]
     assert agent.predict(several[0])[0] == actions[0]
     assert agent.predict(several[0], deterministic=False)[0] in env.action_space
     refuses("deterministic", agent.predict, several[0], deterministic="yes", error=TypeError)

@@ -25,10 +25,10 @@ def exact():
 
 
 def positions():
-    env, places = exact(), [0, 2]
+    env, indices = exact(), [0, 2]
     space = env.observation_space
     return gym.wrappers.TransformObservation(
-        env, lambda x: x[places], gym.spaces.Box(space.low[places], space.high[places])
+        env, lambda x: x[indices], gym.spaces.Box(space.low[indices], space.high[indices])
     )
 
 

@@ -209,8 +209,8 @@ def test_an_outlier_reward_is_not_learned_and_keeps_the_reported_unit():
         if step == 1000:
             with pytest.warns(UserWarning, match=r"reward -1e\+12 of transition 1001"):
                 agent.learn(Transition(0, 0, -1e12, 0, terminated=True))
-        for one in (agent, same):
-            one.learn(Transition(0, 1, 3.0, 0, terminated=True))
+        for learner in (agent, same):
+            learner.learn(Transition(0, 1, 3.0, 0, terminated=True))
     assert agent.q_values(0).tolist() == same.q_values(0).tolist()
     report = agent.learning_report()
     assert report["recent_reward"] == 2.0

@@ -76,13 +76,13 @@ def test_presets_are_used_unless_settings_are_passed():
     paper_agent = SDNNQLearning(OBSERVATIONS, TORQUES, preset="paper")
     assert paper_agent.n_actions == 601
     assert paper_agent.learning == QLearningConfig()
-    given = SDNNQLearning(
+    with_settings = SDNNQLearning(
         OBSERVATIONS, TORQUES, learning=QLearningConfig(discount=0.5), preset="robust"
     )
-    assert (given.n_actions, given.learning) == (61, QLearningConfig(discount=0.5))
-    for name, chosen in SDNNQLearning.presets.items():
+    assert (with_settings.n_actions, with_settings.learning) == (61, QLearningConfig(discount=0.5))
+    for name, settings in SDNNQLearning.presets.items():
         agent = SDNNQLearning(OBSERVATIONS, TORQUES, preset=name)
-        assert agent.learning == chosen.learning
+        assert agent.learning == settings.learning
     refuses("preset", SDNNQLearning, OBSERVATIONS, TORQUES, preset="best")
 
 

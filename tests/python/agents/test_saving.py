@@ -304,11 +304,11 @@ def test_the_files_read_by_tests_in_cpp_are_up_to_date(tmp_path):
     )
     assert names == again
     for name in names:
-        one, other = agent_files.FOLDER / name, tmp_path / name
+        stored, written = agent_files.FOLDER / name, tmp_path / name
         if name.suffix == ".json":
-            assert json.loads(one.read_text()) == json.loads(other.read_text()), name
+            assert json.loads(stored.read_text()) == json.loads(written.read_text()), name
         elif name.stem == "estimator":
-            first, second = (SDNNRegressor.load(path) for path in (one, other))
+            first, second = (SDNNRegressor.load(path) for path in (stored, written))
             np.testing.assert_array_equal(first.weights_, second.weights_)
         else:
-            same_state(load_agent(one), load_agent(other))
+            same_state(load_agent(stored), load_agent(written))

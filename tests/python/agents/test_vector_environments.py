@@ -259,10 +259,10 @@ def test_dict_observations_and_discrete_actions_are_learned_in_vectors():
         def _observation(self):
             return {"at": super()._observation(), "lamp": int(self._at > 0)}
 
-    plain, one = sdnn_agent(Buttons()), sdnn_agent(Buttons())
+    plain, in_vector = sdnn_agent(Buttons()), sdnn_agent(Buttons())
     plain.train(Buttons(), steps=100)
-    one.train(sync(1, Buttons), steps=100)
-    assert states_equal(plain, one)
+    in_vector.train(sync(1, Buttons), steps=100)
+    assert states_equal(plain, in_vector)
     for make in (sync, lambda n, env: AsyncVectorEnv([env] * n)):
         vector = make(3, Buttons)
         assert sdnn_agent(Buttons()).train(vector, steps=100).n_steps == 100
@@ -282,16 +282,16 @@ def test_a_warm_up_may_continue_in_fewer_environments():
 def test_a_fuzzy_warm_up_ends_after_the_last_pending_action():
     agent = fuzzy_agent(Unbounded(), warm_up_steps=10)
     agent.n_environments = 3
-    seen = np.zeros(2)
+    x = np.zeros(2)
     for _ in range(3):
-        actions = [agent.act(seen, environment=i) for i in range(3)]
+        actions = [agent.act(x, environment=i) for i in range(3)]
         for i, action in enumerate(actions):
-            agent.learn(Transition(seen, action, 0.0, seen + i, False), i)
-    actions = [agent.act(seen, environment=i) for i in range(3)]
-    agent.learn(Transition(seen, actions[0], 0.0, seen, False), 0)
+            agent.learn(Transition(x, action, 0.0, x + i, False), i)
+    actions = [agent.act(x, environment=i) for i in range(3)]
+    agent.learn(Transition(x, actions[0], 0.0, x, False), 0)
     assert agent.is_warming_up, "10 are learned, but two actions are pending"
     agent.begin_episode(1)
-    agent.learn(Transition(seen, actions[2], 0.0, seen, False), 2)
+    agent.learn(Transition(x, actions[2], 0.0, x, False), 2)
     assert not agent.is_warming_up
 
 
@@ -450,17 +450,17 @@ def test_a_training_calls_the_learn_method_of_a_subclass():
 def test_learn_each_learns_up_to_the_first_bad_transition():
     agent, by_hand = sdnn_agent(), sdnn_agent()
     agent.n_environments = by_hand.n_environments = 3
-    seen = np.zeros((3, 2))
+    observations = np.zeros((3, 2))
     core = agent.core_parts()[0]
-    actions = core.act_each(seen, [0, 1, 2])
+    actions = core.act_each(observations, [0, 1, 2])
     for i in range(3):
-        action = by_hand.act(seen[i], environment=i)
+        action = by_hand.act(observations[i], environment=i)
         assert action == np.float32(actions[i])
-    by_hand.learn(Transition(seen[0], actions[0], -1.0, seen[0] + 1, False), 0)
-    step = (seen, actions, [-1.0, np.nan, -1.0], seen + 1, [False] * 3)
+    by_hand.learn(Transition(observations[0], actions[0], -1.0, observations[0] + 1, False), 0)
+    step = (observations, actions, [-1.0, np.nan, -1.0], observations + 1, [False] * 3)
     assert core.learn_each(*step, [0, 1, 2], []) == 1
     assert states_equal(agent, by_hand)
     refuses("reward", core.learn_each, *step, [1, 2], [])
     refuses("environments", core.learn_each, *step, [3], [])
-    refuses("next_observations", core.learn_each, *step[:3], seen[:2], step[4], [2], [])
+    refuses("next_observations", core.learn_each, *step[:3], observations[:2], step[4], [2], [])
     assert states_equal(agent, by_hand)

@@ -48,25 +48,25 @@ def scripts():
                 del sys.modules[name]
 
 
-def given(folder, *only, jobs=1):
+def options_of(folder, *only, jobs=1):
     return argparse.Namespace(folder=folder, only=only, jobs=jobs, redraw=False)
 
 
 def test_the_benchmark_page_has_the_tables_of_the_stored_trials(scripts):
     run, report, study = scripts.run, scripts.report, scripts.study
-    tables = report.tables(study, scripts.studies.curves(run.KIND, study, given(EVIDENCE)))
+    tables = report.tables(study, scripts.studies.curves(run.KIND, study, options_of(EVIDENCE)))
     text = (EVIDENCE / "benchmarks.md").read_text()
     assert scripts.page.with_tables(text, tables) == text, "run bench/other_tasks/run.py --redraw"
 
 
 def test_every_stored_curve_is_complete(scripts):
-    found = scripts.studies.curves(scripts.run.KIND, scripts.study, given(EVIDENCE))
-    for trial in itertools.chain(*found.values()):
+    curves = scripts.studies.curves(scripts.run.KIND, scripts.study, options_of(EVIDENCE))
+    for trial in itertools.chain(*curves.values()):
         assert trial["steps"] == sorted(set(trial["steps"]))
         lengths = {len(trial[name]) for name in ("steps", "cpu_seconds", "mean_return")}
         assert len(lengths) == 1
         assert trial["bytes"] > 0
-    assert all((case, scripts.report.OURS) in found for case in scripts.report.GOALS)
+    assert all((case, scripts.report.OURS) in curves for case in scripts.report.GOALS)
 
 
 def quick(spec, case):
@@ -87,11 +87,11 @@ def test_every_agent_of_the_study_learns_40_steps(scripts, monkeypatch):
     """The study as specified but for its budget: those that need no other library."""
     monkeypatch.setattr(scripts.studies, "N_MILESTONE_EPISODES", 2)
     study, tried = scripts.study, set()
-    for (case, variant), one in study.combinations.items():
+    for (case, variant), combination in study.combinations.items():
         if variant in {*tried, "sac", "td3", "ppo"} or case in PHYSICS:
             continue
         tried.add(variant)
-        spec = quick(one.spec, case)
+        spec = quick(combination.spec, case)
         key = study.keys(case, variant)[0]._replace(config_hash=spec.config_hash)
         planned = scripts.studies.PlannedTrial(key, spec)
         record, curve = scripts.studies.learn(planned, lambda done: None)
@@ -119,8 +119,8 @@ def test_a_stored_trial_is_not_run_again(scripts, tmp_path):
     )
     study, curves = scripts.run.StudyFile(file, n_trials=1), {}
     for _ in range(2):
-        studies.run_study("x", study, given(tmp_path, "tiles"))
-        curves, first_curves = studies.curves("x", study, given(tmp_path)), curves
+        studies.run_study("x", study, options_of(tmp_path, "tiles"))
+        curves, first_curves = studies.curves("x", study, options_of(tmp_path)), curves
     assert set(curves) == {("FrozenLake", "tiles")}
     assert curves == first_curves
 
@@ -130,11 +130,11 @@ def test_tables_of_two_hand_made_trials_are_as_worked_by_hand(scripts):
         steps = [10_000, 20_000, 50_000][: len(returns)]
         return {"steps": steps, "mean_return": returns, "cpu_seconds": [1.0] * 3, "bytes": 2048}
 
-    found = {
+    trials = {
         ("CartPole", "q-lambda"): [trial(20.0, 30.0, 480.0), trial(1.0, 2.0, 470.0)],
         ("CartPole", "tiles"): [trial(500.0, 500.0, 490.0)],
     }
-    tables = scripts.report.tables(scripts.study, found)
+    tables = scripts.report.tables(scripts.study, trials)
     goal = tables["goals"].splitlines()[2]
     assert goal == "| CartPole | 50,000 | 475 | 475 (470 to 480) | **1 of 2** | 2 |"
     # (490 - 475) / (475 - 22.4)
@@ -143,7 +143,7 @@ def test_tables_of_two_hand_made_trials_are_as_worked_by_hand(scripts):
     assert "| 475 (2) |" in tables["at the end"]
     assert "| **490** (1) |" in tables["at the end"]
     assert "| SDNNQLambda | 20 | 2 |" in tables["costs"]
-    along = scripts.report.along_the_way(scripts.study, found)
+    along = scripts.report.along_the_way(scripts.study, trials)
     assert "| 10.5" not in along
     assert "| 2 | 10 | 16 | 475 |" in along
 
@@ -179,13 +179,13 @@ def test_a_failed_measurement_does_not_stop_others_or_change_the_packed_store(
 ):
     measured = scripts.measured
     keys = [("a", 1), ("a b", 2)]
-    measured.measure_missing("squares", squared, [*keys, ("bad", -1)], given(tmp_path))
+    measured.measure_missing("squares", squared, [*keys, ("bad", -1)], options_of(tmp_path))
     assert "ValueError('negative')" in capsys.readouterr().err
-    found = measured.measured("squares", tmp_path)
-    assert {key: one["square"] for key, one in found.items()} == {("a", 1): 1, ("a b", 2): 4}
+    squares = measured.measured("squares", tmp_path)
+    assert {key: row["square"] for key, row in squares.items()} == {("a", 1): 1, ("a b", 2): 4}
     assert [file.name for file in tmp_path.iterdir()] == [measured.PACKED]
-    measured.measure_missing("squares", abs, keys, given(tmp_path))  # which would fail
-    assert measured.measured("squares", tmp_path) == found
+    measured.measure_missing("squares", abs, keys, options_of(tmp_path))  # which would fail
+    assert measured.measured("squares", tmp_path) == squares
     packed = (tmp_path / measured.PACKED).read_bytes()
     fail_in_store(measured, tmp_path)
     assert (tmp_path / measured.PACKED).read_bytes() == packed
@@ -195,15 +195,15 @@ def test_a_failed_measurement_does_not_stop_others_or_change_the_packed_store(
 def test_a_process_that_exits_is_reported_with_its_code(scripts, tmp_path, capsys):
     measured = scripts.measured
     keys = [("x", 0), ("x", 3)]
-    measured.measure_missing("squares", squared, keys, given(tmp_path, jobs=2), apart=True)
+    measured.measure_missing("squares", squared, keys, options_of(tmp_path, jobs=2), apart=True)
     assert "ended with 3" in capsys.readouterr().err
     assert list(measured.measured("squares", tmp_path)) == [("x", 3)]
 
 
 def test_only_selects_trials_by_whole_words(scripts):
     key = ("SDNN, small", "CartPole", 3)
-    assert scripts.measured.is_wanted(key, given(EVIDENCE, "CartPole", "3"))
-    assert not scripts.measured.is_wanted(key, given(EVIDENCE, "Cart"))
+    assert scripts.measured.is_wanted(key, options_of(EVIDENCE, "CartPole", "3"))
+    assert not scripts.measured.is_wanted(key, options_of(EVIDENCE, "Cart"))
 
 
 def test_a_page_without_the_marks_of_a_table_is_refused(scripts):
@@ -234,15 +234,15 @@ def test_sensor_wrappers_have_the_stated_noise_and_correlation(scripts):
     first = [env.reset(seed=5)[0], *(env.step(i % 2)[0] for i in range(8))]
     again = [env.reset(seed=5)[0], *(env.step(i % 2)[0] for i in range(8))]
     assert np.array_equal(first, again)
-    seen = []
+    observations = []
     for seed in range(300):
-        seen.append(env.reset(seed=seed)[0])
-        seen += [env.step(i % 2)[0] for i in range(8)]
-    seen = np.array(seen).reshape(300, 9, 15)
+        observations.append(env.reset(seed=seed)[0])
+        observations += [env.step(i % 2)[0] for i in range(8)]
+    observations = np.array(observations).reshape(300, 9, 15)
     # Noise of a copy in the units of a variable: a tenth of its range, 4.8 for the position.
-    apart = (seen[:, :, 0] - seen[:, :, 4]) / np.sqrt(2)
+    apart = (observations[:, :, 0] - observations[:, :, 4]) / np.sqrt(2)
     assert apart.std() == pytest.approx(0.48, rel=0.05)
-    irrelevant = seen[:, :, 12:]
+    irrelevant = observations[:, :, 12:]
     assert irrelevant.std() == pytest.approx(1.0, rel=0.1)
     pairs = irrelevant[:, :-1].ravel(), irrelevant[:, 1:].ravel()
     assert np.corrcoef(*pairs)[0, 1] == pytest.approx(0.95, abs=0.02)
@@ -275,13 +275,13 @@ def test_tile_codings_of_pairs_hashes_and_tables_have_their_indices(scripts):
     ]
     assert pairs(unit).tolist() == np.concatenate(expected).tolist()
     hashed = tiles.HashedTiles(12, 8, 16, 1000)
-    some = np.random.default_rng(1).random((50, 12))
-    found = np.array([hashed(one) for one in some])
-    assert found.shape == (50, 16)
-    assert found.min() >= 0
-    assert found.max() < 1000
-    assert len(np.unique(found)) > 400
-    assert hashed(some[0]).tolist() == hashed(some[0] + 1e-6).tolist()
+    points = np.random.default_rng(1).random((50, 12))
+    indices = np.array([hashed(point) for point in points])
+    assert indices.shape == (50, 16)
+    assert indices.min() >= 0
+    assert indices.max() < 1000
+    assert len(np.unique(indices)) > 400
+    assert hashed(points[0]).tolist() == hashed(points[0] + 1e-6).tolist()
     assert tiles.Table(5)(3).tolist() == [3]
 
 
@@ -302,12 +302,12 @@ def test_swift_sarsa_has_the_values_of_its_reference_implementation(scripts, set
     sizes = tiles.TilesConfig(n_bins=4, n_tilings=4)
     agent = tiles.SwiftSarsa(*spaces, approximator=sizes, learning=learning, seed=1)
     agent.begin_episode()
-    random, found = np.random.default_rng(0), []
+    random, learned = np.random.default_rng(0), []
     for _ in range(3000):
         active = np.sort(random.choice(40, 4, replace=False))
         agent.step(active, float(active[0] < 5))
-        found.append(agent._value)
-    assert [found[n] for n in (9, 99, 999, 2999)] == pytest.approx(values, rel=1e-8)
+        learned.append(agent._value)
+    assert [learned[n] for n in (9, 99, 999, 2999)] == pytest.approx(values, rel=1e-8)
 
 
 def test_stream_q_follows_the_gradient_of_its_value(scripts):

@@ -31,12 +31,12 @@ def test_inner_products_of_long_codes_approach_the_kernel(coding, pairs):
 def test_the_kernel_of_one_and_two_inputs_is_as_worked_by_hand():
     coding = RandomInverse(n_bins=11, n_flipped=10, low=0.0, high=1.0)
     rho = 1 - 4 * 10 / 100
-    one = kernel.AnalyticKernel(coding, n_inputs=2, n_units=100)
-    matrix = one(np.array([[0.05, 0.05]]), np.array([[0.15, 0.05], [0.15, 0.25]]))
+    of_two = kernel.AnalyticKernel(coding, n_inputs=2, n_units=100)
+    matrix = of_two(np.array([[0.05, 0.05]]), np.array([[0.15, 0.05], [0.15, 0.25]]))
     expected = [((1 + rho) / 2 + rho) / 2, ((1 + rho) / 2 * rho**2 + (1 + rho**2) / 2 * rho) / 2]
     np.testing.assert_allclose(matrix, [expected])
-    alone = kernel.AnalyticKernel(coding, n_inputs=1, n_units=100)
-    np.testing.assert_allclose(alone([[0.05]], [[0.25]]), [[rho**2]])
+    of_one = kernel.AnalyticKernel(coding, n_inputs=1, n_units=100)
+    np.testing.assert_allclose(of_one([[0.05]], [[0.25]]), [[rho**2]])
     refuses("n_inputs", kernel.AnalyticKernel, "anchor")
 
 
@@ -55,11 +55,11 @@ COLUMNS = {"different": RANDOM.lognormal(0, 2, 30), "equal": np.full(30, 3.5)}
 )
 def test_the_kernel_uses_fitted_codings_unchanged(coding, column):
     learned = coding.fit(COLUMNS[column], 400)
-    one = kernel.AnalyticKernel([learned, learned], n_units=400)
-    assert one.codings == (learned, learned)
+    analytic = kernel.AnalyticKernel([learned, learned], n_units=400)
+    assert analytic.codings == (learned, learned)
     samples = np.stack([COLUMNS[column]] * 2, axis=1)
     rho = learned.correlations(400)[np.ix_(*[learned.bins(COLUMNS[column])] * 2)]
-    np.testing.assert_allclose(one(samples), (1 + rho) / 2 * rho)
+    np.testing.assert_allclose(analytic(samples), (1 + rho) / 2 * rho)
     assert kernel.similarity(learned, 400).shape == (learned.size, learned.size)
     assert kernel.plot_similarity(learned, 400) is not None
 

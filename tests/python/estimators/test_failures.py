@@ -92,17 +92,17 @@ def test_an_error_at_any_call_leaves_the_model_unchanged(name, work, training):
     copy = WORKS[work](pickle.loads(before), y)
     counting.stops(lambda: WORKS[work](copy, y))
     last = counting.n_calls
-    places = np.random.RandomState(1).randint(1, last, size=90)
-    places = [*places, *range(max(1, last - 10), last + 1)]
+    calls = np.random.RandomState(1).randint(1, last, size=90)
+    calls = [*calls, *range(max(1, last - 10), last + 1)]
     n_failed = 0
-    for n in places:
+    for n in calls:
         if FailAtCall(n).stops(functools.partial(WORKS[work], model, y)):
             n_failed += 1
             assert state_of(model) == before, n
         else:  # some libraries go on after an error of a callback
             model, _ = new_model(name, training=training)
             model.fit(X[::-1], y[::-1]).learn_one(X[0], y[0])
-    assert n_failed > 0.75 * len(places)
+    assert n_failed > 0.75 * len(calls)
 
 
 @pytest.mark.parametrize("name", KINDS)

@@ -85,7 +85,10 @@ def test_settings_of_numpy_and_pandas_types_are_saved(model, tmp_path):
         assert same.class_weight == model.class_weight
     elif not isinstance(model.coding, list):
         assert same.coding == model.coding
-    again = [clone(one).set_params(random_state=0).fit(FRAME, LABELS) for one in (same, model)]
+    again = [
+        clone(estimator).set_params(random_state=0).fit(FRAME, LABELS)
+        for estimator in (same, model)
+    ]
     np.testing.assert_array_equal(again[0].weights_, again[1].weights_)
 
 

@@ -86,8 +86,8 @@ def test_integer_weights_equal_repeated_samples(estimator):
     weighted = estimator().fit(X, y, weights)
     repeated = estimator().fit(np.repeat(X, weights, axis=0), np.repeat(y, weights))
     outputs = (
-        one.predict if estimator is SDNNKernelRidge else one.predict_proba
-        for one in (weighted, repeated)
+        model.predict if estimator is SDNNKernelRidge else model.predict_proba
+        for model in (weighted, repeated)
     )
     np.testing.assert_allclose(*(predict(X) for predict in outputs), atol=1e-8)
 
@@ -159,7 +159,7 @@ def test_class_weights_shift_predictions_towards_rare_classes():
         SDNNKernelClassifier(class_weight=weight).fit(noisy, rare)
         for weight in (None, "balanced", {"rare": 0, "usual": 1})
     )
-    shares = [(one.predict(noisy) == "rare").mean() for one in (plain, balanced, none)]
+    shares = [(model.predict(noisy) == "rare").mean() for model in (plain, balanced, none)]
     assert shares[0] < shares[1]
     assert shares[2] == 0
 

@@ -36,8 +36,8 @@ def test_training_forms_and_threads_give_the_same_bits(make):
 def test_predictions_average_the_networks_of_the_last_epochs():
     model = SDNNRegressor(**OPTIONS).fit(X, Y)
     for n_epochs, earlier in zip((3, 4, 5), model._earlier, strict=True):
-        one = SDNNRegressor(**{**OPTIONS, "max_iter": n_epochs}).fit(X, Y)
-        np.testing.assert_array_equal(earlier.layer.weights, one.weights_)
+        stopped = SDNNRegressor(**{**OPTIONS, "max_iter": n_epochs}).fit(X, Y)
+        np.testing.assert_array_equal(earlier.layer.weights, stopped.weights_)
     assert model.score(X, Y) > 0.95
 
 

@@ -246,9 +246,9 @@ def test_the_default_number_of_units_per_class_falls_with_the_classes():
 
 
 def test_single_units_and_one_versus_one_have_no_probabilities():
-    one = SDNNClassifier(**GIVEN, scheme="one_vs_one", max_iter=1).fit(X, LABELS)
-    assert len(one.thresholds_) == 3  # a unit for each pair of three classes
-    assert not hasattr(one, "predict_proba")
+    of_pairs = SDNNClassifier(**GIVEN, scheme="one_vs_one", max_iter=1).fit(X, LABELS)
+    assert len(of_pairs.thresholds_) == 3  # a unit for each pair of three classes
+    assert not hasattr(of_pairs, "predict_proba")
     assert not hasattr(SDNNClassifier(n_units_per_class=1), "predict_proba")
     refuses("one_vs_one", SDNNClassifier(scheme="one_vs_one", n_units_per_class=5).fit, X, LABELS)
 
@@ -290,9 +290,9 @@ def test_integer_sample_weights_equal_repeated_samples(make):
     targets = Y if make is SDNNRegressor else LABELS
     plain = make(**GIVEN, max_iter=3).fit(X, targets)
     same(plain, make(**GIVEN, max_iter=3).fit(X, targets, np.ones(len(Y))))
-    given = GIVEN | ({"output_range": (-10, 10)} if make is SDNNRegressor else {})
-    weighted = make(**given, max_iter=3).fit(X, targets, times)
-    repeated = make(**given, max_iter=3).fit(X.repeat(times, 0), targets.repeat(times))
+    options = GIVEN | ({"output_range": (-10, 10)} if make is SDNNRegressor else {})
+    weighted = make(**options, max_iter=3).fit(X, targets, times)
+    repeated = make(**options, max_iter=3).fit(X.repeat(times, 0), targets.repeat(times))
     same(weighted, repeated)
     assert (weighted.weights_ != plain.weights_).any()
 

@@ -52,7 +52,7 @@ def fit(model, X, y):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         model.fit(X, y)
-    return model, any(issubclass(one.category, OutlierWarning) for one in caught)
+    return model, any(issubclass(warning.category, OutlierWarning) for warning in caught)
 
 
 @pytest.mark.parametrize("seed", range(100))

@@ -111,9 +111,9 @@ def test_values_have_the_bins_of_libsdnn(parameter_file):
         "[NUMERICAL(RANDOM_INVERSE(10,5)), SYMBOLIC(RANDOM_INVERSE(4,5))]",
     )
     parameters = libsdnn.read_parameter_file(parameter_file(symbols))
-    given = [(0.0, 0), (0.0999, 1), (0.1, 3), (1.0, 4), (-3.0, -2), (2.0, 9)]
+    values = [(0.0, 0), (0.0999, 1), (0.1, 3), (1.0, 4), (-3.0, -2), (2.0, 9)]
     expected = [(0, 0), (0, 1), (1, 3), (9, 3), (0, 0), (9, 3)]
-    assert parameters.bins(given).tolist() == [list(pair) for pair in expected]
+    assert parameters.bins(values).tolist() == [list(pair) for pair in expected]
     for bad in ([0.5, 0.5], [[0.5]], [[np.nan, 0.0]]):
         refuses("inputs", parameters.bins, bad)
 

@@ -207,11 +207,11 @@ def make_agent(kind, **options):
     name, comma, case = kind.partition(",")
     cls = getattr(agents, name)
     approximator, learning = SETTINGS[cls]
-    given = {"observation_space": PLANE, "action_space": TORQUE, "seed": 3}
-    given |= {"approximator": approximator, "learning": learning}
+    settings = {"observation_space": PLANE, "action_space": TORQUE, "seed": 3}
+    settings |= {"approximator": approximator, "learning": learning}
     if cls is SDNNQLambda and "warm_up_steps" not in CASES[comma + case]:  # no warm-up by default
-        given |= {"inputs": "all", "angle_pairs": "none"}
-    agent = cls(**{**given, **CASES[comma + case], **options})
+        settings |= {"inputs": "all", "angle_pairs": "none"}
+    agent = cls(**{**settings, **CASES[comma + case], **options})
     return agent
 
 
@@ -369,8 +369,10 @@ def _shape_and_size(value):
 
 def parameters_of(function):
     parameters = inspect.signature(function).parameters.values()
-    named = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD]
-    return [name for name in named if name not in ("self", "cls")]
+    listed = [
+        parameter.name for parameter in parameters if parameter.kind is not parameter.VAR_KEYWORD
+    ]
+    return [name for name in listed if name not in ("self", "cls")]
 
 
 def bad_cells(label, parameters, cell, values=BAD):

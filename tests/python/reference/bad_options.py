@@ -62,7 +62,7 @@ def run_folder():
     folder = _LASTING.name
     run = os.path.join(folder, "run")
     settings = ["n_pattern_units=20", "n_hidden_units=60", "n_active_units=20"]
-    options = [word for one in settings for word in ("--set", f"approximator.{one}")]
+    options = [word for setting in settings for word in ("--set", f"approximator.{setting}")]
     arguments = ["train", "MountainCar-v0", "--agent", "sdnn-c", "--steps", "60", *options]
     arguments += ["--evaluate-every", "60"]
     result = CliRunner().invoke(main, [*arguments, "--evaluation-episodes", "1", "--out", run])
@@ -73,7 +73,7 @@ def run_folder():
 def parameters_of(command):
     """Return all parameters but the option for help."""
     made = main.commands[command]
-    return [one for one in made.get_params(Context(made)) if one.name != "help"]
+    return [parameter for parameter in made.get_params(Context(made)) if parameter.name != "help"]
 
 
 def command_cells(command):
@@ -88,8 +88,8 @@ def arguments_of(command, parameter, text):
     """The good arguments and options, with the text in the place of one of them."""
     arguments, options = (list(words) for words in COMMANDS[command])
     if isinstance(parameter, Argument):
-        places = [one for one in parameters_of(command) if isinstance(one, Argument)]
-        arguments[places.index(parameter)] = text
+        positional = [other for other in parameters_of(command) if isinstance(other, Argument)]
+        arguments[positional.index(parameter)] = text
     else:
         options.append(f"{parameter.opts[-1]}={text}")  # the last one counts
     return [*options, "--", *arguments]
@@ -125,7 +125,12 @@ def fault_of(result, parameter, text):
 
 def is_named(parameter, told):
     shown = parameter.metavar or parameter.name.upper()
-    names = {*parameter.opts, *(one.strip("-") for one in parameter.opts), shown, shown.lower()}
+    names = {
+        *parameter.opts,
+        *(option.strip("-") for option in parameter.opts),
+        shown,
+        shown.lower(),
+    }
     names |= {f"[{'|'.join(getattr(parameter.type, 'choices', ()))}]"} - {"[]"}
     return any(re.search(rf"(?<![\w-]){re.escape(name)}(?!\w)", told) for name in names)
 

@@ -164,9 +164,9 @@ def with_other_bytes(data, random):
             number = (0, 1, 127, 2**31 - 1, 2**63 - 1, 2**64 - 1)[random.randint(6)]
             changed[place : place + 8] = number.to_bytes(8, "little")
         else:
-            found = NUMBER.search(changed, place)
-            if found:
-                changed[found.start() : found.end()] = EXTREME[random.randint(len(EXTREME))]
+            number_at = NUMBER.search(changed, place)
+            if number_at:
+                changed[number_at.start() : number_at.end()] = EXTREME[random.randint(len(EXTREME))]
     return bytes(changed)
 
 
@@ -221,7 +221,11 @@ def with_other_array(header, random):
     names = sorted(values.keys() - {"__metadata__"})
     array = values[names[random.randint(len(names))]]
     shape = array["shape"]
-    (kinds,) = (one.split() for one in SAME_SIZE if array["dtype"] in one.split())
+    (kinds,) = (
+        names_of_size.split()
+        for names_of_size in SAME_SIZE
+        if array["dtype"] in names_of_size.split()
+    )
     if random.randint(2):
         array["dtype"] = kinds[random.randint(len(kinds))]
     else:

@@ -14,8 +14,8 @@ def run_spec(base=None, settings=None, environment=None, **options):
     values = {"agent": {"name": "sdnn-c"}} if base is None else base.values()
     if environment is not None:
         values["environment"] = msgspec.to_builtins(environment)
-    for table, own in (settings or {}).items():
-        values[table] = {**values.get(table, {}), **own}
+    for table, changes in (settings or {}).items():
+        values[table] = {**values.get(table, {}), **changes}
     for name, value in options.items():
         if name in _OTHERS and value is not None:
             values.get("budget", {}).pop(_OTHERS[name], None)

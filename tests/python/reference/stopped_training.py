@@ -18,13 +18,14 @@ class Stop(Callback):
             training.stop()
 
 
-def states_equal(one, other):
+def states_equal(state, other_state):
     """Whether two agents have the same bits."""
-    one, other = one.state(), other.state()
-    assert one.keys() == other.keys()
+    state, other_state = state.state(), other_state.state()
+    assert state.keys() == other_state.keys()
     return all(
-        one[name].dtype == other[name].dtype and np.array_equal(one[name], other[name])
-        for name in one
+        state[name].dtype == other_state[name].dtype
+        and np.array_equal(state[name], other_state[name])
+        for name in state
     )
 
 

@@ -26,14 +26,14 @@ SMALL = CostConfig(n_inputs=(3, 2), n_rounds=3, round_seconds=0.001)
 
 
 class FakeMeasure:
-    """Times that grow fourfold with each input; notes what it is asked."""
+    """Times that grow fourfold with each input; records its requests."""
 
     def __init__(self, ends_after=math.inf):
-        self.asked = []
+        self.requested = []
         self._last = ends_after
 
     def __call__(self, series, n_inputs, config):
-        self.asked.append((series.id, n_inputs))
+        self.requested.append((series.id, n_inputs))
         if n_inputs > self._last:
             return None
         times = 4.0**n_inputs * np.arange(1, config.n_rounds + 1)
@@ -73,7 +73,7 @@ def test_stored_measurements_are_not_repeated(tmp_path, measured):
 
     class Dies(FakeMeasure):
         def __call__(self, *arguments):
-            if len(self.asked) == 3:
+            if len(self.requested) == 3:
                 raise KilledError
             return super().__call__(*arguments)
 
@@ -81,14 +81,14 @@ def test_stored_measurements_are_not_repeated(tmp_path, measured):
         measured(tmp_path, Dies())
     second = FakeMeasure()
     costs = measured(tmp_path, second)
-    assert second.asked == [(s.id, n) for s in SERIES for n in (2, 3)][3:]
+    assert second.requested == [(s.id, n) for s in SERIES for n in (2, 3)][3:]
     assert len(costs) == 8
     third = FakeMeasure()
     again = measured(tmp_path, third)
-    assert third.asked == []
+    assert third.requested == []
     assert again == costs
     np.testing.assert_array_equal(costs[0].microseconds, [16.0, 32.0, 48.0])
-    assert (costs[0].n_steps, costs[0].table_bytes) == (5, 81)
+    assert (costs[0].n_steps, costs[0].table_bytes) == (5, 9**2)
     assert {cost.machine for cost in costs} == {machine.description()}
     assert {cost.version for cost in costs} == {_core.__version__}
 
@@ -109,7 +109,7 @@ def test_costs_of_another_machine_or_version_are_measured_again(tmp_path, measur
         with monkeypatch.context() as patched:
             patched.setattr(place, name, (lambda: "another") if place is machine else "9.9.9")
             anew = FakeMeasure()
-            assert len(measured(tmp_path, anew)) == len(anew.asked) == 8
+            assert len(measured(tmp_path, anew)) == len(anew.requested) == 8
 
 
 def test_damaged_costs_are_named(tmp_path, measured):

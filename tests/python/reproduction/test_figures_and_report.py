@@ -76,11 +76,8 @@ def test_short_trials_are_drawn_without_smoothing(tmp_path, run, collected):
         np.testing.assert_array_equal(line, np.median(result.steps, axis=0))
 
 
-def test_trials_of_another_seed_are_not_drawn(results):
-    assert [result.n_trials for result in results] == [3, 3]
-
-
 def test_a_figure_states_its_trials_and_configurations(results):
+    assert [result.n_trials for result in results] == [3, 3], "without trials of another seed"
     text = all_text(draw_experiment(EXPERIMENT, results))
     assert "3 trials x 3,000 episodes instead of 10 x 15,000" in text
     assert "quick" not in text.lower()
@@ -115,7 +112,7 @@ def test_a_reproduction_reads_each_trial_once(monkeypatch, tmp_path, use_trial):
     monkeypatch.setattr(ResultStore, "_make_record", counted("trial", ResultStore._make_record))
     done = run_study(PaperStudy(quick=True), tmp_path)
     # SDNN-C in Case I belongs to both figures.
-    assert [len(one["cases"]) for one in done.table["experiments"]] == [2, 8]
+    assert [len(experiment["cases"]) for experiment in done.table["experiments"]] == [2, 8]
     assert calls == ["trial"] * 18
     with ResultStore(tmp_path) as store:
         assert done.table["digest"] == records_digest(store.load())
@@ -160,9 +157,10 @@ def test_measures_of_fake_trials_are_as_worked_by_hand(results):
     assert summary.medians["episode_of_collapse"] == Estimate(math.inf, math.inf, math.inf)
     assert summary.uncensored("episode_of_collapse").tolist() == [3000.0] * 3
     assert summary.to_json()["median_curve_episodes_to_learn"] == np.median(first_good)
-    assert results[0].n_decisions == 3 * 7 * 3000
+    n_decisions = 3 * 3000 * 7  # trials, episodes, decisions of each fake episode
+    assert results[0].n_decisions == n_decisions
     assert results[0].microseconds_per_decision == pytest.approx(
-        1e6 * sum(r.seconds for r in results[0].records) / 63000
+        1e6 * sum(r.seconds for r in results[0].records) / n_decisions
     )
 
 
@@ -199,7 +197,7 @@ def test_a_terminal_shows_claims_and_on_demand_all_tables(report):
     page = report.page(PICTURES)
     page.print(brief)
     page.print(full, full=True)
-    few, all_lines = (one.file.getvalue().splitlines() for one in (brief, full))
+    few, all_lines = (console.file.getvalue().splitlines() for console in (brief, full))
     assert "episodes to learn: 50 [30," in "\n".join(few)
     assert max(map(len, few)) <= 80
     assert len(all_lines) > 3 * len(few)
@@ -228,7 +226,7 @@ def test_the_markdown_report_shows_all_rows_of_tables(report):
 def test_row_files_list_every_evaluation_once(report, results):
     records = [record for result in results for record in result.records]
     rows = [dict(zip(ROW_HEADER, row, strict=True)) for row in trial_rows(records)]
-    assert len(rows) == 2 * 3 * 300
+    assert len(rows) == 2 * 3 * 300  # cases, trials, evaluations
     assert len({(row["case"], row["trial"], row["episode"]) for row in rows}) == len(rows)
     first = records[0].rows
     assert rows[0]["steps"] == first.steps[0]

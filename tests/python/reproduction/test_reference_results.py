@@ -39,18 +39,18 @@ _SPEC.loader.exec_module(script)
 CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
 
 
-def measured(case_id, values, agent="sdnn-c", **more):
-    """Trials that have these final steps, and learned at once for ever."""
+def measured(case_id, values, agent="sdnn-c", **changes):
+    """Trials with these final steps, which are solved from the first evaluation to the last."""
     n = len(values)
-    own = {
+    measures = {
         "episodes_to_learn": np.full(n, 10.0),
         "early_steps": np.full(n, 4.0),
         "episode_of_collapse": np.full(n, math.inf),
         "final_steps": np.array(values, float),
         "final_share_solved": np.ones(n),
     }
-    own |= {name: np.array(found, float) for name, found in more.items()}
-    return TrialMeasures(case_id=case_id, agent=agent, last_episode=PAPER_EPISODES, values=own)
+    measures |= {name: np.array(numbers, float) for name, numbers in changes.items()}
+    return TrialMeasures(case_id=case_id, agent=agent, last_episode=PAPER_EPISODES, values=measures)
 
 
 def final_steps(case, **limits):
@@ -59,15 +59,15 @@ def final_steps(case, **limits):
 
 @pytest.mark.parametrize("n_good", [3, 5, 8])
 def test_the_chance_of_a_claim_is_a_binomial_tail(n_good):
-    """The median of ten is below a limit if six of them are: a binomial tail."""
+    # The median of ten trials is at most 6 if six of the ten are good.
     p = n_good / 10
     tail = sum(math.comb(10, k) * p**k * (1 - p) ** (10 - k) for k in range(6, 11))
     values = n_good * [4] + (10 - n_good) * [50]
     claim = Claim(1, "", (final_steps("s4", at_most=6),))
-    found = TenTrials([measured("s4", values)]).chance(claim)
-    assert found.value == pytest.approx(tail, abs=4 * math.sqrt(tail * (1 - tail) / 10_000))
-    assert found.lower < found.value < found.upper
-    assert found == TenTrials([measured("s4", values)]).chance(claim)
+    chance = TenTrials([measured("s4", values)]).chance(claim)
+    assert chance.value == pytest.approx(tail, abs=4 * math.sqrt(tail * (1 - tail) / 10_000))
+    assert chance.lower < chance.value < chance.upper
+    assert chance == TenTrials([measured("s4", values)]).chance(claim)
 
 
 def test_checks_of_a_claim_are_drawn_together():
@@ -230,7 +230,7 @@ def test_reports_show_the_reference_results(fake_results):
     rows = next(table.rows for table in tables if table.title == "With more trials")
     ends = next(row for row in rows if row[0] == "2")
     assert ends[5] == "inconclusive"
-    assert ends[6].startswith("3")  # 0.377: six good trials among ten
+    assert ends[6].startswith("3")  # 0.377: at least six of ten trials are good
     checks = rows[rows.index(ends) + 1 : rows.index(ends) + 3]
     assert [row[3:6] for row in checks] == [
         ("20", "27 [4, 50]", "undecided"), ("20", "4 [4, 4]", "holds")

@@ -18,7 +18,7 @@ from sdnn.runs.sweep import study_json, study_page
 
 
 def record(study, case, variant, number, steps, returns=None):
-    """A trial whose tests took so many steps; 50 is not solved."""
+    """A trial whose evaluations took these steps; an evaluation of 50 steps is not solved."""
     return make_record(
         config=study.combinations[case, variant].spec.canonical_json(),
         key=study.keys(case, variant)[number],
@@ -36,7 +36,7 @@ def json_of(comparison):
 
 
 def steps_of(*runs):
-    """Steps of tests, from pairs of a number of tests and their steps."""
+    """Steps of evaluations, from pairs of a number of evaluations and their steps."""
     return np.concatenate([np.full(n, steps) for n, steps in runs])
 
 
@@ -75,10 +75,11 @@ def test_differences_between_variants_are_paired_by_trial(study):
     # Means of four draws out of 0, 0, 0.8, 0.9: all of them 0 or 0.9 with probability 1/256.
     assert share.lower == 0.0
     assert 0.8 <= share.upper <= 0.9
-    # 26 of 50 tests in a row must be good: for the last time those that end with test 84.
+    # A trial has collapsed after the last 50 successive evaluations of which 26 are good: of 60
+    # good ones and 40 others, those that end with evaluation 84, at episode 840.
     assert old.result.values["episode_of_collapse"].tolist() == [math.inf, math.inf, 840.0, 0.0]
     assert new.result.values["episode_of_collapse"].tolist() == 4 * [math.inf]
-    # Censored: as the last episode, 1000.
+    # A trial without a collapse counts as its last episode: 1000 - 840 and 1000 - 0.
     assert new.differences["episode_of_collapse"].value == (0 + 0 + 160 + 1000) / 4
 
 
@@ -278,9 +279,13 @@ def test_small_studies_are_not_judged_and_show_claims_of_complete_cases_only(stu
         if case != "s5-noise"
     ]
     comparison = compare(mine, records)
-    judged = {number: c for own in judge_variants(comparison).values() for number, c in own.items()}
+    judged = {
+        number: claim
+        for claims in judge_variants(comparison).values()
+        for number, claim in claims.items()
+    }
     assert sorted(judged) == [3, 5, 7]
-    assert {c.verdict for c in judged.values()} == {Verdict.NOT_JUDGED}
+    assert {claim.verdict for claim in judged.values()} == {Verdict.NOT_JUDGED}
 
 
 OWN = "[base]\nenvironment = 'sdnn/PaperAcrobot-v0'\n"
@@ -378,5 +383,5 @@ def test_many_cases_wrap_to_the_next_row(study):
     mine = study(OWN + "[study]\ntrials = 1\n" + "".join(f"[cases.c{i}]\n" for i in range(7)))
     records = [record(mine, f"c{i}", "base", 0, steps_of((60, 4))) for i in range(7)]
     figure = draw_study(compare(mine, records), "")
-    assert len(figure.axes) == 4 * 5
+    assert len(figure.axes) == 4 * 5  # five cases in a row, two panels for each
     assert sum(axes.get_visible() for axes in figure.axes) == 2 * 7

@@ -239,8 +239,8 @@ def test_notes_name_runs_and_evaluations_that_are_omitted(tmp_path):
     empty = make(tmp_path / "empty", seeds[3])
     (curve,), notes = curves_of([whole, short, begun, empty])
     assert (curve.n_runs, curve.kind, curve.values.tolist()) == (2, "evaluation", [1, 3])
-    named = [begun.folder, empty.folder, f"{whole.folder}, {short.folder}"]
-    assert [note.partition(":")[0] for note in notes] == [str(one) for one in named]
+    names = [begun.folder, empty.folder, f"{whole.folder}, {short.folder}"]
+    assert [note.partition(":")[0] for note in notes] == [str(name) for name in names]
     assert "step 40" in notes[2]
     curves, notes = curves_of([whole, begun])
     assert [(curve.kind, curve.run) for curve in curves] == [

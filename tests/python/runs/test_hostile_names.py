@@ -113,13 +113,13 @@ def test_the_outputs_of_a_study_with_hostile_names_are_harmless(study, name):
     )
     records = [
         make_record(
-            config=one.spec.canonical_json(),
+            config=combination.spec.canonical_json(),
             key=key,
             version=name,
             finished_at=name,
             steps=[4] * 20,
         )
-        for pair, one in hostile.combinations.items()
+        for pair, combination in hostile.combinations.items()
         for key in hostile.keys(*pair)
     ]
     comparison = compare(hostile, records)

@@ -146,16 +146,17 @@ def test_a_run_killed_at_any_instant_resumes_exactly(whole, tmp_path):
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(config.values()))
     script = Path(__file__).with_name("kill_run.py")
-    done = python(script, tmp_path / "run", path, "12", "8")
+    n_kills, seed = 12, 8
+    done = python(script, tmp_path / "run", path, str(n_kills), str(seed))
     assert done.returncode == 0, done.stderr
-    killed, *left = map(int, done.stdout.split())
-    assert killed >= 10
-    assert len(set(left)) >= 4  # some had come further than those before
+    n_killed, *n_steps_saved = map(int, done.stdout.split())
+    assert n_killed >= n_kills - 2  # a run may end before it is killed
+    assert len(set(n_steps_saved)) >= 4, "some runs came further than those before"
     assert contents(Run(tmp_path / "run", config)) == contents(whole(config))
 
 
 def test_a_target_return_stops_a_run_until_a_new_goal_replaces_it(tmp_path):
-    config = run_spec(CONFIG, target_return=-1e9)
+    config = run_spec(CONFIG, target_return=-1e9)  # which every evaluation reaches
     run = Run.create(tmp_path / "run", config)
     outcome = run.train()
     assert (outcome.n_steps, outcome.reason) == (90, "target")

@@ -38,11 +38,11 @@ def test_the_description_of_the_scaling_reproduces_observations(redundant):
         known = {}
         values, _ = bare.reset(seed=seed)
         for line in lines:
-            name, variable, first, last, one, other = re.fullmatch(
+            name, variable, first, last, left, right = re.fullmatch(
                 r"(\S+): (?:variable (\d), from (\S+) to (\S+)|the mean of (\S+) and (\S+))", line
             ).groups()
             if variable is None:
-                known[name] = (known[one] + known[other]) / 2
+                known[name] = (known[left] + known[right]) / 2
             else:
                 part = (values[int(variable)] - float(first)) / (float(last) - float(first))
                 known[name] = min(max(part, 0.0), 1.0)

@@ -13,9 +13,10 @@ from sdnn.reports.statistics import (
 )
 
 
-def test_the_bootstrap_of_the_median_of_two_values_is_exact():
-    # Resamples of {0, 1}: medians 0, 1/2, 1 with probabilities 1/4, 1/2, 1/4.
-    assert estimate_median([0.0, 1.0]) == Estimate(0.5, 0.0, 1.0)
+@pytest.mark.parametrize("estimate", [estimate_median, estimate_mean])
+def test_the_bootstrap_of_two_values_is_exact(estimate):
+    # Resamples of {0, 1}: medians and means 0, 1/2, 1 with probabilities 1/4, 1/2, 1/4.
+    assert estimate([0.0, 1.0]) == Estimate(0.5, 0.0, 1.0)
 
 
 def test_the_interval_of_the_median_is_near_the_asymptotic_one():
@@ -43,9 +44,9 @@ def test_medians_of_mostly_censored_trials_are_infinite():
 
 
 def test_the_median_of_one_trial_has_no_interval_and_of_none_is_refused():
-    one = estimate_median([4.0])
-    assert one.value == 4.0
-    assert math.isnan(one.lower)
+    estimate = estimate_median([4.0])
+    assert estimate.value == 4.0
+    assert math.isnan(estimate.lower)
     refuses("shape", estimate_median, [])
 
 
@@ -79,11 +80,6 @@ def test_contrasts_of_single_or_nan_values_are_nan_and_of_infinite_ones_refused(
     refuses("shape", estimate_contrast, [1.0], [])
 
 
-def test_the_bootstrap_of_the_mean_of_two_values_is_exact():
-    # Resamples of {0, 1}: means 0, 1/2, 1 with probabilities 1/4, 1/2, 1/4.
-    assert estimate_mean([0.0, 1.0]) == Estimate(0.5, 0.0, 1.0)
-
-
 def test_the_interval_of_the_mean_is_near_the_normal_one():
     values = np.random.default_rng(1).normal(3.0, 2.0, 400)
     estimate = estimate_mean(values)
@@ -94,8 +90,12 @@ def test_the_interval_of_the_mean_is_near_the_normal_one():
 
 
 def test_means_of_infinite_values_or_no_trials_are_refused():
-    one = estimate_mean([2.0])
-    assert (one.value, math.isnan(one.lower), math.isnan(one.upper)) == (2.0, True, True)
+    estimate = estimate_mean([2.0])
+    assert (estimate.value, math.isnan(estimate.lower), math.isnan(estimate.upper)) == (
+        2.0,
+        True,
+        True,
+    )
     refuses("infinite", estimate_mean, [1.0, math.inf])
     refuses("trial", estimate_mean, [])
     assert math.isnan(estimate_mean([1.0, math.nan]).value)

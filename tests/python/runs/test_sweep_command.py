@@ -76,10 +76,10 @@ def test_sweep_and_reproduce_share_stored_trials(invoke):
 
 
 def test_the_json_output_is_the_written_table_for_any_number_of_jobs(invoke, tmp_path):
-    one = invoke("sweep", "mine.toml", "--json", "--jobs", 1, "--out", "one", "--seed", 4)
-    two = invoke("sweep", "mine.toml", "--json", "--jobs", 2, "--out", "two", "--seed", 4)
-    table = json.loads(one.stdout)
-    assert json.loads(two.stdout)["digest"] == table["digest"]
+    of_one_job = invoke("sweep", "mine.toml", "--json", "--jobs", 1, "--out", "one", "--seed", 4)
+    of_two_jobs = invoke("sweep", "mine.toml", "--json", "--jobs", 2, "--out", "two", "--seed", 4)
+    table = json.loads(of_one_job.stdout)
+    assert json.loads(of_two_jobs.stdout)["digest"] == table["digest"]
     assert table == json.loads((tmp_path / "one" / "mine-table.json").read_text())
     assert table["seed"] == 4
     assert table["reference"] == "base"
