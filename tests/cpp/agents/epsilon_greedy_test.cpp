@@ -59,13 +59,13 @@ TEST(EpsilonGreedy, MiddleTakesTheMiddleOfTheFirstLongestRunOfTies) {
 
 TEST(EpsilonGreedy, ValuesWithinTheToleranceOfTheBestAreTies) {
   const Row values = {0.0, 0.75, 0.75, 0.5, 0.0, 1.0, 0.0};
-  const auto taken = [&](TieRule rule, double tolerance) {
+  const auto selected = [&](TieRule rule, double tolerance) {
     return EpsilonGreedy({.tie_rule = rule, .tie_tolerance = tolerance}, 1).select(values, 0, true);
   };
-  EXPECT_EQ(taken(TieRule::middle, 0.0), 5U);
-  EXPECT_EQ(taken(TieRule::middle, 0.25), 1U);
-  EXPECT_EQ(taken(TieRule::middle, 0.5), 2U);
-  EXPECT_EQ(taken(TieRule::lowest, 0.5), 1U);
+  EXPECT_EQ(selected(TieRule::middle, 0.0), 5U);
+  EXPECT_EQ(selected(TieRule::middle, 0.25), 1U);
+  EXPECT_EQ(selected(TieRule::middle, 0.5), 2U);
+  EXPECT_EQ(selected(TieRule::lowest, 0.5), 1U);
   EpsilonGreedy uniform({.tie_tolerance = 0.25}, 1);
   std::array<int, 7> counts{};
   for (int i = 0; i < 3000; ++i) ++counts[uniform.select(values, 0, true)];
@@ -79,12 +79,13 @@ TEST(EpsilonGreedy, ValuesWithinTheToleranceOfTheBestAreTies) {
 TEST(EpsilonGreedy, UniformTakesEveryTiedActionEquallyOften) {
   EpsilonGreedy policy({.tie_rule = TieRule::uniform}, 5);
   const Row values = {1, 0, 1, 1, 0, 1};
-  std::array<int, 6> taken{};
+  std::array<int, 6> counts{};
   const int n = 40000;
-  for (int i = 0; i < n; ++i) ++taken[policy.select(values, 0, true)];
-  EXPECT_EQ(taken[1] + taken[4], 0);
+  for (int i = 0; i < n; ++i) ++counts[policy.select(values, 0, true)];
+  EXPECT_EQ(counts[1] + counts[4], 0);
   const double sigma = std::sqrt(n * 0.25 * 0.75);
-  for (const std::size_t action : {0U, 2U, 3U, 5U}) EXPECT_NEAR(taken[action], 0.25 * n, 5 * sigma);
+  for (const std::size_t action : {0U, 2U, 3U, 5U})
+    EXPECT_NEAR(counts[action], 0.25 * n, 5 * sigma);
 }
 
 // The rules of fuzzy Q-learning keep floats: the same picks and the same draws as from doubles.
@@ -123,10 +124,10 @@ TEST(EpsilonGreedy, FirstStepsAreGreedyAndLaterOnesRandomWithProbabilityEpsilon)
 TEST(EpsilonGreedy, RandomActionsAreUniformOverAllActions) {
   EpsilonGreedy policy({.epsilon = 1.0, .n_greedy_steps = 0}, 3);
   const Row values = {5, 0, 0, 0, 0};
-  std::array<int, 5> taken{};
+  std::array<int, 5> counts{};
   const int n = 40000;
-  for (int i = 0; i < n; ++i) ++taken[policy.select(values, 0, true)];
-  for (const int count : taken) EXPECT_NEAR(count, 0.2 * n, 5 * std::sqrt(n * 0.2 * 0.8));
+  for (int i = 0; i < n; ++i) ++counts[policy.select(values, 0, true)];
+  for (const int count : counts) EXPECT_NEAR(count, 0.2 * n, 5 * std::sqrt(n * 0.2 * 0.8));
 }
 
 TEST(EpsilonGreedy, WithoutExplorationEveryStepIsGreedy) {

@@ -14,6 +14,8 @@ namespace {
 using Numbers = std::vector<double>;
 using Indices = std::vector<std::size_t>;
 
+NStepBuffer buffer_of(std::size_t n_steps) { return {n_steps, /*n_inputs=*/1, /*n_dimensions=*/2}; }
+
 /// Step number i of a path: from i / 16 to (i + 1) / 16, action (i, 2 i), reward 2^i.
 void add(NStepBuffer& steps, int i) {
   const auto n = static_cast<std::size_t>(i);
@@ -30,7 +32,7 @@ void expect_oldest(NStepBuffer& steps, int i) {
 }
 
 TEST(NStepBuffer, ReturnsTheOldestStepFirst) {
-  NStepBuffer steps(3, 1, 2);
+  NStepBuffer steps = buffer_of(3);
   EXPECT_EQ(steps.size(), 0U);
   add(steps, 0);
   add(steps, 1);
@@ -47,8 +49,8 @@ TEST(NStepBuffer, ReturnsTheOldestStepFirst) {
 
 // Rewards 1, 2, 4, then 8, 16; gamma = 1/2: every number is exact.
 TEST(NStepBuffer, TheReturnOfTheOldestStepDiscountsLaterRewards) {
-  NStepBuffer steps(3, 1, 2);
-  EXPECT_EQ(steps.return_of_oldest(5.0, 0.5), 5.0);
+  NStepBuffer steps = buffer_of(3);
+  EXPECT_EQ(steps.return_of_oldest(5.0, 0.5), 5.0);  // the value of the next state alone
   for (int i = 0; i < 3; ++i) add(steps, i);
   EXPECT_EQ(steps.return_of_oldest(16.0, 0.5), 1.0 + 1.0 + 1.0 + 2.0);
   EXPECT_EQ(steps.return_of_oldest(16.0, 0.0), 1.0);
@@ -62,8 +64,8 @@ TEST(NStepBuffer, TheReturnOfTheOldestStepDiscountsLaterRewards) {
 }
 
 TEST(NStepBuffer, KnowsTheNextStateOfTheNewestStep) {
-  NStepBuffer steps(2, 1, 2);
-  EXPECT_TRUE(steps.is_continued_by(Numbers{0.9}));  // nothing waits
+  NStepBuffer steps = buffer_of(2);
+  EXPECT_TRUE(steps.is_continued_by(Numbers{0.9}));  // nothing is pending
   add(steps, 3);
   EXPECT_TRUE(steps.is_continued_by(Numbers{0.25}));
   EXPECT_FALSE(steps.is_continued_by(Numbers{0.26}));
@@ -72,7 +74,7 @@ TEST(NStepBuffer, KnowsTheNextStateOfTheNewestStep) {
 }
 
 TEST(NStepBuffer, VisitsEachPendingStepOnce) {
-  NStepBuffer steps(3, 1, 2);
+  NStepBuffer steps = buffer_of(3);
   for (int i = 0; i < 3; ++i) add(steps, i);
   steps.take_oldest();
   Numbers rewards;
@@ -85,7 +87,7 @@ TEST(NStepBuffer, VisitsEachPendingStepOnce) {
 }
 
 TEST(NStepBuffer, RefusesInconsistentStates) {
-  NStepBuffer steps(3, 1, 2);
+  NStepBuffer steps = buffer_of(3);
   for (int i = 0; i < 2; ++i) add(steps, i);
   testing::expect_that_damage_is_refused(steps);
   using testing::with_number;

@@ -16,7 +16,7 @@ namespace {
 
 using Numbers = std::vector<double>;
 
-// A pendulum's: cosine, sine, speed, and a circular one.
+// Of a pendulum: cosine and sine of an angle, a speed, and a circular variable from 10 to 14.
 ObservationScale scale_of_angles() {
   return {{-1.0, -1.0, -8.0, 10.0},
           {1.0, 1.0, 8.0, 14.0},
@@ -43,6 +43,8 @@ TEST(ObservationScale, ScalesNumbersAndAnglesAsWorkedByHand) {
   const ObservationScale scale = scale_of_angles();
   EXPECT_EQ(scale.n_observed(), 4U);
   EXPECT_EQ(scale.n_inputs(), 3U);
+  // Angles of 0, 90, -90 and 180 degrees; speeds are clipped to -8 to 8; 15 is 11, 9 is 13 and 14
+  // is 10 on the circle.
   EXPECT_EQ(scaled(scale, {1.0, 0.0, 4.0, 11.0}), (Numbers{0.5, 0.75, 0.25}));
   EXPECT_EQ(scaled(scale, {0.0, 1.0, 80.0, 15.0}), (Numbers{0.75, 1.0, 0.25}));
   EXPECT_EQ(scaled(scale, {0.0, -0.5, -9.0, 9.0}), (Numbers{0.25, 0.0, 0.75}));
@@ -75,6 +77,7 @@ TEST(ObservationScale, StatesAreInTheUnitIntervalForAnyFiniteObservation) {
   }
 }
 
+// Input 0 is variable 1, input 1 is variable 0; with 3 and 7 bins, and one more for a missing code.
 TEST(ObservationScale, MissingReadingsAreRefusedHeldOrCoded) {
   const auto scale = [](Missing missing) {
     return ObservationScale({0.0, -1.0}, {1.0, 1.0},

@@ -35,7 +35,7 @@ TEST(QLearning, RatesChangeLinearlyWithProgress) {
     EXPECT_THROW(agent.set_progress(bad), std::invalid_argument);
   }
   EXPECT_EQ(agent.progress(), 1.0);
-  agent.set_progress(0.0);  // nothing is left of what was
+  agent.set_progress(0.0);  // rates depend on the present progress only
   EXPECT_EQ(agent.learning_rate(), 0.5);
   Agent steady(LookupTable(1, 5, 2), {}, 1);
   steady.set_progress(0.9);
@@ -43,6 +43,7 @@ TEST(QLearning, RatesChangeLinearlyWithProgress) {
   EXPECT_EQ(steady.epsilon(), 0.1);
 }
 
+// Each quarter of the progress halves the learning rate, each half halves epsilon.
 TEST(QLearning, AnExponentialScheduleMultipliesRatesByEqualFactors) {
   const QLearningConfig config{.learning_rate = 1.0,
                                .policy = {.epsilon = 0.5},
@@ -92,15 +93,15 @@ TEST(QLearning, EpsilonReachesItsFinalValueAfterTheExplorationFraction) {
   Agent agent(LookupTable(1, 5, 2), config, 1);
   EXPECT_EQ(agent.epsilon(), 0.5);
   agent.set_progress(0.125);
-  EXPECT_EQ(agent.epsilon(), 0.3125);
-  EXPECT_EQ(agent.learning_rate(), 0.9375);
+  EXPECT_EQ(agent.epsilon(), (0.5 + 0.125) / 2);  // half way to progress 0.25
+  EXPECT_EQ(agent.learning_rate(), 1.0 - 0.125 * 0.5);
   for (const double progress : {0.25, 0.3, 1.0}) {
     agent.set_progress(progress);
     EXPECT_EQ(agent.epsilon(), 0.125);
   }
   QLearningConfig exponential = config;
   exponential.schedule = Schedule::exponential;
-  EXPECT_DOUBLE_EQ(epsilon_at(exponential, 0.125), 0.25);
+  EXPECT_DOUBLE_EQ(epsilon_at(exponential, 0.125), std::sqrt(0.5 * 0.125));
   EXPECT_EQ(epsilon_at(exponential, 0.3), 0.125);
   const Agent steady(LookupTable(1, 5, 2), {.exploration_fraction = 0.25}, 1);
   EXPECT_EQ(epsilon_at(steady.config(), 0.1), 0.1);
@@ -125,7 +126,7 @@ TEST(QLearning, RatesThatAreSetDoNotFollowProgress) {
   EXPECT_EQ(agent.learning_rate(), 0.75);
   EXPECT_EQ(agent.epsilon(), 0.0);
   agent.learn(cell(0), 0, 16.0, cell(1), true);
-  EXPECT_EQ(agent.network().value(cell(0), 0), 12.0);
+  EXPECT_EQ(agent.network().value(cell(0), 0), 0.75 * 16.0);
   agent.set_epsilon(1.0);
   agent.set_learning_rate(std::nullopt);
   EXPECT_EQ(agent.learning_rate(), 0.25);

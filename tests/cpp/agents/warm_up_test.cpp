@@ -31,18 +31,20 @@ void step(WarmUp& warm_up, std::size_t environment = 0) {
   learn(warm_up, environment, warm_up.act(draw, always, true, environment));
 }
 
+// Warm-ups of two variables and one dimension of actions: {2, 1, n_steps, seed,
+// learns_any_transition}.
 TEST(WarmUp, RepeatsActionsForSomeStepsAndTakesAllOfThem) {
   WarmUp warm_up(2, 1, 1000, 3, true);
-  std::set<double> taken;
+  std::set<double> actions;
   int n_changes = 0;
   double last = -1.0;
   for (int t = 0; t < 400; ++t) {
     const double action = warm_up.act(draw, always, true, 0)[0];
-    taken.insert(action);
+    actions.insert(action);
     n_changes += action != last ? 1 : 0;
     last = action;
   }
-  EXPECT_EQ(taken.size(), 5U);
+  EXPECT_EQ(actions.size(), 5U);
   EXPECT_LT(n_changes, 200);
   EXPECT_GT(n_changes, 20);
 }

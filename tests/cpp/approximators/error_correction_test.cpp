@@ -12,7 +12,7 @@ namespace sdnn::approximators {
 namespace {
 
 std::vector<std::uint32_t> select(std::vector<std::int32_t> potentials, int deficit) {
-  std::vector<std::uint32_t> selected = {99};
+  std::vector<std::uint32_t> selected = {99};  // of an earlier call: overwritten
   select_units(potentials, deficit, selected);
   return selected;
 }
@@ -31,8 +31,8 @@ TEST(SelectUnits, SelectsTheNearestActiveUnitOfEachSubset) {
 }
 
 TEST(SelectUnits, SelectsNoneOfASubsetWithoutSuchAUnit) {
-  EXPECT_EQ(select({5, 3, 9, -8, 7, 2, 2}, 3), (Units{3}));
-  EXPECT_EQ(select({5, 3, 9, 8}, 2), Units{});
+  EXPECT_EQ(select({5, 3, 9, -8, 7, 2, 2}, 3), (Units{3}));  // the only inactive unit
+  EXPECT_EQ(select({5, 3, 9, 8}, 2), Units{});               // all units are active
 }
 
 TEST(SelectUnits, CountsAPotentialOfZeroAsInactive) {

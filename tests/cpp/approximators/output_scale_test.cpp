@@ -7,6 +7,7 @@
 namespace sdnn::approximators {
 namespace {
 
+/// From 20 to 280 of 300 firing units stand for values from -20 to 20.
 const OutputScale kPaper(20, 280, -20.0, 20.0);
 
 // g(u) = (2u - 300) / 13 for 20 <= u <= 280.

@@ -64,7 +64,7 @@ TEST(RBFNetwork, AGradientStepIsAsWorkedByHand) {
 TEST(RBFNetwork, TheBasesSumToOne) {
   for (const double width : {0.1, 1.0, 100.0}) {
     UsedRBF network({.n_inputs = 3, .n_actions = 11, .width = width});
-    network.set_weights(std::vector<double>(256, 5.0));
+    network.set_weights(std::vector<double>(256, 5.0));  // 4^4: three inputs and the action
     core::Random random(1, core::Stream::ties);
     std::vector<double> out(11);
     for (int i = 0; i < 100; ++i) {

@@ -7,25 +7,26 @@
 namespace sdnn::coding {
 namespace {
 
+constexpr int kUnits = 900, kActiveUnits = 300;  // as in the paper
+
 TEST(ActionCode, ThePaperHas601Windows) {
-  const ActionCode code(900, 300);
+  const ActionCode code(kUnits, kActiveUnits);
   EXPECT_EQ(code.n_actions(), 601U);
   for (const std::size_t action : {0U, 1U, 300U, 600U}) EXPECT_EQ(code.first_unit(action), action);
 }
 
 TEST(ActionCode, FewActionsHaveEvenlySpacedWindows) {
-  const ActionCode code(900, 300, 3);
-  EXPECT_EQ(code.first_unit(0), 0U);
-  EXPECT_EQ(code.first_unit(1), 300U);
-  EXPECT_EQ(code.first_unit(2), 600U);
-  EXPECT_EQ(ActionCode(10, 4, 1).first_unit(0), 0U);
+  const ActionCode code(kUnits, kActiveUnits, /*n_actions=*/3);
+  for (const std::size_t action : {0U, 1U, 2U}) EXPECT_EQ(code.first_unit(action), 300 * action);
+  EXPECT_EQ(ActionCode(10, 4, /*n_actions=*/1).first_unit(0), 0U);
 }
 
 TEST(ActionCode, ActionsAreEvenlySpacedInTheirRange) {
-  EXPECT_EQ(action_value(0, 601, -10, 10), -10.0);
-  EXPECT_EQ(action_value(300, 601, -10, 10), 0.0);
-  EXPECT_EQ(action_value(600, 601, -10, 10), 10.0);
-  EXPECT_DOUBLE_EQ(action_value(1, 601, -10, 10), -10.0 + 1.0 / 30);
+  const auto torque = [](std::size_t action) { return action_value(action, 601, -10.0, 10.0); };
+  EXPECT_EQ(torque(0), -10.0);
+  EXPECT_EQ(torque(300), 0.0);
+  EXPECT_EQ(torque(600), 10.0);
+  EXPECT_DOUBLE_EQ(torque(1), -10.0 + 20.0 / 600);
 }
 
 TEST(ActionCode, RefusesBadSizesByName) {

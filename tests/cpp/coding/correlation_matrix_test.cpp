@@ -52,11 +52,11 @@ TEST(CorrelationMatrix, RefusesMatricesThatAreNoCorrelations) {
   const auto make = [&](std::array<double, 4> wanted, int n_units) {
     return coding::correlation_matrix_patterns(n_units, wanted, 2, random);
   };
-  EXPECT_THROW(make({1, 0.5, 0.4, 1}, 100), std::invalid_argument);
-  EXPECT_THROW(make({0.9, 0.5, 0.5, 1}, 100), std::invalid_argument);
-  EXPECT_THROW(make({1, 1.5, 1.5, 1}, 100), std::invalid_argument);
+  EXPECT_THROW(make({1, 0.5, 0.4, 1}, 100), std::invalid_argument);    // not symmetric
+  EXPECT_THROW(make({0.9, 0.5, 0.5, 1}, 100), std::invalid_argument);  // no 1 on the diagonal
+  EXPECT_THROW(make({1, 1.5, 1.5, 1}, 100), std::invalid_argument);    // above 1
   EXPECT_THROW(make({1, std::nan(""), std::nan(""), 1}, 100), std::invalid_argument);
-  EXPECT_THROW(make({1, 0.5, 0.5, 1}, 101), std::invalid_argument);
+  EXPECT_THROW(make({1, 0.5, 0.5, 1}, 101), std::invalid_argument);  // an odd number of units
   EXPECT_THROW(coding::correlation_matrix_patterns(100, {}, 2, random), std::invalid_argument);
 }
 

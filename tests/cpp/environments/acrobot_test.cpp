@@ -163,6 +163,7 @@ TEST(AcrobotTask, MayTestTheGoalAtDecisionsOnly) {
   EXPECT_TRUE(acrobot.step(0.0, 1.0).terminated);
 }
 
+// The limits are 3 pi and 5 pi rad/s, times the goal tolerance; both links have 1 rad/s or none.
 TEST(AcrobotTask, TheGoalNeedsSpeedsBelowTheScaledLimits) {
   const auto ends = [](const AcrobotState& start, double goal_tolerance) {
     const AcrobotConfig config{.gravity = 0.0, .decision_interval = 0.02};
@@ -172,9 +173,9 @@ TEST(AcrobotTask, TheGoalNeedsSpeedsBelowTheScaledLimits) {
   };
   EXPECT_TRUE(ends({3.0, 0.0, 1.0, 0.0}, 1.0 / (3.0 * kPi) * 1.01));
   EXPECT_FALSE(ends({3.0, 0.0, 1.0, 0.0}, 1.0 / (3.0 * kPi) * 0.99));
-  EXPECT_TRUE(ends({3.0, 0.0, 0.0, 1.0}, 0.5));
-  EXPECT_FALSE(ends({3.0, 0.0, 0.0, 1.0}, 0.05));
-  EXPECT_FALSE(ends({3.0, 0.0, 0.0, 0.0}, 0.0));  // no speed is below 0
+  EXPECT_TRUE(ends({3.0, 0.0, 0.0, 1.0}, 0.5));    // 1 < 0.5 * 5 pi
+  EXPECT_FALSE(ends({3.0, 0.0, 0.0, 1.0}, 0.05));  // 1 > 0.05 * 5 pi
+  EXPECT_FALSE(ends({3.0, 0.0, 0.0, 0.0}, 0.0));   // no speed is below 0
 }
 
 TEST(AcrobotTask, TruncatesAfterTheLastDecision) {

@@ -10,6 +10,7 @@ using sdnn::environments::GoalSchedule;
 using sdnn::environments::GoalScheduleConfig;
 using sdnn::environments::GoalScheduleKind;
 
+// 1 / (1 + k / 100) in episode k up to 10,000, then 0.01.
 TEST(GoalSchedule, InverseLinearIsTheDefault) {
   const GoalSchedule lambda;
   EXPECT_DOUBLE_EQ(lambda(1), 1.0 / 1.01);
@@ -20,6 +21,7 @@ TEST(GoalSchedule, InverseLinearIsTheDefault) {
   EXPECT_EQ(lambda(15000), 0.01);
 }
 
+// 1 / sqrt(1 + k) in episode k up to 10,000, then 0.01.
 TEST(GoalSchedule, InverseSqrtIsContinuousAtItsLastEpisode) {
   const GoalScheduleConfig config{.kind = GoalScheduleKind::inverse_sqrt};
   const GoalSchedule lambda(config);

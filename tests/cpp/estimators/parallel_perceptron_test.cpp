@@ -48,24 +48,6 @@ TEST(ParallelPerceptron, PotentialsAndCountsAreAsWorkedByHand) {
   EXPECT_EQ(counts, (std::vector<std::int32_t>{0, 0, 1, 1}));
 }
 
-TEST(ParallelPerceptron, ManyQueriesHaveThePotentialsOfSingleOnes) {
-  for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    const auto problem = testing::random_problem(seed);
-    const auto layer = testing::layer_for(problem);
-    const std::size_t n_inputs = problem.code->n_inputs();
-    const std::size_t n_queries = problem.bins.size() / n_inputs;
-    std::vector<std::int32_t> together(n_queries * problem.n_units);
-    layer->potentials(problem.bins, 1 + static_cast<int>(seed % 3), together);
-    for (std::size_t q = 0; q < n_queries; ++q) {
-      std::vector<std::int32_t> alone(problem.n_units);
-      layer->potentials(std::span(problem.bins).subspan(q * n_inputs, n_inputs), 1, alone);
-      ASSERT_TRUE(std::equal(alone.begin(), alone.end(),
-                             together.begin() + static_cast<std::ptrdiff_t>(q * problem.n_units)))
-          << seed;
-    }
-  }
-}
-
 /// Random tables of `n_units` units for a plain pair, one way of two inputs and both ways of
 /// others.
 std::shared_ptr<const ParallelPerceptron::Code> code_of_three(std::size_t n_units) {
@@ -146,11 +128,12 @@ TEST(ParallelPerceptron, RethrowsTheErrorOfAThread) {
 
 TEST(ParallelPerceptron, DrawsEveryWeightInItsRange) {
   const ParallelPerceptron layer(small_code(), 400, 3, 2);
-  std::vector<int> seen(5);
+  std::vector<int> counts(5);
   for (std::size_t i = 0; i < 400; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) ++seen.at(static_cast<std::size_t>(layer.weight(i, j) + 2));
+    for (std::size_t j = 0; j < 3; ++j)
+      ++counts.at(static_cast<std::size_t>(layer.weight(i, j) + 2));
   }
-  for (const int n : seen) EXPECT_GT(n, 150);
+  for (const int n : counts) EXPECT_GT(n, 150);
 }
 
 TEST(ParallelPerceptron, RefusesWeightsThatCouldOverflow) {

@@ -32,6 +32,8 @@ TEST(TrainingForm, FormsAreFoundByTheirNames) {
 }
 
 TEST(TrainingForm, MemoryOfEachFormIsAsWorkedByHand) {
+  // 2000 samples; 280 units, padded to 288, or to three tiles of 96; codes of 2 * 2000 columns,
+  // which are 64 words of active columns and 64 of positive ones; blocks of 256 samples.
   const auto code = demonstration_code();
   EXPECT_EQ(estimators::with_product_type(code, []<class Product>() { return sizeof(Product); }),
             2U);
@@ -100,8 +102,8 @@ TEST(TrainingForm, DependsOnTheSamplesAndTheMemoryLimit) {
     return estimators::choose_form(TrainingForm::automatic, 280, code, n_samples, limit);
   };
   EXPECT_EQ(chosen(2000, 1 << 30), TrainingForm::dual);
-  EXPECT_EQ(chosen(2000, 10 << 20), TrainingForm::block);
-  EXPECT_EQ(chosen(2000, 1 << 20), TrainingForm::plain);
+  EXPECT_EQ(chosen(2000, 10 << 20), TrainingForm::block);  // less than 2000^2 products of 2 bytes
+  EXPECT_EQ(chosen(2000, 1 << 20), TrainingForm::plain);   // less than a block
   EXPECT_EQ(chosen(6000, 1 << 30), TrainingForm::dual);
   EXPECT_EQ(chosen(7000, 1 << 30), TrainingForm::block);
   EXPECT_EQ(chosen(50000, kAnyMemory), TrainingForm::block);

@@ -29,8 +29,10 @@ TEST(Wiring, HasOneTablePerInput) {
   const auto tables = code_books_of(config, 1);
   std::vector<std::size_t> sizes;
   for (const auto& table : tables) sizes.push_back(table.n_bins());
+  // Numbers have (3 - 1) * (4 + 1) bins between their anchors, symbols one each.
   EXPECT_EQ(sizes, (std::vector<std::size_t>{10, 7, 10, 3, 10}));
   EXPECT_EQ(coding::n_bins_of(config), 40.0);
+  // A pattern of 16 units is a word of 8 bytes, stored as it is and permuted for four partners.
   EXPECT_EQ(coding::pattern_bytes_of(config, coding::n_bins_of(config)), 40.0 * (1 + 4) * 8);
 }
 

@@ -14,27 +14,29 @@ double steps_of(const WeightAverage& average, std::size_t unit, std::size_t colu
   return average.weight(unit, column) / static_cast<double>(1 << average.fraction_bits());
 }
 
+// A snapshot every 2 corrections: after n of them it moves the average by 8 * 2 / n of the
+// distance, at most all of it.
 TEST(WeightAverage, SnapshotsAreAveragedAsWorkedByHand) {
   HiddenLayer layer(2, 3);
-  WeightAverage average(layer, 2);
-  const auto note = [&](std::uint64_t n, std::int32_t weight) {
+  WeightAverage average(layer, /*interval=*/2);
+  const auto average_after = [&](std::uint64_t n, std::int32_t weight) {
     layer.set_weight(1, 2, weight);
     layer.set_threshold(0, -weight);
     average.note(n, layer);
     return steps_of(average, 1, 2);
   };
-  EXPECT_EQ(note(1, 8), 0);
+  EXPECT_EQ(average_after(1, 8), 0);
   EXPECT_EQ(average.n_snapshots(), 0U);
-  EXPECT_EQ(note(2, 8), 8);  // the first is all there is
-  EXPECT_EQ(note(3, 100), 8);
-  EXPECT_EQ(note(4, 16), 16);  // 8 * 2 / 4 of the way: all of it
-  EXPECT_EQ(note(16, 8), 8);   // 8 * 2 / 16
-  EXPECT_EQ(note(32, 0), 4);   // half of it
+  EXPECT_EQ(average_after(2, 8), 8);
+  EXPECT_EQ(average_after(3, 100), 8);  // no snapshot
+  EXPECT_EQ(average_after(4, 16), 16);
+  EXPECT_EQ(average_after(16, 8), 8);  // 8 * 2 / 16: all of the distance
+  EXPECT_EQ(average_after(32, 0), 4);  // half of it
   EXPECT_EQ(average.threshold(0), -4 * std::int64_t{1} << WeightAverage::kFractionBits);
-  EXPECT_EQ(note(64, 0), 3);  // a quarter
+  EXPECT_EQ(average_after(64, 0), 3);  // a quarter
   EXPECT_EQ(average.n_snapshots(), 5U);
   EXPECT_EQ(average.weight(0, 2), 0);
-  EXPECT_EQ(average.fraction_bits(), 10);  // for 16, which came once
+  EXPECT_EQ(average.fraction_bits(), 10);  // so that the largest weight, 16, fits in 15 bits
 }
 
 // High bytes, the last unit of a layer that fills no block, and the largest weights.

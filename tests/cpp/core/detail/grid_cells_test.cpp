@@ -23,7 +23,7 @@ std::string message(std::size_t n_per_dimension, std::size_t n_dimensions, std::
 }
 
 TEST(GridCells, CountsArePowersOfTheCellsPerDimension) {
-  EXPECT_EQ(grid_cells("n", "cells", 9, 6, 84, kAnything), 531441U);
+  EXPECT_EQ(grid_cells("n", "cells", 9, 6, 84, kAnything), 531441U);  // 9^6, of 84 bytes each
   EXPECT_EQ(grid_cells("n", "cells", 4, 7, 8, kAnything), 16384U);
   EXPECT_EQ(grid_cells("n", "cells", 5, 0, 1, kAnything), 1U);
   EXPECT_EQ(grid_cells("n", "cells", 2, 8 * sizeof(std::size_t) - 1, 1, kAnything),

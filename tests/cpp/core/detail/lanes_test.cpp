@@ -33,9 +33,9 @@ TEST(Lanes, ADoubleIsASingleLane) {
 }
 
 TEST(Lanes, UnrolledCountsUp) {
-  std::vector<std::size_t> seen;
-  unrolled<4>([&](std::size_t i) { seen.push_back(i); });
-  EXPECT_EQ(seen, (std::vector<std::size_t>{0, 1, 2, 3}));
+  std::vector<std::size_t> indices;
+  unrolled<4>([&](std::size_t i) { indices.push_back(i); });
+  EXPECT_EQ(indices, (std::vector<std::size_t>{0, 1, 2, 3}));
 }
 
 #if SDNN_LANES
