@@ -46,8 +46,9 @@ TEST(SDNNC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
   EXPECT_EQ(largest, 4);
 }
 
-// A quarter of a unit is missing: it is lost, or made up for by a whole unit, always or in a
-// quarter of all cases.
+// The unit is the value of one more firing unit. A deficit of a quarter of it is lost by rounding
+// half up, corrected by a whole unit by rounding away, and so in a quarter of all networks by
+// rounding at random.
 TEST(SDNNC, RoundingDecidesOnFractionsOfAUnit) {
   const State state = {0.1, 0.5, 0.9};
   const auto moved = [&](Rounding rounding, double units, std::uint64_t seed) {

@@ -58,7 +58,7 @@ def test_an_episode_that_is_set_holds_from_the_next_reset_on():
     env.reset()
     env.episode = 100
     assert env.step([0.0])[4]["goal_tolerance"] == GoalSchedule()(1)
-    assert [tolerance(env) for _ in range(2)] == [0.5, 0.5]
+    assert [tolerance(env) for _ in range(2)] == [0.5, 0.5], "1 / (1 + 100 / 100)"
 
 
 def test_a_schedule_may_be_a_function_or_a_configuration():

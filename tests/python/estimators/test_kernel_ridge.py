@@ -256,7 +256,7 @@ def test_targets_whose_squares_overflow_are_refused():
 
 
 @pytest.mark.parametrize("coding", ["random-inverse", "with-missing", "anchor", "circular"])
-def test_five_hundred_columns_are_fitted_within_two_seconds(coding):
+def test_500_columns_with_equal_codings_share_a_matrix_and_are_fitted_within_2_seconds(coding):
     wide = np.random.RandomState(0).uniform(size=(40, 500))
     begin = time.process_time()
     SDNNKernelRidge(coding).fit(wide, wide[:, 0]).predict(wide)
