@@ -16,7 +16,7 @@ namespace {
 
 using Numbers = std::vector<double>;
 
-// Of a pendulum: cosine and sine of an angle, a speed, and a circular variable from 10 to 14.
+// Ranges of a pendulum: cosine and sine of an angle, a speed, and a circular variable.
 ObservationScale scale_of_angles() {
   return {{-1.0, -1.0, -8.0, 10.0},
           {1.0, 1.0, 8.0, 14.0},

@@ -130,7 +130,7 @@ TEST(QLearning, RefusesBadTransitionsAndChangesNothing) {
   EXPECT_EQ(core::state_of(agent), before);
 }
 
-// Of 2^17 actions, two successive random draws are hardly ever the same.
+// Two successive random draws of 2^17 actions are hardly ever the same.
 TEST(QLearning, ARandomActionLastsKStepsWithProbabilityOneKth) {
   constexpr int kLongest = 8, kDraws = 20000;
   Agent agent(LookupTable(1, 1, 1 << 17),
