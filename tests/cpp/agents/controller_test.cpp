@@ -237,14 +237,6 @@ TEST(Controller, LearnsTheIndexThatWasTakenOfEqualRoundedActions) {
   }
 }
 
-TEST(Controller, LearnsAnActionBetweenTwoAsTheNearest) {
-  const Numbers observed = {1.0, 0.0, 4.0, 11.0};
-  Controller between(rbf_config()), nearest(rbf_config());
-  between.learn(observed, Numbers{0.9}, 1.0, observed, true);
-  nearest.learn(observed, Numbers{1.0}, 1.0, observed, true);
-  EXPECT_EQ(core::state_of(between), core::state_of(nearest));
-}
-
 TEST(Controller, RefusesBadArgumentsAndChangesNothing) {
   const Numbers good(4, 0.5), shorter(3, 0.5), nan = {0.5, 0.5, testing::kNaN, 0.5};
   for (ControllerConfig config :
@@ -272,61 +264,6 @@ TEST(Controller, RefusesBadArgumentsAndChangesNothing) {
       EXPECT_EQ(core::state_of(controller), before);
     }
   }
-}
-
-TEST(Controller, WithFuzzyRulesLearnsOnlyItsLastAction) {
-  const Numbers here(4, 0.5), there(4, 0.25);
-  Controller controller(fuzzy_config());
-  const Numbers action = {controller.act(here)[0]};
-  const core::State before = core::state_of(controller);
-  EXPECT_THROW(controller.learn(there, action, 1.0, there, false), std::invalid_argument);
-  EXPECT_THROW(controller.learn(here, Numbers{1.9}, 1.0, there, false), std::invalid_argument);
-  EXPECT_EQ(core::state_of(controller), before);
-  controller.learn(here, action, 1.0, there, false);
-  EXPECT_NE(core::state_of(controller), before);
-}
-
-TEST(Controller, TakesAllowedActionsOnly) {
-  ControllerConfig config = with(LinearSDNNConfig{}, QLambdaConfig{});
-  config.action = {.low = {-1.0, 0.0}, .high = {1.0, 3.0}, .discrete = true};
-  for (const auto& made : {config, with_warm_up(config)}) {
-    Controller controller(made);
-    core::Random random(1, core::Stream::exploration);
-    std::vector<std::uint8_t> mask(7, 1);
-    Numbers here(4, 0.5);
-    for (int t = 0; t < 100; ++t) {
-      const auto taken = controller.act(here, t % 5 != 0, 0, mask);
-      const Numbers action(taken.begin(), taken.end());
-      EXPECT_EQ(mask[static_cast<std::size_t>(action[0] + 1.0)], 1);
-      EXPECT_EQ(mask[static_cast<std::size_t>(action[1] + 3.0)], 1);
-      for (auto& one : mask) one = random.uniform() < 0.5 ? 1 : 0;
-      mask[random.below(3)] = mask[3 + random.below(4)] = 1;
-      for (double& x : here) x = random.uniform();
-      controller.learn(here, action, 1.0, here, t % 9 == 8, 0, mask);
-    }
-  }
-  Controller controller(config);
-  const Numbers here(4, 0.5);
-  for (const std::vector<std::uint8_t>& bad :
-       {std::vector<std::uint8_t>(6, 1), {0, 0, 0, 1, 1, 1, 1}, {1, 1, 2, 1, 1, 1, 1}}) {
-    EXPECT_THROW((void)controller.act(here, true, 0, bad), std::invalid_argument);
-  }
-  EXPECT_THROW((void)Controller(sdnn()).act(here, true, 0, std::vector<std::uint8_t>(5, 1)),
-               std::invalid_argument);
-}
-
-TEST(Controller, KeepsRatesSetDuringItsWarmUp) {
-  Controller controller(with_warm_up(rbf_config()));
-  controller.set_epsilon(0.75);
-  controller.set_progress(0.5);
-  EXPECT_EQ(controller.epsilon(), 0.75);
-  core::Random random(5, core::Stream::weights);
-  Numbers observed{1.0, 0.0, 0.0, 0.0};
-  for (int t = 0; t < 30; ++t) step(controller, random, observed, false);
-  ASSERT_FALSE(controller.is_warming_up());
-  EXPECT_EQ(std::get<QLearning<RBFNetwork>>(controller.agent()).epsilon(), 0.75);
-  EXPECT_EQ(controller.progress(), 0.5);
-  EXPECT_EQ(controller.learning_rate(), 0.5);  // the default, as none was set
 }
 
 TEST(Controller, RefusesInconsistentStates) {
@@ -389,63 +326,6 @@ TEST(Controller, RefusesImpossibleSettingsBeforeItsWarmUp) {
   config = rbf_config();
   config.learning = kTraces;
   EXPECT_THROW(Controller{config}, std::invalid_argument);
-}
-
-/// A mass that actions move on a line, a place whose value matters once `is_late`, and noise.
-class LateTask {
- public:
-  static ControllerConfig config() {
-    return {.approximator = LinearSDNNConfig{.n_anchor_patterns = 4, .n_interpolated = 6},
-            .learning = QLambdaConfig{.policy = {.epsilon = 0.3}},
-            .seed = 3,
-            .observation = {.low = std::vector<std::optional<double>>(5, 0.0),
-                            .high = std::vector<std::optional<double>>(5, 1.0),
-                            .relevant_only = true,
-                            .inputs = {1}},
-            .action = {.low = {0.0}, .high = {2.0}, .discrete = true},
-            .warm_up_steps = 400};
-  }
-
-  void step(Controller& controller, std::size_t environment, bool is_late, bool is_cut) {
-    Numbers& seen = observed_[environment];
-    const double action = controller.act(seen, true, environment)[0];
-    if (is_cut) controller = Controller::restored(controller.config(), core::state_of(controller));
-    Numbers next{std::clamp(seen[0] + 0.1 * (action - 1.0), 0.0, 1.0)};
-    for (int i = 0; i < 4; ++i) next.push_back(random_.uniform());
-    if (random_.below(8) > 0) next[4] = seen[4];
-    const double reward = -std::abs(seen[0] - 0.5) + (is_late ? 5.0 * seen[4] : 0.0);
-    controller.learn(seen, Numbers{action}, reward, next, false, environment);
-    seen = next;
-  }
-
- private:
-  std::array<Numbers, 2> observed_{Numbers(5, 0.5), Numbers(5, 0.5)};
-  core::Random random_{5, core::Stream::weights};
-};
-
-TEST(Controller, AddsInputsThatBecomeRelevantLater) {
-  Controller uncut(LateTask::config());
-  uncut.set_n_environments(2);
-  Controller resumed = uncut;
-  LateTask task, same;
-  std::vector<std::size_t> n_inputs;
-  for (std::size_t t = 0; t < 1700; ++t) {
-    const std::size_t environment = t % 2;
-    const bool was_warm = !uncut.is_warming_up();
-    const std::uint64_t identity = uncut.identity();
-    task.step(uncut, environment, t >= 400, false);
-    same.step(resumed, environment, t >= 400, t % 90 == 7);
-    if (uncut.is_warming_up()) continue;
-    const std::size_t n = uncut.observations().n_inputs();
-    if (!n_inputs.empty() && n == n_inputs.back()) continue;
-    n_inputs.push_back(n);
-    if (!was_warm) continue;
-    EXPECT_TRUE(t + 1 == 800 || t + 1 == 1600) << t;
-    EXPECT_NE(uncut.identity(), identity);
-  }
-  EXPECT_EQ(n_inputs.size(), 2U);
-  EXPECT_EQ(uncut.observations().inputs().back().first, 4U);
-  EXPECT_EQ(core::state_of(uncut), core::state_of(resumed));
 }
 
 }  // namespace

@@ -24,23 +24,18 @@ namespace {
 
 using Numbers = std::vector<double>;
 
-/// A mass on a line with springs, pushed by random actions that last: inputs are the position, and
-/// the velocity unless it is hidden, with noise. `exact` are the inputs without noise.
+/// A mass on a line with springs, pushed by random actions that last: inputs are the position and
+/// the velocity with noise. `exact` are the inputs without noise.
 struct Mass {
   RandomExperience experience;
-  std::vector<double> exact = {};
+  Numbers exact = {};
 };
-Mass pushed_mass(std::size_t n, double noise, bool is_velocity_hidden, std::uint64_t seed = 1) {
+Mass pushed_mass(std::size_t n, double noise, std::uint64_t seed) {
   core::Random random(seed, core::Stream::sensor_noise);
-  const std::size_t n_inputs = is_velocity_hidden ? 1 : 2;
-  Mass mass{{.n_inputs = n_inputs, .circular = std::vector<bool>(n_inputs)}};
+  Mass mass{{.n_inputs = 2, .circular = std::vector<bool>(2)}};
   mass.experience.actions.resize(1);
   double position = 0.1, velocity = 0.0, action = 0.0;
-  const auto inputs = [&] {
-    Numbers exact{0.5 + position};
-    if (!is_velocity_hidden) exact.push_back(0.5 + 3.0 * velocity);
-    return exact;
-  };
+  const auto inputs = [&] { return Numbers{0.5 + position, 0.5 + 3.0 * velocity}; };
   const auto sensed = [&](Numbers values) {
     for (double& x : values) x = std::clamp(x + noise * random.normal(), 0.0, 1.0);
     return values;
@@ -62,10 +57,6 @@ Mass pushed_mass(std::size_t n, double noise, bool is_velocity_hidden, std::uint
     mass.experience.ends.push_back(false);
   }
   return mass;
-}
-
-HistoryFilter fitted(History history, const RandomExperience& experience) {
-  return {history, experience, std::vector<int>(experience.n_inputs), 1};
 }
 
 TEST(LeastSquares, FindsTheWeightsOfALine) {
@@ -134,23 +125,10 @@ TEST(History, AveragesMoveByAHalfAndAFifthOfTheDistance) {
   }
 }
 
-TEST(History, AutoSelectsNoneDifferencesOrObserver) {
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    const auto kind = [seed](double noise, bool is_velocity_hidden) {
-      const Mass mass = pushed_mass(1000, noise, is_velocity_hidden, seed);
-      return fitted(History::automatic, mass.experience).kind();
-    };
-    EXPECT_EQ(kind(0.0, false), History::none) << seed;
-    EXPECT_EQ(kind(0.0, true), History::differences) << seed;
-    EXPECT_EQ(kind(0.05, false), History::observer) << seed;
-  }
-  EXPECT_EQ(fitted(History::automatic, pushed_mass(50, 0.05, false).experience).kind(),
-            History::none);  // too few transitions
-}
-
 TEST(History, AnObserverReducesTheErrorOfNoisySensors) {
-  const Mass learned = pushed_mass(1000, 0.05, false, 1), fresh = pushed_mass(1000, 0.05, false, 2);
-  const HistoryFilter filter = fitted(History::observer, learned.experience);
+  constexpr std::size_t kSteps = 1000;
+  const Mass learned = pushed_mass(kSteps, 0.05, 1), fresh = pushed_mass(kSteps, 0.05, 2);
+  const HistoryFilter filter(History::observer, learned.experience, {0, 0}, 1);
   EXPECT_LT(filter.gain(), 1.0);
   HistoryFilter::Memory memory;
   HistoryFilter::Room room;
@@ -160,7 +138,7 @@ TEST(History, AnObserverReducesTheErrorOfNoisySensors) {
   };
   double of_estimates = 0.0, of_sensors = 0.0;
   filter.begin(row(fresh.experience.states, 0), memory, state, room);
-  for (std::size_t t = 0; t < 1000; ++t) {
+  for (std::size_t t = 0; t < kSteps; ++t) {
     const auto sensed = row(fresh.experience.next_states, t), exact = row(fresh.exact, t);
     filter.follow(Numbers{fresh.experience.actions[0][t]}, sensed, memory, state, room);
     for (std::size_t i = 0; i < 2; ++i) {

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <stdexcept>
-#include <variant>
 #include <vector>
 
 #include "instruction_sets.hpp"

@@ -47,28 +47,12 @@ std::string error_of(const ObservationConfig& config) {
   return testing::message_of([&] { const Observations observations(config, true, 1); });
 }
 
-TEST(Observations, WithFixedRangesNeedNoFit) {
-  const Observations observations({.low = {-1.0, 0.0}, .high = {3.0, 10.0}}, false, 1);
-  EXPECT_FALSE(observations.needs_fit());
-  Numbers state(2);
-  observations.scale(Numbers{1.0, 2.5}, state);
-  EXPECT_EQ(state, (Numbers{0.5, 0.25}));
-}
-
 TEST(Observations, AreFittedWithAQuarterOfTheirWidthMoreAtEachEnd) {
   const auto observations = fitted(unbounded(3), {0.0, -5.0, 7.0, 4.0, 5.0, 7.0});
   EXPECT_EQ(low_of(observations), (Numbers{-1.0, -7.5, 5.25}));  // a constant: a quarter of itself
   EXPECT_EQ(high_of(observations), (Numbers{5.0, 7.5, 8.75}));
   const ObservationConfig half_known{.low = {{}, 0.0}, .high = {{}, 1.0}};
   EXPECT_EQ(low_of(fitted(half_known, {0.0, 0.4, 4.0, 0.6})), (Numbers{-1.0, 0.0}));
-}
-
-TEST(Observations, ThatAreMissingDoNotChangeFittedRanges) {
-  const double end = testing::kInfinity;
-  const auto observations = fitted(unbounded(2), {0.0, end, 4.0, testing::kNaN, end, -end});
-  // A quarter of 0 to 4 more at each end; a variable that was never read counts as a constant 0.
-  EXPECT_EQ(low_of(observations), (Numbers{-1.0, -0.25}));
-  EXPECT_EQ(high_of(observations), (Numbers{5.0, 0.25}));
 }
 
 TEST(Observations, AdaptiveRangesExcludeRareValuesAndStayWithinFixedOnes) {

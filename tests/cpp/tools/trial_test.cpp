@@ -7,7 +7,6 @@
 #endif
 
 #include <bit>
-#include <cmath>
 #include <vector>
 
 #include "allocation_count.hpp"
@@ -144,44 +143,6 @@ TEST(AcrobotTrial, TrialsRunTogetherHaveTheRowsOfTrialsRunAlone) {
   }
 }
 
-TEST(AcrobotTrial, EvaluationsDoNotChangeWhatIsLearned) {
-  for (const double noise : {0.0, 0.02}) {
-    Setting setting{.sensors = {.noise = noise}};
-    setting.protocol.evaluate_every_episodes = 1;
-    auto often = table_trial(setting);
-    setting.protocol.evaluate_every_episodes = 1000;
-    auto never = table_trial(setting);
-    often.advance(100);
-    never.advance(100);
-    EXPECT_EQ(often.rows().size(), 100U);
-    EXPECT_EQ(never.rows().size(), 0U);
-    EXPECT_EQ(often.agent().networks().front(), never.agent().networks().front());
-  }
-}
-
-TEST(AcrobotTrial, AnUnsolvedEvaluationCountsAllItsDecisions) {
-  auto run = table_trial({.acrobot = {.goal_height = 2.5}, .protocol = {.episodes = 20}});
-  run.advance(20);
-  for (const TestRow& row : run.rows()) {
-    EXPECT_EQ(row.steps, 50);
-    EXPECT_FALSE(row.solved);
-    EXPECT_LE(row.episode_return, 0.0);
-    EXPECT_EQ(std::fmod(row.episode_return, 5.0), 0.0);
-  }
-  EXPECT_EQ(run.n_decisions(), 22 * 50);
-}
-
-TEST(AcrobotTrial, ASolvedEvaluationEndsAtTheGoal) {
-  // At the start the tip hangs 2 m below joint 1: a goal there is reached within the first second.
-  auto run = table_trial({.acrobot = {.goal_height = -2.5}, .protocol = {.episodes = 10}});
-  run.advance(10);
-  ASSERT_EQ(run.rows().size(), 1U);
-  EXPECT_EQ(run.rows()[0].steps, 1);
-  EXPECT_TRUE(run.rows()[0].solved);
-  EXPECT_EQ(run.rows()[0].episode_return, 10.0);
-  EXPECT_EQ(run.n_decisions(), 11);
-}
-
 template <class Trial>
 void expect_no_allocation(Trial run) {
   const std::size_t before = testing::allocation_count();
@@ -194,45 +155,6 @@ TEST(AcrobotTrial, AnEpisodeAllocatesNothing) {
   expect_no_allocation(network_trial(setting));
   expect_no_allocation(rbf_trial(setting));
   expect_no_allocation(agent_trial(fuzzy_agent(setting), setting));
-}
-
-/// Takes action 0 and keeps how the transitions it learned ended.
-struct Recorder {
-  std::size_t n_inputs() const { return 4; }
-  void begin_episode() {}
-  std::size_t act(std::span<const double> state, bool explore) {
-    if (!explore) tested.emplace_back(state.begin(), state.end());
-    return 0;
-  }
-  double normalized_action(std::size_t) const { return 0.0; }
-  void learn(std::span<const double>, std::size_t, double, std::span<const double>,
-             bool terminated) {
-    ends.push_back(terminated);
-  }
-  std::vector<std::vector<double>> tested;
-  std::vector<bool> ends;
-};
-
-TEST(AcrobotTrial, ATimeLimitIsATerminationOnlyWithoutBootstrapping) {
-  for (const bool bootstraps : {true, false}) {
-    auto run =
-        agent_trial(Recorder{}, {.acrobot = {.max_decisions = 3},
-                                 .protocol = {.episodes = 2, .limit_bootstraps = bootstraps}});
-    run.advance(2);
-    const bool last = !bootstraps;
-    EXPECT_EQ(run.agent().ends, (std::vector{false, false, last, false, false, last}));
-  }
-}
-
-TEST(AcrobotTrial, EvaluationsAreNoisyOnlyWithNoisyEvaluations) {
-  for (const bool noisy : {true, false}) {
-    auto run = agent_trial(Recorder{}, {.acrobot = {.max_decisions = 1},
-                                        .sensors = {.noise = 0.02},
-                                        .protocol = {.episodes = 10, .noisy_evaluations = noisy}});
-    run.advance(10);
-    ASSERT_EQ(run.agent().tested.size(), 1U);
-    EXPECT_EQ(run.agent().tested[0] == std::vector<double>(4, 0.5), !noisy);
-  }
 }
 
 #if defined(__linux__) && !defined(__SANITIZE_ADDRESS__)

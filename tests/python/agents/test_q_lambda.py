@@ -11,6 +11,7 @@ from q_lambda_transcription import SMALL, Code, QLambda, random_transitions
 from sdnn import _core
 from sdnn.agents import QLambdaConfig, RBFQLearning, SDNNQLambda, Transition, evaluate, load_agent
 from sdnn.approximators import LinearSDNNConfig
+from stopped_training import states_equal
 
 
 @given(
@@ -167,27 +168,28 @@ def changing_task(seed, n_steps):
 def test_inputs_that_become_relevant_later_are_added(inputs, tmp_path):
     unit, three = gym.spaces.Box(0.0, 1.0, (5,), np.float64), gym.spaces.Discrete(3)
     agent = SDNNQLambda(unit, three, angle_pairs="none", inputs=inputs, warm_up_steps=400, seed=2)
-    same = copy.deepcopy(agent)
+    agent.n_environments = 2
+    same, probe = copy.deepcopy(agent), np.full(5, 0.3)
     numbers = []
     for t, transition in enumerate(changing_task(1, 1700)):
-        agent.learn(transition)
-        same.learn(transition)
+        agent.learn(transition, environment=t // 2 % 2)
+        same.learn(transition, environment=t // 2 % 2)
         if t % 170 == 20:  # during the warm-up, while transitions are remembered, and later
             same.save(tmp_path / "agent.safetensors")
             same = load_agent(tmp_path / "agent.safetensors")
-        if not agent.is_warming_up and len(agent.inputs) not in numbers:
+        if agent.is_warming_up:
+            continue
+        assert np.array_equal(agent.q_values(probe), same.q_values(probe))
+        if len(agent.inputs) not in numbers:
             numbers.append(len(agent.inputs))
             left_out = agent.learning_report()["left_out"]
             assert len(left_out) + len(agent.inputs) == 5
             assert (4 in left_out) == (t == 399)
-            assert t + 1 in (400, 800)
+            assert t + 1 in (400, 800)  # after the warm-up, and after twice as many steps
     assert len(numbers) == 2
     assert ("variable", [4]) in agent.inputs[numbers[0] :]
     assert agent.approximator.n_inputs == numbers[1]
-    assert same.state().keys() == agent.state().keys()
-    for name, values in agent.state().items():
-        np.testing.assert_array_equal(same.state()[name], values)
-    probe = np.full(5, 0.3)
+    assert states_equal(same, agent)
     assert not np.array_equal(agent.q_values(probe), agent.q_values([0.3, 0.3, 0.3, 0.3, 0.9]))
 
 
