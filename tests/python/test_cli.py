@@ -144,6 +144,7 @@ def test_reproduce_without_arguments_runs_everything_that_is_not_stored(invoke, 
     invoke("reproduce", "a", "--quick", "--out", "out")
     assert no_costs == []
     result = invoke("reproduce", "--quick", "--out", "out")
+    # Two trials of nine pairs of case and agent, of which those of Experiment A are stored.
     assert re.search(r"\b18 of 18 .* out \(14 ", result.stdout.splitlines()[-1])
     assert len(no_costs) == 3 * 7 + 4  # three series of 2 to 8 inputs, one of 2 to 5
     names = {p.name for p in (tmp_path / "out").iterdir()}

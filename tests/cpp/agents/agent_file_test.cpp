@@ -206,11 +206,11 @@ TEST(AgentFile, AgentsFromPythonActAndLearnWithTheSameBits) {
     };
     for (const json& step : steps) {
       if (step["begins"].get<bool>()) controller.begin_episode();
-      const auto seen = step["observation"].get<Numbers>();
+      const auto observation = step["observation"].get<Numbers>();
       const auto action = step["action"].get<Numbers>();
-      ASSERT_EQ(numbers(controller.act(seen)), action);
-      ASSERT_EQ(numbers(controller.act(seen, false)), step["greedy"].get<Numbers>());
-      controller.learn(seen, action, step["reward"].get<double>(),
+      ASSERT_EQ(numbers(controller.act(observation)), action);
+      ASSERT_EQ(numbers(controller.act(observation, false)), step["greedy"].get<Numbers>());
+      controller.learn(observation, action, step["reward"].get<double>(),
                        step["next_observation"].get<Numbers>(), step["terminated"].get<bool>());
     }
     EXPECT_EQ(steps.size(), 40U);

@@ -37,6 +37,9 @@ ObservationConfig pendulum() {
           .angle_pairs = {{0, 1}}};
 }
 
+// An angle of 0 is in the middle of -pi to pi; 4 is at 3/4 of -8 to 8, and 11 at 1/4 of 10 to 14.
+const Numbers kPendulumObserved = {1.0, 0.0, 4.0, 11.0}, kPendulumState = {0.5, 0.75, 0.25};
+
 ControllerConfig with(AnyApproximatorConfig approximator, AnyLearningConfig learning,
                       std::size_t n_dimensions = 1) {
   return {.approximator = approximator,
@@ -76,10 +79,14 @@ ControllerConfig with_warm_up(ControllerConfig config) {
   return config;
 }
 
+Numbers action_of(Controller& controller, const Numbers& observed, std::size_t environment = 0) {
+  const auto action = controller.act(observed, true, environment);
+  return {action.begin(), action.end()};
+}
+
 /// A step of a task: what is observed wanders.
 void step(Controller& controller, core::Random& random, Numbers& observed, bool is_cut) {
-  const auto taken = controller.act(observed);
-  const Numbers action(taken.begin(), taken.end());
+  const Numbers action = action_of(controller, observed);
   for (const double a : action) ASSERT_LE(std::abs(a), 2.0);
   if (is_cut) {  // another takes over, between acting and learning
     controller = Controller::restored(controller.config(), core::state_of(controller));
@@ -129,18 +136,17 @@ TEST(Controller, ActsAndLearnsLikeItsAgent) {
   EXPECT_EQ(controller.n_variables(), 4U);
   EXPECT_EQ(controller.n_dimensions(), 2U);
   EXPECT_EQ(std::get<RBFNetworkConfig>(controller.approximator()), bases);
-  const Numbers observed = {1.0, 0.0, 4.0, 11.0}, state = {0.5, 0.75, 0.25};
-  EXPECT_TRUE(std::ranges::equal(controller.state_of(observed), state));
+  EXPECT_TRUE(std::ranges::equal(controller.state_of(kPendulumObserved), kPendulumState));
   for (int t = 0; t < 50; ++t) {
-    const auto indices = agent.act(state);
-    const auto taken = controller.act(observed);
-    const Numbers action(taken.begin(), taken.end());
+    const auto indices = agent.act(kPendulumState);
+    const Numbers action = action_of(controller, kPendulumObserved);
     ASSERT_EQ(action, (Numbers{static_cast<double>(indices[0]) - 2.0,
-                               static_cast<double>(indices[1]) - 2.0}));
-    const double reward = indices[0] == 4 ? 1.0 : 0.0;
-    agent.learn(state, indices, reward, state, t % 5 == 4);
-    controller.learn(observed, action, reward, observed, t % 5 == 4);
-    if (t % 5 != 4) continue;
+                               static_cast<double>(indices[1]) - 2.0}));  // of -2, -1, 0, 1, 2
+    const double reward = action[0] == 2.0 ? 1.0 : 0.0;
+    const bool terminated = t % 5 == 4;
+    agent.learn(kPendulumState, indices, reward, kPendulumState, terminated);
+    controller.learn(kPendulumObserved, action, reward, kPendulumObserved, terminated);
+    if (!terminated) continue;
     agent.begin_episode();
     controller.begin_episode();
   }
@@ -162,8 +168,9 @@ TEST(Controller, GivesTheSameActionsToConcurrentReaders) {
       core::Random ties(i % 2, core::Stream::ties), places(7, core::Stream::weights);
       Numbers actions;
       for (int t = 0; t < 50; ++t) {
-        const Numbers seen{1.0, 0.0, 16.0 * places.uniform() - 8.0, 10.0 + 4.0 * places.uniform()};
-        const auto action = read.best_action(seen, workspace, ties);
+        const Numbers observation{1.0, 0.0, 16.0 * places.uniform() - 8.0,
+                                  10.0 + 4.0 * places.uniform()};
+        const auto action = read.best_action(observation, workspace, ties);
         actions.insert(actions.end(), action.begin(), action.end());
       }
       return actions;
@@ -176,16 +183,17 @@ TEST(Controller, GivesTheSameActionsToConcurrentReaders) {
     auto workspace = controller.workspace();
     core::Random places(7, core::Stream::weights);
     for (int t = 0; t < 50; ++t) {
-      const Numbers seen{1.0, 0.0, 16.0 * places.uniform() - 8.0, 10.0 + 4.0 * places.uniform()};
-      controller.read(controller.prepare(seen, 0), workspace);
-      EXPECT_TRUE(std::ranges::equal(controller.best_of(workspace, 0), same.act(seen, false)));
+      const Numbers observation{1.0, 0.0, 16.0 * places.uniform() - 8.0,
+                                10.0 + 4.0 * places.uniform()};
+      controller.read(controller.prepare(observation, 0), workspace);
+      EXPECT_TRUE(
+          std::ranges::equal(controller.best_of(workspace, 0), same.act(observation, false)));
     }
     EXPECT_EQ(core::state_of(controller), core::state_of(same));
   }
 }
 
 TEST(Controller, WithSeveralEnvironmentsActsAndLearnsLikeItsAgent) {
-  const Numbers observed = {1.0, 0.0, 4.0, 11.0}, state = {0.5, 0.75, 0.25};
   testing::OneDimension<FuzzyQLearning> agent(approximators::FuzzyRules({.n_inputs = 3}), kTraces,
                                               3);
   Controller controller(fuzzy_config());
@@ -197,16 +205,15 @@ TEST(Controller, WithSeveralEnvironmentsActsAndLearnsLikeItsAgent) {
       agent.begin_episode(robot);
       controller.begin_episode(robot);
     }
-    const double picked = agent.act(state, true, robot);
-    const auto taken = controller.act(observed, true, robot);
-    const Numbers action(taken.begin(), taken.end());
-    (void)controller.act(observed, true, 2);  // another one decides meanwhile
-    (void)agent.act(state, true, 2);
-    agent.learn(state, picked, 1.0, state, false, robot);
-    controller.learn(observed, action, 1.0, observed, false, robot);
+    const double picked = agent.act(kPendulumState, true, robot);
+    const Numbers action = action_of(controller, kPendulumObserved, robot);
+    (void)controller.act(kPendulumObserved, true, 2);  // another one decides meanwhile
+    (void)agent.act(kPendulumState, true, 2);
+    agent.learn(kPendulumState, picked, 1.0, kPendulumState, false, robot);
+    controller.learn(kPendulumObserved, action, 1.0, kPendulumObserved, false, robot);
   }
   EXPECT_EQ(core::state_of(std::get<FuzzyQLearning>(controller.agent())), core::state_of(agent));
-  EXPECT_THROW((void)controller.act(observed, true, 3), std::invalid_argument);
+  EXPECT_THROW((void)controller.act(kPendulumObserved, true, 3), std::invalid_argument);
   EXPECT_THROW(controller.begin_episode(3), std::invalid_argument);
 }
 
@@ -214,7 +221,6 @@ TEST(Controller, WithSeveralEnvironmentsActsAndLearnsLikeItsAgent) {
 // taken as index 1 is learned as such; otherwise it is learned as index 2, whose value is 1
 // exactly.
 TEST(Controller, LearnsTheIndexThatWasTakenOfEqualRoundedActions) {
-  const Numbers observed = {1.0, 0.0, 4.0, 11.0}, state = {0.5, 0.75, 0.25};
   for (const bool leaves : {false, true}) {
     auto config = with(kBases, QLearningConfig{.policy = {.epsilon = 1.0, .n_greedy_steps = 0}});
     config.action = {.low = {0.0}, .high = {2.0}, .number = ActionNumber::whole};
@@ -223,15 +229,16 @@ TEST(Controller, LearnsTheIndexThatWasTakenOfEqualRoundedActions) {
     auto agent = std::get<QLearning<RBFNetwork>>(controller.agent());
     const std::vector<std::size_t> learned = {leaves ? 2U : 1U};
     for (std::size_t index = 0; index != 1;) {
-      index = agent.act(state, true, 1).front();
-      ASSERT_EQ(controller.act(observed, true, 1)[0], std::floor(0.5 * double(index) + 0.5));
+      index = agent.act(kPendulumState, true, 1).front();
+      ASSERT_EQ(controller.act(kPendulumObserved, true, 1)[0],
+                std::floor(0.5 * double(index) + 0.5));
     }
     if (leaves) {
       for (const std::size_t n : {1U, 2U}) controller.set_n_environments(n);
     }
     (void)controller.act(Numbers(4, 0.5), false, 1);  // a greedy action is not the one taken
-    controller.learn(observed, Numbers{1.0}, 1.0, observed, true, 1);
-    agent.learn(state, learned, 1.0, state, true, 1);
+    controller.learn(kPendulumObserved, Numbers{1.0}, 1.0, kPendulumObserved, true, 1);
+    agent.learn(kPendulumState, learned, 1.0, kPendulumState, true, 1);
     const auto networks = std::get<QLearning<RBFNetwork>>(controller.agent()).networks();
     EXPECT_EQ(core::state_of(networks[0]), core::state_of(agent.networks()[0]));
   }
@@ -243,8 +250,7 @@ TEST(Controller, RefusesBadArgumentsAndChangesNothing) {
        {rbf_config(), rbf_of_vectors(), fuzzy_config(), fuzzy_of_vectors()}) {
     for (const bool warms_up : {false, true}) {
       Controller controller(warms_up ? with_warm_up(config) : config);
-      const auto taken = controller.act(good);
-      const Numbers action(taken.begin(), taken.end());
+      const Numbers action = action_of(controller, good);
       const core::State before = core::state_of(controller);
       for (const Numbers& bad : {shorter, nan, Numbers{}}) {
         EXPECT_THROW((void)controller.act(bad), std::invalid_argument);

@@ -23,10 +23,10 @@ using Ends = std::vector<std::optional<double>>;
 
 ObservationConfig unbounded(std::size_t n) { return {.low = Ends(n), .high = Ends(n)}; }
 
-Observations fitted(const ObservationConfig& config, const Numbers& seen,
+Observations fitted(const ObservationConfig& config, const Numbers& observed,
                     bool codes_symbols = true) {
   Observations observations(config, codes_symbols, 1);
-  observations.fit(seen);
+  observations.fit(observed);
   return observations;
 }
 
@@ -61,29 +61,29 @@ TEST(Observations, AdaptiveRangesExcludeRareValuesAndStayWithinFixedOnes) {
                                  .high = {100.0, 4.0, 1.0, {}, pi, 1.0},
                                  .adaptive = true,
                                  .angles = {4}};
-  Numbers seen;
+  Numbers observed;
   for (int t = 0; t < 40; ++t) {  // 2 of 40 at each end are rare
     const double part = static_cast<double>(t - 2) / 35.0;
     const bool is_first = t < 2, is_last = t > 37;
-    seen.push_back(is_first ? -90.0 + t : is_last ? 70.0 + t : 2.0 + 4.0 * part);
-    seen.push_back(0.1 * t);             // a quarter more is over the ends
-    seen.push_back(t == 0 ? 1.0 : 0.0);  // hardly moves
-    seen.push_back(is_first ? -1e9 : is_last ? 1e9 : 8.0 * part);
-    seen.push_back(0.1);                 // an angle
-    seen.push_back(t < 20 ? 0.0 : 3.0);  // beyond its bounds
+    observed.push_back(is_first ? -90.0 + t : is_last ? 70.0 + t : 2.0 + 4.0 * part);
+    observed.push_back(0.1 * t);             // a quarter more is over the ends
+    observed.push_back(t == 0 ? 1.0 : 0.0);  // hardly moves
+    observed.push_back(is_first ? -1e9 : is_last ? 1e9 : 8.0 * part);
+    observed.push_back(0.1);                 // an angle
+    observed.push_back(t < 20 ? 0.0 : 3.0);  // beyond its bounds
   }
-  const auto observations = fitted(config, seen);
+  const auto observations = fitted(config, observed);
   EXPECT_EQ(low_of(observations), (Numbers{1.0, 0.0, 0.0, -2.0, -pi, -0.75}));
   EXPECT_EQ(high_of(observations), (Numbers{7.0, 4.0, 1.0, 10.0, pi, 3.0}));
 }
 
 TEST(Observations, RangesMoreThanTwiceTooWideAreNarrowedForUpToFourInputs) {
-  const auto range = [](double low, double high, Numbers seen, std::size_t n_variables = 1) {
+  const auto range = [](double low, double high, Numbers observed, std::size_t n_variables = 1) {
     ObservationConfig config{.narrowed = true};
     config.low.assign(n_variables, low);
     config.high.assign(n_variables, high);
     Numbers rows;
-    for (const double x : seen) rows.insert(rows.end(), n_variables, x);
+    for (const double x : observed) rows.insert(rows.end(), n_variables, x);
     const auto observations = fitted(config, rows);
     return std::pair(observations.low().front(), observations.high().front());
   };
@@ -100,22 +100,22 @@ TEST(Observations, RangesMoreThanTwiceTooWideAreNarrowedForUpToFourInputs) {
 
 TEST(Observations, FindPairsOnACircleAsAngles) {
   ObservationConfig config{.low = Ends(4, -10.0), .high = Ends(4, 10.0), .find_angle_pairs = true};
-  Numbers seen, standing;
+  Numbers observed, standing;
   for (int t = 0; t < 40; ++t) {
     const double angle = 5.0 * t / 39.0;
     for (const double x : {angle, std::cos(angle), std::sin(angle), std::cos(angle)}) {
-      seen.push_back(x);
+      observed.push_back(x);
     }
     for (const double x : {1.0, 0.0, 1.0, 0.0}) standing.push_back(x);
   }
-  const auto observations = fitted(config, seen);
+  const auto observations = fitted(config, observed);
   EXPECT_EQ(kinds_of(observations),
             (std::vector{ObservedKind::variable, ObservedKind::angle, ObservedKind::variable}));
   EXPECT_EQ(observations.circular(), (std::vector<bool>{false, true, false}));
   EXPECT_EQ(low_of(observations), (Numbers{-10.0, -1.0, -1.0, -10.0}));
   EXPECT_EQ(fitted(config, standing).n_inputs(), 4U);
   config.angles = {2};  // is no part of a pair then
-  EXPECT_EQ(fitted(config, seen).n_inputs(), 4U);
+  EXPECT_EQ(fitted(config, observed).n_inputs(), 4U);
 }
 
 TEST(Observations, CodeSymbolsAsOneInputOrAsVariables) {
@@ -150,15 +150,17 @@ Numbers wandering(double noise, double radius_moves) {
     path.push_back(radius * std::cos(angle) + noise * normal());
     path.push_back(radius * std::sin(angle) + noise * normal());
   }
-  Numbers seen(path.begin(), path.end() - 2);
-  seen.insert(seen.end(), path.begin() + 2, path.end());
-  return seen;
+  Numbers observed(path.begin(), path.end() - 2);
+  observed.insert(observed.end(), path.begin() + 2, path.end());
+  return observed;
 }
 
 TEST(Observations, FindNoisyAnglesButNotPositions) {
   ObservationConfig config = unbounded(2);
   config.find_angle_pairs = true;
-  const auto n_inputs = [&config](const Numbers& seen) { return fitted(config, seen).n_inputs(); };
+  const auto n_inputs = [&config](const Numbers& observed) {
+    return fitted(config, observed).n_inputs();
+  };
   EXPECT_EQ(n_inputs(wandering(0.0, 0.0)), 1U);
   EXPECT_EQ(n_inputs(wandering(0.1, 0.0)), 1U);
   EXPECT_EQ(n_inputs(wandering(0.2, 0.0)), 1U);

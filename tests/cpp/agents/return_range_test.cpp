@@ -72,7 +72,8 @@ TEST(ReturnRange, ShrinksWithReturns) {
   EXPECT_LT(environment.range.low(), -2000.0);
   for (int i = 0; i < 400; ++i) environment.note_episode(15, -1.0);
   EXPECT_GT(environment.range.low(), -30.0);
-  EXPECT_LE(environment.range.low(), (std::pow(0.99, 15) - 1.0) / 0.01 + 1.0);
+  const double return_of_15_steps = -(1.0 - std::pow(0.99, 15)) / (1.0 - 0.99);
+  EXPECT_LE(environment.range.low(), return_of_15_steps + 1.0);
   EXPECT_EQ(environment.range.high(), 0.0);
 }
 

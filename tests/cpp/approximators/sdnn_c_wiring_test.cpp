@@ -17,13 +17,13 @@ TEST(SDNNC, ThePapersSizesFollowFromTheDefaults) {
   const Network network({}, 1);
   EXPECT_EQ(network.n_inputs(), 4U);
   EXPECT_EQ(network.n_actions(), 601U);
-  EXPECT_EQ(network.state_code().n_columns(), 2400U);
+  EXPECT_EQ(network.state_code().n_columns(), 4U * 3 * 200);  // of all ordered pairs of inputs
   EXPECT_EQ(network.state_code().table(0).n_bins(), 360U);
   EXPECT_EQ(network.hidden_layer().n_units(), 900U);
   EXPECT_EQ(network.output_scale().u_low(), 20);
   EXPECT_EQ(network.output_scale().u_high(), 280);
-  EXPECT_EQ(Network({.n_inputs = 5}, 1).state_code().n_columns(), 4000U);
-  EXPECT_EQ(Network({.n_inputs = 6}, 1).state_code().n_columns(), 6000U);
+  EXPECT_EQ(Network({.n_inputs = 5}, 1).state_code().n_columns(), 5U * 4 * 200);
+  EXPECT_EQ(Network({.n_inputs = 6}, 1).state_code().n_columns(), 6U * 5 * 200);
 }
 
 TEST(SDNNC, PairsOfInputsAreAnEvenShareOfAll) {

@@ -28,13 +28,13 @@ std::vector<double> observe(const SensorConfig& config, const AcrobotState& stat
 TEST(AcrobotSensors, AreNormalizedAsWorkedByHand) {
   const auto rest = observe({6, 0.0}, {0.0, 0.0, 0.0, 0.0});
   EXPECT_EQ(rest, (std::vector<double>{0.5, 0.5, 0.5, 0.5, 0.0, 0.0}));
-  const auto seen = observe({6, 0.0}, {kPi / 2.0, -kPi / 2.0, 1.5 * kPi, -2.5 * kPi});
-  EXPECT_DOUBLE_EQ(seen[0], 0.75);
-  EXPECT_DOUBLE_EQ(seen[1], 0.25);
-  EXPECT_DOUBLE_EQ(seen[2], 0.75);
-  EXPECT_DOUBLE_EQ(seen[3], 0.25);
-  EXPECT_DOUBLE_EQ(seen[4], 0.25);  // 2 (1/16 + 1/16)
-  EXPECT_DOUBLE_EQ(seen[5], 0.25);  // tip 1 m below joint 1: (2 - 0 - 1) / 4
+  const auto observation = observe({6, 0.0}, {kPi / 2.0, -kPi / 2.0, 1.5 * kPi, -2.5 * kPi});
+  EXPECT_DOUBLE_EQ(observation[0], 0.75);
+  EXPECT_DOUBLE_EQ(observation[1], 0.25);
+  EXPECT_DOUBLE_EQ(observation[2], 0.75);
+  EXPECT_DOUBLE_EQ(observation[3], 0.25);
+  EXPECT_DOUBLE_EQ(observation[4], 0.25);  // 2 (1/16 + 1/16)
+  EXPECT_DOUBLE_EQ(observation[5], 0.25);  // tip 1 m below joint 1: (2 - 0 - 1) / 4
   const auto up = observe({6, 0.0}, {-kPi, 0.0, 100.0, -100.0});
   EXPECT_EQ(up, (std::vector<double>{0.0, 0.5, 1.0, 0.0, 1.0, 1.0}));
 }
@@ -42,18 +42,18 @@ TEST(AcrobotSensors, AreNormalizedAsWorkedByHand) {
 TEST(AcrobotSensors, HeightIsTheNormalizedTipHeight) {
   for (double theta1 = -3.0; theta1 < 3.1; theta1 += 0.5) {
     for (double theta2 = -3.0; theta2 < 3.1; theta2 += 0.5) {
-      const auto seen = observe({6, 0.0}, {theta1, theta2, 0.0, 0.0});
+      const auto observation = observe({6, 0.0}, {theta1, theta2, 0.0, 0.0});
       const double tip = -std::cos(theta1) - std::cos(theta1 + theta2);
-      EXPECT_NEAR(seen[5], (tip + 2.0) / 4.0, 1e-15);
+      EXPECT_NEAR(observation[5], (tip + 2.0) / 4.0, 1e-15);
     }
   }
 }
 
 TEST(AcrobotSensors, AnglesJustBelowPiAreBelowOne) {
   const double below_pi = std::nextafter(kPi, 0.0);
-  const auto seen = observe({4, 0.0}, {below_pi, below_pi, 0.0, 0.0});
-  EXPECT_LT(seen[0], 1.0);
-  EXPECT_LT(seen[1], 1.0);
+  const auto observation = observe({4, 0.0}, {below_pi, below_pi, 0.0, 0.0});
+  EXPECT_LT(observation[0], 1.0);
+  EXPECT_LT(observation[1], 1.0);
 }
 
 TEST(UnitInterval, WrappedNumbersKeepTheirFractionAndSaturatedOnesStopAtItsEnds) {
@@ -80,16 +80,16 @@ TEST(AcrobotSensors, NoiseWrapsAnglesAndClipsOtherSensors) {
   AcrobotSensors sensors({6, 0.02}, 8, Stream::sensor_noise);
   int low = 0, high = 0, floor = 0, ceiling = 0;
   for (int i = 0; i < 2000; ++i) {
-    const auto seen = observe(sensors, {-kPi, 0.0, 100.0, -100.0});
-    for (const double value : seen) {
+    const auto observation = observe(sensors, {-kPi, 0.0, 100.0, -100.0});
+    for (const double value : observation) {
       EXPECT_GE(value, 0.0);
       EXPECT_LE(value, 1.0);
     }
-    EXPECT_LT(seen[0], 1.0);
-    low += seen[0] < 0.5;
-    high += seen[0] > 0.5;
-    ceiling += seen[2] == 1.0;
-    floor += seen[3] == 0.0;
+    EXPECT_LT(observation[0], 1.0);
+    low += observation[0] < 0.5;
+    high += observation[0] > 0.5;
+    ceiling += observation[2] == 1.0;
+    floor += observation[3] == 0.0;
   }
   for (const int n : {low, high, ceiling, floor}) EXPECT_GT(n, 850);  // about half of 2000
 }
@@ -100,10 +100,10 @@ TEST(AcrobotSensors, NoiseMayEnterBeforeRedundantVariablesAreComputed) {
   AcrobotSensors all({6, 0.02, NoiseEntry::basic_sensors}, 42, Stream::sensor_noise);
   for (int i = 0; i < 10; ++i) {
     const auto noisy = observe(basic, state);
-    const auto seen = observe(all, state);
-    for (std::size_t j = 0; j < 4; ++j) EXPECT_EQ(seen[j], noisy[j]);
-    EXPECT_EQ(seen[4], energy_sensor(noisy[2], noisy[3]));
-    EXPECT_EQ(seen[5], height_sensor(noisy[0], noisy[1]));
+    const auto observation = observe(all, state);
+    for (std::size_t j = 0; j < 4; ++j) EXPECT_EQ(observation[j], noisy[j]);
+    EXPECT_EQ(observation[4], energy_sensor(noisy[2], noisy[3]));
+    EXPECT_EQ(observation[5], height_sensor(noisy[0], noisy[1]));
   }
 }
 
@@ -115,12 +115,12 @@ TEST(AcrobotSensors, ConstantAndRandomInputsAreAppendedWithoutChangingOthers) {
                              Stream::sensor_noise);
   double last = -1.0;
   for (int i = 0; i < 10; ++i) {
-    const auto seen = observe(clean, state);
-    ASSERT_EQ(seen.size(), 7U);
-    EXPECT_EQ(seen[4], 0.5);
-    EXPECT_EQ(seen[5], 0.5);
-    EXPECT_NE(seen[6], last);
-    last = seen[6];
+    const auto observation = observe(clean, state);
+    ASSERT_EQ(observation.size(), 7U);
+    EXPECT_EQ(observation[4], 0.5);
+    EXPECT_EQ(observation[5], 0.5);
+    EXPECT_NE(observation[6], last);
+    last = observation[6];
     const auto expected = observe(without, state);
     const auto noisy = observe(random_only, state);
     for (std::size_t j = 0; j < 5; ++j) EXPECT_EQ(noisy[j], expected[j]);

@@ -33,8 +33,8 @@ TEST(Libsdnn, RefusesBadArguments) {
   EXPECT_EQ(estimators::standard_library_named("libstdc++"), StandardLibrary::libstdcxx);
   EXPECT_THROW(estimators::standard_library_named("libc++"), std::invalid_argument);
   LibsdnnRandom random(kSeed, StandardLibrary::msvc);
-  EXPECT_THROW(estimators::libsdnn_patterns({71, 3, 1}, random), std::invalid_argument);
-  EXPECT_THROW(estimators::libsdnn_patterns({70, 3, 35}, random), std::invalid_argument);
+  EXPECT_THROW(estimators::libsdnn_patterns({71, 3, 1}, random), std::invalid_argument);   // odd
+  EXPECT_THROW(estimators::libsdnn_patterns({70, 3, 35}, random), std::invalid_argument);  // all
   EXPECT_THROW(estimators::libsdnn_weights(2, 3, 5, -5, random), std::invalid_argument);
   const std::vector<coding::RandomInverseConfig> inputs(1, {10, 3, 1});
   const std::vector<coding::InputPair> pairs{{0, 1}};

@@ -31,23 +31,30 @@ TEST(TrainingForm, FormsAreFoundByTheirNames) {
   EXPECT_THROW(estimators::training_form_named("primal"), std::invalid_argument);
 }
 
-TEST(TrainingForm, MemoryOfEachFormIsAsWorkedByHand) {
-  // 2000 samples; 280 units, padded to 288, or to three tiles of 96; codes of 2 * 2000 columns,
-  // which are 64 words of active columns and 64 of positive ones; blocks of 256 samples.
+TEST(TrainingForm, MemoryOfEachFormIsThatOfItsTables) {
   const auto code = demonstration_code();
-  EXPECT_EQ(estimators::with_product_type(code, []<class Product>() { return sizeof(Product); }),
-            2U);
-  EXPECT_EQ(estimators::form_memory(TrainingForm::plain, 280, code, 2000), 0U);
-  EXPECT_EQ(estimators::form_memory(TrainingForm::block, 280, code, 2000),
-            4U * 288 * (4096 + 256 + 32) + 2U * 96 * (256 + 4 * 256) +
-                256U * (2 * 64 * 8 + 4096 + 4 * 288 + 2 * 256 + 2000 + 32 * 4));
-  EXPECT_EQ(estimators::form_memory(TrainingForm::block, 280, code, 2000, true) -
-                estimators::form_memory(TrainingForm::block, 280, code, 2000),
-            256U * (2 * 64 * 8 + 4096 + 2 * 4 * 288 + 2000 + 32 * 4) + 2 * (512 * 512 - 256 * 256) +
-                2 * 96 * 4 * 256 + 2000U * (512 * 2 + 2000 + 32 * 4));
-  EXPECT_EQ(estimators::form_memory(TrainingForm::dual, 280, code, 2000),
-            2000U * 2016 * 2 + 280U * 2016 * 4 + 2000U * 288 * 2 + 2000U * 2 * 64 * 8 +
-                4U * 288 * (128 + 32) + 2U * 128 * 128);
+  constexpr std::size_t kSamples = 2000, kUnits = 280;
+  constexpr std::size_t kPadded = 288;                    // units, to a multiple of 16
+  constexpr std::size_t kActive = 2000, kColumns = 4096;  // of 4000, to a multiple of 256
+  constexpr std::size_t kCode = 2 * kColumns / 8, kWalk = 8 * kColumns / 256;
+  EXPECT_EQ(estimators::form_memory(TrainingForm::plain, kUnits, code, kSamples), 0U);
+  const auto block_memory = [](std::size_t block, std::size_t n_planned) {
+    return 4 * kPadded * kColumns                        // weights
+           + block * (kCode + kColumns + 4 * kPadded)    // codes, entries, potentials
+           + 4 * kPadded * (block + 32)                  // samples to be presented
+           + 2 * 96 * (256 + 4 * block)                  // sums of a tile of 96 units
+           + n_planned * (2 * block + kActive + kWalk);  // products, walks through codes
+  };
+  EXPECT_EQ(estimators::form_memory(TrainingForm::block, kUnits, code, kSamples),
+            block_memory(256, 256));
+  EXPECT_EQ(estimators::form_memory(TrainingForm::block, kUnits, code, kSamples, true),
+            block_memory(512, 512 + kSamples));
+  constexpr std::size_t kRow = 2016;  // samples, to a multiple of 32
+  EXPECT_EQ(estimators::form_memory(TrainingForm::dual, kUnits, code, kSamples),
+            2 * kSamples * kRow                               // products of two codes, of 2 bytes
+                + 4 * kUnits * kRow                           // potentials
+                + kSamples * (2 * kPadded + kCode)            // coefficients, codes
+                + 4 * kPadded * (128 + 32) + 2 * 128 * 128);  // 128 samples to be presented
 }
 
 /// The dual form computes an inner product of codes for every two samples: too slow for 20,000

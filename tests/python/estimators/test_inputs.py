@@ -239,10 +239,10 @@ def test_set_params_reaches_listed_codings_by_number_or_all_at_once():
     model.set_params(coding__period=24.0, coding__1__base__period=7.0, coding__0__n_interpolated=8)
     first, second, third = (coding for coding, _ in model.coding)
     assert (first.n_interpolated, second.base.period, third.period) == (8, 7.0, 24.0)
-    expected_model = model.get_params()
-    assert expected_model["coding__2__period"] == 24.0
+    parameters = model.get_params()
+    assert parameters["coding__2__period"] == 24.0
     clone(model).set_params(
-        **{name: expected_model[name] for name in expected_model if name.startswith("coding__")}
+        **{name: parameters[name] for name in parameters if name.startswith("coding__")}
     )
     assert SDNNRegressor("circular").get_params()["coding__period"] == Circular().period
     assert "coding__period" not in SDNNRegressor("circular").get_params(deep=False)

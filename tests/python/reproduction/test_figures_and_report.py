@@ -111,9 +111,9 @@ def test_a_reproduction_reads_each_trial_once(monkeypatch, tmp_path, use_trial):
 
     monkeypatch.setattr(ResultStore, "_make_record", counted("trial", ResultStore._make_record))
     done = run_study(PaperStudy(quick=True), tmp_path)
-    # SDNN-C in Case I belongs to both figures.
+    # SDNN-C in Case I belongs to both figures: two trials of nine pairs of case and agent.
     assert [len(experiment["cases"]) for experiment in done.table["experiments"]] == [2, 8]
-    assert calls == ["trial"] * 18
+    assert calls == ["trial"] * 2 * 9
     with ResultStore(tmp_path) as store:
         assert done.table["digest"] == records_digest(store.load())
 

@@ -188,16 +188,13 @@ def test_names_of_groups_state_their_different_settings(tmp_path):
 
 
 def test_later_goals_at_steps_that_depend_on_the_seed_keep_runs_grouped(tmp_path):
+    # Trainings of episodes, or up to a return, end at steps that depend on the seed.
     of_episodes = run_spec(CONFIG, steps=None, episodes=30)
-    targeted = run_spec(CONFIG, target_return=5.0)
-    for config, one, other in (
-        (of_episodes, Goal(at_step=271, episodes=60), Goal(at_step=300, episodes=60)),
-        (targeted, Goal(at_step=271, steps=600), Goal(at_step=300, steps=600)),
-    ):
+    up_to_a_return = run_spec(CONFIG, target_return=5.0)
+    for config, later in ((of_episodes, {"episodes": 60}), (up_to_a_return, {"steps": 600})):
         runs = [
-            Run(tmp_path / str(goal.at_step), run_spec(config, seed=goal.at_step), goals)
-            for goal in (one, other)
-            for goals in [[goal]]
+            Run(tmp_path / str(step), run_spec(config, seed=step), [Goal(at_step=step, **later)])
+            for step in (271, 300)
         ]
         assert len(groups_of(runs)) == 1
 

@@ -60,7 +60,7 @@ def test_a_trial_that_fails_in_a_team_does_not_affect_the_others(tmp_path, monke
     plan = plan_of_small_agents(1, 20)
     spec = plan[0].spec
     kwargs = spec.environment.kwargs
-    acrobot = kwargs["acrobot"] | {"goal_reward": 1e39, "penalty": 1e39}
+    acrobot = kwargs["acrobot"] | {"goal_reward": 1e39, "penalty": 1e39}  # over a float's range
     environment = spec.environment.replace(kwargs=kwargs | {"acrobot": acrobot})
     bad = PlannedTrial(plan[0].key, spec.replace(environment=environment))
     monkeypatch.setattr("sdnn.runs.engine.teams_of", lambda planned, jobs: [planned])

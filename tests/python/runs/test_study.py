@@ -219,7 +219,7 @@ def test_a_study_may_mix_the_papers_acrobot_with_other_environments(study):
 def test_options_override_the_number_of_trials_and_the_seed_of_the_file(study):
     loaded = study(PAPER, n_trials=1, seed=9)
     assert (loaded.n_trials, loaded.seed) == (1, 9)
-    assert len(loaded.plan()) == 3
+    assert len(loaded.plan()) == 3, "a trial of each case"
 
 
 def test_only_selects_variants_and_refuses_unknown_ones(study):

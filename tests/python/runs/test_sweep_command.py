@@ -99,8 +99,8 @@ def test_the_report_shows_the_study_and_escapes_its_title(invoke, tmp_path):
 
 def test_only_runs_the_selected_variants(invoke):
     result = invoke("sweep", "mine.toml", "--only", "discount=0.8", "--only", "discount=0.8")
-    assert re.search(r"\b4 of 4 .* results \(4 ", result.stdout)
-    assert " 4 of 6 " in result.stdout
+    assert re.search(r"\b4 of 4 .* results \(4 ", result.stdout), "two trials of two cases"
+    assert " 4 of 6 " in result.stdout, "combinations of a variant and a case"
     rest = invoke("sweep", "mine.toml", "--only", "base")
     assert "(4 " in rest.stdout
     assert " of 6 " not in rest.stdout

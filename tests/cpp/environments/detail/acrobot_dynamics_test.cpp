@@ -25,12 +25,13 @@ TEST(AcrobotDynamicsForms, EnergyAsWorkedByHand) {
 
 TEST(AcrobotDynamicsForms, IntegrationStopsAtTheGoal) {
   const AcrobotDynamics dynamics;
-  One::State state{2.0, 0.0, 2.0, 0.0};
-  EXPECT_TRUE(dynamics.integrate<One>(state, 0.0, 9.0, 15.0, true));
-  EXPECT_GE(dynamics.tip_height(One::angles(state)), 1.5);
-  One::State still{2.0, 0.0, 2.0, 0.0};
-  EXPECT_FALSE(dynamics.integrate<One>(still, 0.0, 9.0, 15.0, false));
-  EXPECT_EQ(still, (One::State{2.0, 0.0, 2.0, 0.0}));
+  constexpr double kTorque = 0.0, kSpeedLimit1 = 9.0, kSpeedLimit2 = 15.0;
+  const One::State thrown_upwards{2.0, 0.0, 2.0, 0.0};
+  One::State moving = thrown_upwards, standing = thrown_upwards;
+  EXPECT_TRUE(dynamics.integrate<One>(moving, kTorque, kSpeedLimit1, kSpeedLimit2, true));
+  EXPECT_GE(dynamics.tip_height(One::angles(moving)), 1.5);
+  EXPECT_FALSE(dynamics.integrate<One>(standing, kTorque, kSpeedLimit1, kSpeedLimit2, false));
+  EXPECT_EQ(standing, thrown_upwards);
 }
 
 }  // namespace

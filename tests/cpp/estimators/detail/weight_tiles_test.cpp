@@ -14,6 +14,7 @@ namespace {
 
 using estimators::WeightTiles;
 
+// 102 units: a tile of 96, and 6 padded to 16.
 TEST(WeightTiles, TheLastTileIsAsWideAsNeeded) {
   WeightTiles<std::int32_t> tiles(102, 3);
   EXPECT_EQ(tiles.n_tiles(), 2U);
