@@ -9,6 +9,11 @@
 #include "sdnn_learner.h"
 #include "sdnn_softmax.h"
 #include "sdnn_thermometers.h"
+#ifdef SDNN_HISTORY
+#include "sdnn_history_learner.h"
+#else
+#include "sdnn_last_observation.h"
+#endif
 
 typedef uint32_t sdnn_score;
 #include "sdnn_ties.h"
@@ -38,10 +43,10 @@ typedef struct {
   int32_t traces[SDNN_N_ALL_WEIGHTS];
   int32_t exponent;          /* values and the critic's weights count units of 2 to this power */
   uint32_t rate, actor_rate; /* times 2^16 */
-  int32_t next[SDNN_N_OBSERVED]; /* where the last transition ended */
-  sdnn_code codes[2];            /* of the state that was learned last, and of another one */
-  uint8_t pending;               /* the code of the state that was learned last */
-  uint8_t has_next;              /* whether the last transition did not terminate */
+  sdnn_states states;
+  sdnn_code codes[2]; /* of the state that was learned last, and of another one */
+  uint8_t pending;    /* the code of the state that was learned last */
+  uint8_t has_next;   /* whether the last transition did not terminate */
   uint8_t has_exponent;
   uint8_t is_live[SDNN_N_ROWS]; /* rows of traces that are not all 0 */
 } sdnn_agent;
@@ -202,12 +207,9 @@ static inline void sdnn_end(sdnn_agent* agent) {
 }
 
 /* Begins an episode. Call it before the first action, and whenever the task starts anew. */
-static inline void sdnn_begin_episode(sdnn_agent* agent) { sdnn_end(agent); }
-
-static inline const sdnn_code* sdnn_read(sdnn_agent* agent, const int32_t* observation) {
-  uint32_t bins[SDNN_N_INPUTS];
-  sdnn_bins_of_fixed(observation, bins);
-  return sdnn_other(agent, bins);
+static inline void sdnn_begin_episode(sdnn_agent* agent) {
+  sdnn_forget(&agent->states);
+  sdnn_end(agent);
 }
 
 /* An action that is drawn by its probability. */
@@ -222,8 +224,10 @@ static inline uint32_t sdnn_drawn(const uint32_t* weights, uint64_t sum, sdnn_ra
  * null, the fractional indices of greedy actions are written to it. */
 static inline void sdnn_choose(sdnn_agent* agent, const int32_t* observation, int explore,
                                uint32_t* action, uint32_t* place) {
-  const sdnn_code* const code = sdnn_read(agent, observation);
-  uint32_t d;
+  const sdnn_code* code;
+  uint32_t bins[SDNN_N_INPUTS], d;
+  sdnn_read_to_act(&agent->states, observation, explore, bins);
+  code = sdnn_other(agent, bins);
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     int64_t bits[SDNN_MOST_ROWS];
     uint32_t weights[SDNN_MOST_ROWS];
@@ -236,6 +240,7 @@ static inline void sdnn_choose(sdnn_agent* agent, const int32_t* observation, in
     }
     if (place) place[d] = sdnn_mean_place(weights, n, action[d]);
   }
+  sdnn_note_act(&agent->states, explore, action, place);
 }
 static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observation, int explore,
                                     uint32_t* action) {
@@ -244,22 +249,9 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
 
 /* V(observation) in units of 2 to the power of agent->exponent. */
 static inline int64_t sdnn_state_value(sdnn_agent* agent, const int32_t* observation) {
-  return sdnn_best_sum(agent, sdnn_read(agent, observation));
-}
-
-/* Stores the observation in which a transition ends, clipped to the ranges. Returns whether it is
- * the observation that was stored before. */
-static inline int sdnn_note_next(sdnn_agent* agent, const int32_t* observation) {
-  int is_same = agent->has_next;
-  uint32_t i;
-  for (i = 0; i < SDNN_N_OBSERVED; ++i) {
-    const int32_t low = sdnn_limits[i][0], high = sdnn_limits[i][1];
-    const int32_t reading = observation[i];
-    const int32_t limited = reading < low ? low : reading > high ? high : reading;
-    is_same &= agent->next[i] == limited;
-    agent->next[i] = limited;
-  }
-  return is_same;
+  uint32_t bins[SDNN_N_INPUTS];
+  sdnn_read_only(&agent->states, observation, bins);
+  return sdnn_best_sum(agent, sdnn_other(agent, bins));
 }
 
 /* Learns a transition. Its reward is a number times 2^SDNN_FRACTION_BITS; `terminated` means that
@@ -268,16 +260,23 @@ static inline int sdnn_note_next(sdnn_agent* agent, const int32_t* observation) 
 static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observation,
                                       const uint32_t* action, int32_t reward,
                                       const int32_t* next_observation, int terminated) {
-  uint32_t limited[SDNN_N_DIMENSIONS];
+  uint32_t limited[SDNN_N_DIMENSIONS], bins[SDNN_N_INPUTS], is_next;
   const sdnn_code *code, *next_code;
   int64_t next = 0, error, drift;
   int32_t size;
-  if (!sdnn_accepts(&agent->scale, reward)) return;
+  const int is_accepted = sdnn_accepts(&agent->scale, reward);
+  if (!is_accepted && !SDNN_REMEMBERS) return;
   sdnn_limit_action(action, limited);
-  if (!sdnn_note_next(agent, observation)) sdnn_end(agent);
-  code = sdnn_read(agent, observation);
+  is_next = sdnn_read_first(&agent->states, observation, bins);
+  if (!is_accepted) {
+    sdnn_read_next(&agent->states, limited, next_observation, bins);
+    return;
+  }
+  if (!is_next || !agent->has_next) sdnn_end(agent);
+  code = sdnn_other(agent, bins);
   agent->pending = (uint8_t)(1 - agent->pending);
-  next_code = sdnn_read(agent, next_observation);
+  sdnn_read_next(&agent->states, limited, next_observation, bins);
+  next_code = sdnn_other(agent, bins);
   if ((uint64_t)agent->n_learned < SDNN_MOST_LEARNED) ++agent->n_learned;
   sdnn_apply_rates(agent);
   sdnn_fit_unit(agent, reward);
@@ -286,7 +285,7 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   sdnn_move_actor(agent, code, limited,
                   sdnn_normalized(&agent->error_scale, error, agent->exponent));
   sdnn_move(agent, code, 0, error + drift, drift);
-  sdnn_note_next(agent, next_observation);
+  sdnn_keep_next(&agent->states, next_observation);
   agent->has_next = 1;
   if (terminated) sdnn_end(agent);
   size = sdnn_end_window(&agent->scale);

@@ -34,24 +34,48 @@ static inline void sdnn_act_in_each(const uint32_t* bins, uint32_t* action) {
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = sdnn_best(&code, d, 0);
 }
 
+#ifdef SDNN_HISTORY
+#include "sdnn_history_policy.h"
+#else
 #include "sdnn_policy.h"
+#endif
 
 #if SDNN_IS_BOX
-static inline void sdnn_place_in_each(const int32_t* observation, uint32_t* place) {
-  uint32_t bins[SDNN_N_INPUTS], d;
+static inline void sdnn_place_of_bins(const uint32_t* bins, uint32_t* place) {
   sdnn_code code;
-  sdnn_bins_of_fixed(observation, bins);
+  uint32_t d;
   sdnn_encode_state(bins, &code);
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) sdnn_best(&code, d, &place[d]);
 }
-#if SDNN_N_DIMENSIONS == 1
+#ifdef SDNN_HISTORY
+static inline void sdnn_place_in_each(sdnn_episode* episode, const int32_t* observation,
+                                      uint32_t* place) {
+  uint32_t bins[SDNN_N_INPUTS];
+  sdnn_step_of_int32_t(episode, observation, bins);
+  sdnn_place_of_bins(bins, place);
+  sdnn_note_places(episode, place);
+}
+#else
+static inline void sdnn_place_in_each(const int32_t* observation, uint32_t* place) {
+  uint32_t bins[SDNN_N_INPUTS];
+  sdnn_bins_of_fixed(observation, bins);
+  sdnn_place_of_bins(bins, place);
+}
+#endif
+#if SDNN_N_DIMENSIONS > 1
+#define sdnn_place_fixed sdnn_place_in_each
+#elif defined(SDNN_HISTORY)
+static inline uint32_t sdnn_place_fixed(sdnn_episode* episode, const int32_t* observation) {
+  uint32_t place;
+  sdnn_place_in_each(episode, observation, &place);
+  return place;
+}
+#else
 static inline uint32_t sdnn_place_fixed(const int32_t* observation) {
   uint32_t place;
   sdnn_place_in_each(observation, &place);
   return place;
 }
-#else
-#define sdnn_place_fixed sdnn_place_in_each
 #endif
 #endif
 

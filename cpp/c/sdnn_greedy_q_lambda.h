@@ -22,6 +22,10 @@ static inline void sdnn_act_in_each(const uint32_t* bins, uint32_t* action) {
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = sdnn_best(&code, d);
 }
 
+#ifdef SDNN_HISTORY
+#include "sdnn_history_policy.h"
+#else
 #include "sdnn_policy.h"
+#endif
 
 #endif /* SDNN_GREEDY_Q_LAMBDA_H */

@@ -7,6 +7,9 @@ class sdnn_learner {
  public:
   sdnn_learner() { sdnn_begin(&agent_); }
   void begin_episode() { sdnn_begin_episode(&agent_); }
+#ifdef SDNN_HISTORY
+  void begin_greedy_episode() { sdnn_begin_greedy_episode(&agent_); }
+#endif
 #if SDNN_N_DIMENSIONS == 1
   typedef uint32_t action_type;
   uint32_t act(const int32_t (&observation)[SDNN_N_OBSERVED], bool explore = true) {

@@ -18,6 +18,13 @@ static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uin
 #define sdnn_learn sdnn_learn_in_each
 #endif
 
+#ifdef SDNN_HISTORY
+/* The next greedy actions are those of another episode than the one from which it learns. */
+static inline void sdnn_begin_greedy_episode(sdnn_agent* agent) {
+  sdnn_forget_greedy(&agent->states);
+}
+#endif
+
 /* Makes the agent as it was exported. */
 static inline void sdnn_begin(sdnn_agent* agent) {
   sdnn_begin_as(agent, sdnn_first_head);

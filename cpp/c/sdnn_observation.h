@@ -135,6 +135,7 @@ static inline uint32_t sdnn_symbol_of_fixed(const int32_t* readings, uint32_t n)
   return symbol;
 }
 
+#ifndef SDNN_HISTORY
 /* The bins of all inputs, from readings in fixed point. */
 static inline void sdnn_bins_of_fixed(const int32_t* observation, uint32_t* bins) {
 #define SDNN_VARIABLE(i, at, n_bins, low, width, bounds) \
@@ -146,5 +147,6 @@ static inline void sdnn_bins_of_fixed(const int32_t* observation, uint32_t* bins
 #define SDNN_SYMBOL(i, at, n) bins[i] = sdnn_symbol_of_fixed(&observation[at], n);
   SDNN_INPUTS
 }
+#endif
 
 #endif /* SDNN_OBSERVATION_H */

@@ -7,6 +7,11 @@
 #define SDNN_N_RANDOMS 4
 #include "sdnn_exploration.h"
 #include "sdnn_readout.h"
+#ifdef SDNN_HISTORY
+#include "sdnn_history_learner.h"
+#else
+#include "sdnn_last_bins.h"
+#endif
 
 typedef int64_t sdnn_score;
 #include "sdnn_ties.h"
@@ -37,7 +42,7 @@ typedef struct {
   uint32_t n_kept;             /* steps that the random action will still last */
   uint32_t step;               /* of the episode */
   uint32_t kept[SDNN_N_DIMENSIONS], action[SDNN_N_DIMENSIONS];
-  uint32_t next_bins[SDNN_N_INPUTS];
+  sdnn_states states;
   sdnn_code codes[2]; /* of the pending state, and of another one */
   uint8_t pending;    /* the code of the state of the pending transition */
   uint8_t is_pending; /* whether a transition is to be learned */
@@ -129,7 +134,7 @@ static inline void sdnn_correct(sdnn_agent* agent, int64_t next) {
 }
 
 static inline void sdnn_correct_by_best(sdnn_agent* agent) {
-  const sdnn_code* const next = sdnn_other(agent, agent->next_bins);
+  const sdnn_code* const next = sdnn_other(agent, agent->states.next_bins);
   sdnn_correct(agent, sdnn_value(agent, next, 0, 0));
 }
 
@@ -148,6 +153,7 @@ static inline void sdnn_finish_at_end(sdnn_agent* agent) {
 static inline void sdnn_begin_episode(sdnn_agent* agent) {
   agent->step = 0;
   agent->n_kept = 0;
+  sdnn_forget(&agent->states);
   if (agent->is_pending) sdnn_finish_at_end(agent);
 }
 
@@ -204,9 +210,13 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
   const int32_t* rows = agent->weights;
   if (explore && sdnn_explores(agent)) {
     for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = agent->kept[d];
+    if (SDNN_REMEMBERS) {
+      sdnn_read_to_act(&agent->states, observation, explore, bins);
+      sdnn_note_act(&agent->states, explore, action, 0);
+    }
     return;
   }
-  sdnn_bins_of_fixed(observation, bins);
+  sdnn_read_to_act(&agent->states, observation, explore, bins);
   code = sdnn_other(agent, bins);
   if (SDNN_AVERAGES && !explore && agent->n_snapshots > 0) rows += SDNN_N_WEIGHTS;
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
@@ -215,6 +225,7 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
     action[d] = sdnn_tied(sums, sdnn_n_actions[d], least,
                           &agent->randoms[explore ? SDNN_ACTING : SDNN_EVALUATION]);
   }
+  sdnn_note_act(&agent->states, explore, action, 0);
 }
 
 /* Q(observation, action) in units of 2 to the power of agent->exponent. */
@@ -222,7 +233,7 @@ static inline int64_t sdnn_q_of_each(sdnn_agent* agent, const int32_t* observati
                                      const uint32_t* action) {
   uint32_t bins[SDNN_N_INPUTS], limited[SDNN_N_DIMENSIONS];
   sdnn_limit_action(action, limited);
-  sdnn_bins_of_fixed(observation, bins);
+  sdnn_read_only(&agent->states, observation, bins);
   return sdnn_sum(agent->weights, sdnn_other(agent, bins), limited);
 }
 
@@ -232,13 +243,17 @@ static inline int64_t sdnn_q_of_each(sdnn_agent* agent, const int32_t* observati
 static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observation,
                                       const uint32_t* action, int32_t reward,
                                       const int32_t* next_observation, int terminated) {
-  uint32_t bins[SDNN_N_INPUTS], limited[SDNN_N_DIMENSIONS], d, is_next = 1;
+  uint32_t bins[SDNN_N_INPUTS], limited[SDNN_N_DIMENSIONS], d, is_next;
   const sdnn_code* code;
   int32_t size;
-  if (!sdnn_accepts(&agent->scale, reward)) return;
+  const int is_accepted = sdnn_accepts(&agent->scale, reward);
+  if (!is_accepted && !SDNN_REMEMBERS) return;
   sdnn_limit_action(action, limited);
-  sdnn_bins_of_fixed(observation, bins);
-  for (d = 0; d < SDNN_N_INPUTS; ++d) is_next &= agent->next_bins[d] == bins[d];
+  is_next = sdnn_read_first(&agent->states, observation, bins);
+  if (!is_accepted) {
+    sdnn_read_next(&agent->states, limited, next_observation, bins);
+    return;
+  }
   if (agent->is_pending && !is_next) sdnn_finish_at_end(agent);
   code = sdnn_other(agent, bins);
   if (agent->is_pending) {
@@ -250,7 +265,8 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
     agent->is_pending = 0;
   }
   agent->pending = (uint8_t)(1 - agent->pending);
-  sdnn_bins_of_fixed(next_observation, agent->next_bins);
+  sdnn_read_next(&agent->states, limited, next_observation, agent->states.next_bins);
+  sdnn_keep_next(&agent->states, next_observation);
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) agent->action[d] = limited[d];
   agent->reward = reward;
   agent->is_pending = 1;

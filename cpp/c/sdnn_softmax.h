@@ -45,7 +45,7 @@ static inline uint64_t sdnn_weigh(int64_t* preferences, uint32_t n, uint32_t* we
 static inline uint32_t sdnn_mean_place(const uint32_t* weights, uint32_t n, uint32_t action) {
   const uint64_t below = action > 0 ? weights[action - 1] : 0;
   const uint64_t above = action + 1 < n ? weights[action + 1] : 0;
-  const uint64_t sum = below + weights[action] + above;
+  const uint64_t sum = below + SDNN_LARGEST_PART + above;
   uint64_t rest;
   if (above >= below) {
     return (action << 16) + (uint32_t)sdnn_quotient((above - below) << 16, sum, &rest);

@@ -1,8 +1,11 @@
 """C headers of policies with other compilers and on other processors, against their agents."""
 
+import re
+
 import pytest
 
 from bare_processors import BARE_TARGETS
+from c_histories import POLICIES, check_policy, policy
 from c_learners import LEARNERS, check_learning
 from c_policies import (
     AGENTS,
@@ -17,7 +20,7 @@ from c_policies import (
     run,
     write_policy,
 )
-from sdnn.export import c_header
+from sdnn.export import c_header, export_c_header
 
 
 @pytest.fixture(params=[name for name in TARGETS if name != "x86-64"])
@@ -30,6 +33,12 @@ def target(request, needs):
 @pytest.mark.parametrize("name", AGENTS)
 def test_actions_on_other_processors_are_those_of_the_agent(name, target, tmp_path):
     check_all_actions(name, target, tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["int32_t", "double", "float"])
+@pytest.mark.parametrize("name", POLICIES)
+def test_greedy_actions_with_a_history_are_those_of_the_agent(name, kind, target, tmp_path):
+    check_policy(name, kind, target, tmp_path)
 
 
 @pytest.mark.parametrize("n_steps", [1000, pytest.param(100_000, marks=pytest.mark.slow)])
@@ -49,9 +58,10 @@ def test_learning_on_other_processors_has_the_bits_of_the_agent(
 def test_learning_compiles_for_microcontrollers_with_few_library_calls(name, kind, needs, tmp_path):
     """At most a multiplication and shifts of 64 bits are called from the compiler's library."""
     needs("clang", "nm")
-    (tmp_path / "agent.h").write_text(c_header(LEARNERS[name](), "agent", learning=True).text)
+    agent = LEARNERS[name]()
+    (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
     act, action = "a[0] = agent_act(&agent, x, 1)", "a[0]"
-    if name in ("several", "actor-vector", "actor-discrete"):
+    if agent.n_dimensions > 1:
         act, action = "agent_act(&agent, x, 1, a)", "a"
     calls = f"""
         #include "agent.h"
@@ -117,3 +127,38 @@ def test_the_header_states_flash_and_ram_of_the_compiled_policy(needs, tmp_path)
         assert header.ram_bytes < stack < header.ram_bytes + 256
         assert f"{header.flash_bytes:,} bytes of constants" in header.text
         assert f"{header.ram_bytes:,} bytes of arrays on the stack" in header.text
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_the_header_states_flash_and_ram_of_a_policy_with_a_history(name, needs, tmp_path):
+    target = TARGETS["arm"]
+    needs(target.compiler)
+    agent = policy(name)
+    header = export_c_header(agent, tmp_path / "policy.h")
+    stated = re.search(r"RAM: +([\d,]+) bytes in one struct[^;]*; ([\d,]+) bytes", header.text)
+    episode_bytes, arrays = (int(number.replace(",", "")) for number in stated.groups())
+    assert episode_bytes + arrays == header.ram_bytes
+    arguments = "&episode, x" if agent.n_dimensions == 1 else "&episode, x, action"
+    source = f"""
+        #include "policy.h"
+        extern policy_episode episode;
+        extern uint32_t action[POLICY_N_DIMENSIONS];
+        void step(const int32_t *x);
+        void step(const int32_t *x) {{
+          {"action[0] = " if agent.n_dimensions == 1 else ""}policy_act_fixed({arguments});
+        }}
+        typedef char bytes_are_stated[sizeof episode == {episode_bytes} ? 1 : -1];
+    """
+    (tmp_path / "policy.c").write_text(source + "\n")
+    options = ("-Os", "-mcpu=cortex-m4", "-mfloat-abi=soft", "-fstack-usage")
+    done = compile_policy(tmp_path, target, *options)
+    lines = run(target.prefix + "size", "-A", done).decode().splitlines()
+    sizes = {w[0]: int(w[1]) for w in map(str.split, lines) if len(w) == 3 and w[0][0] == "."}
+    constants = sum(n for name, n in sizes.items() if name.startswith((".rodata", ".data.rel")))
+    assert header.flash_bytes - 512 < constants < header.flash_bytes + 256
+    assert 2048 < sizes[".text"] < 5120
+    usage = (tmp_path / "policy.su").read_text().splitlines()
+    stack = sum(int(line.split("\t")[1]) for line in usage)
+    assert arrays < stack < arrays + 704
+    undefined = set(run(target.prefix + "nm", "-u", done).decode().split())
+    assert undefined <= {"U", "action", "episode", "_GLOBAL_OFFSET_TABLE_"}

@@ -66,13 +66,19 @@ class ActorCriticWriter(LinearWriter):
 
     def code(self) -> ThermometerCode:
         """Return the code of its states."""
-        variables = [i for i, source in enumerate(self.inputs) if source.kind == "variable"]
+        inputs = [*self.inputs, *self.history.added]
+        variables = [i for i, source in enumerate(inputs) if source.kind == "variable"]
         return ThermometerCode(self.network, variables, self.n_inputs)
 
     @property
     def action_window(self) -> int:
         """The number of readout units of an action."""
         return 1
+
+    @property
+    def acts_between(self) -> bool:
+        """Whether greedy actions may lie between those of a Box."""
+        return self.box is not None
 
     def columns(self) -> NDArray[np.intp]:
         """Return the places of the header's columns among those of the weights."""
@@ -103,10 +109,11 @@ class ActorCriticWriter(LinearWriter):
 
     def tie_remark(self) -> list[str]:
         """Describe how ties are broken, and the actions between those of a box."""
+        episode = "&episode, " if self.history.is_needed else ""
         return [
             "Of several most probable actions it takes the middle of the widest run of neighbours,",
             "where the agent draws one.",
-            *self.place_remark("place_fixed(observation"),
+            *self.place_remark(f"place_fixed({episode}observation"),
         ]
 
     def place_remark(self, call: str) -> list[str]:
@@ -131,7 +138,7 @@ class ActorCriticWriter(LinearWriter):
         tables, code, n_weights = self.tables(), self.code(), self.n_weights()
         tables.add("int32_t", "weights", self.weights(self.agent._state_of("agent")).reshape(-1))
         ram_bytes = code.most_columns * code.column_bytes + 12 * max(self.n_rows())
-        ram_bytes += 12 * self.n_inputs
+        ram_bytes += 12 * self.n_inputs + self.history_bytes()
         n_words = min(code.most_columns, code.n_columns) * sum(self.n_rows())
         sizes = {"weight_bytes": 4 * n_weights, "ram_bytes": ram_bytes, "n_words": n_words}
         description, needs = self.description(), self.needs(**sizes)
@@ -199,7 +206,8 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
         first_weights = weights.reshape(-1) if weights.any() else np.zeros(0, np.int32)
         tables.add("int32_t", "first_weights", first_weights)
         about = "The range of each observed number, beyond which all are equal."
-        tables.add("int32_t", "limits", self._limits(), about)
+        if not self.history.is_needed:
+            tables.add("int32_t", "limits", self._limits(), about)
         defines = {
             **self.defines(),
             **self._learning_rule(),
@@ -210,7 +218,9 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
         return self.write(
             "sdnn_actor_critic.h",
             self.description(),
-            learning_needs("7", f"{ram_bytes:,} bytes, in one struct that you place."),
+            learning_needs(
+                self.history.kilobytes(7), f"{ram_bytes:,} bytes, in one struct that you place."
+            ),
             defines,
             tables,
             weight_bytes=0,
@@ -249,6 +259,6 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
     def _ram_bytes(self, n_weights: int) -> int:
         """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
         n_bytes = 8 * 2 + 16 + 24 + 32 * 2 + 4 * 2 * n_weights + 4 * 3
-        n_bytes += 4 * self.n_observed + 2 * self.code_bytes()
-        n_bytes += 3 + self.n_critic_rows + sum(self.n_rows())
+        n_bytes = self.with_states(n_bytes, 4 * self.n_observed, next_bins=False)
+        n_bytes += 2 * self.code_bytes() + 3 + self.n_critic_rows + sum(self.n_rows())
         return -(-n_bytes // 8) * 8

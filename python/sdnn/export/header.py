@@ -54,7 +54,8 @@ def c_header(
 
     The header is C99 and C++, needs ``<stdint.h>`` only, no heap and no floating point. The
     policy's action is that of ``agent.act(observation, explore=False)``; where the agent would draw
-    one of several best actions, it takes the middle of their widest run. An agent that learns does
+    one of several best actions, it takes the middle of their widest run. With a history of
+    observations the policy has a struct with the memory of an episode. An agent that learns does
     and remembers in C what it would in Python in one environment, to the bit, as long as
     observations and rewards are multiples of ``2**-fraction_bits``. See
     docs/how-to/small-processors.md.
@@ -112,12 +113,14 @@ def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool)
     """Return the writer of an agent's header, a `Learner` if it learns.
 
     TypeError for agents without a header. ValueError for an agent that accepts missing readings,
-    has a history, or would learn with running ranges.
+    for SDNN-C with a history, and for running ranges in an agent that would learn.
     """
     expected = "have missing='error': a C header has no other treatment of missing readings"
     require(getattr(agent, "missing", "error") == "error", "agent", expected, agent)
-    expected = "have history='none': states of a C header are those of single observations"
-    require(getattr(agent, "history", "none") == "none", "agent", expected, agent)
+    has_history = getattr(agent, "history", "none") not in ("none", "auto")
+    expected = "have history='none', as SDNNQLambda and SDNNActorCritic alone have a history in C"
+    is_possible = not has_history or isinstance(agent, SDNNQLambda | SDNNActorCritic)
+    require(is_possible, "agent", expected, agent)
     expected = (
         "have ranges of observations that stay, not running ones, to learn in C: make it with"
         " observation_range=(low, high)"

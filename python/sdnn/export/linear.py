@@ -90,8 +90,30 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         last = first if last is None else last
         return {f"{macro}_FIRST": round(first * _ONE), f"{macro}_LAST": round(last * _ONE)}
 
+    def history_bytes(self) -> int:
+        """Return the bytes of a greedy policy's history, on the stack and of an episode."""
+        if not self.history.is_needed:
+            return 0
+        return self.history.stack_bytes + self.history.episode_bytes
+
+    def with_states(self, n_bytes: int, plain_bytes: int, *, next_bins: bool) -> int:
+        """Add the bytes of the last states to those of the fields before them.
+
+        Without a history they have ``plain_bytes``; with one they begin at a multiple of 8 bytes.
+        """
+        if not self.history.is_needed:
+            return n_bytes + plain_bytes
+        last = 8 * self.n_inputs + 4 * self.n_observed + self.history.episode_bytes + 1
+        states = 2 * _whole_words(last) + 8 * self.n_inputs + 4 * self.n_inputs * next_bins + 1
+        return _whole_words(n_bytes) + _whole_words(states)
+
     def code_bytes(self) -> int:
         """Return the bytes of a state's code in memory."""
         code = self.code()
         n_bytes = 8 + 4 * self.n_inputs + code.column_bytes * code.most_columns
         return -(-n_bytes // 4) * 4
+
+
+def _whole_words(n_bytes: int) -> int:
+    """Return the bytes of a struct that holds words of 8 bytes."""
+    return -(-n_bytes // 8) * 8

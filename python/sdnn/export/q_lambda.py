@@ -46,7 +46,7 @@ class QLambdaWriter(LinearWriter):
         tolerance = min(number << max(-shift, 0) >> max(shift, 0), _MOST_TOLERANCE)
         n_words = min(code.most_columns, code.n_columns) * sum(self.n_rows())
         ram_bytes = code.most_columns * code.column_bytes + 8 * max(self.n_rows())
-        ram_bytes += 12 * self.n_inputs
+        ram_bytes += 12 * self.n_inputs + self.history_bytes()
         sizes = {"weight_bytes": 4 * n_weights, "ram_bytes": ram_bytes, "n_words": n_words}
         defines = {**self.defines(), "TIE_TOLERANCE": f"INT64_C({tolerance})"}
         description, needs = self.description(), self.needs(**sizes)
@@ -123,7 +123,9 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
         return self.write(
             "sdnn_q_lambda.h",
             self.description(),
-            learning_needs("6", f"{ram_bytes:,} bytes, in one struct that you place."),
+            learning_needs(
+                self.history.kilobytes(6), f"{ram_bytes:,} bytes, in one struct that you place."
+            ),
             defines,
             tables,
             weight_bytes=0,
@@ -162,6 +164,7 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
     def _ram_bytes(self, n_weights: int) -> int:
         """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
         n_bytes = 8 * 3 + 24 + 32 * 4 + 4 * (2 + self.averages) * n_weights + 4 * 10
-        n_bytes += 4 * (2 * self.n_dimensions + self.n_inputs) + 2 * self.code_bytes()
-        n_bytes += 3 + sum(self.n_rows())
+        n_bytes += 4 * 2 * self.n_dimensions
+        n_bytes = self.with_states(n_bytes, 4 * self.n_inputs, next_bins=True)
+        n_bytes += 2 * self.code_bytes() + 3 + sum(self.n_rows())
         return -(-n_bytes // 8) * 8

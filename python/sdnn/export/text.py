@@ -23,9 +23,12 @@ _FOLDER = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[3] / "cp
 _INCLUDE = re.compile(r'#include "(\w+\.h)"\n')
 
 
-def c_source(file: str, name: str) -> str:
-    """Return a C file with its includes inserted, and the prefix sdnn replaced by ``name``."""
-    text = re.sub(r"\bsdnn_", f"{name}_", _with_includes(file, set()))
+def c_source(file: str, name: str, unused: Iterable[str] = ()) -> str:
+    """Return a C file with its includes inserted, and the prefix sdnn replaced by ``name``.
+
+    Includes of ``unused`` files, which macros exclude, are left out.
+    """
+    text = re.sub(r"\bsdnn_", f"{name}_", _with_includes(file, set(unused)))
     return re.sub(r"\bSDNN_", f"{name.upper()}_", text)
 
 
@@ -41,6 +44,17 @@ def comment(*lines: str) -> list[str]:
     """Return the lines of a comment in C."""
     body = [f" * {line}".rstrip() for line in lines]
     return [f"/*{body[0][2:]}", *body[1:], " */"]
+
+
+def scaling_comment(lines: Iterable[str]) -> list[str]:
+    """Return comment lines about the scaling of a run's noisy or redundant observations."""
+    return comment(
+        "What this policy observes is scaled, since its run had noise or redundant variables:",
+        "each variable from its range to [0, 1], (value - low) / (high - low), and what lies",
+        "beyond the range to 0 or 1. Wherever an observation has units below, it is these.",
+        "",
+        *(f"  {line}" for line in lines),
+    )
 
 
 def define_lines(macro: str, values: Mapping[str, object]) -> list[str]:

@@ -17,6 +17,7 @@ from sdnn import _core
 from sdnn._core import __version__
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.environments.types import Array, Data
+from sdnn.export.history import StateHistory
 from sdnn.export.text import (
     Input,
     Tables,
@@ -26,6 +27,7 @@ from sdnn.export.text import (
     conversions,
     define_lines,
     joined,
+    scaling_comment,
     table_lines,
 )
 from sdnn.support.arguments import argument_error, whole
@@ -81,7 +83,8 @@ class Writer(ABC, Generic[Network]):
         if any(not -(2**31) <= start < 2**31 for start in self.start):
             raise ValueError(f"actions must begin within 32 bits, got {self.start}")
         self.inputs = self._inputs()
-        self.n_inputs = len(self.inputs)
+        self.history = StateHistory(agent, self.inputs)
+        self.n_inputs = len(self.inputs) + len(self.history.added)
         self.n_observed = len(agent.observation_range[0])
         self.fraction_bits = self._checked_fraction_bits(fraction_bits)
 
@@ -135,7 +138,7 @@ class Writer(ABC, Generic[Network]):
     def tables_of_spaces(self) -> Tables:
         """Write the constants of observations and actions."""
         tables = Tables(self.name)
-        n_bins = np.array([source.n_bins for source in self.inputs])
+        n_bins = np.array([len(self.network.table(i)) for i in range(self.n_inputs)])
         tables.add("uint32_t", "n_bins", n_bins, "Bins of each input.")
         if self.box is None:
             about = "The action that has the number 0."
@@ -144,7 +147,14 @@ class Writer(ABC, Generic[Network]):
             fixed = np.round(self.box.astype(np.float64) * 2.0**self.fraction_bits)
             about = f"The actions, times 2^{self.fraction_bits}."
             tables.add("int32_t", "action_fixed", by_dimension(fixed.astype(np.int64)), about)
+        if self.history.is_needed:
+            self.history.add_tables(tables, has_policy=self.acts_between)
         return tables
+
+    @property
+    def acts_between(self) -> bool:
+        """Whether greedy actions may lie between those of a Box."""
+        return False
 
     def n_actions(self) -> list[int]:
         """Return the number of actions of each dimension."""
@@ -164,6 +174,8 @@ class Writer(ABC, Generic[Network]):
             ],
             [zlib.crc32(self.network.permutation(*pair).tobytes()) for pair in self.network.pairs],
         ]
+        if self.history.is_needed:
+            about += self.history.constants()
         return zlib.crc32(json.dumps(about).encode())
 
     def write(
@@ -179,8 +191,10 @@ class Writer(ABC, Generic[Network]):
 
         ``needs`` are lines about memory, and ``sizes`` the other attributes of the `CHeader`.
         """
-        conversion_tables, inputs = conversions(self.inputs, self.name, self.fraction_bits)
-        flash_bytes = tables.n_bytes + conversion_tables.n_bytes
+        conversion_tables, inputs = Tables(self.name), self.history.calls()
+        if not self.history.is_needed:
+            conversion_tables, inputs = conversions(self.inputs, self.name, self.fraction_bits)
+        flash_bytes = tables.n_bytes + conversion_tables.n_bytes + self.history.function_bytes
         macro = self.name.upper()
         spaces = {
             "N_OBSERVED": self.n_observed,
@@ -189,8 +203,10 @@ class Writer(ABC, Generic[Network]):
             "FRACTION_BITS": self.fraction_bits,
             "TIES": f"{macro}_{_TIES[self.tie_rule()]}",
         }
+        if self.history.is_needed:
+            spaces |= self.history.defines(has_policy=self.acts_between)
         text = [
-            *self._scaling(),
+            *(scaling_comment(self.agent.scaling.lines()) if self.agent.scaling else []),
             *comment(
                 f"{self.name}.h: {self.title}, in C99 for small processors.",
                 "",
@@ -206,6 +222,7 @@ class Writer(ABC, Generic[Network]):
                 *self._usage(),
                 f"An action is a number; {self._action_value()} is its value.",
                 *(line for i, source in enumerate(self.inputs) for line in source.usage(i)),
+                *self.history.usage(),
                 *self.tie_remark(),
             ),
             f"#ifndef SDNN_{macro}_H",
@@ -220,7 +237,7 @@ class Writer(ABC, Generic[Network]):
             *conversion_tables.lines,
             *self._float_tables(),
             "",
-            c_source(file, self.name),
+            c_source(file, self.name, self.history.unused_files),
             f"#endif /* SDNN_{macro}_H */",
         ]
         return CHeader(
@@ -229,19 +246,6 @@ class Writer(ABC, Generic[Network]):
             fraction_bits=self.fraction_bits,
             flash_bytes=flash_bytes,
             **sizes,
-        )
-
-    def _scaling(self) -> list[str]:
-        """Return comment lines about the scaling of a run's noisy or redundant observations."""
-        scaling = self.agent.scaling
-        if scaling is None:
-            return []
-        return comment(
-            "What this policy observes is scaled, since its run had noise or redundant variables:",
-            "each variable from its range to [0, 1], (value - low) / (high - low), and what lies",
-            "beyond the range to 0 or 1. Wherever an observation has units below, it is these.",
-            "",
-            *(f"  {line}" for line in scaling.lines()),
         )
 
     def _usage(self) -> list[str]:
@@ -255,21 +259,27 @@ class Writer(ABC, Generic[Network]):
 
     def needs(self, weight_bytes: int, ram_bytes: int, n_words: int) -> list[str]:
         """Return comment lines about the memory and time of a greedy policy."""
-        return [
-            f"Flash: {{flash}} bytes of constants, of which {weight_bytes:,} are weights; the code",
-            "       comes to 1 to 2 kB.",
+        stack = [
             f"RAM:   {ram_bytes:,} bytes of arrays on the stack, and at most 256 bytes for all",
             f"       else there; {self.name}_act_float takes {8 * self.n_observed:,} more.",
+        ]
+        return [
+            f"Flash: {{flash}} bytes of constants, of which {weight_bytes:,} are weights; the code",
+            f"       comes to {'2 to 5' if self.history.is_needed else '1 to 2'} kB.",
+            *(self.history.memory_lines(ram_bytes) if self.history.is_needed else stack),
             "       No heap, and nothing static that changes.",
             f"Time:  a decision reads {n_words:,} words of 32 bits of weights.",
         ]
 
     def calls(self) -> list[str]:
         """Return example lines of C that choose an action."""
+        before, arguments = self.history.calls_of_episode(self.name), "observation"
+        if before:
+            arguments = f"&episode, {arguments}"
         if not self.is_vector:
-            return [f"uint32_t action = {self.name}_act_fixed(observation);"]
+            return [*before, f"uint32_t action = {self.name}_act_fixed({arguments});"]
         array = f"uint32_t action[{self.name.upper()}_N_DIMENSIONS];"
-        return [array, f"{self.name}_act_fixed(observation, action);"]
+        return [*before, array, f"{self.name}_act_fixed({arguments}, action);"]
 
     def _action_value(self) -> str:
         if self.box is None:

@@ -13,7 +13,6 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.agents.imitation import _value
-from sdnn.export import c_header
 from stopped_training import states_equal
 
 RANDOM_STEPS = 1100
@@ -133,13 +132,6 @@ def test_a_training_prints_the_history_that_was_found(invoke, tmp_path):
     assert not any(line.startswith("history") for line in lines("none"))
     assert "history of observations in states: none, as the warm-up found" in lines("auto")
     assert "history of observations in states: averages" in lines("averages")
-
-
-def test_export_refuses_agents_with_a_history():
-    agent = SDNNQLambda(positions(), seed=1, history="differences")
-    agent.train(positions(), steps=RANDOM_STEPS, seed=1)
-    with pytest.raises(ValueError, match="history='none'"):
-        c_header(agent, "pole")
 
 
 def test_missing_codes_and_a_history_exclude_each_other():

@@ -8,7 +8,8 @@ import gymnasium as gym
 import numpy as np
 
 from bare_processors import BARE_TARGETS, STDIO
-from c_policies import STRICT, box, place_of, run
+from c_histories import LEARNERS as HISTORIES
+from c_policies import STRICT, box, lies_between, place_of, run
 from sdnn.agents import (
     ActorCriticConfig,
     QLambdaConfig,
@@ -165,6 +166,7 @@ ACTORS = {
 LEARNERS = {
     **NETWORKS,
     **ACTORS,
+    **HISTORIES,
     "states": states,
     "discrete": discrete, "sarsa": sarsa, "dutch": dutch, "several": several, "circular": circular,
 }  # fmt: skip
@@ -178,8 +180,8 @@ def _ranges(*sizes):
     return {"observation_range": (-np.array(sizes), np.array(sizes))}
 
 
-# A line of input: what to do (0: begin an episode, 1: act and learn, 2: act greedily), observation,
-# reward, next observation, whether it terminated.
+# A line of input: what to do (0: begin an episode, 1: act and learn, 2: act greedily, 3: in another
+# episode), observation, reward, next observation, whether it terminated.
 DRIVER = """
 #include <stdio.h>
 #include "agent.h"
@@ -194,6 +196,7 @@ int main(void) {
   if (!agent_load(&agent, image)) agent_begin(&agent);
   while (fread(line, sizeof *line, 2 * AGENT_N_OBSERVED + 3, stdin) == 2 * AGENT_N_OBSERVED + 3) {
     if (line[0] == 0) agent_begin_episode(&agent);
+    if (line[0] == 3) BEGIN_GREEDY;
     ACT;
     fwrite(action, sizeof *action, AGENT_N_DIMENSIONS, stdout);
     if (line[0] == 1) LEARN;
@@ -237,12 +240,17 @@ def lines_of(agent, n_steps, seed, fraction_bits):
         now = None if ends < 0.06 else following
     table = np.array(lines)
     table[:, 1:-1] = np.clip(np.round(table[:, 1:-1] * scale), -(2**31), 2**31 - 1)
+    if agent.history != "none":
+        table = with_greedy_episodes(table, random)
     return table.astype("<i4")
 
 
-def lies_between(agent):
-    """Whether greedy actions of the agent lie between those that it learns."""
-    return isinstance(agent, SDNNActorCritic) and isinstance(agent.action_space, gym.spaces.Box)
+def with_greedy_episodes(table, random):
+    """Insert greedy steps of other episodes, and of the present one."""
+    counts = np.where(random.random(len(table)) < 0.1, random.integers(1, 6, len(table)), 0)
+    inserted = np.repeat(np.roll(table, 7, axis=0), counts, axis=0)
+    inserted[:, 0] = random.choice([2, 2, 3], len(inserted))
+    return np.insert(table, np.repeat(np.arange(len(table)), counts), inserted, axis=0)
 
 
 def run_agent(agent, lines, fraction_bits):
@@ -256,6 +264,8 @@ def run_agent(agent, lines, fraction_bits):
             now, following = now.argmax(), following.argmax()
         if line[0] == 0:
             agent.begin_episode()
+        if line[0] == 3:
+            agent.begin_greedy_episode()
         action = agent.act(now, explore=line[0] == 1)
         acts_between = line[0] != 1 and lies_between(agent)
         actions.append([
@@ -285,7 +295,9 @@ def build(folder, agent, target, *options):
     )
     if target in BARE_TARGETS.values():
         (folder / "stdio.h").write_text(STDIO)
+    greedy = "(void)0" if agent.history == "none" else "agent_begin_greedy_episode(&agent)"
     source = DRIVER.replace("ACT;", f"{act};").replace("LEARN", learn)
+    source = source.replace("BEGIN_GREEDY", greedy)
     (folder / "steps.c").write_text(source)
     program = folder / "steps"
     run(

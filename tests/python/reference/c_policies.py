@@ -279,6 +279,11 @@ def all_expected(name, agent):
     ]
 
 
+def lies_between(agent):
+    """Whether greedy actions of the agent lie between those that it learns."""
+    return isinstance(agent, SDNNActorCritic) and isinstance(agent.action_space, gym.spaces.Box)
+
+
 def place_of(actions, action):
     """The place of an action among actions at even distances, times 2^16."""
     part = (float(action) - actions[0]) / (actions[-1] - actions[0])

@@ -1,0 +1,138 @@
+/* The states of a learning agent, where they include earlier observations: of the episode from
+ * which it learns, and of greedy steps beside it. See
+ * cpp/include/sdnn/agents/detail/last_states.hpp. */
+#ifndef SDNN_HISTORY_LEARNER_H
+#define SDNN_HISTORY_LEARNER_H
+
+#include "sdnn_history.h"
+
+#define SDNN_REMEMBERS 1
+
+/* A state of an episode, and what it depends on. */
+typedef struct {
+  sdnn_episode episode;
+  sdnn_real state[SDNN_N_INPUTS];
+  int32_t observation[SDNN_N_OBSERVED];
+  uint8_t has_acted; /* whether the next observation belongs to the next step */
+} sdnn_last_state;
+
+typedef struct {
+  sdnn_last_state learned, greedy;
+  sdnn_real next[SDNN_N_INPUTS]; /* where the last transition ended */
+#ifndef SDNN_IS_ACTOR_CRITIC
+  uint32_t next_bins[SDNN_N_INPUTS];
+#endif
+  uint8_t is_greedy; /* whether greedy steps have a separate memory */
+} sdnn_states;
+
+/* Continues an episode, or begins it, with an observation. */
+static inline void sdnn_advance(sdnn_last_state* last, const int32_t* observation) {
+  sdnn_real inputs[SDNN_N_OBSERVED_INPUTS];
+  sdnn_inputs_of_fixed(observation, inputs);
+  sdnn_continue(&last->episode, inputs, last->state);
+  sdnn_copy_32(last->observation, observation, SDNN_N_OBSERVED);
+  last->has_acted = 0;
+}
+
+/* Makes it the state of an observation, unless it is that already. */
+static inline void sdnn_restart(sdnn_last_state* last, const int32_t* observation) {
+  uint32_t i, is_same = last->episode.has_begun;
+  for (i = 0; i < SDNN_N_OBSERVED; ++i) is_same &= last->observation[i] == observation[i];
+  if (is_same) return;
+  last->episode.has_begun = 0;
+  sdnn_advance(last, observation);
+}
+
+/* Makes it the state of an observation in which the agent acts. After an action that is the next
+ * step. Otherwise an equal observation is the same state, and any other begins an episode. */
+static inline void sdnn_find_state(sdnn_last_state* last, const int32_t* observation) {
+  if (last->has_acted) {
+    sdnn_advance(last, observation);
+  } else {
+    sdnn_restart(last, observation);
+  }
+}
+
+/* Copies bytes. The compiler makes no call of memcpy of a volatile store. */
+static inline void sdnn_copy_bytes(void* to, const void* from, uint32_t n) {
+  volatile uint8_t* target = (volatile uint8_t*)to;
+  const uint8_t* source = (const uint8_t*)from;
+  for (; n > 0; --n) *target++ = *source++;
+}
+
+static inline void sdnn_forget_state(sdnn_last_state* last) {
+  last->episode.has_begun = 0;
+  last->has_acted = 0;
+}
+
+static inline void sdnn_forget(sdnn_states* states) {
+  sdnn_forget_state(&states->learned);
+  states->is_greedy = 0;
+}
+static inline void sdnn_forget_greedy(sdnn_states* states) {
+  sdnn_forget_state(&states->greedy);
+  states->is_greedy = 1;
+}
+
+/* The bins of the state in which the agent acts. */
+static inline void sdnn_read_to_act(sdnn_states* states, const int32_t* observation, int explore,
+                                    uint32_t* bins) {
+  sdnn_last_state* const last = explore ? &states->learned : &states->greedy;
+  if (!explore && !states->is_greedy) {
+    sdnn_copy_bytes(last, &states->learned, sizeof *last);
+  }
+  states->is_greedy = !explore;
+  sdnn_find_state(last, observation);
+  sdnn_bins_of_state(last->state, bins);
+}
+
+/* Notes the action that follows, as indices or, unless it is null, at fractional ones. */
+static inline void sdnn_note_act(sdnn_states* states, int explore, const uint32_t* action,
+                                 const uint32_t* place) {
+  sdnn_last_state* const last = explore ? &states->learned : &states->greedy;
+  if (place) {
+    sdnn_note_places(&last->episode, place);
+  } else {
+    sdnn_note_action(&last->episode, action);
+  }
+  last->has_acted = 1;
+}
+
+/* The bins of the state of an observation; no step is taken. */
+static inline void sdnn_read_only(const sdnn_states* states, const int32_t* observation,
+                                  uint32_t* bins) {
+  const sdnn_last_state* const last = states->is_greedy ? &states->greedy : &states->learned;
+  sdnn_last_state next;
+  uint32_t i, is_same = last->episode.has_begun;
+  sdnn_copy_bytes(&next, last, sizeof next);
+  for (i = 0; i < SDNN_N_OBSERVED; ++i) is_same &= last->observation[i] == observation[i];
+  if (!is_same) sdnn_find_state(&next, observation);
+  sdnn_bins_of_state(next.state, bins);
+}
+
+/* The bins of the state in which a transition starts. Returns whether the last one ended there. */
+static inline uint32_t sdnn_read_first(sdnn_states* states, const int32_t* observation,
+                                       uint32_t* bins) {
+  uint32_t i, is_next = 1;
+  sdnn_restart(&states->learned, observation);
+  sdnn_bins_of_state(states->learned.state, bins);
+  for (i = 0; i < SDNN_N_INPUTS; ++i) is_next &= states->next[i] == states->learned.state[i];
+  return is_next;
+}
+
+/* The bins of the state in which a transition ends, whose start was read before. */
+static inline void sdnn_read_next(sdnn_states* states, const uint32_t* action,
+                                  const int32_t* next_observation, uint32_t* bins) {
+  sdnn_note_action(&states->learned.episode, action);
+  sdnn_advance(&states->learned, next_observation);
+  sdnn_bins_of_state(states->learned.state, bins);
+  states->is_greedy = 0;
+}
+
+/* Notes that the agent has learned the transition that was read. */
+static inline void sdnn_keep_next(sdnn_states* states, const int32_t* next_observation) {
+  (void)next_observation;
+  sdnn_copy_bytes(states->next, states->learned.state, sizeof states->next);
+}
+
+#endif /* SDNN_HISTORY_LEARNER_H */

@@ -1,0 +1,200 @@
+"""Constants of states that include earlier observations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from sdnn.agents.q_learning import ValueAgent
+from sdnn.environments.types import Array, Data
+from sdnn.export.text import Input, Tables
+
+_FILES = ("sdnn_history.h", "sdnn_history_policy.h", "sdnn_history_learner.h")
+_FILES_WITHOUT = ("sdnn_policy.h", "sdnn_last_bins.h", "sdnn_last_observation.h")
+_DIGITS = {"float64": (53, -1074), "float32": (24, -149), "float16": (11, -24), "whole": (0, 0)}
+"""Binary digits of the numbers of a Box, and the exponent of their least bit; 0: whole numbers."""
+
+
+class StateHistory:
+    """The history of an agent with a linear readout, as its header has it.
+
+    Parameters
+    ----------
+    agent : ValueAgent
+        After its warm-up.
+    inputs : sequence of Input
+        Those of an observation.
+    """
+
+    def __init__(self, agent: ValueAgent[Any, Any], inputs: Sequence[Input]) -> None:
+        self.agent, self.inputs, self.kind = agent, inputs, agent.history
+        self.fitted = agent._state_of("history")
+        self.numbers = [i for i, source in enumerate(inputs) if source.kind != "symbol"]
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether states depend on earlier observations: symbols have no history."""
+        return self.kind != "none" and bool(self.numbers)
+
+    @property
+    def unused_files(self) -> Sequence[str]:
+        """The C files that its header does not need."""
+        return _FILES_WITHOUT if self.is_needed else _FILES
+
+    @property
+    def added(self) -> list[Input]:
+        """The inputs of a state beside those of the observation, with those that they describe."""
+        n = {"differences": 1, "averages": 2}.get(self.kind, 0) if self.is_needed else 0
+        sources = [self.inputs[i] for i in self.numbers]
+        if self.kind == "differences":  # of an angle, a change is none
+            sources = [replace(source, kind="variable") for source in sources]
+        return sources * n
+
+    @property
+    def n_remembered(self) -> int:
+        """The number of real numbers that are remembered of an episode, without actions."""
+        return len(self.numbers) * (2 if self.kind == "averages" else 1)
+
+    @property
+    def episode_bytes(self) -> int:
+        """The bytes of an episode's memory."""
+        n_actions = self.agent.n_dimensions if self.kind == "observer" else 0
+        return 8 * (self.n_remembered + n_actions + 1)
+
+    @property
+    def stack_bytes(self) -> int:
+        """The bytes of arrays that a step has on the stack."""
+        if not self.is_needed:
+            return 0
+        n_changes = len(self.numbers) if self.kind == "observer" else 0
+        return 8 * (2 * len(self.inputs) + len(self.added) + n_changes)
+
+    @property
+    def function_bytes(self) -> int:
+        """The bytes of constants of sine, cosine and atan2, where they are used."""
+        kinds = {source.kind for source in self.inputs} if self.is_needed else set[str]()
+        n_numbers = 23 if "angle" in kinds else 0
+        if self.kind == "observer" and kinds & {"angle", "circular"}:
+            n_numbers += 12
+        return 8 * n_numbers
+
+    @property
+    def is_box(self) -> bool:
+        """Whether the observer depends on actions of a Box."""
+        return self.kind == "observer" and not self.agent._action.discrete
+
+    def kilobytes(self, n: int) -> str:
+        """Return the size of the code of an agent that learns, which is ``n`` without a history."""
+        return str(n + 3 if self.is_needed else n)
+
+    def constants(self) -> list[object]:
+        """Return what was fitted, by which images are recognized."""
+        return [self.kind, *(np.ravel(values).tolist() for values in self.fitted.values())]
+
+    def defines(self, *, has_policy: bool) -> Data:
+        """Return the macros; a policy has greedy actions between those of a Box."""
+        sizes: Data = {
+            "HISTORY": {"differences": 1, "averages": 2, "observer": 3}[self.kind],
+            "N_OBSERVED_INPUTS": len(self.inputs),
+            "N_NUMBERS": len(self.numbers),
+        }
+        if self.kind == "observer":
+            sizes["GAIN"] = real_numbers([float(self.fitted["observer.gain"])])[0]
+        if self.is_box:
+            sizes["N_REAL_ACTIONS"] = len(self.agent.actions_of(0))
+            if has_policy:
+                digits, least = _DIGITS[self.agent._action.number]
+                sizes |= {"ACTION_DIGITS": digits, "LEAST_ACTION_BIT": f"({least})"}
+        return sizes
+
+    def add_tables(self, tables: Tables, *, has_policy: bool) -> None:
+        """Add the constants of the history; real numbers are the bits of IEEE 754."""
+        is_circular = [self.inputs[i].kind in ("angle", "circular") for i in self.numbers]
+        about = "Inputs that are numbers, and whether they are angles."
+        tables.add("uint16_t", "numbers", np.array(self.numbers), about)
+        tables.add("uint8_t", "is_circular", np.array(is_circular, np.int64))
+        if self.kind == "differences":
+            largest = self.fitted["largest"][self.numbers]
+            about = "Differences in which an input is 1, as the bits of doubles."
+            tables.add("uint64_t", "largest_differences", bits_of(largest), about)
+        elif self.kind == "observer":
+            self._add_observer(tables, has_policy)
+
+    def _add_observer(self, tables: Tables, has_policy: bool) -> None:
+        fitted = {
+            name.removeprefix("observer."): values
+            for name, values in self.fitted.items()
+            if name.startswith("observer.")
+        }
+        tables.lines.append("/* The observer's model, as the bits of doubles. */")
+        for name in ("means", "deviations"):
+            tables.add("uint64_t", name, bits_of(fitted[name]))
+        tables.add("uint64_t", "estimate_low", bits_of(fitted["low"]))
+        tables.add("uint64_t", "estimate_width", bits_of(fitted["high"] - fitted["low"]))
+        tables.add("uint64_t", "observer_weights", bits_of(fitted["weights"]))
+        tables.add("uint8_t", "n_levels", fitted["n_levels"])
+        tables.add("uint64_t", "levels", bits_of(fitted["levels"]))
+        if not self.is_box:
+            return
+        actions = [self.agent.actions_of(d) for d in range(self.agent.n_dimensions)]
+        about = "The actions of each dimension, as the bits of doubles."
+        tables.add("uint64_t", "real_actions", bits_of(np.concatenate(actions)), about)
+        if has_policy:
+            bounds = np.column_stack([self.agent._action.low, self.agent._action.high])
+            tables.add("uint64_t", "action_bounds", bits_of(bounds))
+
+    def usage(self) -> Iterator[str]:
+        """Describe the inputs to a reader of the header."""
+        if self.kind == "observer":
+            yield "Inputs that are numbers are estimates of an observer, from all readings so far."
+        about = ["the change of input {} in the last step"]
+        if self.kind == "averages":
+            about = [f"a {speed} running average of input {{}}" for speed in ("fast", "slow")]
+        texts = [text.format(i) for text in about for i in self.numbers]
+        for number, text in enumerate(texts[: len(self.added)], len(self.inputs)):
+            yield f"  input {number}: {text}"
+
+    def memory_lines(self, ram_bytes: int) -> list[str]:
+        """Return comment lines about the memory of a greedy policy."""
+        n_bytes = self.episode_bytes
+        return [
+            f"RAM:   {n_bytes:,} bytes in one struct that you place; {ram_bytes - n_bytes:,} bytes"
+            " of arrays on",
+            "       the stack, and at most 704 bytes for all else there.",
+        ]
+
+    def calls_of_episode(self, name: str) -> list[str]:
+        """Return example lines of C that begin an episode, of a policy that remembers it."""
+        if not self.is_needed:
+            return []
+        return [
+            f"static {name}_episode episode; // the memory of an episode",
+            f"{name}_begin_episode(&episode); // whenever the task starts anew",
+        ]
+
+    def calls(self) -> list[str]:
+        """Return macro calls, one per input, that compute the inputs of an observation in C."""
+        return [self._call(i, source) for i, source in enumerate(self.inputs)]
+
+    def _call(self, i: int, source: Input) -> str:
+        first = source.at[0]
+        if source.kind == "angle":
+            return f"ANGLE({i}, {first}, {source.at[1]})"
+        if source.kind == "symbol":
+            return f"SYMBOL({i}, {first}, {source.n_bins})"
+        low, width = real_numbers([source.low, source.high - source.low])
+        return f"{source.kind.upper()}({i}, {first}, {low}, {width})"
+
+
+def bits_of(values: Array) -> Array:
+    """Return the bits of doubles, shape (n,)."""
+    numbers = np.ascontiguousarray(values, np.float64).reshape(-1)
+    return numbers.view(np.uint64)
+
+
+def real_numbers(values: Iterable[float]) -> list[str]:
+    """Return real numbers as literals of the C headers."""
+    return [f"UINT64_C(0x{bits:016x})" for bits in bits_of(np.array(list(values))).tolist()]

@@ -1,0 +1,244 @@
+"""Agents whose states include earlier observations, and programs in C that act as they do."""
+
+import functools
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+
+from c_policies import STRICT, box, lies_between, run
+from sdnn.agents import (
+    ActorCriticConfig,
+    QLambdaConfig,
+    SDNNActorCritic,
+    SDNNQLambda,
+    Transition,
+)
+from sdnn.approximators import LinearSDNNConfig
+from sdnn.export import export_c_header
+
+SMALL = LinearSDNNConfig(n_pattern_units=24, averaging_interval=7)
+WARM_UP_STEPS = 150
+
+
+def warmed_up(agent, n_steps=WARM_UP_STEPS):
+    """Return the agent after steps in which positions drift with velocities and actions push."""
+    random = np.random.default_rng(1)
+    space = agent.observation_space
+    agent.begin_episode()
+    now, velocity = np.zeros(gym.spaces.flatdim(space)), 0.0
+    for _ in range(n_steps):
+        action = agent.act(element_of(space, now))
+        push = np.sum(np.asarray(action, float)) - 1.0
+        velocity = 0.9 * velocity + 0.1 * push + random.normal(0, 0.02)
+        following = 0.9 * now + 0.1 * velocity + random.normal(0, 0.1, now.size)
+        ends = bool(random.random() < 0.05)
+        agent.learn(
+            Transition(
+                element_of(space, now), action, float(following[0]), element_of(space, following),
+                ends,
+            )
+        )  # fmt: skip
+        now = following
+        if ends:
+            agent.begin_episode()
+            now, velocity = random.normal(0, 0.3, now.size), 0.0
+    agent.begin_episode()
+    return agent
+
+
+def element_of(space, variables):
+    """Return an observation of a space from its variables, of which the largest is a symbol."""
+    if not isinstance(space, gym.spaces.Tuple):
+        return variables
+    parts, first = [], 0
+    for part in space.spaces:
+        values = variables[first : first + gym.spaces.flatdim(part)]
+        is_symbol = isinstance(part, gym.spaces.Discrete)
+        parts.append(int(values.argmax() + part.start) if is_symbol else values.astype(part.dtype))
+        first += values.size
+    return tuple(parts)
+
+
+def _agent(agent_class, history, spaces, **settings):
+    settings = {"inputs": "all", "angle_pairs": [], "approximator": SMALL} | settings
+    return warmed_up(agent_class(*spaces, history=history, warm_up_steps=WARM_UP_STEPS, **settings))
+
+
+def _ranges(*sizes):
+    return {"observation_range": (-np.array(sizes), np.array(sizes))}
+
+
+def differences():
+    """Two numbers and an angle, discrete actions, traces of true-online Q(lambda)."""
+    spaces = box(1.0, 2.0, np.pi), gym.spaces.Discrete(3, start=-1)
+    return _agent(SDNNQLambda, "differences", spaces, angles=[2], seed=1)
+
+
+def averages():
+    """Sarsa with replacing traces, a cosine and a sine, two dimensions of actions."""
+    learning = QLambdaConfig(
+        bootstrap="sarsa", traces="replacing", tie_rule="middle", epsilon=0.2, max_action_repeat=1
+    )
+    spaces = box(1.0, 1.0, 8.0), gym.spaces.MultiDiscrete([3, 2])
+    settings = {"angle_pairs": [(0, 1)], "learning": learning, **_ranges(1.0, 1.0, 8.0)}
+    return _agent(SDNNQLambda, "averages", spaces, seed=2, **settings)
+
+
+def observer():
+    """A cosine and a sine, and torques that are numbers of the model."""
+    config = replace(SMALL, n_actions=11, action_window=2, averaging_interval=0)
+    settings = {"angle_pairs": [(0, 1)], "approximator": config, **_ranges(1.0, 1.0, 8.0)}
+    learning = QLambdaConfig(tie_rule="lowest", epsilon=0.2, schedule_steps=0)
+    spaces = box(1.0, 1.0, 8.0), box(2.0)
+    return _agent(SDNNQLambda, "observer", spaces, seed=3, learning=learning, **settings)
+
+
+def actor_differences():
+    """An actor-critic without thermometers, with an angle, and torques in double precision."""
+    learning = ActorCriticConfig(thermometers=False)
+    spaces = box(np.pi, 2.0), gym.spaces.Box(-1.0, 2.0, (1,), np.float64)
+    settings = {"angles": [0], "learning": learning, **_ranges(np.pi, 2.0)}
+    return _agent(SDNNActorCritic, "differences", spaces, seed=4, **settings)
+
+
+def actor_averages():
+    """An actor-critic with thermometers of averages, and discrete actions."""
+    spaces = box(1.0, 2.0), gym.spaces.Discrete(3)
+    return _agent(SDNNActorCritic, "averages", spaces, seed=5, **_ranges(1.0, 2.0))
+
+
+def actor_observer():
+    """An actor-critic with an observer that has numbers of two torques and an angle."""
+    config = replace(SMALL, n_actions=9)
+    spaces = box(np.pi, 2.0), box(2.0, 0.7)
+    settings = {"angles": [0], "approximator": config, **_ranges(np.pi, 2.0)}
+    return _agent(SDNNActorCritic, "observer", spaces, seed=6, **settings)
+
+
+def actor_observer_of_levels():
+    """An actor-critic with an observer that tells actions apart."""
+    spaces = box(1.0, 2.0, 1.0), gym.spaces.MultiDiscrete([3, 4])
+    return _agent(SDNNActorCritic, "observer", spaces, seed=7, **_ranges(1.0, 2.0, 1.0))
+
+
+def symbols(history):
+    """Return an agent that observes a number between two symbols."""
+    space = gym.spaces.Tuple([gym.spaces.Discrete(3), box(2.0), gym.spaces.Discrete(2, start=1)])
+    learning = QLambdaConfig(tie_rule="lowest")
+    return _agent(SDNNQLambda, history, (space, box(1.0)), seed=8, learning=learning)
+
+
+def running():
+    """An actor-critic with running ranges, and torques in half precision."""
+    spaces = box(1.0, 2.0), gym.spaces.Box(-1.0, 1.0, (1,), np.float16)
+    config = replace(SMALL, n_actions=9)
+    return _agent(SDNNActorCritic, "observer", spaces, seed=9, approximator=config)
+
+
+def whole():
+    """An actor-critic with torques that are whole numbers."""
+    spaces = box(1.0, 2.0), gym.spaces.Box(-20, 30, (1,), np.int32)
+    config = replace(SMALL, n_actions=9)
+    return _agent(SDNNActorCritic, "observer", spaces, seed=10, approximator=config)
+
+
+LEARNERS = {
+    "differences": differences, "averages": averages, "observer": observer,
+    "actor-differences": actor_differences, "actor-averages": actor_averages,
+    "actor-observer": actor_observer, "actor-levels": actor_observer_of_levels,
+}  # fmt: skip
+POLICIES = {
+    **LEARNERS,
+    **{f"symbols-{history}": functools.partial(symbols, history)
+       for history in ("differences", "averages", "observer")},
+    "running": running, "whole": whole,
+}  # fmt: skip
+
+# A line of input: 1 where an episode begins, else 0, and an observation.
+DRIVER = """
+{define}
+#include "policy.h"
+#include <stdio.h>
+static policy_episode episode;
+int main(void) {{
+  {type} begins, x[POLICY_N_OBSERVED]; uint32_t action[POLICY_N_DIMENSIONS];
+  while (fread(&begins, sizeof begins, 1, stdin) == 1) {{
+    if (fread(x, sizeof *x, POLICY_N_OBSERVED, stdin) != POLICY_N_OBSERVED) return 1;
+    if (begins > 0) policy_begin_episode(&episode);
+    {call};
+    fwrite(action, sizeof *action, POLICY_N_DIMENSIONS, stdout);
+  }}
+  return 0;
+}}
+"""
+
+
+@functools.cache
+def policy(name):
+    """Return the agent after some learning."""
+    return warmed_up(POLICIES[name](), 400)
+
+
+def steps_of(agent, n, seed):
+    """Episodes of readings, some outside the ranges; the first column is 1 where one begins."""
+    random = np.random.default_rng(seed)
+    size = gym.spaces.flatdim(agent.observation_space)
+    rows, now = [], None
+    for _ in range(n):
+        begins = now is None
+        now = random.normal(0, 1.0, size) if begins else 0.9 * now + random.normal(0, 0.3, size)
+        rows.append([begins, *now])
+        if random.random() < 0.05:
+            now = None
+    return np.array(rows, float)
+
+
+def actions_at(agent, indices):
+    """Return the actions at indices, or at fractional ones times 2^16 between those of a box."""
+    if not lies_between(agent):
+        return [agent.actions_of(d)[index] for d, index in enumerate(indices)]
+    space, n = agent.action_space, len(agent.actions_of(0))
+    low, high = space.low.astype(float), space.high.astype(float)
+    action = low + (high - low) * (np.array(indices) / 2**16 / (n - 1))
+    return (np.floor(action + 0.5) if space.dtype.kind == "i" else action).astype(space.dtype)
+
+
+@functools.cache
+def expected_of(name, kind, fraction_bits, n_steps):
+    """Return lines of input and the agent's actions for them."""
+    agent, steps = policy(name), steps_of(policy(name), n_steps, 2)
+    scale = 2.0**fraction_bits if kind == "int32_t" else 1.0
+    dtype = {"int32_t": "<i4", "float": "<f4", "double": "<f8"}[kind]
+    steps[:, 1:] *= scale
+    lines = np.round(steps).astype(dtype) if kind == "int32_t" else steps.astype(dtype)
+    expected = []
+    for begins, *variables in lines.astype(float):
+        if begins:
+            agent.begin_greedy_episode()
+        observation = element_of(agent.observation_space, np.array(variables) / scale)
+        expected.append(agent.act(observation, explore=False))
+    return lines, expected
+
+
+def check_policy(name, kind, target, folder, n_steps=3000):
+    """Check that a program takes the agent's actions in episodes."""
+    agent = policy(name)
+    header = export_c_header(agent, folder / "policy.h")
+    one, function = agent.n_dimensions == 1, f"policy_act_{kind.replace('int32_t', 'fixed')}"
+    if lies_between(agent):
+        function, kind = "policy_place_fixed", "int32_t"
+    call = f"action[0] = {function}(&episode, x)" if one else f"{function}(&episode, x, action)"
+    define = "" if kind == "int32_t" else "#define POLICY_USE_FLOAT"
+    (folder / "main.c").write_text(DRIVER.format(define=define, type=kind, call=call))
+    program = folder / "main"
+    run(
+        target.compiler, *STRICT, "-O2", *target.options, *(("-static",) if target.runner else ()),
+        folder / "main.c", "-o", program,
+    )  # fmt: skip
+    lines, expected = expected_of(name, kind, header.fraction_bits, n_steps)
+    command = [target.runner, program] if target.runner else [program]
+    written = np.frombuffer(run(*command, input=lines.tobytes()), "<u4")
+    actions = [actions_at(agent, indices) for indices in written.reshape(-1, agent.n_dimensions)]
+    np.testing.assert_array_equal(actions, np.reshape(expected, (n_steps, -1)))
+    assert len(np.unique(written)) > 1
