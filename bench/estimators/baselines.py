@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, ClassifierMixin, RegressorMixin, clone
 from sklearn.ensemble import (
     HistGradientBoostingClassifier,
     HistGradientBoostingRegressor,
@@ -49,6 +49,24 @@ class AnalyticKernelRidge(RegressorMixin, BaseEstimator):
         return self.mean_ + np.concatenate(
             [self.ridge_.predict(self.kernel_(part, self.X_)) for part in parts]
         )
+
+
+class WithClasses(ClassifierMixin, BaseEstimator):
+    """A classifier of whole numbers, for labels of any type."""
+
+    def __init__(self, model):
+        self.model = model
+
+    def fit(self, X, y):
+        self.classes_, numbers = np.unique(y, return_inverse=True)
+        self.model_ = clone(self.model).fit(X, numbers)
+        return self
+
+    def predict(self, X):
+        return self.classes_[np.asarray(self.model_.predict(X)).reshape(-1)]
+
+    def predict_proba(self, X):
+        return self.model_.predict_proba(X)
 
 
 def codings(*length_scales):

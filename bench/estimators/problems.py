@@ -19,8 +19,10 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
-from baselines import gaussian_process, scaled
+from baselines import WithClasses, gaussian_process, scaled
+from catboost import CatBoostClassifier, CatBoostRegressor
 from demonstration import target, training_points
+from lightgbm import LGBMClassifier, LGBMRegressor
 from matplotlib.figure import Figure
 from measured import measure_missing, measured, options
 from page import markdown, show
@@ -50,6 +52,7 @@ from sklearn.model_selection import train_test_split
 from sklearn.neighbors import KNeighborsClassifier, KNeighborsRegressor
 from sklearn.neural_network import MLPClassifier, MLPRegressor
 from sklearn.svm import SVC, SVR
+from xgboost import XGBClassifier, XGBRegressor
 
 from sdnn import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.reports.plots import png_bytes
@@ -200,6 +203,8 @@ def short(n_inputs):
     return max(2, 4000 // n_pairs // 2 * 2)
 
 
+QUIET_CATBOOST = {"thread_count": 1, "verbose": False, "allow_writing_files": False}
+
 REGRESSORS = {
     "SDNN": lambda seed, n_inputs: SDNNRegressor(random_state=seed),
     "SDNN kernel ridge": lambda seed, n_inputs: SDNNKernelRidge(),
@@ -213,6 +218,9 @@ REGRESSORS = {
         pairs="auto", random_state=seed
     ),
     "gradient boosting": lambda seed, n_inputs: HistGradientBoostingRegressor(random_state=seed),
+    "CatBoost": lambda seed, n_inputs: CatBoostRegressor(random_state=seed, **QUIET_CATBOOST),
+    "LightGBM": lambda seed, n_inputs: LGBMRegressor(random_state=seed, n_jobs=1, verbose=-1),
+    "XGBoost": lambda seed, n_inputs: XGBRegressor(random_state=seed, n_jobs=1),
     "random forest": lambda seed, n_inputs: RandomForestRegressor(random_state=seed),
     "SVM": lambda seed, n_inputs: scaled(SVR()),
     "Gaussian process": lambda seed, n_inputs: gaussian_process(n_inputs, 0.1),
@@ -230,6 +238,11 @@ CLASSIFIERS = {
         pairs="auto", random_state=seed
     ),
     "gradient boosting": lambda seed, n_inputs: HistGradientBoostingClassifier(random_state=seed),
+    "CatBoost": lambda seed, n_inputs: WithClasses(
+        CatBoostClassifier(random_state=seed, **QUIET_CATBOOST)
+    ),
+    "LightGBM": lambda seed, n_inputs: LGBMClassifier(random_state=seed, n_jobs=1, verbose=-1),
+    "XGBoost": lambda seed, n_inputs: WithClasses(XGBClassifier(random_state=seed, n_jobs=1)),
     "random forest": lambda seed, n_inputs: RandomForestClassifier(random_state=seed),
     "SVM": lambda seed, n_inputs: scaled(SVC()),
     "MLP": lambda seed, n_inputs: scaled(MLPClassifier(random_state=seed)),
@@ -367,7 +380,8 @@ def draw(results, path):
     colors = {
         "SDNN": "#1f5fa8", "SDNN kernel ridge": "#6fa8dc", "SDNN, last epoch": "#0b2f57",
         "SDNN, 4,000 columns": "#36b0b0", "SDNN, features selected": "#7b61c4",
-        "gradient boosting": "#d9822b",
+        "gradient boosting": "#d9822b", "CatBoost": "#b3541e", "LightGBM": "#e8b04b",
+        "XGBoost": "#f2d0a4",
         "random forest": "#5b8c5a", "SVM": "#a05195", "Gaussian process": "#c2453a",
         "MLP": "#8a7f3d", "neighbours": "#888888", "linear": "#bbbbbb",
     }  # fmt: skip

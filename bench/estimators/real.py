@@ -19,6 +19,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 import problems
+from catboost import CatBoost
+from lightgbm import LGBMModel
 from measured import measure_missing, measured, options
 from page import show
 from real_data import CLASSIFICATION, REGRESSION, is_word, samples
@@ -61,6 +63,12 @@ def make_model(make, X, seed):
         return model.set_params(coding=[(WithMissing(base=Symbolic()), words)])
     if hasattr(model, "categorical_features"):
         return model.set_params(categorical_features="from_dtype")
+    inner = getattr(model, "model", model)
+    if isinstance(inner, CatBoost):
+        inner.set_params(cat_features=words)
+        return model
+    if isinstance(inner, LGBMModel):  # finds the types of columns itself
+        return model
     one_hot = OneHotEncoder(categories=levels, sparse_output=False)
     return make_pipeline(
         ColumnTransformer([("words", one_hot, words)], remainder="passthrough"), model
