@@ -54,6 +54,7 @@ PYBIND11_MODULE(_core, module) {
   bind_approximators(module);
   bind_environments(module);
   bind_estimators(module);
+  bind_experts(module);
   bind_agents(module);
   bind_controller(module);
   bind_tools(module);

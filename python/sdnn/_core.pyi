@@ -1158,6 +1158,92 @@ class PerceptronTrainer:
         """
         Bytes beside the layer
         """
+class RecursiveLeastSquares:
+    """
+    Linear regression that learns from one sample at a time
+    """
+    def __init__(self, low: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], high: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], n_outputs: typing.SupportsInt | typing.SupportsIndex, forgetting: typing.SupportsFloat | typing.SupportsIndex, error_limit: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
+        ...
+    def add_inputs(self, low: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], high: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Adds inputs after the others; predictions stay
+        """
+    def add_outputs(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Adds outputs after the others, as if all their targets had been 0
+        """
+    def learn(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def predict(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The outputs, NaN for a missing input
+        """
+    def restore(self, state: dict) -> None:
+        """
+        Take what `state` of one with the same settings gave; on an error nothing changes
+        """
+    def state(self) -> dict:
+        """
+        What it remembers: arrays by name
+        """
+    @property
+    def n_inputs(self) -> int:
+        ...
+    @property
+    def n_outputs(self) -> int:
+        ...
+class PredictionMixture:
+    """
+    A weighted mean of predictions, whose weights follow their recent errors
+    """
+    def __init__(self, n_experts: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def learn(self, predictions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], target: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def mix(self, predictions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> float:
+        """
+        The weighted mean
+        """
+    def restore(self, state: dict) -> None:
+        """
+        Take what `state` of one with the same settings gave; on an error nothing changes
+        """
+    def state(self) -> dict:
+        """
+        What it remembers: arrays by name
+        """
+    @property
+    def n_experts(self) -> int:
+        ...
+    @property
+    def weights(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+class ProbabilityMixture:
+    """
+    A weighted mean of probabilities, whose weights follow the likelihood of recent labels
+    """
+    def __init__(self, n_scorers: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def learn(self, shares: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], scores: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], label: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def mix(self, shares: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], scores: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The probabilities of classes
+        """
+    def restore(self, state: dict) -> None:
+        """
+        Take what `state` of one with the same settings gave; on an error nothing changes
+        """
+    def state(self) -> dict:
+        """
+        What it remembers: arrays by name
+        """
+    @property
+    def n_scorers(self) -> int:
+        ...
+    @property
+    def weights(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
 class EpsilonGreedyConfig:
     """
     The parameters of the policy; the defaults are the paper's (section 4.2).

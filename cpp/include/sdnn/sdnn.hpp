@@ -74,5 +74,8 @@
 #include "sdnn/estimators/correction_rules.hpp"
 #include "sdnn/estimators/online_layer.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"
+#include "sdnn/estimators/prediction_mixture.hpp"
+#include "sdnn/estimators/probability_mixture.hpp"
+#include "sdnn/estimators/recursive_least_squares.hpp"
 #include "sdnn/estimators/trainer.hpp"
 #include "sdnn/estimators/training_form.hpp"

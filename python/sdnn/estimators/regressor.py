@@ -196,7 +196,9 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
 
     def _counts_of_targets(self, targets: Floats) -> Floats:
         """Convert targets to firing counts, which are not rounded."""
-        return (targets - self.output_range_[:, 0]) / self._step()
+        with np.errstate(over="ignore"):  # a target far beyond a narrow range
+            counts = (targets - self.output_range_[:, 0]) / self._step()
+        return np.clip(counts, -FURTHEST, FURTHEST)
 
     def _outputs_of_counts(self, counts: Array) -> Floats:
         """Convert firing counts to outputs, shape (n_samples, n_outputs)."""

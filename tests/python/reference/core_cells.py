@@ -88,6 +88,12 @@ GOOD = {
         "n_classes": 3, "scheme": "one_vs_rest", "form": "auto", "memory_limit": 2**20,
         "n_threads": 1,
     },
+    "RecursiveLeastSquares": lambda: {
+        "low": [0.0, -1.0], "high": [1.0, 1.0], "n_outputs": 2, "forgetting": 0.99,
+        "error_limit": 20.0,
+    },
+    "PredictionMixture": lambda: {"n_experts": 3},
+    "ProbabilityMixture": lambda: {"n_scorers": 2},
     "EpsilonGreedy": lambda: {"config": core.EpsilonGreedyConfig(), "seed": 1},
     "LinearSDNN": lambda: {"config": linear_config(), "n_actions": [3, 4], "seed": 1},
     "BareAgent": lambda: {
@@ -131,6 +137,19 @@ METHODS = {
     ("ParallelPerceptron", "counts"): {"bins": BINS, "n_groups": 1, "n_threads": 1},
     ("PDeltaTrainer", "present"): {"order": [0, 2, 1]},
     ("PerceptronTrainer", "present"): {"order": [0, 2, 1]},
+    ("RecursiveLeastSquares", "predict"): {"inputs": [0.5, 0.5]},
+    ("RecursiveLeastSquares", "learn"): {"inputs": [0.5, 0.5], "targets": [1.0, 2.0]},
+    ("RecursiveLeastSquares", "add_inputs"): {"low": [0.0], "high": [1.0]},
+    ("RecursiveLeastSquares", "add_outputs"): {"n": 1},
+    ("RecursiveLeastSquares", "restore"): {"state": {}},
+    ("PredictionMixture", "mix"): {"predictions": [1.0, 2.0, 3.0]},
+    ("PredictionMixture", "learn"): {"predictions": [1.0, 2.0, 3.0], "target": 1.0},
+    ("PredictionMixture", "restore"): {"state": {}},
+    ("ProbabilityMixture", "mix"): {"shares": [0.5, 0.5], "scores": [[0.1, 0.2]] * 2},
+    ("ProbabilityMixture", "learn"): {
+        "shares": [0.5, 0.5], "scores": [[0.1, 0.2]] * 2, "label": 1
+    },
+    ("ProbabilityMixture", "restore"): {"state": {}},
     ("SDNNC", "values"): {"state": [0.1, 0.2]},
     ("SDNNC", "value"): {"state": [0.1, 0.2], "action": 3},
     ("SDNNC", "update"): {"state": [0.1, 0.2], "action": 3, "target": 1.0, "rate": 1.0},

@@ -1,0 +1,126 @@
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "sdnn/estimators/prediction_mixture.hpp"
+#include "sdnn/estimators/probability_mixture.hpp"
+#include "sdnn/estimators/recursive_least_squares.hpp"
+#include "states.hpp"
+
+namespace py = pybind11;
+using namespace sdnn;
+using bindings::ArrayArgument;
+using bindings::matrix;
+using bindings::vector;
+
+namespace {
+
+using Numbers = ArrayArgument<double>;
+
+py::array_t<double> numbers_of(const std::vector<double>& numbers) {
+  return bindings::array_of<double>(numbers);
+}
+
+void bind_least_squares(py::module_& module) {
+  using estimators::RecursiveLeastSquares;
+  auto type =
+      bindings::Class<RecursiveLeastSquares>(
+          module, "RecursiveLeastSquares",
+          "Linear regression that learns from one sample at a time")
+          .def(py::init([](const Numbers& low, const Numbers& high, std::size_t n_outputs,
+                           double forgetting, double error_limit) {
+                 return RecursiveLeastSquares(vector(low, "low"), vector(high, "high"), n_outputs,
+                                              forgetting, error_limit);
+               }),
+               py::arg("low"), py::arg("high"), py::arg("n_outputs"), py::arg("forgetting"),
+               py::arg("error_limit") = RecursiveLeastSquares::kUnlimited)
+          .def_property_readonly("n_inputs", &RecursiveLeastSquares::n_inputs)
+          .def_property_readonly("n_outputs", &RecursiveLeastSquares::n_outputs)
+          .def(
+              "predict",
+              [](const RecursiveLeastSquares& self, const Numbers& inputs) {
+                return bindings::filled<double>({self.n_outputs()}, [&](auto out) {
+                  self.predict(vector(inputs, "inputs"), out);
+                });
+              },
+              py::arg("inputs"), "The outputs, NaN for a missing input")
+          .def(
+              "learn",
+              [](RecursiveLeastSquares& self, const Numbers& inputs, const Numbers& targets) {
+                self.learn(vector(inputs, "inputs"), vector(targets, "targets"));
+              },
+              py::arg("inputs"), py::arg("targets"))
+          .def(
+              "add_inputs",
+              [](RecursiveLeastSquares& self, const Numbers& low, const Numbers& high) {
+                self.add_inputs(vector(low, "low"), vector(high, "high"));
+              },
+              py::arg("low"), py::arg("high"), "Adds inputs after the others; predictions stay")
+          .def("add_outputs", &RecursiveLeastSquares::add_outputs, py::arg("n"),
+               "Adds outputs after the others, as if all their targets had been 0");
+  bindings::def_state(type);
+}
+
+void bind_mixtures(py::module_& module) {
+  using estimators::PredictionMixture;
+  using estimators::ProbabilityMixture;
+  auto predictions =
+      bindings::Class<PredictionMixture>(
+          module, "PredictionMixture",
+          "A weighted mean of predictions, whose weights follow their recent errors")
+          .def(py::init<std::size_t>(), py::arg("n_experts"))
+          .def_property_readonly("n_experts", &PredictionMixture::n_experts)
+          .def_property_readonly(
+              "weights", [](const PredictionMixture& self) { return numbers_of(self.weights()); })
+          .def(
+              "mix",
+              [](const PredictionMixture& self, const Numbers& each) {
+                return self.mix(vector(each, "predictions"));
+              },
+              py::arg("predictions"), "The weighted mean")
+          .def(
+              "learn",
+              [](PredictionMixture& self, const Numbers& each, double target) {
+                self.learn(vector(each, "predictions"), target);
+              },
+              py::arg("predictions"), py::arg("target"));
+  bindings::def_state(predictions);
+
+  auto probabilities =
+      bindings::Class<ProbabilityMixture>(
+          module, "ProbabilityMixture",
+          "A weighted mean of probabilities, whose weights follow the likelihood of recent labels")
+          .def(py::init<std::size_t>(), py::arg("n_scorers"))
+          .def_property_readonly("n_scorers", &ProbabilityMixture::n_scorers)
+          .def_property_readonly(
+              "weights", [](const ProbabilityMixture& self) { return numbers_of(self.weights()); })
+          .def(
+              "mix",
+              [](const ProbabilityMixture& self, const Numbers& shares, const Numbers& scores) {
+                const auto of_classes = vector(shares, "shares");
+                return bindings::filled<double>({of_classes.size()}, [&](auto out) {
+                  self.mix(of_classes, matrix(scores, "scores", of_classes.size()), out);
+                });
+              },
+              py::arg("shares"), py::arg("scores"), "The probabilities of classes")
+          .def(
+              "learn",
+              [](ProbabilityMixture& self, const Numbers& shares, const Numbers& scores,
+                 std::size_t label) {
+                self.learn(vector(shares, "shares"), matrix(scores, "scores"), label);
+              },
+              py::arg("shares"), py::arg("scores"), py::arg("label"));
+  bindings::def_state(probabilities);
+}
+
+}  // namespace
+
+void bind_experts(py::module_& module) {
+  bind_least_squares(module);
+  bind_mixtures(module);
+}

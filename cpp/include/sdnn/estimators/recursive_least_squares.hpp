@@ -1,0 +1,311 @@
+/// Linear regression that learns from one sample at a time and forgets old ones.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/floating_point.hpp"
+
+namespace sdnn::estimators {
+
+/// Recursive least squares with exponential forgetting, for any number of outputs.
+///
+/// Inputs are measured in half widths of their first range, from its middle. A missing input, NaN,
+/// counts as the middle. The ranges grow with the inputs, each time by at most their width on
+/// either side, and inputs beyond that are clipped. Outputs are clipped to the range of the learned
+/// targets and a fifth of its width. Errors may be limited to a multiple of their mean size. Thus
+/// no number overflows, and outliers do little damage.
+///
+/// All sums have a fixed order, so that results have the same bits on every machine.
+///
+/// Source: Haykin, S. (2002). Adaptive Filter Theory, chapter 9, with a bound on the trace of the
+/// covariance, which would otherwise grow without limit along directions that no input has.
+/// Cost: (n_inputs + 1)^2 multiplications and additions, three times.
+class RecursiveLeastSquares {
+ public:
+  static constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+
+  /// Takes the first ranges of the inputs, shape (n_inputs,) each. A sample that is n samples old
+  /// has the weight forgetting^n. `error_limit` is the largest error in mean sizes of errors.
+  /// Throws std::invalid_argument naming the impossible argument.
+  RecursiveLeastSquares(std::span<const double> low, std::span<const double> high,
+                        std::size_t n_outputs, double forgetting, double error_limit = kUnlimited)
+      : forgetting_(forgetting), error_limit_(error_limit) {
+    core::require_in_range("forgetting", forgetting, 0.5, 1.0);
+    core::require(error_limit >= 1.0, "error_limit", "at least 1", error_limit);
+    core::require_in_range("n_outputs", n_outputs, 1, kMostOutputs);
+    covariance_ = {kFirstVariance};
+    add_outputs(n_outputs);
+    add_inputs(low, high);
+  }
+
+  std::size_t n_inputs() const noexcept { return low_.size(); }
+  std::size_t n_outputs() const noexcept { return origins_.size(); }
+
+  /// Adds inputs after the others, without a change of any prediction. Throws
+  /// std::invalid_argument naming the impossible argument.
+  void add_inputs(std::span<const double> low, std::span<const double> high) {
+    core::require_size("high", high.size(), low.size());
+    core::require_in_range("n_inputs", n_inputs() + low.size(), 0, kMostInputs);
+    for (std::size_t i = 0; i < low.size(); ++i) {
+      core::require_finite("low", low[i]);
+      core::require_finite("high", high[i]);
+      core::require(low[i] <= high[i], "high", "at least low", high[i]);
+    }
+    const std::size_t n_before = n_inputs() + 1, n = n_before + low.size();
+    std::vector<double> covariance(n * n), weights(n_outputs() * n);
+    for (std::size_t row = 0; row < n; ++row) covariance[row * n + row] = kFirstVariance;
+    for (std::size_t row = 0; row < n_before; ++row) {
+      std::copy_n(&covariance_[row * n_before], n_before, &covariance[row * n]);
+    }
+    for (std::size_t output = 0; output < n_outputs(); ++output) {
+      std::copy_n(&weights_[output * n_before], n_before, &weights[output * n]);
+    }
+    covariance_ = std::move(covariance);
+    weights_ = std::move(weights);
+    for (std::size_t i = 0; i < low.size(); ++i) {
+      low_.push_back(low[i]);
+      high_.push_back(high[i]);
+      middle_.push_back(low[i] / 2.0 + high[i] / 2.0);
+      half_width_.push_back(high[i] / 2.0 - low[i] / 2.0);
+    }
+  }
+
+  /// Adds outputs after the others, as if all targets so far had been 0. Throws
+  /// std::invalid_argument naming the impossible argument.
+  void add_outputs(std::size_t n) {
+    core::require_in_range("n_outputs", n_outputs() + n, 1, kMostOutputs);
+    const std::size_t size = n_outputs() + n;
+    origins_.resize(size);
+    lowest_.resize(size);
+    highest_.resize(size);
+    mean_errors_.resize(size);
+    weights_.resize(size * (n_inputs() + 1));
+  }
+
+  /// Shapes: inputs (n_inputs,), outputs (n_outputs,). Throws std::invalid_argument for another
+  /// size. Thread safety: calls may run at the same time.
+  void predict(std::span<const double> inputs, std::span<double> outputs) const {
+    core::require_size("inputs", inputs.size(), n_inputs());
+    core::require_size("outputs", outputs.size(), n_outputs());
+    std::vector<double> columns(n_inputs() + 1);
+    scale(inputs, columns);
+    for (std::size_t o = 0; o < n_outputs(); ++o) outputs[o] = output(o, columns);
+  }
+
+  /// Learns a sample. Shapes: inputs (n_inputs,), targets (n_outputs,), finite. Throws
+  /// std::invalid_argument for another size, and targets that are not finite.
+  void learn(std::span<const double> inputs, std::span<const double> targets) {
+    core::require_size("inputs", inputs.size(), n_inputs());
+    core::require_size("targets", targets.size(), n_outputs());
+    for (const double target : targets) core::require_finite("targets", target);
+    const std::size_t n = n_inputs() + 1;
+    std::vector<double> columns(n), gains(n);
+    widen(inputs);
+    scale(inputs, columns);
+    const double variance = product(columns, gains);
+    const double factor = 1.0 / (forgetting_ + variance);
+    if (n_learned_ == 0.0) {
+      std::ranges::copy(targets, origins_.begin());
+      std::ranges::copy(targets, lowest_.begin());
+      std::ranges::copy(targets, highest_.begin());
+    }
+    n_learned_ = std::min(n_learned_ + 1.0, kErrorMemory);
+    for (std::size_t o = 0; o < n_outputs(); ++o) {
+      const double predicted = unlimited_output(o, columns);
+      const double error = limited_error(o, targets[o] - predicted);
+      const double learned = finite(predicted + error);
+      lowest_[o] = std::min(lowest_[o], learned);
+      highest_[o] = std::max(highest_[o], learned);
+      correct(o, gains, factor * error);
+    }
+    update_covariance(gains, factor);
+  }
+
+  /// Lists what is remembered; see core/state.hpp.
+  template <class Self, class Archive>
+  static void serialize(Self& self, Archive& archive) {
+    const std::size_t n = self.n_inputs(), n_outputs = self.n_outputs(), n_columns = n + 1;
+    archive.number("n_learned", self.n_learned_);
+    archive.fixed("low", {n}, self.low_);
+    archive.fixed("high", {n}, self.high_);
+    archive.fixed("middle", {n}, self.middle_);
+    archive.fixed("half_width", {n}, self.half_width_);
+    archive.fixed("covariance", {n_columns, n_columns}, self.covariance_);
+    archive.fixed("weights", {n_outputs, n_columns}, self.weights_);
+    archive.fixed("origins", {n_outputs}, self.origins_);
+    archive.fixed("lowest", {n_outputs}, self.lowest_);
+    archive.fixed("highest", {n_outputs}, self.highest_);
+    archive.fixed("mean_errors", {n_outputs}, self.mean_errors_);
+    if constexpr (Archive::kReads) {
+      const auto expect_finite = [&archive](const char* name, const std::vector<double>& values) {
+        const bool holds = std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
+        archive.expect(holds, name, "finite");
+      };
+      const auto expect_least = [&archive](const char* name, const std::vector<double>& values,
+                                           const std::vector<double>& least) {
+        const bool holds = std::ranges::equal(values, least, std::greater_equal<>());
+        archive.expect(holds, name, "at least the lowest");
+      };
+      const bool is_number = self.n_learned_ >= 0.0 && self.n_learned_ <= kErrorMemory;
+      archive.expect(is_number, "n_learned", "in [0, 100]");
+      expect_finite("low", self.low_);
+      expect_finite("high", self.high_);
+      expect_finite("middle", self.middle_);
+      expect_finite("half_width", self.half_width_);
+      expect_finite("covariance", self.covariance_);
+      expect_finite("weights", self.weights_);
+      expect_finite("origins", self.origins_);
+      expect_finite("lowest", self.lowest_);
+      expect_finite("highest", self.highest_);
+      expect_finite("mean_errors", self.mean_errors_);
+      expect_least("high", self.high_, self.low_);
+      expect_least("half_width", self.half_width_, std::vector<double>(n));
+      expect_least("highest", self.highest_, self.lowest_);
+      expect_least("mean_errors", self.mean_errors_, std::vector<double>(n_outputs));
+    }
+  }
+
+ private:
+  static constexpr std::size_t kMostInputs = 4096, kMostOutputs = std::size_t{1} << 20;
+  static constexpr double kFirstVariance = 10.0;  ///< of a weight, for errors of variance 1
+  static constexpr double kLargestMean = 100.0;   ///< of the variances of all weights
+  static constexpr double kMargin = 0.2;          ///< share of the range of targets
+  static constexpr double kErrorMemory = 100.0;   ///< samples in the mean of errors
+  static constexpr double kFewErrors = 20.0;      ///< samples after which errors are limited
+  static constexpr double kFarthest = 1e6;        ///< half widths from the middle
+  static constexpr double kLargest = std::numeric_limits<double>::max();
+
+  static double finite(double x) noexcept { return std::clamp(x, -kLargest, kLargest); }
+
+  /// The input within its range and the width of the range on either side.
+  double clipped(std::size_t i, double input) const noexcept {
+    const double width = high_[i] - low_[i];
+    return std::clamp(finite(input), finite(low_[i] - width), finite(high_[i] + width));
+  }
+
+  /// Widens the ranges to the inputs. A range of a single value, which stays the middle, gets the
+  /// distance of the second value as its half width.
+  void widen(std::span<const double> inputs) noexcept {
+    for (std::size_t i = 0; i < inputs.size(); ++i) {
+      if (std::isnan(inputs[i])) continue;
+      const bool is_constant = half_width_[i] == 0.0;
+      const double input = is_constant ? finite(inputs[i]) : clipped(i, inputs[i]);
+      low_[i] = std::min(low_[i], input);
+      high_[i] = std::max(high_[i], input);
+      if (is_constant) half_width_[i] = finite(std::abs(input - middle_[i]));
+    }
+  }
+
+  /// Writes the scaled inputs and, as the first column, 1.
+  void scale(std::span<const double> inputs, std::span<double> columns) const noexcept {
+    columns[0] = 1.0;
+    for (std::size_t i = 0; i < inputs.size(); ++i) {
+      columns[i + 1] = 0.0;
+      if (std::isnan(inputs[i]) || half_width_[i] == 0.0) continue;
+      const double half_distance = clipped(i, inputs[i]) / 2.0 - middle_[i] / 2.0;
+      columns[i + 1] = std::clamp(2.0 * (half_distance / half_width_[i]), -kFarthest, kFarthest);
+    }
+  }
+
+  /// The output within the range of the targets and its margin.
+  double output(std::size_t o, std::span<const double> columns) const noexcept {
+    const double margin = kMargin * (highest_[o] / 2.0 - lowest_[o] / 2.0) * 2.0;
+    return std::clamp(unlimited_output(o, columns), finite(lowest_[o] - margin),
+                      finite(highest_[o] + margin));
+  }
+
+  /// The output on which learning is based.
+  double unlimited_output(std::size_t o, std::span<const double> columns) const noexcept {
+    const double* const weights = &weights_[o * columns.size()];
+    double sum = 0.0;
+    for (std::size_t i = 0; i < columns.size(); ++i) sum += weights[i] * columns[i];
+    const double value = origins_[o] + sum;
+    return std::isnan(value) ? origins_[o] : finite(value);
+  }
+
+  /// Writes the product of covariance and columns, and returns that of columns and product.
+  double product(std::span<const double> columns, std::span<double> out) {
+    const std::size_t n = columns.size();
+    const auto multiply = [&] {
+      std::ranges::fill(out, 0.0);
+      for (std::size_t row = 0; row < n; ++row) {
+        const double* const covariances = &covariance_[row * n];
+        const double column = columns[row];
+        for (std::size_t i = 0; i < n; ++i) out[i] += covariances[i] * column;
+      }
+      double sum = 0.0;
+      for (std::size_t i = 0; i < n; ++i) sum += columns[i] * out[i];
+      return sum;
+    };
+    const double variance = multiply();
+    if (variance >= 0.0 && variance < kLargest) return variance;
+    reset_covariance();  // rounding errors added up
+    return multiply();
+  }
+
+  void reset_covariance() noexcept {
+    const std::size_t n = n_inputs() + 1;
+    std::ranges::fill(covariance_, 0.0);
+    for (std::size_t row = 0; row < n; ++row) covariance_[row * n + row] = kFirstVariance;
+  }
+
+  /// Updates the mean size of an output's errors.
+  double limited_error(std::size_t o, double error) noexcept {
+    const double limit =
+        n_learned_ > kFewErrors ? finite(error_limit_ * mean_errors_[o]) : kLargest;
+    const double limited = limit > 0.0 ? std::clamp(error, -limit, limit) : finite(error);
+    mean_errors_[o] += (std::abs(limited) - mean_errors_[o]) / n_learned_;
+    return limited;
+  }
+
+  void correct(std::size_t o, std::span<const double> gains, double size) noexcept {
+    double* const weights = &weights_[o * gains.size()];
+    bool are_finite = true;
+    for (std::size_t i = 0; i < gains.size(); ++i) {
+      weights[i] += gains[i] * size;
+      are_finite = are_finite && std::isfinite(weights[i]);
+    }
+    if (!are_finite) std::fill_n(weights, gains.size(), 0.0);
+  }
+
+  void update_covariance(std::span<const double> gains, double factor) noexcept {
+    const std::size_t n = gains.size();
+    const double growth = 1.0 / forgetting_;
+    double trace = 0.0;
+    for (std::size_t row = 0; row < n; ++row) {
+      double* const covariances = &covariance_[row * n];
+      for (std::size_t i = 0; i < n; ++i) {  // the order of factors keeps it symmetric
+        covariances[i] = (covariances[i] - gains[row] * gains[i] * factor) * growth;
+      }
+      trace += covariances[row];
+    }
+    const double largest = kLargestMean * static_cast<double>(n);
+    if (!(trace >= 0.0 && trace < kLargest)) {
+      reset_covariance();
+    } else if (trace > largest) {
+      for (double& covariance : covariance_) covariance *= largest / trace;
+    }
+  }
+
+  double forgetting_;
+  double error_limit_;
+  double n_learned_ = 0.0;                ///< at most kErrorMemory
+  std::vector<double> low_, high_;        ///< ranges of the inputs
+  std::vector<double> middle_;            ///< of the first range, as its half width
+  std::vector<double> half_width_;        ///< 0 while an input has had a single value
+  std::vector<double> covariance_;        ///< (n_inputs + 1, n_inputs + 1)
+  std::vector<double> weights_;           ///< (n_outputs, n_inputs + 1)
+  std::vector<double> origins_;           ///< first target of each output
+  std::vector<double> lowest_, highest_;  ///< ranges of the targets
+  std::vector<double> mean_errors_;
+};
+
+}  // namespace sdnn::estimators

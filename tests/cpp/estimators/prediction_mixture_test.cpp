@@ -1,0 +1,87 @@
+#include "sdnn/estimators/prediction_mixture.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "sdnn/core/state.hpp"
+
+namespace sdnn {
+namespace {
+
+using estimators::PredictionMixture;
+using Numbers = std::vector<double>;
+
+TEST(PredictionMixture, WeightsAreTheInverseEighthPowerOfErrorsMixedWithTheirMean) {
+  PredictionMixture mixture(2);
+  EXPECT_EQ(mixture.mix(Numbers{1.0, 4.0}), 2.5);
+  mixture.learn(Numbers{0.0, 1.0}, 2.0);
+  // Squared errors 4 and 1, of mean 2.5, which counts as much as five samples.
+  const double ratio = std::pow((1.0 + 5 * 2.5) / (4.0 + 5 * 2.5), 8);
+  EXPECT_NEAR(mixture.weights()[0], ratio / (1.0 + ratio), 1e-15);
+  EXPECT_NEAR(mixture.mix(Numbers{1.0, 4.0}), (ratio + 4.0) / (ratio + 1.0), 1e-14);
+}
+
+TEST(PredictionMixture, FollowsADriftThatChangesWhichExpertIsRight) {
+  PredictionMixture mixture(2);
+  for (int i = 0; i < 1000; ++i) mixture.learn(Numbers{0.1, 1.0}, 0.0);
+  EXPECT_GT(mixture.weights()[0], 0.99);
+  for (int i = 0; i < 200; ++i) mixture.learn(Numbers{0.1, 1.0}, 1.0);
+  EXPECT_GT(mixture.weights()[1], 0.99);
+}
+
+TEST(PredictionMixture, AnOutlierDoesNotMakeExpertsAlike) {
+  PredictionMixture mixture(2);
+  for (int i = 0; i < 200; ++i) mixture.learn(Numbers{0.1, 0.3}, 0.0);
+  mixture.learn(Numbers{0.1, 0.3}, 1e300);
+  EXPECT_GT(mixture.weights()[0], 0.8);
+}
+
+TEST(PredictionMixture, WeightsDoNotDependOnTheUnitOfTargets) {
+  const int exponents[]{-1000, -500, 0, 500, 1000};
+  std::vector<Numbers> weights;
+  for (const int exponent : exponents) {
+    PredictionMixture mixture(3);
+    for (int i = 0; i < 50; ++i) {
+      const auto scaled = [&](double x) { return std::ldexp(x, exponent); };
+      mixture.learn(Numbers{scaled(i % 3), scaled(1.5), scaled(i % 4)}, scaled(i % 5));
+    }
+    weights.push_back(mixture.weights());
+  }
+  for (const Numbers& other : weights) EXPECT_EQ(other, weights[0]);
+}
+
+TEST(PredictionMixture, StaysFiniteForAnyNumbers) {
+  constexpr double kMax = std::numeric_limits<double>::max();
+  const Numbers extremes{0.0, 1.0, -1.0, 5e-324, 1e300, -kMax, kMax, 1e-200, -1e154, 0.0, 0.0};
+  PredictionMixture mixture(3);
+  for (std::size_t i = 0; i < 5000; ++i) {
+    const Numbers each{extremes[i % 11], extremes[(i / 3) % 11], extremes[(i / 31) % 11]};
+    const double mixed = mixture.mix(each);
+    ASSERT_GE(mixed, *std::ranges::min_element(each));
+    ASSERT_LE(mixed, *std::ranges::max_element(each));
+    mixture.learn(each, extremes[(i * i / 7) % 11]);
+    for (const double weight : mixture.weights()) ASSERT_TRUE(weight >= 0.0 && weight <= 1.0);
+  }
+  for (int i = 0; i < 100; ++i) mixture.learn(Numbers{0.0, 0.0, 0.0}, 0.0);
+  EXPECT_EQ(mixture.mix(Numbers{0.0, 0.0, 0.0}), 0.0);
+}
+
+TEST(PredictionMixture, RestoresItsStateAndNamesAWrongArgument) {
+  PredictionMixture mixture(2), other(2);
+  for (int i = 0; i < 30; ++i) mixture.learn(Numbers{0.1, i % 3 * 1.0}, 0.0);
+  core::restore(other, core::state_of(mixture));
+  EXPECT_EQ(other.weights(), mixture.weights());
+  EXPECT_THROW(PredictionMixture(0), std::invalid_argument);
+  EXPECT_THROW(mixture.learn(Numbers{0.0}, 1.0), std::invalid_argument);
+  EXPECT_THROW(mixture.learn(Numbers{0.0, 0.0}, INFINITY), std::invalid_argument);
+  EXPECT_THROW(mixture.mix(Numbers{0.0, NAN}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sdnn
