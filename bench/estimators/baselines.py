@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
-from sklearn.base import BaseEstimator, ClassifierMixin, RegressorMixin, clone
+from sklearn.base import BaseEstimator, ClassifierMixin, RegressorMixin
 from sklearn.ensemble import (
     HistGradientBoostingClassifier,
     HistGradientBoostingRegressor,
@@ -59,7 +61,7 @@ class WithClasses(ClassifierMixin, BaseEstimator):
 
     def fit(self, X, y):
         self.classes_, numbers = np.unique(y, return_inverse=True)
-        self.model_ = clone(self.model).fit(X, numbers)
+        self.model_ = copy.deepcopy(self.model).fit(X, numbers)  # CatBoost's cannot be cloned
         return self
 
     def predict(self, X):

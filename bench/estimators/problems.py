@@ -4,7 +4,7 @@
 
 Measures what the store lacks, draws problems.png and writes the table of problems.md, both in
 docs/evidence; --full prints every problem.
-Needs sdnn[river], whose measured data are in the package.
+Needs sdnn[river], whose measured data are in the package, catboost, lightgbm and xgboost.
 """
 
 from __future__ import annotations

