@@ -106,14 +106,14 @@ double BareAgent::normalized_action(Action action) const {
 }
 
 void BareAgent::learn(std::span<const double> state, Action action, double reward,
-                      std::span<const double> next_state, bool terminated) {
+                      std::span<const double> next_state, bool terminated, double dt) {
   indices_.resize(action.size());
   const auto learn = [&](auto& agent) {
     if constexpr (kHasNumbers<decltype(agent)>) {
-      agent.learn(state, action, reward, next_state, terminated);
+      agent.learn(state, action, reward, next_state, terminated, 0, {}, dt);
     } else {
       assign(action, indices_);
-      agent.learn(state, indices_, reward, next_state, terminated);
+      agent.learn(state, indices_, reward, next_state, terminated, 0, {}, dt);
     }
   };
   std::visit(learn, agent_);

@@ -49,9 +49,9 @@ class BareAgent {
   /// Returns the action to take in a state, valid until the next act.
   Action act(std::span<const double> state, bool explore = true);
   double normalized_action(Action action) const;
-  /// Learns a transition; of fuzzy rules that of the last exploring act.
+  /// Learns a transition of dt usual steps; of fuzzy rules that of the last exploring act.
   void learn(std::span<const double> state, Action action, double reward,
-             std::span<const double> next_state, bool terminated);
+             std::span<const double> next_state, bool terminated, double dt = 1.0);
 
  private:
   agents::AnyAgent agent_;

@@ -124,7 +124,7 @@ std::size_t learn_each(Controller& controller, const ArrayArgument<double>& obse
                        const ArrayArgument<double>& actions, const py::list& rewards,
                        const ArrayArgument<double>& next_observations, const py::list& terminated,
                        const py::list& environments, const py::list& progress,
-                       const MaskArgument& next_masks) {
+                       const MaskArgument& next_masks, const std::optional<py::list>& dts) {
   bindings::wait_for_readers(controller);
   const std::size_t n = controller.n_variables();
   std::size_t n_learned = 0;
@@ -132,6 +132,7 @@ std::size_t learn_each(Controller& controller, const ArrayArgument<double>& obse
     const auto i = environment.cast<std::size_t>();
     core::require(i < std::min(rewards.size(), terminated.size()), "environments",
                   "those of rewards and terminated", i);
+    core::require(!dts || i < dts->size(), "dts", "a number for each environment", i);
     const auto reward = rewards[i].cast<double>();
     const auto ends = terminated[i].cast<bool>();
     if (n_learned > 0 && n_learned <= progress.size()) {
@@ -141,7 +142,7 @@ std::size_t learn_each(Controller& controller, const ArrayArgument<double>& obse
       controller.learn(row(observations, "observations", n, i),
                        row(actions, "actions", controller.n_dimensions(), i), reward,
                        row(next_observations, "next_observations", n, i), ends, i,
-                       mask_of(next_masks, "next_masks", i));
+                       mask_of(next_masks, "next_masks", i), dts ? (*dts)[i].cast<double>() : 1.0);
     } catch (const std::logic_error&) {
       if (n_learned == 0) throw;
       break;
@@ -163,12 +164,13 @@ void def_transition(py::class_<Controller>& type, const char* name, const char* 
       [call](Controller& self, const ArrayArgument<double>& observation,
              const ArrayArgument<double>& action, double reward,
              const ArrayArgument<double>& next_observation, bool terminated,
-             std::size_t environment, const MaskArgument& next_mask) {
+             std::size_t environment, const MaskArgument& next_mask, double dt) {
         call(self, bindings::flat(observation), bindings::flat(action), reward,
-             bindings::flat(next_observation), terminated, environment, mask_of(next_mask));
+             bindings::flat(next_observation), terminated, environment, mask_of(next_mask), dt);
       },
       py::arg("observation"), py::arg("action"), py::arg("reward"), py::arg("next_observation"),
-      py::arg("terminated"), py::arg("environment") = 0, py::arg("next_mask") = py::none(), doc);
+      py::arg("terminated"), py::arg("environment") = 0, py::arg("next_mask") = py::none(),
+      py::arg("dt") = 1.0, doc);
 }
 
 }  // namespace
@@ -293,6 +295,7 @@ void bind_controller(py::module_& module) {
           "learn_each", &learn_each, py::arg("observations"), py::arg("actions"),
           py::arg("rewards"), py::arg("next_observations"), py::arg("terminated"),
           py::arg("environments"), py::arg("progress"), py::arg("next_masks") = py::none(),
+          py::arg("dts") = py::none(),
           "Learns in some environments, in order; `progress` is set between two, if given. Returns "
           "how many were learned: all before the first that cannot be, whose error is raised where "
           "it comes first")

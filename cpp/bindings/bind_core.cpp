@@ -91,6 +91,8 @@ void bind_elementary(py::module_& module) {
       py::arg("x"), "(sin x, cos x), item by item");
   module.def("exp", py::vectorize([](double x) { return core::exp(x); }), py::arg("x"));
   module.def("log", py::vectorize([](double x) { return core::log(x); }), py::arg("x"));
+  module.def("power", py::vectorize([](double x, double y) { return core::power(x, y); }),
+             py::arg("base"), py::arg("exponent"));
   module.def("atan2", py::vectorize([](double y, double x) { return core::atan2(y, x); }),
              py::arg("y"), py::arg("x"));
   module.def("normal_quantile", py::vectorize([](double p) { return core::normal_quantile(p); }),

@@ -129,12 +129,12 @@ void bind_bare_agent(py::module_& module) {
           "learn",
           [](BareAgent& self, const ArrayArgument<double>& state,
              const ArrayArgument<double>& action, double reward,
-             const ArrayArgument<double>& next_state, bool terminated) {
+             const ArrayArgument<double>& next_state, bool terminated, double dt) {
             self.learn(bindings::vector(state, "state"), bindings::vector(action, "action"), reward,
-                       bindings::vector(next_state, "next_state"), terminated);
+                       bindings::vector(next_state, "next_state"), terminated, dt);
           },
           py::arg("state"), py::arg("action"), py::arg("reward"), py::arg("next_state"),
-          py::arg("terminated"));
+          py::arg("terminated"), py::arg("dt") = 1.0);
 }
 
 void bind_trial(py::module_& module) {

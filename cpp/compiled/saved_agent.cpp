@@ -26,9 +26,9 @@ std::span<const double> SavedAgent::act(std::span<const double> observation, boo
 
 void SavedAgent::learn(std::span<const double> observation, std::span<const double> action,
                        double reward, std::span<const double> next_observation, bool terminated,
-                       std::size_t environment, Mask next_mask) {
+                       std::size_t environment, Mask next_mask, double dt) {
   file_->controller.learn(observation, action, reward, next_observation, terminated, environment,
-                          next_mask);
+                          next_mask, dt);
 }
 
 }  // namespace sdnn::agents

@@ -9,6 +9,7 @@
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller.hpp"
 #include "sdnn/agents/controller_config.hpp"
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/exploration.hpp"

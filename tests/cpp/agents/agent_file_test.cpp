@@ -58,7 +58,8 @@ void learn(Agent& controller, int n_steps) {
     const Numbers observed{0.1 * (t % 10), 1.0 * (t % 7)}, next{0.1 * ((t + 1) % 10), 1.0};
     const auto taken = controller.act(observed);
     const Numbers action(taken.begin(), taken.end());
-    controller.learn(observed, action, 1.0 * (t % 3), next, t % 13 == 12);
+    const double dt = t % 4 == 3 ? 2.5 : 1.0;
+    controller.learn(observed, action, 1.0 * (t % 3), next, t % 13 == 12, 0, {}, dt);
   }
 }
 

@@ -63,6 +63,21 @@ TEST(NStepBuffer, TheReturnOfTheOldestStepDiscountsLaterRewards) {
   EXPECT_EQ(steps.return_of_oldest(-8.0, 0.5), 8.0 + 8.0 - 2.0);
 }
 
+// Durations 2, 1/2 and 1 with gamma = 1/4: discounts 1/16, 1/2 and 1/4.
+TEST(NStepBuffer, DiscountsBySquaresAndRootsForLongerAndShorterSteps) {
+  NStepBuffer steps(3, 1, 2);
+  const Numbers dts{2.0, 0.5, 1.0};
+  for (std::size_t i = 0; i < 3; ++i) {
+    steps.add(Numbers{0.5}, Indices{0, 0}, 16.0, Numbers{0.5}, dts[i]);
+  }
+  EXPECT_DOUBLE_EQ(steps.return_of_oldest(64.0, 0.25), 16.0 + (16.0 + (16.0 + 16.0) / 2.0) / 16.0);
+  NStepBuffer restored(3, 1, 2);
+  core::restore(restored, core::state_of(steps));
+  EXPECT_EQ(restored.return_of_oldest(64.0, 0.25), steps.return_of_oldest(64.0, 0.25));
+  testing::expect_refused(steps, testing::with_number(core::state_of(steps), "dts", 0.0, 1),
+                          "state: dts must be in [0.001, 1000000]");
+}
+
 TEST(NStepBuffer, KnowsTheNextStateOfTheNewestStep) {
   NStepBuffer steps = buffer_of(2);
   EXPECT_TRUE(steps.is_continued_by(Numbers{0.9}));  // nothing is pending

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "instruction_sets.hpp"
@@ -64,6 +66,40 @@ TEST(QLambda, TargetsOfOneStepAreAsWorkedByHand) {
   EXPECT_EQ(q(agent, a, 0), 0.0);  // waits for the next action
   agent.learn(b, Indices{2}, 8.0, b, true);
   EXPECT_NEAR(q(agent, a, 0), 5.0, 0.5);
+}
+
+// gamma = 1/2 and a transition of 2 steps: a quarter of what follows remains; of half a step, 0.71.
+TEST(QLambda, DurationsDiscountTargets) {
+  const State a{0.1, 0.1}, b{0.9, 0.9};
+  for (const auto& [dt, remaining] : {std::pair(2.0, 0.25), std::pair(0.5, 0.7071)}) {
+    QLambda agent = agent_of({.learning_rate = 1.0, .discount = 0.5, .final_learning_rate = {}});
+    agent.learn(b, Indices{2}, 8.0, b, true);
+    agent.learn(a, Indices{0}, 1.0, b, false, 0, {}, dt);
+    EXPECT_NEAR(q(agent, a, 0), 1.0 + remaining * 8.0, 1e-3);
+  }
+  QLambda agent = agent_of({});
+  for (const double bad : {0.0, -1.0, 1e-4, 1e7, testing::kNaN, testing::kInfinity}) {
+    const core::State before = core::state_of(agent);
+    EXPECT_THROW(agent.learn(a, Indices{0}, 1.0, b, false, 0, {}, bad), std::invalid_argument);
+    EXPECT_EQ(core::state_of(agent), before);
+  }
+}
+
+// With alpha = 1 and gamma = 1/2, an error of 8 after two transitions moves the first one's value
+// by lambda times the discount of the first transition, not that of the second.
+TEST(QLambda, TracesDecayByTheDurationOfTheTransitionBefore) {
+  const State a{0.1, 0.1}, b{0.5, 0.9}, c{0.9, 0.4};
+  for (const double dt : {1.0, 3.0}) {
+    QLambda agent = agent_of({.learning_rate = 1.0,
+                              .discount = 0.5,
+                              .trace_decay = 0.5,
+                              .traces = TraceKind::replacing,
+                              .final_learning_rate = {}},
+                             {3}, 1, 2);
+    agent.learn(a, Indices{0}, 0.0, b, false, 0, {}, dt);
+    agent.learn(b, Indices{1}, 8.0, c, true, 0, {}, 7.0);
+    EXPECT_NEAR(q(agent, a, 0), 0.5 * std::pow(0.5, dt) * 8.0, 0.01);
+  }
 }
 
 TEST(QLambda, RatesAreHalfwayAfterScheduleSteps) {

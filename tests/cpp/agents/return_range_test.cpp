@@ -16,8 +16,8 @@ namespace {
 struct Stream {
   explicit Stream(double discount) : range(discount), rewards(range.no_rewards()) {}
 
-  bool note(double reward, bool terminated = false) {
-    return range.note(reward, terminated, rewards);
+  bool note(double reward, bool terminated = false, double dt = 1.0) {
+    return range.note(reward, terminated, rewards, dt);
   }
   /// An episode with a reward of 1 in each step.
   void note_episode(int n_steps, double reward = 1.0, bool terminates = true) {
@@ -47,6 +47,20 @@ TEST(ReturnRange, GrowsAtFirstByAQuarterMoreThanNeeded) {
   expect_range(environment.range, 0.0, 30.0);
   EXPECT_TRUE(environment.note(-42.5));  // -42.5 + 22.5 = -20, and (30 + 20) / 4
   expect_range(environment.range, -32.5, 30.0);
+}
+
+// The return of a reward of 1 every 100 steps is 1 / (1 - 0.99^100) = 1.58, and of 1 in each tenth
+// of a step 1 / (1 - 0.99^0.1) = 995.5; without durations it would be 100 for both.
+TEST(ReturnRange, DiscountsByDurations) {
+  Stream rare(0.99), frequent(0.99);
+  for (int i = 0; i < 20000; ++i) {
+    rare.note(1.0, false, 100.0);
+    frequent.note(1.0, false, 0.1);
+  }
+  EXPECT_GE(rare.range.high(), 1.57);
+  EXPECT_LE(rare.range.high(), 2.0);
+  EXPECT_GE(frequent.range.high(), 990.0);
+  EXPECT_LE(frequent.range.high(), 1250.0);
 }
 
 TEST(ReturnRange, OfNegativeRewardsEndsAtZero) {

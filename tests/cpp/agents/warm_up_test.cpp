@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "sdnn/core/pcg64.hpp"
+#include "sdnn/core/state.hpp"
+#include "states.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -76,6 +78,31 @@ TEST(WarmUp, RemembersMasks) {
   for (std::size_t t = 0; t < 3; ++t) {
     EXPECT_TRUE(std::ranges::equal(warm_up.step(t).next_mask, expected[t])) << t;
   }
+}
+
+TEST(WarmUp, RemembersDurationsOnceOneIsUnusual) {
+  WarmUp warm_up(1, 1, 1000, 3, true);
+  const Numbers here{0.5}, action{1.0};
+  const Numbers dts{1.0, 1.0, 2.5, 1.0};
+  for (std::size_t t = 0; t < dts.size(); ++t) {
+    EXPECT_EQ(core::state_of(warm_up).contains("dts"), t > 2);
+    warm_up.learn({.begins = false,
+                   .environment = 0,
+                   .observation = here,
+                   .action = action,
+                   .reward = 1.0,
+                   .next_observation = here,
+                   .terminated = false,
+                   .dt = dts[t]});
+  }
+  WarmUp restored(1, 1, 1000, 3, true);
+  core::restore(restored, core::state_of(warm_up));
+  for (std::size_t t = 0; t < dts.size(); ++t) {
+    EXPECT_EQ(warm_up.step(t).dt, dts[t]);
+    EXPECT_EQ(restored.step(t).dt, dts[t]);
+  }
+  testing::expect_refused(restored, testing::with_number(core::state_of(warm_up), "dts", -1.0),
+                          "state: dts must be in [0.001, 1000000]");
 }
 
 TEST(WarmUp, EvaluationDoesNotChangeItsActions) {

@@ -96,6 +96,15 @@ TEST(Exp, KeepsItsBits) {
   EXPECT_EQ(digest, 2816221857222245310U);
 }
 
+TEST(Power, IsExactForBasesZeroAndOne) {
+  for (const double exponent : {1e-3, 1.0, 2.5, 1e6}) {
+    EXPECT_EQ(sdnn::core::power(0.0, exponent), 0.0);
+    EXPECT_EQ(sdnn::core::power(1.0, exponent), 1.0);
+  }
+  EXPECT_DOUBLE_EQ(sdnn::core::power(0.5, 3.0), 0.125);
+  EXPECT_DOUBLE_EQ(sdnn::core::power(16.0, 0.25), 2.0);
+}
+
 TEST(Atan2, TreatsZerosAndInfinitiesLikeTheCLibrary) {
   for (const double y : {0.0, -0.0, 1.0, -1.0, 5e-324, -5e-324, kInfinity, -kInfinity}) {
     for (const double x : {0.0, -0.0, 2.0, -2.0, 1.7e308, -1.7e308, kInfinity, -kInfinity}) {

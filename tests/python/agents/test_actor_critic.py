@@ -6,7 +6,7 @@ import pytest
 import sdnn_actor_critic as page
 from hypothesis import given, settings, strategies as st
 
-from q_lambda_transcription import SMALL, random_transitions
+from q_lambda_transcription import SMALL, VariableDiscount, random_durations, random_transitions
 from refusals import refuses
 from sdnn import _core
 from sdnn.agents import (
@@ -32,6 +32,21 @@ class Code(page.CodeWithThermometers):
         return np.array(self.readout.code(state), np.int64)
 
 
+class ActorCritic(page.ActorCritic):
+    """The agent of the page, with transitions of any duration."""
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.discount = VariableDiscount(self.settings)
+        self.update_actor = self.discount.in_traces(self.update_actor)
+        self.critic.update_trace = self.discount.in_traces(self.critic.update_trace)
+
+    def learn(self, state, action, reward, next_state, terminated, dt=1.0):
+        self.discount.set(dt)
+        super().learn(state, action, reward, next_state, terminated)
+        self.discount.end()
+
+
 @given(
     seed=st.integers(0, 10**6),
     n_actions=st.lists(st.integers(1, 4), min_size=1, max_size=2),
@@ -40,10 +55,11 @@ class Code(page.CodeWithThermometers):
     rate=st.sampled_from([1e-6, 0.3, 1.0]),
     entropy=st.sampled_from([0.0, 0.01, 1.0]),
     scale=st.sampled_from([1.0, 100.0, 1e6, 1e-40]),
+    are_usual=st.booleans(),
 )
 @settings(max_examples=40, deadline=None)
 def test_weights_are_those_of_the_numpy_transcription(
-    seed, n_actions, trace_decay, discount, rate, entropy, scale
+    seed, n_actions, trace_decay, discount, rate, entropy, scale, are_usual
 ):
     learning = {
         "learning_rate": rate,
@@ -61,11 +77,13 @@ def test_weights_are_those_of_the_numpy_transcription(
         seed=seed,
     )
     (critic,) = agent.networks
-    transcription = page.ActorCritic(Code(critic), n_actions, page.Settings(**learning, seed=seed))
+    transcription = ActorCritic(Code(critic), n_actions, page.Settings(**learning, seed=seed))
+    durations = random_durations(seed, are_usual)
     for state, action, reward, next_state, end in random_transitions(seed, 25, n_actions, scale):
+        dt = next(durations)
         np.testing.assert_array_equal(agent.act(state), transcription.act(state))
         for learner in (agent, transcription):
-            learner.learn(state, action, reward, next_state, end == "terminal")
+            learner.learn(state, action, reward, next_state, end == "terminal", dt)
             if end == "limit":
                 learner.begin_episode()
         assert critic.exponent == transcription.critic.exponent

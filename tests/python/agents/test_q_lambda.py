@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from q_lambda_transcription import SMALL, Code, QLambda, random_transitions
+from q_lambda_transcription import SMALL, Code, QLambda, random_durations, random_transitions
 from sdnn import _core
 from sdnn.agents import QLambdaConfig, RBFQLearning, SDNNQLambda, Transition, evaluate, load_agent
 from sdnn.approximators import LinearSDNNConfig
@@ -24,10 +24,11 @@ from stopped_training import states_equal
     discount=st.sampled_from([0.0, 0.9, 1.0]),
     learning_rate=st.sampled_from([1e-6, 0.3, 1.0]),
     scale=st.sampled_from([1.0, 100.0, 1e6, 1e-40]),
+    usual=st.booleans(),
 )
 @settings(max_examples=60, deadline=None)
 def test_weights_are_those_of_the_numpy_transcription(
-    seed, n_actions, window, bootstrap, traces, trace_decay, discount, learning_rate, scale
+    seed, n_actions, window, bootstrap, traces, trace_decay, discount, learning_rate, scale, usual
 ):
     learning = {
         "learning_rate": learning_rate,
@@ -48,13 +49,15 @@ def test_weights_are_those_of_the_numpy_transcription(
     )
     (readout,) = agent.networks
     transcription = QLambda(Code(readout.code, 2), n_actions, window, learning)
+    durations = random_durations(seed, usual)
     for state, action, reward, next_state, end in random_transitions(seed, 25, n_actions, scale):
+        dt = next(durations)
         # Acting keeps sums for learning.
         x = transcription.code(state)
         best = [int(index) for index in agent.act(state)]
         assert transcription.value(x, best) == transcription.best_value(x)
         for learner in (agent, transcription):
-            learner.learn(state, action, reward, next_state, end == "terminal")
+            learner.learn(state, action, reward, next_state, end == "terminal", dt)
             if end == "limit":
                 learner.begin_episode()
         assert readout.exponent == transcription.exponent

@@ -66,6 +66,15 @@ def test_the_exponential_is_within_07_units_of_the_last_place():
     assert worst_ulp(_core.exp(subnormal), exact) < 1.0
 
 
+def test_powers_have_relative_errors_that_grow_with_the_logarithm_of_the_result():
+    rng = np.random.default_rng(6)
+    base, exponent = rng.uniform(0.0, 1.0, 4000), 10.0 ** rng.uniform(-3.0, 2.0, 4000)
+    for b, e, power in zip(base, exponent, _core.power(base, exponent), strict=True):
+        exact = mpmath.mpf(float(b)) ** mpmath.mpf(float(e))
+        if power > 1e-300:
+            assert abs(float(power) / exact - 1) < (2 + abs(mpmath.log(exact))) * 2.0**-52
+
+
 def test_the_arctangent_is_within_15_units_of_the_last_place():
     rng = np.random.default_rng(5)
     y, x = rng.uniform(-1.0, 1.0, (2, 6000))

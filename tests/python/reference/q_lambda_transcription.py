@@ -30,6 +30,39 @@ def random_transitions(seed, n_steps, n_actions, scale):
         state = next_state if end == "none" else rng.random(2)
 
 
+def random_durations(seed, are_usual):
+    """Yield numbers of usual steps, whole ones and others."""
+    rng = np.random.default_rng(seed)
+    while True:
+        yield 1.0 if are_usual else float(rng.choice([1.0, 2.0, 5.0, 0.3, rng.uniform(0.001, 20)]))
+
+
+class VariableDiscount:
+    """The discount of a transition, by its duration, and that by which traces decay."""
+
+    def __init__(self, settings: Any) -> None:
+        self.settings, self.usual = settings, settings.discount
+        self.of_trace = self.usual
+
+    def set(self, dt: float) -> None:
+        """Begin a transition."""
+        self.settings.discount = self.usual**dt
+
+    def end(self) -> None:
+        """End it: traces decay by its discount in the next one."""
+        self.of_trace = self.settings.discount
+
+    def in_traces(self, update: Any) -> Any:
+        """Wrap a function that decays a trace."""
+
+        def call(*arguments: Any) -> None:
+            present, self.settings.discount = self.settings.discount, self.of_trace
+            update(*arguments)
+            self.settings.discount = present
+
+        return call
+
+
 class Code:
     """A code of `n_columns` features that `code_of(state)` returns."""
 
@@ -48,6 +81,8 @@ class QLambda(page.QLambda):
         settings = SimpleNamespace(**vars(page.Settings()) | options)
         self.window, self.transition = window, None
         super().__init__(code, [n + window - 1 for n in n_actions], settings)
+        self.discount = VariableDiscount(settings)
+        self.dt = 1.0
 
     def rows(self, action: Any) -> Any:
         return np.add.outer(super().rows(action), range(self.window)).ravel()
@@ -60,8 +95,11 @@ class QLambda(page.QLambda):
             self.learn_pending(lambda: self.best_value(self.code(self.next_state)))
         super().begin_episode()
 
-    def learn(self, state: Any, action: Any, reward: float, next_state: Any, ends: bool) -> None:
+    def learn(
+        self, state: Any, action: Any, reward: float, next_state: Any, ends: bool, dt: float = 1.0
+    ) -> None:
         if self.settings.bootstrap == "q_learning":
+            self.dt = dt
             super().learn(state, action, reward, next_state, ends)
             return
         x = self.code(state)
@@ -72,7 +110,7 @@ class QLambda(page.QLambda):
                 self.begin_episode()
         self.fit_unit(reward)
         self.n_learned += 1
-        self.transition, self.next_state = (x, action, reward), next_state
+        self.transition, self.next_state, self.dt = (x, action, reward), next_state, dt
         if ends:
             self.learn_pending(lambda: 0)
             self.end_trace()
@@ -85,15 +123,17 @@ class QLambda(page.QLambda):
         self.transition = None
 
     def correct(self, x: Any, action: Any, reward: float, next_value: int) -> None:
+        self.discount.set(self.dt)
         if self.settings.traces == "replacing":
             while abs(self.value(x, action)) >= 2**33:
                 self.double_unit()
                 next_value = page.rounded(next_value, 1)
             self.old_value = self.value(x, action)  # without a correction along the features
         super().correct(x, action, reward, next_value)
+        self.discount.end()
 
     def update_trace(self, x: Any, rows: Any, rate: int) -> None:
-        super().update_trace(x, rows, rate)
+        self.discount.in_traces(super().update_trace)(x, rows, rate)
         if self.settings.traces == "replacing":
             active = np.ix_(rows, np.flatnonzero(x))
             self.trace[active] = 2**12 * x[x != 0]

@@ -15,6 +15,7 @@
 #include "sdnn/agents/detail/error_scale.hpp"
 #include "sdnn/agents/detail/linear_td.hpp"
 #include "sdnn/agents/detail/q_lambda_episode.hpp"
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/exploration.hpp"
 #include "sdnn/agents/schedule_config.hpp"
@@ -139,19 +140,22 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     return mean_offset(workspace_, d, action);
   }
 
-  /// Learns one transition. Traces are reset if it does not begin in the state in which the last
-  /// one ended. Throws std::invalid_argument for a reward that is not finite or beyond +- 1e300, or
-  /// an environment that does not exist; then nothing has been learned.
+  /// Learns one transition of dt usual steps. Traces are reset if it does not begin in the state in
+  /// which the last one ended. Throws std::invalid_argument for a reward that is not finite or
+  /// beyond +- 1e300, an impossible dt, or an environment that does not exist; then nothing has
+  /// been learned.
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
-             ActionMask next_mask = {}) {
+             ActionMask next_mask = {}, double dt = 1.0) {
     require_transition(state, action, reward, next_state, next_mask);
+    require_duration(dt);
     Episode& episode = episodes_.of(environment);
     if (!std::ranges::equal(episode.next_state, state)) {
       if (!episode.has_acted) episode.mask.clear();
       end(episode);
     }
     episode.has_acted = false;
+    episode.dt = dt;
     critic().read_next(state, episode.next);  // as acting left it
     std::swap(episode.present, episode.next);
     critic().read_next(next_state, episode.next);
@@ -239,6 +243,8 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     std::vector<std::uint8_t> mask;  ///< of the present state
     bool has_acted = false;          ///< since the last transition: the mask is that of the act
     std::int64_t old_value = 0;      ///< V_old, in units
+    double dt = 1.0;                 ///< the duration of the transition that is learned
+    double trace_dt = 1.0;           ///< that of the one before, see LinearTD
   };
 
   Episode new_episode() const {
@@ -255,6 +261,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     archive.part("trace", episode.trace);
     archive.part("actor_trace", episode.actor_trace);
     archive.number("old_value", episode.old_value);
+    serialize_duration("trace_dt", episode.trace_dt, archive);
     archive.numbers("next_state", episode.next_state);
     archive.number("has_acted", episode.has_acted);
     serialize_mask("mask", episode.mask, archive, self.n_dimensions(),
@@ -311,6 +318,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     episode.trace.clear();
     episode.actor_trace.clear();
     episode.old_value = 0;
+    episode.dt = episode.trace_dt = 1.0;
     episode.next_state.clear();
   }
 
@@ -325,7 +333,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
                  {.error = scale_.normalized(error.error, critic().exponent().value_or(0)),
                   .rate = actor_rate_,
                   .entropy = static_cast<std::int32_t>(std::lround(config_.entropy * kOne)),
-                  .decay = td_.decay()});
+                  .decay = td_.decay(episode)});
     td_.correct(episode, episodes_, kOnlyAction, error, rate_, is_dutch);
   }
 

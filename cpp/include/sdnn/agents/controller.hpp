@@ -21,6 +21,7 @@
 #include "sdnn/agents/detail/greedy_action.hpp"
 #include "sdnn/agents/detail/last_states.hpp"
 #include "sdnn/agents/detail/taken_actions.hpp"
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/exploration.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/history.hpp"
@@ -247,25 +248,27 @@ class Controller : public WithRates<Controller> {
   /// Learns a transition, unless its reward is far larger than the recent ones; see RewardScale.
   /// The action may be any action of the task; in a box, the agent's nearest action is learned.
   /// Fuzzy Q-learning accepts only the action of the last act with `explore` in the environment.
-  /// `next_mask` restricts the actions of the next state. Throws std::invalid_argument for unusable
+  /// `next_mask` restricts the actions of the next state; dt is the duration in usual steps, after
+  /// which gamma^dt remains of the next state's value. Throws std::invalid_argument for unusable
   /// arguments, and then nothing has changed; std::overflow_error for a weight beyond its range.
   void learn(std::span<const double> observation, std::span<const double> action, double reward,
              std::span<const double> next_observation, bool terminated, std::size_t environment = 0,
-             ActionMask next_mask = {}) {
+             ActionMask next_mask = {}, double dt = 1.0) {
     if (terminated) next_mask = {};
     actions_.require_mask("next_mask", next_mask);
     core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
+    require_duration(dt);
     require_environment(environment);
     const auto held = readings_.filled(observation, next_observation, environment);
     if (warm_up_) {
       remember({false, environment, observation, action, reward, next_observation, terminated,
-                next_mask, warm_up_->has_acted(environment)});
+                next_mask, warm_up_->has_acted(environment), dt});
       return;
     }
     last_states_.start(observations_, environment, held.observation, state_);
     find_indices(action, environment);
     last_states_.follow(observations_, environment, action, held.next_observation, next_state_);
-    learn_scaled(reward, terminated, environment, next_mask, has_acted(environment));
+    learn_scaled(reward, terminated, environment, next_mask, has_acted(environment), dt);
     readings_.note_step(environment);
     notes_.note(observation);
     const WarmUp::Step step{false,  environment,      observation, action,
@@ -276,7 +279,7 @@ class Controller : public WithRates<Controller> {
   /// Throws what learn would for a transition that cannot be learned; changes nothing.
   void check(std::span<const double> observation, std::span<const double> action, double reward,
              std::span<const double> next_observation, bool terminated, std::size_t environment,
-             ActionMask next_mask) const;
+             ActionMask next_mask, double dt = 1.0) const;
 
   /// Ends a warm-up in which a teacher acted. Ranges extend beyond the observations by twice their
   /// width on each side, because the agent will leave the teacher's path.
@@ -410,7 +413,7 @@ class Controller : public WithRates<Controller> {
 
   bool has_acted(std::size_t environment) const;
   void learn_scaled(double reward, bool terminated, std::size_t environment, ActionMask next_mask,
-                    bool is_own);
+                    bool is_own, double dt);
 
   ControllerConfig config_;
   std::vector<coding::PatternTable> tables_;

@@ -11,6 +11,7 @@
 #include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/detail/dimensions.hpp"
 #include "sdnn/agents/detail/fuzzy_dimension.hpp"
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/fuzzy_q_learning_config.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/core/detail/check.hpp"
@@ -32,7 +33,8 @@ namespace sdnn::agents {
 /// Eligibility traces (trace_decay = lambda > 0; not used in the paper): e(i, a) *= gamma lambda
 /// for all, e(i, a_i) += alpha_i for the picks, then v += c_fql (r + gamma V - Q) e everywhere.
 /// Traces accumulate, a random pick does not cut them, they end with the episode, and one below
-/// kForgottenTrace is forgotten.
+/// kForgottenTrace is forgotten. In a transition of dt usual steps gamma is gamma^dt, also where it
+/// fades the traces, at the transition after it.
 ///
 /// An agent may learn in several environments at once, numbered from 0: what belongs to an episode
 /// (the last exploring act, the traces, the number of steps) is then kept for each.
@@ -179,15 +181,16 @@ class FuzzyQLearning {
     return workspace.action;
   }
 
-  /// Learns the transition that began with the last exploring act in the environment.
+  /// Learns the transition, of dt usual steps, that began with the last exploring act in the
+  /// environment.
   ///
   /// Throws std::invalid_argument, and learns nothing, if `state` and `action` are not those of
   /// that act, the only one of which it is known which rule picked which action; also for a bad
-  /// next state or a reward that is not finite. Throws std::overflow_error if a value would exceed
-  /// the range of floats; earlier dimensions have learned then.
+  /// next state, a reward that is not finite or an impossible dt. Throws std::overflow_error if a
+  /// value would exceed the range of floats; earlier dimensions have learned then.
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
-             ActionMask /*next_mask*/ = {}) {
+             ActionMask /*next_mask*/ = {}, double dt = 1.0) {
     core::require_size("action", action.size(), n_dimensions(), "numbers");
     core::require(explored_in(state, environment), "state", "that of the last exploring act",
                   "another");
@@ -196,8 +199,9 @@ class FuzzyQLearning {
                     "that of the last exploring act", action[d]);
     }
     core::require_finite("reward", reward);
+    require_duration(dt);
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
-      dimensions_[d].learn(reward, next_state, terminated, environment, workspace_.fired[d]);
+      dimensions_[d].learn(reward, next_state, terminated, environment, workspace_.fired[d], dt);
     }
   }
 

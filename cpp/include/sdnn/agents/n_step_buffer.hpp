@@ -10,18 +10,20 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/core/detail/floating_point.hpp"
 
 namespace sdnn::agents {
 
-/// A queue of up to n steps (state, action, reward) of an episode, the oldest first. Only the
-/// constructor allocates. An action has `n_dimensions` numbers.
+/// A queue of up to n steps (state, action, reward, duration) of an episode, the oldest first. Only
+/// the constructor allocates. An action has `n_dimensions` numbers.
 class NStepBuffer {
  public:
   struct Step {
     std::vector<double> state;
     std::vector<std::size_t> action;
     double reward = 0.0;
+    double dt = 1.0;
   };
 
   NStepBuffer(std::size_t n_steps, std::size_t n_inputs, std::size_t n_dimensions)
@@ -43,20 +45,23 @@ class NStepBuffer {
 
   /// Requires room for it, and shapes as in the constructor.
   void add(std::span<const double> state, std::span<const std::size_t> action, double reward,
-           std::span<const double> next_state) noexcept {
+           std::span<const double> next_state, double dt = 1.0) noexcept {
     assert(!is_full());
     Step& newest = steps_[(first_ + n_steps_) % steps_.size()];
     std::ranges::copy(state, newest.state.begin());
     std::ranges::copy(action, newest.action.begin());
     newest.reward = reward;
+    newest.dt = dt;
     std::ranges::copy(next_state, next_state_.begin());
     ++n_steps_;
   }
 
-  /// The return of the oldest step: all rewards since, discounted, then `value`.
+  /// The return of the oldest step: all rewards since, discounted by `discount` for each usual step
+  /// of time, then `value`.
   double return_of_oldest(double value, double discount) const noexcept {
     for (std::size_t i = n_steps_; i-- > 0;) {
-      value = steps_[(first_ + i) % steps_.size()].reward + discount * value;
+      const Step& step = steps_[(first_ + i) % steps_.size()];
+      value = step.reward + discount_over(discount, step.dt) * value;
     }
     return value;
   }
@@ -83,16 +88,19 @@ class NStepBuffer {
   static void serialize(Self& self, Archive& archive) {
     std::vector<double> states;
     std::vector<std::int64_t> actions;
-    std::vector<double> rewards;
+    std::vector<double> rewards, dts;
     for (std::size_t i = 0; i < self.n_steps_; ++i) {
       const Step& step = self.steps_[(self.first_ + i) % self.steps_.size()];
       states.insert(states.end(), step.state.begin(), step.state.end());
       for (const std::size_t a : step.action) actions.push_back(static_cast<std::int64_t>(a));
       rewards.push_back(step.reward);
+      dts.push_back(step.dt);
     }
+    if (std::ranges::count(dts, 1.0) == std::ssize(dts)) dts.clear();  // all are usual
     archive.numbers("states", states);
     archive.numbers("actions", actions);
     archive.numbers("rewards", rewards);
+    archive.some_numbers("dts", dts);
     archive.fixed("next_state", {self.next_state_.size()}, self.next_state_);
     if constexpr (Archive::kReads) {
       const std::size_t n_inputs = self.next_state_.size();
@@ -106,6 +114,9 @@ class NStepBuffer {
       const auto is_index = [](std::int64_t a) { return std::in_range<std::size_t>(a); };
       archive.expect(std::ranges::all_of(actions, is_index), "actions", "of actions");
       archive.expect(std::ranges::all_of(rewards, is_finite), "rewards", "finite");
+      archive.expect(dts.empty() || dts.size() == n, "dts", "one per reward, or none");
+      archive.expect(std::ranges::all_of(dts, is_duration), "dts", "in [0.001, 1000000]");
+      dts.resize(n, 1.0);
       archive.expect(std::ranges::all_of(states, is_unit), "states", "in [0, 1]");
       archive.expect(std::ranges::all_of(self.next_state_, is_unit), "next_state", "in [0, 1]");
       self.first_ = 0;
@@ -117,6 +128,7 @@ class NStepBuffer {
           self.steps_[i].action[d] = static_cast<std::size_t>(actions[i * n_dimensions + d]);
         }
         self.steps_[i].reward = rewards[i];
+        self.steps_[i].dt = dts[i];
       }
     }
   }

@@ -17,6 +17,7 @@
 #include "sdnn/agents/detail/imitation.hpp"
 #include "sdnn/agents/detail/linear_td.hpp"
 #include "sdnn/agents/detail/q_lambda_episode.hpp"
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/exploration.hpp"
 #include "sdnn/agents/q_lambda_config.hpp"
@@ -41,7 +42,8 @@ namespace sdnn::agents {
 /// the state where it ended, or the episode ends. Q' is 0 after a terminated transition, and the
 /// best value at any other end of an episode. With replacing traces, z is x where x is not 0, and w
 /// moves along z alone. A step with alpha = 1 corrects the whole error of a new state; it never
-/// overshoots, because <z, x> is bounded.
+/// overshoots, because <z, x> is bounded. In a transition of dt usual steps gamma is gamma^dt, also
+/// where it decays the trace, at the transition after it; see LinearTD.
 ///
 /// After the scaling of observations everything is an integer: alpha and epsilon in steps of 2^-16,
 /// gamma of 2^-15, gamma lambda of 2^-13, traces of 2^-12, values and weights in the readout's
@@ -128,14 +130,15 @@ class QLambda : public IndexAgent<QLambda> {
     take_values(workspace.readout, workspace.values, true);
   }
 
-  /// Learns one transition; with Sarsa it is pending until the next action is known, unless it
-  /// terminated. `next_mask` restricts the actions of the next state. Throws std::invalid_argument
-  /// for a reward that is not finite or beyond +- 1e300, or an environment that does not exist;
-  /// then nothing has been learned.
+  /// Learns one transition of dt usual steps; with Sarsa it is pending until the next action is
+  /// known, unless it terminated. `next_mask` restricts the actions of the next state. Throws
+  /// std::invalid_argument for a reward that is not finite or beyond +- 1e300, an impossible dt, or
+  /// an environment that does not exist; then nothing has been learned.
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
-             ActionMask next_mask = {}) {
+             ActionMask next_mask = {}, double dt = 1.0) {
     require_transition(state, action, reward, next_state, next_mask);
+    require_duration(dt);
     Episode& episode = episodes_.of(environment);
     if (episode.waits && !std::ranges::equal(episode.next_state, state)) finish_at_end(episode);
     readout().read_next(state, episode.next);
@@ -146,6 +149,7 @@ class QLambda : public IndexAgent<QLambda> {
     episode.reward = reward;
     episode.next_state.assign(next_state.begin(), next_state.end());
     episode.next_mask.assign(next_mask.begin(), next_mask.end());
+    episode.dt = dt;
     episode.waits = true;
     if (reward != 0.0 && lacks_rewards()) exploration_.note_first_reward(n_learned_ - n_logged_);
     td_.fit_unit(reward, episodes_);
@@ -355,6 +359,7 @@ class QLambda : public IndexAgent<QLambda> {
   static void end(Episode& episode) noexcept {
     episode.trace.clear();
     episode.old_value = 0;
+    episode.dt = episode.trace_dt = 1.0;
     episode.waits = false;
   }
 

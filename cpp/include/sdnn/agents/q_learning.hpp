@@ -13,6 +13,7 @@
 
 #include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/detail/dimensions.hpp"
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/exploration.hpp"
@@ -47,6 +48,9 @@ namespace sdnn::agents {
 /// Targets are not corrected for actions taken at random in between. Source: Watkins, C. (1989).
 /// Learning from delayed rewards (corrected n-step returns); Sutton, R., Barto, A. (2018).
 /// Reinforcement learning, section 7.1.
+///
+/// In a transition of dt usual steps gamma is gamma^dt (semi-Markov). Source: Bradtke, S., Duff, M.
+/// (1994). Reinforcement learning methods for continuous-time Markov decision problems.
 ///
 /// An agent may learn in several environments at once, numbered from 0. Each has a separate episode
 /// (its pending steps, repeated action, number of steps and rewards); everything else is shared.
@@ -147,18 +151,20 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     for (std::size_t d = 0; d < n_dimensions(); ++d) read(state, workspace, d, true);
   }
 
-  /// Learns one transition; `next_mask` restricts the actions of the next state. Throws
-  /// std::invalid_argument for a reward that is not finite or beyond +- 1e300, or an environment
-  /// that does not exist; then nothing has been learned. Throws std::overflow_error if a weight of
-  /// the approximator would leave its range; then the transition may have been learned in part.
+  /// Learns one transition of dt usual steps; `next_mask` restricts the actions of the next state.
+  /// Throws std::invalid_argument for a reward that is not finite or beyond +- 1e300, an impossible
+  /// dt, or an environment that does not exist; then nothing has been learned. Throws
+  /// std::overflow_error if a weight of the approximator would leave its range; then the transition
+  /// may have been learned in part.
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
-             ActionMask next_mask = {}) {
+             ActionMask next_mask = {}, double dt = 1.0) {
     // Refuses at once what could not be learned: a correction may come later.
     this->require_transition(state, action, reward, next_state, next_mask);
+    require_duration(dt);
     Episode& episode = episodes_.of(environment);
     if constexpr (kHasRange) {
-      if (adapts_range() && range_.note(reward, terminated, episode.rewards)) {
+      if (adapts_range() && range_.note(reward, terminated, episode.rewards, dt)) {
         for (Q& network : networks_) network.set_output_range(range_.low(), range_.high());
       }
     }
@@ -166,7 +172,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     const double next_value = terminated ? 0.0 : state_value(next_state, next_mask);
     NStepBuffer& buffer = episode.buffer;
     if (!buffer.is_continued_by(state)) learn_waiting(episode);
-    buffer.add(state, action, reward, next_state);
+    buffer.add(state, action, reward, next_state, dt);
     episode.next_mask.assign(next_mask.begin(), next_mask.end());
     if (terminated) {
       learn_all(buffer, 0.0);

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/core/detail/floating_point.hpp"
 
 namespace sdnn::agents {
@@ -33,31 +34,39 @@ class ReturnRange {
   /// The rewards of one environment.
   struct Rewards {
     std::vector<double> waiting;  ///< the first n are rewards whose returns are not known yet
+    std::vector<double> dts;      ///< the durations of their transitions
     std::size_t n = 0;
     double sum = 0.0;  ///< z
   };
 
   explicit ReturnRange(double discount) : discount_(discount) { returns_.reserve(kMostReturns); }
 
-  Rewards no_rewards() const { return {std::vector<double>(2 * horizon()), 0, 0.0}; }
+  Rewards no_rewards() const {
+    const std::size_t n = 2 * horizon();
+    return {std::vector<double>(n), std::vector<double>(n, 1.0), 0, 0.0};
+  }
 
   /// Whether there was a reward other than 0: until then the range is empty.
   bool is_known() const noexcept { return low_ < high_; }
   double low() const noexcept { return low_; }
   double high() const noexcept { return high_; }
 
-  /// Notes an environment's next reward, a finite one; returns whether the range has moved.
-  bool note(double reward, bool terminated, Rewards& rewards) noexcept {
-    rewards.sum = clipped(reward + discount_ * rewards.sum);
+  /// Notes an environment's next reward, a finite one, of a transition of dt usual steps; returns
+  /// whether the range has moved.
+  bool note(double reward, bool terminated, Rewards& rewards, double dt = 1.0) noexcept {
+    rewards.sum = clipped(reward + discount_over(discount_, dt) * rewards.sum);
     const bool grows = (n_returns_ < kFewReturns || !is_known()) && hold(rewards.sum);
     if (terminated) rewards.sum = 0.0;
+    rewards.dts[rewards.n] = dt;
     rewards.waiting[rewards.n++] = reward;
     if (!terminated && rewards.n < rewards.waiting.size()) return grows;
     const std::size_t n_known = terminated ? rewards.n : rewards.n - horizon();
-    note_returns(std::span(rewards.waiting).first(rewards.n), n_known, terminated);
-    std::copy(rewards.waiting.begin() + static_cast<std::ptrdiff_t>(n_known),
-              rewards.waiting.begin() + static_cast<std::ptrdiff_t>(rewards.n),
-              rewards.waiting.begin());
+    note_returns(rewards, n_known, terminated);
+    for (std::vector<double>* const numbers : {&rewards.waiting, &rewards.dts}) {
+      const auto first = numbers->begin();
+      std::copy(first + static_cast<std::ptrdiff_t>(n_known),
+                first + static_cast<std::ptrdiff_t>(rewards.n), first);
+    }
     rewards.n -= n_known;
     return follow() || grows;
   }
@@ -89,14 +98,22 @@ class ReturnRange {
   void serialize_rewards(Listed& rewards, Archive& archive) const {
     const auto first = rewards.waiting.begin();
     std::vector<double> waiting(first, first + static_cast<std::ptrdiff_t>(rewards.n));
+    const auto first_dt = rewards.dts.begin();
+    std::vector<double> dts(first_dt, first_dt + static_cast<std::ptrdiff_t>(rewards.n));
+    if (std::ranges::count(dts, 1.0) == std::ssize(dts)) dts.clear();  // all are usual
     archive.number("sum", rewards.sum);
     archive.numbers("rewards", waiting);
+    archive.some_numbers("dts", dts);
     if constexpr (Archive::kReads) {
       archive.expect(is_sum(rewards.sum), "sum", "a finite sum");
       const std::size_t most = rewards.waiting.size();
       archive.expect(waiting.empty() || waiting.size() < most, "rewards", "as few as can wait");
       archive.expect(std::ranges::all_of(waiting, is_sum), "rewards", "finite");
+      archive.expect(dts.empty() || dts.size() == waiting.size(), "dts", "one per reward, or none");
+      archive.expect(std::ranges::all_of(dts, is_duration), "dts", "in [0.001, 1000000]");
+      dts.resize(waiting.size(), 1.0);
       std::ranges::copy(waiting, rewards.waiting.begin());
+      std::ranges::copy(dts, rewards.dts.begin());
       rewards.n = waiting.size();
     }
   }
@@ -135,13 +152,14 @@ class ReturnRange {
   }
 
   /// Computes the returns of the first n_known rewards; `are_all` that the episode has.
-  void note_returns(std::span<const double> rewards, std::size_t n_known, bool are_all) {
+  void note_returns(const Rewards& rewards, std::size_t n_known, bool are_all) {
     const double width = n_returns_ < kFewReturns ? kLargest : high_ - low_;
     const double low = clipped(low_ - width), high = clipped(high_ + width);
     double sum = 0.0, missing = 1.0;
-    for (std::size_t i = rewards.size(); i-- > 0;) {
-      sum = std::clamp(rewards[i] + discount_ * sum, low, high);
-      missing *= discount_;
+    for (std::size_t i = rewards.n; i-- > 0;) {
+      const double discount = discount_over(discount_, rewards.dts[i]);
+      sum = std::clamp(rewards.waiting[i] + discount * sum, low, high);
+      missing *= discount;
       if (i < n_known) note_return(are_all || missing == 1.0 ? sum : sum / (1.0 - missing));
     }
   }

@@ -43,7 +43,7 @@ class SavedAgent {
 
   void learn(std::span<const double> observation, std::span<const double> action, double reward,
              std::span<const double> next_observation, bool terminated, std::size_t environment = 0,
-             Mask next_mask = {});
+             Mask next_mask = {}, double dt = 1.0);
 
  private:
   std::unique_ptr<AgentFile> file_;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "sdnn/agents/action_mask.hpp"
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/pcg64.hpp"
@@ -35,6 +36,7 @@ class WarmUp {
     bool terminated;
     ActionMask next_mask = {};
     bool is_own = true;  ///< of an episode in which the agent acted
+    double dt = 1.0;     ///< its duration in usual steps
   };
 
   /// Where an agent cannot learn any transition, a warm-up is not over between acting and learning.
@@ -107,6 +109,7 @@ class WarmUp {
     };
     note_mask(step.next_mask);
     note_origin(step.is_own);
+    note_duration(step.dt);
     append(observations_, step.observation);
     append(next_observations_, step.next_observation);
     append(actions_, step.action);
@@ -137,7 +140,8 @@ class WarmUp {
             row(next_observations_, n_variables_),
             terminated_[t] != 0,
             std::span(next_masks_).subspan(t * mask_size(), mask_size()),
-            logged_.empty() || logged_[t] == 0};
+            logged_.empty() || logged_[t] == 0,
+            dts_.empty() ? 1.0 : dts_[t]};
   }
 
   template <class Self, class Archive>
@@ -149,6 +153,7 @@ class WarmUp {
     archive.numbers("terminated", self.terminated_);
     archive.some_numbers("next_masks", self.next_masks_);
     archive.some_numbers("logged", self.logged_);
+    archive.some_numbers("dts", self.dts_);
     archive.numbers("begins", self.begins_);
     archive.numbers("environments", self.environments_);
     archive.part("random", self.random_);
@@ -212,6 +217,13 @@ class WarmUp {
     logged_.push_back(is_own ? 0 : 1);
   }
 
+  /// Appends the duration of the next transition; all were usual where the list is empty.
+  void note_duration(double dt) {
+    if (dt == 1.0 && dts_.empty()) return;
+    dts_.resize(size(), 1.0);
+    dts_.push_back(dt);
+  }
+
   template <class Archive>
   void check(Archive& archive) const {
     const std::size_t n = size();
@@ -222,6 +234,8 @@ class WarmUp {
     archive.expect(terminated_.size() == n, "terminated", "one per reward");
     archive.expect(next_masks_.size() == n * mask_size(), "next_masks", "as many of every reward");
     archive.expect(logged_.empty() || logged_.size() == n, "logged", "one per reward, or none");
+    archive.expect(dts_.empty() || dts_.size() == n, "dts", "one per reward, or none");
+    archive.expect(std::ranges::all_of(dts_, is_duration), "dts", "in [0.001, 1000000]");
     archive.expect(begins_.size() == n, "begins", "one per reward");
     archive.expect(environments_.size() == n, "environments", "one per reward");
     archive.expect(!is_over(), "rewards", "fewer than the warm-up's steps");
@@ -235,7 +249,7 @@ class WarmUp {
   std::size_t n_variables_, n_dimensions_, n_steps_;
   bool learns_any_transition_;
   core::Pcg64 random_, evaluation_;
-  std::vector<double> observations_, next_observations_, actions_, rewards_;
+  std::vector<double> observations_, next_observations_, actions_, rewards_, dts_;
   std::vector<std::uint8_t> terminated_, begins_, next_masks_, logged_;
   std::vector<std::int64_t> environments_;
   Episodes<Episode> episodes_;

@@ -176,6 +176,11 @@ inline double exp(double x) noexcept {
          std::bit_cast<double>((biased - half) << 52);
 }
 
+/// base^exponent of a base that is not negative, as e^(exponent log base).
+///
+/// Relative error: about (2 + |exponent log base|) 2^-52.
+inline double power(double base, double exponent) noexcept { return exp(exponent * log(base)); }
+
 /// The angle of the point (x, y), from -pi to pi: atan2 of the C library with the same bits
 /// everywhere, signs of zeros, infinities and NaN included.
 ///

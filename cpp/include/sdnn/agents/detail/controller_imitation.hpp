@@ -8,6 +8,7 @@
 
 #include "sdnn/agents/action_mask.hpp"
 #include "sdnn/agents/controller.hpp"
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/exploration.hpp"
 #include "sdnn/core/detail/check.hpp"
 
@@ -15,10 +16,11 @@ namespace sdnn::agents {
 
 inline void Controller::check(std::span<const double> observation, std::span<const double> action,
                               double reward, std::span<const double> next_observation,
-                              bool terminated, std::size_t environment,
-                              ActionMask next_mask) const {
+                              bool terminated, std::size_t environment, ActionMask next_mask,
+                              double dt) const {
   actions_.require_mask("next_mask", terminated ? ActionMask() : next_mask);
   core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
+  require_duration(dt);
   require_environment(environment);
   observations_.require_readings("observation", observation);
   actions_.require_action(action);
@@ -44,7 +46,7 @@ inline bool Controller::has_acted(std::size_t environment) const {
 
 /// Learns the transition in state_, indices_ and next_state_.
 inline void Controller::learn_scaled(double reward, bool terminated, std::size_t environment,
-                                     ActionMask next_mask, bool is_own) {
+                                     ActionMask next_mask, bool is_own, double dt) {
   RewardScale scale = reward_scale_;  // unchanged if the agent throws
   if (!scale.accepts(reward)) {
     reward_scale_ = scale;
@@ -53,7 +55,7 @@ inline void Controller::learn_scaled(double reward, bool terminated, std::size_t
   std::visit(
       [&](auto& agent) {
         agent.learn(state_, learned_action(agent, environment), reward, next_state_, terminated,
-                    environment, next_mask);
+                    environment, next_mask, dt);
         if constexpr (requires { agent.note_logged(); }) {
           if (!is_own) agent.note_logged();
         }

@@ -232,7 +232,8 @@ inline void Controller::replay(const WarmUp::Step& step, LastReadings& readings)
   for (std::size_t d = 0; d < n_dimensions(); ++d) {
     indices_[d] = actions_.index_of(step.action[d], d);
   }
-  learn_scaled(step.reward, step.terminated, step.environment, step.next_mask, step.is_own);
+  learn_scaled(step.reward, step.terminated, step.environment, step.next_mask, step.is_own,
+               step.dt);
 }
 
 template <class Archive>

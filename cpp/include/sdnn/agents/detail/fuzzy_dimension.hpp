@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/fuzzy_q_learning_config.hpp"
@@ -71,7 +72,7 @@ class FuzzyDimension {
   void begin_episode(std::size_t environment) {
     Episode& episode = episodes_.of(environment);
     episode.step = 0;
-    episode.traces.clear();
+    end_traces(episode);
   }
 
   /// Returns the number to take in `state`, and remembers both for `learn`. Throws
@@ -105,16 +106,16 @@ class FuzzyDimension {
         fired, [&](std::size_t i) -> double { return best_value(rules_.values(fired.rules[i])); });
   }
 
-  /// Learns the outcome of the last exploring act in the environment from the reward and the value
-  /// of the next state, which is 0 if the episode terminated. Throws std::overflow_error, and
-  /// learns nothing, if a value would exceed the range of floats.
+  /// Learns the outcome of the last exploring act in the environment, after dt usual steps, from
+  /// the reward and the value of the next state, which is 0 if the episode terminated. Throws
+  /// std::overflow_error, and learns nothing, if a value would exceed the range of floats.
   void learn(double reward, std::span<const double> next_state, bool terminated,
-             std::size_t environment, approximators::FiredRules& fired) {
+             std::size_t environment, approximators::FiredRules& fired, double dt) {
     Episode& episode = episodes_.of(environment);
     double target = reward;
     if (!terminated) {
       rules_.fire(next_state, fired);
-      target += config_.discount * value(fired);
+      target += discount_over(config_.discount, dt) * value(fired);
     }
     const double value_of_picks = mean_over(episode.fired, [&](std::size_t i) -> double {
       return rules_.value(episode.fired.rules[i], episode.picked[i]);
@@ -132,7 +133,8 @@ class FuzzyDimension {
     for (const Trace& trace : episode.traces) {
       rules_.set_value(trace.rule, trace.action, static_cast<float>(moved(trace, step)));
     }
-    if (terminated) episode.traces.clear();
+    episode.trace_dt = dt;
+    if (terminated) end_traces(episode);
   }
 
   template <class Self, class Archive>
@@ -168,8 +170,14 @@ class FuzzyDimension {
     std::vector<std::size_t> picked;
     double action = 0.0;
     std::vector<Trace> traces;
+    double trace_dt = 1.0;  ///< the time by which the traces have still to fade
     int step = 0;
   };
+
+  static void end_traces(Episode& episode) noexcept {
+    episode.traces.clear();
+    episode.trace_dt = 1.0;
+  }
 
   /// With room for whatever may come: a copy has none.
   Episode new_episode() const {
@@ -197,6 +205,7 @@ class FuzzyDimension {
     }
     archive.numbers("traced", traced);
     archive.numbers("eligibilities", eligibilities);
+    serialize_duration("trace_dt", listed.trace_dt, archive);
     if constexpr (Archive::kReads) self.take(archive, listed, picked, traced, eligibilities);
   }
 
@@ -215,6 +224,7 @@ class FuzzyDimension {
     episode.step = read.step;
     episode.state = read.state;
     episode.action = read.action;
+    episode.trace_dt = read.trace_dt;
     if (!picked.empty()) {
       rules_.fire(episode.state, episode.fired);
       archive.expect(picked.size() == episode.fired.size(), "picked", "one per rule that fired");
@@ -281,11 +291,18 @@ class FuzzyDimension {
     return static_cast<double>(rules_.value(trace.rule, trace.action)) + step * trace.eligibility;
   }
 
-  // Fades the old traces and adds those of the picks, which are of different rules.
+  // Fades the old traces and adds those of the picks, which are of different rules. After short
+  // transitions there may be more traces than there is room for: the oldest are forgotten.
   void renew_traces(Episode& episode) {
     std::vector<Trace>& traces = episode.traces;
-    for (Trace& trace : traces) trace.eligibility *= fading();
+    const double faded = discount_over(config_.discount, episode.trace_dt) * config_.trace_decay;
+    for (Trace& trace : traces) trace.eligibility *= faded;
     std::erase_if(traces, [](const Trace& t) { return !(t.eligibility >= kForgottenTrace); });
+    const std::size_t n_most_old = most_traces() - episode.fired.size();
+    if (traces.size() > n_most_old) {
+      const auto n_forgotten = static_cast<std::ptrdiff_t>(traces.size() - n_most_old);
+      traces.erase(traces.begin(), traces.begin() + n_forgotten);
+    }
     const std::size_t n_old = traces.size();
     for (std::size_t i = 0; i < episode.fired.size(); ++i) {
       const std::size_t rule = episode.fired.rules[i], action = episode.picked[i];

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/episodes.hpp"
 #include "sdnn/approximators/detail/linear_rows.hpp"
 #include "sdnn/approximators/linear_sdnn.hpp"
@@ -16,8 +17,17 @@
 namespace sdnn::agents::detail {
 
 /// Temporal-difference learning of a linear readout. An episode has a trace, a workspace for its
-/// present state, and old_value, the Q_old of true-online TD. All numbers are integers: gamma in
-/// units of 2^-15, gamma * lambda in units of 2^-13, values in the readout's unit.
+/// present state, old_value, the Q_old of true-online TD, and the durations of two transitions: dt
+/// of the present one, whose error is learned, and trace_dt of the one before, which the trace has
+/// still to decay by. All numbers are integers: gamma in units of 2^-15, gamma * lambda in units of
+/// 2^-13, values in the readout's unit.
+///
+/// In a transition of dt usual steps gamma is gamma^dt (semi-Markov), in the error as in the decay
+/// of the trace. Lambda is not raised to a power: it says how far targets bootstrap at a decision,
+/// however long that takes. (gamma lambda)^dt, by which credit fades with time, learned no faster
+/// with random durations, and more slowly where long actions are chosen. Source: Bradtke, S., Duff,
+/// M. (1994). Reinforcement learning methods for continuous-time Markov decision problems; Sutton,
+/// R., Barto, A. (2018). Reinforcement learning, section 12.8 (traces with a discount that varies).
 template <class Episode>
 class LinearTD {
  public:
@@ -32,14 +42,17 @@ class LinearTD {
 
   LinearTD(Readout readout, double discount, double trace_decay)
       : readout_(std::move(readout)),
-        discount_(std::lround(discount * static_cast<double>(kDiscountOne))),
-        decay_(static_cast<std::int32_t>(
-            std::lround(discount * trace_decay * approximators::kDecayOne))) {}
+        discount_(discount),
+        trace_decay_(trace_decay),
+        usual_discount_(discount_of(1.0)),
+        usual_decay_(decay_of(1.0)) {}
 
   Readout& readout() noexcept { return readout_; }
   const Readout& readout() const noexcept { return readout_; }
-  /// gamma lambda, kDecayOne for 1.
-  std::int32_t decay() const noexcept { return decay_; }
+  /// The factor by which the trace of an episode is to decay next, kDecayOne for 1.
+  std::int32_t decay(const Episode& episode) const noexcept {
+    return episode.trace_dt == 1.0 ? usual_decay_ : decay_of(episode.trace_dt);
+  }
 
   /// Makes the unit large enough for a reward.
   void fit_unit(double reward, Episodes<Episode>& episodes) {
@@ -67,22 +80,25 @@ class LinearTD {
                  std::int64_t next, bool is_dutch) {
     const std::int64_t value =
         in_range(episodes, [&] { return readout_.sum(episode.present, action); }, &next);
+    const std::int64_t discount = episode.dt == 1.0 ? usual_discount_ : discount_of(episode.dt);
     const std::int64_t target =
-        readout_.units_of(reward) + ((next * discount_ + (kDiscountOne >> 1)) >> kDiscountBits);
+        readout_.units_of(reward) + ((next * discount + (kDiscountOne >> 1)) >> kDiscountBits);
     const std::int64_t drift = is_dutch ? value - episode.old_value : 0;
     episode.old_value = next;
     return {target - value, drift};
   }
 
-  /// Learns the error at a rate, kRateOne for 1.
+  /// Learns the error at a rate, kRateOne for 1, after which the present transition is the one
+  /// before.
   void correct(Episode& episode, Episodes<Episode>& episodes, Action action, Error error,
                std::int32_t rate, bool is_dutch) {
     const int n_doubled = readout_.learn(episode.present.code(), action, episode.trace,
                                          {.error = error.error + error.drift,
                                           .correction = error.drift,
                                           .rate = rate,
-                                          .decay = decay_,
+                                          .decay = decay(episode),
                                           .is_dutch = is_dutch});
+    episode.trace_dt = std::exchange(episode.dt, 1.0);
     halve_old_values(n_doubled, episodes);
   }
 
@@ -100,7 +116,7 @@ class LinearTD {
     if (!readout_.exponent()) return;
     const std::int32_t exponent = *readout_.exponent();
     const std::int64_t n_weights = readout_.n_weights_of(episodes.of(0).present.code());
-    const std::int64_t rest = std::max<std::int64_t>(kDiscountOne - discount_, 1);
+    const std::int64_t rest = std::max<std::int64_t>(kDiscountOne - usual_discount_, 1);
     const int least_bits =
         Readout::most_bits_of(n_weights) - (kDiscountBits - floor_log2(rest)) - kImplausibleBits;
     const int n_free =
@@ -119,6 +135,13 @@ class LinearTD {
   static constexpr int kRoomBits = 8;  ///< that a smaller unit leaves for larger weights
   static constexpr int kImplausibleBits = 10;
 
+  std::int64_t discount_of(double dt) const noexcept {
+    return std::lround(discount_over(discount_, dt) * static_cast<double>(kDiscountOne));
+  }
+  std::int32_t decay_of(double dt) const noexcept {
+    return static_cast<std::int32_t>(
+        std::lround(discount_over(discount_, dt) * trace_decay_ * approximators::kDecayOne));
+  }
   static int floor_log2(std::int64_t x) noexcept {
     return static_cast<int>(std::bit_width(static_cast<std::uint64_t>(x))) - 1;
   }
@@ -133,8 +156,9 @@ class LinearTD {
   }
 
   Readout readout_;
-  std::int64_t discount_;
-  std::int32_t decay_;
+  double discount_, trace_decay_;
+  std::int64_t usual_discount_;
+  std::int32_t usual_decay_;
 };
 
 }  // namespace sdnn::agents::detail

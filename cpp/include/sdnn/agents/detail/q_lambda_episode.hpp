@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sdnn/agents/action_mask.hpp"
+#include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/exploration.hpp"
 #include "sdnn/approximators/linear_sdnn.hpp"
 
@@ -26,6 +27,8 @@ struct QLambdaEpisode {
   std::vector<double> next_state;
   std::vector<std::uint8_t> next_mask;
   std::int64_t old_value = 0;  ///< Q_old, in units
+  double dt = 1.0;             ///< the duration of the transition that is to be learned
+  double trace_dt = 1.0;       ///< that of the one before, see LinearTD
   Exploration::Episode exploration;
 };
 
@@ -37,6 +40,8 @@ void serialize_episode(Readout& readout, const Exploration& exploration, Episode
   archive.number("waits", episode.waits);
   archive.part("trace", episode.trace);
   archive.number("old_value", episode.old_value);
+  serialize_duration("dt", episode.dt, archive);
+  serialize_duration("trace_dt", episode.trace_dt, archive);
   std::vector<std::int64_t> action(episode.action.begin(), episode.action.end());
   archive.numbers("state", episode.state);
   archive.numbers("action", action);

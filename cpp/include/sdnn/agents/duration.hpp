@@ -1,0 +1,43 @@
+/// The duration of a transition, and what a discount becomes in it.
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/elementary.hpp"
+
+namespace sdnn::agents {
+
+/// The limits of a duration dt, in usual steps: those for which discounts are set.
+inline constexpr double kShortestDuration = 1e-3;
+inline constexpr double kLongestDuration = 1e6;
+
+constexpr bool is_duration(double dt) noexcept {
+  return dt >= kShortestDuration && dt <= kLongestDuration;
+}
+
+/// Throws std::invalid_argument unless dt is within the limits.
+inline void require_duration(double dt) {
+  core::require(is_duration(dt), "dt", "a number of usual steps in [0.001, 1000000]", dt);
+}
+
+/// Returns discount^dt, the discount of a transition of dt usual steps, with the same bits
+/// everywhere. Requires a discount in [0, 1].
+inline double discount_over(double discount, double dt) noexcept {
+  return dt == 1.0 ? discount : core::power(discount, dt);
+}
+
+/// Lists a duration, unless it is usual.
+template <class Archive, class Duration>
+void serialize_duration(std::string_view name, Duration& dt, Archive& archive) {
+  std::optional<double> unusual;
+  if (dt != 1.0) unusual = dt;
+  archive.number(name, unusual);
+  if constexpr (Archive::kReads) {
+    dt = unusual.value_or(1.0);
+    archive.expect(is_duration(dt), name, "in [0.001, 1000000]");
+  }
+}
+
+}  // namespace sdnn::agents
