@@ -324,8 +324,8 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         Raises
         ------
         TypeError, ValueError
-            If an observation, the action, the reward (beyond +-1e300, for example) or
-            ``terminated`` is not usable, or there is no such environment; nothing is learned then.
+            If an observation, the action, the reward (beyond +-1e300, for example), ``terminated``
+            or ``dt`` is not usable, or there is no such environment; nothing is learned then.
         OverflowError
             If a weight would leave its range. Earlier transitions, or other dimensions of the
             action, may have been learned: load a checkpoint.
@@ -345,7 +345,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
                 f"transition must be a Transition, got {shown(transition)}: train(env, steps=...)"
                 " learns in an environment"
             )
-        observation, action, reward, next_observation, terminated, next_mask = transition
+        observation, action, reward, next_observation, terminated, next_mask, dt = transition
         return (
             self._observations.vector("observation", observation),
             self._actions.numbers(action),
@@ -354,6 +354,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             flag("terminated", terminated),
             environment,
             self._actions.mask("next_mask", next_mask),
+            real("dt", dt),
         )
 
     def warn_of_problems(self) -> None:

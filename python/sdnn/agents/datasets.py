@@ -41,6 +41,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     "terminations": ("terminated", "terminals", "terminal", "dones", "done"),
     "truncations": ("truncated", "timeouts", "timeout"),
     "next_masks": ("next_mask",),
+    "dts": ("dt", "durations", "duration"),
 }
 """Usual names of columns, and their names in D4RL, imitation and Stable-Baselines3."""
 
@@ -223,12 +224,13 @@ def _logged(row: Info, place: str) -> Logged:
     try:
         terminated = _flag("terminated", row.get("terminations", False))
         truncated = _flag("truncated", row.get("truncations", False))
+        dt = _duration(row.get("dts", 1.0))
     except ValueError as error:
         raise ValueError(f"dataset, {place}: {error}") from error
     is_end = terminated and not truncated
     observation, action, reward, following = (row[name] for name in _ROW[:4])
     mask = row.get("next_masks")
-    transition = Transition(observation, action, reward, following, is_end, mask)
+    transition = Transition(observation, action, reward, following, is_end, mask, dt)
     return Logged(place, transition, truncated)
 
 
@@ -238,6 +240,13 @@ def _flag(name: str, value: Any) -> bool:
     is_flag = number.size == 1 and number.dtype.kind in "biuf" and number.item() in (0, 1)
     require(is_flag, name, "be True or False, or 1 or 0", value)
     return bool(number.item())
+
+
+def _duration(value: Any) -> float:
+    """Read a number of any library."""
+    number = np.asarray(value)
+    require(number.size == 1 and number.dtype.kind in "iuf", "dt", "be a number", value)
+    return float(number.item())
 
 
 def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = False) -> Data:
@@ -352,13 +361,13 @@ def learn_from(agent: AnyAgent, dataset: Dataset, *, epochs: int = 1) -> int:
         A file ``.csv`` with a line of names, or of JSON lines, each a transition; both are read
         line by line. Arrays of n rows, or columns of a table of pandas, by their names:
         ``observations``, ``actions``, ``rewards``, ``terminations`` and ``truncations`` (flags,
-        also as 0 and 1), and ``next_observations``. Without these, rows follow each other, and
-        where an episode is cut off its last step is not learned. Names of D4RL, imitation and
-        Stable-Baselines3 (``obs``, ``terminals``, ``timeouts``, ``dones``, ...) and columns such
-        as ``observation_0`` are read, too. Or transitions: `Transition`, mappings, or tuples of
-        observation, action, reward, next observation, terminated and perhaps truncated. Or
-        episodes, also a dataset of Minari: objects or mappings with one observation more than
-        rewards.
+        also as 0 and 1), ``dts`` (durations; see `Transition`) and ``next_observations``. Without
+        the last ones, rows follow each other, and where an episode is cut off its last step is not
+        learned. Names of D4RL, imitation and Stable-Baselines3 (``obs``, ``terminals``,
+        ``timeouts``, ``dones``, ...) and columns such as ``observation_0`` are read, too. Or
+        transitions: `Transition`, mappings, or tuples of observation, action, reward, next
+        observation, terminated and perhaps truncated. Or episodes, also a dataset of Minari:
+        objects or mappings with one observation more than rewards.
     epochs : int
         How often the dataset is learned.
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from typing import TypeAlias
 
+from sdnn import _core
 from sdnn.agents.actor_critic import SDNNActorCritic
 from sdnn.agents.datasets import Dataset, Logged, checked_length, reader_of, with_action
 from sdnn.agents.q_lambda import SDNNQLambda
@@ -118,7 +119,9 @@ def _returns(agent: LinearAgent, steps: Steps, value: float) -> list[float]:
     discount = agent.learning.discount
     returns = []
     for transition in reversed(steps):
-        value = float(transition.reward) + discount * value
+        dt = transition.dt
+        remaining = discount if dt == 1.0 else float(_core.power(discount, dt))
+        value = float(transition.reward) + remaining * value
         returns.append(value)
     return returns[::-1]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,8 +10,8 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from sdnn.environments.types import AnyEnv, Array, Data, Element, Elements, Env, Info, Mask, Masks
-from sdnn.support.arguments import flag, has_methods, reward_of, shown
+from sdnn.environments.types import AnyEnv, Array, Data, Element, Elements, Env, Masks
+from sdnn.support.arguments import has_methods
 from sdnn.training.files import SavedEpisode, Statistics, learning_wrappers, names_of, statistics_of
 from sdnn.training.interfaces import (
     EnvironmentAdapter,
@@ -21,6 +20,15 @@ from sdnn.training.interfaces import (
     Seeds,
     UnusableStepError,
     warn_of_endless_episode,
+)
+from sdnn.training.steps import (
+    checked_outcome,
+    duration_in,
+    has_action_masks,
+    has_durations,
+    mask_in,
+    reset_env,
+    step_env,
 )
 
 _LEARNING, EVALUATION = 0, 1
@@ -35,11 +43,6 @@ _ENDLESS = 10_000
 _SCALARS = (np.generic, int, float)
 """Immutable types of observations and actions, which need no copy."""
 
-_OLD_API = (
-    "; an environment of Gym before 0.26 can be wrapped:"
-    " shimmy.GymV21CompatibilityV0(env=env), from pip install shimmy"
-)
-
 
 class UnrepeatedEpisodeError(ValueError):
     """An environment does not repeat the episode in which a training was saved."""
@@ -52,62 +55,6 @@ def require_single(name: str, env: object) -> None:
         raise TypeError(
             f"{name} must be a single environment, got a vector of them, {type(env).__name__}"
         )
-
-
-def has_action_masks(env: object) -> bool:
-    """Return whether an environment, or a vector, tells which actions are allowed."""
-    return bool((getattr(env, "metadata", None) or {}).get("action_masks"))
-
-
-def mask_in(info: Info) -> Mask:
-    """Return the mask in an info; UnusableStepError if there is none."""
-    if "action_mask" not in info:
-        raise UnusableStepError(
-            "info must have 'action_mask', as metadata['action_masks'] of env is True,"
-            f" got {shown(sorted(map(str, info)))}"
-        )
-    mask: Mask = info["action_mask"]
-    return mask
-
-
-def reset_env(env: AnyEnv, seed: Any, options: Options) -> tuple[Element, Info]:
-    """Reset an environment, or a vector; return what is observed first, and the info.
-
-    UnusableStepError if it returns something else than an observation and a dictionary.
-    """
-    made = env.reset(seed=seed, options=options)
-    if not (isinstance(made, tuple | list) and len(made) == 2 and isinstance(made[1], Mapping)):
-        raise UnusableStepError(
-            f"env.reset must return (observation, info), info a dictionary, got {shown(made)}"
-            f"{_OLD_API}"
-        )
-    return made[0], made[1]
-
-
-def step_env(env: AnyEnv, action: Element) -> Sequence[Any]:
-    """Step an environment, or a vector; UnusableStepError if it does not return five values."""
-    made = env.step(action)
-    if not (isinstance(made, (tuple, list)) and len(made) == 5):
-        n = len(made) if isinstance(made, (tuple, list)) else 1
-        raise UnusableStepError(
-            "env.step must return five values, (observation, reward, terminated, truncated, info),"
-            f" got {n}{_OLD_API}"
-        )
-    return made
-
-
-def checked_outcome(reward: Any, terminated: object, truncated: object) -> tuple[float, bool, bool]:
-    """Return a finite float and bools; UnusableStepError for something else."""
-    try:
-        if type(reward) is not float:
-            reward = reward_of(reward)
-        if not math.isfinite(reward):
-            raise ValueError(f"reward must be finite, got {reward}")
-        if not type(terminated) is bool is type(truncated):
-            terminated, truncated = flag("terminated", terminated), flag("truncated", truncated)
-    except (TypeError, ValueError) as error:
-        raise UnusableStepError(str(error)) from error
-    return reward, terminated, truncated
 
 
 def copied(value: Element) -> Element:
@@ -127,6 +74,7 @@ class SingleEnvironment(EnvironmentAdapter):
         self._env = env
         self.rewards, self.terminated, self.truncated = [0.0], [False], [False]
         self.masks = [None] if has_action_masks(env) else None
+        self.dts = [1.0] if has_durations(env) else None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
         """Begin an episode with the seed of environment 0."""
@@ -141,6 +89,8 @@ class SingleEnvironment(EnvironmentAdapter):
         reward, terminated, truncated = checked_outcome(reward, terminated, truncated)
         if self.masks is not None:
             self.masks = [None if terminated else mask_in(info)]
+        if self.dts is not None:
+            self.dts = [duration_in(info)]
         return observation, reward, terminated, truncated
 
     def step(self, actions: Elements) -> Elements:

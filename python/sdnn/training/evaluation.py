@@ -14,18 +14,10 @@ from sdnn.environments.space_kinds import require_same_kind
 from sdnn.environments.types import Data, Element, Env
 from sdnn.support.arguments import has_methods, require, seed_of, whole
 from sdnn.support.display import Displayed
-from sdnn.training.episodes import (
-    EVALUATION,
-    checked_outcome,
-    episode_seed,
-    has_action_masks,
-    mask_in,
-    require_single,
-    reset_env,
-    step_env,
-)
+from sdnn.training.episodes import EVALUATION, episode_seed, require_single
 from sdnn.training.files import fixed_statistics
 from sdnn.training.interfaces import UnusableStepError, explained, warn_of_endless_episode
+from sdnn.training.steps import checked_outcome, has_action_masks, mask_in, reset_env, step_env
 
 _LONG = 100_000
 """Warn after this many steps in one episode."""

@@ -30,7 +30,8 @@ class EnvironmentAdapter(abc.ABC):
     ``can_repeat`` is whether each environment can be reset at any time, with a seed of its own.
     ``rewards``, ``terminated`` and ``truncated`` are those of the last step in each. ``masks`` are
     those of the actions allowed after the last reset or step in each, None where it has none; None
-    altogether where `has_action_masks` is False.
+    altogether where `has_action_masks` is False. ``dts`` are the durations of the last step in
+    each, NaN where the environment gave none; None altogether where `has_durations` is False.
     """
 
     n_environments: int
@@ -39,6 +40,7 @@ class EnvironmentAdapter(abc.ABC):
     terminated: list[bool]
     truncated: list[bool]
     masks: list[Mask] | None
+    dts: list[float] | None
 
     @abc.abstractmethod
     def __init__(self, env: Any) -> None: ...
@@ -64,6 +66,8 @@ class Transition(NamedTuple):
     ``terminated`` is Gymnasium's: the episode ended in a terminal state. An episode cut off by a
     time limit (``truncated``) is not terminated; its last transition is learned like any other.
     ``next_mask`` has 1 for the actions that are allowed in a next state, as `Agent.act` has it.
+    ``dt`` is the step's duration in usual steps, from 0.001 to 1,000,000: the discount of the next
+    state's value is ``discount ** dt``.
     """
 
     observation: ArrayLike
@@ -72,6 +76,7 @@ class Transition(NamedTuple):
     next_observation: ArrayLike
     terminated: bool
     next_mask: Mask = None
+    dt: float = 1.0
 
 
 class Learner(Protocol):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sdnn.environments.types import Array, Data, Element, Elements, Info, Mask, Masks
 from sdnn.support.arguments import require
 from sdnn.support.interrupts import Interrupts
-from sdnn.training.episodes import Episodes, checked_outcome, copied
+from sdnn.training.episodes import Episodes, copied
 from sdnn.training.evaluation import evaluate
 from sdnn.training.files import share_statistics, statistics_of
 from sdnn.training.interfaces import (
@@ -29,6 +29,7 @@ from sdnn.training.interfaces import (
     Transition,
     UnusableStepError,
 )
+from sdnn.training.steps import checked_outcome
 
 Row: TypeAlias = Mapping[str, Any]
 """A row of results, about an episode or an evaluation.
@@ -91,6 +92,7 @@ class _LearnerForAll(ObservingLearner):
         environments: list[int],
         progress: list[float],
         next_masks: Masks | None = None,
+        dts: list[float] | None = None,
     ) -> int:
         """Learn the last step in the first of these environments; return the number of steps.
 
@@ -99,8 +101,9 @@ class _LearnerForAll(ObservingLearner):
         i = environments[0]
         reward, terminates, _ = checked_outcome(rewards[i], terminated[i], False)
         mask = None if next_masks is None else next_masks[i]
+        dt = 1.0 if dts is None else dts[i]
         step = Transition(
-            observations[i], actions[i], reward, next_observations[i], terminates, mask
+            observations[i], actions[i], reward, next_observations[i], terminates, mask, dt
         )
         self._learner.learn(step, **self.arguments[i])
         return 1
@@ -267,6 +270,7 @@ class TrainingLoop(abc.ABC):
                 environments,
                 progress,
                 episodes.masks,
+                episodes.adapter.dts,
             )
         except (ValueError, OverflowError) as error:
             raise self._unusable(error, environments[0]) from error

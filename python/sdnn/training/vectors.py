@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any
 
@@ -13,8 +14,9 @@ from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 from sdnn.environments.spaces import has_mask
 from sdnn.environments.types import Element, Elements, Info, Mask, VectorEnv
 from sdnn.support.arguments import array_of
-from sdnn.training.episodes import SingleEnvironment, has_action_masks, mask_in, reset_env, step_env
+from sdnn.training.episodes import SingleEnvironment
 from sdnn.training.interfaces import EnvironmentAdapter, Options, Seeds, UnusableStepError
+from sdnn.training.steps import has_action_masks, has_durations, mask_in, reset_env, step_env
 
 
 def vector_adapter(env: VectorEnv) -> EnvironmentAdapter:
@@ -34,6 +36,7 @@ class _SyncEnvironments(EnvironmentAdapter):
         self._adapters = [SingleEnvironment(single) for single in env.envs]
         self.n_environments = env.num_envs
         self.masks = [None] * env.num_envs if has_action_masks(env) else None
+        self.dts = [1.0] * env.num_envs if has_durations(env) else None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
         first = self._call_each(seeds, lambda env, i: env.reset({0: seeds[i]})[0])
@@ -57,6 +60,8 @@ class _SyncEnvironments(EnvironmentAdapter):
                 raise UnusableStepError(f"environment {i}: {error}") from error
         if self.masks is not None:
             self.masks = [env.masks[0] if env.masks else None for env in self._adapters]
+        if self.dts is not None:
+            self.dts = [env.dts[0] if env.dts else math.nan for env in self._adapters]
         return results
 
     def _converted(self, observations: list[Element]) -> Elements:
@@ -89,6 +94,7 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         self._mode = _autoreset_mode(env)
         self.n_environments = env.num_envs
         self.masks = [None] * env.num_envs if has_action_masks(env) else None
+        self.dts = [1.0] * env.num_envs if has_durations(env) else None
         self._begun: list[Mask] = []  # masks of episodes that began within the last step
 
     def _step(self, actions: Elements) -> tuple[Elements, Elements]:
@@ -100,6 +106,8 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         self.truncated = self._column("truncated", truncated, "b", "bools")
         ended = [a or b for a, b in zip(self.terminated, self.truncated, strict=True)]
         self._take_masks(infos, self.terminated, ended)
+        if self.dts is not None:
+            self.dts = self._durations_in(infos, ended)
         if self._mode == "SAME_STEP" and any(ended):
             if "final_obs" not in infos:
                 raise ValueError(
@@ -123,6 +131,22 @@ class _Vector(EnvironmentAdapter, abc.ABC):
             last = self._masks_in(infos.get("final_info", {}), truncated)
             masks = [last[i] if has_ended else masks[i] for i, has_ended in enumerate(ended)]
         self.masks = masks
+
+    def _durations_in(self, infos: Info, ended: Sequence[bool]) -> list[float]:
+        """Return the durations in infos, those of last steps from ``final_info`` if it is there."""
+        dts = self._column_in(infos)
+        if self._mode == "SAME_STEP" and any(ended):
+            last = self._column_in(infos.get("final_info", {}))
+            dts = [last[i] if has_ended else dts[i] for i, has_ended in enumerate(ended)]
+        return dts
+
+    def _column_in(self, infos: Info) -> list[float]:
+        """Return the numbers ``dt`` in infos, NaN where one is missing."""
+        if "dt" not in infos:
+            return [math.nan] * self.n_environments
+        is_there = infos.get("_dt", np.ones(self.n_environments, bool))
+        numbers = self._column("dt", np.where(is_there, infos["dt"], math.nan), "fiu", "numbers")
+        return [float(number) for number in numbers]
 
     def _masks_in(self, infos: Info, needed: Sequence[bool]) -> list[Mask]:
         """Return the masks in infos, None where not needed; UnusableStepError if one is missing."""

@@ -46,10 +46,13 @@ REWARDS = (0.0, 1.0, -1.0, 1e-3, 1e12, 1e30, -1e300, 1e300, 5e-324, -5e-324)
 class Walk(gym.Env):
     """Random walks in any space; the first action moves the first number."""
 
-    def __init__(self, space, actions, seed, *, has_angle=False, has_glitches=False, lost=0.0):
+    def __init__(
+        self, space, actions, seed, *, has_angle=False, has_glitches=False, lost=0.0, durations=()
+    ):
         self.observation_space, self.action_space = space, actions
         self.random, self.n, self.has_angle = np.random.default_rng(seed), 0, has_angle
         self.has_glitches, self.lost, self.x = has_glitches, lost, 0.0
+        self.durations, self.metadata = durations, {"durations": bool(durations)}
 
     def _filled(self, space):
         if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
@@ -92,7 +95,8 @@ class Walk(gym.Env):
         if self.has_glitches and self.random.random() < 0.05:
             reward = self.random.choice(REWARDS)
         is_over = self.random.random() < 0.05
-        return self._filled(self.observation_space), float(reward), is_over, self.n >= 30, {}
+        info = {"dt": self.durations[self.n % len(self.durations)]} if self.durations else {}
+        return self._filled(self.observation_space), float(reward), is_over, self.n >= 30, info
 
 
 def random_space(random):
@@ -279,6 +283,8 @@ def _soak_cell(number):
             agent_class = SDNNQLambda
         actions = random_actions(random, agent_class)
         options = {"has_angle": has_angle, "has_glitches": bool(random.random() < 0.3)}
+        if number % 3 == 0:
+            options["durations"] = (1, 0.3, 1, 7.5, 1e6, 0.001)
         n_environments = int(random.choice([1, 1, 1, 3]))
         envs = [Walk(space, actions, number + i, **options) for i in range(n_environments)]
         settings = random_settings(random, agent_class)
