@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.environments.types import AnyEnv, Array, Data, Space
-from sdnn.support.arguments import require, shown
+from sdnn.support.arguments import has_methods, require, shown
 
 _MOST_VARIABLES = 2**20
 _LEAST_INTEGER_BYTES = 4
@@ -234,6 +234,15 @@ def _has_equal_rows(space: Space) -> bool:
     if not isinstance(space, gym.spaces.Box) or len(space.shape) < 2:
         return False
     return bool((space.low == space.low[:1]).all() and (space.high == space.high[:1]).all())
+
+
+def require_single(name: str, env: object) -> None:
+    """Check that a value is one environment; TypeError that names the argument."""
+    has_methods(name, env, "an environment, as of gymnasium.make(id)", "reset", "step")
+    if isinstance(env, gym.vector.VectorEnv):
+        raise TypeError(
+            f"{name} must be a single environment, got a vector of them, {type(env).__name__}"
+        )
 
 
 def require_same_kind(agent: object, env: object) -> None:

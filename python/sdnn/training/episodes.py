@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 
-from sdnn.environments.types import AnyEnv, Array, Data, Element, Elements, Env, Masks
-from sdnn.support.arguments import has_methods
-from sdnn.training.files import SavedEpisode, Statistics, learning_wrappers, names_of, statistics_of
+from sdnn.environments.types import AnyEnv, Data, Element, Elements, Env, Info, Mask, Masks
+from sdnn.support.arguments import flag, real, reward_of, shown
+from sdnn.training.files import (
+    ActionLog,
+    SavedEpisode,
+    Statistics,
+    learning_wrappers,
+    names_of,
+    statistics_of,
+)
 from sdnn.training.interfaces import (
     EnvironmentAdapter,
     ObservingLearner,
@@ -21,24 +28,17 @@ from sdnn.training.interfaces import (
     UnusableStepError,
     warn_of_endless_episode,
 )
-from sdnn.training.steps import (
-    checked_outcome,
-    duration_in,
-    has_action_masks,
-    has_durations,
-    mask_in,
-    reset_env,
-    step_env,
-)
 
 _LEARNING, EVALUATION = 0, 1
 """The kinds of episodes that `episode_seed` gives seeds to."""
 
-_N_RECENT = 1024
-"""Number of actions that are kept in a list before they become an array."""
-
 _ENDLESS = 10_000
 """Steps after which an episode seems to have no end."""
+
+_OLD_API = (
+    "; an environment of Gym before 0.26 can be wrapped:"
+    " shimmy.GymV21CompatibilityV0(env=env), from pip install shimmy"
+)
 
 _SCALARS = (np.generic, int, float)
 """Immutable types of observations and actions, which need no copy."""
@@ -48,13 +48,73 @@ class UnrepeatedEpisodeError(ValueError):
     """An environment does not repeat the episode in which a training was saved."""
 
 
-def require_single(name: str, env: object) -> None:
-    """Check that a value is one environment; TypeError that names the argument."""
-    has_methods(name, env, "an environment, as of gymnasium.make(id)", "reset", "step")
-    if isinstance(env, gym.vector.VectorEnv):
-        raise TypeError(
-            f"{name} must be a single environment, got a vector of them, {type(env).__name__}"
+def announces(env: object, what: str) -> bool:
+    """Return whether the metadata of an environment, or a vector, say that infos have something."""
+    return bool((getattr(env, "metadata", None) or {}).get(what))
+
+
+def duration_in(info: Info) -> float:
+    """Return the duration of a step in an info; UnusableStepError if there is none."""
+    if "dt" not in info:
+        raise UnusableStepError(
+            "info must have 'dt', the duration of the step in usual steps, as"
+            f" metadata['durations'] of env is True, got {shown(sorted(map(str, info)))}"
         )
+    try:
+        return real("dt", info["dt"])
+    except (ValueError, OverflowError) as error:
+        raise UnusableStepError(str(error)) from error
+
+
+def mask_in(info: Info) -> Mask:
+    """Return the mask in an info; UnusableStepError if there is none."""
+    if "action_mask" not in info:
+        raise UnusableStepError(
+            "info must have 'action_mask', as metadata['action_masks'] of env is True,"
+            f" got {shown(sorted(map(str, info)))}"
+        )
+    mask: Mask = info["action_mask"]
+    return mask
+
+
+def reset_env(env: AnyEnv, seed: Any, options: Options) -> tuple[Element, Info]:
+    """Reset an environment, or a vector; return what is observed first, and the info.
+
+    UnusableStepError if it returns something else than an observation and a dictionary.
+    """
+    made = env.reset(seed=seed, options=options)
+    if not (isinstance(made, tuple | list) and len(made) == 2 and isinstance(made[1], Mapping)):
+        raise UnusableStepError(
+            f"env.reset must return (observation, info), info a dictionary, got {shown(made)}"
+            f"{_OLD_API}"
+        )
+    return made[0], made[1]
+
+
+def step_env(env: AnyEnv, action: Element) -> Sequence[Any]:
+    """Step an environment, or a vector; UnusableStepError if it does not return five values."""
+    made = env.step(action)
+    if not (isinstance(made, (tuple, list)) and len(made) == 5):
+        n = len(made) if isinstance(made, (tuple, list)) else 1
+        raise UnusableStepError(
+            "env.step must return five values, (observation, reward, terminated, truncated, info),"
+            f" got {n}{_OLD_API}"
+        )
+    return made
+
+
+def checked_outcome(reward: Any, terminated: object, truncated: object) -> tuple[float, bool, bool]:
+    """Return a finite float and bools; UnusableStepError for something else."""
+    try:
+        if type(reward) is not float:
+            reward = reward_of(reward)
+        if not math.isfinite(reward):
+            raise ValueError(f"reward must be finite, got {reward}")
+        if not type(terminated) is bool is type(truncated):
+            terminated, truncated = flag("terminated", terminated), flag("truncated", truncated)
+    except (TypeError, ValueError) as error:
+        raise UnusableStepError(str(error)) from error
+    return reward, terminated, truncated
 
 
 def copied(value: Element) -> Element:
@@ -73,8 +133,8 @@ class SingleEnvironment(EnvironmentAdapter):
     def __init__(self, env: Env) -> None:
         self._env = env
         self.rewards, self.terminated, self.truncated = [0.0], [False], [False]
-        self.masks = [None] if has_action_masks(env) else None
-        self.dts = [1.0] if has_durations(env) else None
+        self.masks = [None] if announces(env, "action_masks") else None
+        self.dts = [1.0] if announces(env, "durations") else None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
         """Begin an episode with the seed of environment 0."""
@@ -105,32 +165,12 @@ def episode_seed(seed: int, kind: int, episode: int) -> int:
     return int(word) % 2**31  # some environments refuse larger seeds
 
 
-class _ActionLog:
-    """The actions of an episode, kept in arrays: a list of millions would need much more memory."""
-
-    def __init__(self, actions: Array | None = None) -> None:
-        self._arrays = [] if actions is None or not len(actions) else [actions]
-        self._recent: list[Element] = []
-
-    def array(self) -> Array:
-        """Return all actions, shape (n, ...)."""
-        arrays = self._arrays + ([np.array(self._recent)] if self._recent else [])
-        return np.concatenate(arrays) if arrays else np.empty(0)
-
-    def append(self, action: Element) -> None:
-        """Add an action, of the shape and type of the others."""
-        self._recent.append(action)
-        if len(self._recent) == _N_RECENT:
-            self._arrays.append(np.array(self._recent))
-            self._recent.clear()
-
-
 @dataclass(slots=True, eq=False)
 class Episode:
     """The state of an episode; ``actions`` are kept where it may be repeated."""
 
     number: int
-    actions: _ActionLog = field(default_factory=_ActionLog)
+    actions: ActionLog = field(default_factory=ActionLog)
     n_steps: int = 0
     sum_of_rewards: float = 0.0
 
@@ -327,7 +367,7 @@ class Episodes:
             )
         for i, episode in enumerate(saved):
             if episode is not None:
-                actions = _ActionLog(episode.actions)
+                actions = ActionLog(episode.actions)
                 self.present[i] = Episode(
                     episode.number, actions, len(episode.actions), episode.sum_of_rewards
                 )

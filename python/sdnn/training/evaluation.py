@@ -10,14 +10,21 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.environments.space_kinds import require_same_kind
+from sdnn.environments.space_kinds import require_same_kind, require_single
 from sdnn.environments.types import Data, Element, Env
 from sdnn.support.arguments import has_methods, require, seed_of, whole
 from sdnn.support.display import Displayed
-from sdnn.training.episodes import EVALUATION, episode_seed, require_single
+from sdnn.training.episodes import (
+    EVALUATION,
+    announces,
+    checked_outcome,
+    episode_seed,
+    mask_in,
+    reset_env,
+    step_env,
+)
 from sdnn.training.files import fixed_statistics
 from sdnn.training.interfaces import UnusableStepError, explained, warn_of_endless_episode
-from sdnn.training.steps import checked_outcome, has_action_masks, mask_in, reset_env, step_env
 
 _LONG = 100_000
 """Warn after this many steps in one episode."""
@@ -151,7 +158,7 @@ def greedy_episode(
     reset_seed = None if seed is None else episode_seed(seed, EVALUATION, number)
     with fixed_statistics(env, getattr(agent, "wrappers", ())):
         observation, info = reset_env(env, reset_seed, options)
-        has_masks = has_action_masks(env)
+        has_masks = announces(env, "action_masks")
         if hasattr(agent, "begin_greedy_episode"):
             agent.begin_greedy_episode()
         n_steps, total, terminated, truncated = 0, 0.0, False, False

@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from sdnn.environments.spaces import Actions
-from sdnn.environments.types import Array, Data
+from sdnn.environments.types import Array, Data, Element
 from sdnn.support.arguments import seed_of
 from sdnn.support.files import Arrays, Description, read_file, write_file
 
@@ -217,6 +217,30 @@ def read_agent(path: Path, *kinds: str) -> tuple[Any, Description, Arrays]:
         return CLASSES[str(name)].rebuild(description, state), description, arrays
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is damaged: {error}") from error
+
+
+_N_RECENT = 1024
+"""Number of actions that are kept in a list before they become an array."""
+
+
+class ActionLog:
+    """The actions of an episode, kept in arrays: a list of millions would need much more memory."""
+
+    def __init__(self, actions: Array | None = None) -> None:
+        self._arrays = [] if actions is None or not len(actions) else [actions]
+        self._recent: list[Element] = []
+
+    def array(self) -> Array:
+        """Return all actions, shape (n, ...)."""
+        arrays = self._arrays + ([np.array(self._recent)] if self._recent else [])
+        return np.concatenate(arrays) if arrays else np.empty(0)
+
+    def append(self, action: Element) -> None:
+        """Add an action, of the shape and type of the others."""
+        self._recent.append(action)
+        if len(self._recent) == _N_RECENT:
+            self._arrays.append(np.array(self._recent))
+            self._recent.clear()
 
 
 class SavedEpisode(msgspec.Struct, frozen=True, kw_only=True):

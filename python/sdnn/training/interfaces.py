@@ -1,4 +1,4 @@
-"""Interfaces of environments and learners, and arguments that users expect elsewhere."""
+"""Interfaces of environments and learners: what they are called with, and what they return."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class EnvironmentAdapter(abc.ABC):
     ``can_repeat`` is whether each environment can be reset at any time, with a seed of its own.
     ``rewards``, ``terminated`` and ``truncated`` are those of the last step in each. ``masks`` are
     those of the actions allowed after the last reset or step in each, None where it has none; None
-    altogether where `has_action_masks` is False. ``dts`` are the durations of the last step in
-    each, NaN where the environment gave none; None altogether where `has_durations` is False.
+    altogether where its metadata have no ``"action_masks"``. ``dts`` are the durations of the last
+    step in each, NaN where the environment gave none; None altogether without ``"durations"``.
     """
 
     n_environments: int

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sdnn.environments.types import Array, Data, Element, Elements, Info, Mask, Masks
 from sdnn.support.arguments import require
 from sdnn.support.interrupts import Interrupts
-from sdnn.training.episodes import Episodes, copied
+from sdnn.training.episodes import Episodes, checked_outcome, copied
 from sdnn.training.evaluation import evaluate
 from sdnn.training.files import share_statistics, statistics_of
 from sdnn.training.interfaces import (
@@ -29,7 +29,6 @@ from sdnn.training.interfaces import (
     Transition,
     UnusableStepError,
 )
-from sdnn.training.steps import checked_outcome
 
 Row: TypeAlias = Mapping[str, Any]
 """A row of results, about an episode or an evaluation.

@@ -16,11 +16,11 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.environments.space_kinds import require_same_kind
+from sdnn.environments.space_kinds import require_same_kind, require_single
 from sdnn.environments.types import AnyEnv, Env, Info, VectorEnv
 from sdnn.support.arguments import flag, has_methods, path_of, require, shown, whole
 from sdnn.support.display import Displayed
-from sdnn.training.episodes import Episodes, SingleEnvironment, require_single
+from sdnn.training.episodes import Episodes, SingleEnvironment
 from sdnn.training.files import (
     SavedTraining,
     read_training,

@@ -14,9 +14,8 @@ from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 from sdnn.environments.spaces import has_mask
 from sdnn.environments.types import Element, Elements, Info, Mask, VectorEnv
 from sdnn.support.arguments import array_of
-from sdnn.training.episodes import SingleEnvironment
+from sdnn.training.episodes import SingleEnvironment, announces, mask_in, reset_env, step_env
 from sdnn.training.interfaces import EnvironmentAdapter, Options, Seeds, UnusableStepError
-from sdnn.training.steps import has_action_masks, has_durations, mask_in, reset_env, step_env
 
 
 def vector_adapter(env: VectorEnv) -> EnvironmentAdapter:
@@ -35,8 +34,8 @@ class _SyncEnvironments(EnvironmentAdapter):
         self._env = env
         self._adapters = [SingleEnvironment(single) for single in env.envs]
         self.n_environments = env.num_envs
-        self.masks = [None] * env.num_envs if has_action_masks(env) else None
-        self.dts = [1.0] * env.num_envs if has_durations(env) else None
+        self.masks = [None] * env.num_envs if announces(env, "action_masks") else None
+        self.dts = [1.0] * env.num_envs if announces(env, "durations") else None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
         first = self._call_each(seeds, lambda env, i: env.reset({0: seeds[i]})[0])
@@ -93,8 +92,8 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         self._env = env
         self._mode = _autoreset_mode(env)
         self.n_environments = env.num_envs
-        self.masks = [None] * env.num_envs if has_action_masks(env) else None
-        self.dts = [1.0] * env.num_envs if has_durations(env) else None
+        self.masks = [None] * env.num_envs if announces(env, "action_masks") else None
+        self.dts = [1.0] * env.num_envs if announces(env, "durations") else None
         self._begun: list[Mask] = []  # masks of episodes that began within the last step
 
     def _step(self, actions: Elements) -> tuple[Elements, Elements]:
