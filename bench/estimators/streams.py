@@ -90,16 +90,20 @@ def scaled(model):
     return preprocessing.StandardScaler() | model
 
 
-def ours(seed, **options):
-    return RiverRegressor(SDNNRegressor(out_of_range="widen", random_state=seed, **options))
+def ours(seed, experts="window", **options):
+    model = SDNNRegressor(out_of_range="widen", random_state=seed, **options)
+    return RiverRegressor(model, experts=experts)
 
 
-def our_classifier(seed, share=0.5):
-    return RiverClassifier(SDNNClassifier(correction_share=share, random_state=seed))
+def our_classifier(seed, experts="window"):
+    model = SDNNClassifier(correction_share=0.5, random_state=seed)
+    return RiverClassifier(model, experts=experts)
 
 
 REGRESSORS = {
     "SDNN": ours,
+    "SDNN, experts='linear'": lambda seed: ours(seed, "linear"),
+    "SDNN, network alone": lambda seed: ours(seed, "network"),
     "SDNN, n_pattern_units=64": lambda seed: ours(seed, n_pattern_units=64),
     "adaptive random forest": lambda seed: forest.ARFRegressor(seed=seed),
     "Mondrian forest (AMF)": lambda seed: forest.AMFRegressor(seed=seed),
@@ -111,7 +115,8 @@ REGRESSORS = {
 }
 CLASSIFIERS = {
     "SDNN": our_classifier,
-    "SDNN, correction_share=.25": lambda seed: our_classifier(seed, 0.25),
+    "SDNN, experts='linear'": lambda seed: our_classifier(seed, "linear"),
+    "SDNN, network alone": lambda seed: our_classifier(seed, "network"),
     "adaptive random forest": lambda seed: forest.ARFClassifier(seed=seed),
     "Hoeffding adaptive tree": lambda seed: tree.HoeffdingAdaptiveTreeClassifier(seed=seed),
     "nearest neighbours": lambda seed: scaled(neighbors.KNNClassifier()),

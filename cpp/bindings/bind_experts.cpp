@@ -7,6 +7,7 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "sdnn/estimators/kernel_window.hpp"
 #include "sdnn/estimators/prediction_mixture.hpp"
 #include "sdnn/estimators/probability_mixture.hpp"
 #include "sdnn/estimators/recursive_least_squares.hpp"
@@ -48,7 +49,7 @@ void bind_least_squares(py::module_& module) {
                   self.predict(vector(inputs, "inputs"), out);
                 });
               },
-              py::arg("inputs"), "The outputs, NaN for a missing input")
+              py::arg("inputs"), "The outputs; NaN marks a missing input")
           .def(
               "learn",
               [](RecursiveLeastSquares& self, const Numbers& inputs, const Numbers& targets) {
@@ -66,6 +67,47 @@ void bind_least_squares(py::module_& module) {
   bindings::def_state(type);
 }
 
+void bind_kernel_window(py::module_& module) {
+  using estimators::KernelWindow;
+  auto type = bindings::Class<KernelWindow>(
+                  module, "KernelWindow", "Kernel ridge regression on the last samples of a stream")
+                  .def(py::init([](const Numbers& low, const Numbers& high, std::size_t n_outputs,
+                                   std::size_t capacity, double length_scale, double ridge,
+                                   double target_limit) {
+                         return KernelWindow(vector(low, "low"), vector(high, "high"), n_outputs,
+                                             capacity, length_scale, ridge, target_limit);
+                       }),
+                       py::arg("low"), py::arg("high"), py::arg("n_outputs"), py::arg("capacity"),
+                       py::arg("length_scale"), py::arg("ridge"),
+                       py::arg("target_limit") = KernelWindow::kUnlimited)
+                  .def_property_readonly("n_inputs", &KernelWindow::n_inputs)
+                  .def_property_readonly("n_outputs", &KernelWindow::n_outputs)
+                  .def_property_readonly("n_samples", &KernelWindow::n_samples)
+                  .def(
+                      "predict",
+                      [](const KernelWindow& self, const Numbers& inputs) {
+                        return bindings::filled<double>({self.n_outputs()}, [&](auto out) {
+                          self.predict(vector(inputs, "inputs"), out);
+                        });
+                      },
+                      py::arg("inputs"), "The outputs; NaN marks a missing input")
+                  .def(
+                      "learn",
+                      [](KernelWindow& self, const Numbers& inputs, const Numbers& targets) {
+                        self.learn(vector(inputs, "inputs"), vector(targets, "targets"));
+                      },
+                      py::arg("inputs"), py::arg("targets"))
+                  .def(
+                      "add_inputs",
+                      [](KernelWindow& self, const Numbers& low, const Numbers& high) {
+                        self.add_inputs(vector(low, "low"), vector(high, "high"));
+                      },
+                      py::arg("low"), py::arg("high"), "Adds inputs that all samples so far missed")
+                  .def("add_outputs", &KernelWindow::add_outputs, py::arg("n"),
+                       "Adds outputs after the others, whose targets so far were 0");
+  bindings::def_state(type);
+}
+
 void bind_mixtures(py::module_& module) {
   using estimators::PredictionMixture;
   using estimators::ProbabilityMixture;
@@ -73,7 +115,10 @@ void bind_mixtures(py::module_& module) {
       bindings::Class<PredictionMixture>(
           module, "PredictionMixture",
           "A weighted mean of predictions, whose weights follow their recent errors")
-          .def(py::init<std::size_t>(), py::arg("n_experts"))
+          .def(py::init([](const Numbers& priors) {
+                 return PredictionMixture(bindings::copied(vector(priors, "priors")));
+               }),
+               py::arg("priors"))
           .def_property_readonly("n_experts", &PredictionMixture::n_experts)
           .def_property_readonly(
               "weights", [](const PredictionMixture& self) { return numbers_of(self.weights()); })
@@ -122,5 +167,6 @@ void bind_mixtures(py::module_& module) {
 
 void bind_experts(py::module_& module) {
   bind_least_squares(module);
+  bind_kernel_window(module);
   bind_mixtures(module);
 }

@@ -1176,7 +1176,7 @@ class RecursiveLeastSquares:
         ...
     def predict(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
-        The outputs, NaN for a missing input
+        The outputs; NaN marks a missing input
         """
     def restore(self, state: dict) -> None:
         """
@@ -1192,11 +1192,48 @@ class RecursiveLeastSquares:
     @property
     def n_outputs(self) -> int:
         ...
+class KernelWindow:
+    """
+    Kernel ridge regression on the last samples of a stream
+    """
+    def __init__(self, low: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], high: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], n_outputs: typing.SupportsInt | typing.SupportsIndex, capacity: typing.SupportsInt | typing.SupportsIndex, length_scale: typing.SupportsFloat | typing.SupportsIndex, ridge: typing.SupportsFloat | typing.SupportsIndex, target_limit: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
+        ...
+    def add_inputs(self, low: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], high: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Adds inputs that all samples so far missed
+        """
+    def add_outputs(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Adds outputs after the others, whose targets so far were 0
+        """
+    def learn(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def predict(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The outputs; NaN marks a missing input
+        """
+    def restore(self, state: dict) -> None:
+        """
+        Take what `state` of one with the same settings gave; on an error nothing changes
+        """
+    def state(self) -> dict:
+        """
+        What it remembers: arrays by name
+        """
+    @property
+    def n_inputs(self) -> int:
+        ...
+    @property
+    def n_outputs(self) -> int:
+        ...
+    @property
+    def n_samples(self) -> int:
+        ...
 class PredictionMixture:
     """
     A weighted mean of predictions, whose weights follow their recent errors
     """
-    def __init__(self, n_experts: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, priors: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         ...
     def learn(self, predictions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], target: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...

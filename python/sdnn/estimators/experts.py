@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sdnn import _core
 from sdnn.coding import Coding
@@ -18,13 +19,27 @@ from sdnn.coding.symbols import Categorical, present
 from sdnn.estimators.columns import Floats
 from sdnn.estimators.outliers import usual_range
 
-EXPERTS = ("network", "linear")
-"""Values of the setting: the network alone, or beside mean and linear regression."""
+EXPERTS = ("network", "linear", "window")
+"""Values of the setting: each has the experts of the former, and others."""
 
 FORGETTING_OF_MEAN = 0.999
 FORGETTING = (0.999, 0.98)  # of two linear regressions, which are reported as one
+PRIORS = (
+    4.0,
+    2.0,
+    1.0,
+)  # weights of mean and regressions before the errors: simple ones are likely
 ERROR_LIMIT = 20.0  # largest error that the regressions of numbers learn, in mean errors
+WINDOW = 400  # samples of kernel regression, whose time grows with their square
+LENGTH_SCALE = 1.0  # of its kernel, in ranges of inputs and roots of their number
+RIDGE = 0.1
 MOST_COLUMNS = 200  # of linear regression, whose time grows with their square
+
+
+def finite_sum(first: Floats, second: Floats) -> Floats:
+    """Return a sum that is the largest number instead of infinity."""
+    with np.errstate(over="ignore"):
+        return np.nan_to_num(first + second)
 
 
 class Estimates(NamedTuple):
@@ -90,6 +105,8 @@ class LinearColumns:
 class Experts(abc.ABC):
     """The mean and two linear regressions of different memories, beside a network.
 
+    With a window there is kernel regression too, of what the first linear regression leaves.
+
     Parameters
     ----------
     codings : dict of str to Coding
@@ -97,14 +114,20 @@ class Experts(abc.ABC):
     rows : list of dict
         Last samples, as `StreamEstimator` reads them.
     targets : ndarray, shape (n_samples, n_outputs)
+    has_window : bool
     """
 
     first: str  # name of the first expert
     error_limit: float  # see `_core.RecursiveLeastSquares`
 
     def __init__(
-        self, codings: Mapping[str, Coding], rows: Sequence[Mapping[str, object]], targets: Floats
+        self,
+        codings: Mapping[str, Coding],
+        rows: Sequence[Mapping[str, object]],
+        targets: Floats,
+        has_window: bool,
     ) -> None:
+        self.has_window = has_window
         self.mixture = self._mixture()
         self.begin(codings, rows, targets)
 
@@ -118,27 +141,43 @@ class Experts(abc.ABC):
         """Learn all features, the mean and the regressions anew; the weights stay."""
         self.columns = LinearColumns()
         low, high = self.columns.add(codings, rows)
-        self.models = self._models(low, high, targets.shape[1])
+        self._make(low, high, targets.shape[1])
         for sample, target in zip(rows, targets, strict=True):
-            self._learn_linear(self.columns.row(sample), target)
+            self._learn(self.columns.row(sample), target)
 
-    def _models(
-        self, low: Sequence[float], high: Sequence[float], n_outputs: int
-    ) -> list[_core.RecursiveLeastSquares]:
+    def _make(self, low: ArrayLike, high: ArrayLike, n_outputs: int) -> None:
         make, limit = _core.RecursiveLeastSquares, self.error_limit
-        mean = make([], [], n_outputs, FORGETTING_OF_MEAN, limit)
-        return [mean, *(make(low, high, n_outputs, share, limit) for share in FORGETTING)]
+        self.mean = make([], [], n_outputs, FORGETTING_OF_MEAN, limit)
+        self.linear = [make(low, high, n_outputs, share, limit) for share in FORGETTING]
+        self.window = (
+            _core.KernelWindow(low, high, n_outputs, WINDOW, LENGTH_SCALE, RIDGE, limit)
+            if self.has_window
+            else None
+        )
 
-    def _learn_linear(self, row: Floats, target: Floats) -> None:
-        self.models[0].learn([], target)
-        for model in self.models[1:]:
+    def _models(self) -> list[Any]:
+        return [self.mean, *self.linear, *([] if self.window is None else [self.window])]
+
+    def _learn(self, row: Floats, target: Floats) -> None:
+        if self.window is not None:
+            self.window.learn(row, finite_sum(target, -self.linear[0].predict(row)))
+        self.mean.learn([], target)
+        for model in self.linear:
             model.learn(row, target)
+
+    def add(self, codings: Mapping[str, Coding], rows: Sequence[Mapping[str, object]]) -> None:
+        """Add features and categories, whose weights are 0; see `LinearColumns.add`."""
+        low, high = self.columns.add(codings, rows)
+        for model in self._models()[1:]:
+            model.add_inputs(low, high)
 
     def estimates(self, sample: Mapping[str, Any], of_network: Floats) -> Estimates:
         """Return the predictions of all experts; that of the network has shape (n_outputs,)."""
         row = self.columns.row(sample)
-        linear = [model.predict(row) for model in self.models[1:]]
-        return Estimates(row, np.array([self.models[0].predict([]), *linear, of_network]))
+        each = [self.mean.predict([]), *(model.predict(row) for model in self.linear)]
+        if self.window is not None:
+            each.append(finite_sum(each[1], self.window.predict(row)))
+        return Estimates(row, np.array([*each, of_network]))
 
     @abc.abstractmethod
     def mix(self, each: Floats) -> Floats:
@@ -150,39 +189,38 @@ class Experts(abc.ABC):
 
     def learn(self, estimates: Estimates, target: Floats) -> None:
         """Learn the target of predictions, which may have a new class as its last."""
-        n_new = len(target) - self.models[0].n_outputs
+        n_new = len(target) - self.mean.n_outputs
         if n_new:
-            for model in self.models:
+            for model in self._models():
                 model.add_outputs(n_new)
         else:
             self._compare(estimates.each, target)
-        self._learn_linear(estimates.row, target)
-
-    def add(self, codings: Mapping[str, Coding], rows: Sequence[Mapping[str, object]]) -> None:
-        """Add features and categories, whose weights are 0; see `LinearColumns.add`."""
-        low, high = self.columns.add(codings, rows)
-        for model in self.models[1:]:
-            model.add_inputs(low, high)
+        self._learn(estimates.row, target)
 
     @property
     def weights(self) -> dict[str, float]:
         """The weights of the experts, which sum to 1."""
-        first, *linear, network = self.mixture.weights.tolist()
-        return {self.first: first, "linear": sum(linear), "network": network}
+        first, *others, network = self.mixture.weights.tolist()
+        weights = {self.first: first, "linear": sum(others[: len(FORGETTING)])}
+        if self.has_window:
+            weights["window"] = others[-1]
+        return {**weights, "network": network}
 
     def __getstate__(self) -> dict[str, object]:
-        models = [model.state() for model in self.models]
-        return {**self.__dict__, "models": models, "mixture": self.mixture.state()}
+        states = [model.state() for model in [*self._models(), self.mixture]]
+        left_out = ("mean", "linear", "window", "mixture")
+        return {
+            "states": states,
+            **{name: value for name, value in self.__dict__.items() if name not in left_out},
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        states = state.pop("states")
         self.__dict__ = state
-        states, mixture = state["models"], state["mixture"]
-        low, high = (states[-1][name] for name in ("low", "high"))
-        self.models = self._models(low, high, len(states[0]["origins"]))
-        for model, of_model in zip(self.models, states, strict=True):
-            model.restore(of_model)
         self.mixture = self._mixture()
-        self.mixture.restore(mixture)
+        self._make(states[1]["low"], states[1]["high"], len(states[0]["origins"]))
+        for model, of_model in zip([*self._models(), self.mixture], states, strict=True):
+            model.restore(of_model)
 
 
 class RegressionExperts(Experts):
@@ -192,7 +230,8 @@ class RegressionExperts(Experts):
     error_limit = ERROR_LIMIT
 
     def _mixture(self) -> _core.PredictionMixture:
-        return _core.PredictionMixture(2 + len(FORGETTING))
+        of_window = [1.0] if self.has_window else []
+        return _core.PredictionMixture([*PRIORS, *of_window, 1.0])
 
     def mix(self, each: Floats) -> Floats:
         """Return the weighted mean of predictions, shape (1,)."""
@@ -212,7 +251,7 @@ class ClassificationExperts(Experts):
     error_limit = np.inf  # a rare class has large errors
 
     def _mixture(self) -> _core.ProbabilityMixture:
-        return _core.ProbabilityMixture(1 + len(FORGETTING))
+        return _core.ProbabilityMixture(1 + len(FORGETTING) + self.has_window)
 
     def mix(self, each: Floats) -> Floats:
         """Return the probabilities of classes, shape (n_classes,)."""

@@ -39,15 +39,16 @@ class RiverRegressor(StreamEstimator, base.Regressor):
         features, and categories of each, are learned.
     follows_ranges : bool, default=True
         Whether learned ranges of inputs become those of the last 500 samples as the stream drifts.
-    experts : {"linear", "network"}, default="linear"
-        What predicts: the network alone, or with "linear" also the mean of the targets and linear
-        regression on the inputs, by recursive least squares. They are weighted by their recent
-        errors; `weights_` shows the weights.
+    experts : {"window", "linear", "network"}, default="window"
+        What predicts: the network alone; with "linear" also the mean of the targets and linear
+        regression on the inputs; with "window" also kernel regression on the last 400 samples. They
+        are weighted by their recent errors; `weights_` shows the weights.
 
     Notes
     -----
-    Linear regression has up to 200 columns: one for each number, where a missing value counts as
-    the middle of the range, and one for each category.
+    Regressions have up to 200 columns: one for each number, where a missing value counts as the
+    middle of the range, and one for each category. Linear ones are recursive least squares, which
+    remember about 1,000 and 50 samples. The kernel regression learns what the first leaves.
     """
 
     default_model = SDNNRegressor(out_of_range="widen")
@@ -87,7 +88,7 @@ class RiverClassifier(StreamEstimator, base.Classifier):
         that comes later gets additional units, but is an error with ``scheme="one_vs_one"``.
     follows_ranges : bool, default=True
         As in `RiverRegressor`.
-    experts : {"linear", "network"}, default="linear"
+    experts : {"window", "linear", "network"}, default="window"
         As in `RiverRegressor`, with the frequencies of labels instead of the mean, and weights by
         the likelihood of recent labels.
     """

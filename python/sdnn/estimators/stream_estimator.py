@@ -99,7 +99,7 @@ class StreamEstimator:
         model: SDNNRegressor | SDNNClassifier | None = None,
         grace_period: int = 100,
         follows_ranges: bool = True,
-        experts: str = "linear",
+        experts: str = "window",
     ) -> None:
         model_class = type(self.default_model)
         self.model = clone(self.default_model) if model is None else model
@@ -262,7 +262,8 @@ class StreamEstimator:
         codings = dict(zip(names, self.fitted.codings_, strict=True))
         rows, targets = list(map(self._read, self.samples)), self._targets(self.targets)
         if self.mixed is None:
-            self.mixed = self.experts_class(codings, rows, targets)
+            has_window = self.experts == "window"
+            self.mixed = self.experts_class(codings, rows, targets, has_window)
         else:
             self.mixed.begin(codings, rows, targets)
 

@@ -18,7 +18,7 @@ using estimators::PredictionMixture;
 using Numbers = std::vector<double>;
 
 TEST(PredictionMixture, WeightsAreTheInverseEighthPowerOfErrorsMixedWithTheirMean) {
-  PredictionMixture mixture(2);
+  PredictionMixture mixture(Numbers(2, 1.0));
   EXPECT_EQ(mixture.mix(Numbers{1.0, 4.0}), 2.5);
   mixture.learn(Numbers{0.0, 1.0}, 2.0);
   // Squared errors 4 and 1, of mean 2.5, which counts as much as five samples.
@@ -27,8 +27,15 @@ TEST(PredictionMixture, WeightsAreTheInverseEighthPowerOfErrorsMixedWithTheirMea
   EXPECT_NEAR(mixture.mix(Numbers{1.0, 4.0}), (ratio + 4.0) / (ratio + 1.0), 1e-14);
 }
 
+TEST(PredictionMixture, StartsWithThePriors) {
+  PredictionMixture mixture(Numbers{3.0, 1.0});
+  EXPECT_EQ(mixture.weights(), (Numbers{0.75, 0.25}));
+  mixture.learn(Numbers{0.0, 0.0}, 1.0);
+  EXPECT_EQ(mixture.weights(), (Numbers{0.75, 0.25}));
+}
+
 TEST(PredictionMixture, FollowsADriftThatChangesWhichExpertIsRight) {
-  PredictionMixture mixture(2);
+  PredictionMixture mixture(Numbers(2, 1.0));
   for (int i = 0; i < 1000; ++i) mixture.learn(Numbers{0.1, 1.0}, 0.0);
   EXPECT_GT(mixture.weights()[0], 0.99);
   for (int i = 0; i < 200; ++i) mixture.learn(Numbers{0.1, 1.0}, 1.0);
@@ -36,7 +43,7 @@ TEST(PredictionMixture, FollowsADriftThatChangesWhichExpertIsRight) {
 }
 
 TEST(PredictionMixture, AnOutlierDoesNotMakeExpertsAlike) {
-  PredictionMixture mixture(2);
+  PredictionMixture mixture(Numbers(2, 1.0));
   for (int i = 0; i < 200; ++i) mixture.learn(Numbers{0.1, 0.3}, 0.0);
   mixture.learn(Numbers{0.1, 0.3}, 1e300);
   EXPECT_GT(mixture.weights()[0], 0.8);
@@ -46,7 +53,7 @@ TEST(PredictionMixture, WeightsDoNotDependOnTheUnitOfTargets) {
   const int exponents[]{-1000, -500, 0, 500, 1000};
   std::vector<Numbers> weights;
   for (const int exponent : exponents) {
-    PredictionMixture mixture(3);
+    PredictionMixture mixture(Numbers(3, 1.0));
     for (int i = 0; i < 50; ++i) {
       const auto scaled = [&](double x) { return std::ldexp(x, exponent); };
       mixture.learn(Numbers{scaled(i % 3), scaled(1.5), scaled(i % 4)}, scaled(i % 5));
@@ -59,7 +66,7 @@ TEST(PredictionMixture, WeightsDoNotDependOnTheUnitOfTargets) {
 TEST(PredictionMixture, StaysFiniteForAnyNumbers) {
   constexpr double kMax = std::numeric_limits<double>::max();
   const Numbers extremes{0.0, 1.0, -1.0, 5e-324, 1e300, -kMax, kMax, 1e-200, -1e154, 0.0, 0.0};
-  PredictionMixture mixture(3);
+  PredictionMixture mixture(Numbers(3, 1.0));
   for (std::size_t i = 0; i < 5000; ++i) {
     const Numbers each{extremes[i % 11], extremes[(i / 3) % 11], extremes[(i / 31) % 11]};
     const double mixed = mixture.mix(each);
@@ -73,11 +80,12 @@ TEST(PredictionMixture, StaysFiniteForAnyNumbers) {
 }
 
 TEST(PredictionMixture, RestoresItsStateAndNamesAWrongArgument) {
-  PredictionMixture mixture(2), other(2);
+  PredictionMixture mixture(Numbers{4.0, 1.0}), other = mixture;
   for (int i = 0; i < 30; ++i) mixture.learn(Numbers{0.1, i % 3 * 1.0}, 0.0);
   core::restore(other, core::state_of(mixture));
   EXPECT_EQ(other.weights(), mixture.weights());
-  EXPECT_THROW(PredictionMixture(0), std::invalid_argument);
+  EXPECT_THROW(PredictionMixture(Numbers{}), std::invalid_argument);
+  EXPECT_THROW(PredictionMixture(Numbers{0.5}), std::invalid_argument);
   EXPECT_THROW(mixture.learn(Numbers{0.0}, 1.0), std::invalid_argument);
   EXPECT_THROW(mixture.learn(Numbers{0.0, 0.0}, INFINITY), std::invalid_argument);
   EXPECT_THROW(mixture.mix(Numbers{0.0, NAN}), std::invalid_argument);

@@ -414,7 +414,7 @@ def test_follows_ranges_halves_the_error_on_drifting_features(river):
     errors = {}
     for follows in (True, False):
         learner = SDNNRegressor(n_pattern_units=32, random_state=0, out_of_range="widen")
-        model = river.RiverRegressor(learner, follows_ranges=follows)
+        model = river.RiverRegressor(learner, follows_ranges=follows, experts="network")
         random.seed(1)
         for number in range(1500):
             a, b = random.uniform(size=2)

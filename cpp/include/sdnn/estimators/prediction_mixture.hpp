@@ -8,6 +8,7 @@
 #include <limits>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "sdnn/core/detail/check.hpp"
@@ -26,9 +27,12 @@ namespace sdnn::estimators {
 /// expert. Machine Learning 32.
 class PredictionMixture {
  public:
-  /// Throws std::invalid_argument without experts or for more than 1,000.
-  explicit PredictionMixture(std::size_t n_experts) : losses_(n_experts) {
-    core::require_in_range("n_experts", n_experts, 1, kMostExperts);
+  /// Takes the weights before any sample, up to a factor. Shape: (n_experts,). Throws
+  /// std::invalid_argument without experts, for more than 1,000, and for weights outside [1, 1e6].
+  explicit PredictionMixture(std::vector<double> priors)
+      : priors_(std::move(priors)), losses_(priors_.size()) {
+    core::require_in_range("n_experts", n_experts(), 1, kMostExperts);
+    for (const double prior : priors_) core::require_in_range("priors", prior, 1.0, 1e6);
   }
 
   std::size_t n_experts() const noexcept { return losses_.size(); }
@@ -36,19 +40,19 @@ class PredictionMixture {
   /// The weights of the experts, which sum to 1. Shape: (n_experts,).
   std::vector<double> weights() const {
     const std::size_t n = n_experts();
-    std::vector<double> weights(n, 1.0 / static_cast<double>(n));
+    std::vector<double> weights = priors_;
     const double total = std::accumulate(losses_.begin(), losses_.end(), 0.0);
-    if (!(total > 0.0)) return weights;
-    // Few errors are mixed with the mean of all experts.
-    const double common = kPriorSamples * (total / static_cast<double>(n)) / count_;
-    const double least = *std::ranges::min_element(losses_) + common;
-    double sum = 0.0;
-    for (std::size_t k = 0; k < n; ++k) {
-      const double ratio = least / (losses_[k] + common);
-      const double square = ratio * ratio, fourth = square * square;
-      weights[k] = fourth * fourth;
-      sum += weights[k];
+    if (total > 0.0) {
+      // Few errors are mixed with the mean of all experts.
+      const double common = kPriorSamples * (total / static_cast<double>(n)) / count_;
+      const double least = *std::ranges::min_element(losses_) + common;
+      for (std::size_t k = 0; k < n; ++k) {
+        const double ratio = least / (losses_[k] + common);
+        const double square = ratio * ratio, fourth = square * square;
+        weights[k] *= fourth * fourth;
+      }
     }
+    const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
     for (double& weight : weights) weight /= sum;
     return weights;
   }
@@ -130,6 +134,7 @@ class PredictionMixture {
 
   double count_ = 0.0;          ///< discounted number of samples
   std::int32_t exponent_ = 0;   ///< errors are in units of 2^exponent_
+  std::vector<double> priors_;  ///< weights before any sample, up to a factor
   std::vector<double> losses_;  ///< discounted sums of squared errors
 };
 
