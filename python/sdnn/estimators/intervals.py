@@ -8,12 +8,17 @@ the jackknife+, Annals of Statistics 49 (the jackknife, of which this is the pla
 
 from __future__ import annotations
 
+import bisect
+import collections
 import math
 
 import numpy as np
 
 from sdnn.estimators.columns import Floats
 from sdnn.support.arguments import real
+
+N_ERRORS = 300  # errors of a stream that are remembered
+STEP = 0.02  # change of the level of a stream's intervals after an error
 
 ROUNDED_DOWN = 1.0 - 1e-12
 """Factor against rounding, as 0.9 * 10 may be more than 9."""
@@ -61,3 +66,49 @@ def log_sizes(errors: Floats) -> Floats:
     least = LEAST_SHARE * np.sqrt(np.square(shares).mean(axis=0))
     logarithms: Floats = np.log(unit) + np.log(np.maximum(shares, np.where(least > 0, least, 1.0)))
     return logarithms
+
+
+class FollowedErrors:
+    """Half widths of intervals from the last errors of a stream.
+
+    They are a quantile of the last 300 errors, whose level rises after each target outside its
+    interval, and falls a little after each other one, so that the coverage stays as the errors
+    change. Source: Gibbs, I., Candes, E. (2021), Adaptive conformal inference under distribution
+    shift, NeurIPS 34.
+
+    Parameters
+    ----------
+    coverage : float
+        The share of targets that intervals are to contain.
+    """
+
+    def __init__(self, coverage: float) -> None:
+        self.coverage = coverage
+        self.level = coverage
+        self.last: collections.deque[float] = collections.deque(maxlen=N_ERRORS)
+        self.ordered: list[float] = []
+
+    def half_width(self) -> float:
+        """Return the half width of the next interval; 0 before the first error.
+
+        >>> errors = FollowedErrors(0.5)
+        >>> for error in (3.0, 1.0, 2.0):
+        ...     errors.learn(error)
+        >>> errors.half_width()
+        2.0
+        """
+        n_errors = len(self.ordered)
+        if n_errors == 0:
+            return 0.0
+        place = math.ceil(self.level * (n_errors + 1) * ROUNDED_DOWN) - 1
+        return self.ordered[min(max(place, 0), n_errors - 1)]
+
+    def learn(self, error: float) -> None:
+        """Learn the size of an error, which the next half width was to exceed."""
+        if self.ordered:
+            is_outside = error > self.half_width()
+            self.level += STEP * (is_outside - (1.0 - self.coverage))
+        if len(self.last) == N_ERRORS:
+            self.ordered.pop(bisect.bisect_left(self.ordered, self.last[0]))
+        self.last.append(error)
+        bisect.insort(self.ordered, error)

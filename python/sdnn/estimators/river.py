@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import collections
 import math
+import sys
 from collections.abc import Sequence
+from typing import Literal, overload
 
 import numpy as np
 from river import base
+from river.conf import Interval
 
 from sdnn.coding.symbols import is_missing
 from sdnn.estimators.classifier import SDNNClassifier
 from sdnn.estimators.columns import Floats
 from sdnn.estimators.experts import ClassificationExperts, RegressionExperts
+from sdnn.estimators.intervals import FollowedErrors, coverage_of
 from sdnn.estimators.regressor import SDNNRegressor
 from sdnn.estimators.stream_estimator import (
     Features,
@@ -21,7 +25,7 @@ from sdnn.estimators.stream_estimator import (
     Target,
     cleaned_sample,
 )
-from sdnn.support.arguments import require, shown
+from sdnn.support.arguments import flag, require, shown
 
 
 class RiverRegressor(StreamEstimator, base.Regressor):
@@ -43,6 +47,8 @@ class RiverRegressor(StreamEstimator, base.Regressor):
         What predicts: the network alone; with "linear" also the mean of the targets and linear
         regression on the inputs; with "window" also kernel regression on the last 400 samples. They
         are weighted by their recent errors; `weights_` shows the weights.
+    coverage : float, default=0.9
+        The share of targets that intervals of predictions are to contain.
 
     Notes
     -----
@@ -53,6 +59,18 @@ class RiverRegressor(StreamEstimator, base.Regressor):
 
     default_model = SDNNRegressor(out_of_range="widen")
     experts_class = RegressionExperts
+
+    def __init__(
+        self,
+        model: SDNNRegressor | None = None,
+        grace_period: int = 100,
+        follows_ranges: bool = True,
+        experts: str = "window",
+        coverage: float = 0.9,
+    ) -> None:
+        super().__init__(model, grace_period, follows_ranges, experts)
+        self.coverage = coverage_of(coverage)
+        self.errors = FollowedErrors(self.coverage)
 
     def _check_target(self, y: Target) -> None:
         try:
@@ -67,11 +85,42 @@ class RiverRegressor(StreamEstimator, base.Regressor):
     def _targets(self, targets: Sequence[Target]) -> Floats:
         return np.array(targets, dtype=np.float64)[:, None]
 
-    def predict_one(self, x: Features) -> float:
-        """Predict one target."""
-        if self.fitted is None:
-            return float(np.mean(self.targets)) if self.targets else 0.0
-        return float(self._mix(self._estimates(cleaned_sample(x)))[0])
+    def _predict(self, sample: Sample) -> float:
+        if self.fitted is not None:
+            return float(self._mix(self._estimates(sample))[0])
+        if not self.targets:
+            return 0.0
+        with np.errstate(over="ignore", invalid="ignore"):
+            mean = float(np.mean(self.targets))
+        return mean if math.isfinite(mean) else sum(y / len(self.targets) for y in self.targets)
+
+    def learn_one(self, x: Features, y: Target) -> None:
+        """Learn one sample; an error changes nothing."""
+        sample = cleaned_sample(x)
+        self._check_target(y)
+        difference = float(y) - self._predict(sample)  # may overflow
+        super().learn_one(x, y)
+        self.errors.learn(min(abs(difference), sys.float_info.max))
+
+    @overload
+    def predict_one(self, x: Features, with_interval: Literal[False] = False) -> float: ...
+
+    @overload
+    def predict_one(self, x: Features, with_interval: Literal[True]) -> Interval: ...
+
+    def predict_one(self, x: Features, with_interval: bool = False) -> float | Interval:
+        """Predict one target, or with ``with_interval`` bounds of it, as `river.conf` does.
+
+        The interval, whose ``center`` is the prediction, has a half width that the last 300 errors
+        exceed as seldom as ``coverage`` has it (adaptive conformal inference). It is the same for
+        all samples; before the first error it is 0.
+        """
+        prediction = self._predict(cleaned_sample(x))
+        if not flag("with_interval", with_interval):
+            return prediction
+        half_width, largest = self.errors.half_width(), sys.float_info.max
+        lower, upper = prediction - half_width, prediction + half_width
+        return Interval(lower=max(lower, -largest), upper=min(upper, largest))
 
 
 class RiverClassifier(StreamEstimator, base.Classifier):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn import SDNNKernelRidge
-from sdnn.estimators.intervals import error_bounds, log_sizes
+from sdnn import SDNNKernelRidge, SDNNRegressor
+from sdnn.estimators.intervals import FollowedErrors, error_bounds, log_sizes
 
 RNG = np.random.default_rng(3)
 X = RNG.uniform(-1.0, 1.0, (700, 2))
@@ -125,3 +125,53 @@ def test_coverage_within_0_and_1_with_enough_samples_is_required():
     refuses("scaled", model.predict_interval, X, scaled="yes", error=TypeError)
     constant = SDNNKernelRidge().fit(X[:20], np.ones(20))
     np.testing.assert_allclose(constant.predict_interval(X[:3], scaled=True), 1.0, atol=1e-6)
+
+
+def test_half_widths_are_quantiles_of_the_last_errors_whose_level_follows_the_coverage():
+    errors = FollowedErrors(0.5)
+    assert errors.half_width() == 0.0
+    for error in (1.0, 3.0):
+        errors.learn(error)  # 3 is beyond the half width 1: the level is 0.5 + 0.02 * 0.5
+    assert errors.level == pytest.approx(0.51)
+    assert errors.half_width() == 3.0  # the second of two: 0.51 * 3 is rounded up
+    errors.learn(2.0)
+    assert errors.level == pytest.approx(0.5)
+    assert errors.half_width() == 2.0
+    for size in (5.0, 7.0):
+        for _ in range(300):
+            errors.learn(size)
+    assert errors.ordered == [7.0] * 300
+
+
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
+def test_river_intervals_contain_their_share_of_targets_as_the_noise_changes():
+    river = pytest.importorskip("sdnn.estimators.river")
+    random = np.random.RandomState(0)
+    model = river.RiverRegressor(SDNNRegressor(n_pattern_units=40, random_state=0), coverage=0.8)
+    is_covered = []
+    for number in range(1700):
+        a, b = random.uniform(-1, 1, 2)
+        y = np.sin(3 * a) + b + (0.1 + 0.4 * (number > 900)) * random.normal()
+        interval = model.predict_one({"a": a, "b": b}, with_interval=True)
+        assert interval.center == pytest.approx(model.predict_one({"a": a, "b": b}))
+        is_covered.append(y in interval)
+        model.learn_one({"a": a, "b": b}, y)
+    assert abs(np.mean(is_covered[100:]) - 0.8) < 0.02
+    assert min(part.mean() for part in np.array_split(is_covered[100:], 8)) > 0.7
+    assert model.clone().coverage == 0.8
+    assert pickle.loads(pickle.dumps(model)).predict_one({"a": 0.1}, True) == model.predict_one(
+        {"a": 0.1}, with_interval=True
+    )
+
+
+def test_river_intervals_of_extreme_targets_are_finite():
+    river = pytest.importorskip("sdnn.estimators.river")
+    model = river.RiverRegressor(grace_period=5)
+    assert model.predict_one({"a": 1.0}, with_interval=True).width == 0.0
+    for number in range(4):
+        model.learn_one({"a": number}, 1.7e308 * (-1) ** (number // 2))
+    interval = model.predict_one({"a": 1.0}, with_interval=True)
+    assert np.isfinite([interval.lower, interval.upper]).all()
+    for bad in (0.0, 1.0, "0.9", None):
+        refuses("coverage", river.RiverRegressor, coverage=bad, error=(TypeError, ValueError))
+    refuses("with_interval", model.predict_one, {"a": 1.0}, 1, error=TypeError)
