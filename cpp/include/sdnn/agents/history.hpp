@@ -18,10 +18,11 @@ namespace sdnn::agents {
 
 /// Makes states from the inputs of the present and earlier observations; all are in [0, 1].
 ///
-/// With `automatic`, an observer's estimates replace the inputs if they reduce prediction errors by
-/// a tenth, as with noisy sensors. Otherwise differences are added if they explain a further 20 %
-/// of an input's changes, as without observed velocities. Symbols have no history. There is no
-/// history if the experience is too small or there are too many inputs.
+/// With `automatic`, an observer's estimates replace the inputs if they reduce squared prediction
+/// errors by an eighth, as with noisy sensors. Otherwise differences are added if they explain a
+/// further 20 % of an input's changes and leave less than 30 %, as without observed velocities.
+/// Symbols have no history. There is no history if the experience is too small or there are too
+/// many inputs.
 class HistoryFilter {
  public:
   /// Without any history, for observations of `n` inputs.
@@ -231,8 +232,8 @@ class HistoryFilter {
   }
 
  private:
-  static constexpr double kLeastImprovement = 0.1;  // of the observer
-  static constexpr double kLeastShare = 0.2;        // of changes, explained by differences
+  static constexpr double kLeastImprovement = 0.1335;  // of the observer: log(8 / 7)
+  static constexpr double kLeastShare = 0.2;           // of changes, explained by differences
   static constexpr double kFastRate = 0.5, kSlowRate = 0.2;
   static constexpr double kHeadroom = 1.5;
   static constexpr double kLeastDifference = 1e-9;
