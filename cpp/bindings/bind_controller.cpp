@@ -200,6 +200,9 @@ void bind_controller(py::module_& module) {
            py::arg("state") = py::none(), "New, or as it was when `state` was taken")
       .def_property_readonly("approximator", &Controller::approximator)
       .def_property_readonly("is_warming_up", &Controller::is_warming_up)
+      .def_property_readonly(
+          "has_warm_up", [](const Controller& self) { return self.observations().needs_fit(); },
+          "Whether there is, or was, a warm-up")
       .def_property_readonly("n_variables", &Controller::n_variables)
       .def_property_readonly(
           "history",

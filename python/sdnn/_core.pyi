@@ -2082,6 +2082,11 @@ class Controller:
         Where epsilon goes with schedule_steps; None without Q(lambda)
         """
     @property
+    def has_warm_up(self) -> bool:
+        """
+        Whether there is, or was, a warm-up
+        """
+    @property
     def history(self) -> str:
         """
         The part of earlier observations in states; 'none' during the warm-up

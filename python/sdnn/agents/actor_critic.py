@@ -28,7 +28,9 @@ class SDNNActorCritic(ValueAgent[LinearSDNNConfig, ActorCriticConfig]):
     observation_space, action_space, seed, tables, observation_range, angles, angle_pairs, inputs, \
 warm_up_steps, missing, history
         See `Agent`; ``observation_range`` is ``"running"`` by default, so there is no warm-up
-        unless inputs are to be found. Inputs that are left out stay out.
+        unless inputs or pairs are to be found. Inputs that are left out stay out. ``history`` is
+        ``"auto"`` by default; for noisy sensors or hidden velocities give ``angle_pairs="find"``,
+        which has a warm-up and lets the observer know how angles turn.
     approximator : LinearSDNNConfig, optional
         ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces;
         ``action_window`` and ``averaging_interval`` have no effect.
@@ -51,7 +53,7 @@ warm_up_steps, missing, history
     default_range = "running"
     approximator_type = LinearSDNNConfig
     learning_type = ActorCriticConfig
-    presets = presets_of(_core.actor_critic_presets())
+    presets = presets_of(_core.actor_critic_presets(), general={"history": "auto"})
     """Settings by name: ``"general"``."""
 
     def action_probabilities(

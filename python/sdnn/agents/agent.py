@@ -82,13 +82,15 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         variable's last reading in its environment's episode replaces them (before the first one,
         the middle of its range, of a symbol the first one), or each input has a pattern for them
         (SDNN agents only; an angle is missing if one of its pair is).
-    history : {"none", "differences", "averages", "observer", "auto"}
+    history : {"none", "differences", "averages", "observer", "auto"}, optional
         The part of earlier observations in states. ``"differences"``: the change of each input in
         the last step, as a further input, for tasks whose observations lack velocities.
         ``"averages"``: two running averages of each input, as further inputs. ``"observer"``: an
         estimate in place of each input, for noisy sensors, from a model that is fitted in the
-        warm-up (at most 16 inputs). ``"auto"``: what the warm-up finds useful, or nothing. Needs a
-        warm-up. Observations must then be those of one episode, in order.
+        warm-up (at most 16 inputs). These three need a warm-up, and observations must be those of
+        one episode, in order. ``"auto"``, the default of `SDNNQLambda` and `SDNNActorCritic`: what
+        the warm-up finds useful, or nothing, as without a warm-up or with ``missing="code"``. By
+        default ``"none"`` in other agents.
 
     Raises
     ------
@@ -120,6 +122,11 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     def has_running_ranges(self) -> bool:
         """Whether the ranges of observations are adapted to each new observation."""
         return self._observation.running
+
+    @property
+    def finds_history(self) -> bool:
+        """Whether the warm-up decides what states have of earlier observations."""
+        return self._observation.history == "auto" and self._controller.has_warm_up
 
     @property
     def n_dimensions(self) -> int:

@@ -68,6 +68,7 @@ class Preset(NamedTuple):
     learning: Any
     angle_pairs: AnglePairs = "none"
     inputs: Inputs = "all"
+    history: History = "none"
 
 
 def presets_of(listed: Mapping[str, Any], **more: Mapping[str, Any]) -> Mapping[str, Preset]:
@@ -122,10 +123,9 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
         inputs: Inputs | None = None,
         warm_up_steps: int = WARM_UP.default,
         missing: Missing = "error",
-        history: History = "none",
+        history: History | None = None,
     ) -> None:
         chosen = choice("preset", self.default_preset if preset is None else preset, self.presets)
-        made_of = () if tables is None else pattern_tables(tables)
         observations, actions = spaces_of(observation_space, action_space)
         self._take_spaces(observations, actions)
         require_unbatched(observations, actions)
@@ -139,17 +139,18 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             seed,
             warm_up_steps,
         )
+        default_history = "none" if missing == "code" else chosen.history
         self._observation = self._observations.config(
             self.default_range if observation_range is None else observation_range,
             angles,
             chosen.angle_pairs if angle_pairs is None else angle_pairs,
             chosen.inputs if inputs is None else inputs,
             missing=missing,
-            history=history,
+            history=default_history if history is None else history,
             narrows=self.narrows_ranges,
         )
         self._action = self._actions.config
-        self._make_controller(tables=list(made_of))
+        self._make_controller(tables=[] if tables is None else list(pattern_tables(tables)))
 
     def _take_spaces(self, observations: Space, actions: Space) -> None:
         self._observations = Observations(observations)

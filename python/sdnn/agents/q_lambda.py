@@ -22,12 +22,13 @@ class SDNNQLambda(ValueAgent[LinearSDNNConfig, QLambdaConfig]):
     Parameters
     ----------
     observation_space, action_space, seed, tables, observation_range, angles, warm_up_steps,
-    missing, history
+    missing
         See `Agent`.
-    angle_pairs, inputs
-        See `Agent`; by default ``"find"`` and ``"relevant"``, with the preset ``"paper"``
-        ``"none"`` and ``"all"``. So the agent begins with a warm-up, unless there is no choice.
-        Inputs that matter later are added after 2, 4, 8, ... times ``warm_up_steps``.
+    angle_pairs, inputs, history
+        See `Agent`; by default ``"find"``, ``"relevant"`` and ``"auto"``, with the preset
+        ``"paper"`` ``"none"``, ``"all"`` and ``"none"``. So the agent begins with a warm-up, unless
+        there is no choice. Inputs that matter later are added after 2, 4, 8, ... times
+        ``warm_up_steps``, in states without a history.
     approximator : LinearSDNNConfig, optional
         ``n_inputs`` (and ``n_actions``, unless actions are a Box) are taken from the spaces.
     learning : QLambdaConfig, optional
@@ -51,7 +52,8 @@ class SDNNQLambda(ValueAgent[LinearSDNNConfig, QLambdaConfig]):
     approximator_type = LinearSDNNConfig
     learning_type = QLambdaConfig
     presets = presets_of(
-        _core.q_lambda_presets(), general={"angle_pairs": "find", "inputs": "relevant"}
+        _core.q_lambda_presets(),
+        general={"angle_pairs": "find", "inputs": "relevant", "history": "auto"},
     )
     """Settings by name: ``"general"`` and ``"paper"``."""
 

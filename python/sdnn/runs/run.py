@@ -235,6 +235,7 @@ class Run(Displayed):
             has_pictures="rgb_array" in render_modes(single),
             scaling=agent.scaling,
             history=agent.history,
+            finds_history=agent.finds_history,
         )
 
     def agent(self) -> AnyAgent:

@@ -315,13 +315,14 @@ class AgentSpec(Settings, frozen=True):
         ),
     ] = "error"
     history: Annotated[
-        Literal["none", "differences", "averages", "observer", "auto"],
+        Literal["none", "differences", "averages", "observer", "auto"] | None,
         doc(
             "What states have of earlier observations: `none`; `differences` from the last one, "
             "for tasks whose observations lack velocities; running `averages`; estimates of an "
-            "`observer` in place of the inputs, for noisy sensors; `auto`, what the warm-up finds."
+            "`observer` in place of the inputs, for noisy sensors; `auto`, what a warm-up finds, "
+            "the default of `q-lambda` and `actor-critic`. By default `none` in others."
         ),
-    ] = "none"
+    ] = None
 
 
 class ProtocolSpec(Settings, frozen=True):

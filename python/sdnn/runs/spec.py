@@ -119,12 +119,14 @@ class RunSpec(Settings, frozen=True):
             self._set(**{name: base if is_preset else with_changes(base, value, name, hint)})
         pairs = "none" if self.environment.changes_observations else defaults.angle_pairs
         agent = self.agent
+        history = "none" if agent.missing == "code" else defaults.history
         self._set(
             agent=agent.replace(
                 name=entry.id,
                 preset=preset,
                 angle_pairs=pairs if agent.angle_pairs is None else agent.angle_pairs,
                 inputs=defaults.inputs if agent.inputs is None else agent.inputs,
+                history=history if agent.history is None else agent.history,
             )
         )
 
@@ -193,7 +195,7 @@ class RunSpec(Settings, frozen=True):
         return (
             self.entry.core_trial is not None
             and self.environment.is_plain_paper_acrobot
-            and not self._optional_settings()
+            and self._optional_settings().items() <= {("history", "auto")}  # without a warm-up
             and (protocol.n_envs, protocol.evaluation_episodes) == (1, 1)
             and protocol.evaluate_every_episodes is not None
             and not protocol.seeded_episodes
@@ -343,14 +345,15 @@ class RunSpec(Settings, frozen=True):
 
     def _optional_settings(self) -> dict[str, object]:
         values = {name: getattr(self.agent, name) for name in _OPTIONAL}
-        defaults = AgentSpec(angle_pairs="none", inputs="all")
+        defaults = AgentSpec(angle_pairs="none", inputs="all", history="none")
         return {k: value for k, value in values.items() if value != getattr(defaults, k)}
 
     def _agent_arguments(self, env: Env) -> dict[str, object]:
         """Return the arguments that only some agents have: those that are not the default."""
         arguments, environment = self._optional_settings(), self.environment
         if _is_class_of(self.entry.agent, ValueAgent) and self.entry.presets:  # by its preset
-            arguments |= {"angle_pairs": self.agent.angle_pairs, "inputs": self.agent.inputs}
+            names = ("angle_pairs", "inputs", "history")
+            arguments |= {name: getattr(self.agent, name) for name in names}
         if not environment.ranges:
             return arguments
         if environment.has_other_sensors:  # the ranges are then the bounds of the space

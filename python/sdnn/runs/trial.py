@@ -301,6 +301,7 @@ class RunOutcome:
     has_pictures: bool
     scaling: Scaling | None
     history: str
+    finds_history: bool
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -314,7 +314,9 @@ ControllerConfig grid(History history) {
 
 TEST(History, AGridThatIsTooLargeWithDifferencesIsRefusedOrHasNone) {
   EXPECT_THROW(Controller(grid(History::differences)), std::length_error);
-  Controller controller(grid(History::automatic));
+  ControllerConfig config = grid(History::automatic);
+  config.observation.adaptive = true;  // has a warm-up
+  Controller controller(config);
   core::Random random(5, core::Stream::weights);
   Numbers observation{0.5, 0.5}, velocity{0.0, 0.0};
   controller.begin_episode();
@@ -330,7 +332,16 @@ TEST(History, AGridThatIsTooLargeWithDifferencesIsRefusedOrHasNone) {
   }
   EXPECT_FALSE(controller.is_warming_up());
   EXPECT_EQ(controller.history().kind(), History::none);
-  EXPECT_NO_THROW((void)Controller::restored(grid(History::automatic), core::state_of(controller)));
+  EXPECT_NO_THROW((void)Controller::restored(config, core::state_of(controller)));
+}
+
+TEST(History, AnAutomaticHistoryBeginsNoWarmUp) {
+  const Controller controller(config_of(History::automatic));
+  EXPECT_FALSE(controller.is_warming_up());
+  EXPECT_EQ(controller.history().kind(), History::none);
+  EXPECT_TRUE(Controller(config_of(History::observer)).is_warming_up());
+  EXPECT_NO_THROW(
+      (void)Controller::restored(config_of(History::automatic), core::state_of(controller)));
 }
 
 TEST(History, SizesThatAHistoryMakesImpossibleAreRefusedAtOnce) {

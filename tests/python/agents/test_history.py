@@ -7,6 +7,7 @@ import pytest
 from sdnn.agents import (
     SDNNActorCritic,
     SDNNQLambda,
+    SDNNQLearning,
     Transition,
     evaluate,
     imitate,
@@ -45,7 +46,7 @@ def noisy():
     ("task", "history"), [(exact, "none"), (positions, "differences"), (noisy, "observer")]
 )
 def test_history_auto_selects_what_a_task_needs(agent_class, task, history):
-    agent = agent_class(task(), seed=1, history="auto")
+    agent = agent_class(task(), seed=1, angle_pairs="find")
     assert agent.history == "auto"
     agent.train(task(), steps=RANDOM_STEPS, seed=1)
     assert agent.history == history
@@ -56,9 +57,74 @@ def test_history_auto_selects_what_a_task_needs(agent_class, task, history):
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
 @pytest.mark.parametrize("task", ["Acrobot-v1", "Pendulum-v1", "MountainCar-v0"])
 def test_auto_finds_no_history_where_observations_show_the_state(agent_class, task):
-    agent = agent_class(gym.make(task), seed=1004, history="auto")
+    agent = agent_class(gym.make(task), seed=1004, angle_pairs="find")
     agent.train(gym.make(task), steps=RANDOM_STEPS, seed=1004)
     assert agent.history == "none"
+
+
+@pytest.mark.parametrize("seed", [1028, 1037])
+def test_auto_finds_no_history_in_the_task_of_the_paper(seed):
+    """Products of three variables, which the model lacks, are neither noise nor velocities."""
+    agent = SDNNQLambda(gym.make("sdnn/PaperAcrobot-v0"), seed=seed)
+    agent.train(gym.make("sdnn/PaperAcrobot-v0"), steps=RANDOM_STEPS, seed=seed)
+    assert agent.history == "none"
+
+
+@pytest.mark.filterwarnings("ignore:.*is not within the observation space")
+def test_an_actor_critic_that_knows_angles_finds_an_observer_for_a_noisy_pendulum():
+    def pendulum():
+        env, random = gym.make("Pendulum-v1"), np.random.default_rng(1)
+        deviation = np.array([0.1, 0.1, 0.8])
+        return gym.wrappers.TransformObservation(
+            env, lambda x: x + deviation * random.standard_normal(3), env.observation_space
+        )
+
+    agent = SDNNActorCritic(pendulum(), seed=1, angle_pairs="find")
+    agent.train(pendulum(), steps=RANDOM_STEPS, seed=1)
+    assert (agent.history, len(agent.inputs)) == ("observer", 2)
+
+
+@pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
+def test_auto_begins_no_warm_up(agent_class):
+    ranges = {"observation_range": ([-5, -5, -1, -5], [5, 5, 1, 5])}
+    agent = agent_class(exact(), inputs="all", angle_pairs=[], **ranges)
+    assert (agent.is_warming_up, agent.history, agent.finds_history) == (False, "none", False)
+    assert not any(name.startswith("history") for name in agent.state())
+    assert agent_class(exact(), inputs="all", angle_pairs=[], history="observer").is_warming_up
+
+
+def test_the_history_by_default_is_auto_in_the_general_presets_alone():
+    def history(agent_class, **settings):
+        return agent_class(gym.make("Pendulum-v1"), **settings).finds_history
+
+    assert history(SDNNQLambda)
+    assert not history(SDNNQLambda, preset="paper", observation_range="adaptive")
+    assert not history(SDNNQLambda, missing="code")
+    assert history(SDNNActorCritic, angle_pairs="find")
+    assert not history(SDNNQLearning, observation_range="adaptive")
+
+
+@pytest.mark.parametrize("settings", [{}, {"inputs": "all"}])
+def test_an_agent_that_finds_no_history_learns_the_bits_of_one_without(settings):
+    """Inputs that matter later are still found, too."""
+
+    def task():
+        env, random = exact(), np.random.default_rng(1)
+        high = np.concatenate([env.observation_space.high, np.ones(6, np.float32)])
+        return gym.wrappers.TransformObservation(
+            env,
+            lambda x: np.concatenate([x, random.uniform(-1.0, 1.0, 6).astype(np.float32)]),
+            gym.spaces.Box(-high, high),
+        )
+
+    states = []
+    for history in ("auto", "none"):
+        agent = SDNNQLambda(task(), seed=1, history=history, **settings)
+        agent.train(task(), steps=2500, seed=1)
+        assert agent.history == "none"
+        states.append({k: v for k, v in agent.state().items() if k != "history.kind"})
+    assert states[0].keys() == states[1].keys()
+    assert all(np.array_equal(state, states[1][name]) for name, state in states[0].items())
 
 
 @pytest.mark.parametrize("history", ["differences", "averages", "observer"])
@@ -125,12 +191,14 @@ def test_an_observer_that_cannot_be_fitted_is_refused_or_warned_of():
 
 def test_a_training_prints_the_history_that_was_found(invoke, tmp_path):
     def lines(history):
-        folder = str(tmp_path / history)
+        folder = str(tmp_path / str(history))
         options = ("--agent", "q-lambda", "--steps", "1200", "--seed", "1", "--out", folder)
-        return invoke("train", "CartPole-v1", *options, "--history", history).output.splitlines()
+        options += () if history is None else ("--history", history)
+        return invoke("train", "CartPole-v1", *options).output.splitlines()
 
     assert not any(line.startswith("history") for line in lines("none"))
     assert "history of observations in states: none, as the warm-up found" in lines("auto")
+    assert "history of observations in states: none, as the warm-up found" in lines(None)
     assert "history of observations in states: averages" in lines("averages")
 
 

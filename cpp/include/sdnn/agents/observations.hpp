@@ -69,7 +69,7 @@ class Observations {
     if (config_.running) running_.emplace(n_variables());
     const Ranges fixed = fixed_ranges(config_.angle_pairs);
     needs_fit_ = may_find_pairs() || may_leave_out_inputs(config_.angle_pairs) ||
-                 config_.history != History::none || std::ranges::any_of(fixed.low, is_unknown);
+                 has_fixed_history() || std::ranges::any_of(fixed.low, is_unknown);
     if (!needs_fit_) take(fixed, config_.angle_pairs);
   }
 
@@ -346,6 +346,10 @@ class Observations {
     const auto are_numbers = [](Role a, Role b) { return a == Role::number && b == a; };
     return config_.find_angle_pairs &&
            std::ranges::adjacent_find(roles_, are_numbers) != roles_.end();
+  }
+  /// Whether states have a history in any case; an automatic one needs no warm-up.
+  bool has_fixed_history() const noexcept {
+    return config_.history != History::none && config_.history != History::automatic;
   }
   bool may_leave_out_inputs(const Pairs& pairs) const {
     return config_.relevant_only && inputs_with(pairs).size() > kAlwaysKept;

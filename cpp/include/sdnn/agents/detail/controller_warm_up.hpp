@@ -194,7 +194,7 @@ inline void Controller::watch() {
   latest_.reset();
   const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&approximator_);
   const auto kept = observations_.kept_inputs();
-  if (config_.observation.history != History::none || linear == nullptr ||
+  if (!history().is_none() || linear == nullptr ||
       !std::holds_alternative<QLambdaConfig>(config_.learning) || linear->max_pairs != 0 ||
       !tables_.empty() || std::ranges::find(kept, false) == kept.end()) {
     return;
@@ -283,7 +283,8 @@ void Controller::serialize(Self& self, Archive& archive) {
     archive.part("warm_up", *self.warm_up_);
   } else {
     HistoryFilter history = self.history();
-    const bool may_have_history = self.config_.observation.history != History::none;
+    const bool may_have_history =
+        self.observations_.needs_fit() && self.config_.observation.history != History::none;
     if (may_have_history) {
       History kind = history.kind();
       archive.within("history", [&] { HistoryFilter::serialize_kind(kind, archive); });
