@@ -74,15 +74,16 @@ TEST(Relevance, KeepsInputsThatActionsOrRewardsDependOn) {
 }
 
 TEST(Relevance, KeepsAllInputsWithoutRelevanceOrWithFewTransitions) {
-  RandomExperience nothing = pushed_mass(500, 3, 0.0, false, 1);
+  RandomExperience nothing = pushed_mass(500, 3, /*memory=*/0.0, /*is_rewarded=*/false, /*seed=*/1);
   std::ranges::fill(nothing.states, 0.5);
   std::ranges::fill(nothing.next_states, 0.5);
   EXPECT_EQ(relevant(nothing), std::vector<bool>(5, true));
-  EXPECT_EQ(relevant(pushed_mass(99, 3, 0.0, true, 1)), std::vector<bool>(5, true));
+  EXPECT_EQ(relevant(pushed_mass(99, 3, /*memory=*/0.0, /*is_rewarded=*/true, /*seed=*/1)),
+            std::vector<bool>(5, true));
 }
 
 TEST(Relevance, KeepsListedInputsAndThoseThatPredictThem) {
-  const auto experience = pushed_mass(1000, 3, 0.0, false, 1);
+  const auto experience = pushed_mass(1000, 3, /*memory=*/0.0, /*is_rewarded=*/false, /*seed=*/1);
   EXPECT_EQ(Relevance(experience).inputs({false, false, false, true, false}),
             (std::vector<bool>{true, true, false, true, false}));
   RandomExperience still = experience;  // neither actions nor rewards: the position is known

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <string>
+#include <string_view>
 
 #include "instruction_sets.hpp"
 #include "sdnn/core/random.hpp"

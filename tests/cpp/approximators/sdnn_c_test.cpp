@@ -38,12 +38,12 @@ TEST(SDNNC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
   const Network network(config, 1);
   int largest = 0;
   for (std::size_t i = 0; i < 200; ++i) {
-    EXPECT_EQ(network.hidden_layer().threshold(i), i % 2 == 0 ? -80 : 80);
+    EXPECT_EQ(network.hidden_layer().threshold(i), i % 2 == 0 ? -8 * 10 : 8 * 10);
     for (std::size_t j = 0; j < network.state_code().n_columns(); ++j) {
       largest = std::max(largest, std::abs(network.weight(i, j)));
     }
   }
-  EXPECT_EQ(largest, 4);
+  EXPECT_EQ(largest, 8 / 2);
 }
 
 // The unit is the value of one more firing unit. A deficit of a quarter of it is lost by rounding

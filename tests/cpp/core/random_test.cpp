@@ -82,7 +82,7 @@ TEST(Random, NormalConsumesOneDraw) {
   for (int i = 0; i < 1000; ++i) {
     const double z = normal.normal();
     EXPECT_TRUE(std::isfinite(z));
-    EXPECT_EQ(z < 0.0, bits.bits() < (std::uint64_t{1} << 63));
+    EXPECT_EQ(z < 0.0, bits.bits() < (std::uint64_t{1} << 63));  // the lower half
   }
 }
 

@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "folders.hpp"
 #include "sdnn/core/random.hpp"

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <stdexcept>
-#include <string_view>
 
 namespace sdnn::environments {
 namespace {

@@ -38,13 +38,14 @@ TEST(PDeltaRule, CorrectsTheNearestUnitsAndOfEqualOnesTheLowestIndex) {
   EXPECT_EQ(apply(rule, 7, potentials), (Pairs{{0, -1}, {3, -1}}));
 }
 
+// Units 0 and 1 should both be active, units 2 and 3 both inactive.
 TEST(PDeltaRule, GroupsOfUnitsAreCorrectedSeparately) {
   estimators::PDeltaRule rule(4, std::vector<double>{2.0, 0.0}, 2);
   EXPECT_EQ(apply(rule, 0, {1, -1, 1, -1}), (Pairs{{1, 1}, {2, -1}}));
 }
 
 TEST(PDeltaRule, CorrectsAShareOfTheDeficit) {
-  const std::vector<std::int32_t> potentials{5, -2, 0, 3, -2, -9, -4, -1, 0};
+  const std::vector<std::int32_t> potentials{5, -2, 0, 3, -2, -9, -4, -1, 0};  // as above
   estimators::PDeltaRule rule(9, std::vector<double>{3.0, 4.0, 8.0, 9.0, 0.0}, 1, 0.25);
   EXPECT_EQ(apply(rule, 0, potentials), (Pairs{{2, 1}}));          // .25 is at least one
   EXPECT_EQ(apply(rule, 1, potentials), (Pairs{{2, 1}}));          // .5 rounds up

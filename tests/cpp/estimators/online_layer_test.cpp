@@ -142,7 +142,7 @@ TEST(OnlineLayer, RefusesWeightsBeyond14BitsAndBadArguments) {
   PDeltaRule of_more(2 * problem.n_units, problem.targets, problem.n_groups);
   EXPECT_THROW(online.present(problem.bins, of_more), std::invalid_argument);
   std::vector<std::int32_t> bins = problem.bins;
-  bins[0] = 1000;
+  bins[0] = 1000;  // of fewer
   EXPECT_THROW(online.present(bins, rule), std::invalid_argument);
 }
 

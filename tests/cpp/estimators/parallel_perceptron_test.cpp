@@ -133,7 +133,7 @@ TEST(ParallelPerceptron, DrawsEveryWeightInItsRange) {
     for (std::size_t j = 0; j < 3; ++j)
       ++counts.at(static_cast<std::size_t>(layer.weight(i, j) + 2));
   }
-  for (const int n : counts) EXPECT_GT(n, 150);
+  for (const int n : counts) EXPECT_GT(n, 150);  // of 1200 weights; 240 on average
 }
 
 TEST(ParallelPerceptron, RefusesWeightsThatCouldOverflow) {

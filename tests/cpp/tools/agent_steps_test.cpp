@@ -16,7 +16,8 @@ namespace {
 using agents::QLearning;
 using approximators::SDNNC;
 
-/// An agent that records all calls; its action is the number of acts before.
+/// An agent that records all calls by their first letters (of acts without exploration: g, of
+/// terminal transitions: t); its action is the number of acts before.
 class Witness {
  public:
   struct Learned {
