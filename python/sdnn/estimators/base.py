@@ -187,6 +187,10 @@ class BaseSDNN(Fitted, CodedInputs):
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         if self.warm_start and self.refit:
             raise ValueError("refit=True trains a new network: it cannot be with warm_start=True")
+        if self.warm_start and self.calibrate:
+            raise ValueError(
+                "calibrate=True trains a second network: it cannot be with warm_start=True"
+            )
         resumes = self.warm_start and hasattr(self, "network_")
         codings = self.codings_ if resumes else None
         table, observed = self._check_samples(X, y, codings, in_fit=True)

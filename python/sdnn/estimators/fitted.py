@@ -21,6 +21,7 @@ from sdnn.support.arguments import seed_of, whole
 from sdnn.support.files import Arrays, Description, read_file, write_file
 
 MOST_BYTES_OF_NAMES = 2**26
+STEEPNESSES = (1.0, 25.0)  # bounds of a calibrated steepness of the classifier's softmax
 NAMES = ("classes_", "feature_names_in_")  # arrays whose type may be text
 
 
@@ -36,6 +37,9 @@ class Learned(BaseEstimator):
     output_range_: Floats
     training_form_: str
     training_memory_: int
+    held_out_counts_: Floats
+    held_out_residuals_: Floats
+    steepness_: float
     validation_scores_: Floats
     _counts_of_range: int
     _flat: bool
@@ -62,6 +66,9 @@ ATTRIBUTES: dict[str, type] = {
     "_n_weighted": int,
     "_scheme": str,
     "_weight_seed": int,
+    "held_out_counts_": np.ndarray,
+    "held_out_residuals_": np.ndarray,
+    "steepness_": float,
 }
 """Types of the attributes of `Learned` as a file has them; annotations are not read at run time."""
 
@@ -324,6 +331,16 @@ def require_consistent(estimator: Fitted) -> None:
         fits = fits and len(modifier) == code.codings[nu].size
     if not fits:
         raise ValueError("its parts do not fit together")
+    if "held_out_residuals_" in held or "held_out_counts_" in held:
+        residuals, counts = held["held_out_residuals_"], held["held_out_counts_"]
+        fits = residuals.dtype == counts.dtype == np.float64 and len(counts) > 0
+        fits = fits and residuals.shape == (len(counts), held["n_outputs_"])
+        fits = fits and counts.ndim == 1 and np.isfinite(counts).all() and counts.min() > 0
+        if not (fits and np.isfinite(residuals).all()):
+            raise ValueError("its held-out residuals must be finite, with counts above 0")
+    low, high = STEEPNESSES
+    if not low <= held.get("steepness_", low) <= high:
+        raise ValueError(f"steepness_ must be within [{low}, {high}], got {held['steepness_']}")
 
 
 def require_fitted(coding: Coding, n_units: int) -> Coding:

@@ -9,10 +9,8 @@ from sklearn.utils import _safe_indexing
 
 from sdnn.coding import Coding, CorrelationMatrix, Symbolic, WithMissing
 from sdnn.coding.symbols import present
+from sdnn.estimators.calibration import FEWEST_SAMPLES, held_out_fifth
 from sdnn.estimators.columns import Array, Floats, Pairs, input_pairs
-
-HELD_OUT_EVERY = 5  # every fifth sample is held out
-FEWEST_SAMPLES = 10
 
 
 def with_categories(coding: Coding, column: Array) -> Coding:
@@ -47,11 +45,7 @@ def select_pairs(
     labels = np.asarray(y)
     features = np.arange(n_features)
     best = -np.inf, pairs_among(features, seed)
-    order = np.random.RandomState(seed).permutation(len(labels))
-    if is_classifier(model):
-        order = order[np.argsort(labels[order], kind="stable")]
-    is_held = np.zeros(len(labels), dtype=bool)
-    is_held[order[HELD_OUT_EVERY // 2 :: HELD_OUT_EVERY]] = True
+    is_held = held_out_fifth(labels, is_classifier(model), seed)
     too_few = is_classifier(model) and len(np.unique(labels[~is_held])) < 2
     if len(labels) < FEWEST_SAMPLES or too_few:
         return best[1]

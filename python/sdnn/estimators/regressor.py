@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Self
+from typing import Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sdnn.estimators.base import BaseSDNN, OutOfRangeWarning
+from sdnn.estimators.calibration import learn_without_fifth
 from sdnn.estimators.columns import Array, Floats, Ints, Sample
 from sdnn.estimators.fitted import mean_of
 from sdnn.estimators.inputs import CodedRegressor
+from sdnn.estimators.intervals import coverage_of, error_bounds
 from sdnn.estimators.network import Rule
 from sdnn.estimators.outliers import warn_caller
 from sdnn.estimators.parameters import documents, parameter, wholes, words
@@ -46,12 +48,18 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         clipped unless "error". The first causes an `OutOfRangeWarning`.
     refit : bool, default=False
         Whether early stopping trains again on the whole sample, for the best number of epochs.
+    calibrate : bool, default=False
+        Whether `fit` also trains a network without a fifth of the samples, whose errors on it are
+        the base of `predict_interval`, in about twice the time. Needs ten samples.
 
     Attributes
     ----------
     output_range_ : ndarray, shape (n_outputs, 2)
     n_outputs_, n_outputs_out_of_range_ : int
         Number of outputs, and of targets outside the range since the last `fit`.
+    held_out_residuals_, held_out_counts_ : ndarray
+        With ``calibrate``: the errors on the held-out samples, shape (n_samples, n_outputs), and
+        the weights of these samples.
     validation_scores_ : ndarray, shape (n_epochs,) or (0,)
         With early stopping, minus the mean squared error in units of the firing count.
 
@@ -72,6 +80,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     output_range: ArrayLike | None = parameter(None, "array-like", None)
     out_of_range: str = parameter("clip", words("clip", "widen", "error"))
     refit: bool = parameter(False, "boolean")
+    calibrate: bool = parameter(False, "boolean")
 
     def partial_fit(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None
@@ -128,6 +137,39 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             return values[:, 0] if self._flat else values
         spread = self._step() * np.std(counts, axis=0)
         return (values[:, 0], spread[:, 0]) if self._flat else (values, spread)
+
+    def predict_interval(self, X: ArrayLike, coverage: float = 0.9) -> Floats:
+        """Predict lower and upper bounds of targets, shape (n_samples, 2).
+
+        A target lies between them with a probability of at least about ``coverage``, if samples are
+        drawn like those of `fit`: bounds are those of the errors of the samples that a second
+        network had not learned. All have the same width. Several outputs have a shape of
+        (n_samples, n_outputs, 2), and each the coverage apart. Weights count as numbers of samples.
+
+        Raises
+        ------
+        AttributeError
+            If the model was not fitted with ``calibrate=True``.
+        ValueError
+            If ``coverage`` is not within (0, 1), or needs more samples than were held out.
+        """
+        share = coverage_of(coverage)
+        outputs = self.predict(X)  # first, since it raises if the model is not fitted
+        if not hasattr(self, "held_out_residuals_"):
+            raise AttributeError("predict_interval needs a fit with calibrate=True")
+        widths = error_bounds(np.abs(self.held_out_residuals_), self.held_out_counts_, share)
+        width: Array = widths[0] if self._flat else widths
+        return np.stack([outputs - width, outputs + width], axis=-1)
+
+    def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
+        super()._fit(X, y, sample_weight)
+        for name in ("held_out_residuals_", "held_out_counts_"):
+            self.__dict__.pop(name, None)  # of an earlier fit
+        if self.calibrate:
+            held = learn_without_fifth(self, X, y, sample_weight, is_stratified=False)
+            errors = held.y.astype(np.float64) - cast(SDNNRegressor, held.model).predict(held.X)
+            self.held_out_residuals_ = errors.reshape(len(errors), -1)
+            self.held_out_counts_ = held.weights
 
     def _set_outputs(self, y: ArrayLike) -> int:
         targets = np.asarray(y)

@@ -1,0 +1,77 @@
+"""Errors and scores of samples that a network has not learned."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import clone
+from sklearn.utils import _safe_indexing
+
+from sdnn.estimators.columns import Array, Floats
+
+if TYPE_CHECKING:
+    from sdnn.estimators.base import BaseSDNN
+
+HELD_OUT_EVERY = 5  # every fifth sample is held out
+FEWEST_SAMPLES = 10
+
+
+class HeldOut(NamedTuple):
+    """Samples that were held out, and a model that learned the others."""
+
+    model: BaseSDNN
+    X: ArrayLike
+    y: Array
+    weights: Floats  # 1 without weights
+
+
+def held_out_fifth(labels: Array, is_stratified: bool, seed: int) -> NDArray[np.bool_]:
+    """Return which samples are held out: a random fifth, or one of each class.
+
+    >>> held_out_fifth(np.arange(10), False, 0).sum()
+    np.int64(2)
+    """
+    order = np.random.RandomState(seed).permutation(len(labels))
+    if is_stratified:
+        order = order[np.argsort(labels[order], kind="stable")]
+    is_held = np.zeros(len(labels), dtype=bool)
+    is_held[order[HELD_OUT_EVERY // 2 :: HELD_OUT_EVERY]] = True
+    return is_held
+
+
+def learn_without_fifth(
+    fitted: BaseSDNN,
+    X: ArrayLike,
+    y: ArrayLike,
+    sample_weight: ArrayLike | None,
+    is_stratified: bool,
+) -> HeldOut:
+    """Train a model like a fitted one without a fifth of the samples.
+
+    It has the same codings and pairs. A class of a single sample is not held out. ValueError for
+    fewer than ten samples.
+    """
+    targets = np.asarray(y)
+    if len(targets) < FEWEST_SAMPLES:
+        raise ValueError(
+            f"calibrate must be False with fewer than {FEWEST_SAMPLES} samples, got {len(targets)}"
+        )
+    seed = fitted._weight_seed
+    is_held = held_out_fifth(targets, is_stratified, seed)
+    if is_stratified:
+        labels, counts = np.unique(targets, return_counts=True)
+        is_held &= ~np.isin(targets, labels[counts == 1])
+    weights = np.ones(len(targets)) if sample_weight is None else np.asarray(sample_weight)
+    model = clone(fitted).set_params(
+        calibrate=False,
+        random_state=seed,
+        verbose=0,
+        coding=[(coding, [index]) for index, coding in enumerate(fitted.codings_)],
+        pairs=[(mu, None if mu == nu else nu) for mu, nu in fitted.pairs_],
+    )
+    kept, held = np.flatnonzero(~is_held), np.flatnonzero(is_held)
+    weights_of_kept = None if sample_weight is None else weights[kept]
+    model.fit(_safe_indexing(X, kept), targets[kept], weights_of_kept)
+    return HeldOut(model, _safe_indexing(X, held), targets[held], weights[held].astype(np.float64))

@@ -1,0 +1,168 @@
+"""Calibration on held-out samples: probabilities of the classifier, intervals of the regressor."""
+
+import numpy as np
+import pandas as pd
+from sklearn.base import clone
+from sklearn.datasets import load_iris
+
+from refusals import refuses
+from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn.coding import Symbolic
+from sdnn.estimators.calibration import held_out_fifth
+
+OPTIONS = {"n_pattern_units": 40, "random_state": 0}
+
+
+def overlapping(n_samples=600, seed=0):
+    random = np.random.RandomState(seed)
+    X = random.uniform(-1, 1, (n_samples, 3))
+    return X, (X[:, 0] + X[:, 1] + 0.7 * random.normal(size=n_samples) > 0).astype(int)
+
+
+def noisy(n_samples, seed=0):
+    random = np.random.RandomState(seed)
+    X = random.uniform(-1, 1, (n_samples, 2))
+    return X, np.sin(3 * X[:, 0]) + X[:, 1] + 0.3 * random.normal(size=n_samples)
+
+
+def losses_of(model, X, y):
+    return -np.log(model.predict_proba(X)[np.arange(len(y)), y])
+
+
+def test_a_fifth_of_each_class_is_held_out():
+    labels = np.repeat([0, 1, 2], [50, 20, 5])
+    is_held = held_out_fifth(labels, True, 3)
+    assert [int(is_held[labels == label].sum()) for label in range(3)] == [10, 4, 1]
+    assert held_out_fifth(np.zeros(100), False, 3).sum() == 20
+
+
+def test_the_steepness_has_the_smallest_log_loss_on_the_held_out_fifth(tmp_path):
+    points, labels = load_iris(return_X_y=True)
+    plain = SDNNClassifier(**OPTIONS).fit(points, labels)
+    model = SDNNClassifier(**OPTIONS, calibrate=True).fit(points, labels)
+    np.testing.assert_array_equal(model.weights_, plain.weights_)
+    is_held = held_out_fifth(labels, True, model._weight_seed)
+    part = clone(plain).set_params(
+        random_state=model._weight_seed,
+        coding=[(coding, [index]) for index, coding in enumerate(plain.codings_)],
+        pairs=plain.pairs_,
+    )
+    part.fit(points[~is_held], labels[~is_held])
+    scores = np.log(part.predict_proba(points[is_held])) / 6  # but for a constant of each sample
+
+    def loss(steepness):
+        raised = np.exp(steepness * (scores - scores.max(axis=1, keepdims=True)))
+        shares = raised / raised.sum(axis=1, keepdims=True)
+        return -np.log(shares[np.arange(len(shares)), labels[is_held]]).mean()
+
+    best = min(map(loss, np.exp(np.linspace(0, np.log(25), 1000))))
+    np.testing.assert_allclose(loss(model.steepness_), best, rtol=1e-4)
+    raised = plain.predict_proba(points) ** (model.steepness_ / 6)
+    expected = raised / raised.sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(model.predict_proba(points), expected)
+    np.testing.assert_array_equal(
+        model.predict_proba_one(points[3]), model.predict_proba(points)[3]
+    )
+    model.save(tmp_path / "model")
+    loaded = SDNNClassifier.load(tmp_path / "model")
+    assert loaded.steepness_ == model.steepness_
+    np.testing.assert_array_equal(loaded.predict_proba(points), model.predict_proba(points))
+
+
+def test_calibration_lowers_the_loss_where_classes_overlap():
+    X, y = overlapping()
+    model = SDNNClassifier(**OPTIONS, calibrate=True).fit(X[:400], y[:400])
+    plain = SDNNClassifier(**OPTIONS).fit(X[:400], y[:400])
+    assert (
+        losses_of(model, X[400:], y[400:]).mean() < losses_of(plain, X[400:], y[400:]).mean() - 0.02
+    )
+    model.set_params(calibrate=False).fit(X[:400], y[:400])
+    assert not hasattr(model, "steepness_")
+
+
+def test_weights_of_held_out_samples_count_and_those_of_weight_0_are_absent():
+    X, y = overlapping(200)
+    flipped = np.concatenate([y, 1 - y[:50]])
+    weights = np.concatenate([np.ones(200), np.zeros(50)])
+    model = SDNNClassifier(**OPTIONS, calibrate=True)
+    model.fit(np.concatenate([X, X[:50]]), flipped, weights)
+    assert model.steepness_ == clone(model).fit(X, y).steepness_
+    random = np.random.RandomState(0).choice([1.0, 2.0], 200)
+    assert model.fit(X, y, random).steepness_ != clone(model).fit(X, y).steepness_
+    balanced = (
+        clone(model)
+        .set_params(class_weight="balanced")
+        .fit(X[y + np.arange(200) % 2 > 0], y[y + np.arange(200) % 2 > 0])
+    )
+    assert 1.0 <= balanced.steepness_ <= 25.0
+
+
+def test_rare_categories_and_classes_do_not_prevent_calibration():
+    X, y = overlapping(60)
+    table = pd.DataFrame(X, columns=["a", "b", "c"])
+    table["word"] = ["rare", *["u", "v"] * 29, "other"]
+    labels = np.array(["no", "yes", "once"])[np.where(np.arange(60) == 30, 2, y)]
+    model = SDNNClassifier([(Symbolic(), ["word"])], **OPTIONS, calibrate=True)
+    assert model.fit(table, labels).predict_proba(table).shape == (60, 3)
+    numbers = SDNNRegressor([(Symbolic(), ["word"])], **OPTIONS, calibrate=True).fit(table, y * 1.0)
+    assert numbers.predict_interval(table, 0.5).shape == (60, 2)
+    selected = SDNNRegressor(pairs="auto", **OPTIONS, calibrate=True).fit(X, y * 1.0)
+    assert len(selected.held_out_counts_) == 12
+
+
+def test_intervals_of_the_regressor_contain_their_share_of_new_targets(tmp_path):
+    X, y = noisy(1200)
+    model = SDNNRegressor(**OPTIONS, calibrate=True).fit(X[:600], y[:600])
+    plain = SDNNRegressor(**OPTIONS).fit(X[:600], y[:600])
+    np.testing.assert_array_equal(model.predict(X), plain.predict(X))
+    for coverage in (0.5, 0.9):
+        bounds = model.predict_interval(X[600:], coverage)
+        share = np.mean((bounds[:, 0] <= y[600:]) & (y[600:] <= bounds[:, 1]))
+        assert abs(share - coverage) < 0.07
+    sizes = np.sort(np.abs(model.held_out_residuals_[:, 0]))
+    widths = np.diff(model.predict_interval(X, 0.9), axis=1) / 2  # of 120 errors, 0.9 * 121 = 108.9
+    np.testing.assert_allclose(widths, sizes[108], rtol=1e-9)
+    model.save(tmp_path / "model")
+    loaded = SDNNRegressor.load(tmp_path / "model")
+    np.testing.assert_array_equal(loaded.predict_interval(X), model.predict_interval(X))
+
+
+def test_intervals_of_several_outputs_and_weights():
+    X, y = noisy(100)
+    model = SDNNRegressor(**OPTIONS, calibrate=True).fit(X, np.stack([y, 10 * y], axis=1))
+    bounds = model.predict_interval(X, 0.6)
+    assert bounds.shape == (100, 2, 2)
+    weights = np.tile([1.0, 2.0, 0.0, 1.0], 25)
+    weighted = SDNNRegressor(**OPTIONS, calibrate=True).fit(X, y, weights)
+    assert set(weighted.held_out_counts_) <= {1.0, 2.0}
+    assert len(weighted.held_out_counts_) == 15
+    assert weighted.predict_interval(X[:2]).shape == (2, 2)
+
+
+def test_calibration_refuses_what_it_cannot_do(tmp_path):
+    X, y = noisy(40)
+    for options in ({"n_units_per_class": 1}, {"scheme": "one_vs_one"}):
+        refuses("calibrate", SDNNClassifier(**options, calibrate=True).fit, X, y > 0)
+    refuses("calibrate", SDNNRegressor(calibrate=True).fit, X[:9], y[:9])
+    refuses("calibrate", SDNNRegressor(calibrate=True, warm_start=True).fit, X, y)
+    plain = SDNNRegressor(**OPTIONS).fit(X, y)
+    refuses("calibrate", plain.predict_interval, X, error=AttributeError)
+    model = SDNNRegressor(**OPTIONS, calibrate=True).fit(X, y)
+    refuses("coverage", model.predict_interval, X, 0.95)
+    refuses("coverage", model.predict_interval, X, 1.0)
+    path = tmp_path / "damaged"
+    for name, wrong in (
+        ("held_out_residuals_", np.zeros((3, 1))),
+        ("held_out_residuals_", np.full((8, 1), np.nan)),
+        ("held_out_counts_", np.zeros(8)),
+        ("held_out_counts_", np.ones(8, np.float32)),
+    ):
+        damaged = SDNNRegressor(**OPTIONS, calibrate=True).fit(X, y)
+        setattr(damaged, name, wrong)
+        damaged.save(path)
+        refuses("held-out", SDNNRegressor.load, path)
+    classes = SDNNClassifier(**OPTIONS, calibrate=True).fit(X, y > 0)
+    for steepness in (0.0, 26.0, float("nan")):
+        classes.steepness_ = steepness
+        classes.save(path)
+        refuses("steepness_", SDNNClassifier.load, path)
