@@ -254,9 +254,9 @@ def test_a_command_continues_after_a_lost_scheduler(cluster, tmp_path):
     assert "Traceback" not in words
     cluster.start_scheduler()
     cluster.add_worker()
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
     here = CliRunner().invoke(main, ["reproduce", *arguments, "--out", str(tmp_path / "here")])
-    assert json.loads(done.stdout)["digest"] == json.loads(here.stdout)["digest"]
+    assert json.loads(process.stdout)["digest"] == json.loads(here.stdout)["digest"]
 
 
 def wait_for_rows(folder):

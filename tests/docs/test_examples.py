@@ -27,7 +27,7 @@ SCRIPTS = sorted(path for path in FOLDER.glob("*.py") if path not in (MAKER, *PA
 
 def run(script, folder, *options):
     """Return the output of a script."""
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-W", "ignore", script, *options],
         cwd=folder,
         env=os.environ | {"MPLBACKEND": "Agg"},
@@ -35,8 +35,8 @@ def run(script, folder, *options):
         text=True,
         check=False,
     )
-    assert done.returncode == 0, done.stderr[-4000:]
-    return done.stdout
+    assert process.returncode == 0, process.stderr[-4000:]
+    return process.stdout
 
 
 def numbers(pattern, printed):

@@ -16,15 +16,15 @@ PAGES = {page.relative_to(run_page.ROOT).as_posix(): page for page in run_page.p
 
 def run(page, *options):
     """Run a page in a process of its own; return what it prints."""
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-W", "ignore", run_page.__file__, page, *options],
         capture_output=True,
         text=True,
         check=False,
         start_new_session=True,
     )
-    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-6000:]
-    return done.stdout
+    assert process.returncode == 0, process.stdout[-4000:] + process.stderr[-6000:]
+    return process.stdout
 
 
 @pytest.mark.timeout(300)

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 def site(tmp_path_factory, skip_unless_ci):
     pytest.importorskip("mkdocs") if not os.environ.get("CI") else None
     folder = tmp_path_factory.mktemp("site") / "site"
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)],
         cwd=ROOT,
         env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
@@ -26,7 +26,7 @@ def site(tmp_path_factory, skip_unless_ci):
         text=True,
         check=False,
     )
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert process.returncode == 0, process.stdout + process.stderr
     return folder
 
 
@@ -67,8 +67,8 @@ def test_doxygen_builds_the_cpp_reference_without_warnings(tmp_path, skip_unless
     if shutil.which("doxygen") is None:
         skip_unless_ci("needs doxygen")
     text = (ROOT / "docs/site/Doxyfile").read_text() + f'\nOUTPUT_DIRECTORY = "{tmp_path}"\n'
-    done = subprocess.run(
+    process = subprocess.run(
         ["doxygen", "-"], input=text, cwd=ROOT, capture_output=True, text=True, check=False
     )
-    assert done.returncode == 0, done.stderr[-4000:]
+    assert process.returncode == 0, process.stderr[-4000:]
     assert (tmp_path / "html" / "classsdnn_1_1approximators_1_1SDNNC.html").exists()

@@ -27,13 +27,13 @@ STUB_COMMAND = "python tests/python/reference/core_stub.py > python/sdnn/_core.p
 def run_example(cmake, configure, build, *options, target="all"):
     """Builds the example against an installed library; returns the lines it prints."""
     quick = ("-DCMAKE_BUILD_TYPE=None", "-DCMAKE_CXX_FLAGS=-O1")
-    done = configure(EXAMPLE, build, *quick, *options)
-    assert done.returncode == 0, done.stdout + done.stderr
-    done = cmake("--build", build, "--target", target)
-    assert done.returncode == 0, done.stdout + done.stderr
+    process = configure(EXAMPLE, build, *quick, *options)
+    assert process.returncode == 0, process.stdout + process.stderr
+    process = cmake("--build", build, "--target", target)
+    assert process.returncode == 0, process.stdout + process.stderr
     program = next(path for path in build.rglob("swing_up*") if os.access(path, os.X_OK))
-    done = subprocess.run([program, "40", "7"], capture_output=True, text=True, check=True)
-    return [tuple(line.split()) for line in done.stdout.splitlines()]
+    process = subprocess.run([program, "40", "7"], capture_output=True, text=True, check=True)
+    return [tuple(line.split()) for line in process.stdout.splitlines()]
 
 
 def rows_of_trial():
@@ -97,8 +97,8 @@ def test_the_cpp_example_runs_with_the_installed_python_package(cmake, configure
     lines = run_example(cmake, configure, tmp_path / "example", root, target="swing_up")
     assert lines == rows_of_trial()
     cache = (tmp_path / "example" / "CMakeCache.txt").read_text()
-    found = re.search(r"^sdnn_DIR:PATH=(.*)$", cache, re.MULTILINE)[1]
-    assert Path(found).resolve() == Path(folder).resolve()
+    used_folder = re.search(r"^sdnn_DIR:PATH=(.*)$", cache, re.MULTILINE)[1]
+    assert Path(used_folder).resolve() == Path(folder).resolve()
 
 
 def test_a_missing_json_library_is_an_error_for_saved_agents_only(configure, tmp_path):
@@ -110,9 +110,9 @@ def test_a_missing_json_library_is_an_error_for_saved_agents_only(configure, tmp
             f"target_link_libraries(robot PRIVATE {target})\n"
         )
         none = "-DCMAKE_DISABLE_FIND_PACKAGE_nlohmann_json=ON"
-        done = configure(tmp_path, tmp_path / "build", none)
-        assert (done.returncode == 0) == fits, done.stdout + done.stderr
-        assert ("apt install nlohmann-json3-dev" in done.stderr) != fits
+        process = configure(tmp_path, tmp_path / "build", none)
+        assert (process.returncode == 0) == fits, process.stdout + process.stderr
+        assert ("apt install nlohmann-json3-dev" in process.stderr) != fits
 
 
 def test_cmake_finds_eigen_in_the_python_on_the_path(
@@ -128,10 +128,12 @@ def test_cmake_finds_eigen_in_the_python_on_the_path(
     monkeypatch.setenv("PATH", "")  # the folder of this Python is put before it
     monkeypatch.delenv("CMAKE_PREFIX_PATH", raising=False)
     build = tmp_path / "build"
-    done = configure(tmp_path, build, "-DCMAKE_FIND_USE_CMAKE_SYSTEM_PATH=OFF")
-    assert done.returncode == 0, done.stdout + done.stderr
-    found = re.search(r"^Eigen3_DIR:PATH=(.*)$", (build / "CMakeCache.txt").read_text(), re.M)[1]
-    assert site.resolve() in Path(found).resolve().parents
+    process = configure(tmp_path, build, "-DCMAKE_FIND_USE_CMAKE_SYSTEM_PATH=OFF")
+    assert process.returncode == 0, process.stdout + process.stderr
+    eigen_folder = re.search(
+        r"^Eigen3_DIR:PATH=(.*)$", (build / "CMakeCache.txt").read_text(), re.M
+    )[1]
+    assert site.resolve() in Path(eigen_folder).resolve().parents
 
 
 @pytest.mark.parametrize("required", [False, True])
@@ -145,11 +147,11 @@ def test_find_package_fails_without_eigen(required, configure, tmp_path):
         f"find_package(sdnn {'REQUIRED' if required else 'QUIET'})\n"
         'message(STATUS "found: ${sdnn_FOUND}")\n'
     )
-    given = (f"-Dsdnn_DIR={tmp_path.as_posix()}", "-DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON")
-    done = configure(tmp_path, tmp_path / "build", *given)
-    said = " ".join((done.stdout + done.stderr).split())
-    assert done.returncode == (1 if required else 0), said
-    assert ("sdnn needs Eigen >= 3.4" if required else "found: 0") in said
+    options = (f"-Dsdnn_DIR={tmp_path.as_posix()}", "-DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON")
+    process = configure(tmp_path, tmp_path / "build", *options)
+    messages = " ".join((process.stdout + process.stderr).split())
+    assert process.returncode == (1 if required else 0), messages
+    assert ("sdnn needs Eigen >= 3.4" if required else "found: 0") in messages
 
 
 def test_no_build_file_has_options_for_a_processor():
@@ -223,10 +225,10 @@ def sdist(tmp_path_factory):
     pytest.importorskip("scikit_build_core")
     out = tmp_path_factory.mktemp("sdist")
     code = f"from scikit_build_core.build import build_sdist; build_sdist({str(out)!r})"
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
     )
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert process.returncode == 0, process.stdout + process.stderr
     return next(out.glob("sdnn_learn-*.tar.gz"))
 
 
@@ -261,10 +263,10 @@ def test_a_wheel_built_from_the_source_distribution_is_complete(sdist, tmp_path)
     for module in ("scikit_build_core", "pybind11", "pip"):
         pytest.importorskip(module)
     command = [sys.executable, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps"]
-    done = subprocess.run(
+    process = subprocess.run(
         [*command, "-w", tmp_path, sdist], capture_output=True, text=True, check=False
     )
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert process.returncode == 0, process.stdout + process.stderr
     wheel = next(tmp_path.glob("sdnn_learn-*.whl"))
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())

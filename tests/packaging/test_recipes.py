@@ -31,11 +31,11 @@ def conan(needs, tmp_path):
     def run(*arguments):
         env = os.environ | {"CONAN_HOME": str(tmp_path / "conan")}
         command = ["conan", *map(str, arguments)]
-        done = subprocess.run(
+        process = subprocess.run(
             command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False
         )
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout
+        assert process.returncode == 0, process.stdout + process.stderr
+        return process.stdout
 
     run("profile", "detect")
     return run
@@ -51,9 +51,9 @@ def include_folder(target, configure, folder):
         f"get_target_property(found {target} INTERFACE_INCLUDE_DIRECTORIES)\n"
         'message(STATUS "found: ${found}")\n'
     )
-    done = configure(folder, folder / "build")
-    assert done.returncode == 0, done.stdout + done.stderr
-    return re.search(r"found: ([^;\n]+)", done.stdout)[1]
+    process = configure(folder, folder / "build")
+    assert process.returncode == 0, process.stdout + process.stderr
+    return re.search(r"found: ([^;\n]+)", process.stdout)[1]
 
 
 def test_the_cpp_example_builds_with_conan(conan, cmake, configure, tmp_path):
@@ -74,10 +74,10 @@ def test_the_cpp_example_builds_with_conan(conan, cmake, configure, tmp_path):
     conan("install", f"--requires=sdnn/{version}", *generators, *standard)
     quick = ("-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS=-O0")
     toolchain = f"-DCMAKE_TOOLCHAIN_FILE={build}/conan_toolchain.cmake"
-    done = configure(EXAMPLE, build / "cmake", toolchain, *quick)
-    assert done.returncode == 0, done.stdout + done.stderr
-    done = cmake("--build", build / "cmake", "--target", "regression")
-    assert done.returncode == 0, done.stdout + done.stderr
+    process = configure(EXAMPLE, build / "cmake", toolchain, *quick)
+    assert process.returncode == 0, process.stdout + process.stderr
+    process = cmake("--build", build / "cmake", "--target", "regression")
+    assert process.returncode == 0, process.stdout + process.stderr
 
 
 def test_the_conan_recipe_refuses_cpp_17(conan):

@@ -29,8 +29,8 @@ def invoke(invoke):
 
 
 def test_help_lists_commands_and_version_the_environment(invoke):
-    said = invoke("--help").stdout
-    assert all(re.search(rf"^  {name} .*\w\.$", said, re.MULTILINE) for name in main.commands)
+    help_text = invoke("--help").stdout
+    assert all(re.search(rf"^  {name} .*\w\.$", help_text, re.MULTILINE) for name in main.commands)
     version, compiler, *others = invoke("--version").stdout.splitlines()
     assert version == f"sdnn {sdnn.__version__}"
     assert re.fullmatch(r"compiler (GCC|.*[Cc]lang|MSVC) .*\d.*", compiler)
@@ -314,9 +314,9 @@ def pumping():
 @pytest.mark.usefixtures("pumping")
 def test_a_registered_agent_class_is_reproduced_with_figures_and_reports(invoke, refused, tmp_path):
     call = partial(invoke, "reproduce", trial=None)
-    done = call("b", "--quick", "--agent", "pumping")
-    assert done.exit_code == 0
-    assert "Pumping" in done.stdout
+    result = call("b", "--quick", "--agent", "pumping")
+    assert result.exit_code == 0
+    assert "Pumping" in result.stdout
     folder = tmp_path / "results"
     text = (folder / "results-pumping-quick.csv").read_text()
     rows = list(csv.DictReader(text.splitlines()))
@@ -407,10 +407,10 @@ def test_bad_options_of_the_module_show_no_traceback(tmp_path):
 @pytest.mark.parametrize("words", [["train", "CartPole-v1"], ["reproduce"], ["--version"]])
 def test_an_unknown_instruction_set_is_reported_with_its_variable(tmp_path, monkeypatch, words):
     monkeypatch.setenv("SDNN_INSTRUCTION_SET", "sse9")
-    done = python("-m", "sdnn", *words, cwd=tmp_path)
-    assert done.returncode == 1
-    assert done.stderr.startswith("Error: SDNN_INSTRUCTION_SET: ")
-    assert done.stderr.count("\n") == 1
+    process = python("-m", "sdnn", *words, cwd=tmp_path)
+    assert process.returncode == 1
+    assert process.stderr.startswith("Error: SDNN_INSTRUCTION_SET: ")
+    assert process.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 
 
@@ -433,10 +433,10 @@ def test_a_reproduction_of_ten_episodes_runs_in_a_separate_process(tmp_path):
     # Compiled trials; nothing is learned in ten episodes, one evaluation.
     out = tmp_path / "out"
     command = ("-m", "sdnn", "reproduce", "a", "--trials", "1", "--episodes", "10", "--json")
-    done = python(*command, "--out", str(out))
-    assert done.stderr == ""
-    assert done.returncode == 0
-    (experiment,) = json.loads(done.stdout)["experiments"]
+    process = python(*command, "--out", str(out))
+    assert process.stderr == ""
+    assert process.returncode == 0
+    (experiment,) = json.loads(process.stdout)["experiments"]
     assert [case["measures"]["final_steps"]["median"]["lower"] for case in experiment["cases"]] == [
         None,
         None,
@@ -449,6 +449,6 @@ def test_ctrl_c_in_a_command_exits_with_130(monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(main.commands["bench"], "callback", interrupted)
-    done = CliRunner().invoke(main, ["bench"])
-    assert done.exit_code == 130
-    assert "Interrupted." in done.output
+    result = CliRunner().invoke(main, ["bench"])
+    assert result.exit_code == 130
+    assert "Interrupted." in result.output

@@ -16,8 +16,8 @@ FOOTPRINT = Path(__file__).parent / "reference" / "footprint.py"
     ids=["train", "reproduce"],
 )
 def test_a_command_executes_few_files_of_the_package(tmp_path, command, limit):
-    words = [sys.executable, FOOTPRINT, *command.split(), "--out", tmp_path / "out"]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
-    files = json.loads(done.stderr.splitlines()[-1])
+    arguments = [sys.executable, FOOTPRINT, *command.split(), "--out", tmp_path / "out"]
+    process = subprocess.run(arguments, capture_output=True, text=True, check=True)
+    files = json.loads(process.stderr.splitlines()[-1])
     assert "cli/__init__.py" in files
     assert len(files) <= limit, files

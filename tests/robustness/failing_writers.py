@@ -78,8 +78,8 @@ def n_faults(action, folder, error_number):
             error = caught
         n_calls = faults.fault_disarm()
         where = f"{action}, call {number}: {error!r}"
-        found = look(work)
-        assert found in ((old, new) if error else (new,)), where
+        content = look(work)
+        assert content in ((old, new) if error else (new,)), where
         assert error is None or str(work) in str(error), where
         assert sorted(p.name for p in work.iterdir()) == names, where
         if n_calls < number:

@@ -66,14 +66,14 @@ def test_a_python_writer_leaves_the_old_or_new_file_at_every_failing_call(
     for error in errors:
         (tmp_path / str(error)).mkdir()
     path = os.pathsep.join([*(p for p in sys.path if p), str(ROOT / "tests/python/reference")])
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, HERE / "failing_writers.py", action, tmp_path, *map(str, errors)],
         env=os.environ | {"LD_PRELOAD": faults, "PYTHONPATH": path},
         capture_output=True,
         text=True,
     )
-    assert done.returncode == 0, done.stderr
-    assert int(done.stdout) >= n_least
+    assert process.returncode == 0, process.stderr
+    assert int(process.stdout) >= n_least
 
 
 @pytest.mark.parametrize("error", [*SYSTEM, *MEMORY])
@@ -91,11 +91,11 @@ def test_the_cpp_writer_leaves_the_old_or_new_file_at_every_failing_call(faults,
             "FAULT_FOLDER": str(folder),
             "FAULT_ERROR": str(error),
         }
-        done = subprocess.run([program, path], env=os.environ | faulty, capture_output=True)
+        process = subprocess.run([program, path], env=os.environ | faulty, capture_output=True)
         assert list(folder.iterdir()) == [path], number
-        if done.returncode:
+        if process.returncode:
             n_failed += 1
-            assert str(path).encode() in done.stdout or b"bad_alloc" in done.stdout
+            assert str(path).encode() in process.stdout or b"bad_alloc" in process.stdout
             assert path.read_bytes() in (b"old", new)
         else:
             assert path.read_bytes() == new

@@ -8,7 +8,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include "instruction_sets.hpp"
 #include "sdnn/agents/detail/make_actor_critic.hpp"
 #include "sdnn/approximators/detail/state_wiring.hpp"
 #include "sdnn/core/random.hpp"
@@ -101,16 +100,6 @@ TEST(ActorCritic, EnvironmentsHaveSeparateTraces) {
   agent.begin_episode(1);
   EXPECT_GT(probabilities(agent, a)[0], probabilities(agent, b)[0]);
   EXPECT_THROW(agent.begin_episode(2), std::invalid_argument);
-}
-
-TEST(ActorCritic, LearnsTheSameBitsOnEveryInstructionSet) {
-  std::vector<core::State> states;
-  testing::on_every_instruction_set([&](const auto&) {
-    ActorCritic agent = actor_critic_of({}, {3, 5});
-    learn_at_random(agent, 300, 2);
-    states.push_back(core::state_of(agent));
-  });
-  for (const core::State& state : states) EXPECT_EQ(state, states.front());
 }
 
 TEST(ActorCritic, RefusesBadTransitionsAndChangesNothing) {

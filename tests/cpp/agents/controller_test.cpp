@@ -123,7 +123,7 @@ TEST(Controller, ContinuesExactlyAfterItWasSavedAtAnyStep) {
     expect_exact_resume(config);
     expect_exact_resume(whole(config));
     expect_exact_resume(with_warm_up(config));
-    expect_exact_resume(with_warm_up(whole(config)), 3);
+    expect_exact_resume(with_warm_up(whole(config)), /*n_environments=*/3);
   }
 }
 

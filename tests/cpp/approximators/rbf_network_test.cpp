@@ -82,11 +82,11 @@ TEST(RBFNetwork, ValuesAreSumsInTheOrderOfTheBases) {
     const std::vector<double> state = {0.25, 0.8};
     std::vector<double> out(9);
     network.values(state, out);
-    const auto bases = [n_bases](double x) {
+    const auto bases = [n_bases](double x) {  // widths in distances of centres
       std::vector<double> own;
       double total = 0.0;
       for (int k = 0; k < n_bases; ++k) {
-        const double distance = (x * (n_bases - 1) - k) / 0.5;
+        const double distance = (x * (n_bases - 1) - k) / RBFNetworkConfig{}.width;
         own.push_back(core::exp(-0.5 * distance * distance));
         total += own.back();
       }

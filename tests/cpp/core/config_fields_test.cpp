@@ -37,7 +37,7 @@ TEST(ConfigFields, ListMembersAndNestedMembersInOrder) {
 TEST(ConfigFields, ReadAndWriteTheMembers) {
   Learning config;
   const auto [n_steps, epsilon] = Learning::fields();
-  EXPECT_EQ(n_steps.of(std::as_const(config)), 3);
+  EXPECT_EQ(n_steps.of(std::as_const(config)), config.n_steps);
   epsilon.of(config) = 0.5;
   EXPECT_EQ(config.policy.epsilon, 0.5);
   static_assert(std::is_same_v<FieldValue<decltype(epsilon), Learning>, double>);

@@ -88,17 +88,16 @@ TEST(PerceptronRule, OneVersusOneCorrectsTheUnitsOfTheClass) {
 }
 
 TEST(CorrectionRules, RefuseBadArguments) {
-  const std::vector<double> targets{1.0, std::nan("")};
-  EXPECT_THROW(estimators::PDeltaRule(4, targets, 1), std::invalid_argument);
-  EXPECT_THROW(estimators::PDeltaRule(3, std::vector<double>{1, 1}, 2), std::invalid_argument);
-  EXPECT_THROW(estimators::PDeltaRule(4, std::vector<double>{1}, 0), std::invalid_argument);
-  EXPECT_THROW(estimators::PDeltaRule(0, std::vector<double>{1}, 1), std::invalid_argument);
+  const std::vector<double> targets{1.0, 1.0}, nan{1.0, std::nan("")};
+  using estimators::PDeltaRule, estimators::PerceptronRule;
+  EXPECT_THROW(PDeltaRule(4, nan, 1), std::invalid_argument);
+  EXPECT_THROW(PDeltaRule(3, targets, 2), std::invalid_argument);  // no two equal groups
+  EXPECT_THROW(PDeltaRule(4, targets, 0), std::invalid_argument);
+  EXPECT_THROW(PDeltaRule(0, targets, 1), std::invalid_argument);
   for (const double share : {0.0, -1.0, 1.01, std::nan("")}) {
-    EXPECT_THROW(estimators::PDeltaRule(4, std::vector<double>{1}, 1, share),
-                 std::invalid_argument);
+    EXPECT_THROW(PDeltaRule(4, targets, 1, share), std::invalid_argument);
   }
-  const std::vector<std::int32_t> labels{0, 3};
-  using estimators::PerceptronRule;
+  const std::vector<std::int32_t> labels{0, 3};  // of four classes or more
   EXPECT_THROW(PerceptronRule(3, labels, 3, ClassScheme::one_vs_rest), std::invalid_argument);
   EXPECT_THROW(PerceptronRule(3, labels, 4, ClassScheme::one_vs_rest), std::invalid_argument);
   EXPECT_THROW(PerceptronRule(1, labels, 1, ClassScheme::one_vs_one), std::invalid_argument);

@@ -139,7 +139,7 @@ inline void expect_bits_of_plain_training(estimators::TrainingForm form) {
 }
 
 /// The problem with rounds in the order of the data instead, several in one order where `at_once`.
-inline Problem in_data_order(Problem problem, std::size_t n_rounds, bool at_once) {
+inline Problem in_data_order(Problem problem, std::size_t n_rounds, bool at_once = false) {
   const std::size_t n_samples = problem.bins.size() / problem.code->n_inputs();
   for (auto& order : problem.orders) {
     order.clear();

@@ -171,11 +171,11 @@ def test_a_subclass_of_an_imported_module_can_be_unpickled(tmp_path, monkeypatch
         "spaces = gymnasium.spaces.Box(-1, 1, (2,)), gymnasium.spaces.Discrete(2)\n"
         "sys.stdout.buffer.write(pickle.dumps(docking.Docker(*spaces)))\n"
     )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, check=True
     )
     monkeypatch.syspath_prepend(tmp_path)
-    assert type(pickle.loads(done.stdout)).__name__ == "Docker"
+    assert type(pickle.loads(process.stdout)).__name__ == "Docker"
 
 
 def test_actions_keep_the_dtype_of_a_discrete_space(tmp_path):

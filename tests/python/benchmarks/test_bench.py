@@ -21,10 +21,10 @@ ROOT = Path(__file__).parents[3]
 @pytest.fixture(scope="module")
 def quick():
     """The results of a quick run of the command."""
-    done = CliRunner().invoke(main, ["bench", "--quick", "--json"], catch_exceptions=False)
-    assert done.exit_code == 0
-    assert done.stderr == ""
-    return json.loads(done.stdout)
+    result = CliRunner().invoke(main, ["bench", "--quick", "--json"], catch_exceptions=False)
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    return json.loads(result.stdout)
 
 
 def script(name):
@@ -117,8 +117,8 @@ def test_the_command_and_the_page_show_every_table_and_warn_of_quick_runs(
 ):
     measured = quick
     monkeypatch.setattr("sdnn.benchmarks.run_benchmarks", lambda *, quick: measured)
-    done = CliRunner().invoke(main, ["bench", "--quick"], catch_exceptions=False)
-    assert done.exit_code == 0
+    result = CliRunner().invoke(main, ["bench", "--quick"], catch_exceptions=False)
+    assert result.exit_code == 0
     page = script("performance_tables")
     text = page.to_markdown(with_yardsticks)
     shown = report.tables(quick)
@@ -126,9 +126,9 @@ def test_the_command_and_the_page_show_every_table_and_warn_of_quick_runs(
         assert table.title in text
         assert all(len(row) == len(table.header) for row in table.rows)
         for row in table.rows:
-            assert table not in shown or row[0].split(",")[0] in done.stdout
+            assert table not in shown or row[0].split(",")[0] in result.stdout
     assert report.QUICK_WARNING in text
-    assert report.QUICK_WARNING in done.stdout
+    assert report.QUICK_WARNING in result.stdout
     assert report.QUICK_WARNING not in page.to_markdown({**with_yardsticks, "quick": False})
 
 

@@ -342,6 +342,6 @@ except ValueError as error:
 def test_a_file_truncated_while_it_is_read_is_reported_as_damaged(tmp_path):
     path = tmp_path / "file"
     write_file(path, "agent", {"a": np.zeros(2**20)}, {})
-    done = python("-c", TRUNCATED, path)
-    assert done.returncode == 0, done.stderr
-    assert f"{path} is damaged" in done.stdout
+    process = python("-c", TRUNCATED, path)
+    assert process.returncode == 0, process.stderr
+    assert f"{path} is damaged" in process.stdout

@@ -58,9 +58,9 @@ def test_unknown_instruction_sets_are_refused(name):
 @pytest.mark.parametrize(("value", "expected"), [("portable", "portable"), ("sse9", "sse9")])
 def test_the_environment_variable_selects_the_instruction_set(value, expected):
     code = "import sdnn; print(sdnn.instruction_set())"
-    done = python("-c", code, env=environment(SDNN_INSTRUCTION_SET=value))
-    assert expected in done.stdout + done.stderr
-    assert (done.returncode == 0) == (value == "portable")
+    process = python("-c", code, env=environment(SDNN_INSTRUCTION_SET=value))
+    assert expected in process.stdout + process.stderr
+    assert (process.returncode == 0) == (value == "portable")
 
 
 def test_an_unknown_instruction_set_in_the_environment_raises_an_error():
@@ -73,13 +73,13 @@ def test_an_unknown_instruction_set_in_the_environment_raises_an_error():
     lines = ["import sdnn, sdnn.approximators, sdnn.environments"]
     lines += [f"try: {call}\nexcept ValueError as error: print(error)" for call in calls]
     environment = os.environ | {"SDNN_INSTRUCTION_SET": "foo"}
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", "\n".join(lines)],
         env=environment,
         capture_output=True,
         text=True,
         check=True,
     )
-    printed = done.stdout.splitlines()
+    printed = process.stdout.splitlines()
     assert len(printed) == len(calls)
     assert all("instruction set" in line and "got foo" in line for line in printed)

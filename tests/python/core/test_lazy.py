@@ -36,8 +36,10 @@ def test_importing_sdnn_imports_no_large_package():
         "'rich', 'safetensors', 'scipy', 'sklearn', 'sdnn.runs', 'sdnn.reproduction'}\n"
         "print(large & {*sys.modules})"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "set()\n"
+    process = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert process.stdout == "set()\n"
 
 
 def test_an_installation_of_compiled_modules_only_works(tmp_path):
@@ -51,5 +53,5 @@ def test_an_installation_of_compiled_modules_only_works(tmp_path):
     code += "sys.meta_path[:] = sys.meta_path[-3:]  # not an editable installation's\n"
     code += "import sdnn, sdnn.runs, sdnn.reproduction; assert sdnn.__file__.endswith('.pyc')\n"
     code += "print(sdnn.runs.BudgetSpec().steps, sdnn.SDNNRegressor(), sdnn.SDNNKernelRidge())"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout == "None SDNNRegressor() SDNNKernelRidge()\n", done.stderr
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert process.stdout == "None SDNNRegressor() SDNNKernelRidge()\n", process.stderr

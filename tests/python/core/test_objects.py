@@ -220,5 +220,5 @@ threading.Thread(target=work, daemon=True).start()
 time.sleep(0.2)
 """
     for _ in range(3):
-        done = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=60)
-        assert (done.returncode, done.stderr) == (0, b"")
+        process = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=60)
+        assert (process.returncode, process.stderr) == (0, b"")

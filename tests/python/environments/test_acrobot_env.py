@@ -59,16 +59,16 @@ def test_importing_the_environments_registers_them(imports, prefix):
         f"assert gymnasium.make({prefix + ID!r}).observation_space.shape == (4,)\n"
         f"assert gymnasium.make_vec({prefix + ID!r}, num_envs=2).num_envs == 2\n"
     )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True
     )
-    assert done.returncode == 0, done.stderr
+    assert process.returncode == 0, process.stderr
 
 
 def test_a_missing_gymnasium_is_named():
     code = "import sys, sdnn; sys.modules['gymnasium'] = None; sdnn.environments"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert "gymnasium" in done.stderr.splitlines()[-1]
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "gymnasium" in process.stderr.splitlines()[-1]
 
 
 def test_the_spaces_are_unit_boxes_of_the_chosen_dtype():

@@ -76,8 +76,10 @@ def test_a_missing_scikit_learn_is_named_with_its_installation():
         "try: sdnn.SDNNRegressor\n"
         "except ImportError as error: print(error)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "pip install scikit-learn" in done.stdout
+    process = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert "pip install scikit-learn" in process.stdout
 
 
 def test_sparse_samples_are_refused(estimator):

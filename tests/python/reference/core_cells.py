@@ -223,10 +223,10 @@ def never_made_cells():
 def _calls(name):
     """Call a method with as many arguments as it wants, of which none is looked at."""
 
-    def call(one):
+    def call(instance):
         for count in range(7):
             try:
-                return getattr(one, name)(*[0] * count)
+                return getattr(instance, name)(*[0] * count)
             except TypeError as error:
                 if NOT_MADE in str(error):
                     raise
@@ -238,22 +238,31 @@ def _calls(name):
 def _refusal_cell(cls, use):
     def run():
         try:
-            given = use(cls.__new__(cls))
+            result = use(cls.__new__(cls))
         except TypeError as error:
             return "" if NOT_MADE in str(error) else f"said {error}"
-        return "" if given is None else f"gave {given!r}"
+        return "" if result is None else f"gave {result!r}"
 
     return run
 
 
 def _general_cell(cls):
     def run():
-        one = cls.__new__(cls)
-        uses = [repr, str, hash, bool, len, copy.copy, copy.deepcopy, lambda one: one == one]
-        uses += [lambda one, p=p: pickle.dumps(one, p) for p in range(6)]
+        instance = cls.__new__(cls)
+        uses = [
+            repr,
+            str,
+            hash,
+            bool,
+            len,
+            copy.copy,
+            copy.deepcopy,
+            lambda instance: instance == instance,
+        ]
+        uses += [lambda instance, p=p: pickle.dumps(instance, p) for p in range(6)]
         for use in uses:
             with contextlib.suppress(TypeError):
-                use(one)
+                use(instance)
         return ""
 
     return run

@@ -35,9 +35,11 @@ def generate() -> str:
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "pybind11_stubgen", "sdnn._core", "--exit-code"]
         command += ["--enum-class-locations", ".+:sdnn._core"]
-        done = subprocess.run([*command, "-o", folder], capture_output=True, text=True, check=False)
-        if done.returncode != 0:
-            raise RuntimeError(done.stdout + done.stderr)
+        process = subprocess.run(
+            [*command, "-o", folder], capture_output=True, text=True, check=False
+        )
+        if process.returncode != 0:
+            raise RuntimeError(process.stdout + process.stderr)
         text = (Path(folder) / "sdnn" / "_core.pyi").read_text()
     # The tool invents an __all__ that the module does not have, and writes down its version.
     if not hasattr(sdnn._core, "__all__"):

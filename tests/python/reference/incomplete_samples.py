@@ -74,14 +74,14 @@ def weight_cells():
 
 def _weight_cell(cls, setting, y, change, place, habit):
     def run():
-        places, weights = PLACES[place], SCALES[place] * WEIGHTS
-        rows, targets = change(X[: len(places)], y[: len(places)])
-        data = np.insert(X, places, rows, 0), np.insert(y, places, targets, 0)
+        indices, weights = PLACES[place], SCALES[place] * WEIGHTS
+        rows, targets = change(X[: len(indices)], y[: len(indices)])
+        data = np.insert(X, indices, rows, 0), np.insert(y, indices, targets, 0)
         settings = ESTIMATORS[cls][1] | setting
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             expected = habit(cls(**settings), X, y, weights)
-            model = habit(cls(**settings), *data, np.insert(weights, places, 0.0))
+            model = habit(cls(**settings), *data, np.insert(weights, indices, 0.0))
         return "" if _state(model) == _state(expected) else "another model was learned"
 
     return run

@@ -44,13 +44,13 @@ def transitions(columns):
 
 def episodes(columns):
     """Return episodes as Minari and imitation have them, of as many rows as there are."""
-    found = []
+    all_episodes = []
     for first in range(0, len(columns["rewards"]), LENGTH):
-        part = {name: values[first : first + LENGTH] for name, values in columns.items()}
-        after = part.pop("next_observations")
-        part["observations"] = np.concatenate([part["observations"], after[-1:]])
-        found.append(part)
-    return found
+        episode = {name: values[first : first + LENGTH] for name, values in columns.items()}
+        after = episode.pop("next_observations")
+        episode["observations"] = np.concatenate([episode["observations"], after[-1:]])
+        all_episodes.append(episode)
+    return all_episodes
 
 
 def file_of_values(columns):

@@ -110,12 +110,12 @@ def test_a_reproduction_reads_each_trial_once(monkeypatch, tmp_path, use_trial):
         return call
 
     monkeypatch.setattr(ResultStore, "_make_record", counted("trial", ResultStore._make_record))
-    done = run_study(PaperStudy(quick=True), tmp_path)
+    reproduction = run_study(PaperStudy(quick=True), tmp_path)
     # SDNN-C in Case I belongs to both figures: two trials of nine pairs of case and agent.
-    assert [len(experiment["cases"]) for experiment in done.table["experiments"]] == [2, 8]
+    assert [len(experiment["cases"]) for experiment in reproduction.table["experiments"]] == [2, 8]
     assert calls == ["trial"] * 2 * 9
     with ResultStore(tmp_path) as store:
-        assert done.table["digest"] == records_digest(store.load())
+        assert reproduction.table["digest"] == records_digest(store.load())
 
 
 def test_an_agent_has_the_same_color_in_every_figure(tmp_path, run, collected):

@@ -39,11 +39,11 @@ def trained(invoke):
 
 
 def test_train_prints_a_summary_and_the_next_commands(invoke):
-    done = invoke("train", DRIFTING, *SHORT, "--seed", 3)
-    assert done.exit_code == 0, done.output
-    assert done.stderr == ""  # no progress where there is no terminal
+    result = invoke("train", DRIFTING, *SHORT, "--seed", 3)
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""  # no progress where there is no terminal
     folder = Path("runs/drifting_env-tests-Drifting-v0-sdnn-c-3")
-    lines = done.stdout.splitlines()
+    lines = result.stdout.splitlines()
     assert lines[0].startswith(f"{folder}: 150 steps, ")
     assert lines[1].startswith("last evaluation, after 140 steps: mean return ")
     assert "corrections" in lines[2]
@@ -87,8 +87,8 @@ def test_record_writes_a_gif_of_the_requested_steps(invoke, trained, tmp_path):
 
 @pytest.mark.filterwarnings("ignore:.*render_mode")
 def test_record_refuses_environments_that_cannot_be_rendered(invoke, refused, tmp_path):
-    done = invoke("train", "drifting_env:tests/Unseen-v0", *SHORT, "--out", "one")
-    commands = done.stdout.splitlines()[-1]
+    result = invoke("train", "drifting_env:tests/Unseen-v0", *SHORT, "--out", "one")
+    commands = result.stdout.splitlines()[-1]
     assert "sdnn plot one" in commands
     assert "record" not in commands
     error = refused("record", "one", "x.gif", code=1)
@@ -98,12 +98,12 @@ def test_record_refuses_environments_that_cannot_be_rendered(invoke, refused, tm
 
 def test_export_writes_the_c_header_of_a_run_or_an_agent_file(invoke, tmp_path):
     assert invoke("train", DRIFTING, *SHORT, "--seed", 3, "--out", "run").exit_code == 0
-    done = invoke("export", "run", "--c-header", "drift.h")
-    assert done.exit_code == 0, done.output
-    assert done.stderr == ""
+    result = invoke("export", "run", "--c-header", "drift.h")
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
     agent = Run.open("run").agent()
     assert Path("drift.h").read_text() == c_header(agent, "drift").text
-    assert done.stdout.startswith("wrote drift.h: ")
+    assert result.stdout.startswith("wrote drift.h: ")
     options = ("--name", "mine", "--fraction-bits", 12, "--json")
     printed = json.loads(
         invoke("export", "run/agent.safetensors", "--c-header", "b.h", *options).stdout
@@ -118,11 +118,11 @@ def test_export_writes_the_c_header_of_a_run_or_an_agent_file(invoke, tmp_path):
 def test_export_with_learning_writes_the_header_of_a_linear_agent(invoke):
     linear = ("--agent", "q-lambda", *SHORT[:6], *SMALL[-2:], "--out", "one")
     assert invoke("train", DRIFTING, *linear).exit_code == 0
-    done = invoke("export", "one", "--c-header", "drift.h", "--learning")
-    assert done.exit_code == 0, done.output
+    result = invoke("export", "one", "--c-header", "drift.h", "--learning")
+    assert result.exit_code == 0, result.output
     header = c_header(Run.open("one").agent(), "drift", learning=True)
     assert Path("drift.h").read_text() == header.text
-    assert f"{header.ram_bytes:,} bytes of memory" in done.stdout
+    assert f"{header.ram_bytes:,} bytes of memory" in result.stdout
 
 
 def test_export_with_learning_refuses_a_network_without_a_weight_limit(refused, trained):
@@ -153,13 +153,13 @@ SCALED_LINES = [
 
 
 def test_train_and_export_state_the_scaling_of_observations(invoke):
-    done = invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one")
-    printed = done.stdout.splitlines()[-2]
+    result = invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one")
+    printed = result.stdout.splitlines()[-2]
     assert "0 from -4 to 4, 1 from -2 to 3, and means of neighbours (1)" in printed
     assert "sdnn.runs.Run.open('one').spec.make_env()" in printed
     for source in ("one", "one/agent.safetensors", "one/checkpoint.safetensors"):
-        done = invoke("export", source, "--c-header", "a.h")
-        assert [line.strip() for line in done.stdout.splitlines()[2:]] == SCALED_LINES
+        result = invoke("export", source, "--c-header", "a.h")
+        assert [line.strip() for line in result.stdout.splitlines()[2:]] == SCALED_LINES
         text = Path("a.h").read_text()
         assert text == c_header(Run.open("one").agent(), "a").text
         comment, _ = text.split(" */\n", 1)
@@ -249,14 +249,14 @@ def test_plot_names_runs_without_rows(invoke, tmp_path):
     del config["folder"]
     Path("run2").mkdir()
     Path("run2/config.json").write_text(json.dumps(config))
-    done = invoke("plot", "run1", "run2")
-    assert (done.exit_code, "curves.png" in done.stdout) == (0, True)
-    assert "run2" in done.stderr
-    assert "run1" not in done.stderr
+    result = invoke("plot", "run1", "run2")
+    assert (result.exit_code, "curves.png" in result.stdout) == (0, True)
+    assert "run2" in result.stderr
+    assert "run1" not in result.stderr
 
 
 def test_train_dry_run_prints_the_configuration_and_writes_nothing(invoke, tmp_path):
-    done = invoke(
+    result = invoke(
         "train", "CartPole-v1", "--agent", "sdnn-c", "--preset", "robust", "--episodes", 7,
         "--noise", 0.1, "--redundant", 2, "--range", "-4:4", "--range", "1=-3:3",
         "--set", "learning.discount=0.5", "--set", "learning.tie_rule=middle",
@@ -264,8 +264,8 @@ def test_train_dry_run_prints_the_configuration_and_writes_nothing(invoke, tmp_p
         "--evaluate-every", 0, "--checkpoint-every", 5, "--dry-run", "--set",
         "approximator.circular=[]",
     )  # fmt: skip
-    assert done.exit_code == 0, done.output
-    values = json.loads(done.stdout)
+    assert result.exit_code == 0, result.output
+    values = json.loads(result.stdout)
     assert values.pop("folder") == "runs/CartPole-v1-sdnn-c-0"
     assert values["environment"] == {
         "id": "CartPole-v1",
@@ -283,10 +283,10 @@ def test_train_dry_run_prints_the_configuration_and_writes_nothing(invoke, tmp_p
 
 
 def test_angle_pairs_find_makes_the_angle_of_pendulum_circular(invoke):
-    done = invoke(
+    result = invoke(
         "train", "Pendulum-v1", "--steps", 70, "--angle-pairs", "find", "--out", "one", *SMALL
     )
-    assert done.exit_code == 0, done.output
+    assert result.exit_code == 0, result.output
     assert Run.open("one").agent().approximator.circular == (True, False)
 
 
@@ -343,11 +343,11 @@ def test_an_environment_module_may_register_an_agent(invoke, tmp_path, monkeypat
     monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
     short = ("--steps", 60, "--evaluate-every", 50, "--set", "agent.warm_up_steps=20")
     try:
-        done = invoke("train", "my_room:my/Room-v0", "--agent", "roomy", *short, "--out", "one")
-        assert done.exit_code == 0, done.output
+        result = invoke("train", "my_room:my/Room-v0", "--agent", "roomy", *short, "--out", "one")
+        assert result.exit_code == 0, result.output
         del AGENTS["roomy"], sys.modules["my_room"], gym.registry["my/Room-v0"]
-        done = invoke("resume", "one", "--steps", 70)
-        assert done.exit_code == 0, done.output
+        result = invoke("resume", "one", "--steps", 70)
+        assert result.exit_code == 0, result.output
     finally:
         AGENTS.pop("roomy", None)
         sys.modules.pop("my_room", None)
@@ -361,9 +361,9 @@ def test_configuration_files_must_be_toml_or_json(refused, tmp_path):
 
 
 def test_train_with_n_envs_learns_in_several_environments(invoke):
-    done = invoke("train", DRIFTING, *SHORT, "--n-envs", 4, "--out", "four", "--json")
-    assert done.exit_code == 0, done.output
-    assert json.loads(done.stdout)["n_steps"] == 150
+    result = invoke("train", DRIFTING, *SHORT, "--n-envs", 4, "--out", "four", "--json")
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["n_steps"] == 150
     run = Run.open("four")
     assert run.spec.protocol.n_envs == 4
     environments = {row["environment"] for row in run.rows() if row["kind"] == "episode"}
@@ -534,8 +534,8 @@ def test_a_reward_of_nan_is_reported_with_its_step_and_the_way_to_resume(invoke,
     error = refused("train", BROKEN, *options, "--out", "one run", code=1)
     assert f"{BROKEN}: " in error
     assert re.search(r"\b250\b.*reward.*nan.*\b249\b.*sdnn resume 'one run'", error)
-    done = invoke("resume", "one run", "--json")
-    assert (done.exit_code, json.loads(done.stdout)["n_steps"]) == (0, 400)
+    result = invoke("resume", "one run", "--json")
+    assert (result.exit_code, json.loads(result.stdout)["n_steps"]) == (0, 400)
     error = refused("train", BROKEN, *options, "--env-arg", "at=1", "--out", "two", code=1)
     assert "sdnn resume two" in error
 
@@ -551,9 +551,9 @@ def test_a_reward_of_nan_in_an_evaluation_is_reported_in_one_line(invoke, refuse
 
 def test_scaling_observations_opens_no_second_environment(invoke):
     only = ("drifting_env:tests/Only-v0", *SHORT, "--redundant", 1, "--range", "all=-2:2")
-    done = invoke("train", *only, "--evaluate-every", 0, "--out", "one")
-    assert done.exit_code == 0
-    assert "0 from -2 to 2, 1 from -2 to 2" in done.stdout
+    result = invoke("train", *only, "--evaluate-every", 0, "--out", "one")
+    assert result.exit_code == 0
+    assert "0 from -2 to 2, 1 from -2 to 2" in result.stdout
     scaling = load_agent("one/agent.safetensors").scaling
     assert scaling.ranges == ((-2.0, 2.0), (-2.0, 2.0))
 
@@ -610,11 +610,11 @@ def test_an_error_of_an_environment_is_raised_with_its_traceback(invoke, kind):
 def test_a_full_standard_output_is_reported_in_one_line(trained):
     command = f"{sys.executable} -m sdnn resume {trained} --json"
     for out, errors in (("> /dev/full", "Error: [Errno 28] No space left"), ("| true", "")):
-        done = subprocess.run(
+        process = subprocess.run(
             ["sh", "-c", f"{command} {out}"], env=environment(), capture_output=True, text=True
         )
-        assert done.stderr.startswith(errors), done.stderr
-        assert done.stderr.count("\n") == bool(errors), done.stderr
+        assert process.stderr.startswith(errors), process.stderr
+        assert process.stderr.count("\n") == bool(errors), process.stderr
 
 
 def test_train_does_not_overwrite_runs_or_files(refused, trained):
@@ -673,8 +673,8 @@ def test_train_reports_values_in_steps_that_are_too_coarse(invoke):
 
 def test_train_reports_observations_that_are_left_out(invoke):
     options = ["--agent", "q-lambda", "--steps", 1001, "--evaluate-every", 0]
-    done = invoke("train", "drifting_env:tests/Crowded-v0", *options, "--out", "one", "--json")
-    left_out = json.loads(done.stdout)["learning_report"]["left_out"]
+    result = invoke("train", "drifting_env:tests/Crowded-v0", *options, "--out", "one", "--json")
+    left_out = json.loads(result.stdout)["learning_report"]["left_out"]
     assert len(left_out) >= 3
     assert set(left_out) <= {2, 3, 4, 5}, "inputs of noise"
     listed = f"{len(left_out)} of 6 observations.*: {', '.join(map(str, left_out))}"
@@ -694,8 +694,8 @@ def test_commands_report_an_unfinished_warm_up(invoke):
     assert invoke("record", "one", "x.gif", "--steps", 2).stdout.splitlines()[-1] == WARMING_UP
     evaluate = ("evaluate", "one", "--episodes", 1, "--json")
     assert json.loads(invoke(*evaluate).stdout)["is_warming_up"] is True
-    done = json.loads(invoke("resume", "one", "--json").stdout)
-    assert (done["is_warming_up"], done["learning_report"]) == (True, None)
+    printed = json.loads(invoke("resume", "one", "--json").stdout)
+    assert (printed["is_warming_up"], printed["learning_report"]) == (True, None)
     assert "warming up" not in invoke("resume", "one", "--steps", 60).stdout
     assert "warming up" not in invoke("evaluate", "one", "--episodes", 1).stdout
     assert json.loads(invoke(*evaluate).stdout)["is_warming_up"] is False
@@ -703,9 +703,9 @@ def test_commands_report_an_unfinished_warm_up(invoke):
 
 
 def test_resume_accepts_later_goals_and_refuses_earlier_or_conflicting_ones(invoke, refused):
-    done = json.loads(invoke("train", DRIFTING, *SHORT, "--out", "one", "--json").stdout)
-    assert (done["n_steps"], done["reason"], done["folder"]) == (150, "done", "one")
-    assert 0.0 <= done["learning_report"]["share_changed"] <= 1.0
+    printed = json.loads(invoke("train", DRIFTING, *SHORT, "--out", "one", "--json").stdout)
+    assert (printed["n_steps"], printed["reason"], printed["folder"]) == (150, "done", "one")
+    assert 0.0 <= printed["learning_report"]["share_changed"] <= 1.0
     assert "150 steps" in invoke("resume", "one").stdout
     assert json.loads(invoke("resume", "one", "--steps", 170, "--json").stdout)["n_steps"] == 170
     assert "--steps: " in refused("resume", "one", "--steps", 9, code=2)

@@ -52,17 +52,17 @@ def test_a_gif_shows_every_state_of_an_evaluation_episode(run, tmp_path):
 
 
 def test_max_steps_limits_the_frames_of_a_recording(run, tmp_path):
-    assert record(run, tmp_path / "x.gif", max_steps=5).n_frames == 6
+    assert record(run, tmp_path / "x.gif", max_steps=5).n_frames == 1 + 5
 
 
 def test_an_mp4_has_even_sides_and_every_frame(run, tmp_path):
     recording = record(run, tmp_path / "x.mp4", seed=5)
     program = imageio_ffmpeg.get_ffmpeg_exe()
     command = [program, "-i", tmp_path / "x.mp4", "-f", "null", "-"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert "66x34" in done.stderr
-    assert "10 fps" in done.stderr
-    assert re.findall(r"frame= *(\d+)", done.stderr)[-1] == str(recording.n_frames)
+    process = subprocess.run(command, capture_output=True, text=True)
+    assert "66x34" in process.stderr
+    assert "10 fps" in process.stderr
+    assert re.findall(r"frame= *(\d+)", process.stderr)[-1] == str(recording.n_frames)
     assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]
 
 

@@ -147,9 +147,9 @@ def test_a_run_killed_at_any_instant_resumes_exactly(whole, tmp_path):
     path.write_text(json.dumps(config.values()))
     script = Path(__file__).with_name("kill_run.py")
     n_kills, seed = 12, 8
-    done = python(script, tmp_path / "run", path, str(n_kills), str(seed))
-    assert done.returncode == 0, done.stderr
-    n_killed, *n_steps_saved = map(int, done.stdout.split())
+    process = python(script, tmp_path / "run", path, str(n_kills), str(seed))
+    assert process.returncode == 0, process.stderr
+    n_killed, *n_steps_saved = map(int, process.stdout.split())
     assert n_killed >= n_kills - 2  # a run may end before it is killed
     assert len(set(n_steps_saved)) >= 4, "some runs came further than those before"
     assert contents(Run(tmp_path / "run", config)) == contents(whole(config))

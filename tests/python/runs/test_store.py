@@ -108,14 +108,14 @@ def test_a_store_on_a_read_only_file_system_can_be_read(tmp_path):
         or subprocess.run([*apart, mount, "sh", path.parent], capture_output=True).returncode
     ):
         pytest.skip("needs the right to mount a folder read-only")
-    done = subprocess.run(
+    process = subprocess.run(
         [*apart, f'{mount} && exec "$@"', "sh", path.parent, sys.executable, "-c", READING,
          path.parent],
         capture_output=True,
         text=True,
         env=environment(),
     )  # fmt: skip
-    assert (done.returncode, done.stdout) == (0, "2 2\n"), done.stderr
+    assert (process.returncode, process.stdout) == (0, "2 2\n"), process.stderr
 
 
 def test_after_each_trial_a_copy_of_the_file_is_complete(tmp_path):

@@ -139,8 +139,8 @@ def test_a_failing_trial_omits_its_variant_only(invoke, tmp_path):
 
     result = invoke("sweep", "mine.toml", trial=Raising)
     assert result.exit_code == 1
-    words = " (discount=0.8) failed: OverflowError: a weight would leave its range"
-    assert result.stderr.count(words) == 2
+    failure = " (discount=0.8) failed: OverflowError: a weight would leave its range"
+    assert result.stderr.count(failure) == 2
     assert "6 of 8 " in result.stdout
     assert " 1 of 6 " in result.stdout
     table = json.loads((tmp_path / "results" / "mine-table.json").read_text())
@@ -174,9 +174,9 @@ def test_dry_run_counts_and_estimates_without_making_a_file(invoke, tmp_path):
     assert (forecast["planned"], forecast["stored"], forecast["jobs"]) == (8, 4, 3)
     assert len(forecast["trials"]) == 6
     invoke("sweep", "mine.toml")
-    done = json.loads(invoke("sweep", "mine.toml", "--dry-run", "--json").stdout)
-    assert done["seconds"] == 0.0
-    assert {t["source"] for t in done["trials"]} == {"2 stored trials"}
+    printed = json.loads(invoke("sweep", "mine.toml", "--dry-run", "--json").stdout)
+    assert printed["seconds"] == 0.0
+    assert {t["source"] for t in printed["trials"]} == {"2 stored trials"}
 
 
 def test_a_dry_run_reports_a_trial_that_raises(invoke):

@@ -143,11 +143,11 @@ def test_duplicate_and_invalid_ids_are_not_registered():
 
 
 def test_agents_have_labels_titles_and_entries():
-    words = ["sdnn-c", "fuzzy", "rbf", "q-lambda", "actor-critic"]
-    words += ["sdnn-c-general", "sdnn-c-robust"]
-    words += ["sdnn-c-small", "q-lambda-general", "actor-critic-general"]
-    assert list(labels()) == words
-    assert [title_of(word) for word in words] == [
+    expected_labels = ["sdnn-c", "fuzzy", "rbf", "q-lambda", "actor-critic"]
+    expected_labels += ["sdnn-c-general", "sdnn-c-robust"]
+    expected_labels += ["sdnn-c-small", "q-lambda-general", "actor-critic-general"]
+    assert list(labels()) == expected_labels
+    assert [title_of(label) for label in expected_labels] == [
         "SDNN-C", "FQL", "RBFN", "SDNNQLambda", "SDNNActorCritic", "SDNN-C, general",
         "SDNN-C, robust", "SDNN-C, small", "SDNNQLambda, general", "SDNNActorCritic, general",
     ]  # fmt: skip

@@ -18,17 +18,18 @@ TEST(BlockTraining, HasTheBitsOfPlainTraining) {
 // Plans are kept from the second epoch in the order of the data on.
 TEST(BlockTraining, HasTheBitsOfPlainTrainingWithKeptPlans) {
   for (std::uint64_t seed = 300; seed < 330; ++seed) {
-    auto problem = testing::in_data_order(testing::random_problem(seed), 6, false);
-    if (seed % 2 == 0) problem.orders[3] = {0};  // something else in between
-    testing::compare_with_plain(problem, estimators::TrainingForm::block,
-                                1 + static_cast<int>(seed % 3),
+    auto problem = testing::in_data_order(testing::random_problem(seed), /*n_rounds=*/6);
+    if (seed % 2 == 0) problem.orders[3] = {0};  // a single sample between epochs
+    const int n_threads = 1 + static_cast<int>(seed % 3);
+    testing::compare_with_plain(problem, estimators::TrainingForm::block, n_threads,
                                 [&](bool same) { ASSERT_TRUE(same) << "problem " << seed; });
   }
 }
 
 TEST(BlockTraining, HasTheBitsOfPlainTrainingOverSeveralBlocks) {
+  constexpr std::size_t kSeveralBlocks = 1300;  // samples, of 512 or 256 in a block
   const auto problem = testing::in_data_order(
-      testing::with_samples(testing::random_problem(12), 1300, 12), 4, false);
+      testing::with_samples(testing::random_problem(12), kSeveralBlocks, 12), /*n_rounds=*/4);
   for (const std::size_t limit :
        {std::size_t{1} << 30, std::size_t{3} << 20}) {  // with plans, without
     const auto plain_layer = testing::layer_for(problem);

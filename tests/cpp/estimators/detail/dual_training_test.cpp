@@ -28,7 +28,7 @@ TEST(DualTraining, HasTheBitsOfPlainTrainingInDataOrder) {
 
 TEST(DualTraining, HasTheBitsOfPlainTrainingOverManyWindows) {
   const auto problem = testing::with_samples(testing::random_problem(11), 1500, 11);
-  testing::compare_with_plain(testing::in_data_order(problem, 4, false),
+  testing::compare_with_plain(testing::in_data_order(problem, /*n_rounds=*/4),
                               estimators::TrainingForm::dual, 2,
                               [](bool same) { ASSERT_TRUE(same); });
 }
