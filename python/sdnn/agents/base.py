@@ -230,10 +230,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
 
     @property
     def progress(self) -> float:
-        """The part of the learning that is done, in [0, 1]; ``train`` sets it.
-
-        Settings such as ``final_epsilon`` follow it.
-        """
+        """The part of the learning that is done, in [0, 1], for schedules; ``train`` sets it."""
         return self._controller.progress
 
     @progress.setter
