@@ -241,7 +241,8 @@ class Streaming:
     def _learn_waiting(self, is_over: bool) -> None:
         if self._step is None:
             return
-        (_, _, reward, observation, terminated, _), self._step = self._step, None
+        step, self._step = self._step, None
+        reward, observation, terminated = step.reward, step.next_observation, step.terminated
         self._discounted = DISCOUNT * self._discounted * (not is_over) + reward
         self._returns.update(self._discounted)
         next_state = self._see(observation)

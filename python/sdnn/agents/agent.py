@@ -124,11 +124,6 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         return self._observation.running
 
     @property
-    def finds_history(self) -> bool:
-        """Whether the warm-up decides what states have of earlier observations."""
-        return self._observation.history == "auto" and self._controller.has_warm_up
-
-    @property
     def n_dimensions(self) -> int:
         """Dimensions of an action."""
         return len(self._action.low)

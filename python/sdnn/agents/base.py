@@ -139,7 +139,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             seed,
             warm_up_steps,
         )
-        default_history = "none" if missing == "code" else chosen.history
+        default_history = "none" if str(missing) == "code" else chosen.history
         self._observation = self._observations.config(
             self.default_range if observation_range is None else observation_range,
             angles,
@@ -220,13 +220,15 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
 
     @property
     def history(self) -> str:
-        """The part of earlier observations in states.
-
-        With ``history="auto"`` that which the warm-up found; ``"auto"`` until it is over.
-        """
+        """The part of earlier observations in states; ``"auto"`` until the warm-up chose it."""
         if self.is_warming_up:
             return self._observation.history
         return self._controller.history
+
+    @property
+    def finds_history(self) -> bool:
+        """Whether the warm-up decides what states have of earlier observations."""
+        return self._observation.history == "auto" and self._controller.has_warm_up
 
     @property
     def progress(self) -> float:

@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import clone
 from sklearn.utils import _safe_indexing
 
 from sdnn.estimators.columns import Array, Floats
+from sdnn.estimators.training import FEWEST_SAMPLES, held_out_fifth
 
 if TYPE_CHECKING:
     from sdnn.estimators.base import BaseSDNN
-
-HELD_OUT_EVERY = 5  # every fifth sample is held out
-FEWEST_SAMPLES = 10
 
 
 class HeldOut(NamedTuple):
@@ -25,20 +23,6 @@ class HeldOut(NamedTuple):
     X: ArrayLike
     y: Array
     weights: Floats  # 1 without weights
-
-
-def held_out_fifth(labels: Array, is_stratified: bool, seed: int) -> NDArray[np.bool_]:
-    """Return which samples are held out: a random fifth, or one of each class.
-
-    >>> held_out_fifth(np.arange(10), False, 0).sum()
-    np.int64(2)
-    """
-    order = np.random.RandomState(seed).permutation(len(labels))
-    if is_stratified:
-        order = order[np.argsort(labels[order], kind="stable")]
-    is_held = np.zeros(len(labels), dtype=bool)
-    is_held[order[HELD_OUT_EVERY // 2 :: HELD_OUT_EVERY]] = True
-    return is_held
 
 
 def learn_without_fifth(

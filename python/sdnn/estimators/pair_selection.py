@@ -9,8 +9,8 @@ from sklearn.utils import _safe_indexing
 
 from sdnn.coding import Coding, CorrelationMatrix, Symbolic, WithMissing
 from sdnn.coding.symbols import present
-from sdnn.estimators.calibration import FEWEST_SAMPLES, held_out_fifth
 from sdnn.estimators.columns import Array, Floats, Pairs, input_pairs
+from sdnn.estimators.training import FEWEST_SAMPLES, held_out_fifth
 
 
 def with_categories(coding: Coding, column: Array) -> Coding:

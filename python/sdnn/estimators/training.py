@@ -23,6 +23,8 @@ from sdnn.support.arguments import require
 LARGE_SAMPLE = 5000
 """Size from which on every epoch's network is averaged, and blocks of samples are shuffled."""
 BLOCK = 512  # samples; the trainer reuses the sums of a block in later epochs
+HELD_OUT_EVERY = 5  # every fifth sample is held out
+FEWEST_SAMPLES = 10
 LARGEST_WEIGHT = 10**6
 MOST_PRESENTED = 2**28  # samples in an epoch: their indices take a GiB
 
@@ -82,6 +84,20 @@ def sample_weights(
     if each.sum() > MOST_PRESENTED:
         raise ValueError(f"{name} must sum to at most {MOST_PRESENTED}, got {each.sum():.4g}")
     return each
+
+
+def held_out_fifth(labels: Array, is_stratified: bool, seed: int) -> NDArray[np.bool_]:
+    """Return which samples are held out: a random fifth, or one of each class.
+
+    >>> held_out_fifth(np.arange(10), False, 0).sum()
+    np.int64(2)
+    """
+    order = np.random.RandomState(seed).permutation(len(labels))
+    if is_stratified:
+        order = order[np.argsort(labels[order], kind="stable")]
+    is_held = np.zeros(len(labels), dtype=bool)
+    is_held[order[HELD_OUT_EVERY // 2 :: HELD_OUT_EVERY]] = True
+    return is_held
 
 
 def without_absent(
