@@ -92,16 +92,23 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
             self.steepness_ = self._calibrated_steepness(held)
 
     def _calibrated_steepness(self, held: HeldOut) -> float:
-        """Return the steepness with the smallest log loss on samples that are held out."""
+        """Return the steepness with the smallest log loss on samples that are held out.
+
+        Half a sample more has a random class, because a few samples may all be predicted rightly.
+        """
         model = cast(SDNNClassifier, held.model)
         scores = model._scores(model._bins(held.X), self._n_threads())
         targets = model._targets(held.y)
         each = class_weights(self.class_weight, held.y)
         weights = held.weights if each is None else held.weights * each
+        share = 0.5 / (0.5 + float(weights.sum()))
 
         def loss(log_steepness: float) -> float:
             logarithms = log_softmax(np.exp(log_steepness) * scores, axis=1)
-            return weighted_mean(-logarithms[np.arange(len(targets)), targets], weights)
+            of_targets = logarithms[np.arange(len(targets)), targets]
+            return weighted_mean(
+                -(1 - share) * of_targets - share * logarithms.mean(axis=1), weights
+            )
 
         best = minimize_scalar(loss, bounds=np.log(STEEPNESSES), method="bounded").x
         return float(np.clip(np.exp(best), *STEEPNESSES))
