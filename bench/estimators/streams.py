@@ -233,7 +233,7 @@ def draw_scores(results, path):
         names = [f"{stream} ({n})" for stream, n in zip(data, seeds, strict=True)]
         axes.set_yticks(range(len(data)), names)
         names = [name.replace(" ", "\n", 1).replace("=", "\n=") for name in models]
-        axes.set_xticks(range(len(models)), names, fontsize=9)
+        axes.set_xticks(range(len(models)), names, fontsize=8)
         axes.tick_params(length=0, labeltop=True, labelbottom=False)
         axes.spines[:].set_visible(False)
         axes.set_title(title, loc="left", weight="bold")
