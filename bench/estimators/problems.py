@@ -337,10 +337,10 @@ def rank_columns(title, models, middles):
     """Mean ranks by model, of those that were measured on all problems; and on such problems."""
     own = np.array([model not in VARIANTS for model in models])
     there = np.isfinite(middles)
-    columns = {title: rank_column(models, middles, own & there.all(axis=0))}
+    columns = {f"{title}, rank": rank_column(models, middles, own & there.all(axis=0))}
     if not there.all():
         of_all = there.all(axis=1)
-        columns[f"on {of_all.sum()}"] = rank_column(models, middles[of_all], own)
+        columns[f"{title}, on {of_all.sum()}"] = rank_column(models, middles[of_all], own)
     return columns
 
 
@@ -421,7 +421,7 @@ def main():
     summary = {}
     for unit, (problems, models) in TABLES.items():
         middles = middles_of(results, problems, models)
-        summary |= rank_columns(f"{unit}, rank", models, middles)
+        summary |= rank_columns(unit, models, middles)
         summary[f"{unit}, seconds to fit"] = fit_column(results, problems, models)
         if arguments.full:
             print(table(problems, models, middles))

@@ -51,7 +51,7 @@ TABLES = {
     "AUC": ("auc", CLASSIFICATION, CLASSIFIERS),
 }
 SHOWN = (
-    "SDNN", "SDNN kernel ridge", "gradient boosting", "random forest", "Gaussian process", "linear"
+    "SDNN", "SDNN kernel ridge", "CatBoost", "gradient boosting", "Gaussian process", "linear"
 )  # fmt: skip
 """Models in the page; --full prints all."""
 
@@ -139,18 +139,19 @@ def keys():
 
 
 def class_columns(results):
-    """Means over the classifications by model; times are medians."""
+    """Means over the classifications that all models have, by model; times are medians."""
+    common = [p for p in CLASSIFICATION if all((p, model) not in LEFT_OUT for model in CLASSIFIERS)]
+    means = {
+        title: {
+            model: f"{np.mean([row[what] for p in common for row in results[p, model]]):.3f}"
+            for model in CLASSIFIERS
+            if what in results[common[0], model][0]
+        }
+        for title, what in (("calibration error", "calibration"), ("log loss", "log_loss"))
+    }
     rows = {
         model: [row for problem in CLASSIFICATION for row in results[problem, model]]
         for model in CLASSIFIERS
-    }
-    means = {
-        title: {
-            model: f"{np.mean([row[what] for row in of_all]):.3f}"
-            for model, of_all in rows.items()
-            if what in of_all[0]
-        }
-        for title, what in (("calibration error", "calibration"), ("log loss", "log_loss"))
     }
     times = {
         model: f"{np.median([row['predict_us'] for row in of_all]):.0f}"
@@ -171,7 +172,7 @@ def main():
     summary, tables = {}, {}
     for title, (what, data, models) in TABLES.items():
         middles = problems.middles_of(results, data, models, what, np.mean)
-        summary |= problems.rank_columns(f"{title}, rank", models, middles)
+        summary |= problems.rank_columns(title, models, middles)
         if title == "R2":
             tables["R2, measured data"] = problems.table(data, models, middles, SHOWN)
         if arguments.full:
