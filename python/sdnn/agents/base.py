@@ -79,10 +79,7 @@ def presets_of(listed: Mapping[str, Any], **more: Mapping[str, Any]) -> Mapping[
 
 
 class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
-    """An agent that acts, learns and can be saved.
-
-    `Agent` adds trainings, reading from files, and properties for its user.
-    """
+    """An agent that acts, learns and can be saved; `Agent` adds trainings and properties."""
 
     kind: ClassVar[str]
     """The name of this approximator and learning rule in files."""
@@ -139,7 +136,8 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             seed,
             warm_up_steps,
         )
-        default_history = "none" if str(missing) == "code" else chosen.history
+        has_code = isinstance(missing, str) and missing == "code"
+        default_history = "none" if has_code else chosen.history
         self._observation = self._observations.config(
             self.default_range if observation_range is None else observation_range,
             angles,

@@ -183,7 +183,7 @@ class BaseKernelRidge(CodedInputs):
         degrees = DEGREES if self.degree == "auto" else (int(self.degree),)
         codings = self._fit_codings(self._codings(X, table), table, N_UNITS)
         self.codings_, possible = tuple(codings), [all_inputs(len(codings))]
-        if self.pairs == "all" and self.inputs == "auto":
+        if isinstance(self.pairs, str) and self.inputs == "auto":
             possible = inputs_to_compare(codings, table, samples, degrees, self._losses)
         components = np.arange(len(table))
         if len(table) > self.max_components:
