@@ -47,6 +47,8 @@ def learn_without_fifth(
     if is_stratified:
         labels, counts = np.unique(targets, return_counts=True)
         is_held &= ~np.isin(targets, labels[counts == 1])
+        if not is_held.any():
+            raise ValueError("calibrate must be False where hardly a class has two samples")
     weights = np.ones(len(targets)) if sample_weight is None else np.asarray(sample_weight)
     model = clone(fitted).set_params(
         calibrate=False,

@@ -168,3 +168,8 @@ def test_calibration_refuses_what_it_cannot_do(tmp_path):
         classes.steepness_ = steepness
         classes.save(path)
         refuses("steepness_", SDNNClassifier.load, path)
+
+
+def test_classes_of_single_samples_cannot_be_calibrated():
+    X = np.arange(12.0)[:, None]
+    refuses("calibrate", SDNNClassifier(calibrate=True).fit, X, np.arange(12))
