@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from sdnn.support.arguments import path_of, real, require, whole
 from sdnn.support.files import naming, open_to_append, read_bytes, write_whole
 from sdnn.support.progress import ProgressBars
+from sdnn.training.files import MOST_IN_BLOCK, EpisodeBlock
 from sdnn.training.loop import Row
 from sdnn.training.training import Callback, Training
 
@@ -72,12 +73,12 @@ class StopTrainingOnRewardThreshold(Callback):
 
 
 class SaveBestAgent(Callback):
-    """Saves the agent whenever it was better than ever before.
+    """Saves the agent whenever it was better than ever before in this training.
 
     Without ``episodes`` after an evaluation with the highest mean return so far. With ``episodes``
     after a block of so many learned episodes whose mean return is the highest: that costs no
-    steps, but the returns are those of the agent that still learned and explored. Blocks do not
-    overlap, so that three numbers are enough to remember; a resumed training continues its block.
+    steps, but the returns are those of the agent that still learned and explored. The training
+    remembers the best block, and a resumed one continues its block.
 
     Parameters
     ----------
@@ -89,33 +90,21 @@ class SaveBestAgent(Callback):
 
     def __init__(self, path: str | Path, episodes: int | None = None) -> None:
         self.path = path_of("path", path)
-        self.episodes = None if episodes is None else whole("episodes", episodes, 1, 2**31)
+        self.episodes = None if episodes is None else whole("episodes", episodes, 1, MOST_IN_BLOCK)
 
     def on_start(self, training: Training) -> None:
-        """Forget the blocks of another training."""
-        if training.n_rows == 0:
-            self.state = {}
+        """Let the training compare blocks of so many episodes."""
+        if self.episodes is not None:
+            training.blocks.setdefault(self.episodes, EpisodeBlock(self.episodes))
 
     def on_row(self, training: Training, row: Row) -> None:
         """Save the agent after the best evaluation or block of episodes so far."""
-        is_evaluation = row["kind"] == "evaluation"
-        if self.episodes is None:
-            is_best = is_evaluation and n_since_best(training) == 0
+        if row["kind"] == "evaluation":
+            is_best = self.episodes is None and n_since_best(training) == 0
         else:
-            is_best = not is_evaluation and self._ends_best_block(self.episodes, row["return"])
+            is_best = self.episodes in training.best_blocks
         if is_best:
             training.agent.save(self.path)
-
-    def _ends_best_block(self, n_episodes: int, episode_return: float) -> bool:
-        n = self.state.get("episodes", 0) + 1
-        total = self.state.get("sum", 0.0) + episode_return
-        best = self.state.get("best", -math.inf)
-        if n < n_episodes:
-            self.state = {**self.state, "episodes": n, "sum": total}
-            return False
-        is_best = best < total < math.inf
-        self.state = {"best": total} if is_best else {"best": best} if best > -math.inf else {}
-        return is_best
 
 
 class StopTrainingOnNoImprovement(Callback):

@@ -194,6 +194,13 @@ def _has_no_statistics(wrapper: object) -> bool:
 _ARRAYS_OF_TRAINING = "training."
 """Prefix of the names of arrays that are not the agent's."""
 
+_LARGEST_RETURN = 1e300
+"""Returns that count as larger ones, so that sums of a block are finite."""
+MOST_IN_BLOCK = 10**6
+"""Episodes of a block."""
+
+_Sum = Annotated[float, msgspec.Meta(ge=-1e307, le=1e307)]
+_BlockLength = Annotated[int, msgspec.Meta(ge=1, le=MOST_IN_BLOCK)]
 _Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 _Period = Annotated[int, msgspec.Meta(ge=1, le=2**53)]
 
@@ -258,11 +265,39 @@ class SavedEpisode(msgspec.Struct, frozen=True, kw_only=True):
     observation: Any = None
 
 
+class EpisodeBlock(msgspec.Struct, omit_defaults=True):
+    """The learned episodes of which each ``length`` are compared with the best so many before.
+
+    Blocks do not overlap. ``total`` is the sum of the ``n`` returns of the present block, ``best``
+    the largest sum of a whole one.
+    """
+
+    length: _BlockLength
+    n: _Count = 0
+    total: _Sum = 0.0
+    best: _Sum | None = None
+
+    def __post_init__(self) -> None:
+        if self.n >= self.length:
+            raise ValueError("a block must be shorter than its length")
+
+    def ends_best(self, episode_return: float) -> bool:
+        """Add an episode; return whether it ends a block that is better than all before."""
+        self.n += 1
+        self.total += min(max(-_LARGEST_RETURN, episode_return), _LARGEST_RETURN)
+        if self.n < self.length:
+            return False
+        is_best = self.best is None or self.total > self.best
+        if is_best:
+            self.best = self.total
+        self.n, self.total = 0, 0.0
+        return is_best
+
+
 class SavedTraining(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The state that `sdnn.agents.Training` resumes.
 
-    ``present`` has an entry for each environment, ``evaluations`` steps and mean returns,
-    ``callbacks`` the class and the numbers of each that has some;
+    ``present`` has an entry for each environment, ``evaluations`` steps and mean returns;
     ``next_episode`` is the number of the first that has not begun; ``wrappers`` have learned as
     much when the present episode began.
     """
@@ -280,7 +315,7 @@ class SavedTraining(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
     limit_bootstraps: bool
     evaluations: list[tuple[_Count, float]]
     present: list[SavedEpisode | None]
-    callbacks: dict[str, dict[str, float]] = msgspec.field(default_factory=dict)
+    blocks: list[EpisodeBlock] = msgspec.field(default_factory=list)
     wrappers: list[Statistics] = msgspec.field(default_factory=list)
 
     def __post_init__(self) -> None:

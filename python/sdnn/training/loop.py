@@ -21,7 +21,7 @@ from sdnn.support.arguments import require
 from sdnn.support.interrupts import Interrupts
 from sdnn.training.episodes import Episodes, checked_outcome, copied
 from sdnn.training.evaluation import evaluate
-from sdnn.training.files import share_statistics, statistics_of
+from sdnn.training.files import EpisodeBlock, share_statistics, statistics_of
 from sdnn.training.interfaces import (
     CoreParts,
     Learner,
@@ -181,6 +181,10 @@ class TrainingLoop(abc.ABC):
     n_rows = 0
     evaluations: list[tuple[int, float]]
     """Steps and mean returns of all evaluations so far, including those before `load`."""
+    blocks: dict[int, EpisodeBlock]
+    """Blocks of episodes that are compared, by their length."""
+    best_blocks: frozenset[int] = frozenset()
+    """Lengths of the blocks that the last episode ended, and that are better than all before."""
     rows: list[Row]
     """Rows since the training was begun, or last loaded."""
     is_within_step = False
@@ -285,7 +289,11 @@ class TrainingLoop(abc.ABC):
         rows: list[Row] = []
         failure: Exception | None = None
         if is_over := self._episodes.is_over(environment):
-            rows.append(self._episode_row(environment))
+            row = self._episode_row(environment)
+            rows.append(row)
+            self.best_blocks = frozenset(
+                block.length for block in self.blocks.values() if block.ends_best(row["return"])
+            )
             self.n_episodes += 1
             self._episodes.present[environment] = None
             self._warn_of_problems()

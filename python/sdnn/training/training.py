@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Self
 
 import gymnasium as gym
@@ -76,8 +74,6 @@ class Callback:
 
     step_interval: int = 1
     """``on_step`` is called where the number of steps is a multiple of it."""
-    state: Mapping[str, float] = MappingProxyType({})
-    """Finite numbers, which `Training.save` writes and `Training.load` gives back."""
 
     def on_start(self, training: Training) -> None:
         """Before the first step, also of a training that is resumed."""
@@ -239,6 +235,7 @@ class Training(TrainingLoop):
         self.reset_options = reset_options
         self.evaluations = []
         self.rows = []
+        self.blocks = {}
         adapter = _adapter_for(env)
         self._learner = learner_for_all(agent, adapter.n_environments)
         self._episodes = Episodes(
@@ -287,7 +284,7 @@ class Training(TrainingLoop):
         self._keep_statistics()
         saved = SavedTraining(
             **{name: getattr(self, name) for name in names},
-            callbacks={name: dict(c.state) for name, c in _named(self.callbacks) if c.state},
+            blocks=list(self.blocks.values()),
             wrappers=self._episodes.learned_before,
             present=self._episodes.saved(self.agent.action_space.shape or ()),
         )
@@ -339,8 +336,7 @@ class Training(TrainingLoop):
         )
         for name in _STATE:
             setattr(training, name, getattr(saved, name))
-        for name, callback in _named(training.callbacks):
-            callback.state = saved.callbacks.get(name, callback.state)
+        training.blocks = {block.length: block for block in saved.blocks}
         learned = saved.wrappers if does_repeat else agent.wrappers
         is_same = take_statistics(training._episodes.wrappers, learned)
         if does_repeat:
@@ -382,18 +378,6 @@ class CheckpointCallback(Callback):
     def _save(self, training: Training) -> None:
         training.save(self.path)
         self.n_saved = training.n_steps
-
-
-def _named(callbacks: Iterable[Callback]) -> list[tuple[str, Callback]]:
-    """Name callbacks that can have a state: by class, and by number among those of the class."""
-    counts: Counter[str] = Counter()
-    named = []
-    for callback in callbacks:
-        if hasattr(callback, "state"):
-            name = type(callback).__name__
-            named.append((f"{name}.{counts[name]}", callback))
-            counts[name] += 1
-    return named
 
 
 def _optional(name: str, value: float | None) -> int | None:

@@ -184,7 +184,7 @@ def test_save_best_agent_saves_at_each_better_evaluation(tmp_path):
 
 
 class ScriptedReturns(gym.Env):
-    """Has episodes of one step, with these returns in turn, from the first episode's seed on."""
+    """Has episodes of one step with these returns."""
 
     observation_space, action_space = gym.spaces.Box(0, 1, (1,)), gym.spaces.Discrete(2)
 
@@ -201,8 +201,8 @@ class ScriptedReturns(gym.Env):
 class BestSteps(SaveBestAgent):
     """Notes the steps after which the best agent was saved."""
 
-    def on_start(self, training):
-        super().on_start(training)
+    def __init__(self, path, episodes):
+        super().__init__(path, episodes)
         self.steps = []
 
     def on_row(self, training, row):
@@ -215,31 +215,63 @@ RETURNS_OF_PAIRS = [1, 3, 4, -1, 2, 3, 0, 5, 9, 8]
 """Their sums in pairs are 4, 3, 5, 5 and 17: better than all before after 2, 6 and 10 episodes."""
 
 
-def test_save_best_agent_compares_blocks_of_learned_episodes(tmp_path):
-    env = ScriptedReturns(RETURNS_OF_PAIRS)
-    best = BestSteps(tmp_path / "best.safetensors", episodes=2)
-    SDNNQLambda(env, inputs="all").train(env, steps=10, callbacks=[best])
-    assert best.steps == [2, 6, 10]
-    refuses("episodes", SaveBestAgent, best.path, episodes=0)
+@pytest.fixture
+def best_of(tmp_path):
+    """Trains in parts, each with a number of further returns and a callback, if any."""
+
+    def steps_after_which_the_best_was_saved(*parts):
+        path, n_learned, steps = tmp_path / "training.safetensors", 0, []
+        for returns, episodes in parts:
+            env = ScriptedReturns(returns)
+            n_learned += len(returns)
+            best = BestSteps(tmp_path / "best.safetensors", episodes) if episodes else Callback()
+            options = {"steps": n_learned, "callbacks": [best]}
+            if path.exists():
+                training = Training.load(path, env, **options)
+            else:
+                training = Training(SDNNQLambda(env, inputs="all"), env, **options)
+            training.run()
+            training.save(path)
+            steps += best.steps if episodes else []
+        return steps
+
+    return steps_after_which_the_best_was_saved
 
 
-def test_a_resumed_training_continues_its_block_of_episodes(tmp_path):
+def test_save_best_agent_compares_blocks_of_learned_episodes(best_of, tmp_path):
+    assert best_of((RETURNS_OF_PAIRS, 2)) == [2, 6, 10]
+    for length in (0, 1.5, 10**6 + 1):
+        refuses("episodes", SaveBestAgent, tmp_path / "best", length)
+
+
+@pytest.mark.parametrize("n_first", range(1, 10))
+def test_a_resumed_training_continues_its_block_of_episodes(best_of, n_first):
+    first, second = RETURNS_OF_PAIRS[:n_first], RETURNS_OF_PAIRS[n_first:]
+    assert best_of((first, 2), (second, 2)) == [2, 6, 10]
+
+
+def test_the_best_block_is_remembered_while_no_callback_asks_for_it(best_of):
+    assert best_of(([100, 100], 2), ([1, 1], None), ([2, 2, 101, 101], 2)) == [2, 8]
+
+
+def test_blocks_of_another_length_are_compared_anew(best_of):
+    assert best_of(([100] * 10, 10), ([-1, -1, -2, -2, 150, 150], 2)) == [10, 12, 16]
+
+
+def test_two_callbacks_of_the_same_length_save_the_same_agents(tmp_path):
     env = ScriptedReturns(RETURNS_OF_PAIRS)
-    by_evaluations = SaveBestAgent(tmp_path / "unused")
-    best = BestSteps(tmp_path / "best.safetensors", episodes=2)
-    callbacks = [by_evaluations, best]
-    training = Training(SDNNQLambda(env, inputs="all"), env, steps=5, callbacks=callbacks)
-    training.run()
-    assert best.steps == [2]
-    training.save(tmp_path / "training.safetensors")
-    best = BestSteps(best.path, episodes=2)
-    callbacks = [by_evaluations, best]
-    resumed = tmp_path / "training.safetensors"
-    Training.load(resumed, env, steps=10, callbacks=callbacks).run()
-    assert best.steps == [6, 10]
-    other = ScriptedReturns([-1, -2])
-    SDNNQLambda(other, inputs="all").train(other, steps=2, callbacks=callbacks)
-    assert best.steps == [2], "another training begins anew"
+    agent = SDNNQLambda(env, inputs="all")
+    both = [BestSteps(tmp_path / name, 2) for name in ("first", "second")]
+    agent.train(env, steps=10, callbacks=both)
+    assert [best.steps for best in both] == [[2, 6, 10]] * 2
+    env = ScriptedReturns([-1, -1])
+    agent.train(env, steps=2, callbacks=both)
+    assert [best.steps[-1] for best in both] == [2, 2], "another training begins anew"
+
+
+@pytest.mark.parametrize("extreme", [1e300, -1e300])
+def test_extreme_returns_are_saved_and_compared(best_of, extreme):
+    assert best_of(([extreme, extreme], 2), ([0, 0, 1, 1], 2))[0] == 2
 
 
 def test_two_evaluations_without_improvement_stop_a_training(tmp_path):
