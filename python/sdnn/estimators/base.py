@@ -240,6 +240,12 @@ class BaseSDNN(Fitted, CodedInputs):
         self.network_ = history.network
         self._earlier = history.earlier
 
+    def _validate_to_begin(self) -> None:
+        """Raise ValueError for parameters with which samples cannot be learned one at a time."""
+        self._validate_params()
+        if self.calibrate:
+            raise ValueError(f"calibrate works in fit only, got {self.calibrate}")
+
     def _partial_fit(
         self, X: ArrayLike, y: ArrayLike, classes: ArrayLike | None, sample_weight: ArrayLike | None
     ) -> Self:
@@ -247,7 +253,7 @@ class BaseSDNN(Fitted, CodedInputs):
         work = self._copy_to_train()
         first = not hasattr(self, "network_")
         if first:
-            self._validate_params()
+            self._validate_to_begin()
         X, y, sample_weight = without_absent(X, y, sample_weight)
         table, observed = work._check_samples(X, y, None if first else self.codings_)
         if first:
@@ -277,7 +283,7 @@ class BaseSDNN(Fitted, CodedInputs):
             work._note_inputs(row[None])
             bins = code.bins_of_row(row)
         else:
-            self._validate_params()
+            self._validate_to_begin()
             table = work._first_row(x)
             work._begin(x, table, y if classes is None else classes)
             work.n_iter_ = 0

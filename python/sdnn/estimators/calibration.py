@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import clone
-from sklearn.utils import _safe_indexing
 
 from sdnn.estimators.columns import Array, Floats
-from sdnn.estimators.training import FEWEST_SAMPLES, held_out_fifth
+from sdnn.estimators.training import FEWEST_SAMPLES, Rows, held_out_fifth, samples_in
 
 if TYPE_CHECKING:
     from sdnn.estimators.base import BaseSDNN
@@ -20,6 +19,7 @@ class HeldOut(NamedTuple):
     """Samples that were held out, and a model that learned the others."""
 
     model: BaseSDNN
+    rows: Rows  # numbers of the samples
     X: ArrayLike
     y: Array
     weights: Floats  # 1 without weights
@@ -59,5 +59,6 @@ def learn_without_fifth(
     )
     kept, held = np.flatnonzero(~is_held), np.flatnonzero(is_held)
     weights_of_kept = None if sample_weight is None else weights[kept]
-    model.fit(_safe_indexing(X, kept), targets[kept], weights_of_kept)
-    return HeldOut(model, _safe_indexing(X, held), targets[held], weights[held].astype(np.float64))
+    model.fit(samples_in(X, kept), targets[kept], weights_of_kept)
+    weights_of_held = weights[held].astype(np.float64)
+    return HeldOut(model, held, samples_in(X, held), targets[held], weights_of_held)

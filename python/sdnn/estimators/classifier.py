@@ -89,18 +89,22 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
         self.__dict__.pop("steepness_", None)  # of an earlier fit
         if self.calibrate:
             held = learn_without_fifth(self, X, y, sample_weight, is_stratified=True)
-            self.steepness_ = self._calibrated_steepness(held)
+            each = class_weights(self.class_weight, np.asarray(y))
+            self.steepness_ = self._calibrated_steepness(held, each)
 
-    def _calibrated_steepness(self, held: HeldOut) -> float:
+    def _calibrated_steepness(self, held: HeldOut, each: Floats | None) -> float:
         """Return the steepness with the smallest log loss on samples that are held out.
+
+        ``each`` are the weights of all samples by their classes.
 
         Half a sample more has a random class, because a few samples may all be predicted rightly.
         """
         model = cast(SDNNClassifier, held.model)
         scores = model._scores(model._bins(held.X), self._n_threads())
         targets = model._targets(held.y)
-        each = class_weights(self.class_weight, held.y)
-        weights = held.weights if each is None else held.weights * each
+        weights = held.weights if each is None else held.weights * each[held.rows]
+        expected = "be False where class_weight is 0 for all samples that are held out"
+        require(weights.any(), "calibrate", expected, self.calibrate)
         share = 0.5 / (0.5 + float(weights.sum()))
 
         def loss(log_steepness: float) -> float:

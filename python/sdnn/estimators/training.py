@@ -115,7 +115,13 @@ def without_absent(
     if weights is None or weights.all():
         return X, y, weights
     rows = np.flatnonzero(weights)
-    return _safe_indexing(X, rows), _safe_indexing(y, rows), weights[rows]
+    return samples_in(X, rows), samples_in(y, rows), weights[rows]
+
+
+def samples_in(X: ArrayLike, rows: Rows) -> ArrayLike:
+    """Return some samples of a frame, a list, an array or anything that becomes one."""
+    samples: ArrayLike = _safe_indexing(X if hasattr(X, "__getitem__") else np.asarray(X), rows)
+    return samples
 
 
 def class_weights(class_weight: ClassWeight, labels: Array) -> Floats | None:

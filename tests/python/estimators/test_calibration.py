@@ -173,3 +173,44 @@ def test_calibration_refuses_what_it_cannot_do(tmp_path):
 def test_classes_of_single_samples_cannot_be_calibrated():
     X = np.arange(12.0)[:, None]
     refuses("calibrate", SDNNClassifier(calibrate=True).fit, X, np.arange(12))
+
+
+def test_held_out_classes_of_weight_0_cannot_calibrate():
+    X, _ = noisy(60)
+    labels = np.r_[0, np.ones(59, int)]  # the only sample of class 0 is never held out
+    model = SDNNClassifier(**OPTIONS, calibrate=True, class_weight={0: 1, 1: 0})
+    refuses("calibrate", model.fit, X, labels)
+
+
+def test_online_learning_cannot_begin_with_calibration():
+    X, y = noisy(20)
+    for method, sample in (("partial_fit", (X, y)), ("learn_one", (X[0], y[0]))):
+        model = SDNNRegressor(**OPTIONS, calibrate=True)
+        refuses("calibrate", getattr(model, method), *sample)
+        model.fit(X, y)
+        residuals = model.held_out_residuals_
+        getattr(model, method)(*sample)
+        assert model.held_out_residuals_ is residuals
+
+
+class OnlyArray:
+    """Becomes an array, and has no indices."""
+
+    def __init__(self, values):
+        self.values, self.shape = values, values.shape
+
+    def __array__(self, dtype=None, copy=None):
+        return self.values
+
+    def __len__(self):
+        return len(self.values)
+
+
+def test_samples_may_be_anything_that_becomes_an_array():
+    X, y = noisy(30)
+    model = SDNNRegressor(**OPTIONS, calibrate=True)
+    weights = np.r_[0.0, np.ones(29)]
+    for arguments in ((y,), (y, weights)):
+        expected = clone(model).fit(X, *arguments).held_out_residuals_
+        residuals = clone(model).fit(OnlyArray(X), *arguments).held_out_residuals_
+        assert np.array_equal(residuals, expected)
