@@ -40,6 +40,7 @@ from sdnn.support.arguments import (
     argument_error,
     blamed,
     choice,
+    duration_of,
     flag,
     is_of_class,
     path_of,
@@ -352,7 +353,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             flag("terminated", terminated),
             environment,
             self._actions.mask("next_mask", next_mask),
-            real("dt", dt),
+            duration_of(dt),
         )
 
     def warn_of_problems(self) -> None:

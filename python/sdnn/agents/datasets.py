@@ -21,6 +21,7 @@ from sdnn.support.arguments import (
     advice,
     argument_error,
     array_of,
+    duration_of,
     is_of_class,
     path_of,
     require,
@@ -41,7 +42,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     "terminations": ("terminated", "terminals", "terminal", "dones", "done"),
     "truncations": ("truncated", "timeouts", "timeout"),
     "next_masks": ("next_mask",),
-    "dts": ("dt", "durations", "duration"),
+    "dts": ("dt",),
 }
 """Usual names of columns, and their names in D4RL, imitation and Stable-Baselines3."""
 
@@ -224,7 +225,7 @@ def _logged(row: Info, place: str) -> Logged:
     try:
         terminated = _flag("terminated", row.get("terminations", False))
         truncated = _flag("truncated", row.get("truncations", False))
-        dt = _duration(row.get("dts", 1.0))
+        dt = duration_of(row.get("dts", 1.0))
     except ValueError as error:
         raise ValueError(f"dataset, {place}: {error}") from error
     is_end = terminated and not truncated
@@ -240,13 +241,6 @@ def _flag(name: str, value: Any) -> bool:
     is_flag = number.size == 1 and number.dtype.kind in "biuf" and number.item() in (0, 1)
     require(is_flag, name, "be True or False, or 1 or 0", value)
     return bool(number.item())
-
-
-def _duration(value: Any) -> float:
-    """Read a number of any library."""
-    number = np.asarray(value)
-    require(number.size == 1 and number.dtype.kind in "iuf", "dt", "be a number", value)
-    return float(number.item())
 
 
 def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = False) -> Data:

@@ -166,23 +166,45 @@ def real(name: str, value: object) -> float:
         raise argument_error(name, problem, OverflowError) from None
 
 
+def single_number(value: object) -> object:
+    """Return the number in an array that has a single one; other values unchanged."""
+    import numpy as np
+
+    is_array = isinstance(value, np.ndarray | np.generic)
+    if is_array and not isinstance(value, np.ma.MaskedArray):
+        array = np.asarray(value)
+        if array.size == 1 and array.dtype.kind in "fiub":
+            return array.item()
+    return value
+
+
 def reward_of(reward: object) -> float:
     """Convert a reward, a number, bool or array with a single number; ValueError for others."""
     if isinstance(reward, float):  # includes np.float64
         return float(reward)
     import numpy as np
 
-    is_array = isinstance(reward, np.ndarray | np.generic)
-    if is_array and not isinstance(reward, np.ma.MaskedArray):
-        array = np.asarray(reward)
-        if array.size == 1 and array.dtype.kind in "fiub":
-            reward, is_array = array.item(), False
-    if isinstance(reward, SupportsFloat) and not is_array:
+    reward = single_number(reward)
+    is_of_numpy = isinstance(reward, np.ndarray | np.generic)
+    if isinstance(reward, SupportsFloat) and not is_of_numpy:
         with suppress(OverflowError, TypeError, ValueError):
             return float(reward)
+    return _small_enough("reward", reward)
+
+
+def duration_of(dt: object) -> float:
+    """Convert a duration, a number or an array with a single one; ValueError for others."""
+    return dt if type(dt) is float else _small_enough("dt", single_number(dt))
+
+
+def _small_enough(name: str, value: object) -> float:
+    """Check a number; ValueError if not, also for one beyond all floats.
+
+    Callers of `Agent.learn` would take an OverflowError for that of a weight.
+    """
     try:
-        return real("reward", reward)  # raises the error
-    except OverflowError as error:  # callers of `Agent.learn` would take it for that of a weight
+        return real(name, value)
+    except OverflowError as error:
         raise ValueError(str(error)) from None
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sdnn.environments.types import AnyEnv, Data, Element, Elements, Env, Info, Mask, Masks
-from sdnn.support.arguments import flag, real, reward_of, shown
+from sdnn.support.arguments import duration_of, flag, reward_of, shown
 from sdnn.training.files import (
     ActionLog,
     SavedEpisode,
@@ -61,8 +61,8 @@ def duration_in(info: Info) -> float:
             f" metadata['durations'] of env is True, got {shown(sorted(map(str, info)))}"
         )
     try:
-        return real("dt", info["dt"])
-    except (ValueError, OverflowError) as error:
+        return duration_of(info["dt"])
+    except ValueError as error:
         raise UnusableStepError(str(error)) from error
 
 
