@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -26,10 +26,11 @@ MOST_SAMPLES = 400  # that decide; solving for more would take longer than the f
 MOST_OUTPUTS = 200  # samples whose outputs are compared, for importances and gradients
 LARGEST_ERROR = 0.97  # of a choice that is taken, as a share of the error before
 LEAST_SIGNIFICANCE = 2.0  # standard errors by which it must be smaller
-Losses = Callable[[Samples, Floats], Floats]  # of samples and of outputs without each of them
 N_DIRECTIONS = 2
 MOST_ROUNDS = 5  # in which directions are sought
 STEP = 0.15  # of gradients, in standard deviations of an input
+
+Losses = Callable[[Samples, Floats], Floats]  # of samples and of outputs without each of them
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -106,9 +107,7 @@ def few_samples(table: Array, codings: Sequence[Coding], samples: Samples) -> tu
 
 def squared_losses(samples: Samples, left_out: Floats) -> Floats:
     """Return squared errors of outputs, in variances of the targets, shape (n_samples,)."""
-    shares = samples.weights / samples.weights.sum()
-    variances = shares @ np.square(samples.targets - samples.mean)
-    squares = np.square(samples.targets - left_out) / np.where(variances > 0, variances, 1.0)
+    squares = np.square(samples.targets - left_out) / samples.variances
     losses: Floats = squares.mean(axis=1)
     return losses
 
@@ -180,9 +179,7 @@ class InputChoice:
         self._n_samples = (1 / self._samples.shares).sum()
         means = self._shares @ self._positions
         self._deviations = np.sqrt(self._shares @ np.square(self._positions - means))
-        centered = self._samples.targets - self._samples.mean
-        variances = self._shares @ np.square(centered)
-        self._variances = np.where(variances > 0, variances, 1.0)
+        self._variances = self._samples.variances
 
     def best(self) -> Inputs:
         """Return the inputs with which errors are clearly smallest, by default all of them."""
@@ -212,17 +209,18 @@ class InputChoice:
         values: Floats = self._positions @ weights
         return values, RandomInverse().fit(values, N_UNITS)
 
-    def _solve(self, inputs: Inputs) -> Candidate:
-        shape = (len(self._table), len(self._table))
-        total, squares = np.zeros(shape), np.zeros(shape)
-        for feature in inputs.features:
-            correlations = self._correlations(feature)
-            total += correlations
-            squares += np.square(correlations)
+    def _of_all(self, inputs: Inputs) -> Iterator[Floats]:
+        """Yield the correlations of each of the inputs."""
+        yield from map(self._correlations, inputs.features)
         for weights in inputs.directions:
             values, coding = self._direction(weights)
             bins = coding.bins(values)
-            correlations = self._matrix(coding)[np.ix_(bins, bins)]
+            yield self._matrix(coding)[np.ix_(bins, bins)]
+
+    def _solve(self, inputs: Inputs) -> Candidate:
+        shape = (len(self._table), len(self._table))
+        total, squares = np.zeros(shape), np.zeros(shape)
+        for correlations in self._of_all(inputs):
             total += correlations
             squares += np.square(correlations)
         n_inputs = len(inputs.features) + len(inputs.directions)

@@ -112,8 +112,7 @@ class BaseKernelRidge(CodedInputs):
     -----
     For m components, or m samples if these are fewer, `fit` takes ``48 m^2`` bytes, ``98304 m``
     more with low rank, 16 MB to choose inputs, `predict` ``65536 m``, and both ``8 n_bins^2`` per
-    different coding. Time
-    grows with the cube of m, and beyond that with the number of samples.
+    different coding. Time grows with the cube of m, and beyond that with the number of samples.
     """
 
     alpha: float | str = parameter("auto", Interval(Real, 0, np.inf, closed="neither"), AUTO)
@@ -138,7 +137,7 @@ class BaseKernelRidge(CodedInputs):
     def describe_inputs(self) -> str:
         """Return lines of text about the kernel's inputs: features, then mixtures of features.
 
-        Features of mixtures are in units of their ranges, the largest weights are first.
+        Features of mixtures are in units of their ranges; the largest weight is first, and 1.
         """
         selected, directions = self.selected_features_, self._inputs.directions
         numbers = range(len(self.codings_))
@@ -146,8 +145,8 @@ class BaseKernelRidge(CodedInputs):
         lines = [f"{len(selected)} of {len(names)} features", *(names[i] for i in selected)]
         for number, weights in enumerate(directions):
             order = np.argsort(-np.abs(weights), kind="stable")
-            largest = np.abs(weights).max()
-            parts = (f"{weights[i] / largest:+.2f} {names[i]}" for i in order if weights[i])
+            shares = weights / weights[order[0]]
+            parts = (f"{shares[i]:+.2f} {names[i]}" for i in order if weights[i])
             lines.append(f"direction {number}: {' '.join(parts)}")
         return "\n".join(lines)
 

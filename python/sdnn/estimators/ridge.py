@@ -42,6 +42,13 @@ class Samples:
         mean: Floats = self.weights @ self.targets / self.weights.sum()
         return mean
 
+    @property
+    def variances(self) -> Floats:
+        """Weighted variances of targets, 1 for constant ones, shape (n_outputs,)."""
+        shares = self.weights / self.weights.sum()
+        variances: Floats = shares @ np.square(self.targets - self.mean)
+        return np.where(variances > 0, variances, 1.0)
+
 
 @dataclasses.dataclass
 class Diagonal:

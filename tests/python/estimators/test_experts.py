@@ -97,9 +97,9 @@ def test_columns_of_numbers_and_categories():
 
 def test_columns_are_limited():
     columns = LinearColumns()
-    words = Symbolic(categories=tuple(range(MOST_COLUMNS - 1)))
+    categories = Symbolic(categories=tuple(range(MOST_COLUMNS - 1)))
     codings = {
-        "w": words,
+        "w": categories,
         "a": RandomInverse(),
         "b": RandomInverse(),
         "c": Symbolic(categories=("u", "v")),
