@@ -27,85 +27,65 @@ py::array_t<double> numbers_of(const std::vector<double>& numbers) {
   return bindings::array_of<double>(numbers);
 }
 
+/// Binds all but the constructor of a regression, whose numbers of inputs and outputs may grow.
+template <class Model>
+py::class_<Model> bind_regression(py::module_& module, const char* name, const char* doc) {
+  auto model = bindings::Class<Model>(module, name, doc);
+  model.def_property_readonly("n_inputs", &Model::n_inputs)
+      .def_property_readonly("n_outputs", &Model::n_outputs)
+      .def(
+          "predict",
+          [](const Model& self, const Numbers& inputs) {
+            return bindings::filled<double>(
+                {self.n_outputs()}, [&](auto out) { self.predict(vector(inputs, "inputs"), out); });
+          },
+          py::arg("inputs"), "The outputs; NaN marks a missing input")
+      .def(
+          "learn",
+          [](Model& self, const Numbers& inputs, const Numbers& targets) {
+            self.learn(vector(inputs, "inputs"), vector(targets, "targets"));
+          },
+          py::arg("inputs"), py::arg("targets"))
+      .def(
+          "add_inputs",
+          [](Model& self, const Numbers& low, const Numbers& high) {
+            self.add_inputs(vector(low, "low"), vector(high, "high"));
+          },
+          py::arg("low"), py::arg("high"),
+          "Adds inputs after the others, which all samples so far missed")
+      .def("add_outputs", &Model::add_outputs, py::arg("n"),
+           "Adds outputs after the others, whose targets so far were 0");
+  bindings::def_state(model);
+  return model;
+}
+
 void bind_least_squares(py::module_& module) {
   using estimators::RecursiveLeastSquares;
-  auto type =
-      bindings::Class<RecursiveLeastSquares>(
-          module, "RecursiveLeastSquares",
-          "Linear regression that learns from one sample at a time")
-          .def(py::init([](const Numbers& low, const Numbers& high, std::size_t n_outputs,
-                           double forgetting, double error_limit) {
-                 return RecursiveLeastSquares(vector(low, "low"), vector(high, "high"), n_outputs,
-                                              forgetting, error_limit);
-               }),
-               py::arg("low"), py::arg("high"), py::arg("n_outputs"), py::arg("forgetting"),
-               py::arg("error_limit") = RecursiveLeastSquares::kUnlimited)
-          .def_property_readonly("n_inputs", &RecursiveLeastSquares::n_inputs)
-          .def_property_readonly("n_outputs", &RecursiveLeastSquares::n_outputs)
-          .def(
-              "predict",
-              [](const RecursiveLeastSquares& self, const Numbers& inputs) {
-                return bindings::filled<double>({self.n_outputs()}, [&](auto out) {
-                  self.predict(vector(inputs, "inputs"), out);
-                });
-              },
-              py::arg("inputs"), "The outputs; NaN marks a missing input")
-          .def(
-              "learn",
-              [](RecursiveLeastSquares& self, const Numbers& inputs, const Numbers& targets) {
-                self.learn(vector(inputs, "inputs"), vector(targets, "targets"));
-              },
-              py::arg("inputs"), py::arg("targets"))
-          .def(
-              "add_inputs",
-              [](RecursiveLeastSquares& self, const Numbers& low, const Numbers& high) {
-                self.add_inputs(vector(low, "low"), vector(high, "high"));
-              },
-              py::arg("low"), py::arg("high"), "Adds inputs after the others; predictions stay")
-          .def("add_outputs", &RecursiveLeastSquares::add_outputs, py::arg("n"),
-               "Adds outputs after the others, as if all their targets had been 0");
-  bindings::def_state(type);
+  bind_regression<RecursiveLeastSquares>(module, "RecursiveLeastSquares",
+                                         "Linear regression that learns from one sample at a time")
+      .def(py::init([](const Numbers& low, const Numbers& high, std::size_t n_outputs,
+                       double forgetting, double error_limit) {
+             return RecursiveLeastSquares(vector(low, "low"), vector(high, "high"), n_outputs,
+                                          forgetting, error_limit);
+           }),
+           py::arg("low"), py::arg("high"), py::arg("n_outputs"), py::arg("forgetting"),
+           py::arg("error_limit") = RecursiveLeastSquares::kUnlimited);
 }
 
 void bind_kernel_window(py::module_& module) {
   using estimators::KernelWindow;
-  auto type = bindings::Class<KernelWindow>(
-                  module, "KernelWindow", "Kernel ridge regression on the last samples of a stream")
-                  .def(py::init([](const Numbers& low, const Numbers& high, std::size_t n_outputs,
-                                   std::size_t capacity, double length_scale, double ridge,
-                                   double target_limit) {
-                         return KernelWindow(vector(low, "low"), vector(high, "high"), n_outputs,
-                                             capacity, length_scale, ridge, target_limit);
-                       }),
-                       py::arg("low"), py::arg("high"), py::arg("n_outputs"), py::arg("capacity"),
-                       py::arg("length_scale"), py::arg("ridge"),
-                       py::arg("target_limit") = KernelWindow::kUnlimited)
-                  .def_property_readonly("n_inputs", &KernelWindow::n_inputs)
-                  .def_property_readonly("n_outputs", &KernelWindow::n_outputs)
-                  .def_property_readonly("n_samples", &KernelWindow::n_samples)
-                  .def(
-                      "predict",
-                      [](const KernelWindow& self, const Numbers& inputs) {
-                        return bindings::filled<double>({self.n_outputs()}, [&](auto out) {
-                          self.predict(vector(inputs, "inputs"), out);
-                        });
-                      },
-                      py::arg("inputs"), "The outputs; NaN marks a missing input")
-                  .def(
-                      "learn",
-                      [](KernelWindow& self, const Numbers& inputs, const Numbers& targets) {
-                        self.learn(vector(inputs, "inputs"), vector(targets, "targets"));
-                      },
-                      py::arg("inputs"), py::arg("targets"))
-                  .def(
-                      "add_inputs",
-                      [](KernelWindow& self, const Numbers& low, const Numbers& high) {
-                        self.add_inputs(vector(low, "low"), vector(high, "high"));
-                      },
-                      py::arg("low"), py::arg("high"), "Adds inputs that all samples so far missed")
-                  .def("add_outputs", &KernelWindow::add_outputs, py::arg("n"),
-                       "Adds outputs after the others, whose targets so far were 0");
-  bindings::def_state(type);
+  bind_regression<KernelWindow>(module, "KernelWindow",
+                                "Kernel ridge regression on the last samples of a stream")
+      .def(py::init([](const Numbers& low, const Numbers& high, std::size_t n_outputs,
+                       std::size_t capacity, double length_scale, double ridge,
+                       double target_limit) {
+             return KernelWindow(vector(low, "low"), vector(high, "high"), n_outputs, capacity,
+                                 length_scale, ridge, target_limit);
+           }),
+           py::arg("low"), py::arg("high"), py::arg("n_outputs"), py::arg("capacity"),
+           py::arg("length_scale"), py::arg("ridge"),
+           py::arg("target_limit") = KernelWindow::kUnlimited)
+      .def_property_readonly("n_samples", &KernelWindow::n_samples);
 }
 
 void bind_mixtures(py::module_& module) {

@@ -1166,11 +1166,11 @@ class RecursiveLeastSquares:
         ...
     def add_inputs(self, low: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], high: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         """
-        Adds inputs after the others; predictions stay
+        Adds inputs after the others, which all samples so far missed
         """
     def add_outputs(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
-        Adds outputs after the others, as if all their targets had been 0
+        Adds outputs after the others, whose targets so far were 0
         """
     def learn(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], targets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         ...
@@ -1200,7 +1200,7 @@ class KernelWindow:
         ...
     def add_inputs(self, low: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], high: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         """
-        Adds inputs that all samples so far missed
+        Adds inputs after the others, which all samples so far missed
         """
     def add_outputs(self, n: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
