@@ -1,9 +1,6 @@
 #include <pybind11/numpy.h>
-#include <pybind11/stl.h>
 
 #include <cstddef>
-#include <span>
-#include <vector>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
@@ -23,16 +20,11 @@ namespace {
 
 using Numbers = ArrayArgument<double>;
 
-py::array_t<double> numbers_of(const std::vector<double>& numbers) {
-  return bindings::array_of<double>(numbers);
-}
-
 /// Binds all but the constructor of a regression, whose numbers of inputs and outputs may grow.
 template <class Model>
 py::class_<Model> bind_regression(py::module_& module, const char* name, const char* doc) {
   auto model = bindings::Class<Model>(module, name, doc);
-  model.def_property_readonly("n_inputs", &Model::n_inputs)
-      .def_property_readonly("n_outputs", &Model::n_outputs)
+  model.def_property_readonly("n_outputs", &Model::n_outputs)
       .def(
           "predict",
           [](const Model& self, const Numbers& inputs) {
@@ -84,8 +76,7 @@ void bind_kernel_window(py::module_& module) {
            }),
            py::arg("low"), py::arg("high"), py::arg("n_outputs"), py::arg("capacity"),
            py::arg("length_scale"), py::arg("ridge"),
-           py::arg("target_limit") = KernelWindow::kUnlimited)
-      .def_property_readonly("n_samples", &KernelWindow::n_samples);
+           py::arg("target_limit") = KernelWindow::kUnlimited);
 }
 
 void bind_mixtures(py::module_& module) {
@@ -99,9 +90,10 @@ void bind_mixtures(py::module_& module) {
                  return PredictionMixture(bindings::copied(vector(priors, "priors")));
                }),
                py::arg("priors"))
-          .def_property_readonly("n_experts", &PredictionMixture::n_experts)
-          .def_property_readonly(
-              "weights", [](const PredictionMixture& self) { return numbers_of(self.weights()); })
+          .def_property_readonly("weights",
+                                 [](const PredictionMixture& self) {
+                                   return bindings::array_of<double>(self.weights());
+                                 })
           .def(
               "mix",
               [](const PredictionMixture& self, const Numbers& each) {
@@ -121,9 +113,10 @@ void bind_mixtures(py::module_& module) {
           module, "ProbabilityMixture",
           "A weighted mean of probabilities, whose weights follow the likelihood of recent labels")
           .def(py::init<std::size_t>(), py::arg("n_scorers"))
-          .def_property_readonly("n_scorers", &ProbabilityMixture::n_scorers)
-          .def_property_readonly(
-              "weights", [](const ProbabilityMixture& self) { return numbers_of(self.weights()); })
+          .def_property_readonly("weights",
+                                 [](const ProbabilityMixture& self) {
+                                   return bindings::array_of<double>(self.weights());
+                                 })
           .def(
               "mix",
               [](const ProbabilityMixture& self, const Numbers& shares, const Numbers& scores) {

@@ -1187,9 +1187,6 @@ class RecursiveLeastSquares:
         What it remembers: arrays by name
         """
     @property
-    def n_inputs(self) -> int:
-        ...
-    @property
     def n_outputs(self) -> int:
         ...
 class KernelWindow:
@@ -1221,13 +1218,7 @@ class KernelWindow:
         What it remembers: arrays by name
         """
     @property
-    def n_inputs(self) -> int:
-        ...
-    @property
     def n_outputs(self) -> int:
-        ...
-    @property
-    def n_samples(self) -> int:
         ...
 class PredictionMixture:
     """
@@ -1249,9 +1240,6 @@ class PredictionMixture:
         """
         What it remembers: arrays by name
         """
-    @property
-    def n_experts(self) -> int:
-        ...
     @property
     def weights(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
@@ -1275,9 +1263,6 @@ class ProbabilityMixture:
         """
         What it remembers: arrays by name
         """
-    @property
-    def n_scorers(self) -> int:
-        ...
     @property
     def weights(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
