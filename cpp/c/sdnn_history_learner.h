@@ -34,11 +34,16 @@ static inline void sdnn_advance(sdnn_last_state* last, const int32_t* observatio
   last->has_acted = 0;
 }
 
-/* Makes it the state of an observation, unless it is that already. */
-static inline void sdnn_restart(sdnn_last_state* last, const int32_t* observation) {
+/* Whether it is the state of an observation. */
+static inline uint32_t sdnn_is_state_of(const sdnn_last_state* last, const int32_t* observation) {
   uint32_t i, is_same = last->episode.has_begun;
   for (i = 0; i < SDNN_N_OBSERVED; ++i) is_same &= last->observation[i] == observation[i];
-  if (is_same) return;
+  return is_same;
+}
+
+/* Makes it the state of an observation, unless it is that already. */
+static inline void sdnn_restart(sdnn_last_state* last, const int32_t* observation) {
+  if (sdnn_is_state_of(last, observation)) return;
   last->episode.has_begun = 0;
   sdnn_advance(last, observation);
 }
@@ -103,10 +108,8 @@ static inline void sdnn_read_only(const sdnn_states* states, const int32_t* obse
                                   uint32_t* bins) {
   const sdnn_last_state* const last = states->is_greedy ? &states->greedy : &states->learned;
   sdnn_last_state next;
-  uint32_t i, is_same = last->episode.has_begun;
   sdnn_copy_bytes(&next, last, sizeof next);
-  for (i = 0; i < SDNN_N_OBSERVED; ++i) is_same &= last->observation[i] == observation[i];
-  if (!is_same) sdnn_find_state(&next, observation);
+  if (!sdnn_is_state_of(last, observation)) sdnn_find_state(&next, observation);
   sdnn_bins_of_state(next.state, bins);
 }
 

@@ -4,35 +4,11 @@
 
 #include "sdnn_observation.h"
 
-#define SDNN_REMEMBERS 0
-
 typedef struct {
   int32_t next[SDNN_N_OBSERVED]; /* where the last transition ended */
 } sdnn_states;
 
-static inline void sdnn_forget(sdnn_states* states) { (void)states; }
-
-/* The bins of the state in which the agent acts. */
-static inline void sdnn_read_to_act(sdnn_states* states, const int32_t* observation, int explore,
-                                    uint32_t* bins) {
-  (void)states;
-  (void)explore;
-  sdnn_bins_of_fixed(observation, bins);
-}
-static inline void sdnn_note_act(sdnn_states* states, int explore, const uint32_t* action,
-                                 const uint32_t* place) {
-  (void)states;
-  (void)explore;
-  (void)action;
-  (void)place;
-}
-
-/* The bins of the state of an observation; no step is taken. */
-static inline void sdnn_read_only(const sdnn_states* states, const int32_t* observation,
-                                  uint32_t* bins) {
-  (void)states;
-  sdnn_bins_of_fixed(observation, bins);
-}
+#include "sdnn_single_observations.h"
 
 /* Stores the observation in which a transition ends, clipped to the ranges. Returns whether it is
  * the observation that was stored before. */
@@ -53,14 +29,6 @@ static inline uint32_t sdnn_read_first(sdnn_states* states, const int32_t* obser
                                        uint32_t* bins) {
   sdnn_bins_of_fixed(observation, bins);
   return sdnn_keep_next(states, observation);
-}
-
-/* The bins of the state in which a transition ends. */
-static inline void sdnn_read_next(sdnn_states* states, const uint32_t* action,
-                                  const int32_t* next_observation, uint32_t* bins) {
-  (void)states;
-  (void)action;
-  sdnn_bins_of_fixed(next_observation, bins);
 }
 
 #endif /* SDNN_LAST_OBSERVATION_H */
