@@ -193,8 +193,7 @@ class HistoryFilter {
                           : kind_ == History::observer ? observer_.n_inputs()
                                                        : n_observed();
     return (is_none() && memory.empty()) ||
-           (!is_none() && memory.size() == n &&
-            std::ranges::all_of(memory, [](double x) { return std::isfinite(x); }));
+           (!is_none() && memory.size() == n && core::are_finite(memory));
   }
 
   /// Lists the kind, which `serialize` does not: other parts need it before.

@@ -1,7 +1,6 @@
 /// The last readings of an agent's sensors, where missing ones are replaced by them.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "sdnn/agents/episodes.hpp"
+#include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::agents {
 
@@ -102,8 +102,7 @@ class LastReadings {
     for (const auto& symbol : symbols_) {
       const auto first = static_cast<std::size_t>(symbol[0]);
       const auto n = static_cast<std::size_t>(symbol[1]);
-      const auto is_read = [](double x) { return std::isfinite(x); };
-      if (std::ranges::all_of(observation.subspan(first, n), is_read)) continue;
+      if (core::are_finite(observation.subspan(first, n))) continue;
       for (std::size_t i = first; i < first + n; ++i) room[i] = last_of(i);
     }
     return room;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "sdnn/agents/duration.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/floating_point.hpp"
 
 namespace sdnn::agents {
@@ -110,10 +110,9 @@ class NStepBuffer {
       archive.expect(states.size() == n * n_inputs, "states", "n_inputs per reward");
       archive.expect(actions.size() == n * n_dimensions, "actions", "those of every reward");
       const auto is_unit = [](double x) { return x >= 0.0 && x <= 1.0; };
-      const auto is_finite = [](double x) { return std::isfinite(x); };
       const auto is_index = [](std::int64_t a) { return std::in_range<std::size_t>(a); };
       archive.expect(std::ranges::all_of(actions, is_index), "actions", "of actions");
-      archive.expect(std::ranges::all_of(rewards, is_finite), "rewards", "finite");
+      archive.expect(core::are_finite(rewards), "rewards", "finite");
       archive.expect(dts.empty() || dts.size() == n, "dts", "one per reward, or none");
       archive.expect(std::ranges::all_of(dts, is_duration), "dts", "in [0.001, 1000000]");
       dts.resize(n, 1.0);

@@ -132,8 +132,7 @@ class ObservationScale {
   /// Whether a variable of the input is missing.
   static bool is_missing(const ObservedInput& input, std::span<const double> observation) noexcept {
     if (input.kind == ObservedKind::symbol) {
-      const auto one_hot = observation.subspan(input.first, input.second);
-      return !std::ranges::all_of(one_hot, [](double x) { return std::isfinite(x); });
+      return !core::are_finite(observation.subspan(input.first, input.second));
     }
     return !std::isfinite(observation[input.first]) ||
            (input.kind == ObservedKind::angle && !std::isfinite(observation[input.second]));

@@ -13,6 +13,7 @@
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/floating_point.hpp"
 #include "sdnn/core/elementary.hpp"
+#include "sdnn/estimators/detail/stream_limits.hpp"
 
 namespace sdnn::estimators {
 
@@ -40,34 +41,25 @@ class KernelWindow {
       : capacity_(capacity),
         length_scale_(length_scale),
         ridge_(ridge),
-        target_limit_(target_limit),
-        n_outputs_(n_outputs) {
-    core::require_in_range("n_outputs", n_outputs, 1, kMostOutputs);
+        target_limit_(target_limit) {
     core::require_in_range("capacity", capacity, 2, kMostSamples);
     core::require_in_range("length_scale", length_scale, 1e-3, 1e3);
     core::require_in_range("ridge", ridge, 1e-3, 1e3);
     core::require(target_limit >= 1.0, "target_limit", "at least 1", target_limit);
     inverse_.resize(capacity * capacity);
-    targets_.resize(capacity * n_outputs);
-    mean_sizes_.resize(n_outputs);
+    add_outputs(n_outputs);
     add_inputs(low, high);
   }
 
   std::size_t n_inputs() const noexcept { return middle_.size(); }
-  std::size_t n_outputs() const noexcept { return n_outputs_; }
+  std::size_t n_outputs() const noexcept { return mean_sizes_.size(); }
   std::size_t n_samples() const noexcept { return n_samples_; }
 
   /// Adds inputs after the others, which all samples so far had missed. Throws
   /// std::invalid_argument naming the impossible argument.
   void add_inputs(std::span<const double> low, std::span<const double> high) {
-    core::require_size("high", high.size(), low.size());
+    detail::require_ranges(low, high, n_inputs());
     const std::size_t n_before = n_inputs(), n = n_before + low.size();
-    core::require_in_range("n_inputs", n, 0, kMostInputs);
-    for (std::size_t i = 0; i < low.size(); ++i) {
-      core::require_finite("low", low[i]);
-      core::require_finite("high", high[i]);
-      core::require(low[i] <= high[i], "high", "at least low", high[i]);
-    }
     std::vector<double> inputs(capacity_ * n);
     for (std::size_t slot = 0; slot < n_samples_; ++slot) {
       std::copy_n(inputs_.data() + slot * n_before, n_before, inputs.data() + slot * n);
@@ -83,49 +75,48 @@ class KernelWindow {
   /// Adds outputs after the others, whose targets so far were 0. Throws std::invalid_argument
   /// naming the impossible argument.
   void add_outputs(std::size_t n) {
-    core::require_in_range("n_outputs", n_outputs_ + n, 1, kMostOutputs);
-    const std::size_t size = n_outputs_ + n;
+    const std::size_t n_before = n_outputs(), size = detail::n_outputs_with(n, n_before);
     std::vector<double> targets(capacity_ * size);
     for (std::size_t slot = 0; slot < n_samples_; ++slot) {
-      std::copy_n(targets_.data() + slot * n_outputs_, n_outputs_, targets.data() + slot * size);
+      std::copy_n(targets_.data() + slot * n_before, n_before, targets.data() + slot * size);
     }
     targets_ = std::move(targets);
     mean_sizes_.resize(size);
-    n_outputs_ = size;
   }
 
   /// Shapes: inputs (n_inputs,), outputs (n_outputs,). Throws std::invalid_argument for another
   /// size. Thread safety: calls may run at the same time.
   void predict(std::span<const double> inputs, std::span<double> outputs) const {
     core::require_size("inputs", inputs.size(), n_inputs());
-    core::require_size("outputs", outputs.size(), n_outputs_);
+    core::require_size("outputs", outputs.size(), n_outputs());
     std::vector<double> scaled(n_inputs()), kernel(n_samples_), coefficients(n_samples_);
     scale(inputs, scaled);
     kernels(scaled, kernel);
     solve(kernel, coefficients);
     std::ranges::fill(outputs, 0.0);
     for (std::size_t slot = 0; slot < n_samples_; ++slot) {
-      for (std::size_t o = 0; o < n_outputs_; ++o) {
-        outputs[o] += coefficients[slot] * targets_[slot * n_outputs_ + o];
+      for (std::size_t o = 0; o < n_outputs(); ++o) {
+        outputs[o] += coefficients[slot] * targets_[slot * n_outputs() + o];
       }
     }
-    for (double& output : outputs) output = std::isnan(output) ? 0.0 : finite(output);
+    for (double& output : outputs) output = std::isnan(output) ? 0.0 : detail::finite(output);
   }
 
   /// Learns a sample in the place of the oldest. Shapes: inputs (n_inputs,), targets (n_outputs,),
   /// finite. Throws std::invalid_argument for another size, and targets that are not finite.
   void learn(std::span<const double> inputs, std::span<const double> targets) {
     core::require_size("inputs", inputs.size(), n_inputs());
-    core::require_size("targets", targets.size(), n_outputs_);
+    core::require_size("targets", targets.size(), n_outputs());
     for (const double target : targets) core::require_finite("targets", target);
     std::vector<double> scaled(n_inputs());
     scale(inputs, scaled);
-    n_learned_ = std::min(n_learned_ + 1.0, kSizeMemory);
+    n_learned_ = std::min(n_learned_ + 1.0, detail::kSizeMemory);
     const std::size_t slot = next_;
     const bool replaces = n_samples_ == capacity_;
     const bool is_exact = add(slot, scaled, replaces);
-    for (std::size_t o = 0; o < n_outputs_; ++o) {
-      targets_[slot * n_outputs_ + o] = limited(o, targets[o]);
+    for (std::size_t o = 0; o < n_outputs(); ++o) {
+      targets_[slot * n_outputs() + o] =
+          detail::limited(targets[o], target_limit_, n_learned_, mean_sizes_[o]);
     }
     next_ = (slot + 1) % capacity_;
     n_replaced_ = replaces ? n_replaced_ + 1 : 0;
@@ -135,7 +126,7 @@ class KernelWindow {
   /// Lists what is remembered; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
-    const std::size_t n = self.n_inputs(), n_outputs = self.n_outputs_, size = self.capacity_;
+    const std::size_t n = self.n_inputs(), n_outputs = self.n_outputs(), size = self.capacity_;
     std::uint64_t n_samples = self.n_samples_, next = self.next_, n_replaced = self.n_replaced_;
     archive.number("n_samples", n_samples);
     archive.number("next", next);
@@ -151,18 +142,14 @@ class KernelWindow {
       archive.expect(n_samples <= size, "n_samples", "at most capacity");
       archive.expect(next < size && (n_samples == size || next == n_samples), "next",
                      "the slot after the samples");
-      archive.expect(self.n_learned_ >= 0.0 && self.n_learned_ <= kSizeMemory, "n_learned",
+      archive.expect(self.n_learned_ >= 0.0 && self.n_learned_ <= detail::kSizeMemory, "n_learned",
                      "in [0, 100]");
-      const auto expect_finite = [&archive](const char* name, const std::vector<double>& values) {
-        const bool holds = std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
-        archive.expect(holds, name, "finite");
-      };
-      expect_finite("middle", self.middle_);
-      expect_finite("half_width", self.half_width_);
-      expect_finite("inputs", self.inputs_);
-      expect_finite("targets", self.targets_);
-      expect_finite("inverse", self.inverse_);
-      expect_finite("mean_sizes", self.mean_sizes_);
+      archive.expect(core::are_finite(self.middle_), "middle", "finite");
+      archive.expect(core::are_finite(self.half_width_), "half_width", "finite");
+      archive.expect(core::are_finite(self.inputs_), "inputs", "finite");
+      archive.expect(core::are_finite(self.targets_), "targets", "finite");
+      archive.expect(core::are_finite(self.inverse_), "inverse", "finite");
+      archive.expect(core::are_finite(self.mean_sizes_), "mean_sizes", "finite");
       self.n_samples_ = static_cast<std::size_t>(n_samples);
       self.next_ = static_cast<std::size_t>(next);
       self.n_replaced_ = static_cast<std::size_t>(n_replaced);
@@ -170,22 +157,14 @@ class KernelWindow {
   }
 
  private:
-  static constexpr std::size_t kMostInputs = 4096, kMostOutputs = std::size_t{1} << 20;
   static constexpr std::size_t kMostSamples = 4096;
   static constexpr std::size_t kMostReplaced = 2000;  ///< before rounding errors are removed
-  static constexpr double kSizeMemory = 100.0;        ///< samples in the mean size of targets
-  static constexpr double kFewSizes = 20.0;           ///< samples after which targets are limited
   static constexpr double kFarthest = 1e6;            ///< widths from the middle
-  static constexpr double kLargest = std::numeric_limits<double>::max();
-
-  static double finite(double x) noexcept { return std::clamp(x, -kLargest, kLargest); }
 
   void scale(std::span<const double> inputs, std::span<double> scaled) const noexcept {
     for (std::size_t i = 0; i < inputs.size(); ++i) {
-      scaled[i] = 0.0;
-      if (std::isnan(inputs[i]) || half_width_[i] == 0.0) continue;
-      const double half_distance = finite(inputs[i]) / 2.0 - middle_[i] / 2.0;
-      scaled[i] = std::clamp(half_distance / half_width_[i], -kFarthest, kFarthest);
+      const double distance = detail::scaled(inputs[i], middle_[i], half_width_[i]);
+      scaled[i] = std::clamp(distance, -kFarthest, kFarthest);
     }
   }
 
@@ -259,23 +238,14 @@ class KernelWindow {
     }
   }
 
-  /// Updates the mean size of an output's targets.
-  double limited(std::size_t o, double target) noexcept {
-    const double limit = n_learned_ > kFewSizes ? finite(target_limit_ * mean_sizes_[o]) : kLargest;
-    const double result = limit > 0.0 ? std::clamp(target, -limit, limit) : target;
-    mean_sizes_[o] += (std::abs(result) - mean_sizes_[o]) / n_learned_;
-    return result;
-  }
-
   std::size_t capacity_;
   double length_scale_;
   double ridge_;
   double target_limit_;
-  std::size_t n_outputs_;
   std::size_t n_samples_ = 0;
   std::size_t next_ = 0;                     ///< slot of the next sample
   std::size_t n_replaced_ = 0;               ///< samples since the inverse was exact
-  double n_learned_ = 0.0;                   ///< at most kSizeMemory
+  double n_learned_ = 0.0;                   ///< at most detail::kSizeMemory
   std::vector<double> middle_, half_width_;  ///< of the ranges of inputs
   std::vector<double> inputs_;               ///< scaled, (capacity, n_inputs)
   std::vector<double> targets_;              ///< (capacity, n_outputs)

@@ -12,6 +12,7 @@
 
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/floating_point.hpp"
+#include "sdnn/estimators/detail/stream_limits.hpp"
 
 namespace sdnn::estimators {
 
@@ -40,7 +41,6 @@ class RecursiveLeastSquares {
       : forgetting_(forgetting), error_limit_(error_limit) {
     core::require_in_range("forgetting", forgetting, 0.5, 1.0);
     core::require(error_limit >= 1.0, "error_limit", "at least 1", error_limit);
-    core::require_in_range("n_outputs", n_outputs, 1, kMostOutputs);
     covariance_ = {kFirstVariance};
     add_outputs(n_outputs);
     add_inputs(low, high);
@@ -52,13 +52,7 @@ class RecursiveLeastSquares {
   /// Adds inputs after the others, without a change of any prediction. Throws
   /// std::invalid_argument naming the impossible argument.
   void add_inputs(std::span<const double> low, std::span<const double> high) {
-    core::require_size("high", high.size(), low.size());
-    core::require_in_range("n_inputs", n_inputs() + low.size(), 0, kMostInputs);
-    for (std::size_t i = 0; i < low.size(); ++i) {
-      core::require_finite("low", low[i]);
-      core::require_finite("high", high[i]);
-      core::require(low[i] <= high[i], "high", "at least low", high[i]);
-    }
+    detail::require_ranges(low, high, n_inputs());
     const std::size_t n_before = n_inputs() + 1, n = n_before + low.size();
     std::vector<double> covariance(n * n), weights(n_outputs() * n);
     for (std::size_t row = 0; row < n; ++row) covariance[row * n + row] = kFirstVariance;
@@ -81,8 +75,7 @@ class RecursiveLeastSquares {
   /// Adds outputs after the others, as if all targets so far had been 0. Throws
   /// std::invalid_argument naming the impossible argument.
   void add_outputs(std::size_t n) {
-    core::require_in_range("n_outputs", n_outputs() + n, 1, kMostOutputs);
-    const std::size_t size = n_outputs() + n;
+    const std::size_t size = detail::n_outputs_with(n, n_outputs());
     origins_.resize(size);
     lowest_.resize(size);
     highest_.resize(size);
@@ -117,11 +110,12 @@ class RecursiveLeastSquares {
       std::ranges::copy(targets, lowest_.begin());
       std::ranges::copy(targets, highest_.begin());
     }
-    n_learned_ = std::min(n_learned_ + 1.0, kErrorMemory);
+    n_learned_ = std::min(n_learned_ + 1.0, detail::kSizeMemory);
     for (std::size_t o = 0; o < n_outputs(); ++o) {
       const double predicted = unlimited_output(o, columns);
-      const double error = limited_error(o, targets[o] - predicted);
-      const double learned = finite(predicted + error);
+      const double error =
+          detail::limited(targets[o] - predicted, error_limit_, n_learned_, mean_errors_[o]);
+      const double learned = detail::finite(predicted + error);
       lowest_[o] = std::min(lowest_[o], learned);
       highest_[o] = std::max(highest_[o], learned);
       correct(o, gains, factor * error);
@@ -145,27 +139,23 @@ class RecursiveLeastSquares {
     archive.fixed("highest", {n_outputs}, self.highest_);
     archive.fixed("mean_errors", {n_outputs}, self.mean_errors_);
     if constexpr (Archive::kReads) {
-      const auto expect_finite = [&archive](const char* name, const std::vector<double>& values) {
-        const bool holds = std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
-        archive.expect(holds, name, "finite");
-      };
       const auto expect_least = [&archive](const char* name, const std::vector<double>& values,
                                            const std::vector<double>& least) {
         const bool holds = std::ranges::equal(values, least, std::greater_equal<>());
         archive.expect(holds, name, "at least the lowest");
       };
-      const bool is_number = self.n_learned_ >= 0.0 && self.n_learned_ <= kErrorMemory;
-      archive.expect(is_number, "n_learned", "in [0, 100]");
-      expect_finite("low", self.low_);
-      expect_finite("high", self.high_);
-      expect_finite("middle", self.middle_);
-      expect_finite("half_width", self.half_width_);
-      expect_finite("covariance", self.covariance_);
-      expect_finite("weights", self.weights_);
-      expect_finite("origins", self.origins_);
-      expect_finite("lowest", self.lowest_);
-      expect_finite("highest", self.highest_);
-      expect_finite("mean_errors", self.mean_errors_);
+      archive.expect(self.n_learned_ >= 0.0 && self.n_learned_ <= detail::kSizeMemory, "n_learned",
+                     "in [0, 100]");
+      archive.expect(core::are_finite(self.low_), "low", "finite");
+      archive.expect(core::are_finite(self.high_), "high", "finite");
+      archive.expect(core::are_finite(self.middle_), "middle", "finite");
+      archive.expect(core::are_finite(self.half_width_), "half_width", "finite");
+      archive.expect(core::are_finite(self.covariance_), "covariance", "finite");
+      archive.expect(core::are_finite(self.weights_), "weights", "finite");
+      archive.expect(core::are_finite(self.origins_), "origins", "finite");
+      archive.expect(core::are_finite(self.lowest_), "lowest", "finite");
+      archive.expect(core::are_finite(self.highest_), "highest", "finite");
+      archive.expect(core::are_finite(self.mean_errors_), "mean_errors", "finite");
       expect_least("high", self.high_, self.low_);
       expect_least("half_width", self.half_width_, std::vector<double>(n));
       expect_least("highest", self.highest_, self.lowest_);
@@ -174,21 +164,16 @@ class RecursiveLeastSquares {
   }
 
  private:
-  static constexpr std::size_t kMostInputs = 4096, kMostOutputs = std::size_t{1} << 20;
   static constexpr double kFirstVariance = 10.0;  ///< of a weight, for errors of variance 1
   static constexpr double kLargestMean = 100.0;   ///< of the variances of all weights
   static constexpr double kMargin = 0.2;          ///< share of the range of targets
-  static constexpr double kErrorMemory = 100.0;   ///< samples in the mean of errors
-  static constexpr double kFewErrors = 20.0;      ///< samples after which errors are limited
   static constexpr double kFarthest = 1e6;        ///< half widths from the middle
-  static constexpr double kLargest = std::numeric_limits<double>::max();
-
-  static double finite(double x) noexcept { return std::clamp(x, -kLargest, kLargest); }
 
   /// The input within its range and the width of the range on either side.
   double clipped(std::size_t i, double input) const noexcept {
     const double width = high_[i] - low_[i];
-    return std::clamp(finite(input), finite(low_[i] - width), finite(high_[i] + width));
+    return std::clamp(detail::finite(input), detail::finite(low_[i] - width),
+                      detail::finite(high_[i] + width));
   }
 
   /// Widens the ranges to the inputs. A range of a single value, which stays the middle, gets the
@@ -197,10 +182,10 @@ class RecursiveLeastSquares {
     for (std::size_t i = 0; i < inputs.size(); ++i) {
       if (std::isnan(inputs[i])) continue;
       const bool is_constant = half_width_[i] == 0.0;
-      const double input = is_constant ? finite(inputs[i]) : clipped(i, inputs[i]);
+      const double input = is_constant ? detail::finite(inputs[i]) : clipped(i, inputs[i]);
       low_[i] = std::min(low_[i], input);
       high_[i] = std::max(high_[i], input);
-      if (is_constant) half_width_[i] = finite(std::abs(input - middle_[i]));
+      if (is_constant) half_width_[i] = detail::finite(std::abs(input - middle_[i]));
     }
   }
 
@@ -208,18 +193,16 @@ class RecursiveLeastSquares {
   void scale(std::span<const double> inputs, std::span<double> columns) const noexcept {
     columns[0] = 1.0;
     for (std::size_t i = 0; i < inputs.size(); ++i) {
-      columns[i + 1] = 0.0;
-      if (std::isnan(inputs[i]) || half_width_[i] == 0.0) continue;
-      const double half_distance = clipped(i, inputs[i]) / 2.0 - middle_[i] / 2.0;
-      columns[i + 1] = std::clamp(2.0 * (half_distance / half_width_[i]), -kFarthest, kFarthest);
+      const double distance = detail::scaled(clipped(i, inputs[i]), middle_[i], half_width_[i]);
+      columns[i + 1] = std::clamp(2.0 * distance, -kFarthest, kFarthest);
     }
   }
 
   /// The output within the range of the targets and its margin.
   double output(std::size_t o, std::span<const double> columns) const noexcept {
     const double margin = kMargin * (highest_[o] / 2.0 - lowest_[o] / 2.0) * 2.0;
-    return std::clamp(unlimited_output(o, columns), finite(lowest_[o] - margin),
-                      finite(highest_[o] + margin));
+    return std::clamp(unlimited_output(o, columns), detail::finite(lowest_[o] - margin),
+                      detail::finite(highest_[o] + margin));
   }
 
   /// The output on which learning is based.
@@ -228,7 +211,7 @@ class RecursiveLeastSquares {
     double sum = 0.0;
     for (std::size_t i = 0; i < columns.size(); ++i) sum += weights[i] * columns[i];
     const double value = origins_[o] + sum;
-    return std::isnan(value) ? origins_[o] : finite(value);
+    return std::isnan(value) ? origins_[o] : detail::finite(value);
   }
 
   /// Writes the product of covariance and columns, and returns that of columns and product.
@@ -246,7 +229,7 @@ class RecursiveLeastSquares {
       return sum;
     };
     const double variance = multiply();
-    if (variance >= 0.0 && variance < kLargest) return variance;
+    if (variance >= 0.0 && variance < detail::kLargest) return variance;
     reset_covariance();  // rounding errors added up
     return multiply();
   }
@@ -257,23 +240,10 @@ class RecursiveLeastSquares {
     for (std::size_t row = 0; row < n; ++row) covariance_[row * n + row] = kFirstVariance;
   }
 
-  /// Updates the mean size of an output's errors.
-  double limited_error(std::size_t o, double error) noexcept {
-    const double limit =
-        n_learned_ > kFewErrors ? finite(error_limit_ * mean_errors_[o]) : kLargest;
-    const double limited = limit > 0.0 ? std::clamp(error, -limit, limit) : finite(error);
-    mean_errors_[o] += (std::abs(limited) - mean_errors_[o]) / n_learned_;
-    return limited;
-  }
-
   void correct(std::size_t o, std::span<const double> gains, double size) noexcept {
     double* const weights = &weights_[o * gains.size()];
-    bool are_finite = true;
-    for (std::size_t i = 0; i < gains.size(); ++i) {
-      weights[i] += gains[i] * size;
-      are_finite = are_finite && std::isfinite(weights[i]);
-    }
-    if (!are_finite) std::fill_n(weights, gains.size(), 0.0);
+    for (std::size_t i = 0; i < gains.size(); ++i) weights[i] += gains[i] * size;
+    if (!core::are_finite({weights, gains.size()})) std::fill_n(weights, gains.size(), 0.0);
   }
 
   void update_covariance(std::span<const double> gains, double factor) noexcept {
@@ -288,7 +258,7 @@ class RecursiveLeastSquares {
       trace += covariances[row];
     }
     const double largest = kLargestMean * static_cast<double>(n);
-    if (!(trace >= 0.0 && trace < kLargest)) {
+    if (!(trace >= 0.0 && trace < detail::kLargest)) {
       reset_covariance();
     } else if (trace > largest) {
       for (double& covariance : covariance_) covariance *= largest / trace;
@@ -297,7 +267,7 @@ class RecursiveLeastSquares {
 
   double forgetting_;
   double error_limit_;
-  double n_learned_ = 0.0;                ///< at most kErrorMemory
+  double n_learned_ = 0.0;                ///< at most detail::kSizeMemory
   std::vector<double> low_, high_;        ///< ranges of the inputs
   std::vector<double> middle_;            ///< of the first range, as its half width
   std::vector<double> half_width_;        ///< 0 while an input has had a single value

@@ -13,6 +13,7 @@
 
 #include "sdnn/agents/history.hpp"
 #include "sdnn/agents/observations.hpp"
+#include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::agents::detail {
 
@@ -250,14 +251,13 @@ class LastStates {
     }
     if constexpr (std::remove_cvref_t<decltype(archive)>::kReads) {
       const auto is_unit = [](double x) { return x >= 0.0 && x <= 1.0; };
-      const auto is_finite = [](double x) { return std::isfinite(x); };
       const bool is_empty = last.observation.empty() && last.state.empty() && last.memory.empty();
       const bool is_whole = last.observation.size() == n_variables_ &&
                             last.state.size() == history_.n_inputs() && history_.fits(last.memory);
       archive.expect(is_empty || (is_whole && std::ranges::all_of(last.state, is_unit)), "state",
                      "a state in [0, 1] for an observation, or empty");
       archive.expect((last.action.empty() || last.action.size() == n_dimensions_) &&
-                         std::ranges::all_of(last.action, is_finite),
+                         core::are_finite(last.action),
                      "action", "finite, a number for each dimension, or empty");
     }
   }

@@ -12,6 +12,7 @@
 
 #include "sdnn/agents/detail/least_squares.hpp"
 #include "sdnn/agents/relevance.hpp"
+#include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/interruption.hpp"
 #include "sdnn/core/elementary.hpp"
 
@@ -382,9 +383,6 @@ class Observer {
   static std::ptrdiff_t offset(std::size_t n) noexcept { return static_cast<std::ptrdiff_t>(n); }
 
   void check(const auto& archive) const {
-    const auto are_finite = [](const std::vector<double>& values) {
-      return std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
-    };
     const auto is_near = [](double x) { return x >= -1.0 && x <= 2.0; };
     const auto is_wide = [](double x) { return x >= kLeastDeviation / 2.0 && x <= 2.0; };
     archive.expect(means_.size() == n_inputs() && std::ranges::all_of(means_, is_near), "means",
@@ -397,12 +395,13 @@ class Observer {
                      "in [1, 7]");
       n += static_cast<std::size_t>(levels);
     }
-    archive.expect(levels_.size() == n && are_finite(levels_), "levels", "finite, n_levels in all");
-    archive.expect(weights_.size() == n_features() * n_inputs() && are_finite(weights_), "weights",
-                   "a finite number for each feature and input");
-    archive.expect(low_.size() == n_inputs() && are_finite(low_), "low",
+    archive.expect(levels_.size() == n && core::are_finite(levels_), "levels",
+                   "finite, n_levels in all");
+    archive.expect(weights_.size() == n_features() * n_inputs() && core::are_finite(weights_),
+                   "weights", "a finite number for each feature and input");
+    archive.expect(low_.size() == n_inputs() && core::are_finite(low_), "low",
                    "a finite number for each input");
-    archive.expect(high_.size() == n_inputs() && are_finite(high_) &&
+    archive.expect(high_.size() == n_inputs() && core::are_finite(high_) &&
                        std::ranges::equal(low_, high_, std::less<>()),
                    "high", "for each input a finite number above low");
     archive.expect(gain_ > 0.0 && gain_ <= 1.0, "gain", "in (0, 1]");

@@ -2,6 +2,7 @@
 /// value.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -53,6 +54,11 @@ inline void require_positive(std::string_view name, double value) {
 /// Throws std::invalid_argument unless `value` is a finite number.
 inline void require_finite(std::string_view name, double value) {
   require(std::isfinite(value), name, "finite", value);
+}
+
+/// Whether all numbers are finite.
+inline bool are_finite(std::span<const double> values) noexcept {
+  return std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
 }
 
 /// Throws std::invalid_argument unless there are as many items, "values", as expected. Only the

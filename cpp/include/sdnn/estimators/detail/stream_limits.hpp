@@ -1,0 +1,58 @@
+/// Limits of the regressions that learn from a stream of samples: no number overflows, and outliers
+/// do little damage.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <span>
+
+#include "sdnn/core/detail/check.hpp"
+#include "sdnn/core/detail/floating_point.hpp"
+
+namespace sdnn::estimators::detail {
+
+inline constexpr double kLargest = std::numeric_limits<double>::max();
+inline constexpr double kSizeMemory = 100.0;  ///< samples in a mean size
+inline constexpr double kFewSizes = 20.0;     ///< samples after which sizes are limited
+
+/// The nearest finite number; NaN stays.
+inline double finite(double x) noexcept { return std::clamp(x, -kLargest, kLargest); }
+
+/// Checks ranges that are added to those of other inputs. Throws std::invalid_argument naming the
+/// impossible argument.
+inline void require_ranges(std::span<const double> low, std::span<const double> high,
+                           std::size_t n_others) {
+  core::require_size("high", high.size(), low.size());
+  core::require_in_range("n_inputs", n_others + low.size(), 0, 4096);
+  for (std::size_t i = 0; i < low.size(); ++i) {
+    core::require_finite("low", low[i]);
+    core::require_finite("high", high[i]);
+    core::require(low[i] <= high[i], "high", "at least low", high[i]);
+  }
+}
+
+/// The number of outputs after some are added. Throws std::invalid_argument for too many.
+inline std::size_t n_outputs_with(std::size_t n_added, std::size_t n_others) {
+  core::require_in_range("n_outputs", n_others + n_added, 1, std::size_t{1} << 20);
+  return n_others + n_added;
+}
+
+/// The distance of an input from the middle of a range, in widths of the range. It is 0 for a
+/// missing input, NaN, and for a range of a single value.
+inline double scaled(double input, double middle, double half_width) noexcept {
+  if (std::isnan(input) || half_width == 0.0) return 0.0;
+  return (finite(input) / 2.0 - middle / 2.0) / half_width;
+}
+
+/// Limits the size of a target or an error to a multiple of the mean size, which is updated. The
+/// number of samples, this one included, is at most kSizeMemory.
+inline double limited(double x, double multiple, double n_samples, double& mean_size) noexcept {
+  const double limit = n_samples > kFewSizes ? finite(multiple * mean_size) : kLargest;
+  const double result = limit > 0.0 ? std::clamp(x, -limit, limit) : finite(x);
+  mean_size += (std::abs(result) - mean_size) / n_samples;
+  return result;
+}
+
+}  // namespace sdnn::estimators::detail
