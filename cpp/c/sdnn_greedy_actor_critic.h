@@ -48,34 +48,9 @@ static inline void sdnn_place_of_bins(const uint32_t* bins, uint32_t* place) {
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) sdnn_best(&code, d, &place[d]);
 }
 #ifdef SDNN_HISTORY
-static inline void sdnn_place_in_each(sdnn_episode* episode, const int32_t* observation,
-                                      uint32_t* place) {
-  uint32_t bins[SDNN_N_INPUTS];
-  sdnn_step_of_int32_t(episode, observation, bins);
-  sdnn_place_of_bins(bins, place);
-  sdnn_note_places(episode, place);
-}
+SDNN_POLICY(sdnn_place_fixed, int32_t, sdnn_place_of_bins, sdnn_note_places)
 #else
-static inline void sdnn_place_in_each(const int32_t* observation, uint32_t* place) {
-  uint32_t bins[SDNN_N_INPUTS];
-  sdnn_bins_of_fixed(observation, bins);
-  sdnn_place_of_bins(bins, place);
-}
-#endif
-#if SDNN_N_DIMENSIONS > 1
-#define sdnn_place_fixed sdnn_place_in_each
-#elif defined(SDNN_HISTORY)
-static inline uint32_t sdnn_place_fixed(sdnn_episode* episode, const int32_t* observation) {
-  uint32_t place;
-  sdnn_place_in_each(episode, observation, &place);
-  return place;
-}
-#else
-static inline uint32_t sdnn_place_fixed(const int32_t* observation) {
-  uint32_t place;
-  sdnn_place_in_each(observation, &place);
-  return place;
-}
+SDNN_POLICY(sdnn_place_fixed, int32_t, sdnn_bins_of_fixed, sdnn_place_of_bins)
 #endif
 #endif
 

@@ -36,9 +36,9 @@ static inline void sdnn_inputs_of_double(const double* observation, sdnn_real* i
 #undef SDNN_READING
 }
 
-static inline void sdnn_inputs_of_float(const float* observation, sdnn_real* inputs){
+static inline void sdnn_inputs_of_float(const float* observation, sdnn_real* inputs) {
 #define SDNN_READING(i) sdnn_real_of_double((double)observation[i])
-    SDNN_INPUTS
+  SDNN_INPUTS
 #undef SDNN_READING
 }
 #endif
@@ -53,28 +53,31 @@ static inline void sdnn_inputs_of_float(const float* observation, sdnn_real* inp
   }
 
 #if SDNN_N_DIMENSIONS == 1
-#define SDNN_POLICY(name, reading)                                                 \
+#define SDNN_POLICY(name, reading, choose, note)                                   \
   static inline uint32_t name(sdnn_episode* episode, const reading* observation) { \
     uint32_t bins[SDNN_N_INPUTS], action;                                          \
     sdnn_step_of_##reading(episode, observation, bins);                            \
-    sdnn_act_in_each(bins, &action);                                               \
-    sdnn_note_action(episode, &action);                                            \
+    choose(bins, &action);                                                         \
+    note(episode, &action);                                                        \
     return action;                                                                 \
   }
 #else
-#define SDNN_POLICY(name, reading)                                                               \
+#define SDNN_POLICY(name, reading, choose, note)                                                 \
   static inline void name(sdnn_episode* episode, const reading* observation, uint32_t* action) { \
     uint32_t bins[SDNN_N_INPUTS];                                                                \
     sdnn_step_of_##reading(episode, observation, bins);                                          \
-    sdnn_act_in_each(bins, action);                                                              \
-    sdnn_note_action(episode, action);                                                           \
+    choose(bins, action);                                                                        \
+    note(episode, action);                                                                       \
   }
 #endif
 
-SDNN_STEP(int32_t, sdnn_inputs_of_fixed) SDNN_POLICY(sdnn_act_fixed, int32_t)
+SDNN_STEP(int32_t, sdnn_inputs_of_fixed)
+SDNN_POLICY(sdnn_act_fixed, int32_t, sdnn_act_in_each, sdnn_note_action)
 #ifdef SDNN_USE_FLOAT
-    SDNN_STEP(double, sdnn_inputs_of_double) SDNN_STEP(float, sdnn_inputs_of_float)
-        SDNN_POLICY(sdnn_act_double, double) SDNN_POLICY(sdnn_act_float, float)
+SDNN_STEP(double, sdnn_inputs_of_double)
+SDNN_STEP(float, sdnn_inputs_of_float)
+SDNN_POLICY(sdnn_act_double, double, sdnn_act_in_each, sdnn_note_action)
+SDNN_POLICY(sdnn_act_float, float, sdnn_act_in_each, sdnn_note_action)
 #endif
 
 #endif /* SDNN_HISTORY_POLICY_H */

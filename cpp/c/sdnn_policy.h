@@ -84,28 +84,29 @@ static inline uint32_t sdnn_act_bins(const uint32_t* bins) {
   sdnn_act_in_each(bins, &action);
   return action;
 }
-#define SDNN_POLICY(name, reading, bins_of)                 \
+#define SDNN_POLICY(name, reading, bins_of, choose)         \
   static inline uint32_t name(const reading* observation) { \
-    uint32_t bins[SDNN_N_INPUTS];                           \
+    uint32_t bins[SDNN_N_INPUTS], action;                   \
     bins_of(observation, bins);                             \
-    return sdnn_act_bins(bins);                             \
+    choose(bins, &action);                                  \
+    return action;                                          \
   }
 #else
 static inline void sdnn_act_bins(const uint32_t* bins, uint32_t* action) {
   sdnn_act_in_each(bins, action);
 }
-#define SDNN_POLICY(name, reading, bins_of)                               \
+#define SDNN_POLICY(name, reading, bins_of, choose)                       \
   static inline void name(const reading* observation, uint32_t* action) { \
     uint32_t bins[SDNN_N_INPUTS];                                         \
     bins_of(observation, bins);                                           \
-    sdnn_act_in_each(bins, action);                                       \
+    choose(bins, action);                                                 \
   }
 #endif
 
-SDNN_POLICY(sdnn_act_fixed, int32_t, sdnn_bins_of_fixed)
+SDNN_POLICY(sdnn_act_fixed, int32_t, sdnn_bins_of_fixed, sdnn_act_in_each)
 #ifdef SDNN_USE_FLOAT
-SDNN_POLICY(sdnn_act_double, double, sdnn_bins_of_double)
-SDNN_POLICY(sdnn_act_float, float, sdnn_bins_of_float)
+SDNN_POLICY(sdnn_act_double, double, sdnn_bins_of_double, sdnn_act_in_each)
+SDNN_POLICY(sdnn_act_float, float, sdnn_bins_of_float, sdnn_act_in_each)
 #endif
 
 #endif /* SDNN_POLICY_H */
