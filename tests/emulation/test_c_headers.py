@@ -22,6 +22,8 @@ from c_policies import (
 )
 from sdnn.export import c_header, export_c_header
 
+ARM = TARGETS["arm"]
+
 
 @pytest.fixture(params=[name for name in TARGETS if name != "x86-64"])
 def target(request, needs):
@@ -107,23 +109,27 @@ def test_the_integer_path_needs_no_library_and_no_floating_point(name, target, t
     check_integer_path(name, target, tmp_path)
 
 
+def sizes_on_arm(folder):
+    """Compile policy.c for size; return the bytes of its constants, its code and its stack."""
+    options = ("-Os", "-mcpu=cortex-m4", "-mfloat-abi=soft", "-fstack-usage")
+    done = compile_policy(folder, ARM, *options)
+    lines = run(ARM.prefix + "size", "-A", done).decode().splitlines()
+    sizes = {w[0]: int(w[1]) for w in map(str.split, lines) if len(w) == 3 and w[0][0] == "."}
+    constants = sum(n for name, n in sizes.items() if name.startswith((".rodata", ".data.rel")))
+    usage = (folder / "policy.su").read_text().splitlines()
+    return constants, sizes[".text"], sum(int(line.split("\t")[1]) for line in usage)
+
+
 def test_the_header_states_flash_and_ram_of_the_compiled_policy(needs, tmp_path):
-    target = TARGETS["arm"]
-    needs(target.compiler)
+    needs(ARM.compiler)
     for number, agent in enumerate(agents().values()):
         folder = tmp_path / str(number)
         folder.mkdir()
         header = write_policy(folder, agent, floats=False)
-        options = ("-Os", "-mcpu=cortex-m4", "-mfloat-abi=soft", "-fstack-usage")
-        done = compile_policy(folder, target, *options)
-        lines = run(target.prefix + "size", "-A", done).decode().splitlines()
-        sizes = {w[0]: int(w[1]) for w in map(str.split, lines) if len(w) == 3 and w[0][0] == "."}
-        constants = sum(n for name, n in sizes.items() if name.startswith((".rodata", ".data.rel")))
+        constants, code, stack = sizes_on_arm(folder)
         # Tables of what nobody calls (actions, say) are not in the object.
         assert header.flash_bytes - 512 < constants < header.flash_bytes + 128
-        assert 400 < sizes[".text"] < 2048
-        usage = (folder / "policy.su").read_text().splitlines()
-        stack = sum(int(line.split("\t")[1]) for line in usage)
+        assert 400 < code < 2048
         assert header.ram_bytes < stack < header.ram_bytes + 256
         assert f"{header.flash_bytes:,} bytes of constants" in header.text
         assert f"{header.ram_bytes:,} bytes of arrays on the stack" in header.text
@@ -131,8 +137,7 @@ def test_the_header_states_flash_and_ram_of_the_compiled_policy(needs, tmp_path)
 
 @pytest.mark.parametrize("name", POLICIES)
 def test_the_header_states_flash_and_ram_of_a_policy_with_a_history(name, needs, tmp_path):
-    target = TARGETS["arm"]
-    needs(target.compiler)
+    needs(ARM.compiler)
     agent = policy(name)
     header = export_c_header(agent, tmp_path / "policy.h")
     stated = re.search(r"RAM: +([\d,]+) bytes in one struct[^;]*; ([\d,]+) bytes", header.text)
@@ -150,15 +155,9 @@ def test_the_header_states_flash_and_ram_of_a_policy_with_a_history(name, needs,
         typedef char bytes_are_stated[sizeof episode == {episode_bytes} ? 1 : -1];
     """
     (tmp_path / "policy.c").write_text(source + "\n")
-    options = ("-Os", "-mcpu=cortex-m4", "-mfloat-abi=soft", "-fstack-usage")
-    done = compile_policy(tmp_path, target, *options)
-    lines = run(target.prefix + "size", "-A", done).decode().splitlines()
-    sizes = {w[0]: int(w[1]) for w in map(str.split, lines) if len(w) == 3 and w[0][0] == "."}
-    constants = sum(n for name, n in sizes.items() if name.startswith((".rodata", ".data.rel")))
+    constants, code, stack = sizes_on_arm(tmp_path)
     assert header.flash_bytes - 512 < constants < header.flash_bytes + 256
-    assert 2048 < sizes[".text"] < 5120
-    usage = (tmp_path / "policy.su").read_text().splitlines()
-    stack = sum(int(line.split("\t")[1]) for line in usage)
+    assert 2048 < code < 5120
     assert arrays < stack < arrays + 704
-    undefined = set(run(target.prefix + "nm", "-u", done).decode().split())
+    undefined = set(run(ARM.prefix + "nm", "-u", tmp_path / "policy.o").decode().split())
     assert undefined <= {"U", "action", "episode", "_GLOBAL_OFFSET_TABLE_"}
