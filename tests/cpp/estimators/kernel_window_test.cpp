@@ -4,27 +4,22 @@
 
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <stdexcept>
 #include <vector>
 
 #include "errors.hpp"
+#include "estimators/streams.hpp"
 #include "sdnn/core/state.hpp"
+#include "states.hpp"
 
 namespace sdnn {
 namespace {
 
 using estimators::KernelWindow;
+using testing::kMax;
+using testing::kNaN;
+using testing::predicted;
 using Numbers = std::vector<double>;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kMax = std::numeric_limits<double>::max();
-
-double predicted(const KernelWindow& window, const Numbers& inputs) {
-  Numbers out(window.n_outputs());
-  window.predict(inputs, out);
-  return out[0];
-}
 
 /// An input between 0 and 1 that repeats late.
 double input_of(int i) { return std::fmod(0.618 * i, 1.0); }

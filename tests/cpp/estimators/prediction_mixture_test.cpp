@@ -5,16 +5,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <stdexcept>
 #include <vector>
 
+#include "estimators/streams.hpp"
 #include "sdnn/core/state.hpp"
 
 namespace sdnn {
 namespace {
 
 using estimators::PredictionMixture;
+using testing::kMax;
 using Numbers = std::vector<double>;
 
 TEST(PredictionMixture, WeightsAreTheInverseEighthPowerOfErrorsMixedWithTheirMean) {
@@ -64,7 +65,6 @@ TEST(PredictionMixture, WeightsDoNotDependOnTheUnitOfTargets) {
 }
 
 TEST(PredictionMixture, StaysFiniteForAnyNumbers) {
-  constexpr double kMax = std::numeric_limits<double>::max();
   const Numbers extremes{0.0, 1.0, -1.0, 5e-324, 1e300, -kMax, kMax, 1e-200, -1e154, 0.0, 0.0};
   PredictionMixture mixture(Numbers(3, 1.0));
   for (std::size_t i = 0; i < 5000; ++i) {

@@ -4,17 +4,18 @@
 
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <vector>
 
+#include "estimators/streams.hpp"
 #include "sdnn/core/state.hpp"
 
 namespace sdnn {
 namespace {
 
 using estimators::ProbabilityMixture;
+using testing::kMax;
 using Numbers = std::vector<double>;
 
 Numbers mixed(const ProbabilityMixture& mixture, const Numbers& shares, const Numbers& scores) {
@@ -55,7 +56,6 @@ TEST(ProbabilityMixture, FollowsADriftThatChangesWhichExpertIsRight) {
 }
 
 TEST(ProbabilityMixture, ProbabilitiesSumToOneForAnyNumbers) {
-  constexpr double kMax = std::numeric_limits<double>::max();
   ProbabilityMixture mixture(1);
   const Numbers extremes{0.0, 1.0, -kMax, kMax, 1e300, 5e-324, -3.0};
   for (std::size_t i = 0; i < 1000; ++i) {

@@ -4,30 +4,25 @@
 
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <stdexcept>
 #include <vector>
 
 #include "errors.hpp"
+#include "estimators/streams.hpp"
 #include "sdnn/core/state.hpp"
+#include "states.hpp"
 
 namespace sdnn {
 namespace {
 
 using estimators::RecursiveLeastSquares;
+using testing::kMax;
+using testing::kNaN;
+using testing::predicted;
 using Numbers = std::vector<double>;
-
-constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
-constexpr double kLargestDouble = std::numeric_limits<double>::max();
 
 RecursiveLeastSquares unit_model(std::size_t n_inputs, double forgetting = 1.0) {
   return {Numbers(n_inputs, -1.0), Numbers(n_inputs, 1.0), 1, forgetting};
-}
-
-double predicted(const RecursiveLeastSquares& model, const Numbers& inputs) {
-  Numbers out(model.n_outputs());
-  model.predict(inputs, out);
-  return out[0];
 }
 
 TEST(RecursiveLeastSquares, IsRidgeRegressionWithoutForgetting) {
@@ -54,8 +49,8 @@ TEST(RecursiveLeastSquares, FollowsAChangeSoonerTheMoreItForgets) {
 TEST(RecursiveLeastSquares, MissingInputsAreTheMiddleOfTheirFirstRange) {
   RecursiveLeastSquares model(Numbers{10.0, 5.0}, Numbers{20.0, 5.0}, 1, 0.99);
   for (int i = 0; i < 20; ++i) model.learn(Numbers{10.0 + i % 11, 5.0}, Numbers{3.0 * (i % 11)});
-  EXPECT_EQ(predicted(model, {kNotANumber, 5.0}), predicted(model, {15.0, 7.0}));
-  EXPECT_EQ(predicted(model, {12.0, kNotANumber}), predicted(model, {12.0, 5.0}));
+  EXPECT_EQ(predicted(model, {kNaN, 5.0}), predicted(model, {15.0, 7.0}));
+  EXPECT_EQ(predicted(model, {12.0, kNaN}), predicted(model, {12.0, 5.0}));
 }
 
 TEST(RecursiveLeastSquares, AnInputThatWasConstantCountsOnceItChanges) {
@@ -103,31 +98,12 @@ TEST(RecursiveLeastSquares, LimitedErrorsKeepAnOutlierOut) {
 }
 
 TEST(RecursiveLeastSquares, StaysFiniteForAnyNumbers) {
-  const Numbers extremes{0.0,
-                         -0.0,
-                         1.0,
-                         -1.0,
-                         1e-310,
-                         -5e-324,
-                         1e300,
-                         -1e300,
-                         -kLargestDouble,
-                         kLargestDouble,
-                         kNotANumber,
-                         1e-300,
-                         1e154,
-                         -1e154,
-                         3.0,
-                         kLargestDouble,
-                         -1e308,
-                         1e308,
-                         0.5,
-                         INFINITY,
-                         -INFINITY};
-  for (const double low : {0.0, -kLargestDouble, -1e-310}) {
+  const Numbers extremes{0.0,    -0.0,  1.0,    -1.0,  1e-310, -5e-324,  1e300,
+                         -1e300, -kMax, kMax,   kNaN,  1e-300, 1e154,    -1e154,
+                         3.0,    kMax,  -1e308, 1e308, 0.5,    INFINITY, -INFINITY};
+  for (const double low : {0.0, -kMax, -1e-310}) {
     for (const double limit : {20.0, RecursiveLeastSquares::kUnlimited}) {
-      RecursiveLeastSquares model(Numbers{low, low}, Numbers{1e-310, kLargestDouble}, 1, 0.9,
-                                  limit);
+      RecursiveLeastSquares model(Numbers{low, low}, Numbers{1e-310, kMax}, 1, 0.9, limit);
       for (std::size_t i = 0; i < 3000; ++i) {
         const double target = extremes[(i * i / 7) % extremes.size()];
         const Numbers inputs{extremes[i % extremes.size()], extremes[(i / 5) % extremes.size()]};
@@ -167,12 +143,12 @@ TEST(RecursiveLeastSquares, NamesAWrongArgument) {
   EXPECT_EQ(made({0.0}, {1.0}, 1, 0.9, 0.5), "error_limit must be at least 1, got 0.5");
   EXPECT_EQ(made({0.0}, {1.0}, 0, 0.9, 1.0), "n_outputs must be in [1, 1048576], got 0");
   EXPECT_EQ(made({2.0}, {1.0}, 1, 0.9, 1.0), "high must be at least low, got 1");
-  EXPECT_EQ(made({kNotANumber}, {1.0}, 1, 0.9, 1.0), "low must be finite, got nan");
+  EXPECT_EQ(made({kNaN}, {1.0}, 1, 0.9, 1.0), "low must be finite, got nan");
   EXPECT_EQ(made({0.0}, {}, 1, 0.9, 1.0), "high must be 1 values, got 0");
   auto model = unit_model(2);
   Numbers out(1);
   EXPECT_THROW(model.predict(Numbers{1.0}, out), std::invalid_argument);
-  EXPECT_THROW(model.learn(Numbers{1.0, 1.0}, Numbers{kNotANumber}), std::invalid_argument);
+  EXPECT_THROW(model.learn(Numbers{1.0, 1.0}, Numbers{kNaN}), std::invalid_argument);
   EXPECT_THROW(model.learn(Numbers{1.0, 1.0}, Numbers{}), std::invalid_argument);
 }
 
