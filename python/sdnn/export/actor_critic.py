@@ -12,8 +12,8 @@ from sdnn.agents import SDNNActorCritic
 from sdnn.environments.types import Array, Data
 from sdnn.export.code import Code
 from sdnn.export.linear import LinearWriter
-from sdnn.export.text import Tables
-from sdnn.export.writer import NONE, SCALE_FIELDS, CHeader, Field, Learner, learning_needs
+from sdnn.export.text import Tables, rounded_up
+from sdnn.export.writer import NONE, SCALE_FIELDS, CHeader, Field, Learner
 
 _CRITIC, _ACTOR = "action_value.weights", "actor.weights"
 _LARGEST = 2**31 - 1  # of readings
@@ -26,7 +26,7 @@ class ThermometerCode(Code):
         self.thermometers: list[int] = []
         self.n_units = 0
         super().__init__(network, n_inputs)
-        self.n_pair_slots = len(self.groups) * (-(-self.m // 64) * 64)
+        self.n_pair_slots = len(self.groups) * rounded_up(self.m, 64)
         """Columns of the groups in the agent's weights, where each fills whole words."""
         n_thermometer_columns = network.weights().shape[1] - self.n_pair_slots
         if n_thermometer_columns:
@@ -218,9 +218,7 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
         return self.write(
             "sdnn_actor_critic.h",
             self.description(),
-            learning_needs(
-                self.history.kilobytes(7), f"{ram_bytes:,} bytes, in one struct that you place."
-            ),
+            self.learning_needs(7, ram_bytes),
             defines,
             tables,
             weight_bytes=0,
@@ -261,4 +259,4 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
         n_bytes = 8 * 2 + 16 + 24 + 32 * 2 + 4 * 2 * n_weights + 4 * 3
         n_bytes = self.with_states(n_bytes, 4 * self.n_observed, next_bins=False)
         n_bytes += 2 * self.code_bytes() + 3 + self.n_critic_rows + sum(self.n_rows())
-        return -(-n_bytes // 8) * 8
+        return rounded_up(n_bytes, 8)

@@ -49,7 +49,7 @@ class StateHistory:
         """The inputs of a state beside those of the observation, with those that they describe."""
         n = {"differences": 1, "averages": 2}.get(self.kind, 0) if self.is_needed else 0
         sources = [self.inputs[i] for i in self.numbers]
-        if self.kind == "differences":  # of an angle, a change is none
+        if self.kind == "differences":  # the change of an angle is no angle
             sources = [replace(source, kind="variable") for source in sources]
         return sources * n
 
@@ -86,16 +86,12 @@ class StateHistory:
         """Whether the observer depends on actions of a Box."""
         return self.kind == "observer" and not self.agent._action.discrete
 
-    def kilobytes(self, n: int) -> str:
-        """Return the size of the code of an agent that learns, which is ``n`` without a history."""
-        return str(n + 3 if self.is_needed else n)
-
     def constants(self) -> list[object]:
         """Return what was fitted, by which images are recognized."""
         return [self.kind, *(np.ravel(values).tolist() for values in self.fitted.values())]
 
-    def defines(self, *, has_policy: bool) -> Data:
-        """Return the macros; a policy has greedy actions between those of a Box."""
+    def defines(self, *, acts_between: bool) -> Data:
+        """Return the macros; ``acts_between``: greedy actions may lie between those of a Box."""
         sizes: Data = {
             "HISTORY": {"differences": 1, "averages": 2, "observer": 3}[self.kind],
             "N_OBSERVED_INPUTS": len(self.inputs),
@@ -105,12 +101,12 @@ class StateHistory:
             sizes["GAIN"] = real_numbers([float(self.fitted["observer.gain"])])[0]
         if self.is_box:
             sizes["N_REAL_ACTIONS"] = len(self.agent.actions_of(0))
-            if has_policy:
+            if acts_between:
                 digits, least = _DIGITS[self.agent._action.number]
                 sizes |= {"ACTION_DIGITS": digits, "LEAST_ACTION_BIT": f"({least})"}
         return sizes
 
-    def add_tables(self, tables: Tables, *, has_policy: bool) -> None:
+    def add_tables(self, tables: Tables, *, acts_between: bool) -> None:
         """Add the constants of the history; real numbers are the bits of IEEE 754."""
         is_circular = [self.inputs[i].kind in ("angle", "circular") for i in self.numbers]
         about = "Inputs that are numbers, and whether they are angles."
@@ -121,9 +117,9 @@ class StateHistory:
             about = "Differences in which an input is 1, as the bits of doubles."
             tables.add("uint64_t", "largest_differences", bits_of(largest), about)
         elif self.kind == "observer":
-            self._add_observer(tables, has_policy)
+            self._add_observer(tables, acts_between)
 
-    def _add_observer(self, tables: Tables, has_policy: bool) -> None:
+    def _add_observer(self, tables: Tables, acts_between: bool) -> None:
         fitted = {
             name.removeprefix("observer."): values
             for name, values in self.fitted.items()
@@ -142,7 +138,7 @@ class StateHistory:
         actions = [self.agent.actions_of(d) for d in range(self.agent.n_dimensions)]
         about = "The actions of each dimension, as the bits of doubles."
         tables.add("uint64_t", "real_actions", bits_of(np.concatenate(actions)), about)
-        if has_policy:
+        if acts_between:
             bounds = np.column_stack([self.agent._action.low, self.agent._action.high])
             tables.add("uint64_t", "action_bounds", bits_of(bounds))
 

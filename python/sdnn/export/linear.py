@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.environments.types import Data
 from sdnn.export.code import Code
-from sdnn.export.text import Tables
+from sdnn.export.text import Tables, rounded_up
 from sdnn.export.writer import Writer, require_few_weights
 
 _ONE = 1 << 16  # of rates
@@ -30,7 +30,7 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         """Return the places of the header's columns among those of the weights."""
         m = self.agent.approximator.n_pattern_units
         n_groups = len(self.network.pairs)
-        slots = np.arange(n_groups)[:, None] * (-(-m // 64) * 64) + np.arange(m)
+        slots = np.arange(n_groups)[:, None] * rounded_up(m, 64) + np.arange(m)
         columns: NDArray[np.intp] = slots.reshape(-1)
         return columns
 
@@ -104,16 +104,11 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         if not self.history.is_needed:
             return n_bytes + plain_bytes
         last = 8 * self.n_inputs + 4 * self.n_observed + self.history.episode_bytes + 1
-        states = 2 * _whole_words(last) + 8 * self.n_inputs + 4 * self.n_inputs * next_bins + 1
-        return _whole_words(n_bytes) + _whole_words(states)
+        states = 2 * rounded_up(last, 8) + 8 * self.n_inputs + 4 * self.n_inputs * next_bins + 1
+        return rounded_up(n_bytes, 8) + rounded_up(states, 8)
 
     def code_bytes(self) -> int:
         """Return the bytes of a state's code in memory."""
         code = self.code()
         n_bytes = 8 + 4 * self.n_inputs + code.column_bytes * code.most_columns
-        return -(-n_bytes // 4) * 4
-
-
-def _whole_words(n_bytes: int) -> int:
-    """Return the bytes of a struct that holds words of 8 bytes."""
-    return -(-n_bytes // 8) * 8
+        return rounded_up(n_bytes, 4)

@@ -10,14 +10,8 @@ from sdnn import _core
 from sdnn.agents import SDNNQLambda
 from sdnn.environments.types import Array, Data
 from sdnn.export.linear import LinearWriter
-from sdnn.export.writer import (
-    NONE,
-    SCALE_FIELDS,
-    CHeader,
-    Field,
-    Learner,
-    learning_needs,
-)
+from sdnn.export.text import rounded_up
+from sdnn.export.writer import NONE, SCALE_FIELDS, CHeader, Field, Learner
 
 _WEIGHTS = ("action_value.weights", "action_value.averaged_weights")
 _MOST_TOLERANCE = 2**62  # in units: above any difference of values
@@ -123,9 +117,7 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
         return self.write(
             "sdnn_q_lambda.h",
             self.description(),
-            learning_needs(
-                self.history.kilobytes(6), f"{ram_bytes:,} bytes, in one struct that you place."
-            ),
+            self.learning_needs(6, ram_bytes),
             defines,
             tables,
             weight_bytes=0,
@@ -167,4 +159,4 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
         n_bytes += 4 * 2 * self.n_dimensions
         n_bytes = self.with_states(n_bytes, 4 * self.n_inputs, next_bins=True)
         n_bytes += 2 * self.code_bytes() + 3 + sum(self.n_rows())
-        return -(-n_bytes // 8) * 8
+        return rounded_up(n_bytes, 8)

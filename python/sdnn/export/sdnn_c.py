@@ -11,7 +11,7 @@ from sdnn import _core
 from sdnn.agents import SDNNQLearning
 from sdnn.environments.types import Array, Data
 from sdnn.export.code import Code
-from sdnn.export.text import Tables, weight_words
+from sdnn.export.text import Tables, rounded_up, weight_words
 from sdnn.export.writer import (
     MOST_FRACTION_BITS,
     SCALE_FIELDS,
@@ -19,7 +19,6 @@ from sdnn.export.writer import (
     Field,
     Learner,
     Writer,
-    learning_needs,
     require_few_weights,
 )
 from sdnn.support.arguments import argument_error, whole
@@ -144,7 +143,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         self._check_settings()
         self.code = Code(self.network, self.n_inputs)
         self.used, self.first_units = self.units(self.network)
-        self.n_units = -(-self.used.size // 4) * 4
+        self.n_units = rounded_up(self.used.size, 4)
         self.require_small(self.n_units, self.code.n_columns)
         self._check_values()
         self.n_words = self.n_units // 4 * self.code.n_columns
@@ -314,14 +313,11 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
             **self._add_weights(tables, is_new),
         }
         ram_bytes = self._ram_bytes()
-        memory = (
-            f"{ram_bytes:,} bytes, in one struct that you place, and {self._stack_bytes():,} bytes"
-            " of arrays on the stack."
-        )
+        stack = f", and {self._stack_bytes():,} bytes of arrays on the stack"
         return self.write(
             "sdnn_c.h",
             self.describe(str(self.used.size)),
-            learning_needs("9", memory),
+            self.learning_needs(9, ram_bytes, stack),
             defines,
             tables,
             weight_bytes=0 if is_new else 4 * self.n_words,
@@ -374,14 +370,14 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
     def _ram_bytes(self) -> int:
         """Return the size of the C struct, with numbers aligned to their sizes."""
         n_steps, code = self.agent.learning.n_steps, self.code
-        columns = -(-code.column_bytes * code.most_columns // 4) * 4
+        columns = rounded_up(code.column_bytes * code.most_columns, 4)
         state_bytes = 8 + 4 * self.n_inputs + columns + 4 + 4 * self.n_units
         n_bytes = 5 * 32 + 24 + 5 * 8 + (n_steps + 1) * state_bytes + 12 * n_steps
         n_bytes += 4 * self.n_words + 4 * self.n_units
         n_bytes += 4 * (10 + self.n_inputs + self.n_observed)
         if self.adapts:
             n_bytes += 5 * 8 + 8 * _MOST_RETURNS + 8 * self.horizon + 12
-        return int(-(-n_bytes // 8) * 8)
+        return rounded_up(n_bytes, 8)
 
     def _stack_bytes(self) -> int:
         """Return the bytes of the largest arrays that are on the stack at the same time."""

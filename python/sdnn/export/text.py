@@ -113,6 +113,11 @@ def joined(lines: Iterable[str]) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
+def rounded_up(n: int, size: int) -> int:
+    """Return the least multiple of ``size`` that is not below ``n``."""
+    return -(-n // size) * size
+
+
 def by_dimension(actions: Array) -> Array:
     """Arrange actions as (n_actions,), or as (n_dimensions, n_actions)."""
     return actions[:, 0] if actions.shape[1] == 1 else actions.T

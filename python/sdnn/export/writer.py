@@ -148,7 +148,7 @@ class Writer(ABC, Generic[Network]):
             about = f"The actions, times 2^{self.fraction_bits}."
             tables.add("int32_t", "action_fixed", by_dimension(fixed.astype(np.int64)), about)
         if self.history.is_needed:
-            self.history.add_tables(tables, has_policy=self.acts_between)
+            self.history.add_tables(tables, acts_between=self.acts_between)
         return tables
 
     @property
@@ -204,7 +204,7 @@ class Writer(ABC, Generic[Network]):
             "TIES": f"{macro}_{_TIES[self.tie_rule()]}",
         }
         if self.history.is_needed:
-            spaces |= self.history.defines(has_policy=self.acts_between)
+            spaces |= self.history.defines(acts_between=self.acts_between)
         text = [
             *(scaling_comment(self.agent.scaling.lines()) if self.agent.scaling else []),
             *comment(
@@ -415,16 +415,17 @@ class Learner(Writer[Network]):
             "MAX_ACTION_REPEAT": learning.max_action_repeat,
         }
 
-
-def learning_needs(code_kilobytes: str, memory: str) -> list[str]:
-    """Return comment lines about the memory of an agent that learns."""
-    return [
-        f"Flash: {{flash}} bytes of constants; the code comes to some {code_kilobytes} kB.",
-        f"RAM:   {memory}",
-        "       No heap, and nothing static that changes.",
-        "Where the processor cannot multiply or shift 64 bits by itself, the compiler's library",
-        "does (libgcc); nothing is divided.",
-    ]
+    def learning_needs(self, kilobytes: int, ram_bytes: int, stack: str = "") -> list[str]:
+        """Return comment lines about memory; ``kilobytes`` of code are those without a history."""
+        kilobytes += 3 * self.history.is_needed
+        return [
+            f"Flash: {{flash}} bytes of constants; the code comes to some {kilobytes} kB.",
+            f"RAM:   {ram_bytes:,} bytes, in one struct that you place{stack}.",
+            "       No heap, and nothing static that changes.",
+            "Where the processor cannot multiply or shift 64 bits by itself, the compiler's"
+            " library",
+            "does (libgcc); nothing is divided.",
+        ]
 
 
 def require_few_weights(n_weights: int, settings: str) -> None:

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <stdexcept>
 #include <vector>
 
@@ -146,10 +147,12 @@ TEST(RecursiveLeastSquares, NamesAWrongArgument) {
   EXPECT_EQ(made({kNaN}, {1.0}, 1, 0.9, 1.0), "low must be finite, got nan");
   EXPECT_EQ(made({0.0}, {}, 1, 0.9, 1.0), "high must be 1 values, got 0");
   auto model = unit_model(2);
-  Numbers out(1);
+  model.add_outputs(1);
+  Numbers out(2);
   EXPECT_THROW(model.predict(Numbers{1.0}, out), std::invalid_argument);
-  EXPECT_THROW(model.learn(Numbers{1.0, 1.0}, Numbers{kNaN}), std::invalid_argument);
+  EXPECT_THROW(model.learn(Numbers{1.0, 1.0}, Numbers{1.0, kNaN}), std::invalid_argument);
   EXPECT_THROW(model.learn(Numbers{1.0, 1.0}, Numbers{}), std::invalid_argument);
+  EXPECT_THROW(model.add_outputs(SIZE_MAX), std::invalid_argument);
 }
 
 }  // namespace

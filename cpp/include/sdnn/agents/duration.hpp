@@ -1,8 +1,12 @@
 /// The duration of a transition, and what a discount becomes in it.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+#include <iterator>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/elementary.hpp"
@@ -37,6 +41,24 @@ void serialize_duration(std::string_view name, Duration& dt, Archive& archive) {
   if constexpr (Archive::kReads) {
     dt = unusual.value_or(1.0);
     archive.expect(is_duration(dt), name, "in [0.001, 1000000]");
+  }
+}
+
+/// Throws unless durations that were read are those of n rewards, or none, if all are usual.
+template <class Archive>
+void expect_durations(const std::vector<double>& dts, std::size_t n, const Archive& archive) {
+  archive.expect(dts.empty() || dts.size() == n, "dts", "one per reward, or none");
+  archive.expect(std::ranges::all_of(dts, is_duration), "dts", "in [0.001, 1000000]");
+}
+
+/// Lists the durations of n rewards, unless all are usual.
+template <class Archive>
+void serialize_durations(std::vector<double>& dts, std::size_t n, Archive& archive) {
+  if (std::ranges::count(dts, 1.0) == std::ssize(dts)) dts.clear();
+  archive.some_numbers("dts", dts);
+  if constexpr (Archive::kReads) {
+    expect_durations(dts, n, archive);
+    dts.resize(n, 1.0);
   }
 }
 

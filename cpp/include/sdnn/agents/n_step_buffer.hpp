@@ -96,11 +96,10 @@ class NStepBuffer {
       rewards.push_back(step.reward);
       dts.push_back(step.dt);
     }
-    if (std::ranges::count(dts, 1.0) == std::ssize(dts)) dts.clear();  // all are usual
     archive.numbers("states", states);
     archive.numbers("actions", actions);
     archive.numbers("rewards", rewards);
-    archive.some_numbers("dts", dts);
+    serialize_durations(dts, rewards.size(), archive);
     archive.fixed("next_state", {self.next_state_.size()}, self.next_state_);
     if constexpr (Archive::kReads) {
       const std::size_t n_inputs = self.next_state_.size();
@@ -113,9 +112,6 @@ class NStepBuffer {
       const auto is_index = [](std::int64_t a) { return std::in_range<std::size_t>(a); };
       archive.expect(std::ranges::all_of(actions, is_index), "actions", "of actions");
       archive.expect(core::are_finite(rewards), "rewards", "finite");
-      archive.expect(dts.empty() || dts.size() == n, "dts", "one per reward, or none");
-      archive.expect(std::ranges::all_of(dts, is_duration), "dts", "in [0.001, 1000000]");
-      dts.resize(n, 1.0);
       archive.expect(std::ranges::all_of(states, is_unit), "states", "in [0, 1]");
       archive.expect(std::ranges::all_of(self.next_state_, is_unit), "next_state", "in [0, 1]");
       self.first_ = 0;

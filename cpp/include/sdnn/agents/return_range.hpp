@@ -100,18 +100,14 @@ class ReturnRange {
     std::vector<double> waiting(first, first + static_cast<std::ptrdiff_t>(rewards.n));
     const auto first_dt = rewards.dts.begin();
     std::vector<double> dts(first_dt, first_dt + static_cast<std::ptrdiff_t>(rewards.n));
-    if (std::ranges::count(dts, 1.0) == std::ssize(dts)) dts.clear();  // all are usual
     archive.number("sum", rewards.sum);
     archive.numbers("rewards", waiting);
-    archive.some_numbers("dts", dts);
+    serialize_durations(dts, waiting.size(), archive);
     if constexpr (Archive::kReads) {
       archive.expect(is_sum(rewards.sum), "sum", "a finite sum");
       const std::size_t most = rewards.waiting.size();
       archive.expect(waiting.empty() || waiting.size() < most, "rewards", "as few as can wait");
       archive.expect(std::ranges::all_of(waiting, is_sum), "rewards", "finite");
-      archive.expect(dts.empty() || dts.size() == waiting.size(), "dts", "one per reward, or none");
-      archive.expect(std::ranges::all_of(dts, is_duration), "dts", "in [0.001, 1000000]");
-      dts.resize(waiting.size(), 1.0);
       std::ranges::copy(waiting, rewards.waiting.begin());
       std::ranges::copy(dts, rewards.dts.begin());
       rewards.n = waiting.size();

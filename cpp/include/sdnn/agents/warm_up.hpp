@@ -234,8 +234,7 @@ class WarmUp {
     archive.expect(terminated_.size() == n, "terminated", "one per reward");
     archive.expect(next_masks_.size() == n * mask_size(), "next_masks", "as many of every reward");
     archive.expect(logged_.empty() || logged_.size() == n, "logged", "one per reward, or none");
-    archive.expect(dts_.empty() || dts_.size() == n, "dts", "one per reward, or none");
-    archive.expect(std::ranges::all_of(dts_, is_duration), "dts", "in [0.001, 1000000]");
+    expect_durations(dts_, n, archive);
     archive.expect(begins_.size() == n, "begins", "one per reward");
     archive.expect(environments_.size() == n, "environments", "one per reward");
     archive.expect(!is_over(), "rewards", "fewer than the warm-up's steps");

@@ -35,8 +35,9 @@ inline void require_ranges(std::span<const double> low, std::span<const double> 
 
 /// The number of outputs after some are added. Throws std::invalid_argument for too many.
 inline std::size_t n_outputs_with(std::size_t n_added, std::size_t n_others) {
-  core::require_in_range("n_outputs", n_others + n_added, 1, std::size_t{1} << 20);
-  return n_others + n_added;
+  const std::size_t n = n_others + n_added, most = std::size_t{1} << 20;
+  core::require_in_range("n_outputs", std::max(n, n_added), 1, most);  // n may have overflowed
+  return n;
 }
 
 /// The distance of an input from the middle of a range, in widths of the range. It is 0 for a
