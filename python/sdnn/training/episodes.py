@@ -274,8 +274,7 @@ class Episodes:
             observations = self.adapter.step(elements)
         except UnusableStepError as error:
             raise self._unusable(error, None) from error
-        self.observations = self._checked(self._learner.read, "next_observation", observations)
-        self._read_masks()
+        self.observations = self._read("next_observation", observations)
         for i, number in self._begins_with_step.items():
             self.present[i] = Episode(number)
             self._learner.begin_episode(i)
@@ -287,17 +286,15 @@ class Episodes:
 
     def up_to_episode_end(self, most: int) -> list[int]:
         """Return the next environments to learn from: at most `most`, up to an episode's end."""
-        environments = self.unlearned[:most]
+        adapter, environments = self.adapter, self.unlearned[:most]
         for k, i in enumerate(environments, 1):
-            if self.is_over(i):
+            if adapter.terminated[i] or adapter.truncated[i]:
                 del environments[k:]
         return environments
 
-    def terminated(self, limit_bootstraps: bool) -> list[bool]:
-        """Return which steps are learned as terminal: truncated ones unless `limit_bootstraps`."""
+    def ended(self) -> list[bool]:
+        """Return in which environments the last step has ended the episode."""
         adapter = self.adapter
-        if limit_bootstraps:
-            return adapter.terminated
         return [a or b for a, b in zip(adapter.terminated, adapter.truncated, strict=True)]
 
     def note_learned(self, environments: list[int]) -> None:
@@ -321,22 +318,20 @@ class Episodes:
         """Store the first observations of episodes that have begun, as the learner reads them."""
         if len(first_observations) == self.n_environments:
             observations = list(first_observations.values())
-            self.observations = self._checked(self._learner.read, "observation", observations)
+            self.observations = self._read("observation", observations)
         else:
             for i, first in first_observations.items():
-                self.observations[i] = self._checked(self._learner.read, "observation", [first])[0]
-        self._read_masks()
+                self.observations[i] = self._read("observation", [first])[0]
 
-    def _read_masks(self) -> None:
-        if self.adapter.masks is not None:
-            self.masks = self._checked(self._learner.masks, self.adapter.masks)
-
-    def _checked(self, read: Callable[..., Any], *arguments: Any) -> Any:
-        """Read values of an environment; a ValueError becomes an error that names the step."""
+    def _read(self, name: str, observations: Elements) -> Elements:
+        """Read observations and all masks; a ValueError becomes an error that names the step."""
         try:
-            return read(*arguments)
+            rows = self._learner.read(name, observations)
+            if self.adapter.masks is not None:
+                self.masks = self._learner.masks(self.adapter.masks)
         except ValueError as error:
             raise self._unusable(error, None) from error
+        return rows
 
     def saved(self, shape: tuple[int, ...]) -> list[SavedEpisode | None]:
         """Return the present episodes for a file; ``shape`` is the shape of an action."""
@@ -435,6 +430,5 @@ class Episodes:
             ]
             observations = self.adapter.step(self.actions)
             self.previous_observations = self.observations
-            self.observations = self._checked(self._learner.read, "observation", observations)
-            self._read_masks()
+            self.observations = self._read("observation", observations)
             over = {i for i in self._environments if self.is_over(i)}

@@ -103,7 +103,7 @@ class ObservingLearner(Protocol):
     def begin_episode(self, environment: int) -> None:
         """Note that an episode begins."""
 
-    def read(self, name: str, observations: Elements) -> Elements:
+    def read(self, name: str, observations: Elements, /) -> Elements:
         """Return observations as `act` and `learn` take them, copied; ValueError names them."""
 
     def flat(self, observation: Element) -> NDArray[np.float64]:
@@ -112,7 +112,7 @@ class ObservingLearner(Protocol):
     def masks(self, masks: list[Mask]) -> Masks:
         """Return masks of all environments as `act` and `learn` take them; ValueError names one."""
 
-    def elements(self, actions: Elements) -> Elements:
+    def elements(self, actions: Elements, /) -> Elements:
         """Return the elements of the action space that `act` has chosen."""
 
 

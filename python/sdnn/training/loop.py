@@ -55,7 +55,7 @@ class _LearnerForAll(ObservingLearner):
     def begin_episode(self, environment: int) -> None:
         self._learner.begin_episode(**self.arguments[environment])
 
-    def read(self, name: str, observations: Elements) -> Elements:
+    def read(self, name: str, observations: Elements, /) -> Elements:
         return [copied(observation) for observation in observations]
 
     def flat(self, observation: Element) -> NDArray[np.float64]:
@@ -78,7 +78,7 @@ class _LearnerForAll(ObservingLearner):
             chosen[i] = self._learner.act(observations[i], **self.arguments[i], **mask)
         return chosen
 
-    def elements(self, actions: Elements) -> Elements:
+    def elements(self, actions: Elements, /) -> Elements:
         return actions
 
     def learn(
@@ -111,14 +111,16 @@ class _LearnerForAll(ObservingLearner):
 class _CoreLearnerForAll(_LearnerForAll):
     """Acts and learns in all environments by one call of an agent in C++."""
 
+    read: Callable[[str, Elements], NDArray[np.float64]]
+    elements: Callable[[Any], Array]
+    learn: Callable[..., int]
+
     def __init__(self, learner: Learner, n_environments: int, parts: CoreParts) -> None:
         super().__init__(learner, n_environments)
         self.progressing = self._core = parts.core
-        self._read, self._elements, self._mask = parts.read, parts.elements, parts.mask
+        self.read, self.elements, self._mask = parts.read, parts.elements, parts.mask
+        self.learn = parts.core.learn_each
         self._n_actions = sum(parts.core.n_actions)
-
-    def read(self, name: str, observations: Elements) -> NDArray[np.float64]:
-        return self._read(name, observations)
 
     def flat(self, observation: Element) -> NDArray[np.float64]:
         return np.array(observation)
@@ -142,12 +144,6 @@ class _CoreLearnerForAll(_LearnerForAll):
             for i in set(range(len(chosen))).difference(environments):
                 chosen[i] = np.ravel(actions[i])  # a replay leaves elements of the space, not rows
         return chosen
-
-    def elements(self, actions: Any) -> Array:
-        return self._elements(actions)
-
-    def learn(self, *outcomes: Any) -> int:
-        return self._core.learn_each(*outcomes)
 
 
 def learner_for_all(learner: Learner, n_environments: int) -> _LearnerForAll:
@@ -214,9 +210,7 @@ class TrainingLoop(abc.ABC):
             while not (self.is_finished or self._stops):
                 self.is_within_step = True
                 try:
-                    while not self._episodes.unlearned:
-                        self._act_and_step()
-                    environment = self._learn()
+                    environment = self._learn_until(due)
                 except Exception:
                     self._episodes.abandon()
                     self.is_within_step = False
@@ -239,6 +233,21 @@ class TrainingLoop(abc.ABC):
             self.agent.n_environments = n_environments
         self._listeners = self._find_listeners()
         self._set_next_call()
+
+    def _learn_until(self, due: float) -> int:
+        """Act, step and learn until an episode ends, a callback is due, or a time is reached.
+
+        Returns the environment of the last step learned, whose outcome is to be noted.
+        """
+        episodes = self._episodes
+        while True:
+            while not episodes.unlearned:
+                self._act_and_step()
+            environment = self._learn()
+            is_due = self.n_steps >= self._next_call or self._stops or time.monotonic() >= due
+            if is_due or episodes.is_over(environment):
+                return environment
+            self._set_progress(is_episode_over=False)
 
     def _act_and_step(self) -> None:
         """Reset environments whose episode is over, choose actions, and step all environments."""
@@ -269,7 +278,7 @@ class TrainingLoop(abc.ABC):
                 episodes.actions,
                 episodes.adapter.rewards,
                 episodes.observations,
-                episodes.terminated(self.limit_bootstraps),
+                episodes.adapter.terminated if self.limit_bootstraps else episodes.ended(),
                 environments,
                 progress,
                 episodes.masks,
@@ -286,9 +295,11 @@ class TrainingLoop(abc.ABC):
 
         An error of the evaluation is returned, not raised: the step itself is complete.
         """
+        is_over = self._episodes.is_over(environment)
+        is_called = self.n_steps >= self._next_call
         rows: list[Row] = []
         failure: Exception | None = None
-        if is_over := self._episodes.is_over(environment):
+        if is_over:
             row = self._episode_row(environment)
             rows.append(row)
             self.best_blocks = frozenset(
@@ -300,7 +311,6 @@ class TrainingLoop(abc.ABC):
             if self.evaluate_every_episodes is not None and self._lacks_evaluation:
                 self._learner.begin_episode(environment)  # learns the pending n-step returns first
         self._set_progress(is_over)
-        is_called = self.n_steps >= self._next_call
         if (is_over or is_called) and self._lacks_evaluation:
             try:
                 rows.append(self._evaluate())
