@@ -54,6 +54,9 @@ class AgentEntry:
         steps take little longer than the acrobot's.
     table_bytes
         Memory of what is learned under settings of ``approximator``; None if it is not known.
+    step_work
+        Estimate of the operations of a step under settings of ``approximator``, beside those of
+        other agents; None if it is not known. Of trials, those with more work begin first.
     presets
         Settings of both by their names, of which a run chooses one; none: their defaults.
     version
@@ -69,6 +72,7 @@ class AgentEntry:
     core_trial: Callable[..., Any] | None = None
     advances_together: bool = False
     table_bytes: Callable[[Any], int] | None = None
+    step_work: Callable[[Any], int] | None = None
     presets: Mapping[str, Preset] = field(default_factory=dict)
     version: str = ""
 
@@ -168,18 +172,21 @@ _register(
     "SDNN-C",
     SDNNQLearning.presets,
     table_bytes=lambda net: net.n_pattern_units * net.n_pairs * net.n_hidden_units,
+    step_work=lambda net: net.n_pairs * net.n_hidden_units,
 )
 _register(
     FuzzyQLearning,
     "FQL",
     advances_together=True,
     table_bytes=lambda rules: 4 * rules.n_sets**rules.n_inputs * rules.n_actions,
+    step_work=lambda rules: 2**rules.n_inputs * rules.n_actions,
 )
 _register(
     RBFQLearning,
     "RBFN",
     advances_together=True,
     table_bytes=lambda network: 8 * network.n_bases ** (network.n_inputs + 1),
+    step_work=lambda network: network.n_bases ** (network.n_inputs + 1),
 )
 _register(SDNNQLambda, "SDNNQLambda", SDNNQLambda.presets)
 _register(SDNNActorCritic, "SDNNActorCritic", SDNNActorCritic.presets)

@@ -14,6 +14,7 @@ import zlib
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from queue import SimpleQueue
 from signal import SIGINT, SIGTERM
 from typing import NamedTuple, Protocol
@@ -187,6 +188,19 @@ class TrialsOutcome:
     signal: int | None = None
 
 
+@lru_cache(maxsize=1024)
+def _work_of(spec: RunSpec) -> int:
+    """Return an estimate of a trial's operations, to compare it with others of its study."""
+    if spec.entry.step_work is None or not spec.is_compiled:
+        return spec.length
+    return spec.length * spec.entry.step_work(spec.core_settings()["approximator"])
+
+
+def _least_work(*team: PlannedTrial) -> int:
+    """Return a key that sorts trials, or teams of them, with most work first."""
+    return -sum(_work_of(planned.spec) for planned in team)
+
+
 def run_trials(
     plan: Iterable[PlannedTrial],
     store: ResultStore,
@@ -196,7 +210,8 @@ def run_trials(
 ) -> TrialsOutcome:
     """Run the planned trials that are not stored, and store each as soon as it is finished.
 
-    They run by default in threads of this process, one for each core; the observer receives what
+    They run by default in threads of this process, one for each core, and those with most work
+    begin first: a long one at the end would leave other cores idle. The observer receives what
     happens. Ctrl-C and SIGTERM end the run after the chunks under way; finished trials are stored
     before it returns. A trial that raises does not stop the others.
 
@@ -209,7 +224,7 @@ def run_trials(
     observe: Observer = observer or (lambda _: None)
     planned = tuple(plan)
     stored = store.keys()
-    missing = tuple(p for p in planned if p.key not in stored)
+    missing = sorted((p for p in planned if p.key not in stored), key=_least_work)
     n_reused = len(planned) - len(missing)
     observe(Begun(len(planned), n_reused, sum(p.spec.length for p in missing)))
     stop = threading.Event()
@@ -327,7 +342,7 @@ MOST_TABLE_BYTES = 2**26
 
 
 def teams_of(planned: Iterable[PlannedTrial], jobs: int) -> Iterable[list[PlannedTrial]]:
-    """Divide trials into teams that keep ``jobs`` threads busy, in the order of first trials.
+    """Divide trials into teams that keep ``jobs`` threads busy, those with most work first.
 
     Trials that are not faster together are teams of one.
     """
@@ -340,11 +355,11 @@ def teams_of(planned: Iterable[PlannedTrial], jobs: int) -> Iterable[list[Planne
             if spec.entry.table_bytes(approximator) <= MOST_TABLE_BYTES:
                 task = spec.agent.name, spec.environment.paper_settings().acrobot
         by_task.setdefault(task, []).append(trial)
-    teams: dict[PlannedTrial, list[PlannedTrial]] = {}
+    teams = []
     for alike in by_task.values():
         size = min(MOST_TOGETHER, -(-len(alike) // jobs))
-        teams |= {alike[k]: alike[k : k + size] for k in range(0, len(alike), size)}
-    return [teams[trial] for trial in planned if trial in teams]
+        teams += [alike[k : k + size] for k in range(0, len(alike), size)]
+    return sorted(teams, key=lambda team: _least_work(*team))
 
 
 class ThreadExecutor:

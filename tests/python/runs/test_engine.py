@@ -37,10 +37,24 @@ def test_teams_have_one_agent_each_and_shrink_as_jobs_increase():
     teams = teams_of(plan, 2)
     assert {planned for team in teams for planned in team} == set(plan)
     assert sorted(map(len, teams)) == [1] * 12 + [6] * 4
-    assert [plan.index(team[0]) for team in teams] == sorted(plan.index(t[0]) for t in teams)
     assert all(len({planned.key.agent for planned in team}) == 1 for team in teams)
     assert max(map(len, teams_of(plan, 1))) == 8
     assert max(map(len, teams_of(plan, 12))) == 1
+
+
+def test_trials_with_most_inputs_begin_first(tmp_path):
+    plan = plan_of_small_agents(2, 20)
+    begun = {}
+
+    def observe(message):
+        if isinstance(message, Advanced):
+            begun.setdefault(message.planned.key)
+
+    with ResultStore(tmp_path) as store:
+        run_trials(plan, store, executor=ThreadExecutor(1), observer=observe)
+    keys = [key for key in begun if key.agent == "sdnn-c"]
+    n_inputs = [int(key.case_id[1]) for key in keys]
+    assert n_inputs == sorted(n_inputs, reverse=True)
 
 
 def test_trials_run_in_teams_have_the_rows_of_trials_run_alone(tmp_path):
@@ -239,7 +253,7 @@ def restarting(record):
 
 
 def test_observers_receive_the_reports_of_an_executor_in_order(tmp_path, run, restarting):
-    plan = fake_trial.make_plan(1)
+    plan = fake_trial.make_plan(1)[::-1]  # the order in which they begin
     recorder = fake_trial.Recorder()
     outcome, _ = run(tmp_path, plan, executor=restarting, observer=recorder)
     assert (outcome.n_run, outcome.interrupted) == (1, False)
