@@ -191,7 +191,8 @@ class AcrobotDecisions {
 /// acting in it with exploration.
 ///
 /// States are uniform in [0, 1)^d and rewards in [-1, 1), both drawn from `seed`, in a single
-/// episode that does not terminate. Drawing and the first act are not timed. Give each call another
+/// episode that does not terminate. Drawing and the first act are not timed, nor other programs'
+/// share of the processor. Give each call another
 /// seed, so that no state is in the agent's caches. Make an untimed call first, because an
 /// untrained agent can be faster. Throws std::invalid_argument unless n_repetitions is in [0,
 /// kMaxRepetitions], and the agent's errors.
@@ -220,7 +221,8 @@ Times time_agent_steps(Agent& agent, int n_repetitions, std::uint64_t seed) {
       [&](int) {
         agent.learn(before, action, reward, state, false);
         action = agent.act(state, true);
-      });
+      },
+      true);
 }
 
 }  // namespace sdnn::tools
