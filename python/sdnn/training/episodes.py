@@ -66,6 +66,16 @@ def duration_in(info: Info) -> float:
         raise UnusableStepError(str(error)) from error
 
 
+def _require_durations(dts: Sequence[float], environments: Sequence[int]) -> None:
+    """Raise UnusableStepError if an environment of a vector gave no duration of its step."""
+    for i in environments:
+        if math.isnan(dts[i]):
+            raise UnusableStepError(
+                f"info of environment {i} must have 'dt', the duration of the step in usual steps,"
+                " as metadata['durations'] of env is True, got nan or nothing"
+            )
+
+
 def mask_in(info: Info) -> Mask:
     """Return the mask in an info; UnusableStepError if there is none."""
     if "action_mask" not in info:
@@ -272,6 +282,8 @@ class Episodes:
                 episode.actions.append(elements[i])
         try:
             observations = self.adapter.step(elements)
+            if self.adapter.dts is not None:
+                _require_durations(self.adapter.dts, self.unlearned)
         except UnusableStepError as error:
             raise self._unusable(error, None) from error
         self.observations = self._read("next_observation", observations)
