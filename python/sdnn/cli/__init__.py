@@ -13,6 +13,7 @@ from sdnn.cli.export import export
 from sdnn.cli.runs import evaluate, plot, record, resume
 from sdnn.cli.studies import reproduce, sweep
 from sdnn.cli.train import train
+from sdnn.cli.verify import verify
 
 __all__ = ["main"]
 
@@ -91,5 +92,5 @@ def main() -> None:
     _check_instruction_set()
 
 
-for command in (train, resume, evaluate, plot, record, export, reproduce, sweep, bench):
+for command in (train, resume, evaluate, plot, record, export, reproduce, sweep, verify, bench):
     main.add_command(command)

@@ -28,6 +28,7 @@ from sdnn.reproduction.cost import SERIES, CostRecord
 from sdnn.runs.report import (
     MEASURE_END,
     PERCENT,
+    VERIFY_NOTE,
     format_estimate,
     measure_cells,
     measures_section,
@@ -124,7 +125,7 @@ class Report:
             warnings=warnings,
             sections=[*self._first_sections(pictures), *self._details()],
             source=f"Root seed {self.seed}; digest of the rows {self.digest[:16]}; sdnn"
-            f" {_core.__version__}.",
+            f" {_core.__version__}. {VERIFY_NOTE}",
         )
 
     def _first_sections(self, pictures: Mapping[str, bytes]) -> Iterator[Section]:

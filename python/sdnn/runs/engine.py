@@ -66,6 +66,10 @@ class PlannedTrial:
         """The trial's name for readers, such as ``"SDNN-C s4, trial 1"``; trials count from 1."""
         return f"{title_of(self.key.agent)} {self.key.case_id}, trial {self.key.trial + 1}"
 
+    def make(self) -> Trial | TrainingTrial:
+        """Make the trial to run; see `RunSpec.make_trial`."""
+        return self.spec.make_trial(self.key.seed)
+
 
 # Events that executors report and observers receive.
 
@@ -259,7 +263,7 @@ def run_to_end(planned: PlannedTrial) -> Generator[Advanced | Finished, None, No
     """
     begin = time.thread_time()
     record = None
-    with opened(planned.spec.make_trial(planned.key.seed)) as trial:
+    with opened(planned.make()) as trial:
         with closing(_run_in_chunks(trial)) as pieces:
             for _ in pieces:
                 done = trial.done if isinstance(trial, TrainingTrial) else trial.episode

@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from sdnn.runs.trial import TrialKey, TrialRecord
+
 
 class RunError(Exception):
     """Base of errors that users can correct by the message alone, without a traceback."""
@@ -37,6 +44,20 @@ class RunTerminatedError(RunError):
 
 class StoreError(RunError):
     """The result file cannot be opened, read or written."""
+
+
+class ChangedRowsError(StoreError):
+    """The rows of a stored trial do not fit their checksum; ``record`` has them as they are."""
+
+    def __init__(self, path: Path, key: TrialKey, record: TrialRecord) -> None:
+        self.path = path
+        self.key = key
+        self.record = record
+        super().__init__(f"{path} is damaged: the rows of {key} have changed")
+
+    def __reduce__(self) -> tuple[type[ChangedRowsError], tuple[Path, TrialKey, TrialRecord]]:
+        """Pickle the error by its parts."""
+        return type(self), (self.path, self.key, self.record)
 
 
 class PlotUnavailableError(RunError):

@@ -24,6 +24,9 @@ NOTE = (
     f"Medians over trials with {PERCENT} bootstrap intervals over trials. us/decision: processor"
     " time of sensing, choosing, physics and learning."
 )
+VERIFY_NOTE = (
+    "sdnn verify FOLDER, with the folder of this page, runs trials again and compares every bit."
+)
 MEASURE_END = ("decisions", "us/decision")
 """Header of the last two cells that `measure_cells` returns."""
 

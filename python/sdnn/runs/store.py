@@ -22,7 +22,7 @@ from typing import NamedTuple, TypeAlias, TypeVar
 import msgspec
 import numpy as np
 
-from sdnn.runs.errors import StoreError
+from sdnn.runs.errors import ChangedRowsError, StoreError
 from sdnn.runs.journal import BUSY_SECONDS, foreign_journal, has_rows, is_hot
 from sdnn.runs.trial import ROW, Hash, TrialKey, TrialRecord, TrialRows, config_hash as hash_of
 from sdnn.support.files import is_there, open_regular
@@ -235,7 +235,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             wanted = sorted(finished if keys is None else finished.keys() & set(keys))
             return tuple(self._make_record(finished[key]) for key in wanted)
 
-    def _make_record(self, run: _Run) -> TrialRecord:
+    def _make_record(self, run: _Run, rows: TrialRows | None = None) -> TrialRecord:
         return TrialRecord(
             key=run.key,
             config=run.config,
@@ -243,7 +243,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             n_decisions=run.n_decisions,
             seconds=run.seconds,
             finished_at=str(run.finished_at),
-            rows=self._rows(run),
+            rows=self._rows(run) if rows is None else rows,
         )
 
     @contextmanager
@@ -306,7 +306,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         values = self._read(_Rows, _ROW_COLUMNS, "rows", order, run.id)
         rows = TrialRows(np.array(values, ROW))
         if rows.checksum() != run.checksum:
-            raise StoreError(f"{self.path} is damaged: the rows of {run.key} have changed")
+            raise ChangedRowsError(self.path, run.key, self._make_record(run, rows))
         return rows
 
     def _hash_before(self, run: _Run, first: int) -> Hash | None:

@@ -18,6 +18,7 @@ from sdnn.runs.figures import draw_study
 from sdnn.runs.report import (
     MEASURE_END,
     PERCENT,
+    VERIFY_NOTE,
     Content,
     WrittenReport,
     describe_call,
@@ -234,7 +235,7 @@ def study_page(comparison: Comparison, digest: str, addition: Addition, picture:
             settings_section(titles),
         ],
         source=f"Study {study.source}; root seed {study.seed}; digest of the rows"
-        f" {digest[:16]}; sdnn {_core.__version__}.",
+        f" {digest[:16]}; sdnn {_core.__version__}. {VERIFY_NOTE}",
     )
 
 

@@ -47,6 +47,7 @@ COMMANDS = {
     "record": (["run", "out.gif"], ["--steps=2"]),
     "reproduce": (["a"], ["--dry-run", "--out=results"]),
     "sweep": (["study.toml"], ["--dry-run", "--out=results"]),
+    "verify": (["run"], []),
 }
 """Good arguments and options, with which the commands work and end soon."""
 

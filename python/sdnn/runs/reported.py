@@ -1,0 +1,267 @@
+"""Results that were reported, to be run again: the trials of stores and of runs' folders.
+
+Nothing in them is trusted: counts and sizes are limited, configurations must fit their hashes, and
+code is imported only where `Consent` allows it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol, TypeAlias
+
+import gymnasium as gym
+
+from sdnn.agents.registry import agent_entry, split_label
+from sdnn.runs.config_file import ConfigFile
+from sdnn.runs.environment import find_module
+from sdnn.runs.errors import ChangedRowsError, ConfigError, RunError
+from sdnn.runs.run import CONFIG, Goal, Run
+from sdnn.runs.spec import RunSpec
+from sdnn.runs.store import STORE_NAME, ResultStore
+from sdnn.runs.study_file import MOST_TRIALS
+from sdnn.runs.trial import TrialKey, TrialRecord, TrialRows
+from sdnn.support.arguments import shown
+
+MOST_TABLE_BYTES = 2**33
+"""Largest limit of an agent's tables that a reported configuration may set, in bytes."""
+
+_TRUSTED = frozenset({"gymnasium", "sdnn"})
+"""Packages whose environments need no consent."""
+
+Values: TypeAlias = Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Consent:
+    """The modules whose code may run; environments of Gymnasium and of this library always may."""
+
+    modules: tuple[str, ...] = ()
+
+    def import_modules(self) -> None:
+        """Import the modules, which may register agents and environments; RunError if one fails."""
+        for module in self.modules:
+            try:
+                find_module(module)
+                importlib.import_module(module)
+            except Exception as error:  # a user's module may raise anything
+                raise RunError(
+                    f"importing {module} failed: {type(error).__name__}: {error}"
+                ) from error
+
+    def require(self, environment_id: str) -> None:
+        """Check that the code of an environment may run; ConfigError that names its module."""
+        module = environment_id.rpartition(":")[0]
+        if not module:
+            registered = gym.registry.get(environment_id)
+            entry_point = registered.entry_point if registered else None
+            if isinstance(entry_point, str):
+                module = entry_point.partition(":")[0]
+            elif entry_point is not None:
+                module = entry_point.__module__
+        package = module.partition(".")[0]
+        allowed = _TRUSTED | {name.partition(".")[0] for name in self.modules}
+        if package and package not in allowed:
+            problem = f"is code of the module {module}, which runs only if you trust it"
+            raise ConfigError("environment.id", f"{environment_id} {problem}: --import {module}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportedTrial:
+    """A trial as it was reported, to be run again.
+
+    ``digest`` is the beginning of a SHA-256: of all rows, or where ``covers_tests`` of the test
+    episodes. ``rows`` and ``n_decisions`` are None where they were not reported. ``goals`` are
+    those of a run that was resumed. ``problem`` is what is wrong with the report itself.
+    """
+
+    key: TrialKey
+    config: str
+    version: str
+    digest: str
+    covers_tests: bool = False
+    rows: TrialRows | None = None
+    n_decisions: int | None = None
+    goals: tuple[Goal, ...] = ()
+    problem: str = ""
+
+    @classmethod
+    def of_record(
+        cls, record: TrialRecord, goals: tuple[Goal, ...] = (), problem: str = ""
+    ) -> ReportedTrial:
+        """Make it from a stored trial."""
+        return cls(
+            key=record.key,
+            config=record.config,
+            version=record.version,
+            digest=record.rows.checksum(),
+            rows=record.rows,
+            n_decisions=record.n_decisions,
+            goals=goals,
+            problem=problem,
+        )
+
+    def digest_of(self, rows: TrialRows) -> str:
+        """Return the digest of other rows, as long as the reported one."""
+        whole = rows.digest() if self.covers_tests else rows.checksum()
+        return whole[: len(self.digest)]
+
+    def spec(self, consent: Consent) -> RunSpec:
+        """Return the specification in the configuration; it is the same on every machine.
+
+        ConfigError if it is one of another agent, cannot be used by this version, needs code
+        without consent, or is larger than what was reported.
+        """
+        values = json.loads(self.config)
+        environment, agent = values.get("environment"), values.get("agent")
+        if not (isinstance(environment, dict) and isinstance(environment.get("id"), str)):
+            raise ConfigError("environment.id", "is missing in the configuration")
+        consent.require(environment["id"])
+        if not isinstance(agent, dict):
+            raise ConfigError("agent", "is missing in the configuration")
+        label = self.key.agent
+        try:
+            name, preset = split_label(label)
+        except ValueError as error:
+            hint = "a module that registers it can be given by --import"
+            raise ConfigError("agent.name", f"{error}; {hint}") from None
+        if agent.get("name") != name:
+            problem = (
+                f"must be {name!r}, as the rows are of {label}, got {shown(agent.get('name'))}"
+            )
+            raise ConfigError("agent.name", problem)
+        entry = agent_entry(name)
+        if preset is None and "paper" in entry.presets:
+            preset = "paper"
+        agent = {"history": "none", **agent, "preset": preset}
+        version = agent.pop("version", "")
+        if version != entry.version:
+            problem = f"must be {entry.version!r}, as of the agent here, got {shown(version)}"
+            raise ConfigError("agent.version", problem)
+        spec = RunSpec.from_values({**values, "agent": agent, "seed": self.key.seed})
+        if changes := changed_settings(self.config, spec.canonical_json()):
+            key, (reported, here) = next(iter(changes.items()))
+            raise ConfigError(key, f"is {reported} in the configuration, which gives {here} here")
+        self._require_size(spec)
+        return spec
+
+    def _require_size(self, spec: RunSpec) -> None:
+        n_decisions, target = self.n_decisions, spec.budget.target_return
+        if n_decisions is not None and target is None and not self.goals:
+            unit = "steps" if spec.budget.steps is not None else "episodes"
+            if spec.length > n_decisions:
+                problem = f"must fit the {n_decisions} reported decisions, got {spec.length}"
+                raise ConfigError(f"budget.{unit}", problem)
+        n_bytes = getattr(spec.approximator, "max_table_bytes", 0)
+        if n_bytes > MOST_TABLE_BYTES:
+            problem = f"must be at most {MOST_TABLE_BYTES}, got {n_bytes}"
+            raise ConfigError("approximator.max_table_bytes", problem)
+
+
+def changed_settings(before: str, after: str) -> dict[str, tuple[str, str]]:
+    """Return the settings that differ between two configurations in JSON, by their dotted keys.
+
+    >>> changed_settings('{"a":{"b":1,"c":2}}', '{"a":{"b":1,"c":3}}')
+    {'a.c': ('2', '3')}
+    """
+    pairs = [dict(_settings(json.loads(text))) for text in (before, after)]
+    keys = dict.fromkeys(key for settings in pairs for key in settings)
+    texts = {key: (pairs[0].get(key, "missing"), pairs[1].get(key, "missing")) for key in keys}
+    return {key: pair for key, pair in texts.items() if pair[0] != pair[1]}
+
+
+def _settings(table: Values, prefix: str = "") -> Iterator[tuple[str, str]]:
+    for name, value in table.items():
+        if isinstance(value, dict) and value:
+            yield from _settings(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", json.dumps(value)
+
+
+class Reports(Protocol):
+    """A source of reported trials.
+
+    ``title`` names it, ``keys`` are those of all its finished trials. ``machine`` describes where
+    they were run, if that is known; ``n_unfinished`` counts trials that cannot be compared.
+    """
+
+    title: str
+    keys: list[TrialKey]
+    machine: str
+    n_unfinished: int
+
+    def load(self, keys: Collection[TrialKey]) -> Iterable[ReportedTrial]:
+        """Return the trials of the given keys."""
+
+    def check(self, keys: Iterable[TrialKey]) -> Iterator[bool]:
+        """Yield for each key whether the trial's rows fit their checksum, if they have one."""
+
+
+class StoredReports:
+    """The finished trials in a folder of `sdnn reproduce`, `sweep` or `train`; nothing is written.
+
+    RunError if the folder has no results, or its files are damaged.
+    """
+
+    machine = ""
+
+    def __init__(self, folder: Path, consent: Consent) -> None:
+        self.title, self._folder = str(folder), folder
+        if not (folder / STORE_NAME).exists():
+            raise RunError(f"{folder} holds no results: there is no {folder / STORE_NAME}")
+        with ResultStore(folder, read_only=True) as store:
+            finished = store.keys()
+            self.n_unfinished = len(store.keys(unfinished=True)) - len(finished)
+        if len(finished) > MOST_TRIALS:
+            raise RunError(f"{folder} must hold at most {MOST_TRIALS} trials, got {len(finished)}")
+        self.keys = sorted(finished)
+        self._run = self._open_run(consent) if (folder / CONFIG).exists() else None
+
+    def _open_run(self, consent: Consent) -> Run:
+        """Open the run of the folder, once the code that its configuration names is allowed."""
+        file = ConfigFile.read(self._folder / CONFIG)
+        environment = file.values.get("environment")
+        named = environment.get("id") if isinstance(environment, dict) else environment
+        try:
+            consent.require(str(named))
+        except ConfigError as error:
+            raise file.located(error) from error
+        return Run.open(self._folder)
+
+    def load(self, keys: Collection[TrialKey]) -> Iterator[ReportedTrial]:
+        """Return the trials of the given keys."""
+        with ResultStore(self._folder, read_only=True) as store:
+            try:
+                records = [(record, "") for record in store.load(keys)]
+            except ChangedRowsError:
+                records = [self._load(store, key) for key in sorted(keys)]
+        for record, problem in records:
+            run = self._run
+            if run is not None and run.key.config_hash != record.key.config_hash:
+                changes = changed_settings(record.config, run.spec.canonical_json())
+                problem = problem or f"{self._folder / CONFIG} has another configuration" + "".join(
+                    f"; {key} is {here}, of the rows {stored}"
+                    for key, (stored, here) in changes.items()
+                )
+            goals = () if run is None else run.goals
+            yield ReportedTrial.of_record(record, goals, problem)
+
+    def _load(self, store: ResultStore, key: TrialKey) -> tuple[TrialRecord, str]:
+        try:
+            return store.load([key])[0], ""
+        except ChangedRowsError as error:
+            return error.record, "the stored rows do not fit their checksum"
+
+    def check(self, keys: Iterable[TrialKey]) -> Iterator[bool]:
+        """Yield for each key whether the trial's rows fit their checksum."""
+        with ResultStore(self._folder, read_only=True) as store:
+            for key in keys:
+                try:
+                    store.rows(key)
+                except ChangedRowsError:
+                    yield False
+                else:
+                    yield True
