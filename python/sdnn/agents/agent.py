@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, Self, TypeAlias, cast
 
 import gymnasium as gym
 import numpy as np
@@ -32,6 +32,9 @@ from sdnn.training.callbacks import ProgressBarCallback
 from sdnn.training.files import read_agent, read_statistics
 from sdnn.training.interfaces import Transition, explained
 from sdnn.training.training import Callback, Training, TrainingResult, checked_callbacks, shows_bar
+
+if TYPE_CHECKING:
+    from sdnn.reports.plots import Figure
 
 _MOST_OBSERVED = 16
 """The most numeric inputs of an observer."""
@@ -304,6 +307,48 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         finally:
             if seed is None:
                 self._next_episode = training.next_episode
+
+    @explained
+    def plot_values(
+        self, source: Env | Elements, *, inputs: Sequence[str | int] | None = None, seed: int = 0
+    ) -> Figure:
+        """Draw the values of states over one or two inputs, the others at their median.
+
+        Parameters
+        ----------
+        source : environment, or list of observations
+            Where states are met: in greedy episodes with a tenth of random actions, or given.
+        inputs : list of one or two, optional
+            Names of inputs, or numbers of observed variables; by default the most influential ones.
+        seed : int
+            Of the episodes and of the shuffling.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from sdnn.agents.inspection_figures import plot_values
+
+        return plot_values(self, source, inputs, seed)
+
+    @explained
+    def plot_policy(
+        self, source: Env | Elements, *, inputs: Sequence[str | int] | None = None, seed: int = 0
+    ) -> Figure:
+        """Draw greedy actions over one or two inputs; arguments are those of `plot_values`."""
+        from sdnn.agents.inspection_figures import plot_policy
+
+        return plot_policy(self, source, inputs, seed)
+
+    @explained
+    def plot_inputs(self, source: Env | Elements, *, seed: int = 0) -> Figure:
+        """Draw how far values and greedy actions change where an input is shuffled among states.
+
+        Arguments are those of `plot_values`.
+        """
+        from sdnn.agents.inspection_figures import plot_inputs
+
+        return plot_inputs(self, source, seed)
 
     def _state_of(self, part: str) -> Arrays:
         """Return the arrays of a part of the state, such as ``"agent"``, by name."""

@@ -10,6 +10,7 @@ import click
 from sdnn.cli.bench import bench
 from sdnn.cli.common import exit_interrupted, explained_option
 from sdnn.cli.export import export
+from sdnn.cli.inspect import inspect
 from sdnn.cli.runs import evaluate, plot, record, resume
 from sdnn.cli.studies import reproduce, sweep
 from sdnn.cli.train import train
@@ -92,5 +93,7 @@ def main() -> None:
     _check_instruction_set()
 
 
-for command in (train, resume, evaluate, plot, record, export, reproduce, sweep, verify, bench):
+for command in (
+    train, resume, evaluate, plot, record, inspect, export, reproduce, sweep, verify, bench,
+):  # fmt: skip
     main.add_command(command)

@@ -39,12 +39,17 @@ def color_of(index: int) -> str:
 
 def figure_bytes(figure: Figure) -> tuple[bytes, bytes]:
     """Return a figure as PNG and as SVG; equal figures give equal bytes."""
+    return png_bytes(figure), svg_bytes(figure)
+
+
+def svg_bytes(figure: Figure) -> bytes:
+    """Return a figure as SVG; equal figures give equal bytes."""
     from matplotlib import rc_context
 
     svg = BytesIO()
     with stay_interrupts(), rc_context({"svg.hashsalt": "sdnn"}):
         figure.savefig(svg, format="svg", metadata={"Date": None})
-    return png_bytes(figure), svg.getvalue()
+    return svg.getvalue()
 
 
 def png_bytes(figure: Figure, dpi: int = 200) -> bytes:

@@ -43,6 +43,7 @@ COMMANDS = {
     "resume": (["run"], []),
     "evaluate": (["run"], ["--episodes=1"]),
     "export": (["run"], ["--c-header=agent.h"]),
+    "inspect": (["run"], []),
     "plot": (["run"], []),
     "record": (["run", "out.gif"], ["--steps=2"]),
     "reproduce": (["a"], ["--dry-run", "--out=results"]),

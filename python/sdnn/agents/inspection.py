@@ -1,0 +1,366 @@
+"""Read from an agent which inputs matter, and its values and actions over two of them.
+
+States are rows of observed variables, (n, n_variables), as an agent's observation space flattens
+them. Each counts as the first observation of an episode, for agents whose states have a history.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from sdnn.agents.base import BaseAgent
+from sdnn.environments.types import Data, Element, Env, Space
+from sdnn.support.arguments import advice, require
+from sdnn.training.episodes import announces, mask_in, reset_env, step_env
+from sdnn.training.files import fixed_statistics
+
+Floats: TypeAlias = NDArray[np.float64]
+AnyAgent: TypeAlias = BaseAgent[Any, Any]
+InputType: TypeAlias = Literal["variable", "circular", "angle", "symbol"]
+
+MOST_STATES = 1_000
+"""Largest number of states from which influences are estimated."""
+MOST_READS, MOST_SLOW_READS = 40_000, 10_000
+"""Number of reads for influences, and of agents with slower networks: inputs share them."""
+MOST_STEPS = 2_000
+"""Steps in which states are met."""
+SHARE_RANDOM = 0.1
+"""Share of random actions with which states are met beside the greedy path."""
+N_SHUFFLES = 2
+
+
+@dataclass(frozen=True)
+class AgentInput:
+    """An input of an agent's states, or observed variables that are in no input.
+
+    ``columns`` are the numbers of the observed variables: of an angle its cosine and sine, of a
+    symbol one for each value.
+    """
+
+    name: str
+    type: InputType
+    columns: tuple[int, ...]
+    is_used: bool = True
+
+    @property
+    def has_symbols(self) -> bool:
+        """Whether its values are symbols without an order."""
+        return self.type == "symbol"
+
+    def numbers(self, states: Floats) -> Floats:
+        """Return a number for each state: the variable, degrees of an angle, or the symbol."""
+        values: Floats = states[:, list(self.columns)]
+        if self.type == "angle":
+            degrees: Floats = np.degrees(np.arctan2(values[:, 1], values[:, 0]))
+            return degrees
+        if self.has_symbols:
+            symbols: NDArray[np.int64] = np.argmax(values, axis=1)
+            return symbols.astype(np.float64)
+        return values[:, 0]
+
+    def place(self, states: Floats, numbers: Floats) -> None:
+        """Write numbers, as `numbers` returns them, into states, in place."""
+        if self.type == "angle":
+            radians = np.radians(numbers)
+            states[:, self.columns[0]], states[:, self.columns[1]] = (
+                np.cos(radians),
+                np.sin(radians),
+            )
+        elif self.has_symbols:
+            states[:, list(self.columns)] = np.eye(len(self.columns))[numbers.astype(np.int64)]
+        else:
+            states[:, self.columns[0]] = numbers
+
+    def typical(self, states: Floats) -> float:
+        """Return the median over states; of angles the mean direction, of symbols the mode."""
+        numbers = self.numbers(states)
+        if self.type == "angle":
+            sines, cosines = np.sin(np.radians(numbers)), np.cos(np.radians(numbers))
+            return math.degrees(math.atan2(float(sines.mean()), float(cosines.mean())))
+        if self.has_symbols:
+            return float(np.bincount(numbers.astype(np.int64)).argmax())
+        return float(np.median(numbers))
+
+    def limits(self, states: Floats) -> tuple[float, float]:
+        """Return the range of the states met, without their outermost hundredth at each end."""
+        if self.type == "angle":
+            return -180.0, 180.0
+        low, high = np.percentile(self.numbers(states), (1, 99)).tolist()
+        return (low, high) if low < high else (low - 0.5, high + 0.5)
+
+
+def variable_names(space: Space, prefix: str = "") -> list[str]:
+    """Return a name for each variable of a flattened space: keys of a Dict, and numbers.
+
+    >>> space = gym.spaces.Dict(gear=gym.spaces.Discrete(2), speed=gym.spaces.Box(-1, 1, (2,)))
+    >>> variable_names(space)
+    ['gear = 0', 'gear = 1', 'speed[0]', 'speed[1]']
+    """
+    if isinstance(space, gym.spaces.Dict):
+        parts = ((f"{prefix}.{key}" if prefix else str(key), part) for key, part in space.items())
+        return [name for key, part in parts for name in variable_names(part, key)]
+    if isinstance(space, gym.spaces.Tuple):
+        parts = ((f"{prefix}[{i}]", part) for i, part in enumerate(space))
+        return [name for key, part in parts for name in variable_names(part, key)]
+    n_variables = gym.spaces.flatdim(space)
+    if isinstance(space, gym.spaces.Discrete):
+        start = int(space.start)
+        return [f"{prefix or 'observation'} = {start + i}" for i in range(n_variables)]
+    if not prefix:
+        return [f"observation {i}" for i in range(n_variables)]
+    return [prefix] if n_variables == 1 else [f"{prefix}[{i}]" for i in range(n_variables)]
+
+
+def inputs_of(agent: AnyAgent) -> list[AgentInput]:
+    """Return the inputs of an agent's states, then the observed variables that are in none.
+
+    RuntimeError while the agent is warming up.
+    """
+    require_learned(agent)
+    names = variable_names(agent.observation_space)
+    groups = {first: n for first, n in agent._observation.symbols}
+    inputs: list[AgentInput] = []
+    for input_type, variables in agent._controller.inputs:
+        if input_type == "symbol":
+            inputs.append(_symbol(names, variables[0], variables[1]))
+        elif input_type == "angle":
+            name = f"angle of {names[variables[0]]} and {names[variables[1]].split()[-1]}"
+            inputs.append(AgentInput(name, "angle", tuple(variables)))
+        else:
+            numeric: InputType = "circular" if input_type == "circular" else "variable"
+            inputs.append(AgentInput(names[variables[0]], numeric, tuple(variables)))
+    inputs = list(dict.fromkeys(inputs))  # a code of a single input has it twice
+    inside = {column for agent_input in inputs for column in agent_input.columns}
+    column = 0
+    while column < len(names):
+        n_variables = groups.get(column, 1)
+        if column not in inside and column in groups:
+            inputs.append(_symbol(names, column, n_variables, is_used=False))
+        elif column not in inside:
+            inputs.append(AgentInput(names[column], "variable", (column,), is_used=False))
+        column += n_variables
+    return inputs
+
+
+def _symbol(names: list[str], first: int, n: int, *, is_used: bool = True) -> AgentInput:
+    name = names[first].partition(" = ")[0]
+    return AgentInput(name, "symbol", tuple(range(first, first + n)), is_used)
+
+
+def require_learned(agent: AnyAgent) -> None:
+    """Raise a RuntimeError while the agent is warming up."""
+    if agent.is_warming_up:
+        raise RuntimeError(
+            "the agent is still warming up: it acts at random, and has learned nothing to inspect"
+        )
+
+
+class Reading(NamedTuple):
+    """The knowledge of an agent about states: a row for each state.
+
+    ``action_values`` of all actions, or of the state where an agent has no values of actions,
+    (n, n_values); ``values`` of the best action (n,); ``actions``, the numbers of a greedy action,
+    (n, n_dimensions).
+    """
+
+    action_values: Floats
+    values: Floats
+    actions: Floats
+
+
+class Reader:
+    """Reads values and greedy actions of states from an agent, and changes nothing that it learned.
+
+    Parameters
+    ----------
+    agent
+        One that is not warming up; RuntimeError else.
+    """
+
+    def __init__(self, agent: AnyAgent) -> None:
+        require_learned(agent)
+        self.agent = agent
+        self._core = agent._controller
+        self._has_state_values = agent.kind in ("actor-critic", "fuzzy")
+        self._n_dimensions = len(agent._action.low)
+
+    @property
+    def most_reads(self) -> int:
+        """Number of states that may be read for influences."""
+        is_linear = self.agent.kind in ("q-lambda", "actor-critic")
+        return MOST_READS if is_linear else MOST_SLOW_READS
+
+    @property
+    def value_name(self) -> str:
+        """The name of the values of states."""
+        return "V(s)" if self._has_state_values else "max Q(s, a)"
+
+    def forget(self) -> None:
+        """Begin a greedy episode: the next state counts as its first observation."""
+        self.agent.begin_greedy_episode()
+
+    def value(self, state: Floats) -> float:
+        """Return the value of a state: that of its best action."""
+        return self._value_of(self._parts(state))
+
+    def read(self, states: Floats) -> Reading:
+        """Read states, each as the first observation of an episode.
+
+        Of several best actions it is the first, so that equal values give equal actions.
+        """
+        self.forget()
+        parts = [self._parts(state) for state in states]
+        values = np.array([self._value_of(of_state) for of_state in parts])
+        if self._has_state_values:
+            actions = np.array([self._act(state) for state in states])
+        else:
+            best = ([int(np.argmax(part)) for part in of_state] for of_state in parts)
+            numbers = [self._numbers_of(d) for d in range(self._n_dimensions)]
+            actions = np.array([[n[i] for n, i in zip(numbers, row, strict=True)] for row in best])
+        return Reading(np.array([np.concatenate(of_state) for of_state in parts]), values, actions)
+
+    def _parts(self, state: Floats) -> list[Floats]:
+        """Return the values of all actions of each dimension, or what is known of the state."""
+        if self.agent.kind == "actor-critic":
+            return [np.array([self._core.state_value(state)])]
+        return [self._core.values(state, d) for d in range(self._n_dimensions)]
+
+    def _value_of(self, parts: list[Floats]) -> float:
+        best = [float(part.max()) for part in parts]
+        return sum(best) if self.agent.kind == "q-lambda" else sum(best) / len(best)
+
+    def _numbers_of(self, dimension: int) -> Floats:
+        n_actions = self._core.n_actions[dimension]
+        return np.array([self._core.action_of(i, dimension) for i in range(n_actions)])
+
+    def _act(self, state: Floats) -> Floats:
+        self.forget()
+        return np.ravel(self._core.act(state, False))
+
+
+def meet_states(agent: AnyAgent, env: Env, seed: int = 0, options: Data | None = None) -> Floats:
+    """Run greedy episodes with a tenth of random actions, and return states that were met.
+
+    At most `MOST_STATES` of `MOST_STEPS` steps, evenly spaced. Nothing is learned.
+    """
+    generator = np.random.default_rng(seed)
+    env.action_space.seed(seed)
+    has_masks = announces(env, "action_masks")
+    states: list[Floats] = []
+    with fixed_statistics(env, agent.wrappers):
+        episode = 0
+        while len(states) < MOST_STEPS:
+            observation, info = reset_env(env, (seed + episode) % 2**32, options)
+            agent.begin_greedy_episode()
+            is_over = False
+            while not is_over and len(states) < MOST_STEPS:
+                states.append(agent.flat_observation(observation))
+                mask = mask_in(info) if has_masks else None
+                action = agent.act(observation, explore=False, mask=mask)
+                if generator.random() < SHARE_RANDOM:
+                    action = _random_action(env, mask)
+                observation, _, terminated, truncated, info = step_env(env, action)
+                is_over = bool(terminated or truncated)
+            episode += 1
+    rows = np.array(states)
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    require(len(rows) > 1, "env", "give observations without missing readings", env)
+    return thinned(rows, MOST_STATES)
+
+
+def thinned(states: Floats, n_most: int) -> Floats:
+    """Return at most a number of states, evenly spaced."""
+    n = min(len(states), n_most)
+    return np.asarray(states[np.linspace(0, len(states) - 1, n).astype(np.int64)])
+
+
+def _random_action(env: Env, mask: Any) -> Element:
+    if mask is None:
+        return env.action_space.sample()
+    if isinstance(mask, tuple | list):
+        return env.action_space.sample(tuple(np.asarray(part, np.int8) for part in mask))
+    return env.action_space.sample(np.asarray(mask, np.int8))
+
+
+@dataclass(frozen=True)
+class Influence:
+    """The influence of an input, from shuffling it among the states that were met.
+
+    ``on_values`` is how far values change, as a share of how far those of two states are apart;
+    ``on_actions`` how far greedy actions change: the share of states with another action, or of a
+    Box the mean change as a share of its range.
+    """
+
+    input: AgentInput
+    on_values: float
+    on_actions: float
+
+
+def influences(
+    reader: Reader, states: Floats, inputs: Sequence[AgentInput], seed: int = 0
+) -> list[Influence]:
+    """Return the influence of each input, the largest first.
+
+    Inputs are sorted by the mean of both influences, each as a share of the largest one.
+    """
+    generator = np.random.default_rng(seed)
+    n_used = max(1, sum(agent_input.is_used for agent_input in inputs))
+    states = thinned(states, max(50, reader.most_reads // (N_SHUFFLES * n_used)))
+    before = reader.read(states)
+    spread = math.sqrt(2.0) * float(np.sqrt(before.action_values.var(axis=0).mean()))
+    measured = []
+    for agent_input in inputs:
+        on_values, on_actions = 0.0, 0.0
+        for _ in range(N_SHUFFLES if agent_input.is_used else 0):
+            shuffled = states.copy()
+            order = generator.permutation(len(states))
+            columns = list(agent_input.columns)
+            shuffled[:, columns] = states[order][:, columns]
+            after = reader.read(shuffled)
+            change = after.action_values - before.action_values
+            if spread > 0.0:
+                on_values += float(np.sqrt(np.square(change).mean())) / spread / N_SHUFFLES
+            on_actions += _action_change(reader.agent, before.actions, after.actions)
+        measured.append(Influence(agent_input, on_values, on_actions / N_SHUFFLES))
+    largest = [
+        max((getattr(influence, name) for influence in measured), default=0.0) or 1.0
+        for name in ("on_values", "on_actions")
+    ]
+    return sorted(
+        measured,
+        key=lambda i: -i.on_values / largest[0] - i.on_actions / largest[1],
+    )
+
+
+def _action_change(agent: AnyAgent, before: Floats, after: Floats) -> float:
+    space = agent.action_space
+    if not isinstance(space, gym.spaces.Box):
+        return float((before != after).any(axis=1).mean())
+    extent = np.ravel(space.high).astype(np.float64) - np.ravel(space.low)
+    return float((np.abs(after - before) / extent).mean())
+
+
+def named_inputs(names: Sequence[str | int], inputs: Sequence[AgentInput]) -> list[AgentInput]:
+    """Return the inputs of these names, or numbers of observed variables; ValueError if unknown."""
+    require(1 <= len(names) <= 2, "inputs", "be one or two names of inputs", names)
+    chosen = []
+    for name in names:
+        matches = [
+            agent_input
+            for agent_input in inputs
+            if agent_input.name == str(name)
+            or (str(name).isdecimal() and int(name) in agent_input.columns)
+        ]
+        if not matches:
+            known = [agent_input.name for agent_input in inputs]
+            raise ValueError(f"inputs: no input {name!r}; {advice(str(name), known)}")
+        chosen.append(matches[0])
+    require(len(set(chosen)) == len(chosen), "inputs", "be two different inputs", names)
+    return chosen

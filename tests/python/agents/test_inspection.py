@@ -1,0 +1,341 @@
+"""Inspected agents, in tasks whose answer is known: which input matters, where actions switch."""
+
+import copy
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from refusals import refuses
+from sdnn.agents import (
+    FuzzyQLearning,
+    RBFQLearning,
+    SDNNActorCritic,
+    SDNNQLambda,
+    SDNNQLearning,
+    evaluate,
+)
+from sdnn.agents.inspection import (
+    AgentInput,
+    Reader,
+    influences,
+    inputs_of,
+    meet_states,
+    named_inputs,
+    variable_names,
+)
+from sdnn.agents.schedules import schedule_of
+from sdnn.agents.state_maps import map_of, replay
+from sdnn.training.training import Callback
+
+FIXED = {"inputs": "all", "angle_pairs": "none", "history": "none"}
+SWITCH = 0.2
+
+
+class Bandit(gym.Env):
+    """Pays for the action by the observation; each episode has a single step."""
+
+    def __init__(self, observation_space, action_space, reward):
+        self.observation_space, self.action_space = observation_space, action_space
+        self._reward = reward
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        if seed is not None:
+            self.observation_space.seed(seed)
+        self._observation = self.observation_space.sample()
+        return self._observation, {}
+
+    def step(self, action):
+        reward = float(self._reward(self._observation, action))
+        self._observation = self.observation_space.sample()
+        return self._observation, reward, True, False, {}
+
+
+def box(n):
+    return gym.spaces.Box(-1.0, 1.0, (n,))
+
+
+def switching(observation, action):
+    return action == (observation[1] > SWITCH)
+
+
+@pytest.fixture(scope="module")
+def switching_agent():
+    """An agent whose best action depends on the second of three variables, and its task."""
+    env = Bandit(box(3), gym.spaces.Discrete(2), switching)
+    agent = SDNNQLambda(env, seed=1, **FIXED)
+    agent.train(env, steps=6000)
+    return agent, env
+
+
+def ranked(agent, env, seed=0):
+    return influences(Reader(agent), meet_states(agent, env, seed), inputs_of(agent), seed)
+
+
+def test_the_input_that_decides_has_the_largest_influence(switching_agent):
+    for seed in range(3):
+        first, *others = ranked(*switching_agent, seed)
+        assert first.input.columns == (1,)
+        assert first.on_actions > 0.3
+        assert max(other.on_actions for other in others) < 0.1
+        assert max(other.on_values for other in others) < first.on_values / 2
+
+
+def test_the_policy_switches_where_the_optimal_one_does(switching_agent):
+    agent, env = switching_agent
+    inputs = inputs_of(agent)
+    states = meet_states(agent, env)
+    over_one = map_of(Reader(agent), states, [inputs[1]], inputs)
+    (numbers,) = over_one.axes
+    actions = over_one.actions[:, 0]
+    np.testing.assert_array_equal(actions[numbers < SWITCH - 0.12], 0.0)
+    np.testing.assert_array_equal(actions[numbers > SWITCH + 0.12], 1.0)
+    over_two = map_of(Reader(agent), states, [inputs[0], inputs[1]], inputs)
+    assert over_two.values.shape == (49, 49)
+    right = over_two.actions[..., 0] == (over_two.axes[1] > SWITCH)[:, np.newaxis]
+    assert right.mean() > 0.9
+    assert over_two.typical.keys() == {"observation 2"}
+    assert over_two.typical["observation 2"] == pytest.approx(np.median(states[:, 2]))
+
+
+def test_symbols_of_a_dictionary_that_decide_are_found():
+    space = gym.spaces.Dict(
+        colour=gym.spaces.Discrete(3), gear=gym.spaces.Discrete(4, start=2), speed=box(1)
+    )
+    env = Bandit(space, gym.spaces.Discrete(2), lambda o, action: action == (o["gear"] % 2))
+    agent = SDNNQLambda(env, seed=1, **FIXED)
+    agent.train(env, steps=4000)
+    first, *_ = ranked(agent, env)
+    assert (first.input.name, first.input.type, first.input.columns) == (
+        "gear", "symbol", (3, 4, 5, 6)
+    )  # fmt: skip
+    inputs = inputs_of(agent)
+    over_gear = map_of(Reader(agent), meet_states(agent, env), [first.input], inputs)
+    np.testing.assert_array_equal(over_gear.axes[0], [0, 1, 2, 3])
+    np.testing.assert_array_equal(over_gear.actions[:, 0], [0, 1, 0, 1])
+
+
+def test_an_angle_is_one_input_in_degrees():
+    def reward(observation, action):
+        return action == (observation[1] > 0.0)
+
+    class Turning(Bandit):
+        def step(self, action):
+            _, *rest = super().step(action)
+            return self._turned(), *rest
+
+        def reset(self, **options):
+            super().reset(**options)
+            return self._turned(), {}
+
+        def _turned(self):
+            angle = self.np_random.uniform(-np.pi, np.pi)
+            noise = self.np_random.uniform(-1.0, 1.0)
+            self._observation = np.array([np.cos(angle), np.sin(angle), noise], np.float32)
+            return self._observation
+
+    env = Turning(box(3), gym.spaces.Discrete(2), reward)
+    agent = SDNNQLambda(env, seed=1, **FIXED | {"angle_pairs": [(0, 1)]})
+    agent.train(env, steps=4000)
+    inputs = inputs_of(agent)
+    angle = next(i for i in inputs if i.type == "angle")
+    assert angle.columns == (0, 1)
+    states = meet_states(agent, env)
+    over_angle = map_of(Reader(agent), states, [angle], inputs)
+    degrees, actions = over_angle.axes[0], over_angle.actions[:, 0]
+    assert (degrees[0], degrees[-1]) == (-180.0, 180.0)
+    assert (actions[(degrees > 20) & (degrees < 160)] == 1.0).mean() > 0.9
+    assert (actions[(degrees > -160) & (degrees < -20)] == 0.0).mean() > 0.9
+    placed = states[:3].copy()
+    angle.place(placed, np.array([90.0, -90.0, 180.0]))
+    np.testing.assert_allclose(placed[:, :2], [[0, 1], [0, -1], [-1, 0]], atol=1e-12)
+    np.testing.assert_allclose(angle.numbers(placed), [90.0, -90.0, 180.0])
+
+
+@pytest.mark.parametrize(
+    "agent_class", [SDNNQLambda, SDNNQLearning, SDNNActorCritic, RBFQLearning, FuzzyQLearning]
+)
+def test_readings_are_those_of_the_agents_methods(agent_class):
+    env = Bandit(box(2), gym.spaces.Box(-1.0, 1.0, (2,)), lambda o, a: -abs(o[0] - a).sum())
+    more = {} if agent_class in (RBFQLearning, FuzzyQLearning) else FIXED
+    agent = agent_class(env, seed=1, **more)
+    agent.train(env, steps=600)
+    states = meet_states(agent, env)[:20]
+    reading = Reader(agent).read(states)
+    for state, values, value, action in zip(states, *reading, strict=True):
+        state = state.astype(np.float32)
+        agent.begin_greedy_episode()
+        if hasattr(agent, "value"):
+            expected = agent.value(state)
+        else:
+            parts = [agent.q_values(state, d) for d in range(2)]
+            np.testing.assert_array_equal(values, np.concatenate(parts))
+            total = sum(part.max() for part in parts)
+            expected = total if agent_class is SDNNQLambda else total / 2
+        assert value == expected
+        if agent_class is not FuzzyQLearning:  # which draws among equal values
+            np.testing.assert_allclose(action, agent.act(state, explore=False), rtol=1e-6)
+
+
+def test_continuous_actions_follow_the_input_that_decides():
+    def reward(observation, action):
+        return -abs(observation[1] - action[0])
+
+    env = Bandit(box(2), gym.spaces.Box(-1.0, 1.0, (1,)), reward)
+    agent = SDNNQLambda(env, seed=1, **FIXED)
+    agent.train(env, steps=6000)
+    assert ranked(agent, env)[0].input.columns == (1,)
+    inputs = inputs_of(agent)
+    over_one = map_of(Reader(agent), meet_states(agent, env), [inputs[1]], inputs)
+    assert over_one.actions[:40].mean() < -0.4
+    assert over_one.actions[-40:].mean() > 0.4
+
+
+def test_inspecting_changes_nothing_that_is_learned(switching_agent):
+    agent, env = copy.deepcopy(switching_agent)
+    other, other_env = copy.deepcopy((agent, env))
+    Reader(agent).read(meet_states(agent, env))
+    ranked(agent, env)
+    replay(Reader(agent), env)
+    for trained, its_env in ((agent, env), (other, other_env)):
+        trained.train(its_env, steps=300, seed=5)
+    states = agent.state(), other.state()
+    assert states[0].keys() == states[1].keys()
+    for name, array in states[0].items():
+        if "evaluation" not in name:
+            np.testing.assert_array_equal(array, states[1][name], err_msg=name)
+
+
+def test_a_replay_is_the_first_episode_of_an_evaluation():
+    env = gym.make("CartPole-v1")
+    agent = SDNNQLambda(env, seed=1)
+    agent.train(env, steps=2500)
+    evaluation = evaluate(agent, env, 1, seed=7)
+    episode = replay(Reader(agent), env, 7)
+    assert episode.total_reward == evaluation.returns[0]
+    assert len(episode.values) == evaluation.lengths[0]
+    assert episode.terminated == evaluation.terminated[0]
+    assert episode.states.shape == (len(episode.values), 4)
+    assert episode.actions.shape == (len(episode.values), 1)
+
+
+class Noise(gym.ObservationWrapper):
+    """Appends four variables of noise."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        space = env.observation_space
+        low = np.concatenate([space.low, np.full(4, -np.inf, np.float32)])
+        high = np.concatenate([space.high, np.full(4, np.inf, np.float32)])
+        self.observation_space = gym.spaces.Box(low, high)
+
+    def observation(self, observation):
+        noise = self.np_random.normal(size=4)
+        return np.concatenate([observation, noise]).astype(np.float32)
+
+
+@pytest.mark.parametrize("inputs", ["relevant", "all"])
+def test_noise_ranks_last(inputs):
+    env = Noise(gym.make("CartPole-v1"))
+    agent = SDNNQLambda(env, seed=100, inputs=inputs)
+    agent.train(env, steps=12_000)
+    order = ranked(agent, env)
+    assert {influence.input.columns[0] for influence in order[-4:]} == {4, 5, 6, 7}
+    if inputs == "relevant":
+        assert [i.on_values for i in order if not i.input.is_used] == [0.0] * 4
+
+
+def test_missing_readings_are_left_out_of_the_states_met():
+    class Gaps(gym.ObservationWrapper):
+        def observation(self, observation):
+            return np.where(self.np_random.random(4) < 0.1, np.nan, observation).astype(np.float32)
+
+    env = Gaps(gym.make("CartPole-v1"))
+    agent = SDNNQLambda(env, seed=1, missing="code")
+    agent.train(env, steps=2000)
+    states = meet_states(agent, env)
+    assert np.isfinite(states).all()
+    assert np.isnan(replay(Reader(agent), env).states).any()
+
+
+def test_names_of_variables_follow_the_spaces():
+    space = gym.spaces.Dict(
+        arm=gym.spaces.Dict(angle=box(1), speed=box(2)),
+        pair=gym.spaces.Tuple((gym.spaces.Discrete(2, start=3), box(1))),
+    )
+    assert variable_names(space) == [
+        "arm.angle", "arm.speed[0]", "arm.speed[1]", "pair[0] = 3", "pair[0] = 4", "pair[1]"
+    ]  # fmt: skip
+    assert len(variable_names(space)) == gym.spaces.flatdim(space)
+    assert variable_names(gym.spaces.MultiBinary(2)) == ["observation 0", "observation 1"]
+
+
+def test_inputs_are_chosen_by_name_or_number(switching_agent):
+    inputs = inputs_of(switching_agent[0])
+    assert named_inputs(["observation 2", 0], inputs) == [inputs[2], inputs[0]]
+    for names in (["other"], ["9"], [], ["0", "1", "2"], ["1", "observation 1"]):
+        refuses("inputs", named_inputs, names, inputs)
+
+
+def test_constant_numbers_have_a_range_and_symbols_a_most_frequent_one():
+    states = np.array([[2.0, 1, 0], [2.0, 0, 1], [2.0, 0, 1]])
+    assert AgentInput("x", "variable", (0,)).limits(states) == (1.5, 2.5)
+    symbol = AgentInput("y", "symbol", (1, 2))
+    assert symbol.typical(states) == 1.0
+    symbol.place(states, np.zeros(3))
+    np.testing.assert_array_equal(states[:, 1:], [[1, 0]] * 3)
+
+
+class Noted(Callback):
+    """Notes epsilon and alpha at every hundredth step."""
+
+    step_interval = 100
+
+    def __init__(self):
+        self.points = []
+
+    def on_step(self, training):
+        progress = training.n_steps / training.steps
+        agent = training.agent
+        self.points.append((training.n_steps, progress, agent.epsilon, agent.learning_rate))
+
+
+@pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNQLearning, SDNNActorCritic])
+def test_schedules_are_those_of_the_training(agent_class):
+    env = Bandit(box(2), gym.spaces.Discrete(2), switching)
+    agent = agent_class(env, seed=1, **FIXED)
+    noted = Noted()
+    agent.train(env, steps=1000, callbacks=[noted])
+    steps, progress, epsilon, learning_rate = map(np.array, zip(*noted.points, strict=True))
+    schedule = schedule_of(agent, steps, progress)
+    np.testing.assert_allclose(schedule.epsilon, epsilon, atol=1e-4)
+    np.testing.assert_allclose(schedule.learning_rate, learning_rate, atol=1e-3)
+
+
+def test_agents_draw_figures_of_environments_and_observations(switching_agent, tmp_path):
+    agent, env = switching_agent
+    observations = [env.observation_space.sample() for _ in range(30)]
+    for number, figure in enumerate(
+        (
+            agent.plot_values(env),
+            agent.plot_policy(observations, inputs=["observation 1"]),
+            agent.plot_values(observations, inputs=[0, 2]),
+            agent.plot_inputs(env, seed=3),
+        )
+    ):
+        path = tmp_path / f"{number}.png"
+        figure.savefig(path)
+        assert path.stat().st_size > 3000
+    titles = [axes.get_title(loc="left") for axes in agent.plot_inputs(env).axes]
+    assert titles == ["change of values", "change of greedy actions"]
+    refuses("inputs", agent.plot_values, env, inputs=["none"])
+    refuses("source", agent.plot_policy, observations[:1])
+
+
+def test_agents_that_are_warming_up_cannot_be_inspected():
+    env = gym.make("CartPole-v1")
+    agent = SDNNQLambda(env, seed=1)
+    for draw in (agent.plot_values, agent.plot_policy, agent.plot_inputs):
+        with pytest.raises(RuntimeError):
+            draw(env)

@@ -1,0 +1,148 @@
+"""The page about what the agent of a run has learned."""
+
+import json
+import re
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from sdnn.runs import Run, RunError
+from sdnn.runs.inspection import inspect_run
+
+MOST_BYTES = 2 * 10**6
+
+
+class DockEnv(gym.Env):
+    """Go to 0, by a gear; the colour means nothing."""
+
+    observation_space = gym.spaces.Dict(
+        colour=gym.spaces.Discrete(3),
+        gear=gym.spaces.Discrete(2),
+        position=gym.spaces.Box(-2.0, 2.0, (2,)),
+    )
+    action_space = gym.spaces.Box(-1.0, 1.0, (2,))
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self._position = self.np_random.uniform(-1.0, 1.0, 2)
+        return self._observation(), {}
+
+    def step(self, action):
+        self._position = np.clip(self._position + 0.2 * np.asarray(action, float), -2.0, 2.0)
+        return self._observation(), -float(np.abs(self._position).sum()), False, False, {}
+
+    def _observation(self):
+        colour, gear = (int(self.np_random.integers(n)) for n in (3, 2))
+        return {"colour": colour, "gear": gear, "position": self._position.astype(np.float32)}
+
+
+gym.register("tests/Dock-v0", entry_point=DockEnv, max_episode_steps=50)
+
+TASKS = {
+    "CartPole-v1": ("observation 0", "variable"),
+    "Pendulum-v1": ("angle of observation 0 and 1", "angle"),
+    "MountainCar-v0": ("observation 1", "variable"),
+    "Taxi-v4": ("observation", "symbol"),
+    "tests/Dock-v0": ("position[1]", "variable"),
+}
+
+
+@pytest.fixture
+def trained(invoke):
+    """Train a short run and return its folder."""
+
+    def _trained(task, *options, steps=2500):
+        arguments = ("train", task, "--steps", steps, "--evaluate-every", 1000, "--out", "run")
+        result = invoke(*arguments, "--evaluation-episodes", 2, *options)
+        assert result.exit_code == 0, result.output
+        return Path("run")
+
+    return _trained
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_page_is_small_and_self_contained(invoke, trained, task):
+    folder = trained(task)
+    before = (folder / "checkpoint.safetensors").read_bytes()
+    result = invoke("inspect", folder, "--json")
+    assert result.exit_code == 0, result.output
+    values = json.loads(result.stdout)
+    name, input_type = TASKS[task]
+    assert {"name": name, "type": input_type}.items() <= next(
+        i for i in values["inputs"] if i["name"] == name
+    ).items()
+    page = (folder / "inspect.html").read_text()
+    assert len(page) < MOST_BYTES
+    assert page.count("<img") == 4
+    assert not re.search(r"""(?:src|href)\s*=\s*["'](?!data:)""", page)
+    assert not re.search(r"<script|@import|url\((?!data:)", page)
+    assert task in page
+    assert (folder / "checkpoint.safetensors").read_bytes() == before
+
+
+def test_the_table_and_the_warnings_are_printed(invoke, trained):
+    folder = trained("MountainCar-v0", "--agent", "sdnn-c", steps=300)
+    result = invoke("inspect", folder, "--input", "0", "--out", "page.html")
+    assert result.exit_code == 0, result.output
+    assert "observation 1" in result.stdout
+    assert result.stdout.splitlines()[-1] == "wrote page.html"
+    page = Path("page.html").read_text()
+    for words in ("mean size of corrections", "step of values", "share changed"):
+        assert words in page
+    assert "Values and actions over observation 0<" in page
+    for warning in inspect_run(Run.open(folder)).warnings():
+        assert warning.split(":")[0] in page
+
+
+def test_the_map_is_over_the_inputs_that_are_named(invoke, trained):
+    folder = trained("CartPole-v1")
+    options = ("--input", "observation 3", "--input", 0, "--json", "--seed", 4)
+    values = json.loads(invoke("inspect", folder, *options).stdout)
+    assert values["map_of"] == ["observation 3", "observation 0"]
+    returns = Run.open(folder).evaluate(1, 4).returns
+    assert values["episode"]["return"] == returns[0]
+    assert values == json.loads(invoke("inspect", folder, *options).stdout)
+
+
+def test_wrong_options_are_named(invoke, refused, trained):
+    folder = trained("CartPole-v1")
+    assert "--input" in refused("inspect", folder, "--input", "speed", code=2)
+    three = [word for number in range(3) for word in ("--input", number)]
+    assert "--input" in refused("inspect", folder, *three, code=2)
+    assert "page.pdf" in refused("inspect", folder, "--out", "page.pdf", code=2)
+    assert "keep-best" in refused("inspect", folder, "--best", code=1)
+
+
+def test_an_agent_that_is_warming_up_is_refused(trained):
+    folder = trained("CartPole-v1", steps=200)
+    with pytest.raises(RunError, match="warming up"):
+        inspect_run(Run.open(folder))
+
+
+def test_left_out_inputs_and_their_reason_are_shown(trained):
+    folder = trained("tests/Dock-v0", steps=2500)
+    inspection = inspect_run(Run.open(folder))
+    table = inspection.input_table()
+    left_out = {i.input.name for i in inspection.influences if not i.input.is_used}
+    assert "colour" in left_out
+    notes = {row[0]: row[-1] for row in table.rows}
+    assert all(notes[name].startswith("left out") for name in left_out)
+    assert inspection.influences[-1].on_values == 0.0
+
+
+def test_warnings_name_narrow_use_and_collapse(trained, monkeypatch):
+    folder = trained("CartPole-v1", "--range", "1=-500:500", steps=2500)
+    inspection = inspect_run(Run.open(folder))
+    narrow = [text for text in inspection.warnings() if text.startswith("observation 1 uses only")]
+    assert len(narrow) == 1
+    evaluations = [
+        {"kind": "evaluation", "step": step, "mean_return": mean, "episode": step}
+        for step, mean in ((1, 10.0), (2, 500.0), (3, 20.0))
+    ]
+    fallen = type(inspection)(**{**vars(inspection), "rows": evaluations})
+    assert any("--keep-best" in text for text in fallen.warnings())
+    coarse = {**inspection.report, "value_unit": 0.5, "recent_reward": 1.0}
+    rounded = type(inspection)(**{**vars(inspection), "report": coarse})
+    assert any("rounded" in text for text in rounded.warnings())
