@@ -121,7 +121,10 @@ def study_command(make_study: Callable[..., Study]) -> Function:
         else:
             done.page.print(make_console(), full=full)
             page = next(str(file) for file in done.files if file.suffix == ".html")
-            done_now = f"{stored} ({outcome.n_run} run now); " if outcome.n_planned else ""
+            done_now = ""
+            if outcome.n_planned:
+                digest = str(done.table["digest"])[:16]
+                done_now = f"{stored} ({outcome.n_run} run now); digest of the rows {digest}; "
             click.echo(f"{done_now}wrote {len(done.files)} files: see {page}")
         if done.page is None or outcome.failures:
             raise click.exceptions.Exit(1)
@@ -208,6 +211,17 @@ def sweep(file: Path, trials: int | None, seed: int | None, only: tuple[str, ...
     type=click.Choice(tuple(presets())),
     multiple=True,
     help="Draw SDNN-C under these settings beside the paper's; may be repeated.",
+)
+@click.option(
+    "--sensors",
+    type=click.IntRange(4, 6),
+    help="With b: a single case with these sensors.  [default: 4, where --noise is used]",
+)
+@click.option(
+    "--noise",
+    type=click.FloatRange(0, 1),
+    metavar="SIGMA",
+    help="With b: a single case with this noise.  [default: 0.02, where --sensors is used]",
 )
 @study_command
 def reproduce(experiment: str, **options: Any) -> Study:

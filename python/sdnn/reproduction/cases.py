@@ -97,6 +97,25 @@ EXPERIMENTS = (
 PAPER_CASES: dict[str, Case] = {case.id: case for e in EXPERIMENTS for case in e.cases}
 """The paper's cases by their ids; a case of two figures has the title of the later one."""
 
+
+def case_of_sensors(n_sensors: int, noise: float) -> Case:
+    """Return the case with these sensors, the paper's if it has one; agents as in experiment B.
+
+    Examples
+    --------
+    >>> case_of_sensors(6, 0.02).id, case_of_sensors(6, 0.03).id, case_of_sensors(5, 0).id
+    ('s6-noise', 's6-noise-0.03', 's5')
+    """
+    for case in PAPER_CASES.values():
+        if (case.n_sensors, case.noise) == (n_sensors, noise):
+            return replace(case, agents=BOTH)
+    noise = float(noise)
+    case_id = f"s{n_sensors}-noise-{noise!r}" if noise else f"s{n_sensors}"
+    noise_text = f"noise {noise!r}" if noise else "no noise"
+    title = f"{n_sensors} inputs, {noise_text} (not in the paper)"
+    return Case(case_id, title, n_sensors, noise, BOTH, "")
+
+
 COST = "cost"
 """Name on the command line of the measurement of costs, which has no trials."""
 

@@ -20,8 +20,10 @@ from sdnn.reproduction.cases import (
     PAPER_EPISODES,
     PAPER_INTERVAL,
     PAPER_TRIALS,
+    SENSOR_NOISE,
     Case,
     Experiment,
+    case_of_sensors,
     select_experiments,
 )
 from sdnn.reproduction.claims import ClaimOutcome, TenTrials, judge_claims, more_trials
@@ -69,6 +71,9 @@ class PaperStudy(Study):
         Agents to run in every case instead of the case's own.
     presets
         Presets under which SDNN-C runs beside the agents of every case.
+    sensors, noise
+        If either is given, experiment B has a single case, with this number of sensors (4 by
+        default) and this standard deviation of their noise (0.02 by default).
     """
 
     def __init__(
@@ -81,13 +86,19 @@ class PaperStudy(Study):
         quick: bool = False,
         agents: Iterable[str] = (),
         presets: Iterable[str] = (),
+        sensors: int | None = None,
+        noise: float | None = None,
     ) -> None:
         defaults = (QUICK_TRIALS, QUICK_EPISODES) if quick else (PAPER_TRIALS, PAPER_EPISODES)
         trials, episodes = n_trials or defaults[0], n_episodes or defaults[1]
         asked = {experiment.id for experiment in select_experiments(word)}
         self.quick, self.agents, presets = quick, dict.fromkeys(agents), dict.fromkeys(presets)
+        experiments: tuple[Experiment, ...] = EXPERIMENTS
+        has_sensors = sensors is not None or noise is not None
+        if has_sensors:
+            experiments = _experiment_with_sensors(word, sensors, noise)
         self.experiments = [
-            experiment.with_agents(self.agents, presets) for experiment in EXPERIMENTS
+            experiment.with_agents(self.agents, presets) for experiment in experiments
         ]
         cases = [case for experiment in self.experiments for case in experiment.cases]
         whole("episodes", episodes, PAPER_INTERVAL, MOST_EPISODES)
@@ -113,6 +124,7 @@ class PaperStudy(Study):
             *self.agents,
             *(["with"] if self.agents and presets else []),  # else "rbf-robust" is a preset
             *presets,
+            *([self.experiments[0].cases[0].id] if has_sensors else []),
             *([f"{trials}-trials"] if trials != defaults[0] else []),
             *([f"{episodes}-episodes"] if episodes != defaults[1] else []),
             *([f"seed-{seed}"] if seed else []),
@@ -169,6 +181,20 @@ class PaperStudy(Study):
         files["results.csv"] = csv_bytes(ROW_HEADER, trial_rows(report.records))
         page = report.page({name: files[f"{name}.svg"] for name in drawn})
         return Content(page=page, table=report.to_json(), files=files, shown=report.records)
+
+
+def _experiment_with_sensors(
+    word: str, sensors: int | None, noise: float | None
+) -> tuple[Experiment, ...]:
+    """Return experiment B with a single case; ValueError unless it alone is to be run."""
+    if word != "b":
+        name = "noise" if sensors is None else "sensors"
+        raise ValueError(f"{name} needs the experiment 'b' (sdnn reproduce b), got {word!r}")
+    case = case_of_sensors(
+        4 if sensors is None else whole("sensors", sensors, 4, 6),
+        SENSOR_NOISE if noise is None else noise,
+    )
+    return tuple(replace(e, cases=(case,)) for e in EXPERIMENTS if e.id == "b")
 
 
 def collect(experiment: Experiment, comparison: Comparison) -> tuple[CaseResult, ...]:
