@@ -106,6 +106,12 @@ class AcrobotTrial {
   /// The agent, for inspection during the trial. Evaluating it does not change the trial; acting
   /// and learning do.
   Agent& agent() noexcept { return agent_; }
+  /// The acrobot as the last decision left it.
+  const environments::Acrobot& acrobot() const noexcept { return acrobot_; }
+  /// The torque of the last decision, N m.
+  double torque() const noexcept { return torque_; }
+  /// The factor of the goal's speed limits in the last episode that began.
+  double goal_tolerance() const noexcept { return lambda_; }
 
   /// Runs up to `n_episodes` more learning episodes, with the test episodes that are due; an
   /// unfinished episode is finished first.

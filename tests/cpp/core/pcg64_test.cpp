@@ -42,6 +42,14 @@ TEST(Pcg64, DrawsTheNumbersOfNumPy) {
   }
 }
 
+TEST(Pcg64, DrawsTheWordsOfNumPysSeedSequence) {
+  // np.random.SeedSequence([1, 2, 3, 4, 5, 6]).generate_state(4, np.uint64)
+  const std::array<std::uint32_t, 6> words{1, 2, 3, 4, 5, 6};
+  const std::array<std::uint64_t, 4> expected{16991237094181161505U, 14981931853785751691U,
+                                              11178459300072584630U, 1971961610505447179U};
+  EXPECT_EQ(Pcg64::drawn_from(words), expected);
+}
+
 TEST(Pcg64, ContinuesFromItsState) {
   Pcg64 random(Seeds{1, 2}), restored(Seeds{3});
   (void)random.below(5);  // half of 64 bits is left

@@ -150,6 +150,18 @@ void expect_no_allocation(Trial run) {
   EXPECT_EQ(testing::allocation_count(), before);
 }
 
+TEST(AcrobotTrial, ShowsTheAcrobotTheTorqueAndTheGoalToleranceOfTheLastDecision) {
+  auto watched = table_trial({});
+  const environments::GoalSchedule schedule;
+  environments::Acrobot repeated;
+  watched.advance(30, [&] {
+    if (watched.acrobot().decisions() == 1) repeated.reset();
+    repeated.step(watched.torque(), watched.goal_tolerance());
+    EXPECT_EQ(repeated.state(), watched.acrobot().state());
+    EXPECT_EQ(watched.goal_tolerance(), schedule(watched.episode()));
+  });
+}
+
 TEST(AcrobotTrial, AnEpisodeAllocatesNothing) {
   const Setting setting{.sensors = {.noise = 0.02}, .protocol = {.episodes = 10}};
   expect_no_allocation(network_trial(setting));

@@ -69,6 +69,41 @@ class Pcg64 {
     }
   }
 
+  /// Words that a SeedSequence of these words generates.
+  static std::array<std::uint64_t, 4> drawn_from(std::span<const std::uint32_t> words) noexcept {
+    std::uint32_t constant = 0x43b0d7e5;
+    const auto hashed = [&constant](std::uint32_t value) {
+      value ^= constant;
+      constant *= 0x931e8875;
+      value *= constant;
+      return value ^ (value >> 16U);
+    };
+    const auto mixed = [](std::uint32_t x, std::uint32_t y) {
+      const std::uint32_t value = 0xca01f9dd * x - 0x4973f715 * y;
+      return value ^ (value >> 16U);
+    };
+    std::array<std::uint32_t, 4> pool{};
+    for (std::size_t i = 0; i < pool.size(); ++i) pool[i] = hashed(i < words.size() ? words[i] : 0);
+    for (std::size_t from = 0; from < pool.size(); ++from) {
+      for (std::size_t to = 0; to < pool.size(); ++to) {
+        if (from != to) pool[to] = mixed(pool[to], hashed(pool[from]));
+      }
+    }
+    for (std::size_t from = pool.size(); from < words.size(); ++from) {
+      for (std::uint32_t& word : pool) word = mixed(word, hashed(words[from]));
+    }
+    constant = 0x8b51f9dd;
+    std::array<std::uint64_t, 4> drawn{};
+    for (std::size_t i = 0; i < 8; ++i) {
+      std::uint32_t value = pool[i % pool.size()] ^ constant;
+      constant *= 0x58f38ded;
+      value *= constant;
+      value ^= value >> 16U;
+      drawn[i / 2] |= std::uint64_t{value} << (32U * (i % 2));
+    }
+    return drawn;
+  }
+
  private:
   struct Wide {
     std::uint64_t high = 0, low = 0;
@@ -104,41 +139,6 @@ class Pcg64 {
     has_half_ = true;
     half_ = static_cast<std::uint32_t>(drawn >> 32U);
     return static_cast<std::uint32_t>(drawn);
-  }
-
-  /// Words that a SeedSequence of these words generates.
-  static std::array<std::uint64_t, 4> drawn_from(std::span<const std::uint32_t> words) noexcept {
-    std::uint32_t constant = 0x43b0d7e5;
-    const auto hashed = [&constant](std::uint32_t value) {
-      value ^= constant;
-      constant *= 0x931e8875;
-      value *= constant;
-      return value ^ (value >> 16U);
-    };
-    const auto mixed = [](std::uint32_t x, std::uint32_t y) {
-      const std::uint32_t value = 0xca01f9dd * x - 0x4973f715 * y;
-      return value ^ (value >> 16U);
-    };
-    std::array<std::uint32_t, 4> pool{};
-    for (std::size_t i = 0; i < pool.size(); ++i) pool[i] = hashed(i < words.size() ? words[i] : 0);
-    for (std::size_t from = 0; from < pool.size(); ++from) {
-      for (std::size_t to = 0; to < pool.size(); ++to) {
-        if (from != to) pool[to] = mixed(pool[to], hashed(pool[from]));
-      }
-    }
-    for (std::size_t from = pool.size(); from < words.size(); ++from) {
-      for (std::uint32_t& word : pool) word = mixed(word, hashed(words[from]));
-    }
-    constant = 0x8b51f9dd;
-    std::array<std::uint64_t, 4> drawn{};
-    for (std::size_t i = 0; i < 8; ++i) {
-      std::uint32_t value = pool[i % pool.size()] ^ constant;
-      constant *= 0x58f38ded;
-      value *= constant;
-      value ^= value >> 16U;
-      drawn[i / 2] |= std::uint64_t{value} << (32U * (i % 2));
-    }
-    return drawn;
   }
 
   Wide state_, increment_;
