@@ -188,6 +188,7 @@ SHIPPED = (
     r"conanfile\.py",
     r"cpp/include/sdnn/([a-z_]+/){0,2}[a-z0-9_]+\.hpp",
     r"cpp/compiled/[a-z_]+\.cpp|cpp/tools/[a-z_]+\.hpp|cpp/bindings/([a-z_]+\.[ch]pp|CMakeLists\.txt)",
+    r"cpp/wasm/[a-z0-9]+\.[ch]pp|docs/site/demonstration/[a-z]+\.(html|js)",
     r"python/sdnn/([a-z_]+/){0,2}[a-z_]+\.pyi?|python/sdnn/py\.typed",
     r"python/sdnn/(cli/[a-z]+\.txt|reports/page\.(html|md))\.jinja|cpp/c/sdnn_[a-z_]+\.h",
     r"python/sdnn/runs/schema\.sql|python/sdnn/reproduction/(claims\.toml|reference-results\.csv)",
