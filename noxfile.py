@@ -106,6 +106,36 @@ def run_cpp_tests(session, preset):
 
 
 @quick()
+def demonstration(session):
+    """Compile cpp/wasm for the site's page on which agents learn in a browser.
+
+    The C headers are of agents whose sensors have 1, 2 and 3 copies.
+    """
+    folder = ROOT / "build" / "demonstration"
+    headers = folder / "headers"
+    headers.mkdir(parents=True, exist_ok=True)
+    ranges = ("--range=-2.4:2.4", "--range=-3:3", "--range=-0.21:0.21", "--range=-3.5:3.5")
+    for copies, ram in enumerate((20_000, 60_000, 120_000), 1):
+        header = ("--actions=2", f"--ram={ram}", f"--c-header={headers}/pole{copies}.h")
+        python(session, "-m", "sdnn", "export", "--new", *ranges * copies, *header)
+    eigen = (Path(path, "cmeel.prefix", "include", "eigen3") for path in sys.path)
+    folders = (ROOT / "cpp" / "include", ROOT / "cpp", headers, *filter(Path.is_dir, eigen))
+    flags = ["-target", "wasm32-wasi", "-mexec-model=reactor", "-msimd128", "-fno-exceptions", "-s"]
+    flags += ["-std=c++20", "-ffp-contract=off", "-DSDNN_NO_CONTRACTION"]
+    flags += ["-Wall", "-Wextra", "-Wconversion", "-Werror"]
+    flags += [f"-isystem{path}" for path in (*folders, "/usr/include/eigen3")]
+    for name, level in (("acrobot", "-O3"), ("pole", "-Os")):
+        files = (ROOT / "cpp" / "wasm" / f"{name}.cpp", "-o", folder / f"{name}.wasm")
+        python(session, "-m", "ziglang", "c++", level, *flags, *files)
+
+
+@quick()
+def browser(session):
+    """Test the demonstration in Chromium; nox -s demonstration builds it."""
+    pytest(session, "tests/browser")
+
+
+@quick()
 def docs(session):
     """Build the site and the C++ reference; run the examples and the documents' code."""
     pytest(session, "tests/docs")
