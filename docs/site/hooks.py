@@ -2,6 +2,8 @@
 
 Documents link to each other by their places in the repository. The site holds `docs/` at its root;
 links are rewritten to that, and files outside that are linked to are copied.
+
+The demonstration is part of the site if it has been built: `nox -s demonstration`.
 """
 
 import posixpath
@@ -9,12 +11,17 @@ import re
 from pathlib import Path
 
 from mkdocs.structure.files import File
+from mkdocs.structure.nav import Link
 
 ROOT = Path(__file__).parents[2]
 PAGES = {"README.md": "index.md"} | {
     name: name for name in ("REPRODUCTION.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")
 }
 """Pages of the repository's root, and their paths on the site."""
+
+DEMONSTRATION = "demonstration/index.html"
+BUILT = [ROOT / "build" / "demonstration" / name for name in ("acrobot.wasm", "pole.wasm")]
+"""Modules for browsers, compiled by `nox -s demonstration`."""
 
 _LINK = re.compile(r"(?<=\]\()(?!https?:|mailto:|#)([^)#\s]*)(#[^)\s]*)?(?=\))")
 
@@ -30,7 +37,23 @@ def on_files(files, config):
                 source = ROOT / target
                 if source.is_file() and files.get_file_from_path(target) is None:
                     files.append(File.generated(config, target, abs_src_path=str(source)))
+    if has_demonstration():
+        for source in (*(ROOT / "docs" / "site" / "demonstration").iterdir(), *BUILT):
+            place = f"demonstration/{source.name}"
+            files.append(File.generated(config, place, abs_src_path=str(source)))
     return files
+
+
+def has_demonstration():
+    """Return whether everything that browsers run has been built."""
+    return all(path.is_file() for path in BUILT)
+
+
+def on_nav(nav, config, files):
+    """Link to the demonstration, after the first page."""
+    if has_demonstration():
+        nav.items.insert(1, Link("Try it", DEMONSTRATION))
+    return nav
 
 
 def on_page_markdown(markdown, page, config, files):

@@ -54,6 +54,16 @@ def test_every_internal_link_of_the_site_resolves(site):
             assert path.exists(), f"{name} links to {target}"
 
 
+def test_the_demonstration_is_there_if_it_has_been_built(site):
+    names = ("acrobot.wasm", "pole.wasm")
+    is_built = all((ROOT / "build" / "demonstration" / name).is_file() for name in names)
+    first_page = (site / "index.html").read_text("utf-8")
+    assert ('href="demonstration/index.html"' in first_page) == is_built
+    sources = {path.name for path in (ROOT / "docs" / "site" / "demonstration").iterdir()}
+    copied = {path.name for path in (site / "demonstration").glob("*")}
+    assert copied == ({*names, *sources} if is_built else set())
+
+
 def test_the_reference_has_every_public_name(site):
     text = "".join(page.read_text("utf-8") for page in (site / "reference").rglob("*.html"))
     packages = {name for name in sdnn.__all__ if hasattr(getattr(sdnn, name), "__all__")}
