@@ -15,7 +15,10 @@ from numpy.typing import NDArray
 from sdnn.environments.types import Array
 
 _DIRECTION_BITS = 30
-_BYTES = {"uint8_t": 1, "uint16_t": 2, "int32_t": 4, "uint32_t": 4, "uint64_t": 8}
+_BYTES = {
+    "int8_t": 1, "uint8_t": 1, "int16_t": 2, "uint16_t": 2,
+    "int32_t": 4, "uint32_t": 4, "uint64_t": 8,
+}  # fmt: skip
 
 
 _INSTALLED = Path(__file__).parent / "c"
@@ -106,6 +109,25 @@ def wrapped(words: Iterable[str], width: int = 98) -> list[str]:
             line = "  "
         line += f"{word},"
     return [*lines, line]
+
+
+def c_strings(name: str, words: Iterable[str]) -> list[str]:
+    r"""Write a table of words in C, as UTF-8.
+
+    >>> print("\n".join(c_strings("sizes", ["no", "hm?"])))
+    static const char* const sizes[] = {
+      "no",
+      "hm\077",
+    };
+    """
+    quoted = [
+        "".join(
+            chr(byte) if 31 < byte < 127 and chr(byte) not in '"?\\' else f"\\{byte:03o}"
+            for byte in word.encode("utf-8", "backslashreplace")
+        )
+        for word in words
+    ]
+    return [f"static const char* const {name}[] = {{", *(f'  "{word}",' for word in quoted), "};"]
 
 
 def joined(lines: Iterable[str]) -> str:

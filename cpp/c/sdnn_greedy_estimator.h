@@ -1,0 +1,92 @@
+/* An estimator that predicts: its weights are constants. */
+#ifndef SDNN_GREEDY_ESTIMATOR_H
+#define SDNN_GREEDY_ESTIMATOR_H
+
+#include "sdnn_estimates.h"
+#include "sdnn_input_pairs.h"
+#include "sdnn_weight_bytes.h"
+
+typedef struct {
+  const uint32_t* weights; /* of four units each: high bytes if there are any, then low bytes */
+  const int32_t* thresholds;
+  const uint8_t* n_bytes; /* of a weight, for four units each */
+} sdnn_network;
+
+static const sdnn_network sdnn_networks[SDNN_N_NETWORKS] = {SDNN_NETWORKS};
+
+/* Adds the totals of a network. */
+static inline void sdnn_add_totals(const sdnn_network* network, const sdnn_code* code,
+                                   sdnn_total* totals) {
+  const sdnn_column* const negative = code->columns + SDNN_MOST_COLUMNS - code->n_negative;
+  const uint32_t* weights = network->weights;
+  uint32_t unit, byte, i, left = SDNN_GROUP_SIZE;
+  for (unit = 0; unit < SDNN_N_UNITS; unit += 4) {
+    uint32_t potentials[4] = {0, 0, 0, 0};
+    for (byte = network->n_bytes[unit >> 2]; byte-- > 0; weights += SDNN_N_COLUMNS) {
+      for (i = 0; i < 4; ++i) potentials[i] <<= 8;
+      sdnn_add_signed(weights, code->columns, code->n_positive, negative, code->n_negative,
+                      potentials);
+    }
+    for (i = 0; i < 4 && unit + i < SDNN_N_UNITS; ++i) {
+      const uint32_t potential = potentials[i] - (uint32_t)network->thresholds[unit + i];
+#if SDNN_COUNTS_UNITS
+      *totals += potential - 1 < UINT32_C(0x7fffffff); /* above zero, as a number with a sign */
+#else
+      *totals += potential >> 31 ? -(int64_t)(0 - potential) : (int64_t)potential;
+#endif
+      if (--left == 0) {
+        left = SDNN_GROUP_SIZE;
+        ++totals;
+      }
+    }
+  }
+}
+
+/* Returns whether every value of a sample has a bin. */
+static inline int sdnn_totals_of(const double* x, sdnn_total* totals) {
+  uint32_t bins[SDNN_N_INPUTS], i;
+  sdnn_code code;
+  if (!sdnn_bins_of(x, bins)) return 0;
+  sdnn_encode(bins, &code);
+  for (i = 0; i < SDNN_N_GROUPS; ++i) totals[i] = 0;
+  for (i = 0; i < SDNN_N_NETWORKS; ++i) sdnn_add_totals(&sdnn_networks[i], &code, totals);
+  return 1;
+}
+
+#if !SDNN_IS_CLASSIFIER
+
+/* Writes the outputs of a sample. Returns 0, and writes nothing, for a sample that is refused: with
+ * infinity, an unknown category or a missing value for which the estimator has no pattern. */
+static inline int sdnn_predict(const double* x, double* y) {
+  sdnn_total totals[SDNN_N_GROUPS];
+  uint32_t i;
+  if (!sdnn_totals_of(x, totals)) return 0;
+  for (i = 0; i < SDNN_N_GROUPS; ++i) {
+    y[i] = sdnn_double_of(sdnn_output(sdnn_ranges + 2 * i, totals[i]));
+  }
+  return 1;
+}
+
+#else
+
+/* The number of a sample's class, or -1 for a sample that is refused: with infinity, an unknown
+ * category or a missing value for which the estimator has no pattern. */
+static inline int32_t sdnn_predict(const double* x) {
+  sdnn_total totals[SDNN_N_GROUPS];
+  return sdnn_totals_of(x, totals) ? sdnn_class_of(totals) : -1;
+}
+
+/* Writes the scores of the classes. Returns 0, and writes nothing, for a sample that is refused. */
+static inline int sdnn_scores(const double* x, double* scores) {
+  sdnn_total totals[SDNN_N_GROUPS];
+  sdnn_real bits[SDNN_N_CLASSES];
+  uint32_t i;
+  if (!sdnn_totals_of(x, totals)) return 0;
+  sdnn_scores_of(totals, bits);
+  for (i = 0; i < SDNN_N_CLASSES; ++i) scores[i] = sdnn_double_of(bits[i]);
+  return 1;
+}
+
+#endif
+
+#endif /* SDNN_GREEDY_ESTIMATOR_H */

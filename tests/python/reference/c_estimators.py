@@ -1,0 +1,222 @@
+"""Estimators whose predictions are made in C, and programs that compile and ask them."""
+
+import functools
+import warnings
+
+import numpy as np
+
+from bare_processors import BARE_TARGETS, STDIO
+from c_policies import STRICT, run
+from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
+from sdnn.export import export_estimator_header
+
+SMALL = {"n_pattern_units": 24, "max_iter": 8, "random_state": 0}
+COLORS = ("blue", "gr\u00fcn", "red")
+SIZES = (1.0, 2.5, -4.0, 0.0)
+
+
+def numbers(n_samples, seed, n_features=3):
+    """Uniform numbers, a fifth of the range beyond [0, 1] on either side."""
+    return np.random.default_rng(seed).uniform(-0.2, 1.2, (n_samples, n_features))
+
+
+def lacking(n_samples, seed):
+    """Numbers of which some are missing, a constant column, and numbers as categories."""
+    random = np.random.default_rng(seed)
+    X = numbers(n_samples, seed, 4)
+    X[:, 1] = 2.5
+    X[:, 3] = random.choice(SIZES, n_samples)
+    X[random.random(n_samples) < 0.1, 0] = np.nan
+    X[random.random(n_samples) < 0.1, 3] = np.nan
+    return X
+
+
+def words(n_samples, seed):
+    """A word that may be missing or unknown, a number, a day of the week and an angle."""
+    random = np.random.default_rng(seed)
+    X = np.empty((n_samples, 4), object)
+    X[:, 0] = random.choice([*COLORS, "pink", None], n_samples)
+    X[:, 1] = random.normal(size=n_samples) * 1e3
+    X[:, 2] = random.integers(0, 7, n_samples).tolist()
+    X[:, 3] = random.uniform(-1e3, 1e3, n_samples).tolist()
+    return X
+
+
+def targets(X, n_outputs):
+    """Sums of functions of the columns, of one or several outputs."""
+    table = np.array([[hash_of(value) for value in row] for row in X])
+    waves = [np.sin((1 + k) * table).sum(axis=1) * 10.0**k for k in range(n_outputs)]
+    return waves[0] if n_outputs == 1 else np.stack(waves, axis=1)
+
+
+def labels(X, n_classes):
+    """Numbers of classes: ranks of a target."""
+    ranks = targets(X, 1).argsort().argsort()
+    return ranks * n_classes // len(X)
+
+
+def hash_of(value):
+    """A number for a value of any type."""
+    if value is None or value != value:
+        return 9.0
+    return float(len(value)) if isinstance(value, str) else float(value)
+
+
+def several_outputs():
+    """Four networks, three outputs, missing values, a constant column, numbers as categories."""
+    coding = [(WithMissing(base=Symbolic(categories=SIZES)), [3])]
+    model = SDNNRegressor(coding, n_output_units=37, **SMALL)
+    return model.fit(X := lacking(300, 1), targets(X, 3)), lacking
+
+
+def categories():
+    """Words, a matrix of correlations, a circle and quantiles; separate tables."""
+    away = np.abs(np.subtract.outer(np.arange(7), np.arange(7)))
+    coding = [
+        (WithMissing(base=Symbolic(categories=COLORS)), [0]),
+        (RandomInverse(spacing="quantile"), [1]),
+        (CorrelationMatrix(matrix=0.8**away), [2]),
+        (Circular(period=360.0, origin=-17.3), [3]),
+    ]
+    model = SDNNRegressor(coding, n_output_units=30, tables="separate", **SMALL)
+    return model.fit(X := words(300, 2), targets(X, 1)), words
+
+
+def plain_pairs():
+    """Anchors, a plain pattern, an input that no pair uses, a single network."""
+    settings = SMALL | {"n_pattern_units": 300, "n_averaged_epochs": 1}
+    pairs = [(0, None), (2, 0)]
+    model = SDNNRegressor(Anchor(n_interpolated=7), n_output_units=21, pairs=pairs, **settings)
+    return model.fit(X := numbers(300, 3), targets(X, 1)), numbers
+
+
+def wide_weights():
+    """Weights of more than a byte, and a range of outputs that is tiny and far from 0."""
+    settings = SMALL | {"max_iter": 400}
+    X = numbers(200, 4, 2)
+    y = 1e6 + 1e-3 * np.random.default_rng(0).normal(size=200)
+    return SDNNRegressor(n_output_units=9, **settings).fit(X, y), lambda n, s: numbers(n, s, 2)
+
+
+def two_classes():
+    """Several units for either class."""
+    model = SDNNClassifier(**SMALL, n_units_per_class=13)
+    return model.fit(X := lacking(300, 5), labels(X, 2)), lacking
+
+
+def many_classes():
+    """Labels that are words, and more classes than a byte has numbers."""
+    model = SDNNClassifier(**SMALL, n_units_per_class=2)
+    X = numbers(900, 6)
+    return model.fit(X, [f"class {c}" for c in labels(X, 300)]), numbers
+
+
+def single_units():
+    """One unit for each class, whose potential is its score."""
+    model = SDNNClassifier(**SMALL, n_units_per_class=1, n_averaged_epochs=3)
+    return model.fit(X := numbers(300, 7), labels(X, 5)), numbers
+
+
+def one_vs_one():
+    """Units for pairs of classes; the mean of three networks is rounded."""
+    settings = SMALL | {"scheme": "one_vs_one", "n_averaged_epochs": 3}
+    return SDNNClassifier(**settings).fit(X := numbers(300, 8), labels(X, 6)), numbers
+
+
+def one_pair():
+    """A unit for the only pair of classes."""
+    model = SDNNClassifier(**SMALL, scheme="one_vs_one")
+    return model.fit(X := numbers(300, 9), labels(X, 2)), numbers
+
+
+ESTIMATORS = {
+    "several-outputs": several_outputs, "categories": categories, "plain-pairs": plain_pairs,
+    "wide-weights": wide_weights, "two-classes": two_classes, "many-classes": many_classes,
+    "single-units": single_units, "one-vs-one": one_vs_one, "one-pair": one_pair,
+}  # fmt: skip
+
+
+@functools.cache
+def fitted(name):
+    """An estimator of `ESTIMATORS`, and a function that draws samples."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return ESTIMATORS[name]()
+
+
+PREDICT = """
+#include <stdio.h>
+#include "model.h"
+#if MODEL_IS_CLASSIFIER
+#define N_RESULTS (1 + MODEL_N_CLASSES)
+#else
+#define N_RESULTS MODEL_N_OUTPUTS
+#endif
+int main(void) {
+  static double x[MODEL_N_FEATURES], y[N_RESULTS];
+  while (fread(x, sizeof *x, MODEL_N_FEATURES, stdin) == MODEL_N_FEATURES) {
+#if MODEL_IS_CLASSIFIER
+    y[0] = model_number(model_predict(x), 0);
+    if (!model_scores(x, y + 1)) return 1;
+#else
+    if (!model_predict(x, y)) return 1;
+#endif
+    fwrite(y, sizeof *y, N_RESULTS, stdout);
+  }
+  return 0;
+}
+"""
+
+
+def rows_in_c(model, X):
+    """Samples as a program in C gets them: words as their numbers, missing values as NaN."""
+    X = np.array(X, object)
+    for index, coding in enumerate(model.codings_):
+        base = coding.base if isinstance(coding, WithMissing) else coding
+        known = list(getattr(base, "categories", None) or ())
+        if any(isinstance(category, str) for category in known):
+            X[:, index] = [
+                known.index(word) if word in known else np.nan if word is None else len(known)
+                for word in X[:, index]
+            ]
+    return X.astype(np.float64)
+
+
+def compiled(folder, source, target, *options):
+    """Compile a program with a header in its folder; return its command."""
+    if target in BARE_TARGETS.values():
+        (folder / "stdio.h").write_text(STDIO)
+    (folder / "program.c").write_text(source)
+    run(
+        target.compiler, *STRICT, "-O2", *target.options, *options,
+        *(("-static",) if target.runner else ()),
+        "-I", folder, folder / "program.c", "-o", folder / "program",
+    )  # fmt: skip
+    return [target.runner, folder / "program"] if target.runner else [folder / "program"]
+
+
+def predictions(model, X):
+    """What the program writes: outputs, or the class and the scores of all classes."""
+    if isinstance(model, SDNNRegressor):
+        return model.predict(X).reshape(len(X), -1)
+    winners = np.searchsorted(model.classes_, model.predict(X))
+    scores = model.decision_function(X)
+    if model._n_units_each > 1:
+        scores = model._scores(model._bins(X), 1)
+    elif scores.ndim == 1:
+        scores = np.stack([-scores, scores], axis=1)
+    return np.column_stack([winners, scores])
+
+
+def check_predictions(name, target, folder, n_samples, *options):
+    """Compare the bits of predictions."""
+    model, draw = fitted(name)
+    export_estimator_header(model, folder / "model.h")
+    X = draw(n_samples, 11)
+    written = run(*compiled(folder, PREDICT, target, *options), input=rows_in_c(model, X).tobytes())
+    expected = predictions(model, X)
+    assert len(np.unique(expected[:, 0])) > 1
+    np.testing.assert_array_equal(
+        np.frombuffer(written, np.int64).reshape(expected.shape), expected.view(np.int64)
+    )
