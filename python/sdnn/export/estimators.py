@@ -3,61 +3,31 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from sdnn._core import __version__
-from sdnn.export.coded_inputs import add_inputs, coded_input
-from sdnn.export.input_pairs import PairTables
-from sdnn.export.text import (
-    Tables,
-    c_source,
-    c_strings,
-    comment,
-    define_lines,
-    joined,
-    rounded_up,
-    weight_words,
-)
-from sdnn.export.writer import require_few_weights
-from sdnn.support.arguments import argument_error, path_of, shown, whole
+from sdnn.export.estimator_writer import EstimatorHeader, EstimatorWriter
+from sdnn.support.arguments import argument_error, flag, path_of, shown, whole
 from sdnn.support.files import write_whole
 
 if TYPE_CHECKING:
-    from sdnn.estimators import SDNNClassifier, SDNNRegressor
-    from sdnn.estimators.network import Network
-
-    Model: TypeAlias = SDNNRegressor | SDNNClassifier
+    from sdnn.export.estimator_writer import Model
 
 CODE_BYTES = 6000  # of a header's functions, compiled for size on a Cortex-M0+, at most
 _LONGEST_NAME = 40
-_MOST_OF_TWO_BYTES = 32512
 _REMEDY = (
     "train with the settings of sdnn.export.small_settings(), or with n_averaged_epochs=1, and"
     " smaller n_output_units, n_units_per_class, n_pattern_units or fewer pairs"
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class EstimatorHeader:
-    """A C header that holds a regressor or a classifier.
-
-    ``text`` is the file and ``name`` the prefix of its names. ``flash_bytes`` of constants include
-    ``weight_bytes``. ``ram_bytes`` are the arrays that a prediction has on the stack.
-    """
-
-    name: str
-    text: str
-    flash_bytes: int
-    weight_bytes: int
-    ram_bytes: int
-
-
 def export_estimator_header(
-    model: Model, path: str | Path, *, name: str | None = None, flash_bytes: int | None = None
+    model: Model,
+    path: str | Path,
+    *,
+    name: str | None = None,
+    learning: bool = False,
+    flash_bytes: int | None = None,
 ) -> EstimatorHeader:
     """Write a fitted estimator as a C header and return it.
 
@@ -65,23 +35,34 @@ def export_estimator_header(
     ending; everything else is as for `estimator_header`.
     """
     place = path_of("path", path)
-    header = estimator_header(model, place.stem if name is None else name, flash_bytes=flash_bytes)
+    header = estimator_header(
+        model,
+        place.stem if name is None else name,
+        learning=learning,
+        flash_bytes=flash_bytes,
+    )
     write_whole(place, header.text.encode())
     return header
 
 
-def estimator_header(model: Model, name: str, *, flash_bytes: int | None = None) -> EstimatorHeader:
+def estimator_header(
+    model: Model, name: str, *, learning: bool = False, flash_bytes: int | None = None
+) -> EstimatorHeader:
     """Return a fitted `SDNNRegressor` or `SDNNClassifier` as a C header.
 
     The header is C99 and C++, and needs ``<stdint.h>`` only, no heap and no floating point: it
     calculates with doubles in integers. Its predictions are those of ``model.predict``, to the
-    bit. See docs/how-to/estimators-on-a-chip.md.
+    bit. With ``learning`` it also learns samples as ``model.learn_one`` does, to the same weights.
+    See docs/how-to/estimators-on-a-chip.md.
 
     Parameters
     ----------
     model : SDNNRegressor or SDNNClassifier
     name : str
         Prefix of all names in the header.
+    learning : bool, optional
+        Write an estimator that learns, with its weights in a struct. It begins with the last of the
+        averaged networks, as ``model.partial_fit`` does.
     flash_bytes : int, optional
         Bytes that constants and code may take; by default any number.
 
@@ -91,7 +72,8 @@ def estimator_header(model: Model, name: str, *, flash_bytes: int | None = None)
         For other estimators.
     ValueError
         If ``name`` is not a C identifier, the header takes more than ``flash_bytes``, the model has
-        more than 2^26 weights or a weight of more than 16 bits, or a coding has no form in C.
+        more than 2^26 weights or a weight of more than 16 bits, a coding has no form in C, or a
+        parameter does not allow ``learning``.
     sklearn.exceptions.NotFittedError
         If the model is not fitted.
 
@@ -117,7 +99,13 @@ def estimator_header(model: Model, name: str, *, flash_bytes: int | None = None)
             f" at most {_LONGEST_NAME} long, got {shown(name)}",
         )
     limit = None if flash_bytes is None else whole("flash_bytes", flash_bytes, 1, 2**40)
-    header = EstimatorWriter(checked_model(model), name).header()
+    writer = EstimatorWriter
+    fitted = checked_model(model)
+    if flag("learning", learning):
+        from sdnn.export.estimator_learner import EstimatorLearner  # imports scikit-learn
+
+        writer = EstimatorLearner
+    header = writer(fitted, name).header()
     require_flash(header, limit)
     return header
 
@@ -143,183 +131,3 @@ def require_flash(header: EstimatorHeader, limit: int | None) -> None:
             f"must be at least {needed}, for constants of {header.flash_bytes} bytes (weights:"
             f" {header.weight_bytes}) and code of up to {CODE_BYTES}, got {limit}: {_REMEDY}",
         )
-
-
-class EstimatorWriter:
-    """Makes the header of an estimator that predicts."""
-
-    title = "a regressor or classifier"
-
-    def __init__(self, model: Model, name: str) -> None:
-        self.model, self.name = model, name
-        self.networks: tuple[Network, ...] = (*model._earlier, model.network_)
-        self.code = model.network_.input_code
-        self.inputs = [coded_input(index, self.code.codings[index]) for index in self.code.used]
-        self.pairs = PairTables(self.code)
-        self.is_classifier = hasattr(model, "classes_")
-        self.n_units = model.network_.n_units
-        weights = len(self.networks) * self.n_units * self.code.core.n_columns
-        require_few_weights(weights, "n_averaged_epochs, units")
-
-    @property
-    def group_size(self) -> int:
-        """Number of units of an output or a class."""
-        each = self.model._n_units_each if self.is_classifier else self.model._counts_of_range
-        return int(each)
-
-    def defines(self) -> dict[str, object]:
-        """Return the macros of the units."""
-        model = self.model
-        values: dict[str, object] = {
-            "N_FEATURES": len(self.code.codings),
-            "N_UNITS": self.n_units,
-            "GROUP_SIZE": self.group_size,
-            "N_GROUPS": self.n_units // self.group_size,
-            "IS_CLASSIFIER": int(self.is_classifier),
-        }
-        if self.is_classifier:
-            is_one_vs_one = int(model._scheme == "one_vs_one")
-            return {**values, "N_CLASSES": len(model.classes_), "IS_ONE_VS_ONE": is_one_vs_one}
-        counts = {"N_OUTPUTS": model.n_outputs_, "COUNTS_OF_RANGE": model._counts_of_range}
-        return {**values, **counts}
-
-    def header(self) -> EstimatorHeader:
-        """Make the header."""
-        tables = Tables(self.name)
-        macros = self.defines() | add_inputs(tables, self.inputs) | self.pairs.add(tables)
-        n_bytes = tables.n_bytes
-        macros |= self.add_networks(tables)
-        weight_bytes = tables.n_bytes - n_bytes
-        if not self.is_classifier:
-            ranges = np.ascontiguousarray(self.model.output_range_).view(np.uint64).reshape(-1)
-            about = "Lowest and highest output: bits of doubles."
-            tables.add("uint64_t", "ranges", ranges, about)
-        ram_bytes = self.ram_bytes()
-        text = self.text("sdnn_greedy_estimator.h", macros, tables, ram_bytes)
-        return EstimatorHeader(
-            name=self.name,
-            text=text,
-            flash_bytes=tables.n_bytes,
-            weight_bytes=weight_bytes,
-            ram_bytes=ram_bytes,
-        )
-
-    def add_networks(self, tables: Tables) -> dict[str, object]:
-        """Add the weights of all networks to the tables; return the macros of the networks."""
-        rows = []
-        for number, network in enumerate(self.networks):
-            weights, thresholds = network.layer.weights, network.layer.thresholds
-            if np.abs(weights, dtype=np.int64).max() > _MOST_OF_TWO_BYTES:
-                raise ValueError(
-                    f"model must have weights up to {_MOST_OF_TWO_BYTES} for a C header, got"
-                    f" {np.abs(weights).max()}: train with a smaller max_iter"
-                )
-            words, n_bytes = weight_words(weights)
-            padded = np.pad(thresholds, (0, -len(thresholds) % 4))
-            tables.add("uint32_t", f"weights_{number}", words, "Weights, those of four units each.")
-            tables.add("int32_t", f"thresholds_{number}", padded)
-            tables.add("uint8_t", f"weight_bytes_{number}", n_bytes)
-            parts = ("weights", "thresholds", "weight_bytes")
-            names = ", ".join(f"{self.name}_{part}_{number}" for part in parts)
-            rows.append(f"{{{names}}},")
-        return {"N_NETWORKS": len(self.networks), "NETWORKS": rows}
-
-    def ram_bytes(self) -> int:
-        """Return the bytes of the arrays on the stack."""
-        column_bytes = 2 if self.code.core.n_columns <= 2**16 else 4
-        n_groups, counts_units = self.n_units // self.group_size, self.group_size > 1
-        n_bytes = rounded_up(column_bytes * self.pairs.most_columns, 4) + 8
-        n_bytes += (
-            4 * len(self.inputs) + (4 if counts_units or not self.is_classifier else 8) * n_groups
-        )
-        if self.is_classifier:
-            n_bytes += (
-                8 * len(self.model.classes_) * (3 if self.model._scheme == "one_vs_one" else 1)
-            )
-        return n_bytes
-
-    def text(self, file: str, macros: dict[str, object], tables: Tables, ram_bytes: int) -> str:
-        """Return the text of the header, with the C code of ``file``."""
-        macro = self.name.upper()
-        return joined([
-            *comment(
-                f"{self.name}.h: {self.title}, in C99 for small processors.",
-                "",
-                f"Made by sdnn {__version__} of an {type(self.model).__name__} with"
-                f" {self.n_units} units over {self.code.core.n_columns} columns.",
-                "",
-                *self.needs(tables.n_bytes, ram_bytes),
-                "",
-                "Needs <stdint.h> and nothing else of a C library; it is C++ too. It calculates in",
-                "integers, with doubles too: their bits are those of the library on any processor.",
-                "Include it in one source file: its constants are static.",
-                "",
-                *self.usage(),
-            ),
-            f"#ifndef SDNN_{macro}_H",
-            f"#define SDNN_{macro}_H",
-            "",
-            "#include <stdint.h>",
-            "",
-            *define_lines(macro, macros),
-            "",
-            *tables.lines,
-            *self.words(),
-            "",
-            c_source(file, self.name, ["sdnn_observation.h"]),
-            f"#endif /* SDNN_{macro}_H */",
-        ])  # fmt: skip
-
-    def needs(self, flash_bytes: int, ram_bytes: int) -> list[str]:
-        """Return comment lines about memory."""
-        return [
-            f"Flash: {flash_bytes:,} bytes of constants; the code comes to some 4 to 6 kB.",
-            f"RAM:   {ram_bytes:,} bytes of arrays on the stack, and at most 512 bytes for all",
-            "       else there. No heap, and nothing static that changes.",
-        ]
-
-    def calls(self) -> list[str]:
-        """Return example lines of C that predict."""
-        name, macro = self.name, self.name.upper()
-        if self.is_classifier:
-            return [f"int32_t c = {name}_predict(x); // the label is {name}_classes[c]; or -1"]
-        return [
-            f"double y[{macro}_N_OUTPUTS];",
-            f"int is_predicted = {name}_predict(x, y);",
-        ]
-
-    def usage(self) -> list[str]:
-        """Return comment lines about the calls, and the values of a sample."""
-        names = self.model._feature_names() or [""] * len(self.code.codings)
-        values = [
-            f"  {source.usage(names[source.column])}".replace("*/", "* /")
-            .replace("CATEGORIES", f"{self.name}_categories")
-            .encode("ascii", "backslashreplace")
-            .decode()
-            for source in self.inputs
-        ]
-        return [
-            f'  #include "{self.name}.h"',
-            f"  double x[{self.name.upper()}_N_FEATURES];",
-            *(f"  {line}" for line in self.calls()),
-            "",
-            "The values of a sample; others are ignored:",
-            *values,
-            f"{self.name}_missing() is a missing value, and {self.name}_number(n, -8) is n / 2^8.",
-        ]
-
-    def words(self) -> list[str]:
-        """Return the categories and classes that are words, as tables of strings."""
-        lines = []
-        for source in self.inputs:
-            if source.type == "WORDS":
-                name = f"{self.name}_categories_{source.column}"
-                lines += c_strings(name, map(str, source.categories))
-        if not self.is_classifier:
-            return lines
-        classes, name = self.model.classes_.tolist(), f"{self.name}_classes"
-        if all(isinstance(label, int) and abs(label) < 2**31 for label in classes):
-            numbers = Tables(self.name)
-            numbers.add("int32_t", "classes", np.array(classes, np.int64), "Labels of the classes.")
-            return [*lines, *numbers.lines]
-        return [*lines, *c_strings(name, map(str, classes))]

@@ -3,12 +3,37 @@
 ``nox -s emulation`` has other compilers and processors.
 """
 
+import numpy as np
 import pytest
 
-from c_estimators import ESTIMATORS, check_predictions
-from c_policies import TARGETS
+from c_estimators import (
+    ESTIMATORS,
+    LEARN,
+    SMALL,
+    check_learning,
+    check_predictions,
+    compiled,
+    fitted,
+    numbers,
+)
+from c_policies import STRICT_CPP, TARGETS, program, run
+from sdnn import SDNNClassifier, SDNNRegressor
+from sdnn.coding import Circular, RandomInverse, Symbolic
+from sdnn.export import estimator_header, export_estimator_header
 
 SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all", "-fsanitize=address")
+BINS = """
+#include <stdio.h>
+#include "model.h"
+int main(void) {
+  double x[2]; uint32_t bins[2];
+  while (fread(x, sizeof *x, 2, stdin) == 2) {
+    if (!model_bins_of(x, bins)) return 1;
+    fwrite(bins, sizeof *bins, 2, stdout);
+  }
+  return 0;
+}
+"""
 
 
 @pytest.fixture
@@ -20,3 +45,125 @@ def target(needs):
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_predictions_in_c_have_the_bits_of_the_estimator(name, target, tmp_path):
     check_predictions(name, target, tmp_path, 300, *SANITIZED)
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_learning_in_c_has_the_bits_of_the_estimator(name, target, tmp_path):
+    check_learning(name, target, tmp_path, 150, *SANITIZED)
+
+
+@pytest.mark.parametrize("name", ["several-outputs", "categories", "plain-pairs"])
+def test_any_doubles_have_defined_results(name, target, tmp_path):
+    # The sanitizers end a program that computes what C leaves open.
+    model, _ = fitted(name)
+    export_estimator_header(model, tmp_path / "model.h", learning=True)
+    random = np.random.default_rng(0)
+    n_values = model.n_features_in_ + model.n_outputs_
+    bits = random.integers(0, 2**64, (20_000, n_values), np.uint64)
+    extremes = [0.0, -0.0, 5e-324, -2e-308, 1.7976931348623157e308, -1e308, np.inf, -np.inf, np.nan]
+    values = np.where(random.random(bits.shape) < 0.5, bits.view(np.float64), 1.0)
+    values = np.where(random.random(bits.shape) < 0.3, random.choice(extremes, bits.shape), values)
+    written = run(*compiled(tmp_path, LEARN, target, *SANITIZED), input=values.tobytes())
+    is_learned = np.frombuffer(written, np.float64, 20_000 * (model.n_outputs_ + 1))
+    assert 0.0 < is_learned.reshape(20_000, -1)[:, -1].mean() < 1.0
+
+
+@pytest.mark.parametrize("spacing", ["even", "quantile"])
+def test_extreme_numbers_have_the_bins_of_the_coding(spacing, target, tmp_path):
+    random = np.random.default_rng(0)
+    X = random.integers(0, 2**64, (400, 2), np.uint64).view(np.float64)
+    X = np.where(np.isfinite(X), np.clip(X, -1e300, 1e300), 0.0)
+    X[::2] = random.uniform(-1e300, 1e300, (200, 2))
+    coding = RandomInverse(spacing=spacing, n_bins=60)
+    settings = SMALL | {"ranges": "all", "n_output_units": 10}
+    model = SDNNRegressor(coding, **settings).fit(X[:300], np.arange(300.0))
+    export_estimator_header(model, tmp_path / "model.h")
+    written = run(*compiled(tmp_path, BINS, target, *SANITIZED), input=X.tobytes())
+    expected = model.network_.input_code.bins(X)
+    np.testing.assert_array_equal(np.frombuffer(written, "<i4").reshape(-1, 2), expected)
+    assert len(np.unique(expected)) > 20
+
+
+def test_values_at_the_limits_of_bins_have_the_bins_of_the_coding(target, tmp_path):
+    # Neighbours of each limit, those of a circle too, whose places are rounded to nine decimals.
+    coding = [(Circular(period=0.7, origin=0.1), [1])]
+    X = np.array([[-0.3, 0.0], [1.7, 1.0]])
+    model = SDNNRegressor(coding, n_output_units=10, **SMALL).fit(X, [0.0, 1.0])
+    export_estimator_header(model, tmp_path / "model.h")
+    n_even, n_circle = (coding.size for coding in model.codings_)
+    limits = [-0.3 + 2.0 * np.arange(n_even + 1) / n_even, 0.1 + 0.7 * np.arange(999) / n_circle]
+    around = [
+        np.concatenate([np.nextafter(x, -9), x, np.nextafter(x, 9), x - 1e-10, x - 1e-9])
+        for x in (np.resize(column, 999) for column in limits)
+    ]
+    table = np.stack(around, axis=1)
+    written = run(*compiled(tmp_path, BINS, target, *SANITIZED), input=table.tobytes())
+    expected = model.network_.input_code.bins(table)
+    np.testing.assert_array_equal(np.frombuffer(written, "<i4").reshape(-1, 2), expected)
+
+
+def test_a_sample_that_the_estimator_refuses_is_refused_in_c(target, tmp_path):
+    model = SDNNRegressor([(Symbolic(), [1])], n_output_units=10, **SMALL)
+    model.fit([[0.0, 1.0], [1.0, 2.0]], [0.0, 1.0])
+    export_estimator_header(model, tmp_path / "model.h")
+    source = """
+        #include "model.h"
+        int main(void) {
+          double good[2] = {0.5, 2.0}, unknown[2] = {0.5, 3.0}, lacks[2], infinite[2] = {0.0, 1.0};
+          double y[1] = {7.0};
+          lacks[0] = model_missing();
+          lacks[1] = 1.0;
+          infinite[0] = model_number(1, 0) / 0.0;
+          if (model_predict(unknown, y) || model_predict(lacks, y) || model_predict(infinite, y))
+            return 1;
+          return !(y[0] == 7.0 && model_predict(good, y) && y[0] < 7.0);
+        }
+    """
+    run(*compiled(tmp_path, source, target))
+
+
+def test_a_weight_that_would_exceed_16_bits_is_not_learned(target, tmp_path):
+    model = SDNNClassifier(**SMALL, n_units_per_class=1)
+    model.fit(numbers(50, 1), np.arange(50) % 2)
+    export_estimator_header(model, tmp_path / "model.h", learning=True)
+    source = """
+        #include "model.h"
+        static model_model model;
+        int main(void) {
+          const double x[MODEL_N_FEATURES] = {0.5, 0.5, 0.5};
+          const uint32_t n = MODEL_N_COLUMNS * MODEL_N_UNITS;
+          uint32_t i;
+          model_begin(&model);
+          model.largest[0] = model.largest[1] = 32767;
+          for (i = 0; i < n; ++i) model.weights[i] = 32767;
+          /* Both units are on one side, so that either label needs a correction. */
+          if (model_learn(&model, x, 0) || model_learn(&model, x, 1)) return 1;
+          for (i = 0; i < n; ++i) {
+            if (model.weights[i] != 32767) return 2;
+          }
+          for (i = 0; i < n; ++i) model.weights[i] = 5; /* far from the bound that is known */
+          if (!model_learn(&model, x, 0) || !model_learn(&model, x, 1)) return 3;
+          return model.largest[0] + model.largest[1] > 6 + 32767;
+        }
+    """
+    run(*compiled(tmp_path, source, target, *SANITIZED))
+
+
+@pytest.mark.parametrize("compiler", ["g++", "clang++"])
+@pytest.mark.parametrize("name", ["several-outputs", "one-vs-one"])
+def test_the_headers_are_cpp(compiler, name, needs, tmp_path):
+    needs(compiler)
+    model, _ = fitted(name)
+    for header, learning in (("greedy", False), ("learner", True)):
+        export_estimator_header(model, tmp_path / f"{header}.h", learning=learning)
+    source = """
+        #include "greedy.h"
+        #include "learner.h"
+        static learner_model model;
+        int main() {
+          learner_begin(&model);
+          return sizeof(model) == SIZE ? 0 : 1;
+        }
+    """
+    size = estimator_header(model, "learner", learning=True).ram_bytes
+    run(program(tmp_path, source.replace("SIZE", str(size)), compiler, *STRICT_CPP))

@@ -1,5 +1,6 @@
 """Estimators whose predictions are made in C, and programs that compile and ask them."""
 
+import copy
 import functools
 import warnings
 
@@ -130,10 +131,29 @@ def one_pair():
     return model.fit(X := numbers(300, 9), labels(X, 2)), numbers
 
 
+def widening():
+    """Outputs beyond the first range stretch it."""
+    model = SDNNRegressor(n_output_units=37, out_of_range="widen", **SMALL)
+    return model.fit(X := numbers(300, 10), 0.1 * targets(X, 2)), numbers
+
+
+def averaging():
+    """A share of the units is corrected."""
+    model = SDNNRegressor(n_output_units=37, correction_share=0.3, **SMALL)
+    return model.fit(X := numbers(300, 11), targets(X, 1)), numbers
+
+
+def strict():
+    """Numbers and outputs beyond their range are refused."""
+    model = SDNNRegressor(n_output_units=20, out_of_range="error", **SMALL)
+    return model.fit(X := numbers(300, 12), 0.5 * targets(X, 1)), lambda n, s: 1.2 * numbers(n, s)
+
+
 ESTIMATORS = {
     "several-outputs": several_outputs, "categories": categories, "plain-pairs": plain_pairs,
     "wide-weights": wide_weights, "two-classes": two_classes, "many-classes": many_classes,
     "single-units": single_units, "one-vs-one": one_vs_one, "one-pair": one_pair,
+    "widening": widening, "averaging": averaging, "strict": strict,
 }  # fmt: skip
 
 
@@ -145,14 +165,18 @@ def fitted(name):
         return ESTIMATORS[name]()
 
 
+SIZES_OF_RESULTS = """
+#if MODEL_IS_CLASSIFIER
+#define N_RESULTS (1 + MODEL_N_CLASSES)
+#define N_TARGETS 1
+#else
+#define N_RESULTS MODEL_N_OUTPUTS
+#define N_TARGETS MODEL_N_OUTPUTS
+#endif
+"""
 PREDICT = """
 #include <stdio.h>
 #include "model.h"
-#if MODEL_IS_CLASSIFIER
-#define N_RESULTS (1 + MODEL_N_CLASSES)
-#else
-#define N_RESULTS MODEL_N_OUTPUTS
-#endif
 int main(void) {
   static double x[MODEL_N_FEATURES], y[N_RESULTS];
   while (fread(x, sizeof *x, MODEL_N_FEATURES, stdin) == MODEL_N_FEATURES) {
@@ -164,6 +188,35 @@ int main(void) {
 #endif
     fwrite(y, sizeof *y, N_RESULTS, stdout);
   }
+  return 0;
+}
+"""
+
+
+LEARN = """
+#include <stdio.h>
+#include "model.h"
+static model_model model;
+int main(void) {
+  static double x[MODEL_N_FEATURES], y[N_TARGETS], z[1 + N_RESULTS];
+  model_begin(&model);
+  while (fread(x, sizeof *x, MODEL_N_FEATURES, stdin) == MODEL_N_FEATURES) {
+    if (fread(y, sizeof *y, N_TARGETS, stdin) != N_TARGETS) return 1;
+#if MODEL_IS_CLASSIFIER
+    z[0] = model_number(model_predict(&model, x), 0);
+    if (!model_scores(&model, x, z + 1)) z[1] = model_missing();
+    z[N_RESULTS] = model_number(model_learn(&model, x, (uint32_t)model_fixed(y[0], 0)), 0);
+#else
+    if (!model_predict(&model, x, z)) z[0] = model_missing();
+    z[N_RESULTS] = model_number(model_learn(&model, x, y), 0);
+#endif
+    fwrite(z, sizeof *z, 1 + N_RESULTS, stdout);
+  }
+  fwrite(model.weights, sizeof *model.weights, MODEL_N_COLUMNS * MODEL_N_UNITS, stdout);
+  fwrite(model.thresholds, sizeof *model.thresholds, MODEL_N_UNITS, stdout);
+#if !MODEL_IS_CLASSIFIER
+  fwrite(model.ranges, sizeof *model.ranges, 2 * MODEL_N_OUTPUTS, stdout);
+#endif
   return 0;
 }
 """
@@ -187,7 +240,8 @@ def compiled(folder, source, target, *options):
     """Compile a program with a header in its folder; return its command."""
     if target in BARE_TARGETS.values():
         (folder / "stdio.h").write_text(STDIO)
-    (folder / "program.c").write_text(source)
+    include = '#include "model.h"\n'
+    (folder / "program.c").write_text(source.replace(include, include + SIZES_OF_RESULTS))
     run(
         target.compiler, *STRICT, "-O2", *target.options, *options,
         *(("-static",) if target.runner else ()),
@@ -220,3 +274,70 @@ def check_predictions(name, target, folder, n_samples, *options):
     np.testing.assert_array_equal(
         np.frombuffer(written, np.int64).reshape(expected.shape), expected.view(np.int64)
     )
+
+
+def targets_to_learn(model, X):
+    """Outputs, some beyond those of `fit`, or the numbers of classes."""
+    if isinstance(model, SDNNClassifier):
+        return labels(X, len(model.classes_)).astype(np.float64)[:, None]
+    y = targets(X, model.n_outputs_).reshape(len(X), -1)
+    low, high = model.output_range_.T
+    middle = y.mean(axis=0)
+    return (low + high) / 2 + 0.6 * (high - low) * (y - middle) / np.abs(y - middle).max(axis=0)
+
+
+def learned_in_python(model, X, y):
+    """Learn samples; return the rows that the program writes, with NaN for those refused."""
+    n_results = predictions(model, X[:1]).shape[1]
+    rows = np.full((len(X), n_results + 1), np.nan)
+    rows[:, -1] = 0
+    for row, (sample, target) in enumerate(zip(X, y, strict=True)):
+        try:
+            rows[row, :-1] = predictions(model, sample[None])[0]
+        except ValueError:
+            continue
+        try:
+            if isinstance(model, SDNNClassifier):
+                model.learn_one(sample, model.classes_[int(target[0])])
+            else:
+                model.learn_one(sample, float(target[0]) if model._flat else target)
+        except ValueError:
+            continue
+        rows[row, -1] = 1
+    return rows
+
+
+def check_learning(name, target, folder, n_samples, *options):
+    """Compare the bits of predictions, weights, thresholds and ranges while samples are learned."""
+    fitted_model, draw = fitted(name)
+    model = copy.deepcopy(fitted_model)
+    X = draw(n_samples, 12)
+    y = targets_to_learn(model, X)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        if model._earlier:
+            learned_in_python(model, X[:40], y[:40])  # predictions are then those of one network
+        assert model._earlier == ()
+        export_estimator_header(model, folder / "model.h", learning=True)
+        before = model.weights_
+        expected = learned_in_python(model, X, y)
+    assert np.any(before != model.weights_)
+    assert expected[:, -1].mean() > 0.2
+    written = run(
+        *compiled(folder, LEARN, target, *options),
+        input=np.hstack([rows_in_c(model, X), y]).tobytes(),
+    )
+    results = np.frombuffer(written, np.float64, expected.size).reshape(expected.shape)
+    is_written = ~np.isnan(expected).any(axis=1)
+    np.testing.assert_array_equal(results[:, -1], expected[:, -1])
+    np.testing.assert_array_equal(
+        results[is_written].view(np.int64), expected[is_written].view(np.int64)
+    )
+    assert not np.isnan(results[is_written]).any()
+    rest = written[8 * expected.size :]
+    weights = np.frombuffer(rest, np.int16, model.weights_.size)
+    np.testing.assert_array_equal(weights, model.weights_.T.reshape(-1))
+    thresholds = np.frombuffer(rest[weights.nbytes :], np.int32, len(model.thresholds_))
+    np.testing.assert_array_equal(thresholds, model.thresholds_)
+    ranges = rest[weights.nbytes + thresholds.nbytes :]
+    assert ranges == getattr(model, "output_range_", np.empty(0)).tobytes()
