@@ -1,4 +1,4 @@
-"""The command ``sdnn export``: an agent in a form for other programs."""
+"""The command ``sdnn export``: an agent or estimator in a form for other programs."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from sdnn.cli.common import (
     value_of,
     words_of_run,
 )
+from sdnn.cli.export_estimator import estimator_in, export_estimator
 from sdnn.runs.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ _MOST_ACTIONS = 2**16
 _LARGEST = 2**31  # limit of the ranges of observations and actions
 
 
-@click.command(short_help="Write an agent as a C header, for small processors.")
+@click.command(short_help="Write an agent or estimator as a C header, for small processors.")
 @click.argument(
     "source", metavar="[RUN]", required=False, type=click.Path(exists=True, path_type=Path)
 )
@@ -97,6 +98,12 @@ _LARGEST = 2**31  # limit of the ranges of observations and actions
     "--seed", type=SEED, help="With --new: root of the agent's random numbers.  [default: 0]"
 )
 @click.option(
+    "--flash",
+    metavar="BYTES",
+    type=click.IntRange(1, 2**40),
+    help="Most flash that the header's constants may take, and of an estimator its code.",
+)
+@click.option(
     "--name", metavar="PREFIX", help="Prefix of its names.  [default: FILE without ending]"
 )
 @click.option(
@@ -112,6 +119,7 @@ def export(
     learning: bool,
     name: str | None,
     fraction_bits: int | None,
+    flash: int | None,
     as_json: bool,
     new: bool,
     **options: Any,
@@ -120,6 +128,9 @@ def export(
 
     The header observes what the agent did: with --noise or --redundant, variables scaled to [0, 1].
     Its comments name the ranges.
+
+    RUN may also be the file of an SDNNRegressor or SDNNClassifier, which predicts, and with
+    --learning learns.
 
     A new agent needs no RUN, only what it senses and does, here a cart with a pole and two actions:
 
@@ -144,6 +155,14 @@ def export(
             raise click.UsageError(f"{option} needs --new: the agent of RUN has its own")
     learning = learning or new
     with run_command(option_words if source is None else words_of_run(source)):
+        model = None if source is None or source.is_dir() else estimator_in(source)
+        if model is not None:
+            if fraction_bits is not None:
+                raise click.UsageError("--fraction-bits is for agents: an estimator has doubles")
+            export_estimator(
+                model, path, name=name, learning=learning, flash=flash, as_json=as_json
+            )
+            return
         agent = _new_agent(**options) if source is None else _read_agent_of(source)
         try:
             header = c_header(
@@ -163,6 +182,11 @@ def export(
         except (TypeError, RuntimeError) as error:
             prefix = "" if source is None else f"{source}: "
             raise click.ClickException(f"{prefix}{error}") from error
+        if flash is not None and header.flash_bytes > flash:
+            raise click.UsageError(
+                f"--flash must be at least {header.flash_bytes}, for the constants of this agent,"
+                f" got {flash}: make it with --preset small, or fewer units or inputs"
+            )
         write_whole(path, header.text.encode())
     scaling = agent.scaling
     if as_json:

@@ -16,10 +16,11 @@ import pytest
 import drifting_env
 from processes import environment
 from refusals import refuses
+from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.agents import RBFQLearning, SDNNQLearning, Training, evaluate, load_agent
 from sdnn.cli.common import WARMING_UP, value_of
 from sdnn.environments import UnitSensors
-from sdnn.export import c_header
+from sdnn.export import c_header, estimator_header
 from sdnn.runs import AGENTS, Run, RunSpec
 
 SMALL = (
@@ -123,6 +124,35 @@ def test_export_with_learning_writes_the_header_of_a_linear_agent(invoke):
     header = c_header(Run.open("one").agent(), "drift", learning=True)
     assert Path("drift.h").read_text() == header.text
     assert f"{header.ram_bytes:,} bytes of memory" in result.stdout
+
+
+def test_export_writes_the_c_header_of_an_estimator(invoke, refused, tmp_path):
+    X = np.random.default_rng(0).uniform(size=(60, 2))
+    settings = {"n_pattern_units": 32, "max_iter": 3, "random_state": 0}
+    models = {
+        "regressor": SDNNRegressor(n_output_units=20, **settings).fit(X, X[:, 0]),
+        "classifier": SDNNClassifier(n_units_per_class=5, **settings).fit(X, X[:, 0] > 0.5),
+    }
+    for name, model in models.items():
+        model.save(f"{name}.safetensors")
+        for learning in (False, True):
+            options = ["--c-header", f"{name}.h", *(["--learning"] if learning else [])]
+            result = invoke("export", f"{name}.safetensors", *options)
+            assert result.exit_code == 0, result.output
+            header = estimator_header(model, name, learning=learning)
+            assert Path(f"{name}.h").read_text() == header.text
+            assert f"{header.flash_bytes:,} bytes of constants" in result.stdout
+    limits = ("--flash", 10_000, "--c-header", "a.h")
+    printed = json.loads(invoke("export", "regressor.safetensors", *limits, "--json").stdout)
+    assert (printed["file"], printed["name"], printed["ram_bytes"]) == ("a.h", "a", 84)
+    for arguments, words in (
+        (["--flash", 5000], f"--flash must be at least {printed['flash_bytes'] + 6000}, for"),
+        (["--fraction-bits", 8], "--fraction-bits is for agents"),
+        (["--name", "1"], "--name must be a C identifier"),
+    ):
+        error = refused("export", "regressor.safetensors", "--c-header", "b.h", *arguments, code=2)
+        assert words in error
+    assert not Path("b.h").exists()
 
 
 def test_export_with_learning_refuses_a_network_without_a_weight_limit(refused, trained):
