@@ -79,7 +79,7 @@ class EstimatorLearner(EstimatorWriter):
     def needs(self, flash_bytes: int) -> list[str]:
         """Return comment lines about memory."""
         return [
-            f"Flash: {flash_bytes:,} bytes of constants; the code comes to some 4 to 6 kB.",
+            f"Flash: {flash_bytes:,} bytes of constants; the code comes to some 4 to 7 kB.",
             f"RAM:   {self.ram_bytes():,} bytes, in one struct that you place, and"
             f" {self.stack_bytes():,} bytes of arrays",
             "       on the stack, with at most 512 bytes for all else there. No heap.",

@@ -171,7 +171,7 @@ class EstimatorWriter:
     def needs(self, flash_bytes: int) -> list[str]:
         """Return comment lines about memory."""
         return [
-            f"Flash: {flash_bytes:,} bytes of constants; the code comes to some 4 to 6 kB.",
+            f"Flash: {flash_bytes:,} bytes of constants; the code comes to some 4 to 7 kB.",
             f"RAM:   {self.ram_bytes():,} bytes of arrays on the stack, and at most 512 for all",
             "       else there. No heap, and nothing static that changes.",
         ]

@@ -13,7 +13,7 @@ from sdnn.support.files import write_whole
 if TYPE_CHECKING:
     from sdnn.export.estimator_writer import Model
 
-CODE_BYTES = 6000  # of a header's functions, compiled for size on a Cortex-M0+, at most
+CODE_BYTES = 7000  # of a header's functions compiled for size, at most
 _LONGEST_NAME = 40
 _REMEDY = (
     "train with the settings of sdnn.export.small_settings(), or with n_averaged_epochs=1, and"
