@@ -4,6 +4,7 @@ from sdnn.export.estimator_writer import EstimatorHeader
 from sdnn.export.estimators import estimator_header, export_estimator_header
 from sdnn.export.header import c_header, export_c_header, load_image, save_image
 from sdnn.export.new import new_agent
+from sdnn.export.small import small_settings
 from sdnn.export.writer import CHeader
 
 __all__ = [
@@ -16,4 +17,5 @@ __all__ = [
     "load_image",
     "new_agent",
     "save_image",
+    "small_settings",
 ]

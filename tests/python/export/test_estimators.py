@@ -3,8 +3,13 @@
 ``nox -s emulation`` has other compilers and processors.
 """
 
+import copy
+import re
+
 import numpy as np
 import pytest
+from sklearn.datasets import make_friedman1
+from sklearn.exceptions import NotFittedError
 
 from c_estimators import (
     ESTIMATORS,
@@ -17,9 +22,12 @@ from c_estimators import (
     numbers,
 )
 from c_policies import STRICT_CPP, TARGETS, program, run
-from sdnn import SDNNClassifier, SDNNRegressor
+from refusals import refuses
+from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.coding import Circular, RandomInverse, Symbolic
-from sdnn.export import estimator_header, export_estimator_header
+from sdnn.estimators.network import Network
+from sdnn.export import estimator_header, export_estimator_header, small_settings
+from sdnn.export.estimators import CODE_BYTES
 
 SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all", "-fsanitize=address")
 BINS = """
@@ -167,3 +175,85 @@ def test_the_headers_are_cpp(compiler, name, needs, tmp_path):
     """
     size = estimator_header(model, "learner", learning=True).ram_bytes
     run(program(tmp_path, source.replace("SIZE", str(size)), compiler, *STRICT_CPP))
+
+
+@pytest.mark.parametrize("n_inputs", [1, 2, 4, 7, 20])
+@pytest.mark.parametrize("groups", [{}, {"n_outputs": 3}, {"n_classes": 2}, {"n_classes": 12}])
+def test_small_settings_fit_a_small_processor(n_inputs, groups):
+    X = numbers(150, 1, n_inputs)
+    settings = small_settings(n_inputs, **groups) | {"max_iter": 7, "random_state": 0}
+    if "n_classes" in groups:
+        model = SDNNClassifier(**settings).fit(X, np.arange(150) % groups["n_classes"])
+    else:
+        y = np.cos(np.outer(X.sum(axis=1), np.arange(1, 1 + groups.get("n_outputs", 1))))
+        model = SDNNRegressor(**settings).fit(X, y)
+    assert {index for pair in model.pairs_ for index in pair} == set(range(n_inputs))
+    greedy = estimator_header(model, "model", flash_bytes=2**17)
+    assert greedy.ram_bytes < 2**12
+    learner = estimator_header(model, "model", learning=True)
+    (stack_bytes,) = re.findall(r" ([\d,]+) bytes of arrays", learner.text)
+    assert learner.ram_bytes + int(stack_bytes.replace(",", "")) + 512 < 2**16
+    assert len(greedy.text) < 3.5 * greedy.flash_bytes + 30_000
+
+
+def test_small_settings_score_like_the_default():
+    X, y = make_friedman1(700, 5, noise=1.0, random_state=3)
+    y -= 5 * X[:, 4]
+    fit, held = np.split(np.arange(700), [500])
+    scores = [
+        SDNNRegressor(**settings, random_state=0)
+        .fit(X[fit, :4], y[fit])
+        .score(X[held, :4], y[held])
+        for settings in ({}, small_settings(4))
+    ]
+    assert scores[1] > scores[0] - 0.03
+
+
+def test_small_settings_refuse_outputs_with_classes():
+    refuses("n_classes", small_settings, 3, n_outputs=1, n_classes=2)
+    refuses("n_classes", small_settings, 3, n_classes=1)
+    refuses("n_inputs", small_settings, 0)
+
+
+def test_a_header_above_the_limit_of_flash_is_refused_with_size_and_remedy(tmp_path):
+    model, _ = fitted("several-outputs")
+    header = estimator_header(model, "model")
+    needed = header.flash_bytes + CODE_BYTES
+    estimator_header(model, "model", flash_bytes=needed)
+    path = tmp_path / "model.h"
+    message = f"at least {needed}, .*weights: {header.weight_bytes}.*small_settings"
+    with pytest.raises(ValueError, match=message):
+        export_estimator_header(model, path, flash_bytes=needed - 1)
+    assert not path.exists()
+    refuses("flash_bytes", estimator_header, model, "model", flash_bytes=0)
+
+
+def test_estimators_without_a_form_in_c_are_refused_with_a_remedy():
+    X, y = numbers(40, 1), np.arange(40.0)
+    refuses("name", estimator_header, fitted("one-pair")[0], "int a")
+    refuses("model", estimator_header, SDNNKernelRidge().fit(X, y), "model", error=TypeError)
+    with pytest.raises(NotFittedError):
+        estimator_header(SDNNRegressor(), "model")
+    for coding, values, message in (
+        (Circular(period=1e200), X[:, 0], "period and an origin within"),
+        (Symbolic(), np.resize([2**53 + 1, 1], 40).tolist(), "exact as floats"),
+        (RandomInverse(spacing="quantile"), 5e-324 * np.arange(40), "close together"),
+    ):
+        table = X.astype(object)
+        table[:, 2] = values
+        model = SDNNRegressor([(coding, [2])], n_output_units=4, **SMALL).fit(table, y)
+        with pytest.raises(ValueError, match=f"column 2 .*{message}"):
+            estimator_header(model, "model")
+
+
+def test_weights_beyond_16_bits_are_refused():
+    model, _ = fitted("one-pair")
+    changed = copy.deepcopy(model)
+    layer = model.network_.layer
+    weights = layer.weights
+    weights[0, 0] = 40_000
+    code = model.network_.input_code
+    changed.network_ = Network(code, 1, weights=weights, thresholds=layer.thresholds)
+    for learning in (False, True):
+        with pytest.raises(ValueError, match=r"up to 32512 .* got 40000: train with a smaller max"):
+            estimator_header(changed, "model", learning=learning)
