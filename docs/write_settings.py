@@ -58,7 +58,8 @@ def entries(
     properties: dict[str, Any],
     described: dict[str, str],
 ) -> Iterator[str]:
-    """Write a line for each setting; what an earlier class has alike is named only."""
+    """Write a table with a row for each setting; what an earlier class has alike is named only."""
+    yield "| Setting | Default, range | Meaning |\n|---|---|---|\n"
     same: dict[str, list[str]] = {}
     for name, schema in properties.items():
         what, text = default_and_range(schema), short(schema.get("description", ""))
@@ -66,14 +67,14 @@ def entries(
         if described.setdefault(f"{name} {what} {text}", class_name) != class_name:
             same.setdefault(first, []).append(name)
         elif first != class_name and len(text.split()) > 5:
-            yield f"- **`{table}.{name}`** ({what}): As in {first}.\n"
+            yield f"| `{table}.{name}` | {what} | As in {first}. |\n"
         elif (twin := twin_of(name, properties)) and name.endswith("_1"):
-            both = f"**`{table}.{name}`**, **`{twin}`**"
-            yield f"- {both} ({what}): {text.replace('link 1', 'each link')}\n"
+            both = f"`{table}.{name}`, `{twin}`"
+            yield f"| {both} | {what} | {text.replace('link 1', 'each link')} |\n"
         elif not twin:
-            yield f"- **`{table}.{name}`** ({what}): {text}\n"
+            yield f"| `{table}.{name}` | {what} | {text} |\n"
     for first, names in same.items():
-        yield f"- As in {first}: {', '.join(f'`{name}`' for name in names)}\n"
+        yield f"| {', '.join(f'`{name}`' for name in names)} | | As in {first}. |\n"
 
 
 def twin_of(name: str, properties: dict[str, Any]) -> str:

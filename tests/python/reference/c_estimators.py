@@ -114,7 +114,7 @@ def many_classes():
 
 
 def single_units():
-    """One unit for each class, whose potential is its score."""
+    """Return a classifier with a unit for each class, whose potential is its score."""
     model = SDNNClassifier(**SMALL, n_units_per_class=1, n_averaged_epochs=3)
     return model.fit(X := numbers(300, 7), labels(X, 5)), numbers
 
@@ -251,7 +251,7 @@ def compiled(folder, source, target, *options):
 
 
 def predictions(model, X):
-    """What the program writes: outputs, or the class and the scores of all classes."""
+    """The output of the program: outputs, or the class and the scores of all classes."""
     if isinstance(model, SDNNRegressor):
         return model.predict(X).reshape(len(X), -1)
     winners = np.searchsorted(model.classes_, model.predict(X))
