@@ -66,7 +66,7 @@ static uint32_t episode(int learns, uint32_t most) {
   for (step = 0; step < most && !has_fallen(&cart); ++step) {
     uint32_t action;
     observe(&cart, now);
-    action = pole_act(&agent, now, learns);
+    action = learns ? pole_act(&agent, now) : pole_greedy(&agent, now);
     push(&cart, action);
     observe(&cart, next);
     if (learns) pole_learn(&agent, now, action, 1 << POLE_FRACTION_BITS, next, has_fallen(&cart));

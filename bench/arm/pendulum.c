@@ -70,7 +70,7 @@ static int64_t episode(int learns, uint32_t most) {
     uint32_t action;
     int32_t torque, reward;
     observe(&it, now);
-    action = pole_act(&agent, now, learns);
+    action = learns ? pole_act(&agent, now) : pole_greedy(&agent, now);
     torque = pole_action_fixed[action];
 #ifdef POLE_IS_ACTOR_CRITIC
     if (!learns) torque = pole_action_at(0, pole_place(&agent, now));

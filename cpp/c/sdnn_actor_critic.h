@@ -140,9 +140,9 @@ static inline int64_t sdnn_log2_of(uint64_t x) {
 }
 
 /* The weights of the actions of dimension d, as sdnn_weigh has them; returns their sum. */
-static inline uint64_t sdnn_weights_of(const sdnn_agent* agent, const sdnn_code* code, uint32_t d,
+static inline uint64_t sdnn_weights_of(const int32_t* rows, const sdnn_code* code, uint32_t d,
                                        int64_t* bits, uint32_t* weights) {
-  sdnn_sums(agent->weights, code, d, bits);
+  sdnn_sums(rows, code, d, bits);
   return sdnn_weigh(bits, sdnn_n_actions[d], weights);
 }
 
@@ -183,7 +183,7 @@ static inline void sdnn_move_actor(sdnn_agent* agent, const sdnn_code* code, con
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     int64_t slopes[SDNN_MOST_ROWS];
     uint32_t probabilities[SDNN_MOST_ROWS];
-    const uint64_t sum = sdnn_weights_of(agent, code, d, slopes, probabilities);
+    const uint64_t sum = sdnn_weights_of(agent->weights, code, d, slopes, probabilities);
     sdnn_differentiate(slopes, probabilities, sdnn_n_actions[d], sum);
     for (a = 0; a < sdnn_n_actions[d]; ++a) {
       const uint32_t row = sdnn_first_rows[d] + a;
@@ -220,38 +220,54 @@ static inline uint32_t sdnn_drawn(const uint32_t* weights, uint64_t sum, sdnn_ra
   return action;
 }
 
-/* The action to take in each dimension; without `explore` a most probable one. Unless `place` is
- * null, the fractional indices of greedy actions are written to it. */
-static inline void sdnn_choose(sdnn_agent* agent, const int32_t* observation, int explore,
-                               uint32_t* action, uint32_t* place) {
+/* The action to take in each dimension, drawn by the policy. */
+static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observation,
+                                    uint32_t* action) {
   const sdnn_code* code;
   uint32_t bins[SDNN_N_INPUTS], d;
-  sdnn_read_to_act(&agent->states, observation, explore, bins);
+  sdnn_read_to_act(&agent->states, observation, bins);
   code = sdnn_other(agent, bins);
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     int64_t bits[SDNN_MOST_ROWS];
     uint32_t weights[SDNN_MOST_ROWS];
+    const uint64_t sum = sdnn_weights_of(agent->weights, code, d, bits, weights);
+    action[d] = sdnn_drawn(weights, sum, &agent->randoms[0]);
+  }
+  sdnn_note_act(&agent->states, action);
+}
+
+/* A most probable action in each dimension. Unless `place` is null, the fractional indices of the
+ * greedy actions are written to it. */
+static inline void sdnn_choose(const sdnn_agent* agent,
+                               SDNN_EPISODE_PARAMETER const int32_t* observation, uint32_t* action,
+                               uint32_t* place) {
+  sdnn_code code;
+  uint32_t bins[SDNN_N_INPUTS], d;
+  sdnn_read_greedily(&agent->states, SDNN_EPISODE observation, bins);
+  sdnn_encode_state(bins, &code);
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
+    int64_t bits[SDNN_MOST_ROWS];
+    uint32_t weights[SDNN_MOST_ROWS];
     const uint32_t n = sdnn_n_actions[d];
-    const uint64_t sum = sdnn_weights_of(agent, code, d, bits, weights);
-    if (explore) {
-      action[d] = sdnn_drawn(weights, sum, &agent->randoms[0]);
-    } else {
-      action[d] = sdnn_tied(weights, n, SDNN_LARGEST_PART, &agent->randoms[1]);
-    }
+    sdnn_weights_of(agent->weights, &code, d, bits, weights);
+    action[d] = sdnn_tied(weights, n, SDNN_LARGEST_PART);
     if (place) place[d] = sdnn_mean_place(weights, n, action[d]);
   }
-  sdnn_note_act(&agent->states, explore, action, place);
+  sdnn_note_greedy(SDNN_EPISODE action, place);
 }
-static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observation, int explore,
-                                    uint32_t* action) {
-  sdnn_choose(agent, observation, explore, action, 0);
+static inline void sdnn_greedy_in_each(const sdnn_agent* agent,
+                                       SDNN_EPISODE_PARAMETER const int32_t* observation,
+                                       uint32_t* action) {
+  sdnn_choose(agent, SDNN_EPISODE observation, action, 0);
 }
 
 /* V(observation) in units of 2 to the power of agent->exponent. */
-static inline int64_t sdnn_state_value(sdnn_agent* agent, const int32_t* observation) {
+static inline int64_t sdnn_state_value(const sdnn_agent* agent, const int32_t* observation) {
   uint32_t bins[SDNN_N_INPUTS];
+  sdnn_code code;
   sdnn_read_only(&agent->states, observation, bins);
-  return sdnn_best_sum(agent, sdnn_other(agent, bins));
+  sdnn_encode_state(bins, &code);
+  return sdnn_best_sum(agent, &code);
 }
 
 /* Learns a transition. Its reward is a number times 2^SDNN_FRACTION_BITS; `terminated` means that
@@ -295,15 +311,17 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
 #if SDNN_IS_BOX
 /* The fractional index of the greedy action in each dimension, times 2^16; sdnn_action_at converts
  * it to the action. */
-static inline void sdnn_place_in_each(sdnn_agent* agent, const int32_t* observation,
+static inline void sdnn_place_in_each(const sdnn_agent* agent,
+                                      SDNN_EPISODE_PARAMETER const int32_t* observation,
                                       uint32_t* place) {
   uint32_t action[SDNN_N_DIMENSIONS];
-  sdnn_choose(agent, observation, 0, action, place);
+  sdnn_choose(agent, SDNN_EPISODE observation, action, place);
 }
 #if SDNN_N_DIMENSIONS == 1
-static inline uint32_t sdnn_place(sdnn_agent* agent, const int32_t* observation) {
+static inline uint32_t sdnn_place(const sdnn_agent* agent,
+                                  SDNN_EPISODE_PARAMETER const int32_t* observation) {
   uint32_t place;
-  sdnn_place_in_each(agent, observation, &place);
+  sdnn_place_in_each(agent, SDNN_EPISODE observation, &place);
   return place;
 }
 #else

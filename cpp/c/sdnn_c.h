@@ -449,28 +449,52 @@ static inline int sdnn_explores(sdnn_agent* agent) {
   return 1;
 }
 
-/* The number of the action to take; without `explore` a best one. */
-static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation, int explore) {
-  uint32_t bins[SDNN_N_INPUTS], ranks[SDNN_N_ACTIONS], action, best = 0;
-  if (explore && sdnn_explores(agent)) return agent->kept;
-  sdnn_bins_of_fixed(observation, bins);
-  sdnn_rank(agent, sdnn_state_of(agent, bins), ranks);
+/* The highest of the ranks of the actions. */
+static inline uint32_t sdnn_highest(const uint32_t* ranks) {
+  uint32_t action, best = 0;
   for (action = 0; action < SDNN_N_ACTIONS; ++action) {
     if (ranks[action] > best) best = ranks[action];
   }
-  return sdnn_tied(ranks, SDNN_N_ACTIONS, best,
-                   &agent->randoms[explore ? SDNN_ACTING : SDNN_EVALUATION]);
+  return best;
+}
+
+/* The number of the action to take, at times a random one. */
+static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation) {
+  uint32_t bins[SDNN_N_INPUTS], ranks[SDNN_N_ACTIONS];
+  if (sdnn_explores(agent)) return agent->kept;
+  sdnn_bins_of_fixed(observation, bins);
+  sdnn_rank(agent, sdnn_state_of(agent, bins), ranks);
+  return sdnn_draw_tied(ranks, SDNN_N_ACTIONS, sdnn_highest(ranks), &agent->randoms[SDNN_ACTING]);
+}
+
+/* Computes the state of an observation outside of the agent. */
+static inline void sdnn_read_state(const sdnn_agent* agent, const int32_t* observation,
+                                   sdnn_state* state) {
+  const sdnn_state* const latest = &agent->states[agent->latest];
+  uint32_t bins[SDNN_N_INPUTS];
+  sdnn_bins_of_fixed(observation, bins);
+  sdnn_encode(&sdnn_the_coding, bins, &state->code);
+  sdnn_evaluate(agent, state, latest->last_use > 0 ? latest : 0);
+}
+
+/* The number of a best action. */
+static inline uint32_t sdnn_greedy(const sdnn_agent* agent, const int32_t* observation) {
+  uint32_t ranks[SDNN_N_ACTIONS];
+  sdnn_state state;
+  sdnn_read_state(agent, observation, &state);
+  sdnn_rank(agent, &state, ranks);
+  return sdnn_tied(ranks, SDNN_N_ACTIONS, sdnn_highest(ranks));
 }
 
 /* Q(observation, action), times 2^SDNN_FRACTION_BITS, rounded to the nearest. */
-static inline int64_t sdnn_q(sdnn_agent* agent, const int32_t* observation, uint32_t action) {
-  uint32_t bins[SDNN_N_INPUTS];
+static inline int64_t sdnn_q(const sdnn_agent* agent, const int32_t* observation, uint32_t action) {
   int32_t exponent;
   uint64_t fraction;
   sdnn_real value;
-  sdnn_bins_of_fixed(observation, bins);
-  value = sdnn_value(agent, sdnn_count(sdnn_state_of(agent, bins),
-                                       action < SDNN_N_ACTIONS ? action : SDNN_N_ACTIONS - 1));
+  sdnn_state state;
+  sdnn_read_state(agent, observation, &state);
+  value =
+      sdnn_value(agent, sdnn_count(&state, action < SDNN_N_ACTIONS ? action : SDNN_N_ACTIONS - 1));
   if (value << 1 == 0) return 0;
   fraction = sdnn_fraction(value, &exponent);
   exponent += SDNN_FRACTION_BITS;

@@ -46,7 +46,7 @@ static inline void sdnn_fire(const sdnn_network* network, const sdnn_code* code,
 }
 
 /* The best action of a network: counts of firing units in windows, ranked, and ties broken. */
-static inline uint32_t sdnn_best(const sdnn_network* network, const uint32_t* bins) {
+static inline uint32_t sdnn_best_action(const sdnn_network* network, const uint32_t* bins) {
   sdnn_code code;
   uint32_t fires[(SDNN_MOST_UNITS + 31) / 32];
   uint16_t ranks[SDNN_MOST_ACTIONS];
@@ -65,12 +65,12 @@ static inline uint32_t sdnn_best(const sdnn_network* network, const uint32_t* bi
 #if SDNN_HAS_TIE_TOLERANCE
   best = sdnn_ties[best];
 #endif
-  return sdnn_tied(ranks, network->n_actions, (sdnn_score)best, 0);
+  return sdnn_tied(ranks, network->n_actions, (sdnn_score)best);
 }
 
-static inline void sdnn_act_in_each(const uint32_t* bins, uint32_t* action) {
+static inline void sdnn_greedy_in_each(const uint32_t* bins, uint32_t* action) {
   uint32_t d;
-  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = sdnn_best(&sdnn_networks[d], bins);
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = sdnn_best_action(&sdnn_networks[d], bins);
 }
 
 #include "sdnn_policy.h"

@@ -8,18 +8,18 @@ typedef int64_t sdnn_score;
 #include "sdnn_ties.h"
 
 /* The best action of dimension d. */
-static inline uint32_t sdnn_best(const sdnn_code* code, uint32_t d) {
+static inline uint32_t sdnn_best_action(const sdnn_code* code, uint32_t d) {
   int64_t sums[SDNN_MOST_ROWS];
   sdnn_sums(sdnn_weights, code, d, sums);
   return sdnn_tied(sums, sdnn_n_actions[d],
-                   sdnn_largest(sums, sdnn_n_actions[d]) - SDNN_TIE_TOLERANCE, 0);
+                   sdnn_largest(sums, sdnn_n_actions[d]) - SDNN_TIE_TOLERANCE);
 }
 
-static inline void sdnn_act_in_each(const uint32_t* bins, uint32_t* action) {
+static inline void sdnn_greedy_in_each(const uint32_t* bins, uint32_t* action) {
   sdnn_code code;
   uint32_t d;
   sdnn_encode(&sdnn_the_coding, bins, &code);
-  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = sdnn_best(&code, d);
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = sdnn_best_action(&code, d);
 }
 
 #ifdef SDNN_HISTORY

@@ -1,5 +1,5 @@
 /* The states of a learning agent, where they include earlier observations: of the episode from
- * which it learns, and of greedy steps beside it. See
+ * which it learns, and of greedy steps beside it, whose memory the caller places. See
  * cpp/include/sdnn/agents/detail/last_states.hpp. */
 #ifndef SDNN_HISTORY_LEARNER_H
 #define SDNN_HISTORY_LEARNER_H
@@ -17,13 +17,23 @@ typedef struct {
 } sdnn_last_state;
 
 typedef struct {
-  sdnn_last_state learned, greedy;
+  sdnn_last_state learned;
   sdnn_real next[SDNN_N_INPUTS]; /* where the last transition ended */
 #ifndef SDNN_IS_ACTOR_CRITIC
   uint32_t next_bins[SDNN_N_INPUTS];
 #endif
-  uint8_t is_greedy; /* whether greedy steps have a separate memory */
+  uint32_t n_reads; /* observations that were read since the agent began, modulo 2^32 */
 } sdnn_states;
+
+/* The memory of greedy steps. Unless they begin an episode, they continue that of which the agent
+ * learns. */
+typedef struct {
+  sdnn_last_state last;
+  uint32_t n_reads; /* of the agent, when it had this memory */
+} sdnn_greedy_episode;
+
+#define SDNN_EPISODE_PARAMETER sdnn_greedy_episode *episode,
+#define SDNN_EPISODE episode,
 
 /* Continues an episode, or begins it, with an observation. */
 static inline void sdnn_advance(sdnn_last_state* last, const int32_t* observation) {
@@ -72,41 +82,50 @@ static inline void sdnn_forget_state(sdnn_last_state* last) {
 
 static inline void sdnn_forget(sdnn_states* states) {
   sdnn_forget_state(&states->learned);
-  states->is_greedy = 0;
-}
-static inline void sdnn_forget_greedy(sdnn_states* states) {
-  sdnn_forget_state(&states->greedy);
-  states->is_greedy = 1;
+  ++states->n_reads;
 }
 
 /* The bins of the state in which the agent acts. */
-static inline void sdnn_read_to_act(sdnn_states* states, const int32_t* observation, int explore,
+static inline void sdnn_read_to_act(sdnn_states* states, const int32_t* observation,
                                     uint32_t* bins) {
-  sdnn_last_state* const last = explore ? &states->learned : &states->greedy;
-  if (!explore && !states->is_greedy) {
-    sdnn_copy_bytes(last, &states->learned, sizeof *last);
-  }
-  states->is_greedy = !explore;
-  sdnn_find_state(last, observation);
-  sdnn_bins_of_state(last->state, bins);
+  ++states->n_reads;
+  sdnn_find_state(&states->learned, observation);
+  sdnn_bins_of_state(states->learned.state, bins);
 }
 
-/* Notes the action that follows, as indices or, unless it is null, at fractional ones. */
-static inline void sdnn_note_act(sdnn_states* states, int explore, const uint32_t* action,
-                                 const uint32_t* place) {
-  sdnn_last_state* const last = explore ? &states->learned : &states->greedy;
+/* Notes the action that follows, as indices. */
+static inline void sdnn_note_act(sdnn_states* states, const uint32_t* action) {
+  sdnn_note_action(&states->learned.episode, action);
+  states->learned.has_acted = 1;
+}
+
+/* The bins of the state in which the agent acts greedily. */
+static inline void sdnn_read_greedily(const sdnn_states* states, sdnn_greedy_episode* episode,
+                                      const int32_t* observation, uint32_t* bins) {
+  if (episode->n_reads != states->n_reads) {
+    sdnn_copy_bytes(&episode->last, &states->learned, sizeof episode->last);
+    episode->n_reads = states->n_reads;
+  }
+  sdnn_find_state(&episode->last, observation);
+  sdnn_bins_of_state(episode->last.state, bins);
+}
+
+/* Notes the greedy action that follows, as indices or, unless it is null, at fractional ones. */
+static inline void sdnn_note_greedy(sdnn_greedy_episode* episode, const uint32_t* action,
+                                    const uint32_t* place) {
   if (place) {
-    sdnn_note_places(&last->episode, place);
+    sdnn_note_places(&episode->last.episode, place);
   } else {
-    sdnn_note_action(&last->episode, action);
+    sdnn_note_action(&episode->last.episode, action);
   }
-  last->has_acted = 1;
+  episode->last.has_acted = 1;
 }
 
-/* The bins of the state of an observation; no step is taken. */
+/* The bins of the state of an observation, of the episode from which the agent learns; no step is
+ * taken. */
 static inline void sdnn_read_only(const sdnn_states* states, const int32_t* observation,
                                   uint32_t* bins) {
-  const sdnn_last_state* const last = states->is_greedy ? &states->greedy : &states->learned;
+  const sdnn_last_state* const last = &states->learned;
   sdnn_last_state next;
   sdnn_copy_bytes(&next, last, sizeof next);
   if (!sdnn_is_state_of(last, observation)) sdnn_find_state(&next, observation);
@@ -129,7 +148,7 @@ static inline void sdnn_read_next(sdnn_states* states, const uint32_t* action,
   sdnn_note_action(&states->learned.episode, action);
   sdnn_advance(&states->learned, next_observation);
   sdnn_bins_of_state(states->learned.state, bins);
-  states->is_greedy = 0;
+  ++states->n_reads;
 }
 
 /* Notes that the agent has learned the transition that was read. */

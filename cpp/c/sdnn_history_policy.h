@@ -1,9 +1,9 @@
 /* The functions of a greedy policy whose states include earlier observations. The file that
- * includes this one defines sdnn_act_in_each.
+ * includes this one defines sdnn_greedy_in_each.
  *
  *   static sdnn_episode episode;    // the memory of an episode
  *   sdnn_begin_episode(&episode);   // whenever the task starts anew
- *   uint32_t action = sdnn_act_fixed(&episode, observation);
+ *   uint32_t action = sdnn_greedy(&episode, observation);
  *
  * Each call is a step: it remembers the observation, and the action as the one that is taken.
  * Everything else is as in sdnn_policy.h. */
@@ -72,12 +72,12 @@ static inline void sdnn_inputs_of_float(const float* observation, sdnn_real* inp
 #endif
 
 SDNN_STEP(int32_t, sdnn_inputs_of_fixed)
-SDNN_POLICY(sdnn_act_fixed, int32_t, sdnn_act_in_each, sdnn_note_action)
+SDNN_POLICY(sdnn_greedy, int32_t, sdnn_greedy_in_each, sdnn_note_action)
 #ifdef SDNN_USE_FLOAT
 SDNN_STEP(double, sdnn_inputs_of_double)
 SDNN_STEP(float, sdnn_inputs_of_float)
-SDNN_POLICY(sdnn_act_double, double, sdnn_act_in_each, sdnn_note_action)
-SDNN_POLICY(sdnn_act_float, float, sdnn_act_in_each, sdnn_note_action)
+SDNN_POLICY(sdnn_greedy_double, double, sdnn_greedy_in_each, sdnn_note_action)
+SDNN_POLICY(sdnn_greedy_float, float, sdnn_greedy_in_each, sdnn_note_action)
 #endif
 
 #endif /* SDNN_HISTORY_POLICY_H */

@@ -7,19 +7,40 @@ class sdnn_learner {
  public:
   sdnn_learner() { sdnn_begin(&agent_); }
   void begin_episode() { sdnn_begin_episode(&agent_); }
-#ifdef SDNN_HISTORY
-  void begin_greedy_episode() { sdnn_begin_greedy_episode(&agent_); }
-#endif
 #if SDNN_N_DIMENSIONS == 1
   typedef uint32_t action_type;
-  uint32_t act(const int32_t (&observation)[SDNN_N_OBSERVED], bool explore = true) {
-    return sdnn_act(&agent_, observation, explore);
+  uint32_t act(const int32_t (&observation)[SDNN_N_OBSERVED]) {
+    return sdnn_act(&agent_, observation);
   }
 #else
   typedef const uint32_t (&action_type)[SDNN_N_DIMENSIONS];
-  void act(const int32_t (&observation)[SDNN_N_OBSERVED], uint32_t (&action)[SDNN_N_DIMENSIONS],
-           bool explore = true) {
-    sdnn_act(&agent_, observation, explore, action);
+  void act(const int32_t (&observation)[SDNN_N_OBSERVED], uint32_t (&action)[SDNN_N_DIMENSIONS]) {
+    sdnn_act(&agent_, observation, action);
+  }
+#endif
+#ifdef SDNN_HISTORY
+  void begin_greedy_episode(sdnn_greedy_episode& episode) const {
+    sdnn_begin_greedy_episode(&agent_, &episode);
+  }
+#if SDNN_N_DIMENSIONS == 1
+  uint32_t greedy(sdnn_greedy_episode& episode,
+                  const int32_t (&observation)[SDNN_N_OBSERVED]) const {
+    return sdnn_greedy(&agent_, &episode, observation);
+  }
+#else
+  void greedy(sdnn_greedy_episode& episode, const int32_t (&observation)[SDNN_N_OBSERVED],
+              uint32_t (&action)[SDNN_N_DIMENSIONS]) const {
+    sdnn_greedy(&agent_, &episode, observation, action);
+  }
+#endif
+#elif SDNN_N_DIMENSIONS == 1
+  uint32_t greedy(const int32_t (&observation)[SDNN_N_OBSERVED]) const {
+    return sdnn_greedy(&agent_, observation);
+  }
+#else
+  void greedy(const int32_t (&observation)[SDNN_N_OBSERVED],
+              uint32_t (&action)[SDNN_N_DIMENSIONS]) const {
+    sdnn_greedy(&agent_, observation, action);
   }
 #endif
   void learn(const int32_t (&observation)[SDNN_N_OBSERVED], action_type action, int32_t reward,
@@ -30,11 +51,11 @@ class sdnn_learner {
   void set_progress(uint32_t progress) { sdnn_set_progress(&agent_, progress); }
 #endif
 #ifdef SDNN_IS_ACTOR_CRITIC
-  int64_t state_value(const int32_t (&observation)[SDNN_N_OBSERVED]) {
+  int64_t state_value(const int32_t (&observation)[SDNN_N_OBSERVED]) const {
     return sdnn_state_value(&agent_, observation);
   }
 #else
-  int64_t q(const int32_t (&observation)[SDNN_N_OBSERVED], action_type action) {
+  int64_t q(const int32_t (&observation)[SDNN_N_OBSERVED], action_type action) const {
     return sdnn_q(&agent_, observation, action);
   }
 #endif

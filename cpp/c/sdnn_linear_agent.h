@@ -4,9 +4,15 @@
 #define SDNN_LINEAR_AGENT_H
 
 #if SDNN_N_DIMENSIONS == 1
-static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation, int explore) {
+static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation) {
   uint32_t action;
-  sdnn_act_in_each(agent, observation, explore, &action);
+  sdnn_act_in_each(agent, observation, &action);
+  return action;
+}
+static inline uint32_t sdnn_greedy(const sdnn_agent* agent,
+                                   SDNN_EPISODE_PARAMETER const int32_t* observation) {
+  uint32_t action;
+  sdnn_greedy_in_each(agent, SDNN_EPISODE observation, &action);
   return action;
 }
 static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uint32_t action,
@@ -15,13 +21,16 @@ static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uin
 }
 #else
 #define sdnn_act sdnn_act_in_each
+#define sdnn_greedy sdnn_greedy_in_each
 #define sdnn_learn sdnn_learn_in_each
 #endif
 
 #ifdef SDNN_HISTORY
-/* The next greedy actions are those of another episode than the one from which it learns. */
-static inline void sdnn_begin_greedy_episode(sdnn_agent* agent) {
-  sdnn_forget_greedy(&agent->states);
+/* Begins an episode of greedy steps, apart from the one of which the agent learns. */
+static inline void sdnn_begin_greedy_episode(const sdnn_agent* agent,
+                                             sdnn_greedy_episode* episode) {
+  sdnn_forget_state(&episode->last);
+  episode->n_reads = agent->states.n_reads;
 }
 #endif
 

@@ -38,6 +38,10 @@ typedef struct {
   sdnn_column columns[SDNN_MOST_COLUMNS];
 } sdnn_code;
 
+/* A constant in fixed point, rounded to the nearest: the compiler computes it. */
+#define SDNN_FIXED(x) \
+  ((int32_t)((x) * (double)(INT32_C(1) << SDNN_FRACTION_BITS) + ((x) < 0.0 ? -0.5 : 0.5)))
+
 static inline uint32_t sdnn_bit(const uint8_t* bits, uint32_t k) {
   return ((uint32_t)bits[k >> 3] >> (k & 7)) & 1;
 }

@@ -1,13 +1,13 @@
-/* The functions of a greedy policy. The file that includes this one defines sdnn_act_in_each.
+/* The functions of a greedy policy. The file that includes this one defines sdnn_greedy_in_each.
  *
  *   int32_t observation[SDNN_N_OBSERVED]; // in its units, times 2^SDNN_FRACTION_BITS
- *   uint32_t action = sdnn_act_fixed(observation); // the number of the best action
+ *   uint32_t action = sdnn_greedy(observation); // the number of the best action
  *
- * With several dimensions of actions: sdnn_act_fixed(observation, action), with an array of
+ * With several dimensions of actions: sdnn_greedy(observation, action), with an array of
  * SDNN_N_DIMENSIONS numbers. sdnn_action_fixed has the actions of a box, times
  * 2^SDNN_FRACTION_BITS; other actions begin at sdnn_first_action. With SDNN_USE_FLOAT defined
- * before the include, sdnn_act_float and sdnn_act_double take observations in floating point, and
- * sdnn_action_float has the actions of a box. sdnn_act_bins takes the bins of all inputs. */
+ * before the include, sdnn_greedy_float and sdnn_greedy_double take observations in floating point,
+ * and sdnn_action_float has the actions of a box. sdnn_greedy_bins takes the bins of all inputs. */
 #ifndef SDNN_POLICY_H
 #define SDNN_POLICY_H
 
@@ -79,9 +79,9 @@ static inline void sdnn_bins_of_float(const float* observation, uint32_t* bins) 
 #endif /* SDNN_USE_FLOAT */
 
 #if SDNN_N_DIMENSIONS == 1
-static inline uint32_t sdnn_act_bins(const uint32_t* bins) {
+static inline uint32_t sdnn_greedy_bins(const uint32_t* bins) {
   uint32_t action;
-  sdnn_act_in_each(bins, &action);
+  sdnn_greedy_in_each(bins, &action);
   return action;
 }
 #define SDNN_POLICY(name, reading, bins_of, choose)         \
@@ -92,8 +92,8 @@ static inline uint32_t sdnn_act_bins(const uint32_t* bins) {
     return action;                                          \
   }
 #else
-static inline void sdnn_act_bins(const uint32_t* bins, uint32_t* action) {
-  sdnn_act_in_each(bins, action);
+static inline void sdnn_greedy_bins(const uint32_t* bins, uint32_t* action) {
+  sdnn_greedy_in_each(bins, action);
 }
 #define SDNN_POLICY(name, reading, bins_of, choose)                       \
   static inline void name(const reading* observation, uint32_t* action) { \
@@ -103,10 +103,10 @@ static inline void sdnn_act_bins(const uint32_t* bins, uint32_t* action) {
   }
 #endif
 
-SDNN_POLICY(sdnn_act_fixed, int32_t, sdnn_bins_of_fixed, sdnn_act_in_each)
+SDNN_POLICY(sdnn_greedy, int32_t, sdnn_bins_of_fixed, sdnn_greedy_in_each)
 #ifdef SDNN_USE_FLOAT
-SDNN_POLICY(sdnn_act_double, double, sdnn_bins_of_double, sdnn_act_in_each)
-SDNN_POLICY(sdnn_act_float, float, sdnn_bins_of_float, sdnn_act_in_each)
+SDNN_POLICY(sdnn_greedy_double, double, sdnn_bins_of_double, sdnn_greedy_in_each)
+SDNN_POLICY(sdnn_greedy_float, float, sdnn_bins_of_float, sdnn_greedy_in_each)
 #endif
 
 #endif /* SDNN_POLICY_H */

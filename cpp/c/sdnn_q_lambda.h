@@ -193,48 +193,65 @@ static inline int sdnn_explores(sdnn_agent* agent) {
   return 1;
 }
 
-/* The tolerance of ties in units. */
-static inline int64_t sdnn_tie_tolerance(const sdnn_agent* agent) {
-  const int32_t shift = agent->exponent - (SDNN_TIE_TOLERANCE_EXPONENT);
+/* The tolerance of ties in units of 2^exponent. */
+static inline int64_t sdnn_tie_tolerance(int32_t exponent) {
+  const int32_t shift = exponent - (SDNN_TIE_TOLERANCE_EXPONENT);
   if (SDNN_TIE_TOLERANCE == 0) return 0;
   return shift < 0 ? INT64_C(1) << 62 : shift < 63 ? SDNN_TIE_TOLERANCE >> shift : 0;
 }
 
-/* The action to take in each dimension; without `explore` a best one, by the average of the weights
- * where there is one. */
-static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observation, int explore,
+/* The action to take in each dimension, at times a random one. */
+static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observation,
                                     uint32_t* action) {
   uint32_t bins[SDNN_N_INPUTS], d;
   int64_t sums[SDNN_MOST_ROWS], least;
   const sdnn_code* code;
-  const int32_t* rows = agent->weights;
-  if (explore && sdnn_explores(agent)) {
+  if (sdnn_explores(agent)) {
     for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = agent->kept[d];
     if (SDNN_REMEMBERS) {
-      sdnn_read_to_act(&agent->states, observation, explore, bins);
-      sdnn_note_act(&agent->states, explore, action, 0);
+      sdnn_read_to_act(&agent->states, observation, bins);
+      sdnn_note_act(&agent->states, action);
     }
     return;
   }
-  sdnn_read_to_act(&agent->states, observation, explore, bins);
+  sdnn_read_to_act(&agent->states, observation, bins);
   code = sdnn_other(agent, bins);
-  if (SDNN_AVERAGES && !explore && agent->n_snapshots > 0) rows += SDNN_N_WEIGHTS;
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
-    sdnn_sums(rows, code, d, sums);
-    least = sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(agent);
-    action[d] = sdnn_tied(sums, sdnn_n_actions[d], least,
-                          &agent->randoms[explore ? SDNN_ACTING : SDNN_EVALUATION]);
+    sdnn_sums(agent->weights, code, d, sums);
+    least = sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(agent->exponent);
+    action[d] = sdnn_draw_tied(sums, sdnn_n_actions[d], least, &agent->randoms[SDNN_ACTING]);
   }
-  sdnn_note_act(&agent->states, explore, action, 0);
+  sdnn_note_act(&agent->states, action);
+}
+
+/* A best action in each dimension, by the average of the weights where there is one. */
+static inline void sdnn_greedy_in_each(const sdnn_agent* agent,
+                                       SDNN_EPISODE_PARAMETER const int32_t* observation,
+                                       uint32_t* action) {
+  const int is_averaged = SDNN_AVERAGES && agent->n_snapshots > 0;
+  const int32_t* const rows = agent->weights + (is_averaged ? SDNN_N_WEIGHTS : 0);
+  uint32_t bins[SDNN_N_INPUTS], d;
+  int64_t sums[SDNN_MOST_ROWS], least;
+  sdnn_code code;
+  sdnn_read_greedily(&agent->states, SDNN_EPISODE observation, bins);
+  sdnn_encode_state(bins, &code);
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
+    sdnn_sums(rows, &code, d, sums);
+    least = sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(agent->exponent);
+    action[d] = sdnn_tied(sums, sdnn_n_actions[d], least);
+  }
+  sdnn_note_greedy(SDNN_EPISODE action, 0);
 }
 
 /* Q(observation, action) in units of 2 to the power of agent->exponent. */
-static inline int64_t sdnn_q_of_each(sdnn_agent* agent, const int32_t* observation,
+static inline int64_t sdnn_q_of_each(const sdnn_agent* agent, const int32_t* observation,
                                      const uint32_t* action) {
   uint32_t bins[SDNN_N_INPUTS], limited[SDNN_N_DIMENSIONS];
+  sdnn_code code;
   sdnn_limit_action(action, limited);
   sdnn_read_only(&agent->states, observation, bins);
-  return sdnn_sum(agent->weights, sdnn_other(agent, bins), limited);
+  sdnn_encode_state(bins, &code);
+  return sdnn_sum(agent->weights, &code, limited);
 }
 
 /* Learns a transition, whose reward is times 2^SDNN_FRACTION_BITS. `terminated` says that nothing
@@ -292,7 +309,7 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
 }
 
 #if SDNN_N_DIMENSIONS == 1
-static inline int64_t sdnn_q(sdnn_agent* agent, const int32_t* observation, uint32_t action) {
+static inline int64_t sdnn_q(const sdnn_agent* agent, const int32_t* observation, uint32_t action) {
   return sdnn_q_of_each(agent, observation, &action);
 }
 #else

@@ -9,17 +9,28 @@
 
 static inline void sdnn_forget(sdnn_states* states) { (void)states; }
 
+/* Greedy functions have no memory of an episode. */
+#define SDNN_EPISODE_PARAMETER
+#define SDNN_EPISODE
+
 /* The bins of the state in which the agent acts. */
-static inline void sdnn_read_to_act(sdnn_states* states, const int32_t* observation, int explore,
+static inline void sdnn_read_to_act(sdnn_states* states, const int32_t* observation,
                                     uint32_t* bins) {
   (void)states;
-  (void)explore;
   sdnn_bins_of_fixed(observation, bins);
 }
-static inline void sdnn_note_act(sdnn_states* states, int explore, const uint32_t* action,
-                                 const uint32_t* place) {
+static inline void sdnn_note_act(sdnn_states* states, const uint32_t* action) {
   (void)states;
-  (void)explore;
+  (void)action;
+}
+
+/* The bins of the state in which the agent acts greedily. */
+static inline void sdnn_read_greedily(const sdnn_states* states, const int32_t* observation,
+                                      uint32_t* bins) {
+  (void)states;
+  sdnn_bins_of_fixed(observation, bins);
+}
+static inline void sdnn_note_greedy(const uint32_t* action, const uint32_t* place) {
   (void)action;
   (void)place;
 }

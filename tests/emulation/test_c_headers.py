@@ -62,9 +62,9 @@ def test_learning_compiles_for_microcontrollers_with_few_library_calls(name, kin
     needs("clang", "nm")
     agent = LEARNERS[name]()
     (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
-    act, action = "a[0] = agent_act(&agent, x, 1)", "a[0]"
+    act, action = "a[0] = agent_act(&agent, x)", "a[0]"
     if agent.n_dimensions > 1:
-        act, action = "agent_act(&agent, x, 1, a)", "a"
+        act, action = "agent_act(&agent, x, a)", "a"
     calls = f"""
         #include "agent.h"
         agent_agent agent; int32_t x[9]; uint8_t image[AGENT_IMAGE_BYTES];
@@ -150,7 +150,7 @@ def test_the_header_states_flash_and_ram_of_a_policy_with_a_history(name, needs,
         extern uint32_t action[POLICY_N_DIMENSIONS];
         void step(const int32_t *x);
         void step(const int32_t *x) {{
-          {"action[0] = " if agent.n_dimensions == 1 else ""}policy_act_fixed({arguments});
+          {"action[0] = " if agent.n_dimensions == 1 else ""}policy_greedy({arguments});
         }}
         typedef char bytes_are_stated[sizeof episode == {episode_bytes} ? 1 : -1];
     """

@@ -50,7 +50,7 @@ int main(void) {
   for (step = 0; step < 500 && is_up(&cart); ++step) {
     int32_t observation[CARTPOLE_N_OBSERVED];
     read_sensors(&cart, observation);
-    push(&cart, cartpole_first_action[0] + (int32_t)cartpole_act_fixed(observation));
+    push(&cart, cartpole_first_action[0] + (int32_t)cartpole_greedy(observation));
   }
   printf("%d\n", step);
   return 0;

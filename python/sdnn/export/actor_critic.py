@@ -11,9 +11,10 @@ from sdnn import _core
 from sdnn.agents import SDNNActorCritic
 from sdnn.environments.types import Array, Data
 from sdnn.export.code import Code
+from sdnn.export.learner import NONE, SCALE_FIELDS, Field, Learner
 from sdnn.export.linear import LinearWriter
 from sdnn.export.text import Tables, rounded_up
-from sdnn.export.writer import NONE, SCALE_FIELDS, CHeader, Field, Learner
+from sdnn.export.writer import CHeader
 
 _CRITIC, _ACTOR = "action_value.weights", "actor.weights"
 _LARGEST = 2**31 - 1  # of readings
@@ -113,7 +114,7 @@ class ActorCriticWriter(LinearWriter):
         return [
             "Of several most probable actions it takes the middle of the widest run of neighbours,",
             "where the agent draws one.",
-            *self.place_remark(f"place_fixed({episode}observation"),
+            *self.place_remark(f"place({episode}observation"),
         ]
 
     def place_remark(self, call: str) -> list[str]:
@@ -194,8 +195,11 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
 
     def tie_remark(self) -> list[str]:
         """Describe how ties are broken, and the actions between those of a box."""
-        drawn = "Of several most probable actions it draws one, as the agent does."
-        return [drawn, *self.place_remark("place(&agent, observation")]
+        return [
+            f"{self.name}_act draws an action by its probability.",
+            *self.greedy_remark(),
+            *self.place_remark(f"place({self.greedy_arguments}"),
+        ]
 
     def header(self) -> CHeader:
         """Make the header."""

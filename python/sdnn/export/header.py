@@ -94,7 +94,7 @@ def c_header(
     >>> header = c_header(agent, "car")
     >>> header.flash_bytes < 2**17
     True
-    >>> "uint32_t action = car_act_fixed(observation);" in header.text
+    >>> "uint32_t action = car_greedy(observation);" in header.text
     True
     """
     learns = flag("learning", learning)

@@ -104,7 +104,7 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         if not self.history.is_needed:
             return n_bytes + plain_bytes
         last = 8 * self.n_inputs + 4 * self.n_observed + self.history.episode_bytes + 1
-        states = 2 * rounded_up(last, 8) + 8 * self.n_inputs + 4 * self.n_inputs * next_bins + 1
+        states = rounded_up(last, 8) + 8 * self.n_inputs + 4 * self.n_inputs * next_bins + 4
         return rounded_up(n_bytes, 8) + rounded_up(states, 8)
 
     def code_bytes(self) -> int:

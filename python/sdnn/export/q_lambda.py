@@ -9,9 +9,10 @@ import numpy as np
 from sdnn import _core
 from sdnn.agents import SDNNQLambda
 from sdnn.environments.types import Array, Data
+from sdnn.export.learner import NONE, SCALE_FIELDS, Field, Learner
 from sdnn.export.linear import LinearWriter
 from sdnn.export.text import rounded_up
-from sdnn.export.writer import NONE, SCALE_FIELDS, CHeader, Field, Learner
+from sdnn.export.writer import CHeader
 
 _WEIGHTS = ("action_value.weights", "action_value.averaged_weights")
 _MOST_TOLERANCE = 2**62  # in units: above any difference of values

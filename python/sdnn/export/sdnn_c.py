@@ -11,13 +11,11 @@ from sdnn import _core
 from sdnn.agents import SDNNQLearning
 from sdnn.environments.types import Array, Data
 from sdnn.export.code import Code
+from sdnn.export.learner import SCALE_FIELDS, Field, Learner
 from sdnn.export.text import Tables, rounded_up, weight_words
 from sdnn.export.writer import (
     MOST_FRACTION_BITS,
-    SCALE_FIELDS,
     CHeader,
-    Field,
-    Learner,
     Writer,
     require_few_weights,
 )
@@ -369,19 +367,23 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
 
     def _ram_bytes(self) -> int:
         """Return the size of the C struct, with numbers aligned to their sizes."""
-        n_steps, code = self.agent.learning.n_steps, self.code
-        columns = rounded_up(code.column_bytes * code.most_columns, 4)
-        state_bytes = 8 + 4 * self.n_inputs + columns + 4 + 4 * self.n_units
-        n_bytes = 5 * 32 + 24 + 5 * 8 + (n_steps + 1) * state_bytes + 12 * n_steps
+        n_steps = self.agent.learning.n_steps
+        n_bytes = 5 * 32 + 24 + 5 * 8 + (n_steps + 1) * self._state_bytes() + 12 * n_steps
         n_bytes += 4 * self.n_words + 4 * self.n_units
         n_bytes += 4 * (10 + self.n_inputs + self.n_observed)
         if self.adapts:
             n_bytes += 5 * 8 + 8 * _MOST_RETURNS + 8 * self.horizon + 12
         return rounded_up(n_bytes, 8)
 
+    def _state_bytes(self) -> int:
+        """Return the bytes of a state with the potentials of all units."""
+        columns = rounded_up(self.code.column_bytes * self.code.most_columns, 4)
+        return 8 + 4 * self.n_inputs + columns + 4 + 4 * self.n_units
+
     def _stack_bytes(self) -> int:
         """Return the bytes of the largest arrays that are on the stack at the same time."""
         changes = 2 * self.code.column_bytes * self.code.most_columns + self.code.n_columns
+        changes += self._state_bytes()
         return int(changes + 4 * self.network.n_actions + 8 * self.n_inputs)
 
 

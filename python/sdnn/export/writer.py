@@ -6,9 +6,8 @@ import json
 import math
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -34,19 +33,8 @@ from sdnn.support.arguments import argument_error, whole
 
 _DEFAULT_FRACTION_BITS = 16
 MOST_FRACTION_BITS = 30
-NONE = -(2**31)
-"""Number in an image that stands for a missing value."""
-SCALE = "reward_scale"
-SCALE_FIELDS = [
-    (f"{SCALE}.n_rewards", "<u8"),
-    (f"{SCALE}.size", "<i4"),
-    (f"{SCALE}.size_in_window", "<i4"),
-    (f"{SCALE}.headroom", "<i4"),
-]
 _TIES = {"lowest": "LOWEST", "middle": "MIDDLE", "uniform": "DRAWN"}
 MOST_WEIGHTS = 2**26  # larger headers would have hundreds of megabytes
-Field: TypeAlias = tuple[str, str] | tuple[str, str, tuple[int, ...]]
-"""Name and type of a field of an image, and its shape."""
 Network = TypeVar("Network", bound=_core.SDNNC | _core.LinearSDNN)
 
 
@@ -253,6 +241,7 @@ class Writer(ABC, Generic[Network]):
         return [
             f'  #include "{self.name}.h"',
             f"  {observation} // in its own units, times 2^{self.fraction_bits}",
+            f"  observation[0] = {self.name.upper()}_FIXED(0.5); // a constant",
             *(f"  {line}" for line in self.calls()),
             "",
         ]
@@ -261,7 +250,7 @@ class Writer(ABC, Generic[Network]):
         """Return comment lines about the memory and time of a greedy policy."""
         stack = [
             f"RAM:   {ram_bytes:,} bytes of arrays on the stack, and at most 256 bytes for all",
-            f"       else there; {self.name}_act_float takes {8 * self.n_observed:,} more.",
+            f"       else there; {self.name}_greedy_float takes {8 * self.n_observed:,} more.",
         ]
         return [
             f"Flash: {{flash}} bytes of constants, of which {weight_bytes:,} are weights; the code",
@@ -277,9 +266,9 @@ class Writer(ABC, Generic[Network]):
         if before:
             arguments = f"&episode, {arguments}"
         if not self.is_vector:
-            return [*before, f"uint32_t action = {self.name}_act_fixed({arguments});"]
+            return [*before, f"uint32_t action = {self.name}_greedy({arguments});"]
         array = f"uint32_t action[{self.name.upper()}_N_DIMENSIONS];"
-        return [*before, array, f"{self.name}_act_fixed({arguments}, action);"]
+        return [*before, array, f"{self.name}_greedy({arguments}, action);"]
 
     def _action_value(self) -> str:
         if self.box is None:
@@ -313,119 +302,6 @@ class Writer(ABC, Generic[Network]):
         }[rule]
         agent = "as the agent does" if rule == agent_rule else "where the agent draws one"
         return [f"Of several best actions it takes {choice}, {agent}."]
-
-
-class Learner(Writer[Network]):
-    """Makes the header of an agent that learns, and keeps what it has learned in an image.
-
-    An image has fields of fixed sizes, one after the other, and a checksum. The core's state has
-    most of them by the same names.
-    """
-
-    title = "an agent that learns"
-    magic: ClassVar[int]
-    streams: ClassVar[tuple[str, ...]]
-    """Names of the random generators, in the order of the image."""
-
-    @abstractmethod
-    def fields(self) -> list[Field]:
-        """Return names, types and shapes of an image, as `numpy.dtype` takes them."""
-
-    @abstractmethod
-    def remembered(self, state: Data) -> Data:
-        """Return the fields that are not in the core's state, or differ there."""
-
-    @abstractmethod
-    def recall(self, image: Array, state: Data) -> None:
-        """Write the fields of an image into the core's state; ValueError for impossible values."""
-
-    def layout(self) -> np.dtype[Any]:
-        """Return the type of an image without its checksum."""
-        head = [("magic", "<u4"), ("fingerprint", "<u4")]
-        return np.dtype([*head, *self.fields()])
-
-    def state(self) -> Data:
-        """Return the core's state, and the scale of rewards, with all of its numbers."""
-        scale = {"size": NONE, "size_in_window": NONE, **self.agent._state_of("reward_scale")}
-        state = self.agent._state_of("agent")
-        return state | {f"{SCALE}.{name}": number for name, number in scale.items()}
-
-    def image(self) -> bytes:
-        """Return the state as the header's bytes."""
-        state, image = self.state(), np.zeros((), self.layout())
-        known = {"magic": self.magic, "fingerprint": self.fingerprint(), **state}
-        generators = np.array([state[f"{stream}.words"] for stream in self.streams], np.uint64)
-        known |= {"words": generators, **self.remembered(state)}
-        for name in image.dtype.names or ():
-            image[name] = known.get(name, 0)
-        content = image.tobytes()
-        return content + zlib.crc32(content).to_bytes(4, "little")
-
-    def restore(self, whole: bytes) -> None:
-        """Set the agent's state from an image; ValueError if it is damaged or another agent's."""
-        (image,), state = np.frombuffer(whole, self.layout(), 1), self.agent._state_of("agent")
-        for stream, words in zip(self.streams, image["words"], strict=True):
-            state[f"{stream}.words"] = words.copy()
-        fields = image.dtype.names or ()
-        state.pop("n_random_left", None)
-        if "n_random_left" in fields and (n_left := image["n_random_left"]):
-            state["n_random_left"] = np.array(n_left, np.int32)
-        self.recall(image, state)
-        names = [name for name in fields if name.startswith(SCALE)]
-        kept = {name: np.array(image[name]) for name in names if image[name] != NONE}
-        scale = {name.removeprefix(f"{SCALE}."): number for name, number in kept.items()}
-        self.agent._restore(agent=state, reward_scale=scale)
-
-    def tie_rule(self) -> str:
-        """Return how the agent breaks ties."""
-        return str(self.agent.learning.tie_rule)
-
-    def calls(self) -> list[str]:
-        """Return example lines of C in which the agent acts and learns."""
-        name, arguments = self.name, "observation, action, reward, next_observation, terminated"
-        action = [f"uint32_t action = {name}_act(&agent, observation, 1); // 0: the best one"]
-        if self.is_vector:
-            action = [
-                f"uint32_t action[{name.upper()}_N_DIMENSIONS];",
-                f"{name}_act(&agent, observation, 1, action); // 0: the best one",
-            ]
-        return [
-            f"static {name}_agent agent; // everything that it remembers",
-            f"{name}_begin(&agent);",
-            f"{name}_begin_episode(&agent); // whenever the task starts anew",
-            *action,
-            f"{name}_learn(&agent, {arguments});",
-        ]
-
-    def add_head(self, tables: Tables, end: str) -> None:
-        """Add the head of the agent's image, which ends with the field ``end``."""
-        fields: Mapping[str, Any] = self.layout().fields or {}
-        head = np.frombuffer(self.image()[: fields[end][1]], np.uint8)
-        tables.add(
-            "uint8_t", "first_head", head, "The state that the agent begins with, as in an image."
-        )
-
-    def learning_defines(self) -> Data:
-        """Return the macros that all headers of learning agents have."""
-        learning = self.agent.learning
-        return {
-            "FINGERPRINT": f"UINT32_C(0x{self.fingerprint():08x})",
-            "START_STEPS": learning.start_steps,
-            "N_GREEDY_STEPS": learning.n_greedy_steps,
-            "MAX_ACTION_REPEAT": learning.max_action_repeat,
-        }
-
-    def learning_needs(self, kilobytes: int, ram_bytes: int, stack: str = "") -> list[str]:
-        """Return comment lines about memory; ``kilobytes`` of code are those without a history."""
-        kilobytes += 3 * self.history.is_needed
-        return [
-            f"Flash: {{flash}} bytes of constants; the code comes to some {kilobytes} kB.",
-            f"RAM:   {ram_bytes:,} bytes, in one struct that you place{stack}.",
-            "       No heap, and nothing static that changes.",
-            "Where the processor cannot multiply or shift 64 bits by itself, the compiler's"
-            " library",
-            "does (libgcc); nothing is divided.",
-        ]
 
 
 def require_few_weights(n_weights: int, settings: str) -> None:

@@ -78,7 +78,7 @@ def test_greedy_actions_between_those_of_a_box_are_those_of_the_agent(name, targ
     agent = agents()["actor"] if name == "actor" else learned(lone)
     n = agent.n_dimensions
     header = export_c_header(agent, tmp_path / "policy.h")
-    call = "place[0] = policy_place_fixed(x)" if n == 1 else "policy_place_fixed(x, place)"
+    call = "place[0] = policy_place(x)" if n == 1 else "policy_place(x, place)"
     source = f"""
         #include "policy.h"
         #include <stdio.h>
@@ -202,8 +202,8 @@ def test_two_headers_compile_in_one_c_or_cpp_program(needs, tmp_path):
           const int32_t x[LEFT_N_OBSERVED] = {131072, -65536, 20000, 3000};
           const float y[RIGHT_2_N_OBSERVED] = {0.6f, -0.8f, 2.0f};
           uint32_t action[RIGHT_2_N_DIMENSIONS];
-          right_2_act_float(y, action);
-          printf("%d", (int)(left_first_action[0] + (int32_t)left_act_fixed(x)));
+          right_2_greedy_float(y, action);
+          printf("%d", (int)(left_first_action[0] + (int32_t)left_greedy(x)));
           printf(" %.9g %.9g", (double)right_2_action_float[0][action[0]],
                  right_2_action_fixed[1][action[1]] / 65536.0);
           return 0;

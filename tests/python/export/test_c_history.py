@@ -116,7 +116,7 @@ def test_nan_and_infinity_have_defined_actions(needs, tmp_path):
           for (step = 0; step < 625; ++step) {
             const double x[3] = {numbers[step % 5], numbers[step / 5 % 5], numbers[step / 25 % 5]};
             if (step % 25 == 0) policy_begin_episode(&episode);
-            if (policy_act_double(&episode, x) >= 11) return 1;
+            if (policy_greedy_double(&episode, x) >= 11) return 1;
           }
           return 0;
         }
@@ -138,7 +138,7 @@ def test_headers_with_a_history_compile_in_c_and_cpp(name, learning, compiler, n
 def test_a_header_describes_the_episode_and_the_added_inputs():
     text = c_header(differences(), "pole").text
     assert "static pole_episode episode; // the memory of an episode" in text
-    assert "uint32_t action = pole_act_fixed(&episode, observation);" in text
+    assert "uint32_t action = pole_greedy(&episode, observation);" in text
     assert "input 3: the change of input 0 in the last step" in text
 
 

@@ -108,7 +108,7 @@ HOSTILE = """
 static agent_agent agent;
 static uint8_t image[AGENT_IMAGE_BYTES];
 int main(void) {
-  uint32_t noise = 1, step, i;
+  uint32_t noise = 1, step, action, i;
   int is_loaded = 1, n_loaded = 0;
   while (fread(image, 1, sizeof image, stdin) == sizeof image) {
     agent_begin(&agent);
@@ -121,7 +121,8 @@ int main(void) {
         reward = noise >> 31 ? (int32_t)(noise << 1) : noise & 1 << 30 ? INT32_MAX : INT32_MIN;
         if (i < 2 * AGENT_N_OBSERVED) x[i & 1][i / 2] = reward;
       }
-      agent_learn(&agent, x[0], agent_act(&agent, x[0], step & 1), reward, x[1], step % 9 == 0);
+      action = step & 1 ? agent_act(&agent, x[0]) : agent_greedy(&agent, x[0]);
+      agent_learn(&agent, x[0], action, reward, x[1], step % 9 == 0);
       VALUE;
     }
     agent_begin_episode(&agent);
@@ -194,6 +195,58 @@ def test_weights_that_leave_their_range_are_halved(target, tmp_path):
     load_image(agent, image)
 
 
+CONSTANT = """
+#include <stdio.h>
+#include "agent.h"
+#include "policy.h"
+static agent_agent agent, before;
+int main(void) {
+  const agent_agent* const same = &agent;
+  int32_t x[AGENT_N_OBSERVED];
+  agent_begin(&agent);
+  memcpy(&before, &agent, sizeof agent);
+  while (fread(x, sizeof *x, AGENT_N_OBSERVED, stdin) == AGENT_N_OBSERVED) {
+    if (agent_greedy(same, x) != policy_greedy(x)) return 1;
+  }
+  return memcmp(&before, &agent, sizeof agent) != 0;
+}
+"""
+
+
+@pytest.mark.parametrize("make", [discrete, sarsa, network, actor])
+def test_greedy_actions_leave_the_agent_as_it_is_and_are_those_of_the_policy(
+    make, target, tmp_path
+):
+    agent = make()
+    run_agent(agent, lines_of(agent, 300, 1, 16), 16)
+    (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
+    (tmp_path / "policy.h").write_text(c_header(agent, "policy").text)
+    greedy = program(
+        tmp_path, f"#include <string.h>{CONSTANT}", target.compiler, *STRICT, *SANITIZED
+    )
+    observations = lines_of(agent, 1000, 2, 16)[:, 1 : len(agent.observation_range[0]) + 1]
+    run(greedy, input=np.ascontiguousarray(observations).tobytes())
+
+
+def test_constants_become_fixed_point_at_compile_time(target, tmp_path):
+    # 0.3 * 65536 = 19660.8 and halves are rounded away from 0.
+    (tmp_path / "agent.h").write_text(c_header(discrete(), "agent", learning=True).text)
+    numbers = {"0.3": 19661, "-0.3": -19661, "1.5 / 65536": 2, "-1.5 / 65536": -2, "7": 458752}
+    values = ", ".join(f"AGENT_FIXED({number})" for number in numbers)
+    source = f"""
+        #include <stdio.h>
+        #include "agent.h"
+        static const int32_t values[] = {{{values}, AGENT_FIXED(2.0f)}};
+        int main(void) {{
+          unsigned i;
+          for (i = 0; i < 6; ++i) printf("%ld ", (long)values[i]);
+          return 0;
+        }}
+    """
+    printed = run(program(tmp_path, source, target.compiler, *STRICT)).split()
+    assert [int(number) for number in printed] == [*numbers.values(), 131072]
+
+
 @pytest.mark.parametrize("compiler", ["g++", "clang++"])
 @pytest.mark.parametrize(
     ("make", "act"),
@@ -209,6 +262,7 @@ def test_cpp_can_learn_save_and_load_by_the_learner_class(compiler, make, act, n
     needs(compiler)
     agent = make()
     (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
+    greedy = "uint32_t b[2]; one.greedy(x, b)" if agent.n_dimensions > 1 else "one.greedy(x)"
     value = "state_value(x)" if isinstance(agent, SDNNActorCritic) else "q(x, a)"
     source = f"""
         #include "agent.h"
@@ -218,7 +272,8 @@ def test_cpp_can_learn_save_and_load_by_the_learner_class(compiler, make, act, n
           int32_t x[AGENT_N_OBSERVED] = {{}};
           one.begin_episode();
           {act};
-          one.learn(x, a, 1 << AGENT_FRACTION_BITS, x, true);
+          one.learn(x, a, AGENT_FIXED(1.0), x, true);
+          {greedy};
           one.save(image);
           return one.{value} != same.{value} && same.load(image) && same.{value} == one.{value}
                      ? 0 : 1;

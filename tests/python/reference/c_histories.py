@@ -173,6 +173,10 @@ int main(void) {{
 }}
 """
 
+GREEDY = {
+    "int32_t": "policy_greedy", "float": "policy_greedy_float", "double": "policy_greedy_double",
+}  # fmt: skip
+
 
 @functools.cache
 def policy(name):
@@ -225,9 +229,9 @@ def check_policy(name, kind, target, folder, n_steps=3000):
     """Check that a program takes the agent's actions in episodes."""
     agent = policy(name)
     header = export_c_header(agent, folder / "policy.h")
-    one, function = agent.n_dimensions == 1, f"policy_act_{kind.replace('int32_t', 'fixed')}"
+    one, function = agent.n_dimensions == 1, GREEDY[kind]
     if lies_between(agent):
-        function, kind = "policy_place_fixed", "int32_t"
+        function, kind = "policy_place", "int32_t"
     call = f"action[0] = {function}(&episode, x)" if one else f"{function}(&episode, x, action)"
     define = "" if kind == "int32_t" else "#define POLICY_USE_FLOAT"
     (folder / "main.c").write_text(DRIVER.format(define=define, type=kind, call=call))

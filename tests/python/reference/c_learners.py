@@ -197,7 +197,7 @@ int main(void) {
   while (fread(line, sizeof *line, 2 * AGENT_N_OBSERVED + 3, stdin) == 2 * AGENT_N_OBSERVED + 3) {
     if (line[0] == 0) agent_begin_episode(&agent);
     if (line[0] == 3) BEGIN_GREEDY;
-    ACT;
+    if (line[0] == 1) ACT; else GREEDY;
     fwrite(action, sizeof *action, AGENT_N_DIMENSIONS, stdout);
     if (line[0] == 1) LEARN;
   }
@@ -253,11 +253,43 @@ def with_greedy_episodes(table, random):
     return np.insert(table, np.repeat(np.arange(len(table)), counts), inserted, axis=0)
 
 
+def index_without_draw(agent, observation, d, index):
+    """The index of a greedy action, or its place, where C takes the middle and the agent draws."""
+    is_actor = isinstance(agent, SDNNActorCritic)
+    if not is_actor and agent.learning.tie_rule != "uniform":
+        return index
+    values = (agent.action_probabilities if is_actor else agent.q_values)(observation, d)
+    tolerance = 0.0 if is_actor else agent.learning.tie_tolerance
+    is_tied = values >= values.max() - tolerance
+    if is_tied.sum() == 1:
+        return index
+    runs = np.split(np.arange(len(values)), np.flatnonzero(np.diff(is_tied)) + 1)
+    widest = max((run for run in runs if is_tied[run[0]]), key=len)
+    middle = int(widest[(len(widest) - 1) // 2])
+    if not lies_between(agent):
+        return middle
+    weights = np.pad(np.round(values / values.max() * 2**30), 1).astype(int).tolist()
+    below, _, above = neighbours = weights[middle : middle + 3]
+    shift = (abs(above - below) << 16) // sum(neighbours)
+    return (middle << 16) + (shift if above >= below else -shift)
+
+
+def generator_of_greedy_ties(agent):
+    """The name of the random generator that greedy actions draw from in Python, and its state."""
+    state = agent._state_of("agent")
+    name = next(n for n in ("policy.evaluation_ties.words", "ties.words") if n in state)
+    return name, state[name].copy()
+
+
 def run_agent(agent, lines, fraction_bits):
-    """The indices of the actions that the library's agent takes for the lines."""
+    """The indices of the actions that the library's agent takes for the lines.
+
+    Greedy actions draw nothing in C: the agent's generator for them is set back.
+    """
     n, scale = (lines.shape[1] - 3) // 2, 2.0**fraction_bits
     actions = []
     agent._has_warned = True  # of rewards that are too large
+    name, generator = generator_of_greedy_ties(agent)
     for line in lines.tolist():
         now, following = np.array(line[1 : n + 1]) / scale, np.array(line[n + 2 : -1]) / scale
         if isinstance(agent.observation_space, gym.spaces.Discrete):
@@ -268,14 +300,19 @@ def run_agent(agent, lines, fraction_bits):
             agent.begin_greedy_episode()
         action = agent.act(now, explore=line[0] == 1)
         acts_between = line[0] != 1 and lies_between(agent)
-        actions.append([
-            place_of(agent.actions_of(d), one) if acts_between
-            else np.abs(agent.actions_of(d) - one).argmin()
-            for d, one in enumerate(np.ravel(action))
-        ])  # fmt: skip
+        indices = [
+            place_of(agent.actions_of(d), part) if acts_between
+            else np.abs(agent.actions_of(d) - part).argmin()
+            for d, part in enumerate(np.ravel(action))
+        ]  # fmt: skip
+        if line[0] != 1:
+            indices = [index_without_draw(agent, now, d, index) for d, index in enumerate(indices)]
+        actions.append(indices)
         if line[0] == 1:
             agent.learn(Transition(now, action, line[n + 1] / scale, following, bool(line[-1])))
     agent.begin_episode()
+    state = agent._state_of("agent") | {name: generator}
+    agent._restore(agent=state, reward_scale=agent._state_of("reward_scale"))
     return actions
 
 
@@ -283,21 +320,22 @@ def build(folder, agent, target, *options):
     """The header and its program, as a command."""
     header = export_c_header(agent, folder / "agent.h", learning=True)
     one = agent.n_dimensions == 1
-    act = "agent_act(&agent, line + 1, line[0] == 1"
-    act = f"action[0] = {act})" if one else f"{act}, action)"
-    if lies_between(agent):
-        place = "agent_place(&agent, line + 1"
-        place = f"action[0] = {place})" if one else f"{place}, action)"
-        act = f"if (line[0] == 1) {act}; else {place}"
+    has_history = agent.history != "none"
+    function = "agent_place" if lies_between(agent) else "agent_greedy"
+    episode = "&episode, " if has_history else ""
+    act, greedy = "agent_act(&agent, line + 1", f"{function}(&agent, {episode}line + 1"
+    act, greedy = (f"action[0] = {call})" if one else f"{call}, action)" for call in (act, greedy))
     learn = (
         f"agent_learn(&agent, line + 1, {'action[0]' if one else 'action'},"
         " line[1 + AGENT_N_OBSERVED], next, line[2 * AGENT_N_OBSERVED + 2])"
     )
     if target in BARE_TARGETS.values():
         (folder / "stdio.h").write_text(STDIO)
-    greedy = "(void)0" if agent.history == "none" else "agent_begin_greedy_episode(&agent)"
+    begin = "agent_begin_greedy_episode(&agent, &episode)" if has_history else "(void)0"
+    memory = "static agent_greedy_episode episode;" if has_history else ""
     source = DRIVER.replace("ACT;", f"{act};").replace("LEARN", learn)
-    source = source.replace("BEGIN_GREEDY", greedy)
+    source = source.replace("BEGIN_GREEDY", begin).replace("GREEDY;", f"{greedy};")
+    source = source.replace("static agent_agent agent;", f"static agent_agent agent; {memory}")
     (folder / "steps.c").write_text(source)
     program = folder / "steps"
     run(

@@ -349,9 +349,12 @@ def write_policy(folder, agent, *, floats=True, **options):
     """The header, and a source file that makes its functions callable from others."""
     header = export_c_header(agent, folder / "policy.h", **options)
     one = agent.n_dimensions == 1
+    functions = {
+        "fixed": "policy_greedy", "double": "policy_greedy_double", "float": "policy_greedy_float",
+    }  # fmt: skip
     calls = {
-        kind: f"a[0] = policy_act_{kind}(x);" if one else f"policy_act_{kind}(x, a);"
-        for kind in ("fixed", "double", "float")
+        kind: f"a[0] = {function}(x);" if one else f"{function}(x, a);"
+        for kind, function in functions.items()
     }
     define = "#define POLICY_USE_FLOAT" if floats else ""
     (folder / "policy.c").write_text(POLICY.format(define=define, **calls))

@@ -78,7 +78,7 @@ static int episode(void)
 		return -1;
 	}
 	for (int step = 0; step < STEPS; ++step) {
-		const uint32_t action = pole_act(&agent, now, 1);
+		const uint32_t action = pole_act(&agent, now);
 
 		drive(pole_action_fixed[action]);
 		k_msleep(PERIOD);
