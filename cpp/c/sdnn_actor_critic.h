@@ -329,8 +329,6 @@ static inline uint32_t sdnn_place(const sdnn_agent* agent,
 #endif
 #endif
 
-/* An image holds the state as bytes, which the library reads and writes too. The episode is not
- * part of it. */
 #define SDNN_IMAGE_HEAD 120
 #define SDNN_IMAGE_BYTES (SDNN_IMAGE_HEAD + 4 * SDNN_N_ALL_WEIGHTS + 4)
 
@@ -363,27 +361,26 @@ static inline int sdnn_is_exponent(int32_t exponent) {
   return exponent >= -1100 && exponent <= 1100;
 }
 
-/* Returns whether the image is one of this agent, whole and in range; if not, nothing changes. */
-static inline int sdnn_load(sdnn_agent* agent, const uint8_t* image) {
-  const uint8_t* const weights = image + SDNN_IMAGE_HEAD;
-  const int32_t exponent = sdnn_get_32(image + 8);
-  uint32_t j;
-  if (!sdnn_is_image(image, SDNN_IMAGE_BYTES, image + 56) ||
-      (exponent != INT32_MIN && !sdnn_is_exponent(exponent)) ||
-      !sdnn_is_exponent(sdnn_get_32(image + 12)) || sdnn_get(image + 16, 4) > 1024 ||
-      sdnn_get(image + 20, 8) > UINT64_C(1) << 60 || sdnn_get(image + 28, 8) > SDNN_MOST_LEARNED ||
-      !sdnn_is_scale(image + 36)) {
-    return 0;
-  }
-  for (j = 0; j < SDNN_N_ALL_WEIGHTS; ++j) {
-    const int64_t weight = sdnn_get_32(weights + 4 * j), is_of_actor = j >= SDNN_N_WEIGHTS;
+static inline int sdnn_is_head(const uint8_t* head) {
+  const int32_t exponent = sdnn_get_32(head + 8);
+  return sdnn_are_generators(head + 56) && (exponent == INT32_MIN || sdnn_is_exponent(exponent)) &&
+         sdnn_is_exponent(sdnn_get_32(head + 12)) && sdnn_get(head + 16, 4) <= 1024 &&
+         sdnn_get(head + 20, 8) <= UINT64_C(1) << 60 &&
+         sdnn_get(head + 28, 8) <= SDNN_MOST_LEARNED && sdnn_is_scale(head + 36);
+}
+
+/* Whether the weights in a part of an image are in range. -2^23 is one of the critic alone. */
+static inline int sdnn_is_possible(const sdnn_part* part) {
+  uint32_t i;
+  for (i = 0; i < part->n; i += 4) {
+    const uint32_t at = part->offset + i;
+    const int64_t weight = sdnn_get_32(part->bytes + i);
+    const int64_t is_of_actor = at >= SDNN_IMAGE_HEAD + 4 * SDNN_N_WEIGHTS;
+    if (at < SDNN_IMAGE_HEAD || at >= SDNN_IMAGE_BYTES - 4) continue;
     if (weight >= SDNN_LARGEST_WEIGHT || weight < is_of_actor - SDNN_LARGEST_WEIGHT) return 0;
   }
-  sdnn_begin_as(agent, image);
-  sdnn_carry_32((uint8_t*)weights, agent->weights, SDNN_N_ALL_WEIGHTS, 1);
   return 1;
 }
 
 #include "sdnn_learner_class.h"
-
 #endif /* SDNN_ACTOR_CRITIC_H */

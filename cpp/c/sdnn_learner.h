@@ -140,32 +140,47 @@ static inline int sdnn_is_scale(const uint8_t* at) {
          headroom <= 2500;
 }
 
-/* CRC-32. */
-static inline uint32_t sdnn_checksum(const uint8_t* bytes, uint32_t n) {
-  uint32_t crc = UINT32_MAX, bit;
+/* Continues a CRC-32, which begins with 2^32 - 1 and whose complement is the checksum. */
+static inline uint32_t sdnn_add_to_checksum(uint32_t crc, const uint8_t* bytes, uint32_t n) {
+  uint32_t bit;
   for (; n > 0; --n) {
     crc ^= *bytes++;
     for (bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (crc & 1 ? UINT32_C(0xedb88320) : 0);
   }
-  return ~crc;
+  return crc;
+}
+
+/* n bytes of an image, from `offset` on. */
+typedef struct {
+  uint8_t* bytes;
+  uint32_t offset, n;
+} sdnn_part;
+
+/* Moves those bytes of a part that are in an array of words, which begins at `first` in the image:
+ * from the array to the part or, if it reads, the other way. */
+static inline void sdnn_carry_words(const sdnn_part* part, void* words, uint32_t first,
+                                    uint32_t n_words, int reads) {
+  uint32_t* const array = (uint32_t*)words;
+  uint32_t i;
+  for (i = 0; i < part->n; ++i) {
+    const uint32_t k = part->offset + i - first,
+                   shift = 8 * (k & 3); /* below `first`, k is large */
+    if (k >= 4 * n_words) continue;
+    if (reads) {
+      const uint32_t others = array[k >> 2] & ~(UINT32_C(255) << shift);
+      array[k >> 2] = others | (uint32_t)part->bytes[i] << shift;
+    } else {
+      part->bytes[i] = (uint8_t)(array[k >> 2] >> shift & 255);
+    }
+  }
 }
 
 /* The random generators of an agent. SDNN-C rounds at random, too. */
 enum { SDNN_EXPLORATION, SDNN_ACTING, SDNN_EVALUATION, SDNN_REPETITIONS, SDNN_ROUNDING };
 
-/* Writes an image's first bytes and its checksum. */
-static inline void sdnn_seal(uint8_t* image, uint32_t n_bytes) {
-  sdnn_put(sdnn_put(image, SDNN_IMAGE_MAGIC, 4), SDNN_FINGERPRINT, 4);
-  sdnn_put(image + n_bytes - 4, sdnn_checksum(image, n_bytes - 4), 4);
-}
-
-/* Whether an image has the head of this agent, the right checksum and possible generators. */
-static inline int sdnn_is_image(const uint8_t* image, uint32_t n_bytes, const uint8_t* randoms) {
+/* Whether the head of an image has possible generators at this place. */
+static inline int sdnn_are_generators(const uint8_t* randoms) {
   uint32_t i, j;
-  if (sdnn_get(image, 4) != SDNN_IMAGE_MAGIC || sdnn_get(image + 4, 4) != SDNN_FINGERPRINT ||
-      sdnn_get(image + n_bytes - 4, 4) != sdnn_checksum(image, n_bytes - 4)) {
-    return 0;
-  }
   for (i = 0; i < SDNN_N_RANDOMS; ++i) {
     uint8_t any = 0;
     for (j = 0; j < 32; ++j) any |= *randoms++;

@@ -2,6 +2,8 @@
 #ifndef SDNN_LEARNER_CLASS_H
 #define SDNN_LEARNER_CLASS_H
 
+#include "sdnn_slots.h"
+
 #ifdef __cplusplus
 class sdnn_learner {
  public:
@@ -61,6 +63,14 @@ class sdnn_learner {
 #endif
   void save(uint8_t (&image)[SDNN_IMAGE_BYTES]) const { sdnn_save(&agent_, image); }
   bool load(const uint8_t (&image)[SDNN_IMAGE_BYTES]) { return sdnn_load(&agent_, image) != 0; }
+  void save_part(uint32_t offset, uint8_t* bytes, uint32_t n) const {
+    sdnn_save_part(&agent_, offset, bytes, n);
+  }
+  bool load_from(sdnn_reader read, void* context) {
+    return sdnn_load_from(&agent_, read, context) != 0;
+  }
+  bool store(const sdnn_flash& flash) const { return sdnn_store(&agent_, &flash) != 0; }
+  bool restore(const sdnn_flash& flash) { return sdnn_restore(&agent_, &flash) != 0; }
 
  private:
   sdnn_agent agent_;

@@ -40,10 +40,9 @@ static inline void sdnn_begin(sdnn_agent* agent) {
   sdnn_copy_32(agent->weights, sdnn_first_weights, SDNN_N_FIRST_WEIGHTS);
 }
 
-static inline void sdnn_save(const sdnn_agent* agent, uint8_t* image) {
-  sdnn_carry_head((sdnn_agent*)agent, image, 0);
-  sdnn_carry_32(image + SDNN_IMAGE_HEAD, (int32_t*)agent->weights, SDNN_N_ALL_WEIGHTS, 0);
-  sdnn_seal(image, SDNN_IMAGE_BYTES);
+/* Moves the weights that are in a part of an image. */
+static inline void sdnn_carry_arrays(sdnn_agent* agent, const sdnn_part* part, int reads) {
+  sdnn_carry_words(part, agent->weights, SDNN_IMAGE_HEAD, SDNN_N_ALL_WEIGHTS, reads);
 }
 
 #endif /* SDNN_LINEAR_AGENT_H */

@@ -316,8 +316,6 @@ static inline int64_t sdnn_q(const sdnn_agent* agent, const int32_t* observation
 #define sdnn_q sdnn_q_of_each
 #endif
 
-/* An image holds the state as bytes, which the library reads and writes too. The episode is not
- * part of it: call sdnn_begin_episode before, so that its last transition is learned. */
 #define SDNN_IMAGE_HEAD 188
 #define SDNN_IMAGE_BYTES (SDNN_IMAGE_HEAD + 4 * SDNN_N_ALL_WEIGHTS + 4)
 
@@ -350,26 +348,26 @@ static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
 
 #include "sdnn_linear_agent.h"
 
-/* Returns whether the image is one of this agent, whole and in range; if not, nothing changes. */
-static inline int sdnn_load(sdnn_agent* agent, const uint8_t* image) {
-  const uint8_t* const weights = image + SDNN_IMAGE_HEAD;
-  const int32_t exponent = sdnn_get_32(image + 8);
-  uint32_t j;
-  if (!sdnn_is_image(image, SDNN_IMAGE_BYTES, image + 60) ||
-      (exponent != INT32_MIN && (exponent < -1100 || exponent > 1100)) ||
-      sdnn_get(image + 12, 4) > SDNN_MOST_SNAPSHOTS || sdnn_get(image + 16, 4) > SDNN_MOST_RANDOM ||
-      sdnn_get(image + 20, 4) > SDNN_MOST_ENDED || sdnn_get(image + 24, 8) > UINT64_C(1) << 45 ||
-      sdnn_get(image + 32, 8) >> 62 || !sdnn_is_scale(image + 40)) {
-    return 0;
+static inline int sdnn_is_head(const uint8_t* head) {
+  const int32_t exponent = sdnn_get_32(head + 8);
+  return sdnn_are_generators(head + 60) &&
+         (exponent == INT32_MIN || (exponent >= -1100 && exponent <= 1100)) &&
+         sdnn_get(head + 12, 4) <= SDNN_MOST_SNAPSHOTS &&
+         sdnn_get(head + 16, 4) <= SDNN_MOST_RANDOM && sdnn_get(head + 20, 4) <= SDNN_MOST_ENDED &&
+         sdnn_get(head + 24, 8) <= UINT64_C(1) << 45 && sdnn_get(head + 32, 8) >> 62 == 0 &&
+         sdnn_is_scale(head + 40);
+}
+
+/* Whether the weights in a part of an image are in range. */
+static inline int sdnn_is_possible(const sdnn_part* part) {
+  uint32_t i;
+  for (i = 0; i < part->n; i += 4) {
+    const uint32_t at = part->offset + i;
+    const int is_weight = at >= SDNN_IMAGE_HEAD && at < SDNN_IMAGE_BYTES - 4;
+    if (is_weight && sdnn_size(sdnn_get_32(part->bytes + i)) >= SDNN_LARGEST_WEIGHT) return 0;
   }
-  for (j = 0; j < SDNN_N_ALL_WEIGHTS; ++j) {
-    if (sdnn_size(sdnn_get_32(weights + 4 * j)) >= SDNN_LARGEST_WEIGHT) return 0;
-  }
-  sdnn_begin_as(agent, image);
-  sdnn_carry_32((uint8_t*)weights, agent->weights, SDNN_N_ALL_WEIGHTS, 1);
   return 1;
 }
 
 #include "sdnn_learner_class.h"
-
 #endif /* SDNN_Q_LAMBDA_H */

@@ -1,0 +1,146 @@
+/* The image of an SDNN-C agent. */
+#ifndef SDNN_C_IMAGE_H
+#define SDNN_C_IMAGE_H
+
+/* Where the parts of an image begin: the head, rewards, returns, thresholds and weights. */
+#if SDNN_ADAPTS
+#define SDNN_IMAGE_HEAD 272
+#define SDNN_RETURNS_AT (SDNN_IMAGE_HEAD + UINT32_C(8) * SDNN_HORIZON)
+#define SDNN_THRESHOLDS_AT (SDNN_RETURNS_AT + 8 * 256)
+#else
+#define SDNN_IMAGE_HEAD 220
+#define SDNN_THRESHOLDS_AT UINT32_C(220)
+#endif
+#define SDNN_WEIGHTS_AT (SDNN_THRESHOLDS_AT + UINT32_C(4) * SDNN_N_UNITS)
+#define SDNN_IMAGE_BYTES (SDNN_WEIGHTS_AT + 4 * SDNN_N_WORDS + 4)
+
+/* Reads or writes the head of an image: all numbers except rewards, returns, thresholds and
+ * weights. */
+static inline void sdnn_carry_head(sdnn_agent* agent, uint8_t* head, int reads) {
+  uint8_t* at = sdnn_carry_32(head + 12, &agent->n_random_left, 1, reads);
+  if (!reads) sdnn_put(head + 8, SDNN_FRACTION_BITS, 4);
+  at = sdnn_carry_64(at, agent->randoms, 4 * SDNN_N_RANDOMS, reads);
+  at = sdnn_carry_scale(at, &agent->scale, reads);
+  at = sdnn_carry_64(at, &agent->progress, 1, reads);
+  at = sdnn_carry_64(at, &agent->q_low, 1, reads);
+  at = sdnn_carry_64(at, &agent->q_high, 1, reads);
+#if SDNN_ADAPTS
+  at = sdnn_carry_64(at, &agent->low, 1, reads);
+  at = sdnn_carry_64(at, &agent->high, 1, reads);
+  at = sdnn_carry_64(at, &agent->sum, 1, reads);
+  at = sdnn_carry_64(at, &agent->n_returns, 1, reads);
+  at = sdnn_carry_64(at, &agent->due, 1, reads);
+  at = sdnn_carry_32(at, &agent->n_rewards, 1, reads);
+  at = sdnn_carry_32(at, &agent->n_kept_returns, 1, reads);
+  sdnn_carry_32(at, &agent->oldest, 1, reads);
+#endif
+}
+
+/* Makes an agent with the head of an image, and nothing learned. */
+static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
+  sdnn_clear(agent, sizeof *agent);
+  sdnn_carry_head(agent, (uint8_t*)head, 1);
+  sdnn_follow_progress(agent, agent->progress);
+  sdnn_set_range(agent, agent->q_low, agent->q_high);
+}
+
+/* Makes the agent as it was exported. */
+static inline void sdnn_begin(sdnn_agent* agent) {
+  sdnn_begin_as(agent, sdnn_first_head);
+#if SDNN_ADAPTS
+  sdnn_copy_32(agent->rewards, sdnn_first_rewards, agent->n_rewards);
+  sdnn_copy_returns(agent->returns, sdnn_first_returns, agent->n_kept_returns);
+#endif
+#if SDNN_IS_NEW
+  sdnn_draw_weights(agent);
+#else
+  sdnn_copy_32((int32_t*)agent->weights, (const int32_t*)sdnn_first_weights, SDNN_N_WORDS);
+  sdnn_copy_32(agent->thresholds, sdnn_first_thresholds, SDNN_N_UNITS);
+#endif
+}
+
+#if SDNN_ADAPTS
+/* Moves those rewards and returns that are in a part of an image. Rewards behind the last one are 0
+ * there. */
+static inline void sdnn_carry_range(sdnn_agent* agent, const sdnn_part* part, int reads) {
+  const uint32_t n_rewards = reads ? 2 * SDNN_HORIZON : agent->n_rewards;
+  uint32_t i;
+  for (i = 0; i < part->n; ++i) {
+    const uint32_t at = part->offset + i, k = at - SDNN_RETURNS_AT, shift = 8 * (k & 7);
+    if (!reads && at >= SDNN_IMAGE_HEAD && at < SDNN_RETURNS_AT) part->bytes[i] = 0;
+    if (k >= 8 * 256) continue;
+    if (reads) {
+      const sdnn_real others = agent->returns[k >> 3] & ~(UINT64_C(255) << shift);
+      agent->returns[k >> 3] = others | (sdnn_real)part->bytes[i] << shift;
+    } else {
+      part->bytes[i] = (uint8_t)(agent->returns[k >> 3] >> shift & 255);
+    }
+  }
+  sdnn_carry_words(part, agent->rewards, SDNN_IMAGE_HEAD, n_rewards, reads);
+}
+#endif
+
+/* Moves the numbers of arrays that are in a part of an image. */
+static inline void sdnn_carry_arrays(sdnn_agent* agent, const sdnn_part* part, int reads) {
+#if SDNN_ADAPTS
+  sdnn_carry_range(agent, part, reads);
+#endif
+  sdnn_carry_words(part, agent->thresholds, SDNN_THRESHOLDS_AT, SDNN_N_UNITS, reads);
+  sdnn_carry_words(part, agent->weights, SDNN_WEIGHTS_AT, SDNN_N_WORDS, reads);
+}
+
+/* Whether a number read is one, and at most 2^100 in size. */
+static inline int sdnn_is_real(sdnn_real x) { return x << 1 >> 1 <= UINT64_C(1123) << 52; }
+
+#if SDNN_ADAPTS
+/* Whether a head has a possible range, and possible numbers of rewards and returns. */
+static inline int sdnn_is_range(const uint8_t* head) {
+  const uint64_t n_returns = sdnn_get(head + 244, 8), due = sdnn_get(head + 252, 8);
+  const uint32_t n_kept = (uint32_t)sdnn_get(head + 264, 4);
+  const uint32_t oldest = (uint32_t)sdnn_get(head + 268, 4);
+  uint32_t i;
+  for (i = 220; i < 244; i += 8) {
+    if (!sdnn_is_real(sdnn_get(head + i, 8))) return 0;
+  }
+  return !sdnn_less(0, sdnn_get(head + 220, 8)) && !sdnn_less(sdnn_get(head + 228, 8), 0) &&
+         n_returns >> 62 == 0 && due <= n_returns + (n_returns < 512 ? 1 : n_returns >> 9) &&
+         sdnn_get(head + 260, 4) < 2 * SDNN_HORIZON && n_kept <= 256 && oldest <= 255 &&
+         (n_kept == 256 || oldest == 0) && (n_returns < 32 || n_kept >= 32);
+}
+#endif
+
+static inline int sdnn_is_head(const uint8_t* head) {
+  const sdnn_real q_low = sdnn_get(head + 204, 8), q_high = sdnn_get(head + 212, 8);
+#if SDNN_ADAPTS
+  if (!sdnn_is_range(head)) return 0;
+#endif
+  return sdnn_are_generators(head + 16) && sdnn_get(head + 8, 4) == SDNN_FRACTION_BITS &&
+         sdnn_get(head + 12, 4) <= SDNN_START_STEPS && sdnn_get(head + 196, 8) <= SDNN_ONE &&
+         sdnn_is_real(q_low) && sdnn_is_real(q_high) && sdnn_less(q_low, q_high) &&
+         sdnn_is_scale(head + 176);
+}
+
+/* Whether the returns, thresholds and weights in a part of an image are in range. */
+static inline int sdnn_is_possible(const sdnn_part* part) {
+  uint32_t i, j;
+  for (i = 0; i < part->n; i += 4) {
+    const uint32_t at = part->offset + i;
+    const uint8_t* const bytes = part->bytes + i;
+    const int32_t number = sdnn_get_32(bytes);
+    if (at >= SDNN_IMAGE_BYTES - 4) break;
+    if (at >= SDNN_WEIGHTS_AT) {
+      for (j = 0; j < 4; ++j) {
+        if (bytes[j] == 0) return 0;
+      }
+    } else if (at >= SDNN_THRESHOLDS_AT) {
+      if (number <= -1073741824 || number >= 1073741824) return 0;
+#if SDNN_ADAPTS
+    } else if (at >= SDNN_RETURNS_AT && (at & 7) == 0) {
+      if (!sdnn_is_real(sdnn_get(bytes, 8))) return 0;
+#endif
+    }
+  }
+  return 1;
+}
+
+#endif /* SDNN_C_IMAGE_H */
