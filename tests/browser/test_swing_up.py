@@ -129,6 +129,14 @@ def test_an_invalid_seed_changes_nothing(visit, controls):
     assert page.locator("#command").inner_text().endswith("--seed 0")
 
 
+def test_the_command_can_be_copied(visit, controls):
+    page = visit("index.html", permissions=["clipboard-read", "clipboard-write"])
+    _, command = finish(page, controls, sensors=4)
+    page.locator("#copy").click()
+    page.get_by_text("Copied").wait_for()
+    assert page.evaluate("navigator.clipboard.readText()") == command
+
+
 def test_an_agent_that_has_learned_repeats_its_last_test(visit, controls):
     page = visit("index.html")
     finish(page, controls, sensors=6)

@@ -53,6 +53,7 @@ function restart() {
   generation++;
   begun = settings();
   element("result").hidden = true;
+  element("copy").textContent = "Copy the command";
   showRunning();
   const speed = SPEEDS[element("speed").value];
   worker.postMessage({ generation, settings: begun, speed, isRunning });
@@ -139,6 +140,7 @@ element("speed").oninput = () => {
 element("settings").onsubmit = (event) => event.preventDefault();
 for (const id of ["noise", "sensors"]) element(id).oninput = showSettings;
 for (const id of ["noise", "sensors", "preset", "seed"]) element(id).onchange = restart;
+element("copy").hidden = !navigator.clipboard; // pages without TLS have none
 element("copy").onclick = async () => {
   await navigator.clipboard.writeText(element("command").textContent);
   element("copy").textContent = "Copied";
