@@ -36,6 +36,20 @@ static inline uint32_t sdnn_unit_of(const uint8_t* pattern, uint32_t unit) {
   return (uint32_t)pattern[unit >> 3] >> (unit & 7) & 1;
 }
 
+#if SDNN_HAS_EXCESSES
+/* The sign of a column, the unit of a pair, in the code of a sample: 1, 0 or -1. */
+static inline int32_t sdnn_sign_of(const uint32_t* bins, const sdnn_pair* pair, uint32_t unit) {
+  const uint8_t* const pattern =
+      sdnn_patterns + pair->table + bins[pair->modified] * SDNN_PATTERN_BYTES;
+  if (pair->modifier_table != SDNN_NONE) {
+    const uint32_t by = pair->order == SDNN_NONE ? unit : sdnn_orders[pair->order + unit];
+    const uint32_t place = pair->modifier_table + bins[pair->modifier] * SDNN_PATTERN_BYTES;
+    if (!sdnn_unit_of(sdnn_patterns + place, by)) return 0;
+  }
+  return sdnn_unit_of(pattern, unit) ? 1 : -1;
+}
+#endif
+
 static inline void sdnn_encode(const uint32_t* bins, sdnn_code* code) {
   sdnn_column* positive = code->columns;
   sdnn_column* negative = code->columns + SDNN_MOST_COLUMNS;

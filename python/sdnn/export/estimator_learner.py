@@ -62,7 +62,7 @@ class EstimatorLearner(EstimatorWriter):
         about = "Weights at the beginning, column by column."
         tables.add("int8_t" if is_byte else "int16_t", "first_weights", columns, about)
         tables.add("int32_t", "first_thresholds", network.layer.thresholds)
-        return {"N_NETWORKS": 1}
+        return {"N_NETWORKS": 1, "HAS_EXCESSES": 0}
 
     def ram_bytes(self) -> int:
         """Return the bytes of the struct."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     Model: TypeAlias = SDNNRegressor | SDNNClassifier
 
 _MOST_OF_TWO_BYTES = 32512
+_MOST_16_BITS = 2**16 - 1
+_EXCESS_BYTES = 8  # of a struct of sdnn_greedy_estimator.h
+_NETWORK_BYTES = 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +66,11 @@ class EstimatorWriter:
         self.pairs = PairTables(self.code)
         self.is_classifier = hasattr(model, "classes_")
         self.n_units: int = model.network_.n_units
+        if self.pairs.m > _MOST_16_BITS or len(self.code.codings) > _MOST_16_BITS:
+            raise ValueError(
+                f"model must have at most {_MOST_16_BITS} features and n_pattern_units for a C"
+                f" header, got {len(self.code.codings)} and {self.pairs.m}"
+            )
         weights = len(self.networks) * self.n_units * self.code.core.n_columns
         require_few_weights(weights, "n_averaged_epochs, units")
 
@@ -108,19 +117,45 @@ class EstimatorWriter:
 
     def add_networks(self, tables: Tables) -> dict[str, object]:
         """Add the weights of all networks to the tables; return the macros of the networks."""
-        rows = []
+        rows, excesses = [], list[str]()
         for number, network in enumerate(self.networks):
             weights = require_small(network.layer.weights)
+            in_bytes, more = self.split(weights)
+            words, n_bytes = weight_words(in_bytes)
             thresholds = network.layer.thresholds
-            words, n_bytes = weight_words(weights)
             padded = np.pad(thresholds, (0, -len(thresholds) % 4))
             tables.add("uint32_t", f"weights_{number}", words, "Weights, those of four units each.")
             tables.add("int32_t", f"thresholds_{number}", padded)
             tables.add("uint8_t", f"weight_bytes_{number}", n_bytes)
             parts = ("weights", "thresholds", "weight_bytes")
             names = ", ".join(f"{self.name}_{part}_{number}" for part in parts)
-            rows.append(f"{{{names}}},")
-        return {"N_NETWORKS": len(self.networks), "NETWORKS": rows}
+            rows.append(f"{{{names}, {len(excesses)}, {len(more)}}},")
+            excesses += more
+        tables.n_bytes += _EXCESS_BYTES * len(excesses) + _NETWORK_BYTES * len(rows)
+        macros = {"N_NETWORKS": len(rows), "NETWORKS": rows, "HAS_EXCESSES": int(bool(excesses))}
+        return {**macros, "EXCESSES": in_lines(excesses)} if excesses else macros
+
+    def split(self, weights: NDArray[np.int32]) -> tuple[NDArray[np.int32], list[str]]:
+        """Limit weights to a byte where few of four units exceed it, which takes less flash.
+
+        Returns the weights, and the structs in C of what is beyond the limits.
+        """
+        m, limited, rows = self.pairs.m, weights.copy(), []
+        if max(len(weights), len(self.code.pairs)) > _MOST_16_BITS:
+            return limited, []
+        for first in range(0, len(weights), 4):
+            four = weights[first : first + 4]
+            clipped = four.clip(-128, 127)
+            excess = four - clipped
+            units, columns = np.nonzero(excess)
+            if _EXCESS_BYTES * len(units) < 4 * weights.shape[1]:
+                limited[first : first + 4] = clipped
+                places = zip(units.tolist(), columns.tolist(), strict=True)
+                rows += [
+                    f"{{{first + unit},{column // m},{column % m},{excess[unit, column]}}},"
+                    for unit, column in places
+                ]
+        return limited, rows
 
     def ram_bytes(self) -> int:
         """Return the bytes of the arrays on the stack."""
@@ -232,3 +267,13 @@ def require_small(weights: NDArray[np.int32]) -> NDArray[np.int32]:
             " train with a smaller max_iter"
         )
     return weights
+
+
+def in_lines(rows: Iterable[str]) -> list[str]:
+    """Return rows of C in few lines.
+
+    >>> in_lines(["{1,2},"] * 3)
+    ['{1,2},{1,2},{1,2},']
+    """
+    row_list = list(rows)
+    return ["".join(row_list[begin : begin + 5]) for begin in range(0, len(row_list), 5)]

@@ -5,6 +5,7 @@
 
 import copy
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from c_estimators import (
     fitted,
     numbers,
 )
-from c_policies import STRICT_CPP, TARGETS, program, run
+from c_policies import STRICT, STRICT_CPP, TARGETS, program, run
 from refusals import refuses
 from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
 from sdnn.coding import Circular, RandomInverse, Symbolic
@@ -29,6 +30,7 @@ from sdnn.estimators.network import Network
 from sdnn.export import estimator_header, export_estimator_header, small_settings
 from sdnn.export.estimators import CODE_BYTES
 
+PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "estimators-on-a-chip.md"
 SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all", "-fsanitize=address")
 BINS = """
 #include <stdio.h>
@@ -226,6 +228,46 @@ def test_a_header_above_the_limit_of_flash_is_refused_with_size_and_remedy(tmp_p
         export_estimator_header(model, path, flash_bytes=needed - 1)
     assert not path.exists()
     refuses("flash_bytes", estimator_header, model, "model", flash_bytes=0)
+
+
+def test_the_example_corrects_a_sensor_that_drifts(target, tmp_path):
+    code = re.search("```python\n(.*?)```", PAGE.read_text(), re.DOTALL)[1]
+    names = {}
+    exec(code.replace("sensor.safetensors", str(tmp_path / "sensor.safetensors")), names)
+    header = export_estimator_header(names["model"], tmp_path / "sensor.h", learning=True)
+    assert header.flash_bytes + CODE_BYTES < 2**17
+    example = PAGE.parents[1] / "examples" / "c" / "drift.c"
+    run(target.compiler, *STRICT, "-I", tmp_path, example, "-o", tmp_path / "drift", "-lm")
+    first, corrected = map(int, run(tmp_path / "drift").split())
+    assert corrected < first / 4
+    assert f"is {first} ppm without learning" in PAGE.read_text()
+    assert f"it is {corrected} ppm" in PAGE.read_text()
+
+
+def test_names_on_the_page_exist_in_the_headers():
+    named = set(re.findall(r"`((?:sensor|SENSOR)_\w+)", PAGE.read_text()))
+    assert len(named) > 8
+    regressor, classifier = fitted("categories")[0], fitted("two-classes")[0]
+    texts = [
+        estimator_header(model, "sensor", learning=learning).text
+        for model in (regressor, classifier)
+        for learning in (False, True)
+    ]
+    named.remove("sensor_categories_2")
+    assert "sensor_categories_0[]" in texts[0]
+    assert {name for name in named if not re.search(rf"\b{name}\b", "".join(texts))} == set()
+
+
+def test_few_weights_beyond_a_byte_take_little_flash():
+    model, _ = fitted("wide-weights")
+    is_wide = (model.weights_ > 127) | (model.weights_ < -128)
+    assert is_wide[:4].mean() > 0.5
+    assert 0 < is_wide[4:].sum() < 9
+    header = estimator_header(model, "model")
+    # Words of four units: three rows of bytes a network, and a row of second bytes.
+    n_words = model.weights_.shape[1] * (3 * len(model._earlier) + 3 + 1)
+    structs = 20 * (1 + len(model._earlier)) + 8 * int(is_wide[4:].sum())
+    assert header.weight_bytes == 4 * n_words + (1 + len(model._earlier)) * (48 + 3) + structs
 
 
 def test_estimators_without_a_form_in_c_are_refused_with_a_remedy():

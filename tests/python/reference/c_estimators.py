@@ -10,6 +10,7 @@ from bare_processors import BARE_TARGETS, STDIO
 from c_policies import STRICT, run
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
+from sdnn.estimators.network import Network
 from sdnn.export import export_estimator_header
 
 SMALL = {"n_pattern_units": 24, "max_iter": 8, "random_state": 0}
@@ -93,11 +94,17 @@ def plain_pairs():
 
 
 def wide_weights():
-    """Weights of more than a byte, and a range of outputs that is tiny and far from 0."""
-    settings = SMALL | {"max_iter": 400}
+    """Many or few weights of more than a byte, and a range of outputs tiny and far from 0."""
     X = numbers(200, 4, 2)
     y = 1e6 + 1e-3 * np.random.default_rng(0).normal(size=200)
-    return SDNNRegressor(n_output_units=9, **settings).fit(X, y), lambda n, s: numbers(n, s, 2)
+    model = SDNNRegressor(n_output_units=9, **SMALL).fit(X, y)
+    network, code = model.network_, model.network_.input_code
+    factors = np.array([70, 70, 1, -70, 1, 1, 1, 1, 1])
+    weights = network.layer.weights * factors[:, None]
+    weights[6, ::9] += [300, -700, 129, -200, 128, 5]
+    thresholds = network.layer.thresholds * factors
+    model.network_ = Network(code, 9, weights=weights.astype(np.int32), thresholds=thresholds)
+    return model, lambda n_samples, seed: numbers(n_samples, seed, 2)
 
 
 def two_classes():
@@ -114,7 +121,7 @@ def many_classes():
 
 
 def single_units():
-    """Return a classifier with a unit for each class, whose potential is its score."""
+    """A unit for each class, whose potential is its score."""
     model = SDNNClassifier(**SMALL, n_units_per_class=1, n_averaged_epochs=3)
     return model.fit(X := numbers(300, 7), labels(X, 5)), numbers
 
@@ -251,7 +258,7 @@ def compiled(folder, source, target, *options):
 
 
 def predictions(model, X):
-    """The output of the program: outputs, or the class and the scores of all classes."""
+    """Outputs as the program writes them, or the class and the scores of all classes."""
     if isinstance(model, SDNNRegressor):
         return model.predict(X).reshape(len(X), -1)
     winners = np.searchsorted(model.classes_, model.predict(X))
