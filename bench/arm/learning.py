@@ -1,4 +1,4 @@
-"""Lets an agent learn CartPole or Pendulum from nothing, in C and fixed point, on an emulated Arm.
+"""Lets an agent learn a task from nothing, in C and fixed point, on an emulated Arm.
 
 Prints the mean return of 100 greedy episodes after training, for each seed, and what a processor
 needs: memory, flash and the Thumb-2 instructions of a step of acting, learning and physics. Seeds
@@ -6,7 +6,8 @@ are trained natively, or with --emulate in the emulator. Counts are exact; of ti
 nothing. Needs Debian's compilers and an emulator: apt install gcc gcc-arm-linux-gnueabihf
 qemu-user.
 
-usage: python bench/arm/learning.py [cartpole|pendulum] [--agent sdnn-c] [--ram BYTES] [--emulate]
+usage: python bench/arm/learning.py [cartpole|pendulum|wheel] [--agent sdnn-c] [--ram BYTES]
+       [--keep EPISODES] [--emulate]
 """
 
 import argparse
@@ -75,6 +76,13 @@ TASKS = {
         -200.0,
         angles=(0,),
     ),
+    "wheel": Task(
+        (0.3, 1.0, 1.0),
+        gym.spaces.Discrete(5),
+        LinearSDNNConfig(n_pattern_units=48),
+        50_000,
+        475.0,
+    ),
 }
 
 
@@ -107,18 +115,26 @@ def main():
     parser.add_argument("task", nargs="?", choices=TASKS, default="cartpole")
     parser.add_argument("--agent", choices=AGENTS, default="q-lambda")
     parser.add_argument("--ram", type=int, help="Bytes that SDNN-C may take.")
+    parser.add_argument(
+        "--keep",
+        type=int,
+        help="Keep the best policy, measured by so many greedy episodes each 2,000 steps.",
+    )
+    parser.add_argument("--first-seed", type=int, default=1)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--emulate", action="store_true", help="Train in the emulator.")
     arguments = parser.parse_args()
     name, task, kind = arguments.task, TASKS[arguments.task], arguments.agent
     options = ["-DFOLLOWS_PROGRESS"] if kind == "sdnn-c" else []
+    if arguments.keep:
+        options.append(f"-DKEEP_EPISODES={arguments.keep}")
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         plugin = folder / "instruction_count.so"
         source = HERE / "instruction_count.c"
         subprocess.run(["gcc", "-O2", "-shared", "-fPIC", source, "-o", plugin], check=True)
         returns = []
-        for seed in range(1, arguments.seeds + 1):
+        for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds):
             agent = task.agent(seed, kind, arguments.ram)
             header = export_c_header(agent, folder / "pole.h", learning=True)
             native = [program(folder / "native", name, "gcc", *options)]

@@ -24,6 +24,7 @@ typedef uint32_t sdnn_score;
 #define SDNN_N_AVERAGED 0
 #define SDNN_MOST_LEARNED (UINT64_C(1) << 45)
 #define SDNN_N_ALL_WEIGHTS (UINT32_C(1) * SDNN_N_ROWS * SDNN_N_COLUMNS)
+#define SDNN_N_KEPT SDNN_N_ALL_WEIGHTS
 
 /* The running mean square of TD errors. */
 typedef struct {
@@ -140,9 +141,9 @@ static inline int64_t sdnn_log2_of(uint64_t x) {
 }
 
 /* The weights of the actions of dimension d, as sdnn_weigh has them; returns their sum. */
-static inline uint64_t sdnn_weights_of(const int32_t* rows, const sdnn_code* code, uint32_t d,
+static inline uint64_t sdnn_weights_of(const sdnn_agent* agent, const sdnn_code* code, uint32_t d,
                                        int64_t* bits, uint32_t* weights) {
-  sdnn_sums(rows, code, d, bits);
+  sdnn_sums(agent->weights, code, d, bits);
   return sdnn_weigh(bits, sdnn_n_actions[d], weights);
 }
 
@@ -183,7 +184,7 @@ static inline void sdnn_move_actor(sdnn_agent* agent, const sdnn_code* code, con
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     int64_t slopes[SDNN_MOST_ROWS];
     uint32_t probabilities[SDNN_MOST_ROWS];
-    const uint64_t sum = sdnn_weights_of(agent->weights, code, d, slopes, probabilities);
+    const uint64_t sum = sdnn_weights_of(agent, code, d, slopes, probabilities);
     sdnn_differentiate(slopes, probabilities, sdnn_n_actions[d], sum);
     for (a = 0; a < sdnn_n_actions[d]; ++a) {
       const uint32_t row = sdnn_first_rows[d] + a;
@@ -230,35 +231,31 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     int64_t bits[SDNN_MOST_ROWS];
     uint32_t weights[SDNN_MOST_ROWS];
-    const uint64_t sum = sdnn_weights_of(agent->weights, code, d, bits, weights);
+    const uint64_t sum = sdnn_weights_of(agent, code, d, bits, weights);
     action[d] = sdnn_drawn(weights, sum, &agent->randoms[0]);
   }
   sdnn_note_act(&agent->states, action);
 }
 
-/* A most probable action in each dimension. Unless `place` is null, the fractional indices of the
- * greedy actions are written to it. */
-static inline void sdnn_choose(const sdnn_agent* agent,
-                               SDNN_EPISODE_PARAMETER const int32_t* observation, uint32_t* action,
-                               uint32_t* place) {
-  sdnn_code code;
-  uint32_t bins[SDNN_N_INPUTS], d;
-  sdnn_read_greedily(&agent->states, SDNN_EPISODE observation, bins);
-  sdnn_encode_state(bins, &code);
-  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
-    int64_t bits[SDNN_MOST_ROWS];
-    uint32_t weights[SDNN_MOST_ROWS];
-    const uint32_t n = sdnn_n_actions[d];
-    sdnn_weights_of(agent->weights, &code, d, bits, weights);
-    action[d] = sdnn_tied(weights, n, SDNN_LARGEST_PART);
-    if (place) place[d] = sdnn_mean_place(weights, n, action[d]);
-  }
-  sdnn_note_greedy(SDNN_EPISODE action, place);
+/* The weights by which the agent acts: those of the actor follow the critic's. */
+static inline const int32_t* sdnn_policy_of(const sdnn_agent* agent) { return agent->weights; }
+
+static inline int32_t sdnn_scale_of_policy(const sdnn_agent* agent) {
+  (void)agent;
+  return 0;
 }
-static inline void sdnn_greedy_in_each(const sdnn_agent* agent,
-                                       SDNN_EPISODE_PARAMETER const int32_t* observation,
-                                       uint32_t* action) {
-  sdnn_choose(agent, SDNN_EPISODE observation, action, 0);
+
+/* A most probable action of dimension d, by the preferences of its actions. Unless `place` is null,
+ * the fractional index of the greedy action is written to it. */
+static inline uint32_t sdnn_greedy_of(int64_t* preferences, uint32_t d, int32_t scale,
+                                      uint32_t* place) {
+  const uint32_t n = sdnn_n_actions[d];
+  uint32_t weights[SDNN_MOST_ROWS], action;
+  (void)scale;
+  sdnn_weigh(preferences, n, weights);
+  action = sdnn_tied(weights, n, SDNN_LARGEST_PART);
+  if (place) *place = sdnn_mean_place(weights, n, action);
+  return action;
 }
 
 /* V(observation) in units of 2 to the power of agent->exponent. */
@@ -308,27 +305,6 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   if (size != INT32_MIN) sdnn_refine_unit(agent, size);
 }
 
-#if SDNN_IS_BOX
-/* The fractional index of the greedy action in each dimension, times 2^16; sdnn_action_at converts
- * it to the action. */
-static inline void sdnn_place_in_each(const sdnn_agent* agent,
-                                      SDNN_EPISODE_PARAMETER const int32_t* observation,
-                                      uint32_t* place) {
-  uint32_t action[SDNN_N_DIMENSIONS];
-  sdnn_choose(agent, SDNN_EPISODE observation, action, place);
-}
-#if SDNN_N_DIMENSIONS == 1
-static inline uint32_t sdnn_place(const sdnn_agent* agent,
-                                  SDNN_EPISODE_PARAMETER const int32_t* observation) {
-  uint32_t place;
-  sdnn_place_in_each(agent, SDNN_EPISODE observation, &place);
-  return place;
-}
-#else
-#define sdnn_place sdnn_place_in_each
-#endif
-#endif
-
 #define SDNN_IMAGE_HEAD 120
 #define SDNN_IMAGE_BYTES (SDNN_IMAGE_HEAD + 4 * SDNN_N_ALL_WEIGHTS + 4)
 
@@ -355,8 +331,6 @@ static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
   sdnn_apply_rates(agent);
 }
 
-#include "sdnn_linear_agent.h"
-
 static inline int sdnn_is_exponent(int32_t exponent) {
   return exponent >= -1100 && exponent <= 1100;
 }
@@ -382,5 +356,5 @@ static inline int sdnn_is_possible(const sdnn_part* part) {
   return 1;
 }
 
-#include "sdnn_learner_class.h"
+#include "sdnn_linear_agent.h"
 #endif /* SDNN_ACTOR_CRITIC_H */

@@ -19,6 +19,7 @@ typedef uint32_t sdnn_score;
 
 #define SDNN_N_STATES (SDNN_N_STEPS + 1)
 #define SDNN_N_WORDS (UINT32_C(1) * SDNN_N_UNITS / 4 * SDNN_N_COLUMNS)
+#define SDNN_N_KEPT (SDNN_N_WORDS + SDNN_N_UNITS)
 
 static const sdnn_coding sdnn_the_coding = {sdnn_patterns, sdnn_modified, sdnn_modifiers,
                                             sdnn_units};
@@ -204,8 +205,9 @@ static inline void sdnn_set_range(sdnn_agent* agent, sdnn_real low, sdnn_real hi
                  (uint32_t)sdnn_less(high, end);
 }
 
-/* The rank of each action's value. Returns how many units fire for a best one. */
-static inline uint32_t sdnn_rank(const sdnn_agent* agent, const sdnn_state* state,
+/* The rank of each action's value; those of counts below and above the line are given. Returns how
+ * many units fire for a best action. */
+static inline uint32_t sdnn_rank(const sdnn_state* state, uint32_t below, uint32_t above,
                                  uint32_t* ranks) {
   const int32_t* const potentials = state->potentials;
   const uint32_t u_low = SDNN_U_LOW;
@@ -216,8 +218,8 @@ static inline uint32_t sdnn_rank(const sdnn_agent* agent, const sdnn_state* stat
       n_firing -= sdnn_fires(potentials[unit]);
     }
     ranks[action] = 2 * n_firing + 1;
-    if (n_firing > SDNN_U_HIGH) ranks[action] = agent->above;
-    if (n_firing < u_low) ranks[action] = agent->below;
+    if (n_firing > SDNN_U_HIGH) ranks[action] = above;
+    if (n_firing < u_low) ranks[action] = below;
     if (ranks[action] > best) {
       best = ranks[action];
       n_best = n_firing;
@@ -228,7 +230,8 @@ static inline uint32_t sdnn_rank(const sdnn_agent* agent, const sdnn_state* stat
 
 static inline sdnn_real sdnn_state_value(sdnn_agent* agent, const uint32_t* bins) {
   uint32_t ranks[SDNN_N_ACTIONS];
-  return sdnn_value(agent, sdnn_rank(agent, sdnn_state_of(agent, bins), ranks));
+  const sdnn_state* const state = sdnn_state_of(agent, bins);
+  return sdnn_value(agent, sdnn_rank(state, agent->below, agent->above, ranks));
 }
 
 /* The number of units that must fire for a value; `n_firing` fire now. */
@@ -463,7 +466,7 @@ static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation) {
   uint32_t bins[SDNN_N_INPUTS], ranks[SDNN_N_ACTIONS];
   if (sdnn_explores(agent)) return agent->kept;
   sdnn_bins_of_fixed(observation, bins);
-  sdnn_rank(agent, sdnn_state_of(agent, bins), ranks);
+  sdnn_rank(sdnn_state_of(agent, bins), agent->below, agent->above, ranks);
   return sdnn_draw_tied(ranks, SDNN_N_ACTIONS, sdnn_highest(ranks), &agent->randoms[SDNN_ACTING]);
 }
 
@@ -482,7 +485,7 @@ static inline uint32_t sdnn_greedy(const sdnn_agent* agent, const int32_t* obser
   uint32_t ranks[SDNN_N_ACTIONS];
   sdnn_state state;
   sdnn_read_state(agent, observation, &state);
-  sdnn_rank(agent, &state, ranks);
+  sdnn_rank(&state, agent->below, agent->above, ranks);
   return sdnn_tied(ranks, SDNN_N_ACTIONS, sdnn_highest(ranks));
 }
 
@@ -542,8 +545,5 @@ static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uin
 }
 
 #include "sdnn_c_image.h"
-
-#define SDNN_HAS_PROGRESS
-#include "sdnn_learner_class.h"
 
 #endif /* SDNN_C_H */

@@ -1,4 +1,4 @@
-/* The image of an SDNN-C agent. */
+/* The image of an SDNN-C agent, and its kept policy. */
 #ifndef SDNN_C_IMAGE_H
 #define SDNN_C_IMAGE_H
 
@@ -142,5 +142,60 @@ static inline int sdnn_is_possible(const sdnn_part* part) {
   }
   return 1;
 }
+
+#include "sdnn_keeper.h"
+
+/* Writes the weights and thresholds that are in a part of a keeper's memory. */
+static inline void sdnn_carry_kept(sdnn_agent* agent, const sdnn_part* part) {
+  sdnn_carry_words(part, agent->weights, 0, SDNN_N_WORDS, 0);
+  sdnn_carry_words(part, agent->thresholds, 4 * SDNN_N_WORDS, SDNN_N_UNITS, 0);
+}
+
+/* The ranks of counts below and above the line, from those at its ends. */
+static inline int32_t sdnn_scale_of_policy(const sdnn_agent* agent) {
+  const uint32_t below = agent->below - UINT32_C(2) * SDNN_U_LOW;
+  return (int32_t)(below << 2 | (agent->above - UINT32_C(2) * SDNN_U_HIGH));
+}
+
+/* Computes the potentials of four units by the kept weights. Returns whether it could read them. */
+static inline int sdnn_evaluate_kept(const sdnn_keeper* keeper, sdnn_state* state, uint32_t unit) {
+  const sdnn_code* const code = &state->code;
+  const uint32_t n = code->n_positive + code->n_negative;
+  uint32_t j, i;
+  uint8_t bytes[16];
+  if (!keeper->read(keeper->context, 4 * (SDNN_N_WORDS + unit), bytes, 16)) return 0;
+  for (i = 0; i < 4; ++i) state->potentials[unit + i] = -sdnn_get_32(bytes + 4 * i);
+  for (j = 0; j < n; ++j) {
+    const int is_positive = j < code->n_positive;
+    const uint32_t at = is_positive ? j : SDNN_MOST_COLUMNS - (n - j);
+    const uint32_t word = (unit >> 2) * SDNN_N_COLUMNS + code->columns[at];
+    if (!keeper->read(keeper->context, 4 * word, bytes, 4)) return 0;
+    for (i = 0; i < 4; ++i) {
+      const int32_t weight = bytes[i] - 128;
+      state->potentials[unit + i] += is_positive ? weight : -weight;
+    }
+  }
+  return 1;
+}
+
+/* A greedy action of the kept policy, or of the present one where none is kept. */
+static inline uint32_t sdnn_best(const sdnn_agent* agent, const sdnn_keeper* keeper,
+                                 const int32_t* observation) {
+  const uint32_t below = UINT32_C(2) * SDNN_U_LOW + ((uint32_t)keeper->scale >> 2);
+  const uint32_t above = UINT32_C(2) * SDNN_U_HIGH + ((uint32_t)keeper->scale & 3);
+  uint32_t bins[SDNN_N_INPUTS], ranks[SDNN_N_ACTIONS], unit;
+  sdnn_state state;
+  if (!keeper->is_kept) return sdnn_greedy(agent, observation);
+  sdnn_bins_of_fixed(observation, bins);
+  sdnn_encode(&sdnn_the_coding, bins, &state.code);
+  for (unit = 0; unit < SDNN_N_UNITS; unit += 4) {
+    if (!sdnn_evaluate_kept(keeper, &state, unit)) return sdnn_greedy(agent, observation);
+  }
+  sdnn_rank(&state, below, above, ranks);
+  return sdnn_tied(ranks, SDNN_N_ACTIONS, sdnn_highest(ranks));
+}
+
+#define SDNN_HAS_PROGRESS
+#include "sdnn_learner_class.h"
 
 #endif /* SDNN_C_IMAGE_H */

@@ -1,8 +1,8 @@
 /* An agent's state as bytes, its image, which is written and read in parts: no second buffer is
  * needed. The library reads and writes images too.
  *
- * The file that includes this one defines before: sdnn_agent, sdnn_begin, SDNN_IMAGE_HEAD and
- * SDNN_IMAGE_BYTES, the bytes before the arrays and of the whole image, and
+ * The file that includes this one defines sdnn_agent before, SDNN_IMAGE_HEAD and SDNN_IMAGE_BYTES,
+ * the bytes before the arrays and of the whole image, and before or after it sdnn_begin and
  *
  *   sdnn_carry_head(agent, head, reads)    the head of an image, or the agent's from it
  *   sdnn_carry_arrays(agent, part, reads)  those bytes of a part that are in arrays, or into them
@@ -21,8 +21,18 @@
 #endif
 typedef char sdnn_needs_parts_of_16_bytes[SDNN_PART_BYTES % 16 == 0 ? 1 : -1];
 
+/* What a CRC-32 of a content and its checksum comes to. */
+#define SDNN_UNDAMAGED UINT32_C(0xdebb20e3)
+
 /* Reads n bytes of an image, from `offset` on. Returns whether it could. */
 typedef int (*sdnn_reader)(void* context, uint32_t offset, uint8_t* bytes, uint32_t n);
+
+static inline void sdnn_begin(sdnn_agent* agent);
+static inline void sdnn_carry_head(sdnn_agent* agent, uint8_t* head, int reads);
+static inline void sdnn_carry_arrays(sdnn_agent* agent, const sdnn_part* part, int reads);
+static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head);
+static inline int sdnn_is_head(const uint8_t* head);
+static inline int sdnn_is_possible(const sdnn_part* part);
 
 /* Writes the bytes of a part that are in the image's content. */
 static inline void sdnn_write_content(const sdnn_agent* agent, const sdnn_part* part) {
@@ -80,7 +90,6 @@ static inline void sdnn_save(const sdnn_agent* agent, uint8_t* image) {
  * possible numbers. Unless `agent` is null, its arrays become those of the image, in any case. */
 static inline int sdnn_scan(sdnn_agent* agent, sdnn_reader read, void* context, uint8_t* head,
                             uint32_t* checksum) {
-  const uint32_t undamaged = UINT32_C(0xdebb20e3); /* of content and its checksum */
   uint8_t bytes[SDNN_PART_BYTES];
   sdnn_part part;
   uint32_t crc = UINT32_MAX, i;
@@ -98,7 +107,7 @@ static inline int sdnn_scan(sdnn_agent* agent, sdnn_reader read, void* context, 
     sdnn_carry_words(&part, checksum, SDNN_IMAGE_BYTES - 4, 1, 1);
     if (agent) sdnn_carry_arrays(agent, &part, 1);
   }
-  return crc == undamaged && sdnn_get(head, 4) == SDNN_IMAGE_MAGIC &&
+  return crc == SDNN_UNDAMAGED && sdnn_get(head, 4) == SDNN_IMAGE_MAGIC &&
          sdnn_get(head + 4, 4) == SDNN_FINGERPRINT && is_possible && sdnn_is_head(head);
 }
 

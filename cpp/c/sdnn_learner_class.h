@@ -2,7 +2,13 @@
 #ifndef SDNN_LEARNER_CLASS_H
 #define SDNN_LEARNER_CLASS_H
 
+#include "sdnn_keeper.h"
 #include "sdnn_slots.h"
+
+#ifndef SDNN_EPISODE /* where no agent has a history */
+#define SDNN_EPISODE_PARAMETER
+#define SDNN_EPISODE
+#endif
 
 #ifdef __cplusplus
 class sdnn_learner {
@@ -21,30 +27,32 @@ class sdnn_learner {
   }
 #endif
 #ifdef SDNN_HISTORY
-  void begin_greedy_episode(sdnn_greedy_episode& episode) const {
-    sdnn_begin_greedy_episode(&agent_, &episode);
+  void begin_greedy_episode(sdnn_greedy_episode* episode) const {
+    sdnn_begin_greedy_episode(&agent_, episode);
   }
+#endif
 #if SDNN_N_DIMENSIONS == 1
-  uint32_t greedy(sdnn_greedy_episode& episode,
-                  const int32_t (&observation)[SDNN_N_OBSERVED]) const {
-    return sdnn_greedy(&agent_, &episode, observation);
+  uint32_t greedy(SDNN_EPISODE_PARAMETER const int32_t (&observation)[SDNN_N_OBSERVED]) const {
+    return sdnn_greedy(&agent_, SDNN_EPISODE observation);
+  }
+  uint32_t best(const sdnn_keeper& keeper,
+                SDNN_EPISODE_PARAMETER const int32_t (&observation)[SDNN_N_OBSERVED]) const {
+    return sdnn_best(&agent_, &keeper, SDNN_EPISODE observation);
   }
 #else
-  void greedy(sdnn_greedy_episode& episode, const int32_t (&observation)[SDNN_N_OBSERVED],
+  void greedy(SDNN_EPISODE_PARAMETER const int32_t (&observation)[SDNN_N_OBSERVED],
               uint32_t (&action)[SDNN_N_DIMENSIONS]) const {
-    sdnn_greedy(&agent_, &episode, observation, action);
+    sdnn_greedy(&agent_, SDNN_EPISODE observation, action);
+  }
+  void best(const sdnn_keeper& keeper,
+            SDNN_EPISODE_PARAMETER const int32_t (&observation)[SDNN_N_OBSERVED],
+            uint32_t (&action)[SDNN_N_DIMENSIONS]) const {
+    sdnn_best(&agent_, &keeper, SDNN_EPISODE observation, action);
   }
 #endif
-#elif SDNN_N_DIMENSIONS == 1
-  uint32_t greedy(const int32_t (&observation)[SDNN_N_OBSERVED]) const {
-    return sdnn_greedy(&agent_, observation);
+  bool keep(sdnn_keeper& keeper, int64_t score) const {
+    return sdnn_keep(&agent_, &keeper, score) != 0;
   }
-#else
-  void greedy(const int32_t (&observation)[SDNN_N_OBSERVED],
-              uint32_t (&action)[SDNN_N_DIMENSIONS]) const {
-    sdnn_greedy(&agent_, observation, action);
-  }
-#endif
   void learn(const int32_t (&observation)[SDNN_N_OBSERVED], action_type action, int32_t reward,
              const int32_t (&next_observation)[SDNN_N_OBSERVED], bool terminated) {
     sdnn_learn(&agent_, observation, action, reward, next_observation, terminated);

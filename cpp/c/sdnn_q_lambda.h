@@ -23,6 +23,7 @@ typedef int64_t sdnn_score;
 #define SDNN_N_WEIGHTS (UINT32_C(1) * SDNN_N_ROWS * SDNN_N_COLUMNS)
 #define SDNN_N_AVERAGED (SDNN_AVERAGES * SDNN_N_WEIGHTS)
 #define SDNN_N_ALL_WEIGHTS (SDNN_N_WEIGHTS + SDNN_N_AVERAGED)
+#define SDNN_N_KEPT SDNN_N_WEIGHTS
 
 /* Everything that the agent remembers. All functions take its address. */
 typedef struct {
@@ -224,23 +225,19 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
   sdnn_note_act(&agent->states, action);
 }
 
-/* A best action in each dimension, by the average of the weights where there is one. */
-static inline void sdnn_greedy_in_each(const sdnn_agent* agent,
-                                       SDNN_EPISODE_PARAMETER const int32_t* observation,
-                                       uint32_t* action) {
-  const int is_averaged = SDNN_AVERAGES && agent->n_snapshots > 0;
-  const int32_t* const rows = agent->weights + (is_averaged ? SDNN_N_WEIGHTS : 0);
-  uint32_t bins[SDNN_N_INPUTS], d;
-  int64_t sums[SDNN_MOST_ROWS], least;
-  sdnn_code code;
-  sdnn_read_greedily(&agent->states, SDNN_EPISODE observation, bins);
-  sdnn_encode_state(bins, &code);
-  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
-    sdnn_sums(rows, &code, d, sums);
-    least = sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(agent->exponent);
-    action[d] = sdnn_tied(sums, sdnn_n_actions[d], least);
-  }
-  sdnn_note_greedy(SDNN_EPISODE action, 0);
+/* The weights by which the agent acts greedily: their average where there is one. */
+static inline const int32_t* sdnn_policy_of(const sdnn_agent* agent) {
+  return agent->weights + (SDNN_AVERAGES && agent->n_snapshots > 0 ? SDNN_N_WEIGHTS : 0);
+}
+
+/* The exponent of the unit of its values. */
+static inline int32_t sdnn_scale_of_policy(const sdnn_agent* agent) { return agent->exponent; }
+
+/* A best action of dimension d, by the values of its actions. Between actions there are none. */
+static inline uint32_t sdnn_greedy_of(int64_t* sums, uint32_t d, int32_t scale, uint32_t* place) {
+  const int64_t least = sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(scale);
+  (void)place;
+  return sdnn_tied(sums, sdnn_n_actions[d], least);
 }
 
 /* Q(observation, action) in units of 2 to the power of agent->exponent. */
@@ -346,8 +343,6 @@ static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
   sdnn_apply_rates(agent);
 }
 
-#include "sdnn_linear_agent.h"
-
 static inline int sdnn_is_head(const uint8_t* head) {
   const int32_t exponent = sdnn_get_32(head + 8);
   return sdnn_are_generators(head + 60) &&
@@ -369,5 +364,5 @@ static inline int sdnn_is_possible(const sdnn_part* part) {
   return 1;
 }
 
-#include "sdnn_learner_class.h"
+#include "sdnn_linear_agent.h"
 #endif /* SDNN_Q_LAMBDA_H */

@@ -31,6 +31,19 @@ static inline int64_t sdnn_sum_of_row(const int32_t* row, const sdnn_code* code)
          sdnn_sum_of_columns(row, negative, code->n_negative);
 }
 
+/* Replaces the sums of rows by those of the windows of n actions. */
+static inline void sdnn_add_windows(int64_t* sums, uint32_t n) {
+#if SDNN_ACTION_WINDOW > 1
+  uint32_t a, i;
+  for (a = 0; a < n; ++a) {
+    for (i = 1; i < SDNN_ACTION_WINDOW; ++i) sums[a] += sums[a + i];
+  }
+#else
+  (void)sums;
+  (void)n;
+#endif
+}
+
 /* The values of the actions of dimension d. `sums` has room for SDNN_MOST_ROWS numbers. */
 static inline void sdnn_sums(const int32_t* rows, const sdnn_code* code, uint32_t d,
                              int64_t* sums) {
@@ -40,14 +53,7 @@ static inline void sdnn_sums(const int32_t* rows, const sdnn_code* code, uint32_
   for (i = 0; i < n + SDNN_ACTION_WINDOW - 1; ++i) {
     sums[i] = sdnn_sum_of_row(rows + i * SDNN_N_COLUMNS, code);
   }
-#if SDNN_ACTION_WINDOW > 1
-  {
-    uint32_t a;
-    for (a = 0; a < n; ++a) {
-      for (i = 1; i < SDNN_ACTION_WINDOW; ++i) sums[a] += sums[a + i];
-    }
-  }
-#endif
+  sdnn_add_windows(sums, n);
 }
 
 /* The largest of n values. */

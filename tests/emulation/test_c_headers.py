@@ -5,8 +5,9 @@ import re
 import pytest
 
 from bare_processors import BARE_TARGETS
-from c_histories import POLICIES, check_policy, policy
-from c_learners import LEARNERS, check_learning
+from c_histories import POLICIES, actor_observer, check_policy, policy
+from c_keeping import check_best, cut_power
+from c_learners import LEARNERS, actor, check_learning, network, several, states
 from c_policies import (
     AGENTS,
     ALONE,
@@ -55,6 +56,18 @@ def test_learning_on_other_processors_has_the_bits_of_the_agent(
     check_learning(name, target, tmp_path, n_steps)
 
 
+@pytest.mark.parametrize("make", [several, actor, network, actor_observer])
+def test_a_kept_policy_acts_alike_on_other_processors(make, target, tmp_path):
+    check_best(make, target, tmp_path, "-O2")
+
+
+@pytest.mark.parametrize("make", [states, network])
+def test_no_state_is_lost_on_other_processors_when_the_power_is_cut(make, target, tmp_path):
+    n_cuts, *faults = cut_power(make, target=target, folder=tmp_path, n_states=4, stride=97)
+    assert n_cuts > 20
+    assert faults == [0, 0, 0, 0]
+
+
 @pytest.mark.parametrize("name", LEARNERS)
 @pytest.mark.parametrize("kind", ["thumbv6m-none-eabi", "thumbv7em-none-eabi", "riscv32-none-elf"])
 def test_learning_compiles_for_microcontrollers_with_few_library_calls(name, kind, needs, tmp_path):
@@ -65,9 +78,17 @@ def test_learning_compiles_for_microcontrollers_with_few_library_calls(name, kin
     act, action = "a[0] = agent_act(&agent, x)", "a[0]"
     if agent.n_dimensions > 1:
         act, action = "agent_act(&agent, x, a)", "a"
+    memory, episode = "", ""
+    if agent.history != "none":
+        memory, episode = "agent_greedy_episode episode;", "&episode, "
+    best = f"agent_best(&agent, &keeper, {episode}x"
+    best = f"{best}, a)" if agent.n_dimensions > 1 else f"a[0] = {best})"
     calls = f"""
         #include "agent.h"
         agent_agent agent; int32_t x[9]; uint8_t image[AGENT_IMAGE_BYTES];
+        agent_keeper keeper;
+        extern const agent_flash flash;
+        {memory}
         void all(void);
         void all(void) {{
           uint32_t a[2] = {{0, 0}};
@@ -76,6 +97,11 @@ def test_learning_compiles_for_microcontrollers_with_few_library_calls(name, kin
           agent_learn(&agent, x, {action}, 1, x, 0);
           agent_save(&agent, image);
           agent_load(&agent, image);
+          agent_begin_keeping(&keeper, image, agent_read_memory, agent_write_memory, 30);
+          agent_keep(&agent, &keeper, a[0]);
+          {best};
+          agent_store(&agent, &flash);
+          agent_restore(&agent, &flash);
         }}
     """
     (tmp_path / "calls.c").write_text(calls + "\n")
@@ -88,7 +114,7 @@ def test_learning_compiles_for_microcontrollers_with_few_library_calls(name, kin
         if kind.startswith("thumbv6m")
         else set()
     )
-    assert called <= wide
+    assert called <= wide | {"flash"}
 
 
 @pytest.mark.parametrize("name", LEARNERS)

@@ -262,12 +262,15 @@ def test_cpp_can_learn_save_and_load_by_the_learner_class(compiler, make, act, n
     needs(compiler)
     agent = make()
     (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
-    greedy = "uint32_t b[2]; one.greedy(x, b)" if agent.n_dimensions > 1 else "one.greedy(x)"
+    has_many = agent.n_dimensions > 1
+    greedy = "uint32_t b[2]; one.greedy(x, b)" if has_many else "one.greedy(x)"
+    best = "one.best(keeper, x, b)" if has_many else "one.best(keeper, x)"
     value = "state_value(x)" if isinstance(agent, SDNNActorCritic) else "q(x, a)"
     source = f"""
         #include "agent.h"
         static agent_learner one, same;
-        static uint8_t image[AGENT_IMAGE_BYTES];
+        static uint8_t image[AGENT_IMAGE_BYTES], memory[AGENT_KEPT_BYTES];
+        static agent_keeper keeper;
         int main() {{
           int32_t x[AGENT_N_OBSERVED] = {{}};
           one.begin_episode();
@@ -275,6 +278,9 @@ def test_cpp_can_learn_save_and_load_by_the_learner_class(compiler, make, act, n
           one.learn(x, a, AGENT_FIXED(1.0), x, true);
           {greedy};
           one.save(image);
+          agent_begin_keeping(&keeper, memory, agent_read_memory, agent_write_memory, 1);
+          if (!one.keep(keeper, 1)) return 2;
+          {best};
           return one.{value} != same.{value} && same.load(image) && same.{value} == one.{value}
                      ? 0 : 1;
         }}

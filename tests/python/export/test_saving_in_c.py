@@ -1,11 +1,11 @@
 """Agents in C that are saved in parts, and stored in memory that keeps its bytes without power."""
 
 import zlib
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from c_keeping import compiled, cut_power
 from c_learners import (
     LEARNERS,
     actor,
@@ -18,11 +18,10 @@ from c_learners import (
     small_steps,
     states,
 )
-from c_policies import STRICT, TARGETS, program, run
-from sdnn.export import c_header, load_image, save_image
+from c_policies import TARGETS, run
+from sdnn.export import load_image, save_image
 
 SANITIZED = ("-fsanitize=undefined,address", "-fno-sanitize-recover=all")
-POWER_CUTS = Path(__file__).parents[1] / "reference" / "power_cuts.c"
 
 PARTS = """
 #include <stdio.h>
@@ -93,12 +92,6 @@ def target(needs):
     return TARGETS["x86-64"]
 
 
-def compiled(source, agent, folder, target, *options):
-    """Compile a program with the header of an agent that learns; return its path."""
-    (folder / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
-    return program(folder, source, target.compiler, *STRICT, *options)
-
-
 def trained(make, seed=1, n_steps=300):
     """Return an agent that has learned."""
     agent = make()
@@ -112,7 +105,7 @@ def test_parts_of_any_size_are_those_of_the_image(name, target, tmp_path):
     image = save_image(agent)
     parts = compiled(PARTS, agent, tmp_path, target, *SANITIZED)
     for n in (1, 3, 64, 97, len(image)):
-        assert run(parts, n, input=image) == image
+        assert run(*parts, n, input=image) == image
 
 
 @pytest.mark.parametrize("make", [discrete, network, actor])
@@ -122,21 +115,7 @@ def test_a_load_that_fails_leaves_the_agent_or_begins_a_new_one(make, target, tm
     image = save_image(agent)
     load_image(agent, image)
     failing = compiled(FAILING, make(), tmp_path, target, *SANITIZED)
-    run(failing, input=image + save_image(loaded))
-
-
-def cut_power(make, folder, target, n_states, stride, *options):
-    """Return the number of cuts, and of states lost, wrong, not stored, and of violations."""
-    agent = make()
-    is_vector = agent.n_dimensions > 1
-    act = (
-        "agent_act(learner, x[0], action)" if is_vector else "action[0] = agent_act(learner, x[0])"
-    )
-    learn = f"agent_learn(learner, x[0], {'action' if is_vector else 'action[0]'}"
-    learn += ", any_byte() * 512 - 65536, x[1], step % 9 == 0)"
-    source = POWER_CUTS.read_text().replace("ACT;", f"{act};").replace("LEARN;", f"{learn};")
-    power_cuts = compiled(source, agent, folder, target, "-O2", *options)
-    return [int(number) for number in run(power_cuts, n_states, stride).split()]
+    run(*failing, input=image + save_image(loaded))
 
 
 @pytest.mark.parametrize("make", [states, sarsa, network, small_steps, actor_vector])
@@ -195,7 +174,7 @@ int main(void) {
 def test_memory_that_is_overwritten_needs_no_erasing(target, tmp_path):
     # The new state counts as soon as the 16 bytes of its record are written, of the last part.
     overwritten = compiled(OVERWRITTEN, sarsa(), tmp_path, target, *SANITIZED)
-    assert int(run(overwritten)) == 64 - 16 + 1
+    assert int(run(*overwritten)) == 64 - 16 + 1
 
 
 def test_damaged_images_are_never_restored(target, tmp_path):
@@ -217,4 +196,4 @@ def test_damaged_images_are_never_restored(target, tmp_path):
     forged = bytearray(image)  # of another agent
     forged[5] ^= 1
     forged[-4:] = zlib.crc32(forged[:-4]).to_bytes(4, "little")
-    run(damaged, input=b"".join([*images, bytes(forged)]))
+    run(*damaged, input=b"".join([*images, bytes(forged)]))

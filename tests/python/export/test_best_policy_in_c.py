@@ -1,0 +1,77 @@
+"""The best policy in C, by the rule of `SaveBestAgent`, while the agent learns on."""
+
+import numpy as np
+import pytest
+
+from c_histories import actor_observer, differences
+from c_keeping import check_best, compiled
+from c_learners import (
+    actor,
+    actor_vector,
+    discrete,
+    network,
+    paper_rule,
+    sarsa,
+    several,
+)
+from c_policies import TARGETS, run
+from sdnn.training.files import EpisodeBlock
+
+SANITIZED = ("-fsanitize=undefined,address", "-fno-sanitize-recover=all")
+
+
+@pytest.fixture
+def target(needs):
+    needs(TARGETS["x86-64"].compiler, options=SANITIZED)
+    return TARGETS["x86-64"]
+
+
+SCORES = """
+#include <stdio.h>
+#include <stdlib.h>
+#include "agent.h"
+static agent_agent agent;
+static uint8_t memory[AGENT_KEPT_BYTES];
+static agent_keeper keeper;
+int main(int argc, char **argv) {
+  const uint32_t length = (uint32_t)atol(argv[1]);
+  int64_t score;
+  agent_begin(&agent);
+  if (agent_begin_keeping(&keeper, memory, agent_read_memory, agent_write_memory, length)) return 1;
+  while (fread(&score, sizeof score, 1, stdin) == 1) {
+    putchar(agent_keep(&agent, &keeper, score) ? '1' : '0');
+  }
+  return argc > 2;
+}
+"""
+
+
+@pytest.mark.parametrize("length", [1, 2, 7, 30])
+def test_blocks_of_returns_are_compared_as_in_python(length, target, tmp_path):
+    # Few different returns, so that sums are equal at times, and returns beyond the largest one.
+    random = np.random.default_rng(length)
+    scores = random.integers(-3, 4, 3000) * 65536
+    scores[::100] = random.integers(-(2**41), 2**41, 30)
+    block = EpisodeBlock(length)
+    expected = "".join("01"[block.ends_best(float(score))] for score in scores)
+    assert expected.count("1") > 1
+    keep = compiled(SCORES, sarsa(), tmp_path, target, *SANITIZED)
+    assert run(*keep, length, input=scores.astype("<i8").tobytes()).decode() == expected
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        discrete,
+        sarsa,
+        several,
+        network,
+        paper_rule,
+        actor,
+        actor_vector,
+        differences,
+        actor_observer,
+    ],
+)
+def test_the_kept_policy_acts_as_the_agent_did_when_it_was_kept(make, target, tmp_path):
+    check_best(make, target, tmp_path, *SANITIZED)
