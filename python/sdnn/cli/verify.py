@@ -119,6 +119,7 @@ def _show(verification: Verification, as_json: bool) -> None:
             "n_reported": verification.n_reported,
             "n_unfinished": verification.n_unfinished,
             "n_chosen": verification.n_chosen,
+            "digest": verification.digest,
             "equal": [trial.key._asdict() for trial, _ in verification.equal],
             "differences": [
                 {**d.key._asdict(), "problem": d.problem, "details": d.details}

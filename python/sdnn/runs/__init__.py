@@ -4,8 +4,8 @@ A run is one agent that learns in one environment, in a folder of its own, and c
 
 A folder holds ``config.json`` (all that defines the run), ``results.sqlite`` (its episodes and
 evaluations), ``checkpoint.safetensors`` (where it is resumed) and, once it is finished,
-``agent.safetensors``. The commands ``sdnn train``, ``resume``, ``evaluate``, ``plot`` and
-``record`` work on such folders.
+``agent.safetensors``. The commands ``sdnn train``, ``resume``, ``evaluate``, ``plot``, ``record``,
+``inspect`` and ``verify`` work on such folders.
 """
 
 from sdnn.support.lazy import attach

@@ -29,8 +29,13 @@ from sdnn.support.arguments import shown
 MOST_TABLE_BYTES = 2**33
 """Largest limit of an agent's tables that a reported configuration may set, in bytes."""
 
+MOST_DECISIONS = 10**9
+"""Largest number of decisions of a trial that is run again."""
+
 _TRUSTED = frozenset({"gymnasium", "sdnn"})
-"""Packages whose environments need no consent."""
+"""Packages whose registered environments need no consent."""
+_TRUSTED_MODULES = frozenset({"gymnasium", "sdnn", "sdnn.environments"})
+"""Modules that an environment's id may name without consent."""
 
 Values: TypeAlias = Mapping[str, object]
 
@@ -55,7 +60,12 @@ class Consent:
     def require(self, environment_id: str) -> None:
         """Check that the code of an environment may run; ConfigError that names its module."""
         module = environment_id.rpartition(":")[0]
-        if not module:
+        if module in _TRUSTED_MODULES:
+            return
+        trusted = _TRUSTED
+        if module:
+            trusted = frozenset()
+        else:
             registered = gym.registry.get(environment_id)
             entry_point = registered.entry_point if registered else None
             if isinstance(entry_point, str):
@@ -63,7 +73,7 @@ class Consent:
             elif entry_point is not None:
                 module = entry_point.__module__
         package = module.partition(".")[0]
-        allowed = _TRUSTED | {name.partition(".")[0] for name in self.modules}
+        allowed = trusted | {name.partition(".")[0] for name in self.modules}
         if package and package not in allowed:
             problem = f"is code of the module {module}, which runs only if you trust it"
             raise ConfigError("environment.id", f"{environment_id} {problem}: --import {module}")
@@ -149,16 +159,35 @@ class ReportedTrial:
         return spec
 
     def _require_size(self, spec: RunSpec) -> None:
-        n_decisions, target = self.n_decisions, spec.budget.target_return
-        if n_decisions is not None and target is None and not self.goals:
-            unit = "steps" if spec.budget.steps is not None else "episodes"
-            if spec.length > n_decisions:
-                problem = f"must fit the {n_decisions} reported decisions, got {spec.length}"
-                raise ConfigError(f"budget.{unit}", problem)
+        """Check that the specification means no more work than was reported; ConfigError."""
         n_bytes = getattr(spec.approximator, "max_table_bytes", 0)
         if n_bytes > MOST_TABLE_BYTES:
             problem = f"must be at most {MOST_TABLE_BYTES}, got {n_bytes}"
             raise ConfigError("approximator.max_table_bytes", problem)
+        n_decisions, protocol = self.n_decisions, spec.protocol
+        unit = "steps" if spec.budget.steps is not None else "episodes"
+        if n_decisions is None:
+            return
+        if n_decisions > MOST_DECISIONS:
+            problem = f"must need at most {MOST_DECISIONS} decisions, got {n_decisions}"
+            raise ConfigError(f"budget.{unit}", problem)
+        goal = self.goals[-1] if self.goals else None
+        if goal is not None and (goal.steps or goal.episodes or 0) > n_decisions:
+            length = goal.steps or goal.episodes
+            problem = f"must fit the {n_decisions} reported decisions, got {length}"
+            raise ConfigError("goals", problem)
+        if spec.budget.target_return is not None or goal is not None:
+            return
+        every = protocol.evaluate_every if unit == "steps" else protocol.evaluate_every_episodes
+        n_evaluations = spec.length // every if every else 0
+        n_evaluated = n_evaluations * protocol.evaluation_episodes
+        for key, needed in (
+            (f"budget.{unit}", spec.length),
+            ("protocol.evaluation_episodes", spec.length + n_evaluated),
+        ):
+            if needed > n_decisions:
+                problem = f"needs {needed} decisions, more than the {n_decisions} reported ones"
+                raise ConfigError(key, problem)
 
 
 def changed_settings(before: str, after: str) -> dict[str, tuple[str, str]]:

@@ -26,7 +26,15 @@ from sdnn.runs.engine import (
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.reported import Consent, ReportedTrial, Reports
 from sdnn.runs.run import Goal
-from sdnn.runs.trial import ROW, UNKNOWN, TrainingTrial, TrialKey, TrialRecord, TrialRows
+from sdnn.runs.trial import (
+    ROW,
+    UNKNOWN,
+    TrainingTrial,
+    TrialKey,
+    TrialRecord,
+    TrialRows,
+    records_digest,
+)
 from sdnn.support.interrupts import Interrupts
 from sdnn.support.machine import instruction_set
 from sdnn.training.training import Callback, Training
@@ -94,6 +102,11 @@ class Verification:
     differences: tuple[Difference, ...]
     signal: int | None = None
     instruction_set: str = field(default_factory=instruction_set)
+
+    @property
+    def digest(self) -> str:
+        """The digest of the rows of the equal trials, as reports print it."""
+        return records_digest(record for _, record in self.equal)
 
     @property
     def is_equal(self) -> bool:
@@ -181,7 +194,8 @@ def verify(
     executor = executor or ThreadExecutor()
     observe: Observer = observer or (lambda _: None)
     if not reports.keys:
-        raise RunError(f"{reports.title} holds no finished trial")
+        unfinished = f", and {reports.n_unfinished} unfinished" if reports.n_unfinished else ""
+        raise RunError(f"{reports.title} holds no finished trial{unfinished}")
     chosen = set(choose_trials(reports.keys, n_trials, cases=cases, seed=seed))
     others = sorted(set(reports.keys) - chosen)
     for number, is_intact in enumerate(reports.check(others)):

@@ -20,7 +20,7 @@ from sdnn.runs import ResultStore, RunError, StoreError, run_trials
 from sdnn.runs.certificates import CertifiedReports, certify, write_certificate
 from sdnn.runs.engine import Finished
 from sdnn.runs.reported import Consent, ReportedTrial, StoredReports
-from sdnn.runs.trial import TrialRows, canonical_json, config_hash
+from sdnn.runs.trial import TrialRows, canonical_json, config_hash, records_digest
 from sdnn.runs.verification import choose_trials, row_words, verify
 
 TRUSTED = Consent(("drifting_env",))
@@ -163,6 +163,7 @@ def test_a_setting_that_does_not_fit_its_hash_is_found(tmp_path, real_records):
         (lambda v: v["agent"].update(name="rbf"), "agent.name"),
         (lambda v: v["agent"].update(version="2"), "agent.version"),
         (lambda v: v["budget"].update(episodes=10**9), "budget.episodes"),
+        (lambda v: v["protocol"].update(evaluation_episodes=10**9), "protocol.evaluation_episodes"),
         (lambda v: v["approximator"].update(max_table_bytes=2**40), "approximator.max_table_bytes"),
         (lambda v: v["environment"].pop("redundant"), "environment.redundant"),
         (lambda v: v.pop("environment"), "environment.id"),
@@ -237,7 +238,10 @@ def test_modules_are_imported_with_consent_only(invoke, own_module):
     assert own_module.exists()
     refuses("my_envs", Consent().require, "my_envs:mine/Env-v0", error=RunError)
     refuses("drifting_env", Consent().require, "mine/Env-v0", error=RunError)
+    for module in ("sdnn.__main__", "gymnasium.utils.play", "antigravity"):
+        refuses(module, Consent().require, f"{module}:x/Y-v0", error=RunError)
     Consent().require("CartPole-v1")
+    Consent().require("sdnn.environments:sdnn/AcrobotSwingUp-v0")
     Consent().require("sdnn/PaperAcrobot-v0")
 
 
@@ -269,8 +273,15 @@ def test_runs_are_repeated_with_the_goals_that_were_set_later(invoke):
         result = invoke(*verified, f"{name}.json")
         assert result.exit_code == 0, result.output
         assert "all digests equal" in result.stdout
+    certificate = json.loads(Path("one.json").read_text())
+    certificate["trials"][0]["goals"][-1]["episodes"] = 10**6
+    Path("long.json").write_text(json.dumps(certificate))
+    result = invoke(*verified, "long.json")
+    assert (result.exit_code, "goals" in result.stdout) == (1, True)
     values = json.loads(invoke(*verified, "one", "--json").stdout)
     assert (values["n_reported"], len(values["equal"]), values["differences"]) == (1, 1, [])
+    with ResultStore("one", read_only=True) as store:
+        assert values["digest"] == records_digest(store.load())
 
 
 def test_an_edited_configuration_of_a_run_is_named(invoke, tmp_path):
@@ -309,6 +320,26 @@ def test_folders_without_finished_trials_are_refused(tmp_path, invoke, refused):
     with ResultStore(tmp_path / "none"):
         pass
     assert "none" in refused("verify", "none", code=1)
+
+
+def test_trials_of_too_many_decisions_are_not_run(tmp_path, real_records):
+    record = replace(real_records[0], n_decisions=10**12)
+    difference = only_difference(verify_folder(stored(tmp_path / "out", [record])))
+    assert "budget.episodes" in difference.problem
+    assert not difference.was_run
+
+
+def test_unfinished_runs_are_left_out(tmp_path, real_records):
+    record = real_records[0]
+    rows = record.rows
+    with ResultStore(tmp_path / "out") as store:
+        metadata = {"config": record.config, "version": record.version}
+        store.extend(record.key, TrialRows(rows.table[:1]), 0, **metadata)
+    error = refuses("1", verify_folder, tmp_path / "out", error=RunError)
+    assert "unfinished" in str(error)
+    stored(tmp_path / "out", real_records[1:])
+    verification = verify_folder(tmp_path / "out")
+    assert (verification.n_unfinished, len(verification.equal)) == (1, 3)
 
 
 def test_an_interrupt_ends_with_what_is_done(fake_store):
