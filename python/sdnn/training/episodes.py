@@ -71,8 +71,8 @@ def _require_durations(dts: Sequence[float], environments: Sequence[int]) -> Non
     for i in environments:
         if math.isnan(dts[i]):
             raise UnusableStepError(
-                f"info of environment {i} must have 'dt', the duration of the step in usual steps,"
-                " as metadata['durations'] of env is True, got nan or nothing"
+                f"dt must be in the info of environment {i}, the duration of the step in usual"
+                " steps, as metadata['durations'] of env is True, got nan or nothing"
             )
 
 
