@@ -10,7 +10,7 @@ Packages, from the network up (each is imported when first used):
 - ``sdnn.libsdnn``: the files and numbers of the library LIBSDNN
 - ``sdnn.coding``: how inputs become patterns; ``sdnn.coding.kernel``: the kernel of the code
 - ``sdnn.environments``: the acrobot swing-up, redundant and noisy sensors
-- ``sdnn.export``: trained agents as C headers, also as the command ``sdnn export``
+- ``sdnn.export``: agents and estimators as C headers, also as the command ``sdnn export``
 - ``sdnn.reproduction``: the paper's experiments, also as the command ``sdnn reproduce``
 - ``sdnn.runs``: trainings, each in a folder, also as the command ``sdnn train``
 - ``sdnn.benchmarks``: speed on this machine, also as the command ``sdnn bench``

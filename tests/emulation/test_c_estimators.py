@@ -72,3 +72,14 @@ def test_estimators_need_no_floating_point_and_little_code(name, kind, needs, tm
         assert 1500 < sizes[".text"] < CODE_BYTES
         constants = sum(size for name, size in sizes.items() if name.startswith(".rodata"))
         assert header.flash_bytes - 256 < constants < header.flash_bytes + 256
+
+
+@pytest.mark.parametrize("learning", [False, True])
+@pytest.mark.parametrize("name", SOME)
+def test_estimators_compile_where_int_has_16_bits(name, learning, needs, tmp_path):
+    needs("clang")
+    header = estimator_header(fitted(name)[0], "model", learning=learning)
+    (tmp_path / "model.h").write_text(header.text)
+    (tmp_path / "model.c").write_text('#include "model.h"\n')
+    options = (*STRICT, "-ffreestanding", "-Wno-unused-function", "--target=msp430")
+    run("clang", *options, "-fsyntax-only", tmp_path / "model.c")
