@@ -51,12 +51,14 @@ class Section:
     """A part of a page, shown in the order of its fields; empty fields are left out.
 
     The default title is that of the table; a title of level 0 is a faint paragraph. Pictures are
-    SVG. Folded sections have notes, terms, text and a table, and open on demand.
+    SVG; a narrow one, PNG, replaces them on telephones. Folded sections have notes, terms, text
+    and a table, and open on demand.
     """
 
     title: str = ""
     level: int = 2
     picture: bytes = b""
+    narrow_picture: bytes = b""
     alt: str = ""
     is_narrow: bool = False
     table: Table | None = None
@@ -74,6 +76,11 @@ class Section:
     def picture_url(self) -> str:
         """The figure as a data URL: inlined SVGs of a page would share their identifiers."""
         return "data:image/svg+xml;base64," + base64.b64encode(self.picture).decode()
+
+    @property
+    def narrow_picture_url(self) -> str:
+        """The figure for narrow screens as a data URL."""
+        return "data:image/png;base64," + base64.b64encode(self.narrow_picture).decode()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,6 +22,9 @@ COLORS = (
     "#1f5a96", "#c2542d", "#3c7d4b", "#7a5195", "#8a6d1d", "#4a4a4a",
     "#2a9d9d", "#c65b8e", "#7fa328", "#9b3d3d",
 )  # fmt: skip
+NARROW_DPI = 144
+"""Resolution of figures for telephones, which are 5.4 inches wide: two pixels for each of 390."""
+
 INK, FAINT, GRID = "#2b2b2b", "#6f6f6f", "#e4e4e4"
 
 

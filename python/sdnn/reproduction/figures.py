@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,19 +17,26 @@ MAX_STEPS = 50  # an episode's limit: the upper end of the steps axis
 LONG_EPISODES = 2_000  # from this number of learning episodes on, running medians are drawn
 _PANEL_HEIGHT = 3.3
 _WARNING_COLOR = "#a31515"
+_NARROW_FOOTER = 100  # characters of a line below a narrow figure
 _MARKERS = ("o", "s", "^", "v")
 
 
 def draw_experiment(
-    experiment: Experiment, results: Sequence[CaseResult], *, quick: bool = False
+    experiment: Experiment,
+    results: Sequence[CaseResult],
+    *,
+    quick: bool = False,
+    narrow: bool = False,
 ) -> Figure:
     """Draw an experiment: a panel per case, a line and an interquartile band per agent.
 
-    With `quick` the figure is marked as preliminary.
+    With `quick` the figure is marked as preliminary. With `narrow` all panels are in one column,
+    for telephones.
     """
-    n_columns = min(2, len(experiment.cases))
+    n_columns = 1 if narrow else min(2, len(experiment.cases))
     n_rows = -(-len(experiment.cases) // n_columns)
     is_long = max(result.last_episode for result in results) >= LONG_EPISODES
+    has_legend = len({result.agent for result in results}) > 1 or experiment not in EXPERIMENTS
     height = 1.1 + n_rows * _PANEL_HEIGHT
     figure = new_figure(5.4 * n_columns, height)
     panels = figure.subplots(n_rows, n_columns, sharey=True, squeeze=False).ravel()
@@ -47,23 +55,30 @@ def draw_experiment(
             _watermark(axes)
     for axes in panels[len(experiment.cases) :]:
         axes.set_visible(False)
-    if len(colors) > 1 or experiment not in EXPERIMENTS:
+    if has_legend:
         lines, titles = panels[0].get_legend_handles_labels()
-        figure.legend(
-            lines[::-1], titles[::-1], frameon=False, fontsize=9.5, loc="upper right",
-            bbox_to_anchor=(0.99, 1 - 0.08 / height), ncols=len(colors),
-        )  # fmt: skip
-    _label(figure, experiment.title, results, smooth=is_long, quick=quick)
+        lines, titles = lines[::-1], titles[::-1]
+        if narrow:
+            panels[0].legend(
+                lines, titles, frameon=False, fontsize=9, loc="upper right", ncols=len(colors)
+            )
+        else:
+            figure.legend(
+                lines, titles, frameon=False, fontsize=9.5, loc="upper right",
+                bbox_to_anchor=(0.99, 1 - 0.08 / height), ncols=len(colors),
+            )  # fmt: skip
+    _label(figure, experiment.title, results, smooth=is_long, quick=quick, narrow=narrow)
     return figure
 
 
-def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
+def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False, narrow: bool = False) -> Figure:
     """Draw the time of a step against the number of inputs, a line per series, on a log scale.
 
     Exponential growth is a straight line there; quadratic growth bends. A dotted line continues
-    what SDNN-C needs with 4 inputs by its number of columns.
+    what SDNN-C needs with 4 inputs by its number of columns. With `narrow` the legend is above the
+    panel, for telephones.
     """
-    figure = new_figure(9.4, 4.7)
+    figure = new_figure(5.4, 6.2) if narrow else new_figure(9.4, 4.7)
     axes = figure.add_subplot()
     colors = [color_of(place) for place in range(len(SERIES))]
     for number, series in enumerate(SERIES):
@@ -91,7 +106,10 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
     axes.set_xlabel("number of inputs d")
     axes.set_ylabel("time of a step [µs]")
     style(axes)
-    figure.legend(frameon=False, fontsize=9, loc="outside right upper", labelspacing=1.0)
+    figure.legend(
+        frameon=False, fontsize=9, labelspacing=1.0, ncols=2 if narrow else 1,
+        loc="outside upper center" if narrow else "outside right upper",
+    )  # fmt: skip
     axes.set_title("Cost of a step against the number of inputs", loc="left", color=INK)
     if quick:
         _watermark(axes)
@@ -100,6 +118,8 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False) -> Figure:
         "Medians, bars: quartiles of rounds. A step: acting in a new random state and learning the"
         f" transition to it.\nsdnn {costs[0].version}; {machines}; one thread."
     )
+    if narrow:
+        footer = _wrapped(footer)
     figure.supxlabel(footer, x=0.012, ha="left", fontsize=6.5, color=FAINT, linespacing=1.4)
     return figure
 
@@ -111,8 +131,19 @@ def _watermark(axes: Axes) -> None:
     )  # fmt: skip
 
 
+def _wrapped(text: str) -> str:
+    """Break the lines of a footer so that they fit a narrow figure."""
+    return "\n".join(textwrap.fill(line, _NARROW_FOOTER) for line in text.splitlines())
+
+
 def _label(
-    figure: Figure, title: str, results: Sequence[CaseResult], *, smooth: bool, quick: bool
+    figure: Figure,
+    title: str,
+    results: Sequence[CaseResult],
+    *,
+    smooth: bool,
+    quick: bool,
+    narrow: bool,
 ) -> None:
     fewest, most = min(r.n_trials for r in results), max(r.n_trials for r in results)
     trials = f"{fewest}" if fewest == most else f"{fewest} to {most}"
@@ -132,4 +163,5 @@ def _label(
         lines_are += f" of the quartiles over {SMOOTHED_TESTS} tests."
     versions = ", ".join(sorted({record.version for r in results for record in r.records}))
     footer = f"{lines_are} {scale} per case and agent.\nsdnn {versions}; configuration "
-    label(figure, title, below, footer + ",\n".join(lines), _WARNING_COLOR)
+    footer += ",\n".join(lines)
+    label(figure, title, below, _wrapped(footer) if narrow else footer, _WARNING_COLOR)

@@ -45,6 +45,15 @@ RULE_NOTE = (
     f" {PAPER_TRIALS} trials x {PAPER_EPISODES:,} episodes are not judged. A claim of several lines"
     " holds if all of them do, and does not hold if one of them does not."
 )
+INTERVALS_NOTE = (
+    f"Ours: medians over trials, in brackets their {PERCENT} bootstrap intervals; differences and"
+    " ratios are those of medians."
+)
+TOO_SHORT = "too short to tell"
+TOO_SHORT_NOTE = (
+    f"{TOO_SHORT.capitalize()}: the measure needs more episodes than these trials have; see what is"
+    " measured, below."
+)
 DECIDED_NOTE = (
     f"Medians with {PERCENT} intervals over trials. A verdict is by stored reference results, too,"
     " where there are any: the rule and every number are below."
@@ -102,8 +111,11 @@ class Report:
         """The claims about which there are results, judged by these and by reference results."""
         return judge_claims(self.results, self.costs, self.reference)
 
-    def page(self, pictures: Mapping[str, bytes]) -> Page:
-        """Return the page; ``pictures`` are figures as SVG, by file name without suffix."""
+    def page(self, pictures: Mapping[str, bytes], narrow: Mapping[str, bytes] = {}) -> Page:
+        """Return the page; ``pictures`` are figures as SVG, by file name without suffix.
+
+        ``narrow`` are those for telephones, as PNG.
+        """
         warnings = []
         if self.quick:
             warnings.append(QUICK_WARNING)
@@ -123,25 +135,32 @@ class Report:
             intro="Every figure of T. Kobayashi, T. Shibuya and M. Morita (JACIII 19(6), 825-832,"
             " 2015) redrawn from stored rows, and each of its claims beside what these rows say.",
             warnings=warnings,
-            sections=[*self._first_sections(pictures), *self._details()],
+            sections=[*self._first_sections(pictures, narrow), *self._details()],
             source=f"Root seed {self.seed}; digest of the rows {self.digest[:16]}; sdnn"
             f" {_core.__version__}. {VERIFY_NOTE}",
         )
 
-    def _first_sections(self, pictures: Mapping[str, bytes]) -> Iterator[Section]:
+    def _first_sections(
+        self, pictures: Mapping[str, bytes], narrow: Mapping[str, bytes]
+    ) -> Iterator[Section]:
         if self.claims:
             table = _claim_table(self.claims)
-            yield Section(table=table, notes=[DECIDED_NOTE] if "verdict" in table.header else [])
+            notes = [DECIDED_NOTE] if "verdict" in table.header else [INTERVALS_NOTE]
+            if any(TOO_SHORT in row[-1] for row in table.rows):
+                notes.append(TOO_SHORT_NOTE)
+            yield Section(table=table, notes=notes)
         for experiment, _ in self.experiments:
             yield Section(
                 title=experiment.title,
                 picture=pictures[f"experiment-{experiment.id}"],
+                narrow_picture=narrow.get(f"experiment-{experiment.id}", b""),
                 alt=f"{experiment.title}: steps per test episode against learning episodes",
             )
         if self.costs:
             yield Section(
                 title="Cost of a step",
                 picture=pictures["cost"],
+                narrow_picture=narrow.get("cost", b""),
                 alt="Time of a step against the number of inputs, logarithmic",
                 is_narrow=True,
             )
@@ -220,12 +239,15 @@ def _claim_table(claims: Iterable[ClaimOutcome]) -> Table:
         quantities: dict[str, list[str]] = {}
         for check in claim.checks:
             if (text := format_quantity(check)) != "-":
-                quantities.setdefault(_quantity_name(check.check), []).append(text)
+                values = quantities.setdefault(_quantity_name(check.check), [])
+                if text != TOO_SHORT or text not in values:
+                    values.append(text)
         ours = "; ".join(f"{name}: {', '.join(values)}" for name, values in quantities.items())
         paper = "; ".join(dict.fromkeys(check.check.paper for check in claim.checks))
         row = (str(claim.claim.number), claim.claim.text, paper, ours or "-")
         rows.append((*row, claim.decided.value) if is_judged else row)
-    header = ("claim", "the paper says", "paper", "ours" if is_judged else "ours, so far")
+    ours_is = f"ours [{PERCENT} interval]" if is_judged else f"ours, so far [{PERCENT} interval]"
+    header = ("claim", "the paper says", "paper", ours_is)
     return Table(
         "The paper's claims",
         (*header, "verdict") if is_judged else header,
@@ -238,7 +260,8 @@ def _claim_table(claims: Iterable[ClaimOutcome]) -> Table:
 def _quantity_name(check: Check) -> str:
     """Return the name of a check's quantity, without the agents that the claim's text names."""
     if check.measure is None:
-        return f"{check.n_inputs} inputs / {check.n_fewer}"
+        title = next(series.title for series in SERIES if series.id == check.series)
+        return f"{title}, time of a step with {check.n_inputs} inputs / with {check.n_fewer}"
     return check.measure.replace("_", " ") + (", difference" if check.minus else "")
 
 
@@ -277,10 +300,12 @@ def _case_json(experiment: Experiment, result: CaseResult) -> dict[str, object]:
 
 
 def format_quantity(checked: CheckOutcome) -> str:
-    """Write the estimate of a check's quantity with its interval."""
+    """Write the estimate of a check's quantity with its interval; ``"-"`` if it was not run."""
     measure, estimate = checked.check.measure, checked.estimate
     if estimate is None:
         return "-"
+    if math.isnan(estimate.value):
+        return TOO_SHORT
     if measure is not None:
         return format_estimate(estimate, measure, checked.last_episode)
     value, lower, upper = map(_growth, vars(estimate).values())

@@ -11,7 +11,7 @@ import sdnn.reproduction.cost as cost
 from sdnn.agents.registry import agent_entry, split_label, title_of
 from sdnn.environments.paper_acrobot import PAPER_ACROBOT
 from sdnn.reports.pages import Section, Table
-from sdnn.reports.plots import figure_bytes
+from sdnn.reports.plots import NARROW_DPI, figure_bytes, png_bytes
 from sdnn.reproduction.cases import (
     COST,
     EXPERIMENTS,
@@ -179,7 +179,18 @@ class PaperStudy(Study):
         for name, figure in drawn.items():
             files[f"{name}.png"], files[f"{name}.svg"] = figure_bytes(figure)
         files["results.csv"] = csv_bytes(ROW_HEADER, trial_rows(report.records))
-        page = report.page({name: files[f"{name}.svg"] for name in drawn})
+        narrow = {
+            f"experiment-{experiment.id}": draw_experiment(
+                experiment, results, quick=self.quick, narrow=True
+            )
+            for experiment, results in collected
+        }
+        if report.costs:
+            narrow["cost"] = draw_cost(report.costs, quick=self.quick, narrow=True)
+        page = report.page(
+            {name: files[f"{name}.svg"] for name in drawn},
+            {name: png_bytes(figure, NARROW_DPI) for name, figure in narrow.items()},
+        )
         return Content(page=page, table=report.to_json(), files=files, shown=report.records)
 
 

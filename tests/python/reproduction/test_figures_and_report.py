@@ -187,7 +187,7 @@ def test_tables_show_cases_and_claims(report):
     for table in (claims, checks, cases):
         assert {len(row) for row in table.rows} == {len(table.header)}
     assert [row[0] for row in claims.rows] == ["1", "2", "8"]
-    assert claims.header[-1] == "ours, so far"
+    assert claims.header[-1] == "ours, so far [95 % interval]"
     assert claims.rows[0][-1] == "episodes to learn: 50 [30, 50], 60 [50, 60]"
     assert {row[-1] for row in checks.rows} == {"not judged", "not run"}
 
@@ -255,3 +255,25 @@ def test_the_html_report_embeds_pictures_tables_and_settings(report, monkeypatch
         assert all(str(record.key.seed) in html for record in result.records)
     later = page.to_html(describe_call(replace(outcome, n_run=2), 61, ()))
     assert "4 of 6 trials were stored before" in later
+
+
+def test_claims_say_which_measures_need_longer_trials(tmp_path, run, collected):
+    (experiment,) = select_experiments("b")
+    run(tmp_path, plan_trials(experiment.cases, 2, 0, 100))
+    results = collected(experiment, tmp_path, 2, 100)
+    report = Report(experiments=((experiment, results),), costs=(), quick=True, seed=0)
+    pictures = {"experiment-b": PICTURES["experiment-a"]}
+    page = report.page(pictures, {"experiment-b": b"narrow"})
+    by_number = {row[0]: row[-1] for row in next(page.tables).rows}
+    assert by_number["6"] == "episode of collapse, difference: too short to tell"
+    assert any("needs more episodes" in note for note in page.notes)
+    html = page.to_html("")
+    assert "max-width: 640px" in html
+    assert base64.b64encode(b"narrow").decode() in html
+
+
+def test_narrow_figures_have_their_panels_below_each_other(results):
+    wide, narrow = (draw_experiment(EXPERIMENT, results, narrow=narrow) for narrow in (False, True))
+    for figure, n_columns in ((wide, 2), (narrow, 1)):
+        assert figure.axes[0].get_subplotspec().get_gridspec().ncols == n_columns
+    assert narrow.get_figwidth() == wide.get_figwidth() / 2
