@@ -22,7 +22,7 @@ from sdnn.agents.inspection import (
 from sdnn.agents.state_maps import Replay, StateMap, map_of
 from sdnn.environments.types import Elements, Env
 from sdnn.reports.plots import COLORS, FAINT, INK, Axes, Figure, color_of, new_figure, style
-from sdnn.support.arguments import require
+from sdnn.support.arguments import require, seed_of
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
@@ -257,9 +257,15 @@ def plain(figure: Figure) -> Figure:
 
 def states_of(agent: AnyAgent, source: Env | Elements, seed: int) -> Floats:
     """Return states met in an environment, or the observed variables of given observations."""
+    seed_of(seed)
     if isinstance(source, gym.Env):
         return meet_states(agent, source, seed)
-    states = np.array([agent.flat_observation(observation) for observation in source])
+    is_list = isinstance(source, Sequence | np.ndarray) and not isinstance(source, str | bytes)
+    require(is_list, "source", "be an environment or a list of observations", source, TypeError)
+    try:
+        states = np.array([agent.flat_observation(observation) for observation in source])
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"source: {error}") from error
     require(len(states) > 1, "source", "be an environment or at least two observations", source)
     return states
 

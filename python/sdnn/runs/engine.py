@@ -195,7 +195,7 @@ class TrialsOutcome:
 @lru_cache(maxsize=1024)
 def _work_of(spec: RunSpec) -> int:
     """Return an estimate of a trial's operations, to compare it with others of its study."""
-    if spec.entry.step_work is None or not spec.is_compiled:
+    if not spec.is_compiled or spec.entry.step_work is None:
         return spec.length
     return spec.length * spec.entry.step_work(spec.core_settings()["approximator"])
 

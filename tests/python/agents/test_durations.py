@@ -353,7 +353,9 @@ def test_an_environment_that_announces_durations_must_give_them():
     with pytest.raises(UnusableStepError, match="info must have 'dt'"):
         agent.train(Silent(), steps=10)
     for vector_class in (gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv):
-        with pytest.raises(UnusableStepError, match=r"\bdt\b.*environment 1\b|environment 1: .*'dt'"):
+        with pytest.raises(
+            UnusableStepError, match=r"\bdt\b.*environment 1\b|environment 1: .*'dt'"
+        ):
             agent.train(vector_class([Courier, Silent]), steps=10)
 
 

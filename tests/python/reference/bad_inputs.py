@@ -455,10 +455,13 @@ def method_cells(kind):
         yield from bad_cells(f"{kind}.{name}: {{}}", parameters, cell)
 
 
+READERS = ("q_values", "value", "rule_values")
+
+
 def _method_cell(reused, kind, name, parameters, parameter, value):
     def run():
         agent = reused.agent
-        if ", warm-up" in kind and name in ("q_values", "value", "rule_values"):
+        if ", warm-up" in kind and (name in READERS or name.startswith("plot_")):
             return ""  # which has no values yet
         given = arguments(agent, parameters) | {parameter: value()}
 
@@ -517,6 +520,8 @@ def arguments(agent, parameters):
         "mean_return": 5.0,
         "patience": 1,
         "repeat_episodes": True,
+        "source": env,
+        "inputs": None,
     }
     return {name: good[name] for name in parameters}
 

@@ -200,6 +200,7 @@ GOOD = {
     "epochs": lambda: 1,
     "executor": lambda: None,
     "experiment": lambda: EXPERIMENTS[0],
+    "flash_bytes": lambda: None,
     "fraction_bits": lambda: None,
     "image": lambda: save_image(tiny_agent()),
     "jobs": lambda: 1,
@@ -210,16 +211,20 @@ GOOD = {
     "memory_limit": lambda: 2**20,
     "model": lambda: SDNNRegressor(**NETWORK).fit(SAMPLES, NUMBERS),
     "n_episodes": lambda: 20,
+    "n_inputs": lambda: 4,
     "n_most": lambda: 3,
     "n_trials": lambda: 1,
     "n_units": lambda: 200,
     "name": lambda: "portable",
+    "n_classes": lambda: None,
+    "n_outputs": lambda: None,
     "names": lambda: ("early_steps",),
     "observer": lambda: None,
     "observation_space": lambda: gym.spaces.Box(0.0, 1.0, (2,)),
     "options": lambda: None,
     "path": lambda: "agent",
     "plan": lambda: (),
+    "narrow": lambda: False,
     "quick": lambda: True,
     "kind": lambda: "q-lambda",
     "ram_bytes": lambda: 20_000,
@@ -237,7 +242,7 @@ GOOD = {
 """Arguments of public functions; one that is missing here wants a line."""
 
 OBJECTS = {
-    "case", "cases", "costs", "data", "entry", "executor", "experiment", "measured",
+    "case", "cases", "costs", "data", "entry", "executor", "experiment", "measured", "narrow",
     "names", "observer", "plan", "quick", "records", "reference", "results", "stop",
     "store", "title",
 }  # fmt: skip
