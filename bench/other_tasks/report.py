@@ -12,6 +12,7 @@ from studies import Curves
 from tasks import GOALS, TASKS, parts_of
 
 from sdnn.reports.statistics import estimate_median
+from sdnn.runs import EnvironmentSpec
 from sdnn.runs.study import Study
 
 OURS = "q-lambda"
@@ -171,6 +172,23 @@ def tables(study: Study, results: Curves) -> dict[str, str]:
         "losses": markdown(losses, _loss_rows(study, results)),
         "costs": markdown(("agent", "us a step", "KiB"), _cost_rows(study, results)),
     }
+
+
+def stored_returns(study: Study, results: Curves) -> dict[str, dict[str, float]]:
+    """Return the median return at the end of each baseline, by environment and agent.
+
+    Only of environments without other sensors or arguments: `sdnn plot --baseline` draws them.
+    """
+    returns: dict[str, dict[str, float]] = {}
+    for (case, variant), combination in study.combinations.items():
+        environment = combination.spec.environment
+        is_registered = environment.replace(ranges={}) == EnvironmentSpec(id=environment.id)
+        if variant == OURS or "/" in environment.id or not is_registered:
+            continue
+        if trials := results.get((case, variant)):
+            median = round(float(np.median(last_returns(trials))), 2)
+            returns.setdefault(environment.id, {})[combination.variant.title] = median
+    return returns
 
 
 def along_the_way(study: Study, results: Curves) -> str:

@@ -117,15 +117,29 @@ def evaluate(folder: Path, episodes: int, best: bool, seed: int | None, as_json:
     type=NEW_FILE,
     help="A .png, .svg or .pdf file.  [default: curves.png in RUN, or here for several]",
 )
-def plot(folders: tuple[Path, ...], out: Path | None) -> None:
+@click.option(
+    "--baseline",
+    "baselines",
+    metavar="NAME",
+    multiple=True,
+    help="Also draw the stored return of a baseline, such as SAC; may be repeated.",
+)
+@click.option("--plain", is_flag=True, help="Without the lines of the goal and of random actions.")
+def plot(
+    folders: tuple[Path, ...], out: Path | None, baselines: tuple[str, ...], plain: bool
+) -> None:
     """Draw the learning curves of RUN..., and write their numbers beside the figure as CSV.
 
-    One run of its kind: returns of its episodes as points, their running median, and the mean
-    return of each evaluation with the quartiles over its episodes. Runs that differ in their seeds
-    only: the median of their evaluations with the quartiles over the runs. Runs that differ in
-    anything else stay apart. A panel per task.
+    Points are episodes; lines are their running median and the mean returns of evaluations, with
+    quartiles: over the episodes of each evaluation, or over runs that differ in their seeds only,
+    which share their lines. Runs that differ in anything else stay apart. A panel per task.
+
+    Dotted lines show the goal of the environment's registration and, in environments of
+    Gymnasium, the mean return of random actions. The stored returns of baselines are those of the
+    documentation's results on other tasks.
     """
-    from sdnn.runs.curves import SUFFIXES, curves_of, write_curves
+    from sdnn.runs.curves import SUFFIXES, curves_of, environments_of, write_curves
+    from sdnn.runs.levels import levels_of
     from sdnn.runs.run import Run
 
     if out is not None:
@@ -133,9 +147,11 @@ def plot(folders: tuple[Path, ...], out: Path | None) -> None:
     chosen = tuple(dict.fromkeys(folders))
     path = out or (chosen[0] / "curves.png" if len(chosen) == 1 else Path("curves.png"))
     with run_command(option_words):
-        curves, notes = curves_of([Run.open(folder) for folder in chosen])
-        files = write_curves(curves, path)
-    for note in notes:
+        runs = [Run.open(folder) for folder in chosen]
+        curves, notes = curves_of(runs)
+        levels, more_notes = levels_of(environments_of(runs), baselines, plain=plain)
+        files = write_curves(curves, path, levels)
+    for note in (*notes, *more_notes):
         click.echo(f"note: {note}", err=True)
     click.echo("wrote " + " and ".join(map(str, files)))
 

@@ -7,14 +7,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from io import BytesIO
+from itertools import chain
 from pathlib import Path
-from typing import Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.reports.plots import Axes, Figure, color_of, new_figure
+from sdnn.reports.plots import FAINT, INK, Axes, Figure, color_of, new_figure, style
+from sdnn.runs.environment import EnvironmentSpec
 from sdnn.runs.errors import RunError
+from sdnn.runs.levels import Level
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.run import Run
 from sdnn.support.csv_files import csv_bytes
@@ -22,8 +25,14 @@ from sdnn.support.files import write_whole
 from sdnn.support.interrupts import stay_interrupts
 from sdnn.training.loop import Row
 
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+
 WINDOW = 20
 """Episodes in the running median of the returns, or all if there are fewer."""
+
+MAX_POINTS = 500
+"""The most points of a running median over several runs."""
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """Kinds of figures that the curves of runs may be written as."""
@@ -31,6 +40,10 @@ SUFFIXES = (".png", ".svg", ".pdf")
 HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "high")
 
 Kind: TypeAlias = Literal["return", "running median", "evaluation"]
+Series: TypeAlias = tuple[NDArray[np.int64], NDArray[np.float64]]
+"""Steps and values."""
+
+_KINDS_OF_ROWS: tuple[Kind, Kind] = ("return", "evaluation")
 
 _IGNORED = ("seed", "output", "budget.steps", "budget.episodes")  # goals are compared separately
 
@@ -70,6 +83,11 @@ def groups_of(runs: Sequence[Run]) -> list[Group]:
     return groups
 
 
+def environments_of(runs: Sequence[Run]) -> dict[str, EnvironmentSpec]:
+    """Return the environment of each panel by the label of its task."""
+    return {group.task: group.runs[0].spec.environment for group in groups_of(runs)}
+
+
 def _flat_settings(values: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
     for name, value in values.items():
         if f"{prefix}{name}" in _IGNORED:
@@ -95,8 +113,8 @@ def _goal_labels(run: Run) -> Iterator[str]:
 class Curve:
     """A curve of numbers against steps, arrays (n,).
 
-    The numbers are returns of episodes, their running median, or evaluations: the mean return of
-    a single run, or the median over runs that differ in their seeds.
+    The numbers are returns of a run's episodes, their running median, or evaluations: those of a
+    single run, or the median over runs that differ in their seeds.
     """
 
     task: str
@@ -122,8 +140,8 @@ class Curve:
 def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
     """Return the curves of runs, and notes about runs of which something could not be drawn.
 
-    Runs that differ in their seeds only share a curve. RunError if there is nothing to draw yet,
-    or rows cannot be read.
+    Runs that differ in their seeds only share a curve, but keep their episodes. RunError if there
+    is nothing to draw yet, or rows cannot be read.
     """
     made = [_curves_of_group(group) for group in groups_of(runs)]
     curves = [curve for run_curves, _ in made for curve in run_curves]
@@ -134,109 +152,206 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
 
 
 def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
-    """Return the curves of a group: the median over evaluated runs, or each run's; and notes."""
+    """Return the episodes of each run, and the medians over runs of a group; and notes."""
     rows = {run: run.rows() for run in group.runs}
-    series = {run: _steps_and_values(run_rows, "evaluation") for run, run_rows in rows.items()}
-    evaluated = {run: pair for run, pair in series.items() if len(pair[0])}
+    episodes, evaluated = (
+        {run: pair for run, pair in series.items() if len(pair[0])}
+        for series in (
+            {run: _steps_and_values(run_rows, kind) for run, run_rows in rows.items()}
+            for kind in _KINDS_OF_ROWS
+        )
+    )
     what = "no evaluation" if evaluated else "no episode and no evaluation"
-    shown = [*evaluated] or [run for run, run_rows in rows.items() if run_rows]
-    notes = [f"{run.folder}: {what} is whole yet" for run in group.runs if run not in shown]
-    if len(evaluated) < 2:
-        return [curve for run in shown for curve in _curves_of_run(group, run, rows[run])], notes
+    compared = evaluated or episodes
+    notes = [f"{run.folder}: {what} is whole yet" for run in group.runs if run not in compared]
+    curves = [
+        Curve(
+            task=group.task, agent=group.agent, run=str(run.folder),
+            kind="return", steps=steps, values=values,
+        )
+        for run, (steps, values) in episodes.items()
+    ]  # fmt: skip
+    curves += _running_medians(group, episodes)
+    if len(evaluated) == 1:
+        ((run, (steps, values)),) = evaluated.items()
+        returns = (row["returns"] for row in rows[run] if row["kind"] == "evaluation")
+        low, high = np.array([np.percentile(several, (25, 75)) for several in returns]).T
+        evaluation = Curve(
+            task=group.task, agent=group.agent, run=str(run.folder),
+            kind="evaluation", steps=steps, values=values, low=low, high=high,
+        )  # fmt: skip
+        return [*curves, evaluation], notes
+    if not evaluated:
+        return curves, notes
     folders = ", ".join(str(run.folder) for run in evaluated)
     steps = reduce(np.intersect1d, [run_steps for run_steps, _ in evaluated.values()])
     if not len(steps):
-        return [], [*notes, f"{folders}: they have no step in common"]
+        return curves, [*notes, f"{folders}: their evaluations have no step in common"]
     if any(run_steps[-1] > steps[-1] for run_steps, _ in evaluated.values()):
         notes.append(f"{folders}: drawn to step {steps[-1]}, which all of them have reached")
     values = np.array([means[np.isin(run_steps, steps)] for run_steps, means in evaluated.values()])
-    low, middle, high = np.percentile(values, (25, 50, 75), axis=0)
-    curve = Curve(
-        task=group.task, agent=group.agent, n_runs=len(evaluated),
-        kind="evaluation", steps=steps, values=middle, low=low, high=high,
-    )  # fmt: skip
-    return [curve], notes
+    return [*curves, _median_curve(group, "evaluation", steps, values)], notes
 
 
-def _curves_of_run(group: Group, run: Run, rows: Sequence[Row]) -> Iterator[Curve]:
-    for kind in get_args(Kind):
-        steps, values = _steps_and_values(rows, kind)
-        bounds = {}
-        if kind == "evaluation" and len(steps):
-            evaluations = (row["returns"] for row in rows if row["kind"] == "evaluation")
-            low, high = np.array([np.percentile(means, (25, 75)) for means in evaluations]).T
-            bounds = {"low": low, "high": high}
-        if len(steps):
+def _running_medians(group: Group, episodes: Mapping[Run, Series]) -> Iterator[Curve]:
+    """Yield the running median of a run's returns, or the median over runs of theirs.
+
+    Between the ends of its episodes a run has its last value. None is yielded where runs have no
+    step in common.
+    """
+    medians = {run: _running_median(values) for run, (_, values) in episodes.items()}
+    if len(episodes) < 2:
+        for run, (steps, _) in episodes.items():
             yield Curve(
                 task=group.task, agent=group.agent, run=str(run.folder),
-                kind=kind, steps=steps, values=values, **bounds,
+                kind="running median", steps=steps, values=medians[run],
             )  # fmt: skip
+        return
+    all_steps = [steps for steps, _ in episodes.values()]
+    first, last = max(steps[0] for steps in all_steps), min(steps[-1] for steps in all_steps)
+    union = np.unique(np.concatenate(all_steps))
+    grid = union[(union >= first) & (union <= last)]
+    if not len(grid):
+        return
+    grid = grid[np.unique(np.linspace(0, len(grid) - 1, MAX_POINTS).astype(int))]
+    values = [
+        medians[run][np.searchsorted(steps, grid, side="right") - 1]
+        for run, (steps, _) in episodes.items()
+    ]
+    yield _median_curve(group, "running median", grid, np.array(values))
 
 
-def _steps_and_values(
-    rows: Sequence[Row], kind: Kind
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    wanted, name = "episode", "return"
-    if kind == "evaluation":
-        wanted, name = "evaluation", "mean_return"
+def _median_curve(
+    group: Group, kind: Kind, steps: NDArray[np.int64], values: NDArray[np.float64]
+) -> Curve:
+    """Return the median over runs, with its quartiles, of values of shape (n_runs, n_steps)."""
+    low, middle, high = np.percentile(values, (25, 50, 75), axis=0)
+    return Curve(
+        task=group.task, agent=group.agent, n_runs=len(values),
+        kind=kind, steps=steps, values=middle, low=low, high=high,
+    )  # fmt: skip
+
+
+def _running_median(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the median of the last `WINDOW` values at each of them."""
+    ends = range(1, len(values) + 1)
+    return np.array([np.median(values[max(0, end - WINDOW) : end]) for end in ends])
+
+
+def _steps_and_values(rows: Sequence[Row], kind: Kind) -> Series:
+    wanted, name = ("evaluation", "mean_return") if kind == "evaluation" else ("episode", "return")
     matching = [row for row in rows if row["kind"] == wanted]
     steps = np.array([row["step"] for row in matching], np.int64)
-    values = np.array([row[name] for row in matching], np.float64)
-    if kind == "running median":
-        lengths = range(1, len(values) + 1)
-        values = np.array([np.median(values[max(0, end - WINDOW) : end]) for end in lengths])
-    return steps, values
+    return steps, np.array([row[name] for row in matching], np.float64)
 
 
-def write_curves(curves: Sequence[Curve], path: Path) -> tuple[Path, Path]:
+def write_curves(
+    curves: Sequence[Curve], path: Path, levels: Sequence[Level] = ()
+) -> tuple[Path, Path]:
     """Draw the curves of runs into a file, and write their numbers beside it as CSV; return both.
+
+    Levels are drawn across their panels; in the CSV they have no step.
 
     Raises RunError if the name has another ending than those of `SUFFIXES`.
     """
     if path.suffix not in SUFFIXES:
         raise RunError(f"out must end in one of {', '.join(SUFFIXES)}, got {path}")
     content = BytesIO()
-    figure = draw_curves(curves)
+    figure = draw_curves(curves, levels)
     with stay_interrupts():
         figure.savefig(content, format=path.suffix[1:], dpi=150)
     path.parent.mkdir(parents=True, exist_ok=True)
     numbers = path.with_suffix(".csv")
     write_whole(path, content.getvalue())
-    write_whole(numbers, csv_bytes(HEADER, (row for curve in curves for row in curve.rows())))
+    rows = chain.from_iterable(part.rows() for part in curves)
+    rows_of_levels = chain.from_iterable(level.rows() for level in levels)
+    write_whole(numbers, csv_bytes(HEADER, chain(rows, rows_of_levels)))
     return path, numbers
 
 
-def draw_curves(curves: Sequence[Curve]) -> Figure:
-    """Draw the curves of runs: a panel per task, a color per agent.
+_INKS = {"return": FAINT, "running median": INK, "evaluation": INK}
+_LABELS = {
+    "return": "episodes",
+    "running median": f"running median of {WINDOW} episodes",
+    "evaluation": "mean of greedy episodes",
+}
+_LABEL_HEIGHT = 0.055  # of the labels of levels, in parts of a panel
+_MANY_POINTS = 20_000  # from this number on, points are drawn as a picture, also in SVG and PDF
 
-    Raises a `PlotUnavailableError` if matplotlib is not installed.
+
+def draw_curves(curves: Sequence[Curve], levels: Sequence[Level] = ()) -> Figure:
+    """Draw the curves of runs: a panel per task, a color per agent, a dotted line per level.
+
+    The legend explains each agent and each type of line once. Raises a `PlotUnavailableError` if
+    matplotlib is not installed.
     """
     require_matplotlib()
     tasks = list(dict.fromkeys(curve.task for curve in curves))
     agents = list(dict.fromkeys(curve.agent for curve in curves))
     colors = {agent: color_of(place) for place, agent in enumerate(agents)}
-    figure = new_figure(7.5, 3.6 * len(tasks))
+    figure = new_figure(7.5, 0.9 + 3.3 * len(tasks))
     panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
     for task, axes in zip(tasks, panels, strict=True):
         for curve in (c for c in curves if c.task == task):
             _draw_curve(axes, curve, colors[curve.agent])
-        axes.set_title(task, fontsize=10)
-        axes.set(xlabel="steps", ylabel="return")
-        axes.grid(alpha=0.25)
-        axes.legend(fontsize=8, frameon=False)
+        _draw_levels(axes, [level for level in levels if level.task == task])
+        title = task if len(agents) > 1 else f"{task}: {agents[0]}"
+        axes.set_title(title, fontsize=10.5, loc="left", color=INK)
+        axes.set(ylabel="return")
+        axes.xaxis.set_major_formatter(lambda step, _: f"{step:,.0f}")
+        style(axes)
+    panels[-1].set_xlabel("steps")
+    entries = _legend_entries(curves, colors if len(agents) > 1 else {})
+    figure.legend(handles=entries, loc="outside upper left", ncols=3, fontsize=9, frameon=False)
+    footer = "Bands: quartiles over the episodes of an evaluation."
+    if any(curve.n_runs > 1 for curve in curves):
+        footer = "Lines: medians over runs that differ in their seeds; bands: quartiles over them"
+        footer += " (of a single run: over the episodes of an evaluation)."
+    figure.supxlabel(footer, x=0.012, ha="left", fontsize=7.5, color=FAINT)
     return figure
 
 
 def _draw_curve(axes: Axes, curve: Curve, color: str) -> None:
-    of = f" ({curve.n_runs} runs)" if curve.n_runs > 1 else ""
-    label = f"{curve.agent}: {curve.kind}{of}"
-    if curve.kind == "return":
-        axes.plot(curve.steps, curve.values, ".", ms=2, color=color, alpha=0.25, label=label)
-        return
-    is_main = curve.kind == "evaluation"
-    width, dashes, marker = (1.8, "-", "o") if is_main else (1.0, "--", "")
-    axes.plot(
-        curve.steps, curve.values, dashes, lw=width, marker=marker, ms=3, color=color, label=label
-    )
+    (line,) = axes.plot(curve.steps, curve.values, color=color)
+    line.update(_look(curve.kind, len(curve.steps)))
     if curve.low is not None and curve.high is not None:
         axes.fill_between(curve.steps, curve.low, curve.high, color=color, alpha=0.2, lw=0)
+
+
+def _look(kind: Kind, n_points: int = 0) -> dict[str, object]:
+    if kind == "return":
+        is_picture = n_points > _MANY_POINTS
+        return {"ls": "", "marker": ".", "ms": 2.5, "alpha": 0.3, "rasterized": is_picture}
+    if kind == "running median":
+        return {"ls": "--", "lw": 1.2}
+    return {"ls": "-", "lw": 1.8, "marker": "o", "ms": 3}
+
+
+def _draw_levels(axes: Axes, levels: Sequence[Level]) -> None:
+    """Draw dotted lines with labels at the right, which are moved apart where they are close."""
+    for level in levels:
+        axes.axhline(level.value, color=FAINT, lw=1.0, ls=":", zorder=1)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high)
+    height = low
+    for level in sorted(levels, key=lambda level: level.value):
+        height = max(level.value, height)
+        digits = 0 if abs(level.value) >= 10 else 2
+        axes.annotate(
+            f"{level.title} {level.value:,.{digits}f}", (1.01, height), color=FAINT, fontsize=8,
+            xycoords=axes.get_yaxis_transform(), va="center", annotation_clip=False,
+        )  # fmt: skip
+        height += _LABEL_HEIGHT * (high - low)
+
+
+def _legend_entries(curves: Sequence[Curve], colors: Mapping[str, str]) -> list[Artist]:
+    """Return an entry for each color and for each type of line."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    entries: list[Artist] = [Patch(color=color, label=agent) for agent, color in colors.items()]
+    for kind in dict.fromkeys(curve.kind for curve in curves):
+        line = Line2D([], [], color=_INKS[kind], label=_LABELS[kind])
+        line.update(_look(kind))
+        entries.append(line)
+    return entries

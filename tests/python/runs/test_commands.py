@@ -48,8 +48,12 @@ def test_train_prints_a_summary_and_the_next_commands(invoke):
     assert lines[0].startswith(f"{folder}: 150 steps, ")
     assert lines[1].startswith("last evaluation, after 140 steps: mean return ")
     assert "corrections" in lines[2]
-    assert f"sdnn plot {folder}" in lines[-1]
-    assert lines[-1].endswith(f"sdnn record {folder} x.gif")
+    assert lines[-5] == "next:"
+    commands = [line.partition("  #")[0].strip() for line in lines[-4:]]
+    assert commands == [
+        f"sdnn evaluate {folder}", f"sdnn plot {folder}", f"sdnn inspect {folder}",
+        f"sdnn record {folder} x.gif",
+    ]  # fmt: skip
 
 
 def test_evaluate_prints_the_returns_of_an_evaluation(invoke, trained):
@@ -89,7 +93,7 @@ def test_record_writes_a_gif_of_the_requested_steps(invoke, trained, tmp_path):
 @pytest.mark.filterwarnings("ignore:.*render_mode")
 def test_record_refuses_environments_that_cannot_be_rendered(invoke, refused, tmp_path):
     result = invoke("train", "drifting_env:tests/Unseen-v0", *SHORT, "--out", "one")
-    commands = result.stdout.splitlines()[-1]
+    commands = result.stdout.rpartition("next:")[2]
     assert "sdnn plot one" in commands
     assert "record" not in commands
     error = refused("record", "one", "x.gif", code=1)
@@ -267,8 +271,23 @@ def test_plot_draws_several_runs_as_one_curve(invoke, tmp_path):
     assert "curves.png and curves.csv" in invoke("plot", *folders, folders[0]).stdout
     drawn = list(csv.DictReader(Path("curves.csv").read_text().splitlines()))
     assert {(point["kind"], point["n_runs"], point["run"]) for point in drawn} == {
-        ("evaluation", "2", "")
-    }
+        ("evaluation", "2", ""), ("running median", "2", ""),
+        *(("return", "1", str(folder)) for folder in folders),
+    }  # fmt: skip
+
+
+def test_plot_draws_goals_random_actions_and_baselines(invoke, refused, tmp_path):
+    training = ("CartPole-v1", "--steps", 300, "--evaluate-every", 100, "--out", "pole")
+    assert invoke("train", *training).exit_code == 0
+
+    def levels(*options):
+        assert invoke("plot", "pole", *options).exit_code == 0
+        rows = csv.DictReader(Path("pole/curves.csv").read_text().splitlines())
+        return [row["kind"] for row in rows if not row["step"]]
+
+    assert levels() == ["goal", "random actions"]
+    assert levels("--plain", "--baseline", "PPO", "--baseline", "RBFN") == ["PPO", "RBFN"]
+    assert "PPO" in refused("plot", "pole", "--baseline", "nobody", code=1)
 
 
 def test_plot_names_runs_without_rows(invoke, tmp_path):

@@ -7,7 +7,8 @@ import pytest
 from refusals import refuses
 from run_specs import run_spec
 from sdnn.runs import EnvironmentSpec, Goal, Run, RunError
-from sdnn.runs.curves import curves_of, draw_curves, groups_of, write_curves
+from sdnn.runs.curves import MAX_POINTS, curves_of, draw_curves, groups_of, write_curves
+from sdnn.runs.levels import Level
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrialRows
 
@@ -81,7 +82,7 @@ def test_runs_of_one_task_are_one_curve_with_quartiles(tmp_path):
         )
         for seed in range(3)
     ]
-    (curve,) = curves_of(runs)[0]
+    *_, curve = curves_of(runs)[0]
     assert (curve.kind, curve.n_runs) == ("evaluation", 3)
     assert curve.steps.tolist() == [20, 40]  # which all of them have
     assert curve.values.tolist() == [2, 1]
@@ -91,12 +92,39 @@ def test_runs_of_one_task_are_one_curve_with_quartiles(tmp_path):
     assert axes.lines[0].get_ydata().tolist() == [2, 1]
 
 
-def test_runs_without_evaluations_are_drawn_separately(tmp_path):
-    runs = [make(tmp_path / str(n), run_spec(CONFIG, seed=n), [n] * (5 + n)) for n in range(2)]
-    curves, _ = curves_of(runs)
-    assert [(curve.kind, curve.run) for curve in curves] == [
-        (kind, str(run.folder)) for run in runs for kind in ("return", "running median")
+def test_runs_of_different_seeds_keep_their_episodes_and_share_running_medians(tmp_path):
+    returns = [1, 5, 3], [3, 3, 9, 9]
+    runs = [make(tmp_path / str(n), run_spec(CONFIG, seed=n), returns[n]) for n in range(2)]
+    *episodes, medians = curves_of(runs)[0]
+    assert [(curve.kind, curve.run) for curve in episodes] == [
+        ("return", str(run.folder)) for run in runs
     ]
+    assert [curve.values.tolist() for curve in episodes] == [*map(list, returns)]
+    # Running medians are 1, 3, 3 and 3, 3, 3, 6: until step 30, which both have reached.
+    assert (medians.kind, medians.n_runs, medians.run) == ("running median", 2, "")
+    assert medians.steps.tolist() == [10, 20, 30]
+    assert medians.values.tolist() == [2, 3, 3]
+    assert medians.low.tolist() == [1.5, 3, 3]
+
+
+def test_running_medians_of_long_runs_have_few_points(tmp_path):
+    runs = [make(tmp_path / str(n), run_spec(CONFIG, seed=n), range(2_000)) for n in range(2)]
+    medians = curves_of(runs)[0][-1]
+    assert len(medians.steps) == MAX_POINTS
+    assert medians.steps[[0, -1]].tolist() == [10, 20_000]
+    assert medians.values[-1] == np.median(range(1_980, 2_000))
+
+
+def test_legends_name_each_agent_and_each_type_of_line_once(tmp_path):
+    other = run_spec(CONFIG, settings={"learning": {"discount": 0.9}})
+    runs = [
+        make(tmp_path / f"{n}-{seed}", run_spec(spec, seed=seed), [1, 2], [[3]])
+        for n, spec in enumerate((CONFIG, other))
+        for seed in range(2)
+    ]
+    (legend,) = draw_curves(curves_of(runs)[0]).legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert len(texts) == len(set(texts)) == 2 + 3
 
 
 def test_runs_of_other_tasks_or_settings_are_separate_curves(tmp_path):
@@ -234,19 +262,25 @@ def test_notes_name_runs_and_evaluations_that_are_omitted(tmp_path):
     short = make(tmp_path / "short", seeds[1], [1], [[0], [2]])
     begun = make(tmp_path / "begun", seeds[2], [1])
     empty = make(tmp_path / "empty", seeds[3])
-    (curve,), notes = curves_of([whole, short, begun, empty])
+    curves, notes = curves_of([whole, short, begun, empty])
+    assert {c.run for c in curves if c.kind == "return"} == {
+        str(run.folder) for run in (whole, short, begun)
+    }
+    (curve,) = (curve for curve in curves if curve.kind == "evaluation")
     assert (curve.n_runs, curve.kind, curve.values.tolist()) == (2, "evaluation", [1, 3])
     names = [begun.folder, empty.folder, f"{whole.folder}, {short.folder}"]
     assert [note.partition(":")[0] for note in notes] == [str(name) for name in names]
     assert "step 40" in notes[2]
     curves, notes = curves_of([whole, begun])
-    assert [(curve.kind, curve.run) for curve in curves] == [
-        (kind, str(whole.folder)) for kind in ("return", "running median", "evaluation")
-    ]
+    assert [(curve.kind, curve.n_runs, curve.run) for curve in curves] == [
+        ("return", 1, str(whole.folder)), ("return", 1, str(begun.folder)),
+        ("running median", 2, ""), ("evaluation", 1, str(whole.folder)),
+    ]  # fmt: skip
     assert [note.partition(":")[0] for note in notes] == [str(begun.folder)]
     late = make(tmp_path / "late", run_spec(CONFIG, seed=9), [], [[1]], every=30)
-    folders = f"{short.folder}, {late.folder}"
-    refuses(folders, curves_of, [short, late], error=RunError)
+    curves, notes = curves_of([short, late])
+    assert {curve.kind for curve in curves} == {"return", "running median"}
+    assert notes == [f"{short.folder}, {late.folder}: their evaluations have no step in common"]
     refuses(empty.folder.name, curves_of, [empty, make(tmp_path / "new", CONFIG)], error=RunError)
 
 
@@ -262,6 +296,26 @@ def test_figures_and_csv_files_are_written_in_every_format(tmp_path):
     ]  # fmt: skip
     assert (rows[2]["low"], rows[2]["high"], rows[2]["run"]) == ("1.25", "1.75", str(run.folder))
     refuses(".png", write_curves, curves_of([run])[0], tmp_path / "x.doc", error=RunError)
+
+
+def test_levels_are_dotted_lines_with_labels_and_rows_without_a_step(tmp_path):
+    curves, _ = curves_of([make(tmp_path / "run", CONFIG, [1, 100])])
+    levels = [
+        Level(task="CartPole-v1", title=title, value=value)
+        for title, value in (("goal", 475.0), ("PPO", 474.0), ("random actions", 1.234))
+    ]
+    (axes,) = draw_curves(curves, levels).axes
+    dotted = [line.get_ydata()[0] for line in axes.lines if line.get_linestyle() == ":"]
+    assert dotted == [475, 474, 1.234]
+    labels = {text.get_text(): text.xy[1] for text in axes.texts}
+    assert labels.keys() == {"goal 475", "PPO 474", "random actions 1.23"}
+    assert labels["PPO 474"] == 474
+    assert labels["goal 475"] > 490, "moved away from the label of PPO"
+    _, numbers = write_curves(curves, tmp_path / "x.png", levels)
+    rows = list(csv.DictReader(numbers.read_text().splitlines()))[-3:]
+    assert [(row["kind"], row["step"], row["value"]) for row in rows] == [
+        ("goal", "", "475.0"), ("PPO", "", "474.0"), ("random actions", "", "1.234"),
+    ]  # fmt: skip
 
 
 def test_runs_without_rows_and_a_missing_matplotlib_are_refused(tmp_path, monkeypatch):

@@ -1,0 +1,120 @@
+"""Levels to compare returns with: an environment's goal, random actions, and stored baselines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import gymnasium as gym
+import msgspec
+import numpy as np
+
+from sdnn.runs.environment import EnvironmentSpec
+from sdnn.runs.errors import RunError
+from sdnn.support.arguments import advice
+from sdnn.training.episodes import EVALUATION, episode_seed
+
+MAX_EPISODES, MAX_STEPS = 20, 10_000
+"""Random actions are measured in this number of episodes, or in those that the steps allow."""
+
+_MEASURED_PACKAGES = ("gymnasium", "sdnn")
+"""Packages whose environments can be stepped without asking: no code of a user, and no robot."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Level:
+    """A return to compare with in the panel of a task."""
+
+    task: str
+    title: str
+    value: float
+
+    def rows(self) -> Iterator[tuple[object, ...]]:
+        """Yield its row of a file of curves, without a step."""
+        yield (self.task, "", self.title, "", "", "", self.value, "", "")
+
+
+def levels_of(
+    tasks: Mapping[str, EnvironmentSpec], baselines: Sequence[str] = (), *, plain: bool = False
+) -> tuple[list[Level], list[str]]:
+    """Return the levels of tasks, by the titles of their panels, and notes about missing baselines.
+
+    These are the goal of the environment's registration, unless arguments change the environment;
+    the mean return of random actions, in environments of Gymnasium and of this package; and the
+    baselines that are named. With `plain` only these. RunError if a name is not that of a stored
+    baseline.
+    """
+    known = baseline_names()
+    for name in baselines:
+        if name not in known:
+            hint = advice(name, known)
+            raise RunError(f"baseline must be one of {', '.join(known)}, got {name!r}: {hint}")
+    levels, notes = [], []
+    for task, environment in tasks.items():
+        lines = {} if plain else {
+            "goal": goal_of(environment), "random actions": mean_random_return(environment)
+        }  # fmt: skip
+        levels += [
+            Level(task=task, title=title, value=value)
+            for title, value in lines.items()
+            if value is not None
+        ]
+        stored = {} if _is_changed(environment) else _baselines().get(environment.id, {})
+        for name in baselines:
+            if name in stored:
+                levels.append(Level(task=task, title=name, value=stored[name]))
+            else:
+                notes.append(f"{task}: no stored return of {name}")
+    return levels, notes
+
+
+def goal_of(environment: EnvironmentSpec) -> float | None:
+    """Return the return that solves an environment; None if unknown, or arguments change it."""
+    registered = gym.registry.get(environment.id)
+    if registered is None or environment.kwargs:
+        return None
+    return registered.reward_threshold
+
+
+@cache
+def mean_random_return(environment: EnvironmentSpec) -> float | None:
+    """Return the mean return of random actions, always the same; None if it cannot be measured."""
+    registered = gym.registry.get(environment.id)
+    entry = "" if registered is None else str(registered.entry_point)
+    if entry.partition(".")[0] not in _MEASURED_PACKAGES or environment.action_masks:
+        return None
+    returns: list[float] = []
+    n_steps = 0
+    with closing(environment.without_noise().make()) as env:
+        env.action_space.seed(0)
+        for episode in range(MAX_EPISODES):
+            env.reset(seed=episode_seed(0, EVALUATION, episode))
+            total, is_over = 0.0, False
+            while not is_over and n_steps < MAX_STEPS:
+                _, reward, terminated, truncated, _ = env.step(env.action_space.sample())
+                total += float(reward)
+                n_steps += 1
+                is_over = terminated or truncated
+            if not is_over:
+                break
+            returns.append(total)
+    return float(np.mean(returns)) if returns else None
+
+
+def _is_changed(environment: EnvironmentSpec) -> bool:
+    return environment != EnvironmentSpec(id=environment.id)
+
+
+@cache
+def _baselines() -> dict[str, dict[str, float]]:
+    """Return the median return of each stored baseline by environment and agent."""
+    content = files("sdnn.runs").joinpath("baselines.json").read_bytes()
+    return msgspec.json.decode(content, type=dict[str, dict[str, float]])
+
+
+def baseline_names() -> list[str]:
+    """Return the names of all stored baselines."""
+    return list(dict.fromkeys(name for returns in _baselines().values() for name in returns))
