@@ -350,7 +350,9 @@ def _action_change(agent: AnyAgent, before: Floats, after: Floats) -> float:
 def named_inputs(names: Sequence[str | int], inputs: Sequence[AgentInput]) -> list[AgentInput]:
     """Return the inputs of these names, or numbers of observed variables; ValueError if unknown."""
     is_list = isinstance(names, Sequence) and not isinstance(names, str | bytes)
-    require(is_list and 1 <= len(names) <= 2, "inputs", "be one or two names of inputs", names)
+    is_short = is_list and 1 <= len(names) <= 2
+    are_names = is_short and all(isinstance(name, str | int) for name in names)
+    require(are_names, "inputs", "be one or two names of inputs", names)
     chosen = []
     for name in names:
         matches = [
