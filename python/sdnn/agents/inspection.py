@@ -7,7 +7,7 @@ them. Each counts as the first observation of an episode, for agents whose state
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.base import BaseAgent
-from sdnn.environments.types import Data, Element, Env, Space
+from sdnn.environments.types import Data, Element, Env, Mask, Space
 from sdnn.support.arguments import advice, require
-from sdnn.training.episodes import announces, mask_in, reset_env, step_env
-from sdnn.training.files import fixed_statistics
+from sdnn.training.evaluation import greedy_episode
 
 Floats: TypeAlias = NDArray[np.float64]
 AnyAgent: TypeAlias = BaseAgent[Any, Any]
@@ -245,6 +244,43 @@ class Reader:
         return np.ravel(self._core.act(state, False))
 
 
+class WatchedAgent:
+    """An agent in greedy episodes whose observations and actions are noted, and with them values.
+
+    ``random_action`` may return an action to take instead of the greedy one; ``reader`` reads the
+    value of each state.
+    """
+
+    def __init__(
+        self,
+        agent: AnyAgent,
+        *,
+        random_action: Callable[[Mask], Element | None] = lambda _: None,
+        reader: Reader | None = None,
+    ) -> None:
+        self._agent, self._random_action, self._reader = agent, random_action, reader
+        self.wrappers = agent.wrappers
+        self.states: list[Floats] = []
+        self.values: list[float] = []
+        self.actions: list[Floats] = []
+
+    def begin_greedy_episode(self) -> None:
+        """Begin an episode of the agent."""
+        self._agent.begin_greedy_episode()
+
+    def act(self, observation: Element, explore: bool = False, mask: Mask = None) -> Element:
+        """Return the action of the agent, or a random one, and note it."""
+        state = self._agent.flat_observation(observation)
+        self.states.append(state)
+        if self._reader is not None:
+            self.values.append(self._reader.value(state))
+        action = self._agent.act(observation, explore, mask=mask)
+        random = self._random_action(mask)
+        action = action if random is None else random
+        self.actions.append(np.ravel(np.asarray(action, np.float64)))
+        return action
+
+
 def meet_states(agent: AnyAgent, env: Env, seed: int = 0, options: Data | None = None) -> Floats:
     """Run greedy episodes with a tenth of random actions, and return states that were met.
 
@@ -252,24 +288,22 @@ def meet_states(agent: AnyAgent, env: Env, seed: int = 0, options: Data | None =
     """
     generator = np.random.default_rng(seed)
     env.action_space.seed(seed)
-    has_masks = announces(env, "action_masks")
-    states: list[Floats] = []
-    with fixed_statistics(env, agent.wrappers):
-        episode = 0
-        while len(states) < MOST_STEPS:
-            observation, info = reset_env(env, (seed + episode) % 2**32, options)
-            agent.begin_greedy_episode()
-            is_over = False
-            while not is_over and len(states) < MOST_STEPS:
-                states.append(agent.flat_observation(observation))
-                mask = mask_in(info) if has_masks else None
-                action = agent.act(observation, explore=False, mask=mask)
-                if generator.random() < SHARE_RANDOM:
-                    action = _random_action(env, mask)
-                observation, _, terminated, truncated, info = step_env(env, action)
-                is_over = bool(terminated or truncated)
-            episode += 1
-    rows = np.array(states)
+
+    def random_action(mask: Any) -> Element | None:
+        if generator.random() >= SHARE_RANDOM:
+            return None
+        if isinstance(mask, tuple | list):
+            return env.action_space.sample(tuple(np.asarray(part, np.int8) for part in mask))
+        return env.action_space.sample(None if mask is None else np.asarray(mask, np.int8))
+
+    watched = WatchedAgent(agent, random_action=random_action)
+    number = 1  # the first episode is that of a replay
+    while len(watched.states) < MOST_STEPS:
+        for _ in greedy_episode(watched, env, seed, number, options):
+            if len(watched.states) == MOST_STEPS:
+                break
+        number += 1
+    rows = np.array(watched.states)
     rows = rows[np.isfinite(rows).all(axis=1)]
     require(len(rows) > 1, "env", "give observations without missing readings", env)
     return thinned(rows, MOST_STATES)
@@ -279,14 +313,6 @@ def thinned(states: Floats, n_most: int) -> Floats:
     """Return at most a number of states, evenly spaced."""
     n = min(len(states), n_most)
     return np.asarray(states[np.linspace(0, len(states) - 1, n).astype(np.int64)])
-
-
-def _random_action(env: Env, mask: Any) -> Element:
-    if mask is None:
-        return env.action_space.sample()
-    if isinstance(mask, tuple | list):
-        return env.action_space.sample(tuple(np.asarray(part, np.int8) for part in mask))
-    return env.action_space.sample(np.asarray(mask, np.int8))
 
 
 @dataclass(frozen=True)

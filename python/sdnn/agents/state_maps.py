@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdnn.agents.inspection import MOST_STEPS, AgentInput, Floats, Reader
-from sdnn.environments.types import Data, Element, Env, Mask
+from sdnn.agents.inspection import MOST_STEPS, AgentInput, Floats, Reader, WatchedAgent
+from sdnn.environments.types import Data, Env
 from sdnn.training.evaluation import greedy_episode
 
 
@@ -88,34 +88,12 @@ class Replay:
         return float(self.rewards.sum())
 
 
-class _Watched:
-    """An agent in a greedy episode, whose observations, values and actions are noted."""
-
-    def __init__(self, reader: Reader) -> None:
-        self._reader, self._agent = reader, reader.agent
-        self.wrappers = reader.agent.wrappers
-        self.states: list[Floats] = []
-        self.values: list[float] = []
-        self.actions: list[Floats] = []
-
-    def begin_greedy_episode(self) -> None:
-        self._agent.begin_greedy_episode()
-
-    def act(self, observation: Element, explore: bool = False, mask: Mask = None) -> Element:
-        state = self._agent.flat_observation(observation)
-        self.states.append(state)
-        self.values.append(self._reader.value(state))
-        action = self._agent.act(observation, explore, mask=mask)
-        self.actions.append(np.ravel(np.asarray(action, np.float64)))
-        return action
-
-
 def replay(reader: Reader, env: Env, seed: int | None = 0, options: Data | None = None) -> Replay:
     """Run a greedy episode, the first of an evaluation with the same seed, of at most `MOST_STEPS`.
 
     Nothing is learned.
     """
-    watched = _Watched(reader)
+    watched = WatchedAgent(reader.agent, reader=reader)
     totals = [0.0]
     for now in greedy_episode(watched, env, seed, 0, options):
         if now.n_steps:
