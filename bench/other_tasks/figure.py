@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from report import OURS, score
 from studies import Curves
 from tasks import TASKS
 
-from sdnn.reports.plots import png_bytes
+from sdnn.reports.plots import COLORS, png_bytes
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.study import Study
 from sdnn.support.files import write_whole
@@ -41,6 +43,53 @@ def draw(study: Study, results: Curves, path: Path) -> None:
         handles.update(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5, fontsize=9)
     write_whole(path, png_bytes(figure, dpi=130))
+
+
+def draw_overview(study: Study, results: Curves, path: Path) -> None:
+    """Draw the median return of each agent at the end: a line for each task, a dot for each agent.
+
+    Returns are on the scale of `Task.score`, on which 0 is that of random actions and 1 solves the
+    task; lower ones than random actions' are drawn at 0.
+    """
+    require_matplotlib()
+    from matplotlib.figure import Figure
+
+    names = [name for name in TASKS if (name, OURS) in results]
+    order = sorted(names, key=lambda name: score(name, results[name, OURS]))
+    figure = Figure(figsize=(8.0, 0.6 + 0.33 * len(order)), layout="constrained")
+    axes = figure.subplots()
+    legend = {}
+    for line, name in enumerate(order):
+        for variant in study.variants:
+            trials = results.get((name, variant.id))
+            if not trials:
+                continue
+            label, look = _dot(variant.id)
+            x = min(max(score(name, trials), 0.0), MOST_SHOWN)
+            legend[label] = axes.plot(x, line, "o", clip_on=False, **look)[0]
+    axes.axvline(1.0, color="0.4", lw=0.8, ls=":")
+    axes.set_yticks(range(len(order)), order)
+    axes.set_xticks([0, 0.5, 1], ["random actions", "half way", "solved"])
+    axes.set_xlim(-0.02, MOST_SHOWN)
+    axes.grid(axis="y", color="0.9", lw=0.7)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+    figure.legend(legend.values(), legend.keys(), loc="outside upper right", ncols=3, frameon=False)
+    write_whole(path, png_bytes(figure, dpi=150))
+
+
+MOST_SHOWN = 1.3
+"""The largest score that is drawn; better ones lie there."""
+
+
+def _dot(variant: str) -> tuple[str, dict[str, Any]]:
+    """Return the legend's text of an agent and the look of its dots."""
+    if variant == OURS:
+        return "SDNNQLambda", {"ms": 9, "color": COLORS[0], "zorder": 4}
+    if variant == "actor-critic":
+        return "SDNNActorCritic", {"ms": 7, "color": COLORS[1], "zorder": 3}
+    return "others", {"ms": 5, "color": "0.6", "mec": "white", "mew": 0.5, "zorder": 2}
 
 
 def _draw_task(panels, study: Study, results: Curves, name: str) -> None:

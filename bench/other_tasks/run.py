@@ -4,7 +4,7 @@
         [--folder docs/evidence] [--redraw] [--full]
 
 The study is study.toml; --only chooses by the words of case and variant: `--only sdnn-c CartPole`.
-At the end the tables are printed and put into benchmarks.md, other-tasks.png is drawn, and the
+At the end the tables are printed and put into benchmarks.md, the figures are drawn, and the
 medians of baselines are written for `sdnn plot --baseline`, all from the store; --full prints every
 case and agent along the way, too. SAC, TD3 and PPO need `pip install stable-baselines3`,
 LunarLander `box2d`, Hopper and others `mujoco`.
@@ -18,7 +18,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from figure import draw
+from figure import draw, draw_overview
 from measured import options
 from page import show
 from report import along_the_way, stored_returns, tables
@@ -44,6 +44,7 @@ def main() -> None:
     if arguments.full:
         print(along_the_way(study, results))
     draw(study, results, arguments.folder / "other-tasks.png")
+    draw_overview(study, results, arguments.folder / "tasks-overview.png")
     content = json.dumps(stored_returns(study, results), indent=1) + "\n"
     write_whole(BASELINES, content.encode())
 
