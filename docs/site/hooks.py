@@ -1,4 +1,4 @@
-"""The site beside the files: pages of the repository's root, and links as they are on GitHub.
+"""The site beside the files: its first page, pages of the root, and links as they are on GitHub.
 
 Documents link to each other by their places in the repository. The site holds `docs/` at its root;
 links are rewritten to that, and files outside that are linked to are copied.
@@ -17,11 +17,19 @@ ROOT = Path(__file__).parents[2]
 PAGES = {"README.md": "index.md"} | {
     name: name for name in ("REPRODUCTION.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")
 }
-"""Pages of the repository's root, and their paths on the site."""
+"""Pages of the repository's root, and their paths on the site; links to the README lead there."""
+
+FIRST_PAGE = "docs/site/first-page.md"
+"""The first page of the site in place of the README, which is the one of the repository."""
+
+TRY_IT = '<a class="md-button md-button--primary" href="demonstration/index.html">Try it now</a>'
 
 DEMONSTRATION = "demonstration/index.html"
 BUILT = [ROOT / "build" / "demonstration" / name for name in ("acrobot.wasm", "pole.wasm")]
 """Modules for browsers, compiled by `nox -s demonstration`."""
+
+WIDE = ("evidence/benchmarks.md",)
+"""Pages whose tables would be cut on a screen of 1,280 pixels otherwise."""
 
 _LINK = re.compile(r"(?<=\]\()(?!https?:|mailto:|#)([^)#\s]*)(#[^)\s]*)?(?=\))")
 
@@ -29,7 +37,8 @@ _LINK = re.compile(r"(?<=\]\()(?!https?:|mailto:|#)([^)#\s]*)(#[^)\s]*)?(?=\))")
 def on_files(files, config):
     """Add the root's pages, and what they and others link to outside `docs`."""
     for name, place in PAGES.items():
-        files.append(File.generated(config, place, content=(ROOT / name).read_text("utf-8")))
+        source = FIRST_PAGE if place == "index.md" else name
+        files.append(File.generated(config, place, content=(ROOT / source).read_text("utf-8")))
     for page in list(files.documentation_pages()):
         for link in _LINK.finditer(page.content_string):
             target = _target(page.src_uri, link[1])
@@ -57,7 +66,12 @@ def on_nav(nav, config, files):
 
 
 def on_page_markdown(markdown, page, config, files):
-    """Rewrite links from places in the repository to places on the site."""
+    """Rewrite links from places in the repository to places on the site.
+
+    Pages with wide tables get the room of the table of contents.
+    """
+    if page.file.src_uri in WIDE:
+        page.meta["hide"] = ["toc"]
 
     def rewritten(link):
         target = _target(page.file.src_uri, link[1])
@@ -68,13 +82,14 @@ def on_page_markdown(markdown, page, config, files):
         place = PAGES.get(target, target.removeprefix("docs/"))
         return posixpath.relpath(place, posixpath.dirname(page.file.src_uri)) + (link[2] or "")
 
-    return _LINK.sub(rewritten, markdown)
+    try_it = TRY_IT if has_demonstration() else ""
+    return _LINK.sub(rewritten, markdown).replace("<!-- try it now -->", try_it)
 
 
 def _target(page, link):
     """Give what a page of the site links to, as a path in the repository."""
     if not link:
         return None
-    sources = {place: name for name, place in PAGES.items()}
+    sources = {place: name for name, place in PAGES.items()} | {"index.md": FIRST_PAGE}
     source = sources.get(page, f"docs/{page}")
     return posixpath.normpath(posixpath.join(posixpath.dirname(source), link))
