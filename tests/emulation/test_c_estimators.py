@@ -4,6 +4,7 @@ import pytest
 
 from bare_processors import BARE_TARGETS
 from c_estimators import check_learning, check_predictions, fitted
+from c_kernel_estimators import check_kernel
 from c_policies import ALONE, STRICT, TARGETS, run
 from sdnn.export import estimator_header
 from sdnn.export.estimators import CODE_BYTES
@@ -29,6 +30,11 @@ def test_predictions_on_other_processors_have_the_bits_of_the_estimator(name, ta
 @pytest.mark.parametrize("name", SOME)
 def test_learning_on_other_processors_has_the_bits_of_the_estimator(name, target, tmp_path):
     check_learning(name, target, tmp_path, 100)
+
+
+@pytest.mark.parametrize("name", ["listed-pairs", "directions", "low-rank"])
+def test_outputs_of_kernels_on_other_processors_are_sums_in_order(name, target, tmp_path):
+    check_kernel(name, target, tmp_path, 50)
 
 
 PREDICTS = """

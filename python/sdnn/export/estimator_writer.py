@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn._core import __version__
 from sdnn.export.coded_inputs import add_inputs, coded_input
+from sdnn.export.estimator_text import EstimatorHeader, HeaderText
 from sdnn.export.input_pairs import PairTables
 from sdnn.export.text import (
     Tables,
-    c_source,
-    c_strings,
-    comment,
-    define_lines,
-    joined,
     rounded_up,
     weight_words,
 )
@@ -36,35 +30,18 @@ _EXCESS_BYTES = 8  # of a struct of sdnn_greedy_estimator.h
 _NETWORK_BYTES = 20
 
 
-@dataclass(frozen=True, kw_only=True)
-class EstimatorHeader:
-    """A C header that holds a regressor or a classifier.
-
-    ``text`` is the file and ``name`` the prefix of its names. ``flash_bytes`` of constants include
-    ``weight_bytes``. ``ram_bytes`` are the arrays that a prediction has on the stack or, if the
-    estimator learns, all that it remembers.
-    """
-
-    name: str
-    text: str
-    flash_bytes: int
-    weight_bytes: int
-    ram_bytes: int
-
-
-class EstimatorWriter:
+class EstimatorWriter(HeaderText):
     """Makes the header of an estimator that predicts."""
 
-    title: ClassVar[str] = "a regressor or classifier"
     file: ClassVar[str] = "sdnn_greedy_estimator.h"
+    model: Model
 
     def __init__(self, model: Model, name: str) -> None:
-        self.model, self.name = model, name
+        code = model.network_.input_code
+        super().__init__(model, name, [coded_input(i, code.codings[i]) for i in code.used])
         self.networks: tuple[Network, ...] = (*model._earlier, model.network_)
-        self.code = model.network_.input_code
-        self.inputs = [coded_input(index, self.code.codings[index]) for index in self.code.used]
+        self.code = code
         self.pairs = PairTables(self.code)
-        self.is_classifier = hasattr(model, "classes_")
         self.n_units: int = model.network_.n_units
         if self.pairs.m > _MOST_16_BITS or len(self.code.codings) > _MOST_16_BITS:
             raise ValueError(
@@ -73,6 +50,10 @@ class EstimatorWriter:
             )
         weights = len(self.networks) * self.n_units * self.code.core.n_columns
         require_few_weights(weights, "n_averaged_epochs, units")
+
+    def about(self) -> str:
+        """Describe the size of the estimator."""
+        return f"{self.n_units} units over {self.code.core.n_columns} columns"
 
     @property
     def group_size(self) -> int:
@@ -170,92 +151,6 @@ class EstimatorWriter:
                 8 * len(self.model.classes_) * (3 if self.model._scheme == "one_vs_one" else 1)
             )
         return n_bytes
-
-    def text(self, macros: dict[str, object], tables: Tables) -> str:
-        """Return the text of the header."""
-        macro = self.name.upper()
-        return joined([
-            *comment(
-                f"{self.name}.h: {self.title}, in C99 for small processors.",
-                "",
-                f"Made by sdnn {__version__} of an {type(self.model).__name__} with"
-                f" {self.n_units} units over {self.code.core.n_columns} columns.",
-                "",
-                *self.needs(tables.n_bytes),
-                "",
-                "Needs <stdint.h> and nothing else of a C library; it is C++ too. It calculates in",
-                "integers, with doubles too: their bits are those of the library on any processor.",
-                "Include it in one source file: its constants are static.",
-                "",
-                *self.usage(),
-            ),
-            f"#ifndef SDNN_{macro}_H",
-            f"#define SDNN_{macro}_H",
-            "",
-            "#include <stdint.h>",
-            "",
-            *define_lines(macro, macros),
-            "",
-            *tables.lines,
-            *self.words(),
-            "",
-            c_source(self.file, self.name, ["sdnn_observation.h"]),
-            f"#endif /* SDNN_{macro}_H */",
-        ])  # fmt: skip
-
-    def needs(self, flash_bytes: int) -> list[str]:
-        """Return comment lines about memory."""
-        return [
-            f"Flash: {flash_bytes:,} bytes of constants; the code comes to some 4 to 7 kB.",
-            f"RAM:   {self.ram_bytes():,} bytes of arrays on the stack, and at most 512 for all",
-            "       else there. No heap, and nothing static that changes.",
-        ]
-
-    def calls(self) -> list[str]:
-        """Return example lines of C that predict."""
-        name, macro = self.name, self.name.upper()
-        if self.is_classifier:
-            return [f"int32_t c = {name}_predict(x); // the label is {name}_classes[c]; or -1"]
-        return [
-            f"double y[{macro}_N_OUTPUTS];",
-            f"int is_predicted = {name}_predict(x, y);",
-        ]
-
-    def usage(self) -> list[str]:
-        """Return comment lines about the calls, and the values of a sample."""
-        names = self.model._feature_names() or [""] * len(self.code.codings)
-        values = [
-            f"  {source.usage(names[source.column])}".replace("*/", "* /")
-            .replace("CATEGORIES", f"{self.name}_categories")
-            .encode("ascii", "backslashreplace")
-            .decode()
-            for source in self.inputs
-        ]
-        return [
-            f'  #include "{self.name}.h"',
-            f"  double x[{self.name.upper()}_N_FEATURES];",
-            *(f"  {line}" for line in self.calls()),
-            "",
-            "The values of a sample; others are ignored:",
-            *values,
-            f"{self.name}_missing() is a missing value, and {self.name}_number(n, -8) is n / 2^8.",
-        ]
-
-    def words(self) -> list[str]:
-        """Return the categories and classes that are words, as tables of strings."""
-        lines = []
-        for source in self.inputs:
-            if source.type == "WORDS":
-                name = f"{self.name}_categories_{source.column}"
-                lines += c_strings(name, map(str, source.categories))
-        if not self.is_classifier:
-            return lines
-        classes, name = self.model.classes_.tolist(), f"{self.name}_classes"
-        if all(isinstance(label, int) and abs(label) < 2**31 for label in classes):
-            numbers = Tables(self.name)
-            numbers.add("int32_t", "classes", np.array(classes, np.int64), "Labels of the classes.")
-            return [*lines, *numbers.lines]
-        return [*lines, *c_strings(name, map(str, classes))]
 
 
 def require_small(weights: NDArray[np.int32]) -> NDArray[np.int32]:

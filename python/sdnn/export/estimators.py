@@ -6,12 +6,13 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sdnn.export.estimator_writer import EstimatorHeader, EstimatorWriter
-from sdnn.support.arguments import argument_error, flag, path_of, shown, whole
+from sdnn.export.estimator_text import EstimatorHeader, HeaderText
+from sdnn.export.estimator_writer import EstimatorWriter
+from sdnn.support.arguments import argument_error, flag, path_of, require, shown, whole
 from sdnn.support.files import write_whole
 
 if TYPE_CHECKING:
-    from sdnn.export.estimator_writer import Model
+    from sdnn.export.estimator_text import AnyModel
 
 CODE_BYTES = 7000  # of a header's functions compiled for size, at most
 _LONGEST_NAME = 40
@@ -22,7 +23,7 @@ _REMEDY = (
 
 
 def export_estimator_header(
-    model: Model,
+    model: AnyModel,
     path: str | Path,
     *,
     name: str | None = None,
@@ -46,18 +47,19 @@ def export_estimator_header(
 
 
 def estimator_header(
-    model: Model, name: str, *, learning: bool = False, flash_bytes: int | None = None
+    model: AnyModel, name: str, *, learning: bool = False, flash_bytes: int | None = None
 ) -> EstimatorHeader:
-    """Return a fitted `SDNNRegressor` or `SDNNClassifier` as a C header.
+    """Return a fitted estimator as a C header.
 
     The header is C99 and C++, and needs ``<stdint.h>`` only, no heap and no floating point: it
     calculates with doubles in integers. Its predictions are those of ``model.predict``, to the
     bit. With ``learning`` it also learns samples as ``model.learn_one`` does, to the same weights.
-    See docs/how-to/estimators-on-a-chip.md.
+    Kernel estimators add terms in another order than NumPy, so that their last bits may differ. See
+    docs/how-to/estimators-on-a-chip.md.
 
     Parameters
     ----------
-    model : SDNNRegressor or SDNNClassifier
+    model : SDNNRegressor, SDNNClassifier, SDNNKernelRidge or SDNNKernelClassifier
     name : str
         Prefix of all names in the header.
     learning : bool, optional
@@ -99,27 +101,34 @@ def estimator_header(
             f" at most {_LONGEST_NAME} long, got {shown(name)}",
         )
     limit = None if flash_bytes is None else whole("flash_bytes", flash_bytes, 1, 2**40)
-    writer = EstimatorWriter
-    fitted = checked_model(model)
-    if flag("learning", learning):
-        from sdnn.export.estimator_learner import EstimatorLearner  # imports scikit-learn
-
-        writer = EstimatorLearner
-    header = writer(fitted, name).header()
+    header = writer_of(model, name, learns=flag("learning", learning)).header()
     require_flash(header, limit)
     return header
 
 
-def checked_model(model: Model) -> Model:
-    """Return a fitted estimator; TypeError if it has no form in C."""
-    from sdnn.estimators import SDNNClassifier, SDNNRegressor  # scikit-learn is slow to import
+def writer_of(model: AnyModel, name: str, *, learns: bool) -> HeaderText:
+    """Return the writer of a fitted estimator's header; TypeError if it has no form in C."""
+    from sklearn.utils.validation import check_is_fitted  # scikit-learn is slow to import
 
-    if not isinstance(model, SDNNRegressor | SDNNClassifier):
-        raise argument_error(
-            "model", f"must be an SDNNRegressor or SDNNClassifier, got {shown(model)}", TypeError
-        )
-    model._fitted_network  # noqa: B018  # raises NotFittedError
-    return model
+    from sdnn.estimators import (
+        SDNNClassifier,
+        SDNNKernelClassifier,
+        SDNNKernelRidge,
+        SDNNRegressor,
+    )
+    from sdnn.export.estimator_learner import EstimatorLearner
+    from sdnn.export.kernel_writer import KernelWriter
+
+    if isinstance(model, SDNNRegressor | SDNNClassifier):
+        check_is_fitted(model, "network_")
+        return (EstimatorLearner if learns else EstimatorWriter)(model, name)
+    if isinstance(model, SDNNKernelRidge | SDNNKernelClassifier):
+        expected = "be False for kernel estimators, which do not learn online"
+        require(not learns, "learning", expected, learns)
+        check_is_fitted(model, "dual_coef_")
+        return KernelWriter(model, name)
+    expected = "must be an estimator of sdnn, such as an SDNNRegressor"
+    raise argument_error("model", f"{expected}, got {shown(model)}", TypeError)
 
 
 def require_flash(header: EstimatorHeader, limit: int | None) -> None:

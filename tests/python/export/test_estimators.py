@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sklearn.datasets import make_friedman1
+from sklearn.dummy import DummyRegressor
 from sklearn.exceptions import NotFittedError
 
 from c_estimators import (
@@ -24,7 +25,7 @@ from c_estimators import (
 )
 from c_policies import STRICT, STRICT_CPP, TARGETS, program, run
 from refusals import refuses
-from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
+from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import Circular, RandomInverse, Symbolic
 from sdnn.estimators.network import Network
 from sdnn.export import estimator_header, export_estimator_header, small_settings
@@ -273,7 +274,7 @@ def test_few_weights_beyond_a_byte_take_little_flash():
 def test_estimators_without_a_form_in_c_are_refused_with_a_remedy():
     X, y = numbers(40, 1), np.arange(40.0)
     refuses("name", estimator_header, fitted("one-pair")[0], "int a")
-    refuses("model", estimator_header, SDNNKernelRidge().fit(X, y), "model", error=TypeError)
+    refuses("model", estimator_header, DummyRegressor().fit(X, y), "model", error=TypeError)
     with pytest.raises(NotFittedError):
         estimator_header(SDNNRegressor(), "model")
     for coding, values, message in (

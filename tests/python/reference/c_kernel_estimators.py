@@ -1,0 +1,110 @@
+"""Kernel estimators whose predictions are made in C, and their sums in the order of C."""
+
+import functools
+import warnings
+
+import numpy as np
+
+from c_estimators import (
+    PREDICT,
+    compiled,
+    labels,
+    lacking,
+    numbers,
+    rows_in_c,
+    targets,
+    words,
+)
+from c_policies import run
+from sdnn import SDNNKernelClassifier, SDNNKernelRidge
+from sdnn.coding import Circular, RandomInverse, Symbolic, WithMissing
+from sdnn.estimators.input_choice import positions
+from sdnn.export import export_estimator_header
+
+
+def all_pairs():
+    """Missing values, numbers as categories, two outputs, a kernel of degree 3."""
+    coding = [(WithMissing(base=Symbolic(categories=(1.0, 2.5, -4.0, 0.0))), [3])]
+    model = SDNNKernelRidge(coding, inputs="all", degree=3)
+    return model.fit(X := lacking(120, 1), targets(X, 2)), lacking
+
+
+def listed_pairs():
+    """Words, quantiles, a circle whose correlations differ along diagonals, a plain pattern."""
+    coding = [
+        (WithMissing(base=Symbolic(categories=("blue", "gr\u00fcn", "red"))), [0]),
+        (RandomInverse(spacing="quantile"), [1]),
+        (Symbolic(categories=tuple(range(7))), [2]),
+        (Circular(period=360.0, n_anchor_patterns=5, n_interpolated=4), [3]),
+    ]
+    pairs = [(0, 1), (1, None), (3, 2)]
+    model = SDNNKernelRidge(coding, pairs=pairs, degree=2)
+    return model.fit(X := words(120, 2), targets(X, 1)), words
+
+
+def directions():
+    """A function of a mixture of features, which becomes an input."""
+    X = numbers(200, 3, 4)
+    y = np.sin(3 * X @ [1.0, -1.0, 0.5, 0.7])
+    model = SDNNKernelRidge().fit(X, y)
+    assert len(model.directions_) > 0
+    return model, lambda n_samples, seed: numbers(n_samples, seed, 4)
+
+
+def low_rank():
+    """Three classes, fewer components than samples."""
+    model = SDNNKernelClassifier(max_components=40, inputs="all", random_state=0)
+    return model.fit(X := numbers(120, 4), labels(X, 3)), numbers
+
+
+def two_inputs():
+    """Two classes, of two inputs."""
+    model = SDNNKernelClassifier(inputs="all", degree=1)
+    X = numbers(80, 5, 2)
+    return model.fit(X, labels(X, 2)), lambda n_samples, seed: numbers(n_samples, seed, 2)
+
+
+KERNEL_ESTIMATORS = {
+    "all-pairs": all_pairs, "listed-pairs": listed_pairs, "directions": directions,
+    "low-rank": low_rank, "two-inputs": two_inputs,
+}  # fmt: skip
+
+
+@functools.cache
+def fitted_kernel(name):
+    """An estimator of `KERNEL_ESTIMATORS`, and a function that draws samples."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return KERNEL_ESTIMATORS[name]()
+
+
+def outputs_in_order(model, X):
+    """Outputs with every sum in the order of features and of samples."""
+    inputs = model._inputs
+    table = X[:, inputs.features]
+    if len(inputs.directions):
+        terms = positions(X, model.codings_)[:, None] * inputs.directions
+        table = np.hstack([table, np.cumsum(terms, axis=2)[..., -1]])
+    kernel = model._kernel(table)
+    terms = kernel[:, :, None] * model.dual_coef_
+    return np.cumsum(terms, axis=1)[:, -1] + model.intercept_
+
+
+def check_kernel(name, target, folder, n_samples, *options):
+    """Compare the bits of outputs with those of sums in order, and closely with predictions."""
+    model, draw = fitted_kernel(name)
+    header = export_estimator_header(model, folder / "model.h")
+    X = draw(n_samples, 11)
+    written = run(*compiled(folder, PREDICT, target, *options), input=rows_in_c(model, X).tobytes())
+    outputs = outputs_in_order(model, X)
+    results = np.frombuffer(written, np.float64).reshape(n_samples, -1)
+    assert header.ram_bytes < 512
+    if isinstance(model, SDNNKernelClassifier):
+        winners, scores = results[:, 0].astype(int), results[:, 1:]
+        np.testing.assert_array_equal(scores, outputs)
+        np.testing.assert_array_equal(model.classes_[winners], model.predict(X))
+        assert len(np.unique(winners)) > 1
+        return
+    np.testing.assert_array_equal(results.view(np.int64), outputs.view(np.int64))
+    expected = model.predict(X).reshape(outputs.shape)
+    np.testing.assert_allclose(results, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
