@@ -1,5 +1,7 @@
 """C headers of regressors and classifiers with other compilers and on other processors."""
 
+import re
+
 import pytest
 
 from bare_processors import BARE_TARGETS
@@ -89,3 +91,33 @@ def test_estimators_compile_where_int_has_16_bits(name, learning, needs, tmp_pat
     (tmp_path / "model.c").write_text('#include "model.h"\n')
     options = (*STRICT, "-ffreestanding", "-Wno-unused-function", "--target=msp430")
     run("clang", *options, "-fsyntax-only", tmp_path / "model.c")
+
+
+@pytest.mark.parametrize("learning", [False, True])
+@pytest.mark.parametrize("name", ["several-outputs", "categories", "two-classes", "widening"])
+def test_the_header_states_the_stack_that_an_estimator_needs(name, learning, needs, tmp_path):
+    arm = TARGETS["arm"]
+    needs(arm.compiler)
+    model, _ = fitted(name)
+    text = estimator_header(model, "model", learning=learning).text
+    (tmp_path / "model.h").write_text(text)
+    is_classifier = hasattr(model, "classes_")
+    calls = LEARNS.replace(" && model_PREDICT(&model, x, y)", "") if learning else PREDICTS
+    calls = calls.replace("PREDICT", "scores" if is_classifier else "predict")
+    (tmp_path / "calls.c").write_text(calls.replace("TARGET", "1" if is_classifier else "y"))
+    options = (
+        *STRICT,
+        *ALONE,
+        "-Wno-unused-parameter",
+        "-mthumb",
+        "-mcpu=cortex-m0plus",
+        "-mfloat-abi=soft",
+        "-Os",
+        "-c",
+    )
+    run(arm.compiler, *options, "-fstack-usage", "calls.c", "-o", "calls.o", cwd=tmp_path)
+    frames = (tmp_path / "calls.su").read_text().splitlines()
+    stack = sum(int(line.split("\t")[1]) for line in frames)
+    (stated,) = re.findall(r" ([\d,]+) bytes of arrays", text)
+    arrays = int(stated.replace(",", ""))
+    assert arrays < stack < arrays + 640

@@ -82,7 +82,7 @@ class EstimatorLearner(EstimatorWriter):
             f"Flash: {flash_bytes:,} bytes of constants; the code comes to some 4 to 7 kB.",
             f"RAM:   {self.ram_bytes():,} bytes, in one struct that you place, and"
             f" {self.stack_bytes():,} bytes of arrays",
-            "       on the stack, with at most 512 bytes for all else there. No heap.",
+            "       on the stack, with at most 640 bytes for all else there. No heap.",
         ]
 
     def calls(self) -> list[str]:

@@ -97,7 +97,7 @@ class HeaderText(ABC):
         """Return comment lines about memory."""
         return [
             f"Flash: {flash_bytes:,} bytes of constants; the code comes to some 4 to 7 kB.",
-            f"RAM:   {self.ram_bytes():,} bytes of arrays on the stack, and at most 512 for all",
+            f"RAM:   {self.ram_bytes():,} bytes of arrays on the stack, and at most 640 for all",
             "       else there. No heap, and nothing static that changes.",
         ]
 

@@ -195,7 +195,7 @@ def test_small_settings_fit_a_small_processor(n_inputs, groups):
     assert greedy.ram_bytes < 2**12
     learner = estimator_header(model, "model", learning=True)
     (stack_bytes,) = re.findall(r" ([\d,]+) bytes of arrays", learner.text)
-    assert learner.ram_bytes + int(stack_bytes.replace(",", "")) + 512 < 2**16
+    assert learner.ram_bytes + int(stack_bytes.replace(",", "")) + 640 < 2**16
     assert len(greedy.text) < 3.5 * greedy.flash_bytes + 30_000
 
 
