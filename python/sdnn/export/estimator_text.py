@@ -45,6 +45,7 @@ class HeaderText(ABC):
 
     title: ClassVar[str] = "a regressor or classifier"
     file: ClassVar[str]
+    code_size: ClassVar[str] = "4 to 7 kB"
 
     def __init__(self, model: AnyModel, name: str, inputs: Sequence[CodedInput]) -> None:
         self.model, self.name, self.inputs = model, name, inputs
@@ -96,7 +97,7 @@ class HeaderText(ABC):
     def needs(self, flash_bytes: int) -> list[str]:
         """Return comment lines about memory."""
         return [
-            f"Flash: {flash_bytes:,} bytes of constants; the code comes to some 4 to 7 kB.",
+            f"Flash: {flash_bytes:,} bytes of constants; the code comes to some {self.code_size}.",
             f"RAM:   {self.ram_bytes():,} bytes of arrays on the stack, and at most 640 for all",
             "       else there. No heap, and nothing static that changes.",
         ]

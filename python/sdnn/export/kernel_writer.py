@@ -24,6 +24,7 @@ class KernelWriter(HeaderText):
 
     title = "a regressor or classifier with the network's kernel"
     file = "sdnn_kernel_estimator.h"
+    code_size = "2 to 3 kB"
     model: SDNNKernelRidge | SDNNKernelClassifier
 
     def __init__(self, model: SDNNKernelRidge | SDNNKernelClassifier, name: str) -> None:
