@@ -12,10 +12,11 @@ import gymnasium as gym
 import msgspec
 import numpy as np
 
+from sdnn.environments.types import Element, Space
 from sdnn.runs.environment import EnvironmentSpec
 from sdnn.runs.errors import RunError
 from sdnn.support.arguments import advice
-from sdnn.training.episodes import EVALUATION, episode_seed
+from sdnn.training.evaluation import greedy_episode
 
 MAX_EPISODES, MAX_STEPS = 20, 10_000
 """Random actions are measured in this number of episodes, or in those that the steps allow."""
@@ -79,6 +80,17 @@ def goal_of(environment: EnvironmentSpec) -> float | None:
     return registered.reward_threshold
 
 
+class _RandomAgent:
+    """Acts at random."""
+
+    def __init__(self, actions: Space) -> None:
+        self._actions = actions
+
+    def act(self, observation: Element, explore: bool = False) -> Element:
+        """Return any action of the space."""
+        return self._actions.sample()
+
+
 @cache
 def mean_random_return(environment: EnvironmentSpec) -> float | None:
     """Return the mean return of random actions, always the same; None if it cannot be measured."""
@@ -90,17 +102,16 @@ def mean_random_return(environment: EnvironmentSpec) -> float | None:
     n_steps = 0
     with closing(environment.without_noise().make()) as env:
         env.action_space.seed(0)
+        agent = _RandomAgent(env.action_space)
         for episode in range(MAX_EPISODES):
-            env.reset(seed=episode_seed(0, EVALUATION, episode))
-            total, is_over = 0.0, False
-            while not is_over and n_steps < MAX_STEPS:
-                _, reward, terminated, truncated, _ = env.step(env.action_space.sample())
-                total += float(reward)
-                n_steps += 1
-                is_over = terminated or truncated
-            if not is_over:
-                break
-            returns.append(total)
+            for now in greedy_episode(agent, env, 0, episode):
+                if n_steps + now.n_steps > MAX_STEPS:
+                    break
+            else:
+                returns.append(now.total_reward)
+                n_steps += now.n_steps
+                continue
+            break
     return float(np.mean(returns)) if returns else None
 
 
