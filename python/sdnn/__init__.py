@@ -3,7 +3,8 @@
 Packages, from the network up (each is imported when first used):
 
 - ``sdnn.approximators``: SDNN-C, a network that gives Q(s, a) for every action at once
-- ``sdnn.agents``: Q-learning with it, for any Gymnasium environment
+- ``sdnn.agents``: Q-learning with it, for any Gymnasium environment; its classes are here, too:
+  ``from sdnn import SDNNQLambda``
 - ``sdnn.SDNNRegressor``, ``sdnn.SDNNClassifier``: the network as scikit-learn estimators;
   ``sdnn.SDNNKernelRidge``, ``sdnn.SDNNKernelClassifier``: ridge regression with its kernel
   (package ``sdnn.estimators``, needs ``sdnn[sklearn]``)
@@ -29,6 +30,7 @@ __getattr__, __dir__, __all__ = attach(
             "agents approximators benchmarks coding environments estimators export libsdnn "
             "reproduction runs"
         ),
+        "sdnn.agents": ("FuzzyQLearning RBFQLearning SDNNActorCritic SDNNQLambda SDNNQLearning"),
         "sdnn.estimators": "SDNNClassifier SDNNKernelClassifier SDNNKernelRidge SDNNRegressor",
         "sdnn.support.machine": "instruction_set set_instruction_set",
     },

@@ -10,6 +10,13 @@ from sdnn import (
     reproduction as reproduction,
     runs as runs,
 )
+from sdnn.agents import (
+    FuzzyQLearning as FuzzyQLearning,
+    RBFQLearning as RBFQLearning,
+    SDNNActorCritic as SDNNActorCritic,
+    SDNNQLambda as SDNNQLambda,
+    SDNNQLearning as SDNNQLearning,
+)
 from sdnn.estimators import (
     SDNNClassifier as SDNNClassifier,
     SDNNKernelClassifier as SDNNKernelClassifier,

@@ -7,16 +7,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeAlias, cast
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
 from sdnn.agents.base import Approximator, BaseAgent, Learning
 from sdnn.agents.scaling import Scaling
-from sdnn.environments.space_kinds import space_of
+from sdnn.environments.space_kinds import opened, space_of, space_words, unbatched
 from sdnn.environments.spaces import Actions, Observations, action_space_of, observation_space_of
-from sdnn.environments.types import AnyEnv, Array, Data, Element, Elements, Env, Mask, Space
+from sdnn.environments.types import AnyEnv, Array, Data, Element, Elements, Env, Mask
 from sdnn.support.arguments import (
     argument_error,
     blamed,
@@ -31,7 +30,14 @@ from sdnn.support.files import Arrays
 from sdnn.training.callbacks import ProgressBarCallback
 from sdnn.training.files import read_agent, read_statistics
 from sdnn.training.interfaces import Transition, explained
-from sdnn.training.training import Callback, Training, TrainingResult, checked_callbacks, shows_bar
+from sdnn.training.training import (
+    Callback,
+    Training,
+    TrainingResult,
+    checked_callbacks,
+    returns_of,
+    shows_bar,
+)
 
 if TYPE_CHECKING:
     from sdnn.reports.plots import Figure
@@ -50,8 +56,8 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     Parameters
     ----------
     observation_space : gymnasium.Space
-        Any that Gymnasium flattens to a vector: Box, Dict, Tuple, Discrete, ... Or the environment,
-        whose two spaces are taken: `SDNNQLambda(env)`.
+        Any that Gymnasium flattens to a vector: Box, Dict, Tuple, Discrete, ... Or the environment
+        or its id, whose two spaces are taken: `SDNNQLambda(env)`, `SDNNQLambda("CartPole-v1")`.
     action_space : gymnasium.Space, optional
         Box with finite bounds, Discrete, MultiDiscrete or MultiBinary.
     approximator, learning : optional
@@ -102,6 +108,8 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     """
 
     _has_warned_of_history = False
+    _n_trained = 0  # steps of the calls of `train`, for representations; not in files
+    _returns: Sequence[float] = ()  # of the episodes of these calls
 
     @property
     def observation_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -199,12 +207,21 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
 
     def _facts(self) -> dict[str, object]:
         inputs = "found in the warm-up" if self.is_warming_up else len(self.inputs)
-        return {
-            "observation": self.observation_space,
-            "action": self.action_space,
+        facts: dict[str, object] = {
+            "observation": space_words(self.observation_space),
+            "action": space_words(self.action_space),
             "inputs": inputs,
             "seed": self.seed,
         }
+        n_learned = self._n_trained or int(self.state().get("agent.n_learned", 0))
+        if n_learned:
+            facts["learned"] = f"{n_learned:,} steps"
+        if self._returns:
+            facts["last return"] = f"{self._returns[-1]:.5g}"
+        return facts
+
+    def _curve(self) -> Sequence[float]:
+        return self._returns
 
     @explained
     def predict(
@@ -259,7 +276,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     @explained
     def train(
         self,
-        env: AnyEnv,
+        env: AnyEnv | str,
         steps: int | None = None,
         *,
         episodes: int | None = None,
@@ -271,6 +288,8 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         evaluation_episodes: int = 10,
     ) -> TrainingResult:
         """Learn in an environment, or in all of a vector; see `sdnn.agents.Training`.
+
+        An id, such as ``"CartPole-v1"``, stands for the environment that `gymnasium.make` gives.
 
         With ``progress`` a bar in a terminal or notebook shows how far it is, by default where the
         training takes longer than 5 s. Without ``seed``, episodes follow from the agent's, and a
@@ -290,23 +309,26 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         if progress is None or flag("progress", progress):
             bar = ProgressBarCallback("learning", seconds=0.0 if progress else None)
             callbacks = [*checked_callbacks(callbacks), *([bar] if shows_bar() else [])]
-        training = Training(
-            self,
-            env,
-            steps=steps,
-            episodes=episodes,
-            seed=self.seed if seed is None else seed,
-            first_episode=self._next_episode if seed is None else 0,
-            callbacks=callbacks,
-            evaluate_every=evaluate_every,
-            evaluation_env=evaluation_env,
-            evaluation_episodes=evaluation_episodes,
-        )
-        try:
-            return training.run()
-        finally:
-            if seed is None:
-                self._next_episode = training.next_episode
+        with opened("env", env) as learned_env:
+            training = Training(
+                self,
+                learned_env,
+                steps=steps,
+                episodes=episodes,
+                seed=self.seed if seed is None else seed,
+                first_episode=self._next_episode if seed is None else 0,
+                callbacks=callbacks,
+                evaluate_every=evaluate_every,
+                evaluation_env=evaluation_env,
+                evaluation_episodes=evaluation_episodes,
+            )
+            try:
+                return training.run()
+            finally:
+                if seed is None:
+                    self._next_episode = training.next_episode
+                self._n_trained += training.n_steps
+                self._returns = (*self._returns, *returns_of(training.rows))
 
     @explained
     def plot_values(
@@ -420,30 +442,3 @@ def load_agent(path: str | Path) -> AnyAgent:
     """Read an agent of any kind that `Agent.save` wrote; see `Agent.load`."""
     agent: AnyAgent = read_agent(path_of("path", path), "agent", "training")[0]
     return agent
-
-
-def unbatched(space: Space, observation: Element) -> Elements | None:
-    """Split a batch of observations into its elements; None if it is a single observation."""
-    if isinstance(space, gym.spaces.Dict):
-        if not isinstance(observation, Mapping) or set(observation) != set(space):
-            return None
-        columns = _columns((space[name], observation[name]) for name in space)
-        if columns is None:
-            return None
-        return [dict(zip(space, row, strict=True)) for row in zip(*columns, strict=True)]
-    if isinstance(space, gym.spaces.Tuple):
-        if not isinstance(observation, tuple) or len(observation) != len(space):
-            return None
-        columns = _columns(zip(space, observation, strict=True))
-        return None if columns is None else list(zip(*columns, strict=True))
-    is_array = isinstance(observation, np.ndarray) and space.shape is not None
-    is_batch = is_array and observation.ndim == len(space.shape or ()) + 1
-    return observation if is_batch else None
-
-
-def _columns(parts: Iterable[tuple[Space, Element]]) -> list[Elements] | None:
-    """Split each part of a batch into its elements; None if the parts differ in length."""
-    columns = [unbatched(space, part) for space, part in parts]
-    present = [column for column in columns if column is not None]
-    is_batch = len(present) == len(columns) and len({len(column) for column in present}) == 1
-    return present if is_batch else None

@@ -107,7 +107,7 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
     @explained
     def __init__(
         self,
-        observation_space: Observed,
+        observation_space: Observed | str,
         action_space: Space | None = None,
         *,
         approximator: Approximator | None = None,

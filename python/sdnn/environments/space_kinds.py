@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from typing import Any, TypeAlias
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.environments.types import AnyEnv, Array, Data, Space
+from sdnn.environments.types import AnyEnv, Array, Data, Element, Elements, Env, Space
 from sdnn.support.arguments import has_methods, require, shown
 
 _MOST_VARIABLES = 2**20
@@ -197,12 +199,36 @@ _ROUNDING = 1e-5
 """Bounds whose relative difference is at most this are equal apart from rounding."""
 _MOST_SHOWN = 3
 """Largest number of variables that a message lists."""
+_MOST_CHARACTERS = 60
+"""The longest description of a space."""
 
 
-def spaces_of(observed: Observed, actions: Space | None) -> tuple[Space, Space]:
-    """Return the observation and action space, of an environment if ``observed`` is one."""
+def made(name: str, env_id: str) -> Env:
+    """Make an environment; ValueError that names the argument for an id that is not known."""
+    try:
+        return gym.make(env_id)
+    except (gym.error.Error, ImportError) as error:
+        expected = f"{name} must be an environment, or the id of one"
+        raise ValueError(f"{expected}, got {shown(env_id)}: {error}") from error
+
+
+@contextmanager
+def opened(name: str, env: AnyEnv | str) -> Iterator[AnyEnv]:
+    """Yield an environment; one that is named by its id is made, and closed at the end."""
+    if not isinstance(env, str):
+        yield env
+        return
+    with closing(made(name, env)) as env_of_id:
+        yield env_of_id
+
+
+def spaces_of(observed: Observed | str, actions: Space | None) -> tuple[Space, Space]:
+    """Return the observation and action space, of an environment or id if ``observed`` is one."""
+    if isinstance(observed, str) and actions is None:
+        with opened("observation_space", observed) as env:
+            return spaces_of(env, None)
     has_spaces = _space_of(observed, "observation_space") is not None
-    expected = "be a Gymnasium space, or an environment in its place such as gymnasium.make(id)"
+    expected = "be a Gymnasium space, or in its place an environment or its id"
     is_space = isinstance(observed, gym.Space) or (has_spaces and actions is None)
     require(is_space, "observation_space", expected, observed, TypeError)
     if isinstance(observed, gym.Space):
@@ -356,3 +382,41 @@ def _has_equal_actions(space: Space, other_space: Space) -> bool:
     if isinstance(space, gym.spaces.Box) and isinstance(other_space, gym.spaces.Box):
         return space.low.size == other_space.low.size
     return wholes_of(space) is not None and wholes_of(space) == wholes_of(other_space)
+
+
+def space_words(space: Space) -> str:
+    """Describe a space in a line: a Box by its shape, others as they are, shortened.
+
+    >>> space_words(gym.spaces.Box(-1.0, 1.0, (20,)))
+    'Box(20,)'
+    """
+    if isinstance(space, gym.spaces.Box):
+        return f"Box{space.shape}"
+    return textwrap.shorten(repr(space), _MOST_CHARACTERS, placeholder=" ...")
+
+
+def unbatched(space: Space, observation: Element) -> Elements | None:
+    """Split a batch of observations into its elements; None if it is a single observation."""
+    if isinstance(space, gym.spaces.Dict):
+        if not isinstance(observation, Mapping) or set(observation) != set(space):
+            return None
+        columns = _columns((space[name], observation[name]) for name in space)
+        if columns is None:
+            return None
+        return [dict(zip(space, row, strict=True)) for row in zip(*columns, strict=True)]
+    if isinstance(space, gym.spaces.Tuple):
+        if not isinstance(observation, tuple) or len(observation) != len(space):
+            return None
+        columns = _columns(zip(space, observation, strict=True))
+        return None if columns is None else list(zip(*columns, strict=True))
+    is_array = isinstance(observation, np.ndarray) and space.shape is not None
+    is_batch = is_array and observation.ndim == len(space.shape or ()) + 1
+    return observation if is_batch else None
+
+
+def _columns(parts: Iterable[tuple[Space, Element]]) -> list[Elements] | None:
+    """Split each part of a batch into its elements; None if the parts differ in length."""
+    columns = [unbatched(space, part) for space, part in parts]
+    present = [column for column in columns if column is not None]
+    is_batch = len(present) == len(columns) and len({len(column) for column in present}) == 1
+    return present if is_batch else None

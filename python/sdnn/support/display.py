@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from html import escape
+from itertools import pairwise
+
+_WIDTH, _HEIGHT = 240, 48  # of a small curve, in pixels
 
 
 class Displayed:
@@ -20,6 +24,10 @@ class Displayed:
         """Return the facts by name."""
         raise NotImplementedError
 
+    def _curve(self) -> Sequence[float]:
+        """Return numbers that a notebook draws as a small curve; by default none."""
+        return ()
+
     def __repr__(self) -> str:
         facts = ", ".join(f"{name} {fact}" for name, fact in self._facts().items())
         return f"<{type(self).__name__}: {facts}>"
@@ -29,4 +37,29 @@ class Displayed:
             f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(str(fact))}</td></tr>"
             for name, fact in self._facts().items()
         )
-        return f"<table><caption>{escape(type(self).__name__)}</caption>{rows}</table>"
+        table = f"<table><caption>{escape(type(self).__name__)}</caption>{rows}</table>"
+        return table + curve_svg(self._curve())
+
+
+def curve_svg(values: Sequence[float], *, n_points: int = 80) -> str:
+    """Return a small curve as SVG, of the means of equal parts; empty for fewer than two values.
+
+    >>> curve_svg([5.0])
+    ''
+    """
+    n = min(len(values), n_points)
+    limits = [len(values) * i // n for i in range(n + 1)] if n else []
+    means = [sum(values[i:j]) / (j - i) for i, j in pairwise(limits)]
+    if n < 2 or not all(map(math.isfinite, means)):
+        return ""
+    low, high = min(means), max(means)
+    extent = (high - low) or 1.0
+    points = " ".join(
+        f"{2 + _WIDTH * i / (n - 1):.1f},{2 + _HEIGHT * (1 - (mean - low) / extent):.1f}"
+        for i, mean in enumerate(means)
+    )
+    label = f"{len(values):,} returns, {low:.4g} to {high:.4g} in the curve"
+    return (
+        f'<svg width="{_WIDTH + 4}" height="{_HEIGHT + 4}" role="img"><title>{label}</title>'
+        f'<polyline fill="none" stroke="#1f5a96" stroke-width="1.5" points="{points}"/></svg>'
+    )

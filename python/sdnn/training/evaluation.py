@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.environments.space_kinds import require_same_kind, require_single
+from sdnn.environments.space_kinds import made, require_same_kind, require_single
 from sdnn.environments.types import Data, Element, Env
 from sdnn.support.arguments import has_methods, require, seed_of, whole
 from sdnn.support.display import Displayed
@@ -79,7 +80,7 @@ class Evaluation(Displayed):
 @explained
 def evaluate(
     agent: ActingAgent,
-    env: Env,
+    env: Env | str,
     episodes: int = 10,
     *,
     seed: int | None = 0,
@@ -98,7 +99,8 @@ def evaluate(
     agent
         An agent, or anything with its method `act`.
     env
-        Each episode resets it with a seed of its own: every call meets the same episodes.
+        Each episode resets it with a seed of its own: every call meets the same episodes. An id,
+        such as ``"CartPole-v1"``, stands for the environment that `gymnasium.make` gives.
     episodes
         How many.
     seed
@@ -117,6 +119,9 @@ def evaluate(
         `ValueError` that names step and episode.
     """
     has_methods("agent", agent, "an agent", "act")
+    if isinstance(env, str):
+        with closing(made("env", env)) as env_of_id:
+            return evaluate(agent, env_of_id, episodes, seed=seed, options=options)
     require_single("env", env)
     require_same_kind(agent, env)
     root = None if seed is None else seed_of(seed)

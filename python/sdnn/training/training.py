@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -52,7 +52,7 @@ class TrainingResult(Displayed):
     @property
     def returns(self) -> NDArray[np.float64]:
         """Undiscounted returns of the episodes, in order, shape (n,)."""
-        return np.array([row["return"] for row in self.rows if row["kind"] == "episode"])
+        return np.array(returns_of(self.rows))
 
     @property
     def evaluations(self) -> NDArray[np.float64]:
@@ -62,8 +62,18 @@ class TrainingResult(Displayed):
 
     def _facts(self) -> dict[str, object]:
         last = [f"{mean:.5g}" for _, mean in self.evaluations[-1:]] or ["none"]
-        facts = {"steps": self.n_steps, "episodes": self.n_episodes}
+        facts: dict[str, object] = {"steps": self.n_steps, "episodes": self.n_episodes}
+        if self.returns.size:
+            facts["last return"] = f"{self.returns[-1]:.5g}"
         return {**facts, "last evaluation": last[0]}
+
+    def _curve(self) -> Sequence[float]:
+        return returns_of(self.rows)
+
+
+def returns_of(rows: Iterable[Row]) -> list[float]:
+    """Return the returns of the episodes among the rows of a training."""
+    return [row["return"] for row in rows if row["kind"] == "episode"]
 
 
 class Callback:

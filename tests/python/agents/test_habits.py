@@ -21,6 +21,7 @@ from sdnn.agents import (
     learn_from,
     load_agent,
 )
+from sdnn.support.display import curve_svg
 
 
 @pytest.fixture(scope="module")
@@ -110,10 +111,24 @@ def test_constructors_accept_environments_and_vectors_in_the_place_of_spaces():
     for source in (env, envs):
         assert SDNNQLambda(source).description() == expected
     refuses("steps", SDNNQLambda(env).learn, 200, error=TypeError)
-    refuses("gymnasium.make", SDNNQLambda, "CartPole-v1", error=TypeError)
     refuses("SDNNQLambda", SDNNQLambda, error=TypeError)
     refuses("action_space", SDNNQLambda, env.observation_space, error=TypeError)
     assert "observation_space" in inspect.signature(SDNNQLambda).parameters
+
+
+def test_ids_stand_for_environments():
+    agent, other = SDNNQLambda("CartPole-v1", seed=1), SDNNQLambda(gym.make("CartPole-v1"), seed=1)
+    assert agent.description() == other.description()
+    agent.train("CartPole-v1", steps=300)
+    env = gym.make("CartPole-v1")
+    other.train(env, steps=300)
+    assert evaluate(agent, "CartPole-v1", 2).returns.tolist() == (
+        evaluate(other, env, 2).returns.tolist()
+    )
+    refuses("observation_space", SDNNQLambda, "CartPoll-v1")
+    refuses("env", agent.train, "CartPoll-v1", steps=9)
+    refuses("CartPole", evaluate, agent, "CartPoll-v1")
+    refuses("observation_space", SDNNQLambda, "MlpPolicy", "CartPole-v1", error=TypeError)
 
 
 def test_seed_none_draws_a_different_seed_for_each_agent():
@@ -127,6 +142,11 @@ def test_representations_show_spaces_steps_and_returns_and_escape_html(trained):
     evaluation = evaluate(agent, env, episodes=3)
     assert "Discrete(2)" in repr(agent)
     assert "steps 1500" in repr(result)
+    assert re.search(r"learned 1,5\d\d steps, last return \d+", repr(agent))
+    for shown in (agent, result):
+        assert "\n" not in repr(shown)
+        assert shown._repr_html_().count("<svg") == 1
+    assert "learned" not in repr(SDNNQLambda(env))
     assert f"{evaluation.mean_return:.5g}" in repr(evaluation)
     for shown in (agent, result, evaluation):
         assert shown._repr_html_().count("<tr>") == len(shown._facts())
@@ -136,6 +156,25 @@ def test_representations_show_spaces_steps_and_returns_and_escape_html(trained):
             return {"a": "<b>"}
 
     assert "&lt;" in Unescaped(**vars(evaluation))._repr_html_()
+
+
+def test_representations_of_loaded_agents_and_large_spaces_are_a_line(trained, tmp_path):
+    agent = trained[0]
+    agent.save(tmp_path / "agent.safetensors")
+    assert "learned 1,5" in repr(load_agent(tmp_path / "agent.safetensors"))
+    box = gym.spaces.Box(-np.ones(40), 1.0 + np.arange(40.0), dtype=np.float64)
+    for space in (box, gym.spaces.Dict({name: box for name in "abc"})):
+        shown = repr(SDNNQLambda(space, gym.spaces.Discrete(2)))
+        assert "\n" not in shown
+        assert len(shown) < 150
+
+
+def test_small_curves_have_the_means_of_equal_parts():
+    svg = curve_svg([1.0, 3.0, 5.0, 7.0], n_points=2)
+    assert 'points="2.0,50.0 242.0,2.0"' in svg
+    assert "4 returns, 2 to 6" in svg
+    assert curve_svg([1.0, float("inf")]) == curve_svg([]) == ""
+    assert "2.0,50.0" in curve_svg([0.0] * 5)
 
 
 class Means(Callback):
