@@ -222,7 +222,7 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
         return self.write(
             "sdnn_actor_critic.h",
             self.description(),
-            self.learning_needs(7, ram_bytes),
+            self.learning_needs(10, ram_bytes, n_weights),
             defines,
             tables,
             weight_bytes=0,

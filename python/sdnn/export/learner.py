@@ -10,9 +10,11 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 
 from sdnn.environments.types import Array, Data
-from sdnn.export.text import Tables
+from sdnn.export.text import Tables, rounded_up
 from sdnn.export.writer import Network, Writer
 
+_N_RECORD_WORDS, _PART_BYTES = 7, 64
+"""Words after a kept policy, and bytes in which it is written: see cpp/c/sdnn_keeper.h."""
 NONE = -(2**31)
 """Number in an image that stands for a missing value."""
 SCALE = "reward_scale"
@@ -93,17 +95,18 @@ class Learner(Writer[Network]):
 
     def tie_remark(self) -> list[str]:
         """Describe how ties are broken."""
-        return [*super().tie_remark(), *self.greedy_remark()]
+        first, *rest = super().tie_remark()
+        return [first.replace("it takes", f"{self.name}_act takes"), *rest, *self.greedy_remark()]
 
     def greedy_remark(self) -> list[str]:
         """Describe how the agent acts without exploration."""
         action = ", action" if self.is_vector else ""
         remark = [
-            f"{self.name}_greedy({self.greedy_arguments}{action}) has a best action and changes",
-            "nothing of the agent.",
+            f"{self.name}_greedy({self.greedy_arguments}{action}) has a best action,",
+            "and changes nothing of the agent.",
         ]
         if self.tie_rule() == "uniform":
-            remark[-1] = "nothing of the agent: of several it takes the middle of the widest run."
+            remark.append("Of several it takes the middle of the widest run.")
         if self.history.is_needed:
             remark += [
                 f"A {self.name}_greedy_episode is the memory of greedy steps;"
@@ -153,12 +156,20 @@ class Learner(Writer[Network]):
             "MAX_ACTION_REPEAT": learning.max_action_repeat,
         }
 
-    def learning_needs(self, kilobytes: int, ram_bytes: int, stack: str = "") -> list[str]:
-        """Return comment lines about memory; ``kilobytes`` of code are those without a history."""
+    def learning_needs(
+        self, kilobytes: int, ram_bytes: int, n_policy_words: int, stack: str = ""
+    ) -> list[str]:
+        """Return comment lines about memory.
+
+        ``kilobytes`` of code are those without a history, of which 3 are for storing and keeping;
+        ``n_policy_words`` are the 32-bit words of the policy that is kept.
+        """
         kilobytes += 3 * self.history.is_needed
+        kept_bytes = rounded_up(4 * (n_policy_words + _N_RECORD_WORDS), _PART_BYTES)
         return [
             f"Flash: {{flash}} bytes of constants; the code comes to some {kilobytes} kB.",
             f"RAM:   {ram_bytes:,} bytes, in one struct that you place{stack}.",
+            f"       A policy that {self.name}_keep keeps takes {kept_bytes:,} more, or flash.",
             "       No heap, and nothing static that changes.",
             "Where the processor cannot multiply or shift 64 bits by itself, the compiler's"
             " library",

@@ -118,7 +118,7 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
         return self.write(
             "sdnn_q_lambda.h",
             self.description(),
-            self.learning_needs(6, ram_bytes),
+            self.learning_needs(9, ram_bytes, n_weights),
             defines,
             tables,
             weight_bytes=0,

@@ -315,7 +315,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         return self.write(
             "sdnn_c.h",
             self.describe(str(self.used.size)),
-            self.learning_needs(9, ram_bytes, stack),
+            self.learning_needs(12, ram_bytes, self.n_words + self.n_units, stack),
             defines,
             tables,
             weight_bytes=0 if is_new else 4 * self.n_words,

@@ -293,8 +293,11 @@ def test_the_header_states_the_size_of_the_agent_in_memory(name, target, tmp_pat
     header = c_header(LEARNERS[name](), "agent", learning=True)
     (tmp_path / "agent.h").write_text(header.text)
     source = '#include "agent.h"\n#include <stdio.h>\nint main(void)'
-    source += ' { printf("%d", (int)sizeof(agent_agent)); return 0; }'
-    assert int(run(program(tmp_path, source, target.compiler, *STRICT))) == header.ram_bytes
+    source += ' { printf("%d %d", (int)sizeof(agent_agent), (int)AGENT_KEPT_BYTES); return 0; }'
+    printed = run(program(tmp_path, source, target.compiler, *STRICT)).split()
+    ram_bytes, kept_bytes = (int(number) for number in printed)
+    assert ram_bytes == header.ram_bytes
+    assert f"agent_keep keeps takes {kept_bytes:,} more" in header.text
 
 
 @pytest.mark.parametrize("make", [discrete, network, actor_discrete])
