@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import importlib.util
 import os
 import re
 import shutil
@@ -93,7 +92,6 @@ NEEDS: dict[str, Callable[[], bool]] = {
     "cmake": lambda: shutil.which("cmake") is not None,
     "nlohmann/json": Path("/usr/include/nlohmann/json.hpp").exists,
     "an installed package": _command(sys.executable, "-m", "sdnn", "--cmakedir"),
-    "optuna": lambda: importlib.util.find_spec("optuna") is not None,
 }
 
 

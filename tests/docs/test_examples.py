@@ -1,5 +1,6 @@
 """The examples run and reach their stated results; their notebooks have the same cells."""
 
+import importlib.util
 import os
 import re
 import runpy
@@ -175,6 +176,14 @@ def test_the_cpp_example_gives_the_actions_of_python(tmp_path, cmake, skip_unles
     printed = run(FOLDER / "cpp_controller.py", tmp_path)
     assert numbers(r"in Python: (\d+)", printed)[0] > 85
     assert "1000 of 1000 actions are the same" in printed
+
+
+def test_a_search_confirms_its_best_settings_with_other_seeds(tmp_path, skip_unless_ci):
+    if importlib.util.find_spec("optuna") is None:
+        skip_unless_ci("needs optuna")
+    printed = run(FOLDER / "search_settings.py", tmp_path)
+    defaults, best = numbers(r"defaults: ([\d.]+) .*\nbest: ([\d.]+) ", printed)
+    assert min(defaults, best) > 200
 
 
 def test_every_example_is_tested_and_listed():
