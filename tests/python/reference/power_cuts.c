@@ -56,19 +56,23 @@ static int program_flash(void *context, uint32_t address, const uint8_t *bytes, 
   return 1;
 }
 
+/* Erases pages from the first or from the last one on. */
 static int erase_flash(void *context, uint32_t address, uint32_t n) {
-  uint32_t first = address, event, i;
+  const uint32_t n_pages = (n + PAGE - 1) / PAGE;
+  const int from_last = any_byte() & 1;
+  uint32_t k, event, i;
   (void)context;
   n_violations += address % PAGE != 0;
-  for (; first < address + n; first += PAGE) {
+  for (k = 0; k < n_pages; ++k) {
+    uint8_t *const page = flash + address + (from_last ? n_pages - 1 - k : k) * PAGE;
     for (event = 0; event < ERASE_EVENTS; ++event) {
       if (!is_cut()) continue;
       for (i = 0; i < PAGE && event > 0; ++i) {
-        flash[first + i] |= event < ERASE_EVENTS / 2 ? any_byte() & any_byte() : any_byte();
+        page[i] |= event < ERASE_EVENTS / 2 ? any_byte() & any_byte() : any_byte();
       }
       return 0;
     }
-    memset(flash + first, 255, PAGE);
+    memset(page, 255, PAGE);
   }
   return 1;
 }
@@ -129,7 +133,7 @@ int main(int argc, char **argv) {
         n_wrong += !is_restored || !is_image(new_image);
         break;
       }
-      ++n_cuts;
+      if (++n_cuts > n_states * 4 * N_BYTES) return 1; /* it is never stored */
       n_lost += !is_restored;
       n_wrong += is_restored && !is_image(old_image) && !is_image(new_image);
       /* A second cut, and then the state is stored. */
