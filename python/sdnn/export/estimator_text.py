@@ -24,6 +24,15 @@ if TYPE_CHECKING:
     AnyModel: TypeAlias = SDNNRegressor | SDNNClassifier | SDNNKernelRidge | SDNNKernelClassifier
 
 
+def _in_comment(name: str) -> str:
+    """Return a name in ASCII on a line, which neither begins nor ends a comment of C.
+
+    A backslash before the end of a line would join two lines, and so is doubled.
+    """
+    text = name.encode("unicode_escape").decode()
+    return text.replace("*/", "* /").replace("/*", "/ *")
+
+
 @dataclass(frozen=True, kw_only=True)
 class EstimatorHeader:
     """A C header that holds a regressor or a classifier.
@@ -116,10 +125,9 @@ class HeaderText(ABC):
         """Return comment lines about the calls, and the values of a sample."""
         names = self.model._feature_names() or [""] * len(self.model.codings_)
         values = [
-            f"  {source.usage(names[source.column])}".replace("*/", "* /")
-            .replace("CATEGORIES", f"{self.name}_categories")
-            .encode("ascii", "backslashreplace")
-            .decode()
+            f"  {source.usage(_in_comment(names[source.column]))}".replace(
+                "CATEGORIES", f"{self.name}_categories"
+            )
             for source in self.inputs
             if source.column < len(names)
         ]

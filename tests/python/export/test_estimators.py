@@ -180,6 +180,19 @@ def test_the_headers_are_cpp(compiler, name, needs, tmp_path):
     run(program(tmp_path, source.replace("SIZE", str(size)), compiler, *STRICT_CPP))
 
 
+def test_names_of_columns_neither_begin_nor_end_a_comment(target, tmp_path):
+    pandas = pytest.importorskip("pandas")
+    names = ["*/ int x;", "/*/", "*\\\n/ int y;", "*??/\n/ int z;", "größe"]
+    table = pandas.DataFrame(np.random.default_rng(0).random((60, len(names))), columns=names)
+    model = SDNNRegressor(**{**small_settings(len(names)), "max_iter": 2}, random_state=0)
+    model.fit(table, table.sum(axis=1))
+    export_estimator_header(model, tmp_path / "model.h")
+    text = (tmp_path / "model.h").read_text()
+    assert [f"x[{i}], " in text for i in range(len(names))] == [True] * len(names)
+    assert "gr\\xf6\\xdfe" in text
+    run(*compiled(tmp_path, '#include "model.h"\nint main(void) { return 0; }', target))
+
+
 @pytest.mark.parametrize("n_inputs", [1, 2, 4, 7, 20])
 @pytest.mark.parametrize("groups", [{}, {"n_outputs": 3}, {"n_classes": 2}, {"n_classes": 12}])
 def test_small_settings_fit_a_small_processor(n_inputs, groups):
