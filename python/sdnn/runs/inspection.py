@@ -143,6 +143,8 @@ class Inspection:
             agent_input = influence.input
             low, high = agent_input.limits(self.states)
             met = f"{low:.4g} to {high:.4g}"
+            if self._is_constant(agent_input):
+                met = f"{agent_input.numbers(self.states)[0]:.4g}"
             if agent_input.has_symbols:
                 n_met = len(np.unique(agent_input.numbers(self.states)))
                 met = f"{n_met} of {len(agent_input.columns)} symbols"
@@ -181,10 +183,13 @@ class Inspection:
         outside = float(((numbers < low) | (numbers > high)).mean())
         return RangeUse(low, high, (last - first) / (high - low), outside)
 
+    def _is_constant(self, agent_input: AgentInput) -> bool:
+        return bool(np.ptp(agent_input.numbers(self.states)) == 0.0)
+
     def _why_left_out(self, agent_input: AgentInput) -> str:
         if agent_input.is_used:
             return ""
-        if np.ptp(agent_input.numbers(self.states)) == 0.0:
+        if self._is_constant(agent_input):
             return "left out: constant"
         return "left out: neither rewards nor actions had to do with it"
 
@@ -225,6 +230,10 @@ class Inspection:
     def warnings(self) -> list[str]:
         """Return what may be wrong, a sentence each."""
         texts = [*self._warnings_of_values(), *self._warnings_of_ranges()]
+        if self.run.spec.environment.action_masks:
+            texts.append(
+                "Values, the map and influences consider all actions: they know no action masks."
+            )
         evaluations = [row["mean_return"] for row in self.rows if row["kind"] == "evaluation"]
         if len(evaluations) > 2:
             last, best, worst = evaluations[-1], max(evaluations), min(evaluations)
@@ -258,7 +267,9 @@ class Inspection:
     def _warnings_of_ranges(self) -> Iterator[str]:
         for agent_input in self.inputs:
             use = self.range_use(agent_input)
-            if use is not None and use.within < NARROW:
+            if agent_input.is_used and self._is_constant(agent_input):
+                yield f"{agent_input.name} is constant: the agent can do without it."
+            elif use is not None and use.within < NARROW:
                 share = f"{use.within:.0%}"
                 yield f"{agent_input.name} uses only {share} of its range: --range narrows it."
             if use is not None and use.outside > OUTSIDE:

@@ -38,6 +38,28 @@ class DockEnv(gym.Env):
         return {"colour": colour, "gear": gear, "position": self._position.astype(np.float32)}
 
 
+class MaskedEnv(gym.Env):
+    """Each step costs 1; action 2, the only one without a cost, is masked. A sensor is stuck."""
+
+    observation_space = gym.spaces.Box(0.0, 1.0, (2,))
+    action_space = gym.spaces.Discrete(3)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self._observation(), self._info()
+
+    def step(self, action):
+        assert action != 2
+        return self._observation(), -1.0, False, False, self._info()
+
+    def _info(self):
+        return {"action_mask": np.array([1, 1, 0], np.int8)}
+
+    def _observation(self):
+        return np.array([self.np_random.random(), 0.25], np.float32)
+
+
+gym.register("tests/Masked-v0", entry_point=MaskedEnv, max_episode_steps=20)
 gym.register("tests/Dock-v0", entry_point=DockEnv, max_episode_steps=50)
 
 TASKS = {
@@ -146,3 +168,15 @@ def test_warnings_name_narrow_use_and_collapse(trained, monkeypatch):
     coarse = {**inspection.report, "value_unit": 0.5, "recent_reward": 1.0}
     rounded = type(inspection)(**{**vars(inspection), "report": coarse})
     assert any("rounded" in text for text in rounded.warnings())
+
+
+def test_constant_inputs_and_masks_are_said(trained):
+    masks = ("--set", "environment.action_masks=true", "--set", "agent.inputs=all")
+    inspection = inspect_run(Run.open(trained("tests/Masked-v0", *masks, steps=1500)))
+    warnings = inspection.warnings()
+    assert "observation 1 is constant: the agent can do without it." in warnings
+    assert not any("uses only" in text for text in warnings)
+    assert any("no action masks" in text for text in warnings)
+    table = inspection.input_table()
+    met = {row[0]: row[table.header.index("met")] for row in table.rows}
+    assert met["observation 1"] == "0.25"
