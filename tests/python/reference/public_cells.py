@@ -218,8 +218,6 @@ GOOD = {
     "n_trials": lambda: 1,
     "n_units": lambda: 200,
     "name": lambda: "portable",
-    "n_classes": lambda: None,
-    "n_outputs": lambda: None,
     "names": lambda: ("early_steps",),
     "observer": lambda: None,
     "observation_space": lambda: gym.spaces.Box(0.0, 1.0, (2,)),

@@ -188,7 +188,7 @@ SCALED_LINES = [
 
 def test_train_and_export_state_the_scaling_of_observations(invoke):
     result = invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one")
-    printed = result.stdout.splitlines()[-2]
+    printed = result.stdout
     assert "0 from -4 to 4, 1 from -2 to 3, and means of neighbours (1)" in printed
     assert "sdnn.runs.Run.open('one').spec.make_env()" in printed
     for source in ("one", "one/agent.safetensors", "one/checkpoint.safetensors"):
