@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from sdnn.agents.agent import AnyAgent
 
 _MOST_ACTIONS = 2**16
+_FEW_STEPS = 64  # of fixed point, in a range that is hardly resolved
 _LARGEST = 2**31  # limit of the ranges of observations and actions
 
 
@@ -188,6 +189,8 @@ def export(
                 f" got {flash}: make it with --preset small, or fewer units or inputs"
             )
         write_whole(path, header.text.encode())
+    for warning in _coarse_ranges(agent, header.fraction_bits):
+        click.echo(f"warning: {warning}", err=True)
     scaling = agent.scaling
     if as_json:
         values = {k: v for k, v in dataclasses.asdict(header).items() if k != "text"}
@@ -203,6 +206,19 @@ def export(
         click.echo("it observes each variable scaled from its range to [0, 1], as its run did:")
         for line in scaling.lines():
             click.echo(f"  {line}")
+
+
+def _coarse_ranges(agent: AnyAgent, fraction_bits: int) -> Iterator[str]:
+    """Describe the ranges in which an observation in fixed point has few values, a line each."""
+    low, high = agent.observation_range
+    for variable in sorted({at[0] for kind, at in agent.inputs if kind == "variable"}):
+        n_steps = float(high[variable] - low[variable]) * 2.0**fraction_bits
+        if n_steps < _FEW_STEPS:
+            yield (
+                f"observation[{variable}], from {low[variable]:g} to {high[variable]:g}, has a"
+                f" range of only {n_steps:.2g} times 2^-{fraction_bits}: observe it in another"
+                " unit, or with more --fraction-bits"
+            )
 
 
 def _read_agent_of(source: Path) -> AnyAgent:

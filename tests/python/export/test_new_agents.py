@@ -198,3 +198,17 @@ def test_export_refuses_a_run_together_with_options_of_new_agents(export):
         assert (done.exit_code, done.stdout) == (2, ""), done.output
         assert named in done.stderr
     assert export("one.safetensors", "--learning").exit_code == 0
+
+
+def test_ranges_that_fixed_point_hardly_resolves_are_named(invoke):
+    new = ("export", "--new", "--actions", 2, "--c-header", "a.h", "--range", "0:1")
+    assert "warning" not in invoke(*new, "--range", "-0.01:0.01").output
+    amperes = invoke(*new, "--range", "0:0.0001")
+    assert amperes.exit_code == 0
+    # 0.0001 2^16 = 6.55
+    assert "warning: observation[1], from 0 to 0.0001, has a range of only 6.6 times 2^-16" in (
+        amperes.output
+    )
+    assert "warning" not in invoke(*new, "--range", "0:0.0001", "--fraction-bits", 24).output
+    # 10^9 leaves a bit, and 2 steps from 0 to 1
+    assert "observation[0], from 0 to 1," in invoke(*new, "--range", "0:1e9").output
