@@ -66,6 +66,8 @@ def verify(
 
     if certificate is not None and certificate.suffix != ".json":
         raise click.UsageError(f"--certificate must end in .json, got {certificate}")
+    if certificate is not None and not certificate.absolute().parent.is_dir():
+        raise click.UsageError(f"--certificate must be in a folder that exists, got {certificate}")
     consent = Consent(modules)
     with run_command(str):
         consent.import_modules()

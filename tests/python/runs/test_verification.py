@@ -426,6 +426,16 @@ def test_no_certificate_is_written_of_trials_that_differ(invoke, tmp_path, real_
     assert invoke("verify", folder, "--certificate", "made.txt").exit_code == 2
 
 
+def test_a_certificate_without_a_folder_is_refused_before_trials_are_run(
+    invoke, tmp_path, real_records
+):
+    folder = stored(tmp_path / "out", [real_records[0]])
+    result = invoke("verify", folder, "--certificate", "missing/made.json")
+    assert result.exit_code == 2
+    assert "--certificate must be in a folder that exists" in result.output
+    assert "recomputed" not in result.output
+
+
 def test_verifying_leaves_a_run_as_it_is(invoke, tmp_path):
     assert invoke("train", "CartPole-v1", "--steps", 150, *SMALL, "--out", "run").exit_code == 0
     folder = tmp_path / "run"
