@@ -377,7 +377,7 @@ def named_inputs(names: Sequence[str | int], inputs: Sequence[AgentInput]) -> li
     """Return the inputs of these names, or numbers of observed variables; ValueError if unknown."""
     is_list = isinstance(names, Sequence) and not isinstance(names, str | bytes)
     is_short = is_list and 1 <= len(names) <= 2
-    are_names = is_short and all(isinstance(name, str | int) for name in names)
+    are_names = is_short and all(isinstance(name, str | int | np.integer) for name in names)
     require(are_names, "inputs", "be one or two names of inputs", names)
     chosen = []
     for name in names:

@@ -274,6 +274,7 @@ def test_names_of_variables_follow_the_spaces():
 def test_inputs_are_chosen_by_name_or_number(switching_agent):
     inputs = inputs_of(switching_agent[0])
     assert named_inputs(["observation 2", 0], inputs) == [inputs[2], inputs[0]]
+    assert named_inputs(list(np.array([2, 0])), inputs) == [inputs[2], inputs[0]]
     for names in (["other"], ["9"], [], ["0", "1", "2"], ["1", "observation 1"]):
         refuses("inputs", named_inputs, names, inputs)
 
