@@ -271,14 +271,14 @@ def require_single(name: str, env: object) -> None:
         )
 
 
-def require_same_kind(agent: object, env: object) -> None:
+def require_same_kind(agent: object, env: object, argument: str = "env") -> None:
     """Check that an agent can learn in an environment, or in each of a vector.
 
     Observations must be possible in the agent's space, and there must be as many actions. Bounds of
     a Box are the same but for rounding, as other bounds are other units; types are not compared.
     Where the agent's run scaled its observations, the environment must scale them, too. An
     environment without spaces is not checked, nor are bounds for an agent made in C++, whose spaces
-    are its ranges.
+    are its ranges. ``argument`` is the name of ``env`` in errors.
 
     Raises
     ------
@@ -288,7 +288,7 @@ def require_same_kind(agent: object, env: object) -> None:
     scaling = getattr(agent, "scaling", None)
     if scaling is not None and not _is_unit(_space_of(env, "observation_space")):
         raise ValueError(
-            "env must give observations scaled to [0, 1], as the agent's run did"
+            f"{argument} must give observations scaled to [0, 1], as the agent's run did"
             f" ({scaling.words() or 'from which ranges is not known'}): UnitSensors(env,"
             " *agent.scaling.ends) of sdnn.environments, or Run.open(folder).config.environment"
             " of sdnn.runs"
@@ -297,7 +297,7 @@ def require_same_kind(agent: object, env: object) -> None:
         space, other_space = getattr(agent, name, None), _space_of(env, name)
         if space is not None and other_space is not None and not fits(space, other_space):
             raise ValueError(
-                f"env must have the agent's {name}, {in_a_line(space)},"
+                f"{argument} must have the agent's {name}, {in_a_line(space)},"
                 f" got {in_a_line(other_space)}"
             )
         if space is None or other_space is None or not getattr(agent, "has_bounds", True):
@@ -305,7 +305,7 @@ def require_same_kind(agent: object, env: object) -> None:
         if differences := list(_other_bounds(space, other_space)):
             more = ", ..." * (len(differences) > _MOST_SHOWN)
             raise ValueError(
-                f"env must have the bounds of the agent's {name}, got others of"
+                f"{argument} must have the bounds of the agent's {name}, got others of"
                 f" {', '.join(differences[:_MOST_SHOWN])}{more}; {_WAYS_OUT[name]}"
             )
 

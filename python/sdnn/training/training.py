@@ -215,7 +215,7 @@ class Training(TrainingLoop):
                     "evaluation_env must be another environment than env: an evaluation would end"
                     " the episode that is learned from"
                 )
-            require_same_kind(agent, evaluation_env)
+            require_same_kind(agent, evaluation_env, "evaluation_env")
             share_statistics(env, evaluation_env)
         require_same_kind(agent, env)
         if (steps is None) == (episodes is None):

@@ -130,6 +130,8 @@ def test_environments_with_other_spaces_are_refused():
         setattr(other, name, space)
         refuses("env", agent.train, other, steps=10)
         refuses("env", evaluate, agent, other)
+        evaluations = {"evaluate_every": 5, "evaluation_env": other}
+        refuses("evaluation_env", agent.train, Corridor(), steps=10, **evaluations)
 
 
 def test_the_environment_of_a_training_cannot_be_that_of_its_evaluations():
