@@ -202,6 +202,14 @@ def export(
         f" {'memory' if learning else 'arrays on the stack'},"
         f" {header.n_words:,} words of weights read per decision"
     )
+    for statistics in agent.wrappers:
+        if lines := statistics.observation_lines():
+            click.echo(
+                f"it observes what the wrapper {statistics.wrapper} gave, (value - mean) /"
+                " sqrt(variance):"
+            )
+            for line in lines:
+                click.echo(f"  {line}")
     if scaling is not None:
         click.echo("it observes each variable scaled from its range to [0, 1], as its run did:")
         for line in scaling.lines():

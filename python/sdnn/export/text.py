@@ -60,6 +60,18 @@ def scaling_comment(lines: Iterable[str]) -> list[str]:
     )
 
 
+def normalization_comment(wrapper: str, lines: Iterable[str]) -> list[str]:
+    """Return comment lines about a wrapper that normalized an agent's observations."""
+    name = re.sub(r"\W", "", wrapper, flags=re.ASCII)
+    return comment(
+        f"What this policy observes is normalized, as the wrapper {name} gave it:",
+        "each variable is (value - mean) / sqrt(variance), with these at the end of training.",
+        "Wherever an observation has units below, it is these.",
+        "",
+        *(f"  {line}" for line in lines),
+    )
+
+
 def define_lines(macro: str, values: Mapping[str, object]) -> list[str]:
     """Define macros, whose names begin with ``macro``; a list has a line for each element."""
     lines = []

@@ -26,6 +26,7 @@ from sdnn.export.text import (
     conversions,
     define_lines,
     joined,
+    normalization_comment,
     scaling_comment,
     table_lines,
 )
@@ -193,7 +194,14 @@ class Writer(ABC, Generic[Network]):
         }
         if self.history.is_needed:
             spaces |= self.history.defines(acts_between=self.acts_between)
+        normalizations = [
+            line
+            for statistics in self.agent.wrappers
+            if (lines := statistics.observation_lines())
+            for line in normalization_comment(statistics.wrapper, lines)
+        ]
         text = [
+            *normalizations,
             *(scaling_comment(self.agent.scaling.lines()) if self.agent.scaling else []),
             *comment(
                 f"{self.name}.h: {self.title}, in C99 for small processors.",

@@ -42,6 +42,18 @@ class Statistics(msgspec.Struct, frozen=True):
     wrapper: str
     numbers: dict[str, _Numbers]
 
+    def observation_lines(self) -> list[str]:
+        """Describe how the wrapper normalizes each observed variable, a line each; [] if none."""
+        moments = [self.numbers.get(f"obs_rms.{name}") for name in ("mean", "var")]
+        means, variances = (
+            [] if moment is None else np.frombuffer(moment.values, moment.dtype).tolist()
+            for moment in moments
+        )
+        return [
+            f"{i}: mean {mean:.9g}, variance {variance:.9g}"
+            for i, (mean, variance) in enumerate(zip(means, variances, strict=True))
+        ]
+
 
 def learning_wrappers(env: object) -> list[Any]:
     """List the wrappers of an environment, or of a vector, that learn; the outermost first."""

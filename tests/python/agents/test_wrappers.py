@@ -7,6 +7,7 @@ from gymnasium.wrappers import NormalizeObservation, NormalizeReward
 
 from sdnn.agents import (
     RBFQLearning,
+    SDNNQLambda,
     SDNNQLearning,
     Training,
     UnrepeatedEpisodeError,
@@ -181,3 +182,20 @@ def test_statistics_for_an_environment_without_the_wrapper_are_refused(tmp_path)
     training.run()
     with pytest.raises(ValueError, match="NormalizeObservation"):
         Training.load(tmp_path / "training", unbounded(wrapped()))
+
+
+@pytest.mark.parametrize("learning", [False, True])
+def test_headers_in_c_state_how_observations_are_normalized(invoke, tmp_path, learning):
+    env = NormalizeReward(NormalizeObservation(gym.make("CartPole-v1")))
+    agent = SDNNQLambda(env.observation_space, env.action_space, warm_up_steps=50)
+    agent.train(env, steps=100)
+    agent.save("agent.safetensors")
+    options = ["--learning"] * learning
+    printed = invoke("export", "agent.safetensors", "--c-header", "a.h", *options).stdout
+    mean, variance = (getattr(env.get_wrapper_attr("obs_rms"), name)[3] for name in ("mean", "var"))
+    line = f"3: mean {mean:.9g}, variance {variance:.9g}"
+    text = (tmp_path / "a.h").read_text()
+    for lines in (printed, text):
+        assert line in lines
+        assert "the wrapper NormalizeObservation gave" in lines
+        assert "NormalizeReward" not in lines
