@@ -20,7 +20,7 @@
 #include "sdnn_image.h"
 
 #define SDNN_KEPT_MAGIC UINT32_C(0x4b4e4453) /* "SDNK" */
-#define SDNN_N_RECORD_WORDS 7 /* magic, fingerprint, scale, score in two, 0, checksum */
+#define SDNN_N_RECORD_WORDS 7 /* magic, fingerprint, scale, score in two, length, checksum */
 #define SDNN_KEPT_CONTENT (UINT32_C(4) * SDNN_N_KEPT + 4 * SDNN_N_RECORD_WORDS)
 /* The bytes of the memory, which are written in parts. */
 #define SDNN_KEPT_BYTES \
@@ -78,19 +78,20 @@ static inline int sdnn_find_kept(sdnn_keeper* keeper) {
   }
   keeper->scale = sdnn_signed(record[2]);
   keeper->best = sdnn_signed(record[4]) * (INT64_C(1) << 32) + record[3];
+  if (record[5] != keeper->length) keeper->best = INT64_MIN; /* the sum of another number */
   keeper->is_kept = 1;
   return 1;
 }
 
 /* Begins to compare blocks of `length` scores, 1 to 1,000,000. Returns whether the memory has a
- * policy already, as flash may have. */
+ * policy already, as flash may have; the first block replaces one of blocks of another length. */
 static inline int sdnn_begin_keeping(sdnn_keeper* keeper, void* context, sdnn_reader read,
                                      sdnn_writer write, uint32_t length) {
   sdnn_clear(keeper, sizeof *keeper);
   keeper->context = context;
   keeper->read = read;
   keeper->write = write;
-  keeper->length = length < SDNN_MOST_IN_BLOCK ? length : SDNN_MOST_IN_BLOCK;
+  keeper->length = length < SDNN_MOST_IN_BLOCK ? length + !length : SDNN_MOST_IN_BLOCK;
   return sdnn_find_kept(keeper);
 }
 
@@ -113,7 +114,7 @@ static inline int sdnn_write_kept(const sdnn_agent* agent, sdnn_keeper* keeper) 
   record[2] = (uint32_t)sdnn_scale_of_policy(agent);
   record[3] = (uint32_t)(best & UINT32_MAX);
   record[4] = (uint32_t)(best >> 32);
-  record[5] = 0;
+  record[5] = keeper->length;
   record[6] = 0;
   part.bytes = bytes;
   for (part.offset = 0; part.offset < SDNN_KEPT_CONTENT - 4; part.offset += part.n) {

@@ -24,8 +24,8 @@ inline std::int64_t now() noexcept {
   return duration_cast<nanoseconds>(steady_clock::now().time_since_epoch()).count();
 }
 
-/// Nanoseconds that the processor has spent on the calling thread, or those of now() on systems that
-/// do not count them. Reading them costs a call of the system.
+/// Nanoseconds that the processor has spent on the calling thread, or those of now() on systems
+/// that do not count them. Reading them costs a call of the system.
 inline std::int64_t thread_time() noexcept {
 #ifdef CLOCK_THREAD_CPUTIME_ID
   std::timespec time{};

@@ -59,6 +59,31 @@ def test_blocks_of_returns_are_compared_as_in_python(length, target, tmp_path):
     assert run(*keep, length, input=scores.astype("<i8").tobytes()).decode() == expected
 
 
+OTHER_LENGTH = """
+#include <stdio.h>
+#include "agent.h"
+static agent_agent agent;
+static uint8_t memory[AGENT_KEPT_BYTES];
+static agent_keeper keeper;
+static void begin(uint32_t length) {
+  printf(" %d", agent_begin_keeping(&keeper, memory, agent_read_memory, agent_write_memory, length));
+}
+static void keep(int64_t score) { printf("%d", agent_keep(&agent, &keeper, score)); }
+int main(void) {
+  agent_begin(&agent);
+  begin(2), keep(100), keep(100);
+  begin(1), keep(150), keep(140);
+  begin(1), keep(140), keep(160);
+  return 0;
+}
+"""
+
+
+def test_the_first_block_replaces_a_policy_of_blocks_of_another_length(target, tmp_path):
+    program = compiled(OTHER_LENGTH, sarsa(), tmp_path, target, *SANITIZED)
+    assert run(*program).decode() == " 001 110 101"
+
+
 @pytest.mark.parametrize(
     "make",
     [

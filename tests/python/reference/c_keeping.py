@@ -63,7 +63,7 @@ int main(void) {
   if (!agent_load(&agent, images[1])) return 5;
   if (agent_keep(&agent, &keeper, -3) || agent_keep(&agent, &keeper, -4)) return 6;
   /* A program that starts finds the policy and its score in memory. */
-  if (!agent_begin_keeping(&same, memory, read_memory, write_memory, 1)) return 7;
+  if (!agent_begin_keeping(&same, memory, read_memory, write_memory, 2)) return 7;
   if (same.best != -7 || same.scale != keeper.scale) return 8;
   while (fread(x, sizeof *x, AGENT_N_OBSERVED, stdin) == AGENT_N_OBSERVED) {
     BEST;
@@ -75,7 +75,7 @@ int main(void) {
   if (memcmp(action, greedy, sizeof action)) return 9;
   fails = 0;
   memory[9] ^= 16;
-  if (agent_begin_keeping(&same, memory, read_memory, write_memory, 1)) return 10;
+  if (agent_begin_keeping(&same, memory, read_memory, write_memory, 2)) return 10;
   return 0;
 }
 """
