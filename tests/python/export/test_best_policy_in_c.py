@@ -66,7 +66,9 @@ static agent_agent agent;
 static uint8_t memory[AGENT_KEPT_BYTES];
 static agent_keeper keeper;
 static void begin(uint32_t length) {
-  printf(" %d", agent_begin_keeping(&keeper, memory, agent_read_memory, agent_write_memory, length));
+  const int is_kept =
+      agent_begin_keeping(&keeper, memory, agent_read_memory, agent_write_memory, length);
+  printf(" %d", is_kept);
 }
 static void keep(int64_t score) { printf("%d", agent_keep(&agent, &keeper, score)); }
 int main(void) {
