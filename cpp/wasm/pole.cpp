@@ -89,7 +89,7 @@ class Balancer {
 
   void step() {
     const bool is_test = world.n_episodes % (kLearned + 1) == kLearned;
-    const std::uint32_t action = learner_.act(observed_, !is_test);
+    const std::uint32_t action = is_test ? learner_.greedy(observed_) : learner_.act(observed_);
     const bool has_fallen = world.pole.step((action == 0 ? -10.0 : 10.0) + world.hand);
     observe(next_);
     if (!is_test) {
