@@ -146,7 +146,7 @@ def axis_label(agent_input: AgentInput) -> str:
 
 
 def _colorbar(axes: Axes, mesh: object) -> None:
-    figure = axes.get_figure(root=True)
+    figure = axes.figure
     assert figure is not None
     bar = figure.colorbar(mesh, ax=axes, pad=0.02)  # type: ignore[arg-type]
     bar.ax.tick_params(labelsize=8, colors=INK)

@@ -105,7 +105,7 @@ class CertifiedReports:
         self.title = str(path)
         try:
             certificate = msgspec.json.decode(read_bytes(path, MOST_BYTES), type=Certificate)
-        except (ConfigError, RecursionError, ValueError) as error:
+        except (ConfigError, RecursionError, ValueError, msgspec.DecodeError) as error:
             raise RunError(f"{path} is no certificate: {error}") from error
         self.machine = f"{certificate.instruction_set}, {certificate.platform}"
         self._configs = {
