@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import numpy as np
 
-from sdnn._core import __version__
 from sdnn.export.coded_inputs import CodedInput
-from sdnn.export.text import Tables, c_source, c_strings, comment, define_lines, joined
+from sdnn.export.text import Header, Tables, c_source, c_strings, define_lines, header_text
 
 if TYPE_CHECKING:
     from sdnn.estimators import (
@@ -33,20 +31,13 @@ def _in_comment(name: str) -> str:
     return text.replace("*/", "* /").replace("/*", "/ *")
 
 
-@dataclass(frozen=True, kw_only=True)
-class EstimatorHeader:
+class EstimatorHeader(Header):
     """A C header that holds a regressor or a classifier.
 
     ``text`` is the file and ``name`` the prefix of its names. ``flash_bytes`` of constants include
     ``weight_bytes``. ``ram_bytes`` are the arrays that a prediction has on the stack or, if the
     estimator learns, all that it remembers.
     """
-
-    name: str
-    text: str
-    flash_bytes: int
-    weight_bytes: int
-    ram_bytes: int
 
 
 class HeaderText(ABC):
@@ -74,34 +65,21 @@ class HeaderText(ABC):
 
     def text(self, macros: dict[str, object], tables: Tables) -> str:
         """Return the text of the header."""
-        macro = self.name.upper()
-        return joined([
-            *comment(
-                f"{self.name}.h: {self.title}, in C99 for small processors.",
-                "",
-                f"Made by sdnn {__version__} of an {type(self.model).__name__}: {self.about()}.",
-                "",
-                *self.needs(tables.n_bytes),
-                "",
-                "Needs <stdint.h> and nothing else of a C library; it is C++ too. It calculates in",
+        return header_text(
+            self.name,
+            title=self.title,
+            made=[f"{type(self.model).__name__}: {self.about()}."],
+            needs=self.needs(tables.n_bytes),
+            arithmetic=[
                 "integers, with doubles too: their bits are those of the library on any processor.",
                 "Include it in one source file: its constants are static.",
-                "",
-                *self.usage(),
-            ),
-            f"#ifndef SDNN_{macro}_H",
-            f"#define SDNN_{macro}_H",
-            "",
-            "#include <stdint.h>",
-            "",
-            *define_lines(macro, macros),
-            "",
-            *tables.lines,
-            *self.words(),
-            "",
-            c_source(self.file, self.name, ["sdnn_observation.h"]),
-            f"#endif /* SDNN_{macro}_H */",
-        ])  # fmt: skip
+            ],
+            usage=self.usage(),
+            constants=[
+                *define_lines(self.name.upper(), macros), "", *tables.lines, *self.words(),
+            ],
+            code=c_source(self.file, self.name, ["sdnn_observation.h"]),
+        )  # fmt: skip
 
     def needs(self, flash_bytes: int) -> list[str]:
         """Return comment lines about memory."""
@@ -132,7 +110,6 @@ class HeaderText(ABC):
             if source.column < len(names)
         ]
         return [
-            f'  #include "{self.name}.h"',
             f"  double x[{self.name.upper()}_N_FEATURES];",
             *(f"  {line}" for line in self.calls()),
             "",

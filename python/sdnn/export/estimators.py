@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sdnn.export.estimator_text import EstimatorHeader, HeaderText
 from sdnn.export.estimator_writer import EstimatorWriter
-from sdnn.support.arguments import argument_error, flag, path_of, require, shown, whole
-from sdnn.support.files import write_whole
+from sdnn.export.text import require_c_name, write_header
+from sdnn.support.arguments import argument_error, flag, require, shown, whole
 
 if TYPE_CHECKING:
     from sdnn.export.estimator_text import AnyModel
 
 CODE_BYTES = 7000  # of a header's functions compiled for size, at most
-_LONGEST_NAME = 40
 _REMEDY = (
     "train with the settings of sdnn.export.small_settings(), or with n_averaged_epochs=1, and"
     " smaller n_output_units, n_units_per_class, n_pattern_units or fewer pairs"
@@ -35,15 +33,11 @@ def export_estimator_header(
     The file is written as a whole or not at all. The name is by default the file's, without its
     ending; everything else is as for `estimator_header`.
     """
-    place = path_of("path", path)
-    header = estimator_header(
-        model,
-        place.stem if name is None else name,
-        learning=learning,
-        flash_bytes=flash_bytes,
-    )
-    write_whole(place, header.text.encode())
-    return header
+
+    def make(prefix: str) -> EstimatorHeader:
+        return estimator_header(model, prefix, learning=learning, flash_bytes=flash_bytes)
+
+    return write_header(path, name, make)
 
 
 def estimator_header(
@@ -93,13 +87,7 @@ def estimator_header(
     >>> "product_predict(x, y)" in header.text
     True
     """
-    is_name = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
-    if not is_name or len(name) > _LONGEST_NAME:
-        raise argument_error(
-            "name",
-            "must be a C identifier of letters, digits and single underscores between them,"
-            f" at most {_LONGEST_NAME} long, got {shown(name)}",
-        )
+    require_c_name(name)
     limit = None if flash_bytes is None else whole("flash_bytes", flash_bytes, 1, 2**40)
     header = writer_of(model, name, learns=flag("learning", learning)).header()
     require_flash(header, limit)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import zlib
 from pathlib import Path
 from typing import Any
@@ -12,11 +11,9 @@ from sdnn.agents.agent import AnyAgent
 from sdnn.export.actor_critic import ActorCriticLearner, ActorCriticWriter
 from sdnn.export.q_lambda import QLambdaLearner, QLambdaWriter
 from sdnn.export.sdnn_c import SDNNCLearner, SDNNCWriter
+from sdnn.export.text import require_c_name, write_header
 from sdnn.export.writer import CHeader
-from sdnn.support.arguments import argument_error, flag, path_of, require, shown
-from sdnn.support.files import write_whole
-
-_LARGEST_NAME = 40
+from sdnn.support.arguments import flag, require, shown
 
 
 def export_c_header(
@@ -32,15 +29,11 @@ def export_c_header(
     The file is written as a whole or not at all. The name is by default the file's, without its
     ending; everything else is as for `c_header`.
     """
-    place = path_of("path", path)
-    header = c_header(
-        agent,
-        place.stem if name is None else name,
-        fraction_bits=fraction_bits,
-        learning=learning,
-    )
-    write_whole(place, header.text.encode())
-    return header
+
+    def make(prefix: str) -> CHeader:
+        return c_header(agent, prefix, fraction_bits=fraction_bits, learning=learning)
+
+    return write_header(path, name, make)
 
 
 def c_header(
@@ -98,14 +91,7 @@ def c_header(
     True
     """
     learns = flag("learning", learning)
-    fits = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
-    if not fits or len(name) > _LARGEST_NAME:
-        raise argument_error(
-            "name",
-            "must be a C identifier of letters, digits and single underscores between them,"
-            f" at most {_LARGEST_NAME} long, got {shown(name)}",
-        )
-    header: CHeader = writer_of(agent, name, fraction_bits, learns=learns).header()
+    header: CHeader = writer_of(agent, require_c_name(name), fraction_bits, learns=learns).header()
     return header
 
 

@@ -4,26 +4,104 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sdnn._core import __version__
 from sdnn.environments.types import Array
+from sdnn.support.arguments import argument_error, path_of, shown
+from sdnn.support.files import write_whole
 
 _DIRECTION_BITS = 30
 _BYTES = {
     "int8_t": 1, "uint8_t": 1, "int16_t": 2, "uint16_t": 2,
     "int32_t": 4, "uint32_t": 4, "uint64_t": 8,
 }  # fmt: skip
-
+_LONGEST_NAME = 40
 
 _INSTALLED = Path(__file__).parent / "c"
 _FOLDER = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[3] / "cpp" / "c"
 _INCLUDE = re.compile(r'#include "(\w+\.h)"\n')
+
+
+@dataclass(frozen=True, kw_only=True)
+class Header:
+    """A C header: its file and its sizes."""
+
+    name: str
+    text: str
+    flash_bytes: int
+    weight_bytes: int
+    ram_bytes: int
+
+
+AnyHeader = TypeVar("AnyHeader", bound=Header)
+
+
+def require_c_name(name: object) -> str:
+    """Return ``name``; ValueError if it cannot be the prefix of names in C."""
+    fits = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
+    if not isinstance(name, str) or not fits or len(name) > _LONGEST_NAME:
+        raise argument_error(
+            "name",
+            "must be a C identifier of letters, digits and single underscores between them,"
+            f" at most {_LONGEST_NAME} long, got {shown(name)}",
+        )
+    return name
+
+
+def write_header(path: str | Path, name: str | None, make: Callable[[str], AnyHeader]) -> AnyHeader:
+    """Make a header with a name, by default the file's without its ending, and write it whole."""
+    place = path_of("path", path)
+    header = make(place.stem if name is None else name)
+    write_whole(place, header.text.encode())
+    return header
+
+
+def header_text(
+    name: str,
+    *,
+    title: str,
+    made: Sequence[str],
+    needs: Iterable[str],
+    arithmetic: Iterable[str],
+    usage: Iterable[str],
+    constants: Iterable[str],
+    code: str,
+) -> str:
+    """Return the text of a header; ``made`` are the lines about how it was made."""
+    guard = f"SDNN_{name.upper()}_H"
+    return joined([
+        *comment(
+            f"{name}.h: {title}, in C99 for small processors.",
+            "",
+            f"Made by sdnn {__version__} of an {made[0]}",
+            *made[1:],
+            "",
+            *needs,
+            "",
+            "Needs <stdint.h> and nothing else of a C library; it is C++ too. It calculates in",
+            *arithmetic,
+            "",
+            f'  #include "{name}.h"',
+            *usage,
+        ),
+        f"#ifndef {guard}",
+        f"#define {guard}",
+        "",
+        "#include <stdint.h>",
+        "",
+        *constants,
+        "",
+        code,
+        f"#endif /* {guard} */",
+    ])  # fmt: skip
 
 
 def c_source(file: str, name: str, unused: Iterable[str] = ()) -> str:

@@ -13,18 +13,18 @@ import gymnasium as gym
 import numpy as np
 
 from sdnn import _core
-from sdnn._core import __version__
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.environments.types import Array, Data
 from sdnn.export.history import StateHistory
 from sdnn.export.text import (
+    Header,
     Input,
     Tables,
     by_dimension,
     c_source,
-    comment,
     conversions,
     define_lines,
+    header_text,
     joined,
     normalization_comment,
     scaling_comment,
@@ -40,7 +40,7 @@ Network = TypeVar("Network", bound=_core.SDNNC | _core.LinearSDNN)
 
 
 @dataclass(frozen=True, kw_only=True)
-class CHeader:
+class CHeader(Header):
     """A C header that holds an agent's greedy policy, or an agent that learns.
 
     ``text`` is the file and ``name`` the prefix of its names. Fixed-point observations and actions
@@ -49,12 +49,7 @@ class CHeader:
     it remembers. A decision reads ``n_words`` 32-bit words of weights.
     """
 
-    name: str
-    text: str
     fraction_bits: int
-    flash_bytes: int
-    weight_bytes: int
-    ram_bytes: int
     n_words: int
 
 
@@ -200,45 +195,30 @@ class Writer(ABC, Generic[Network]):
             if (lines := statistics.observation_lines())
             for line in normalization_comment(statistics.wrapper, lines)
         ]
-        text = [
-            *normalizations,
-            *(scaling_comment(self.agent.scaling.lines()) if self.agent.scaling else []),
-            *comment(
-                f"{self.name}.h: {self.title}, in C99 for small processors.",
-                "",
-                f"Made by sdnn {__version__} of an {type(self.agent).__name__} agent with seed"
-                f" {self.agent.seed}:",
+        scaling = scaling_comment(self.agent.scaling.lines()) if self.agent.scaling else []
+        text = header_text(
+            self.name,
+            title=self.title,
+            made=[
+                f"{type(self.agent).__name__} agent with seed {self.agent.seed}:",
                 f"{description}.",
+            ],
+            needs=[line.format(flash=f"{flash_bytes:,}") for line in needs],
+            arithmetic=["integers. Include it in one source file: its constants are static."],
+            usage=self._usage(),
+            constants=[
+                *define_lines(macro, {**spaces, **defines}),
+                *define_lines(macro, {"INPUTS": [f"{macro}_{call}" for call in inputs]}),
                 "",
-                *(line.format(flash=f"{flash_bytes:,}") for line in needs),
-                "",
-                "Needs <stdint.h> and nothing else of a C library; it is C++ too. It calculates in",
-                "integers. Include it in one source file: its constants are static.",
-                "",
-                *self._usage(),
-                f"An action is a number; {self._action_value()} is its value.",
-                *(line for i, source in enumerate(self.inputs) for line in source.usage(i)),
-                *self.history.usage(),
-                *self.tie_remark(),
-            ),
-            f"#ifndef SDNN_{macro}_H",
-            f"#define SDNN_{macro}_H",
-            "",
-            "#include <stdint.h>",
-            "",
-            *define_lines(macro, {**spaces, **defines}),
-            *define_lines(macro, {"INPUTS": [f"{macro}_{call}" for call in inputs]}),
-            "",
-            *tables.lines,
-            *conversion_tables.lines,
-            *self._float_tables(),
-            "",
-            c_source(file, self.name, self.history.unused_files),
-            f"#endif /* SDNN_{macro}_H */",
-        ]
+                *tables.lines,
+                *conversion_tables.lines,
+                *self._float_tables(),
+            ],
+            code=c_source(file, self.name, self.history.unused_files),
+        )
         return CHeader(
             name=self.name,
-            text=joined(text),
+            text=joined([*normalizations, *scaling]) + text,
             fraction_bits=self.fraction_bits,
             flash_bytes=flash_bytes,
             **sizes,
@@ -247,11 +227,14 @@ class Writer(ABC, Generic[Network]):
     def _usage(self) -> list[str]:
         observation = f"int32_t observation[{self.name.upper()}_N_OBSERVED];"
         return [
-            f'  #include "{self.name}.h"',
             f"  {observation} // in its own units, times 2^{self.fraction_bits}",
             f"  observation[0] = {self.name.upper()}_FIXED(0.5); // a constant",
             *(f"  {line}" for line in self.calls()),
             "",
+            f"An action is a number; {self._action_value()} is its value.",
+            *(line for i, source in enumerate(self.inputs) for line in source.usage(i)),
+            *self.history.usage(),
+            *self.tie_remark(),
         ]
 
     def needs(self, weight_bytes: int, ram_bytes: int, n_words: int) -> list[str]:
