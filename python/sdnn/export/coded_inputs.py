@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sdnn.coding import Anchor, Circular, Coding, RandomInverse, WithMissing
 from sdnn.coding.symbols import Categorical, Category, present
-from sdnn.export.text import Tables
+from sdnn.export.text import Tables, bits_of
 from sdnn.support.arguments import shown
 
 INPUT_BYTES = 16  # of a struct of sdnn_coded_inputs.h
@@ -113,10 +113,9 @@ def _of_categories(column: int, coding: Coding, base: Categorical) -> CodedInput
 def add_inputs(tables: Tables, inputs: Sequence[CodedInput]) -> dict[str, object]:
     """Add the numbers of inputs to the tables; return the macros of the inputs."""
     n_before = np.cumsum([0, *(len(source.values) for source in inputs)]).tolist()
-    values = np.concatenate([source.values for source in inputs]).view(np.uint64)
-    tables.add(
-        "uint64_t", "values", values, "Ranges and categories of the inputs: bits of doubles."
-    )
+    values = np.concatenate([source.values for source in inputs])
+    about = "Ranges and categories of the inputs: bits of doubles."
+    tables.add("uint64_t", "values", bits_of(values), about)
     tables.n_bytes += INPUT_BYTES * len(inputs)
     macro = tables.prefix.upper()
     types = {source.type for source in inputs}

@@ -9,7 +9,7 @@ import numpy as np
 from sdnn.estimators.classifier import FIRING_SHARE
 from sdnn.estimators.regressor import MARGIN
 from sdnn.export.estimator_writer import EstimatorWriter, require_small
-from sdnn.export.text import Tables, rounded_up
+from sdnn.export.text import Tables, real_number, rounded_up
 
 if TYPE_CHECKING:
     from sdnn.export.estimator_writer import Model
@@ -42,13 +42,12 @@ class EstimatorLearner(EstimatorWriter):
         values = {
             **super().defines(),
             "CORRECTS_SHARE": int(share != 1.0),
-            "SHARE": bits_of(share),
+            "SHARE": real_number(share),
             "REFUSES_OUTSIDE": int(model.out_of_range == "error"),
         }
         if not self.is_classifier:
-            return {
-                **values, "WIDENS": int(model.out_of_range == "widen"), "MARGIN": bits_of(MARGIN),
-            }  # fmt: skip
+            widens = int(model.out_of_range == "widen")
+            return {**values, "WIDENS": widens, "MARGIN": real_number(MARGIN)}
         counts = self.group_size * np.array([FIRING_SHARE, 1 - FIRING_SHARE])
         of_class, of_others = np.minimum(0.5 + counts, self.group_size).astype(int).tolist()
         return {**values, "COUNT_OF_CLASS": of_class, "COUNT_OF_OTHERS": of_others}
@@ -104,12 +103,3 @@ class EstimatorLearner(EstimatorWriter):
             f"int is_predicted = {name}_predict(&model, x, y);",
             f"int is_learned = {name}_learn(&model, x, y); // with the true outputs",
         ]
-
-
-def bits_of(number: float) -> str:
-    """Return a macro's value: the bits of a double.
-
-    >>> bits_of(1.0)
-    'UINT64_C(0x3ff0000000000000)'
-    """
-    return f"UINT64_C(0x{np.float64(number).view(np.uint64):016x})"

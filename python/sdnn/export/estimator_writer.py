@@ -11,11 +11,7 @@ from numpy.typing import NDArray
 from sdnn.export.coded_inputs import add_inputs, coded_input
 from sdnn.export.estimator_text import EstimatorHeader, HeaderText
 from sdnn.export.input_pairs import PairTables
-from sdnn.export.text import (
-    Tables,
-    rounded_up,
-    weight_words,
-)
+from sdnn.export.text import Tables, bits_of, rounded_up, weight_words
 from sdnn.export.writer import require_few_weights
 
 if TYPE_CHECKING:
@@ -85,9 +81,8 @@ class EstimatorWriter(HeaderText):
         macros |= self.add_networks(tables)
         weight_bytes = tables.n_bytes - n_bytes
         if not self.is_classifier:
-            ranges = np.ascontiguousarray(self.model.output_range_).view(np.uint64).reshape(-1)
             about = "Lowest and highest outputs: bits of doubles."
-            tables.add("uint64_t", "ranges", ranges, about)
+            tables.add("uint64_t", "ranges", bits_of(self.model.output_range_), about)
         return EstimatorHeader(
             name=self.name,
             text=self.text(macros, tables),

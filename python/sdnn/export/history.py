@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from sdnn.agents.q_learning import ValueAgent
-from sdnn.environments.types import Array, Data
-from sdnn.export.text import Input, Tables
+from sdnn.environments.types import Data
+from sdnn.export.text import Input, Tables, bits_of, real_number
 
 _FILES = ("sdnn_history.h", "sdnn_history_policy.h", "sdnn_history_learner.h")
 _FILES_WITHOUT = ("sdnn_policy.h", "sdnn_last_bins.h", "sdnn_last_observation.h")
@@ -98,7 +98,7 @@ class StateHistory:
             "N_NUMBERS": len(self.numbers),
         }
         if self.kind == "observer":
-            sizes["GAIN"] = real_numbers([float(self.fitted["observer.gain"])])[0]
+            sizes["GAIN"] = real_number(self.fitted["observer.gain"])
         if self.is_box:
             sizes["N_REAL_ACTIONS"] = len(self.agent.actions_of(0))
             if acts_between:
@@ -181,16 +181,5 @@ class StateHistory:
             return f"ANGLE({i}, {first}, {source.at[1]})"
         if source.kind == "symbol":
             return f"SYMBOL({i}, {first}, {source.n_bins})"
-        low, width = real_numbers([source.low, source.high - source.low])
+        low, width = map(real_number, (source.low, source.high - source.low))
         return f"{source.kind.upper()}({i}, {first}, {low}, {width})"
-
-
-def bits_of(values: Array) -> Array:
-    """Return the bits of doubles, shape (n,)."""
-    numbers = np.ascontiguousarray(values, np.float64).reshape(-1)
-    return numbers.view(np.uint64)
-
-
-def real_numbers(values: Iterable[float]) -> list[str]:
-    """Return real numbers as literals of the C headers."""
-    return [f"UINT64_C(0x{bits:016x})" for bits in bits_of(np.array(list(values))).tolist()]

@@ -10,7 +10,7 @@ from sdnn.coding import WithMissing
 from sdnn.estimators.columns import Floats, Ints
 from sdnn.export.coded_inputs import CodedInput, add_inputs, coded_input
 from sdnn.export.estimator_text import EstimatorHeader, HeaderText
-from sdnn.export.text import Tables, rounded_up
+from sdnn.export.text import Tables, bits_of, rounded_up
 
 if TYPE_CHECKING:
     from sdnn.estimators import SDNNKernelClassifier, SDNNKernelRidge
@@ -83,9 +83,9 @@ class KernelWriter(HeaderText):
         about = "Bins of the samples that were learned."
         tables.add(bin_type, "components", self.components.reshape(-1), about)
         about = "Their coefficients: bits of doubles."
-        tables.add("uint64_t", "duals", bits(self.model.dual_coef_), about)
+        tables.add("uint64_t", "duals", bits_of(self.model.dual_coef_), about)
         weight_bytes = tables.n_bytes - n_bytes
-        tables.add("uint64_t", "intercepts", bits(self.model.intercept_))
+        tables.add("uint64_t", "intercepts", bits_of(self.model.intercept_))
         return EstimatorHeader(
             name=self.name,
             text=self.text(macros, tables),
@@ -107,7 +107,7 @@ class KernelWriter(HeaderText):
                 n_before += len(parts[-1])
             rows.append(row_of[id(matrix)])
         about = "Correlations of bins: bits of doubles."
-        tables.add("uint64_t", "correlations", bits(np.concatenate(parts)), about)
+        tables.add("uint64_t", "correlations", bits_of(np.concatenate(parts)), about)
         tables.n_bytes += _CORRELATION_BYTES * len(rows)
         return {"CORRELATION_OF": rows}
 
@@ -119,9 +119,9 @@ class KernelWriter(HeaderText):
         sources: list[CodedInput] = [coded_input(i, self.model.codings_[i]) for i in mixed]
         tables.add("uint16_t", "mixed", np.array(mixed), "Features of mixtures.")
         ranges = np.concatenate([source.values for source in sources])
-        tables.add("uint64_t", "mixed_values", bits(ranges), "Their ranges: bits of doubles.")
+        tables.add("uint64_t", "mixed_values", bits_of(ranges), "Their ranges: bits of doubles.")
         weights = self.directions[:, mixed].T
-        tables.add("uint64_t", "directions", bits(weights), "Their weights: bits of doubles.")
+        tables.add("uint64_t", "directions", bits_of(weights), "Their weights: bits of doubles.")
         return {"N_DIRECTIONS": len(self.directions), "N_MIXED": len(mixed)}
 
     def ram_bytes(self) -> int:
@@ -130,11 +130,6 @@ class KernelWriter(HeaderText):
         if len(self.directions):
             n_bytes += 8 * (self.n_features + 2 * len(self.directions))
         return rounded_up(n_bytes, 8)
-
-
-def bits(numbers: Floats) -> np.ndarray[tuple[int], np.dtype[np.uint64]]:
-    """Return the bits of doubles, row by row."""
-    return np.ascontiguousarray(numbers, dtype=np.float64).reshape(-1).view(np.uint64)
 
 
 def by_distance(matrix: Floats) -> Floats | None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +10,7 @@ from sdnn.agents import SDNNQLearning
 from sdnn.environments.types import Array, Data
 from sdnn.export.code import Code
 from sdnn.export.learner import SCALE_FIELDS, Field, Learner
-from sdnn.export.text import Tables, rounded_up, weight_words
+from sdnn.export.text import Tables, bits_of, real_number, rounded_up, weight_words
 from sdnn.export.writer import (
     MOST_FRACTION_BITS,
     CHeader,
@@ -291,7 +289,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
                 first = last = getattr(self.agent, name)
                 fraction = 0.0
             numbers = {"FIRST": first, "LAST": last, "FRACTION": fraction}
-            defines |= {f"{macro}_{word}": _real(number) for word, number in numbers.items()}
+            defines |= {f"{macro}_{word}": real_number(number) for word, number in numbers.items()}
         return defines
 
     def header(self) -> CHeader:
@@ -302,7 +300,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         self.add_head(tables, "range.rewards" if self.adapts else "thresholds")
         if self.adapts:
             tables.add("int32_t", "first_rewards", self._rewards(state))
-            tables.add("uint64_t", "first_returns", state["range.returns"].view(np.uint64))
+            tables.add("uint64_t", "first_returns", bits_of(state["range.returns"]))
         defines = {
             **self.code.defines(),
             **self._network_defines(),
@@ -336,7 +334,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
             "WEIGHT_LIMIT": sizes.weight_limit,
             "ROUNDING_RULE": f"{self.name.upper()}_{_ROUNDING[sizes.rounding]}",
             "N_STEPS": learning.n_steps,
-            "DISCOUNT": _real(learning.discount),
+            "DISCOUNT": real_number(learning.discount),
             "ADAPTS": int(self.adapts),
             "HORIZON": self.horizon,
         }
@@ -385,11 +383,6 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         changes = 2 * self.code.column_bytes * self.code.most_columns + self.code.n_columns
         changes += self._state_bytes()
         return int(changes + 4 * self.network.n_actions + 8 * self.n_inputs)
-
-
-def _real(value: Any) -> str:
-    """Write a number as a C macro with its bits."""
-    return f"UINT64_C(0x{np.float64(value).view(np.uint64):x})"
 
 
 def _seeded(seed: int, stream: int) -> list[int]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sdnn._core import __version__
 from sdnn.environments.types import Array
@@ -218,6 +218,20 @@ def c_strings(name: str, words: Iterable[str]) -> list[str]:
         for word in words
     ]
     return [f"static const char* const {name}[] = {{", *(f'  "{word}",' for word in quoted), "};"]
+
+
+def bits_of(values: ArrayLike) -> NDArray[np.uint64]:
+    """Return the bits of doubles, row by row."""
+    return np.ascontiguousarray(values, np.float64).reshape(-1).view(np.uint64)
+
+
+def real_number(value: ArrayLike) -> str:
+    """Return a real number as a literal of the C headers, its bits.
+
+    >>> real_number(1.0)
+    'UINT64_C(0x3ff0000000000000)'
+    """
+    return f"UINT64_C(0x{bits_of(value)[0]:016x})"
 
 
 def joined(lines: Iterable[str]) -> str:
