@@ -28,7 +28,7 @@ from page import markdown
 from sdnn.agents import QLearningConfig
 from sdnn.approximators import RBFNetworkConfig
 from sdnn.reproduction import paper_spec
-from sdnn.runs.engine import trial_seed
+from sdnn.runs.trial import trial_seed
 
 KIND = "rbf tuning"
 STAGES = ("grid", "fine", "ties", "bases", "report")

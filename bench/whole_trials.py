@@ -18,7 +18,7 @@ from page import markdown, show
 
 from sdnn import _core
 from sdnn.reproduction import paper_spec
-from sdnn.runs.engine import trial_seed
+from sdnn.runs.trial import trial_seed
 
 KIND = "whole trials"
 CASES = {"s4": (4, 0.0), "s6": (6, 0.0), "s4-noise": (4, 0.02), "s6-noise": (6, 0.02)}

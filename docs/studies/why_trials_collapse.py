@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.reproduction.cases import EXPERIMENTS
 from sdnn.reproduction.reproduce import case_spec
-from sdnn.runs.engine import trial_seed
 from sdnn.runs.results import episode_of_collapse
 from sdnn.runs.spec import RunSpec
+from sdnn.runs.trial import trial_seed
 from sdnn.support.files import write_whole
 
 CASE = next(case for case in EXPERIMENTS[1].cases if case.id == "s4-noise")

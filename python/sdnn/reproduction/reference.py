@@ -15,11 +15,10 @@ from sdnn.environments.paper_acrobot import PAPER_ACROBOT
 from sdnn.reproduction.cases import MOST_EPISODES, PAPER_CASES, PAPER_INTERVAL
 from sdnn.reproduction.claims import FILE_NAME, HEADER
 from sdnn.reproduction.reproduce import case_spec
-from sdnn.runs.engine import trial_seed
 from sdnn.runs.errors import RunError
 from sdnn.runs.reported import Consent, ReportedTrial, changed_settings
 from sdnn.runs.spec import RunSpec
-from sdnn.runs.trial import TrialKey
+from sdnn.runs.trial import TrialKey, trial_seed
 from sdnn.support.arguments import shown
 from sdnn.support.files import read_bytes
 

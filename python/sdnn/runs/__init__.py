@@ -16,7 +16,7 @@ __getattr__, __dir__, __all__ = attach(
         "sdnn.agents.registry": "AGENTS AgentEntry agent_entry register",
         "sdnn.reports.statistics": "Estimate",
         "sdnn.runs.dask_executor": "DaskExecutor",
-        "sdnn.runs.engine": "Executor Observer PlannedTrial ThreadExecutor run_trials trial_seed",
+        "sdnn.runs.engine": "Executor Observer PlannedTrial ThreadExecutor run_trials",
         "sdnn.runs.environment": "EnvironmentSpec",
         "sdnn.runs.errors": (
             "ClusterError ConfigError PlotUnavailableError RunError RunTerminatedError "
@@ -27,6 +27,8 @@ __getattr__, __dir__, __all__ = attach(
         "sdnn.runs.settings": "AgentSpec BudgetSpec OutputSpec ProtocolSpec",
         "sdnn.runs.spec": "RunSpec",
         "sdnn.runs.store": "ResultStore",
-        "sdnn.runs.trial": "RunEvaluation RunOutcome Trial TrialKey TrialRecord TrialRows",
+        "sdnn.runs.trial": (
+            "RunEvaluation RunOutcome Trial TrialKey TrialRecord TrialRows trial_seed"
+        ),
     },
 )

@@ -12,7 +12,6 @@ from sdnn.runs.engine import (
     PlannedTrial as PlannedTrial,
     ThreadExecutor as ThreadExecutor,
     run_trials as run_trials,
-    trial_seed as trial_seed,
 )
 from sdnn.runs.environment import EnvironmentSpec as EnvironmentSpec
 from sdnn.runs.errors import (
@@ -41,4 +40,5 @@ from sdnn.runs.trial import (
     TrialKey as TrialKey,
     TrialRecord as TrialRecord,
     TrialRows as TrialRows,
+    trial_seed as trial_seed,
 )

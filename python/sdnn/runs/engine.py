@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import threading
 import time
-import zlib
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -19,39 +18,17 @@ from queue import SimpleQueue
 from signal import SIGINT, SIGTERM
 from typing import NamedTuple, Protocol
 
-import numpy as np
-
 from sdnn.agents.registry import title_of
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrainingTrial, Trial, TrialKey, TrialRecord, opened, rows_of
-from sdnn.support.arguments import shown, whole
+from sdnn.support.arguments import whole
 from sdnn.support.interrupts import Interrupts, thread_pool
 from sdnn.support.machine import instruction_set, n_cores
 from sdnn.support.progress import ProgressBars
 
 CHUNK_SECONDS = 0.1
 """Time between two reports of a trial, and the longest time until an interrupt acts."""
-
-
-def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
-    """Return the seed of a trial, the same for every agent, order of execution and number of jobs.
-
-    All agents thus meet the same sensor noise in the same trial of a case. It is the first 64-bit
-    word of ``SeedSequence(root_seed, spawn_key=(crc32(case_id), trial))`` without its lowest bit,
-    because the result file's integers have a sign.
-
-    Examples
-    --------
-    >>> trial_seed(0, "s4", 0) == trial_seed(0, "s4", 1)
-    False
-    """
-    if not isinstance(case_id, str):
-        raise TypeError(f"case_id must be a text, got {shown(case_id)}")
-    spawn_key = (zlib.crc32(case_id.encode()), whole("trial", trial, 0, 2**32 - 1))
-    entropy = whole("root_seed", root_seed, 0, 2**64 - 1)
-    word = np.random.SeedSequence(entropy, spawn_key=spawn_key).generate_state(1, np.uint64)[0]
-    return int(word) >> 1
 
 
 @dataclass(frozen=True)
@@ -224,36 +201,56 @@ def run_trials(
     trial any more: what was finished is stored.
     """
     instruction_set()
-    executor = ThreadExecutor() if executor is None else executor
-    observe: Observer = observer or (lambda _: None)
     planned = tuple(plan)
     stored = store.keys()
     missing = sorted((p for p in planned if p.key not in stored), key=_least_work)
     n_reused = len(planned) - len(missing)
-    observe(Begun(len(planned), n_reused, sum(p.spec.length for p in missing)))
-    stop = threading.Event()
     failures: list[Failed] = []
     n_run = 0
-    signals = Interrupts(stop.set, (SIGINT, SIGTERM))
-    if missing:
-        # Signals only set `stop`: an exception could lose a result between queue and store.
-        with signals, closing(executor.run(missing, stop)) as messages:
-            for message in messages:
-                match message:
-                    case Finished(trial, record):
-                        store.add(record, is_exact=trial.spec.is_compiled)
-                        n_run += 1
-                    case Failed():
-                        failures.append(message)
-                observe(message)
+
+    def keep(message: Finished | Failed) -> None:
+        nonlocal n_run
+        if isinstance(message, Failed):
+            failures.append(message)
+        else:
+            store.add(message.record, is_exact=message.planned.spec.is_compiled)
+            n_run += 1
+
+    interrupted, signal = execute(missing, keep, executor, observer, n_reused=n_reused)
     return TrialsOutcome(
         n_planned=len(planned),
         n_reused=n_reused,
         n_run=n_run,
         failures=tuple(failures),
-        interrupted=stop.is_set(),
-        signal=signals.received,
+        interrupted=interrupted,
+        signal=signal,
     )
+
+
+def execute(
+    planned: Sequence[PlannedTrial],
+    keep: Callable[[Finished | Failed], None],
+    executor: Executor | None,
+    observer: Observer | None,
+    *,
+    n_reused: int = 0,
+) -> tuple[bool, int | None]:
+    """Run trials; ``keep`` receives those that are finished or failed, before the observer does.
+
+    Returns whether it was interrupted, and by which signal. See `run_trials`.
+    """
+    observe: Observer = observer or (lambda _: None)
+    observe(Begun(n_reused + len(planned), n_reused, sum(p.spec.length for p in planned)))
+    stop = threading.Event()
+    signals = Interrupts(stop.set, (SIGINT, SIGTERM))
+    if planned:
+        # Signals only set `stop`: an exception could lose a result between queue and store.
+        with signals, closing((executor or ThreadExecutor()).run(planned, stop)) as messages:
+            for message in messages:
+                if isinstance(message, Finished | Failed):
+                    keep(message)
+                observe(message)
+    return stop.is_set(), signals.received
 
 
 def run_to_end(planned: PlannedTrial) -> Generator[Advanced | Finished, None, None]:

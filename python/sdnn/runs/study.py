@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.reports.statistics import Estimate, estimate_mean
-from sdnn.runs.engine import Observer, PlannedTrial, trial_seed
+from sdnn.runs.engine import Observer, PlannedTrial
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.report import Content
 from sdnn.runs.results import (
@@ -26,7 +26,7 @@ from sdnn.runs.results import (
 )
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
-from sdnn.runs.trial import TrialKey, TrialRecord, opened
+from sdnn.runs.trial import TrialKey, TrialRecord, opened, trial_seed
 from sdnn.support.arguments import whole
 from sdnn.support.toml import KeyPath
 

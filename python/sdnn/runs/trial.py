@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -21,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn import _core
 from sdnn._core import __version__
 from sdnn.agents import Evaluation, Scaling, StopTrainingOnRewardThreshold, Training
-from sdnn.support.arguments import whole
+from sdnn.support.arguments import shown, whole
 from sdnn.training.loop import Row
 
 Hash: TypeAlias = "hashlib._Hash"
@@ -41,6 +42,26 @@ class TrialKey(NamedTuple):
     trial: int
     seed: int
     config_hash: str
+
+
+def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
+    """Return the seed of a trial, the same for every agent, order of execution and number of jobs.
+
+    All agents thus meet the same sensor noise in the same trial of a case. It is the first 64-bit
+    word of ``SeedSequence(root_seed, spawn_key=(crc32(case_id), trial))`` without its lowest bit,
+    because the result file's integers have a sign.
+
+    Examples
+    --------
+    >>> trial_seed(0, "s4", 0) == trial_seed(0, "s4", 1)
+    False
+    """
+    if not isinstance(case_id, str):
+        raise TypeError(f"case_id must be a text, got {shown(case_id)}")
+    spawn_key = (zlib.crc32(case_id.encode()), whole("trial", trial, 0, 2**32 - 1))
+    entropy = whole("root_seed", root_seed, 0, 2**64 - 1)
+    word = np.random.SeedSequence(entropy, spawn_key=spawn_key).generate_state(1, np.uint64)[0]
+    return int(word) >> 1
 
 
 Column: TypeAlias = NDArray[np.int32 | np.float64 | np.bool_]

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field
-from signal import SIGINT, SIGTERM
 
 import numpy as np
 
 from sdnn._core import __version__
 from sdnn.runs.engine import (
-    Advanced,
-    Begun,
     Counted,
     Executor,
     Failed,
     Finished,
     Observer,
     PlannedTrial,
-    ThreadExecutor,
+    execute,
 )
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.reported import Consent, ReportedTrial, Reports
@@ -35,7 +30,6 @@ from sdnn.runs.trial import (
     TrialRows,
     records_digest,
 )
-from sdnn.support.interrupts import Interrupts
 from sdnn.support.machine import instruction_set
 from sdnn.training.training import Callback, Training
 
@@ -191,7 +185,6 @@ def verify(
         If there is no finished trial, or a file is damaged in other ways than changed rows.
     """
     instruction_set()  # raises if the environment variable is wrong
-    executor = executor or ThreadExecutor()
     observe: Observer = observer or (lambda _: None)
     if not reports.keys:
         unfinished = f", and {reports.n_unfinished} unfinished" if reports.n_unfinished else ""
@@ -259,26 +252,17 @@ def _are_different(first: TrialRecord | Exception, second: TrialRecord | Excepti
 
 
 def _run(
-    plan: Sequence[PlannedTrial], executor: Executor, observe: Observer
+    plan: Sequence[PlannedTrial], executor: Executor | None, observe: Observer
 ) -> tuple[Mapping[TrialKey, TrialRecord | Exception], int | None]:
     """Run trials without storing them; return records or errors by key, and a received signal."""
     results: dict[TrialKey, TrialRecord | Exception] = {}
-    stop = threading.Event()
-    observe(Begun(len(plan), 0, sum(planned.spec.length for planned in plan)))
-    with (
-        Interrupts(stop.set, (SIGINT, SIGTERM)) as signals,
-        closing(executor.run(plan, stop)) as messages,
-    ):
-        for message in messages:
-            match message:
-                case Finished(planned, record):
-                    results[planned.key] = record
-                case Failed(planned, error):
-                    results[planned.key] = error
-                case Advanced():
-                    pass
-            observe(message)
-    return results, signals.received
+
+    def keep(message: Finished | Failed) -> None:
+        result = message.error if isinstance(message, Failed) else message.record
+        results[message.planned.key] = result
+
+    _, signal = execute(plan, keep, executor, observe)
+    return results, signal
 
 
 def compare(trial: ReportedTrial, record: TrialRecord, reports: Reports) -> Difference | None:

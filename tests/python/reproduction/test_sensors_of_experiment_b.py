@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from sdnn.cli import main
 from sdnn.reproduction.cases import PAPER_CASES, case_of_sensors
 from sdnn.reproduction.reproduce import PaperStudy
-from sdnn.runs.engine import trial_seed
+from sdnn.runs.trial import trial_seed
 
 
 def reproduce(*arguments):
