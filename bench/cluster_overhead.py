@@ -1,15 +1,17 @@
 """Measure the driver's overhead for each trial on a cluster.
 
-    python bench/cluster_overhead.py
+    python bench/cluster_overhead.py [--workers 1000] [--seconds 1]
 
-A real scheduler and worker processes on this machine run trials that compute nothing but return as
-many rows as a trial of the paper has. Printed is the processor time of driver, scheduler and
-workers, for each trial. The same without a cluster tells what the store takes of it.
+A real scheduler and workers on this machine run trials that only wait some seconds, and return as
+many rows as a trial of the paper has. Printed are the recorded trials a second, the processor time
+of driver, scheduler and workers for each trial, and the memory of the scheduler as trials end. The
+same without a cluster tells what the store takes of it.
 """
 
 from __future__ import annotations
 
 import argparse
+import asyncio
 import os
 import subprocess
 import sys
@@ -20,13 +22,18 @@ from pathlib import Path
 
 import numpy as np
 import psutil
+from distributed import Client
 
 from sdnn.reproduction import EXPERIMENTS, plan_trials
 from sdnn.runs import AGENTS, DaskExecutor, ResultStore, ThreadExecutor, run_trials
+from sdnn.runs.engine import Finished
+
+SECONDS = "SDNN_BENCH_TRIAL_SECONDS"
+WORKERS_OF_A_PROCESS = 125
 
 
-class InstantTrial:
-    """Done at once, with the rows of a whole trial."""
+class WaitingTrial:
+    """Waits instead of learning, and has the rows of a whole trial."""
 
     def __init__(self, *, protocol, seed, **_others):
         self._n_episodes = protocol.episodes
@@ -40,6 +47,7 @@ class InstantTrial:
         return self.episode == self._n_episodes
 
     def advance(self, n):
+        time.sleep(float(os.environ.get(SECONDS, "0")))
         self.episode = self._n_episodes
 
     def test_rows(self):
@@ -54,65 +62,106 @@ class InstantTrial:
         }
 
 
-AGENTS["sdnn-c"] = replace(AGENTS["sdnn-c"], core_trial=InstantTrial)
+AGENTS["sdnn-c"] = replace(AGENTS["sdnn-c"], core_trial=WaitingTrial)
 
 
 def start(folder, *command):
     environment = os.environ | {"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "error"}
     return psutil.Popen(
-        [sys.executable, "-m", "dask", *command, "--scheduler-file", "scheduler.json",
-         "--dashboard-address", "127.0.0.1:0", "--host", "127.0.0.1"],
-        cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        [sys.executable, *command], cwd=folder, env=environment,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
+
+
+async def serve(n_workers):
+    """Run workers with a thread each in this process."""
+    from distributed import Worker
+
+    options = {"scheduler_file": "scheduler.json", "nthreads": 1, "dashboard": False}
+    workers = [Worker(**options, host="127.0.0.1") for _ in range(n_workers)]
+    for worker in workers:
+        await worker
+    await asyncio.gather(*(worker.finished() for worker in workers))
 
 
 def processor_seconds(processes):
     return sum(sum(process.cpu_times()[:2]) for process in processes)
 
 
-def measure(folder, plan, executor, others):
-    """Processor milliseconds for each trial of this process, and of each group of others."""
-    groups = [[psutil.Process()], *others]
+def measure(folder, plan, executor, groups, observer=None):
+    """Trials a second, and processor milliseconds of each group of processes for a trial."""
     with ResultStore(folder) as store:
         before = [processor_seconds(group) for group in groups]
         begin = time.monotonic()
-        outcome = run_trials(plan, store, executor=executor)
+        outcome = run_trials(plan, store, executor=executor, observer=observer)
         seconds = time.monotonic() - begin
         after = [processor_seconds(group) for group in groups]
     assert outcome.n_run == len(plan), outcome
     per_trial = [1e3 * (b - a) / len(plan) for a, b in zip(before, after, strict=True)]
-    return [*per_trial, 1e3 * seconds / len(plan)]
+    return len(plan) / seconds, per_trial
+
+
+class Memory:
+    """Notes megabytes of the scheduler whenever a tenth of the trials has ended."""
+
+    def __init__(self, scheduler, n_trials):
+        self._scheduler, self._interval = scheduler, max(1, n_trials // 10)
+        self._n_ended = 0
+        self.megabytes = []
+
+    def __call__(self, message):
+        if isinstance(message, Finished):
+            self._n_ended += 1
+            if self._n_ended % self._interval == 0:
+                self.megabytes.append(round(self._scheduler.memory_info().rss / 1e6))
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--trials", type=int, default=1000)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--seconds", type=float, default=0.0, help="that a trial waits")
+    parser.add_argument("--serve", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
-    n_trials = options.trials // 2
-    plan = plan_trials(EXPERIMENTS[0].cases, n_trials, 0)
+    if options.serve:
+        asyncio.run(serve(options.serve))
+        return
+    os.environ[SECONDS] = str(options.seconds)
+    plan = plan_trials(EXPERIMENTS[0].cases, options.trials // 2, 0)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        scheduler = start(folder, "scheduler", "--port", "0")
+        scheduler = start(
+            folder, "-m", "dask", "scheduler", "--scheduler-file", "scheduler.json",
+            "--dashboard-address", "127.0.0.1:0", "--host", "127.0.0.1", "--port", "0",
+        )  # fmt: skip
+        file = str(folder / "scheduler.json")
+        size = min(WORKERS_OF_A_PROCESS, max(1, options.workers // 2))
+        n_processes = -(-options.workers // size)
         workers = [
-            start(folder, "worker", "--nthreads", "1", "--no-nanny", "--preload", __file__)
-            for _ in range(options.workers)
+            start(folder, str(Path(__file__).resolve()), "--serve", str(size))
+            for _ in range(n_processes)
         ]
         try:
-            executor = DaskExecutor(str(folder / "scheduler.json"))
-            measure(folder / "warm-up", plan[:20], executor, [])
-            driver, of_scheduler, of_workers, wall = measure(
-                folder / "cluster", plan, executor, [[scheduler], workers]
+            with Client(scheduler_file=file) as client:
+                client.wait_for_workers(n_processes * size, timeout=600)
+            executor = DaskExecutor(file)
+            memory = Memory(scheduler, len(plan))
+            groups = [[psutil.Process()], [scheduler], workers]
+            rate, (driver, of_scheduler, of_workers) = measure(
+                folder / "cluster", plan, executor, groups, memory
             )
-            alone, _ = measure(folder / "alone", plan, ThreadExecutor(1), [])
         finally:
             for process in (*workers, scheduler):
                 process.kill()
                 process.wait()
+        os.environ[SECONDS] = "0"
+        few = plan[:500]
+        _, (alone,) = measure(folder / "alone", few, ThreadExecutor(1), groups[:1])
     print(
-        f"{len(plan)} trials, {options.workers} workers; milliseconds a trial:"
-        f" driver {driver:.2f} (with one thread and no cluster {alone:.2f}),"
-        f" scheduler {of_scheduler:.2f}, workers {of_workers:.2f}; {wall:.2f} from begin to end"
+        f"{len(plan)} trials of {options.seconds:g} s, {n_processes * size} workers:"
+        f" {rate:.0f} recorded a second; processor ms a trial: driver {driver:.2f}"
+        f" (one thread, no cluster {alone:.2f}), scheduler {of_scheduler:.2f},"
+        f" workers {of_workers:.2f}; MB of the scheduler over time: {memory.megabytes}"
     )
 
 

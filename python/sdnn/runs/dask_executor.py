@@ -18,7 +18,7 @@ from contextlib import closing
 from pathlib import Path
 from queue import SimpleQueue
 from threading import Event
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from sdnn import _core
 from sdnn.runs.config_file import MOST_BYTES
@@ -121,7 +121,9 @@ class DaskExecutor:
         self.scheduler = scheduler
         self.scheduler_timeout = scheduler_timeout
 
-    def run(self, planned: Sequence[PlannedTrial], stop: Event) -> Generator[Message, None, None]:
+    def run(
+        self, planned: Sequence[PlannedTrial], stop: Event
+    ) -> Generator[Sequence[Message], None, None]:
         """Run the trials; see `sdnn.runs.engine.Executor`.
 
         ClusterError if the scheduler is lost, or there is no fitting worker for too long.
@@ -139,7 +141,7 @@ class DaskExecutor:
             finally:
                 client.close(timeout=CONNECT_SECONDS)
 
-    def _connect(self, stop: Event) -> Generator[Message, None, Client | None]:
+    def _connect(self, stop: Event) -> Generator[Sequence[Message], None, Client | None]:
         """Connect in short attempts, so that Ctrl-C can end them; None after Ctrl-C."""
         from distributed import Client
 
@@ -156,7 +158,7 @@ class DaskExecutor:
                 expected = f"an address or a scheduler file, got {self.scheduler} ({error})"
                 raise ClusterError(f"scheduler must be {expected}") from error
             if not waits:
-                yield Noted(f"waiting for the scheduler at {self.scheduler}")
+                yield [Noted(f"waiting for the scheduler at {self.scheduler}")]
             waits = True
             stop.wait(WORKERS_SECONDS)
         return None
@@ -178,6 +180,10 @@ class DaskExecutor:
         )
 
 
+Key: TypeAlias = tuple[str | int, ...]
+"""Dask's key of a submitted trial."""
+
+
 class _Placed(NamedTuple):
     """A submitted trial: the number of its submission, and the workers it may run on."""
 
@@ -197,42 +203,49 @@ class _Run:
         self.client = client
         self.probes = probes_of(planned)
         self.waiting = deque((trial, 1) for trial in planned)  # trials and numbers of submissions
-        self.placed: dict[str, _Placed] = {}  # submitted trials by Dask's key
+        self.placed: dict[Key, _Placed] = {}  # submitted trials by Dask's key
         self.threads: dict[str, int] = {}  # number of threads of each admitted worker
         self.problems: dict[str, str] = {}  # why a worker gets no trials; "" if it is admitted
         self.unserved_since: float | None = None
 
-    def messages(self, stop: Event) -> Generator[Message, None, None]:
+    def messages(self, stop: Event) -> Generator[Sequence[Message], None, None]:
         """Run until every trial is finished or failed, or `stop` is set."""
         from distributed import as_completed
 
         completed = as_completed(loop=self.client.loop, with_results=True, raise_errors=False)
-        progress: SimpleQueue[tuple[str, int]] = SimpleQueue()
+        progress: SimpleQueue[tuple[Key, int]] = SimpleQueue()
         self.client.subscribe_topic(PROGRESS_TOPIC, lambda event: progress.put(event[1]))
         looked = -math.inf
         while self.waiting or self.placed:
             if time.monotonic() - looked > WORKERS_SECONDS:
                 looked = time.monotonic()
-                yield from self.update_workers()
+                yield list(self.update_workers())
+            begun = []
             while self.waiting and len(self.placed) < sum(self.threads.values()):
                 planned, n = self.waiting.popleft()
                 # The key is the trial's identity, so that several drivers share it. The number of
                 # the submission is part of it, because Dask never runs a key again.
-                key = "-".join(map(str, ("trial", _core.__version__, *planned.key, n)))
+                # Dask keeps statistics of each group of keys, which is a tuple's first element.
+                key = ("sdnn", _core.__version__, *planned.key, n)
                 workers = list(self.threads)
                 future = self.client.submit(run_on_worker, planned, key=key, workers=workers)
                 self.placed[key] = _Placed(planned, n, frozenset(workers), future)
                 completed.add(future)
-                yield Advanced(planned, 0)
+                begun.append(Advanced(planned, 0))
+            yield begun
             if stop.wait(RESULTS_SECONDS):
                 return
-            while not progress.empty():
-                key, episode = progress.get()
-                if key in self.placed:
-                    yield Advanced(self.placed[key].planned, episode)
-            for future, result in completed.next_batch(block=False):
-                if future.key in self.placed:
-                    yield ended(self.placed.pop(future.key), result)
+            reported = [progress.get() for _ in range(progress.qsize())]
+            yield [
+                Advanced(self.placed[key].planned, episode)
+                for key, episode in reported
+                if key in self.placed
+            ]
+            yield [
+                ended(self.placed.pop(future.key), result)
+                for future, result in completed.next_batch(block=False)
+                if future.key in self.placed
+            ]
 
     def update_workers(self) -> Generator[Message, None, None]:
         """Admit new workers with the same build; resubmit trials whose workers are all lost."""

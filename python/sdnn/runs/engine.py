@@ -1,7 +1,7 @@
 """The engine: runs the trials that a store does not hold yet, in threads or on other machines.
 
 An executor runs trials and reports about them; it has no store. The calling thread alone writes
-the store and calls the observer, and stores a finished trial before it takes the next report. What
+the store and calls the observer, and stores finished trials before it takes the next reports. What
 is not stored, whatever happened to it, is missing and runs again. A trial in C++ releases Python's
 lock while it advances, so threads scale over the cores.
 """
@@ -142,11 +142,12 @@ class Executor(Protocol):
 
     def run(
         self, planned: Sequence[PlannedTrial], stop: threading.Event
-    ) -> Generator[Message, None, None]:
+    ) -> Generator[Sequence[Message], None, None]:
         """Run the trials, and yield messages until each is finished or failed.
 
-        The generator runs in the calling thread. Closing it, or setting `stop`, abandons running
-        trials; no further trial starts.
+        Messages that are there at the same time come together: their trials are stored in one
+        transaction. The generator runs in the calling thread. Closing it, or setting `stop`,
+        abandons running trials; no further trial starts.
 
         RunError if no trial can be run any more.
         """
@@ -208,13 +209,15 @@ def run_trials(
     failures: list[Failed] = []
     n_run = 0
 
-    def keep(message: Finished | Failed) -> None:
+    def keep(ended: Sequence[Finished | Failed]) -> None:
         nonlocal n_run
-        if isinstance(message, Failed):
-            failures.append(message)
-        else:
-            store.add(message.record, is_exact=message.planned.spec.is_compiled)
-            n_run += 1
+        failures.extend(message for message in ended if isinstance(message, Failed))
+        finished = [message for message in ended if isinstance(message, Finished)]
+        if finished:
+            with store.together():
+                for message in finished:
+                    store.add(message.record, is_exact=message.planned.spec.is_compiled)
+        n_run += len(finished)
 
     interrupted, signal = execute(missing, keep, executor, observer, n_reused=n_reused)
     return TrialsOutcome(
@@ -229,7 +232,7 @@ def run_trials(
 
 def execute(
     planned: Sequence[PlannedTrial],
-    keep: Callable[[Finished | Failed], None],
+    keep: Callable[[Sequence[Finished | Failed]], None],
     executor: Executor | None,
     observer: Observer | None,
     *,
@@ -245,11 +248,11 @@ def execute(
     signals = Interrupts(stop.set, (SIGINT, SIGTERM))
     if planned:
         # Signals only set `stop`: an exception could lose a result between queue and store.
-        with signals, closing((executor or ThreadExecutor()).run(planned, stop)) as messages:
-            for message in messages:
-                if isinstance(message, Finished | Failed):
-                    keep(message)
-                observe(message)
+        with signals, closing((executor or ThreadExecutor()).run(planned, stop)) as batches:
+            for messages in batches:
+                keep([message for message in messages if isinstance(message, Finished | Failed)])
+                for message in messages:
+                    observe(message)
     return stop.is_set(), signals.received
 
 
@@ -374,7 +377,7 @@ class ThreadExecutor:
 
     def run(
         self, planned: Sequence[PlannedTrial], stop: threading.Event
-    ) -> Generator[Message, None, None]:
+    ) -> Generator[Sequence[Message], None, None]:
         """Run the trials; see `Executor`."""
         messages: SimpleQueue[Message | None] = SimpleQueue()
         with thread_pool(self.jobs) as pool:
@@ -384,10 +387,9 @@ class ThreadExecutor:
                 # The last message of every trial is Finished, Failed, or None if it was abandoned.
                 n_open = len(planned)
                 while n_open:
-                    message = messages.get()
-                    n_open -= not isinstance(message, Advanced)
-                    if message is not None:
-                        yield message
+                    batch = [messages.get(), *(messages.get() for _ in range(messages.qsize()))]
+                    n_open -= sum(not isinstance(message, Advanced) for message in batch)
+                    yield [message for message in batch if message is not None]
             except BaseException:
                 stop.set()
                 raise

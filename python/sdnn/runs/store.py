@@ -1,8 +1,8 @@
 """The SQLite file that holds the rows of all runs, and measurements.
 
-Finished trials and measurements are stored in one transaction each, and so are the rows of a run in
-progress with every checkpoint. The file survives a kill at any instant (SQLite's rollback journal,
-full synchronization). Runs under different settings live side by side under different keys.
+Trials that finish together are stored in one transaction, and so are a measurement and the rows of
+a run in progress with every checkpoint. The file survives a kill at any instant (SQLite's rollback
+journal, full synchronization). Runs under other settings live side by side under other keys.
 """
 
 from __future__ import annotations
@@ -107,8 +107,8 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             if read_only and not is_new:
                 self._connection = connect(self.path, read_only=True)
                 return
-            connection = connect(None if read_only else self.path)
-            self._connection = on_error.enter_context(closing(connection))
+            place = None if read_only else self.path
+            self._connection = on_error.enter_context(closing(connect(place)))
             self._prepare(is_new)
             on_error.pop_all()
 
@@ -152,12 +152,11 @@ class ResultStore(AbstractContextManager["ResultStore"]):
                 if _inspect(self.path):  # else another process has just made it
                     raise
 
-    def __exit__(self, *_error: object) -> None:
-        self.close()
-
-    def close(self) -> None:
+    def close(self, *_error: object) -> None:
         """Close the file."""
         self._connection.close()
+
+    __exit__ = close
 
     def add(self, record: TrialRecord, *, is_exact: bool = True) -> None:
         """Store a finished trial, or finish a run in progress, in one transaction.
@@ -167,14 +166,12 @@ class ResultStore(AbstractContextManager["ResultStore"]):
 
         StoreError if the file cannot be written, or holds other rows of an exact trial.
         """
-        with self._writing():
+        with self.together():
             run = self._run_in_progress(record.key, record.config, record.version)
             if run.finished_at is not None:
                 if is_exact and run.checksum != record.rows.checksum():
-                    raise StoreError(
-                        f"{self.path} already holds other rows for {record.key}:"
-                        " the same trial gave two results"
-                    )
+                    problem = f"other rows for {record.key}: the same trial gave two results"
+                    raise StoreError(f"{self.path} already holds {problem}")
                 return
             checksum = self._rows(run).hashed()
             self._insert(run.id, record.rows)
@@ -197,7 +194,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         ``seconds`` is the processor time since rows were stored last. A finished run is in progress
         again.
         """
-        with self._writing():
+        with self.together():
             run = self._run_in_progress(key, config, version)
             hashed = rows.hashed(self._hash_before(run, first))
             self._insert(run.id, rows)
@@ -209,9 +206,8 @@ class ResultStore(AbstractContextManager["ResultStore"]):
     def rows(self, key: TrialKey) -> TrialRows:
         """Return the rows of a run, finished or in progress; none if it is not stored."""
         with as_store_error(self.path):
-            for run in self._runs(key):
-                return self._rows(run)
-            return TrialRows(np.zeros(0, ROW))
+            runs = self._runs(key)
+            return self._rows(runs[0]) if runs else TrialRows(np.zeros(0, ROW))
 
     def keys(self, *, unfinished: bool = False) -> set[TrialKey]:
         """Return the keys of all finished trials; with ``unfinished``, also of runs in progress."""
@@ -247,7 +243,11 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         )
 
     @contextmanager
-    def _writing(self) -> Iterator[None]:
+    def together(self) -> Iterator[None]:
+        """Write everything in a block in one transaction, which waits for the disk once."""
+        if self._connection.in_transaction:
+            yield
+            return
         with as_store_error(self.path), self._connection as connection:
             connection.execute("BEGIN IMMEDIATE")
             yield
@@ -278,8 +278,8 @@ class ResultStore(AbstractContextManager["ResultStore"]):
     def _run_in_progress(self, key: TrialKey, config: str, version: str) -> _Run:
         for run in self._runs(key):
             return run
-        nothing = (0, 0.0, None, TrialRows(np.zeros(0, ROW)).checksum())
-        values = (*_stored(key), config, version, *nothing)
+        checksum = TrialRows(np.zeros(0, ROW)).checksum()
+        values = (*_stored(key), config, version, 0, 0.0, None, checksum)
         marks = ", ".join("?" * len(_Run._fields))
         cursor = self._connection.execute(f"INSERT INTO runs VALUES ({marks})", (None, *values, 0))
         run = _Run(cursor.lastrowid or 0, *values, crc=0)
@@ -324,7 +324,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
     def put(self, kind: str, key: str, content: Mapping[str, object]) -> None:
         """Store a measurement as JSON; one that another process stored first stays."""
         values = (kind, key, json.dumps(content))
-        with self._writing():
+        with self.together():
             self._connection.execute(
                 "INSERT OR IGNORE INTO measurements VALUES (?, ?, ?, ?)", (*values, _crc(values))
             )
@@ -335,8 +335,9 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             (n,) = self._connection.execute("SELECT count(*) FROM measurements").fetchone()
             if n > MOST_MEASUREMENTS:
                 raise StoreError(f"{self.path} holds {n} measurements, over {MOST_MEASUREMENTS}")
-            rows_type = list[tuple[str, str, str, int]]
-            rows = self._read(rows_type, "*", "measurements", "ORDER BY kind, key")
+            rows = self._read(
+                list[tuple[str, str, str, int]], "*", "measurements", "ORDER BY kind, key"
+            )
             for row in rows:
                 if row[-1] != _crc(row[:-1]):
                     place = f"measurements, kind {row[0]}, key {row[1]}"
@@ -368,15 +369,12 @@ def _stored(key: TrialKey) -> TrialKey:
 
 
 def _inspect(path: Path) -> bool:
-    """Return whether the file is missing or empty; StoreError if it is damaged or foreign.
-
-    The file is not changed.
-    """
+    """Return whether an unchanged file is missing or empty; StoreError if damaged or foreign."""
     if not is_there(path) or path.stat().st_size == 0:
         return True
     with open_regular(path, MOST_BYTES) as file:
         header = file.read(20)
-    if not header.startswith(b"SQLite format 3\0"):
+    if header[:16] != b"SQLite format 3\0":
         raise sqlite3.DatabaseError("no SQLite file")
     if header[18:] != b"\1\1":
         raise sqlite3.DatabaseError("a SQLite file of another journal mode")
@@ -397,9 +395,9 @@ def _inspect(path: Path) -> bool:
             )
         if objects != _own_objects():  # before any query that a view or a trigger could change
             raise sqlite3.DatabaseError("it has other tables, views or triggers")
-        findings = connection.execute("PRAGMA integrity_check").fetchall()
-        if findings != [("ok",)]:
-            raise sqlite3.DatabaseError(str(findings[0][0]))
+        (finding,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
+        if finding != "ok":
+            raise sqlite3.DatabaseError(finding)
         return False
 
 

@@ -257,9 +257,10 @@ def _run(
     """Run trials without storing them; return records or errors by key, and a received signal."""
     results: dict[TrialKey, TrialRecord | Exception] = {}
 
-    def keep(message: Finished | Failed) -> None:
-        result = message.error if isinstance(message, Failed) else message.record
-        results[message.planned.key] = result
+    def keep(ended: Sequence[Finished | Failed]) -> None:
+        for message in ended:
+            result = message.error if isinstance(message, Failed) else message.record
+            results[message.planned.key] = result
 
     _, signal = execute(plan, keep, executor, observe)
     return results, signal

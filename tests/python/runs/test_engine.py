@@ -20,6 +20,7 @@ from sdnn.runs.engine import (
     run_to_end,
     teams_of,
 )
+from sdnn.runs.trial import records_digest
 
 
 def test_the_number_of_jobs_does_not_change_the_stored_rows(tmp_path, run):
@@ -210,7 +211,7 @@ class Scripted:
 
     def run(self, planned, stop):
         try:
-            yield from (message(*planned) for message in self.script)
+            yield from ([message(*planned)] for message in self.script)
         finally:
             self.closed = True
 
@@ -288,6 +289,29 @@ def test_an_executor_is_closed_when_the_store_fails(tmp_path, run, record, monke
     with pytest.raises(StoreError, match="disk full"):
         run(tmp_path, fake_trial.make_plan(1), executor=executor)
     assert executor.closed
+
+
+def test_trials_that_end_together_are_stored_in_one_transaction(tmp_path, run, use_trial):
+    use_trial(fake_trial.FakeTrial)
+    plan = fake_trial.make_plan(2)
+    seen = []
+
+    class AllAtOnce(ThreadExecutor):
+        def run(self, planned, stop):
+            yield [message for batch in super().run(planned, stop) for message in batch]
+
+    with ResultStore(tmp_path / "out") as store:
+
+        def look(message):
+            if isinstance(message, Finished):
+                seen.append(len(store.keys()))
+
+        statements = []
+        store._connection.set_trace_callback(statements.append)
+        run_trials(plan, store, executor=AllAtOnce(1), observer=look)
+        assert records_digest(store.load()) == run(tmp_path / "one by one", plan)[1]
+    assert seen == [len(plan)] * len(plan)
+    assert statements.count("COMMIT") == 1
 
 
 def test_an_empty_plan_runs_no_executor(tmp_path, run):
