@@ -200,6 +200,7 @@ void bind_controller(py::module_& module) {
            py::arg("state") = py::none(), "New, or as it was when `state` was taken")
       .def_property_readonly("approximator", &Controller::approximator)
       .def_property_readonly("is_warming_up", &Controller::is_warming_up)
+      .def_property_readonly("n_learned", &Controller::n_learned)
       .def_property_readonly(
           "has_warm_up", [](const Controller& self) { return self.observations().needs_fit(); },
           "Whether there is, or was, a warm-up")

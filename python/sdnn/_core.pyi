@@ -2100,6 +2100,9 @@ class Controller:
     def n_environments(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
+    def n_learned(self) -> int:
+        ...
+    @property
     def n_variables(self) -> int:
         ...
     @property

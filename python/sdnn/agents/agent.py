@@ -108,8 +108,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     """
 
     _has_warned_of_history = False
-    _n_trained = 0  # steps of the calls of `train`, for representations; not in files
-    _returns: Sequence[float] = ()  # of the episodes of these calls
+    _returns: Sequence[float] = ()  # of the episodes of all calls of `train`; not in files
 
     @property
     def observation_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -133,6 +132,14 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     def has_running_ranges(self) -> bool:
         """Whether the ranges of observations are adapted to each new observation."""
         return self._observation.running
+
+    @property
+    def n_learned(self) -> int:
+        """Number of steps learned in all, also before a save.
+
+        On-policy agents, `SDNNActorCritic` and `FuzzyQLearning`, learn none of their warm-up.
+        """
+        return self._controller.n_learned
 
     @property
     def n_dimensions(self) -> int:
@@ -213,9 +220,8 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
             "inputs": inputs,
             "seed": self.seed,
         }
-        n_learned = self._n_trained or int(self.state().get("agent.n_learned", 0))
-        if n_learned:
-            facts["learned"] = f"{n_learned:,} steps"
+        if self.n_learned:
+            facts["learned"] = f"{self.n_learned:,} steps"
         if self._returns:
             facts["last return"] = f"{self._returns[-1]:.5g}"
         return facts
@@ -327,7 +333,6 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
             finally:
                 if seed is None:
                     self._next_episode = training.next_episode
-                self._n_trained += training.n_steps
                 self._returns = (*self._returns, *returns_of(training.rows))
 
     @explained

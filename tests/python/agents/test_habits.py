@@ -21,6 +21,7 @@ from sdnn.agents import (
     learn_from,
     load_agent,
 )
+from sdnn.runs import AGENTS
 from sdnn.support.display import curve_svg
 
 
@@ -167,6 +168,28 @@ def test_representations_of_loaded_agents_and_large_spaces_are_a_line(trained, t
         shown = repr(SDNNQLambda(space, gym.spaces.Discrete(2)))
         assert "\n" not in shown
         assert len(shown) < 150
+
+
+@pytest.mark.parametrize("name", AGENTS)
+def test_an_agent_counts_all_steps_that_it_has_learned(name, tmp_path):
+    env = gym.make("Pendulum-v1")
+    agent = AGENTS[name].agent(env, seed=1, observation_range="adaptive", warm_up_steps=200)
+    assert agent.n_learned == 0
+    is_on_policy = name in ("fuzzy", "actor-critic")
+    for n_more, n_learned in (
+        (150, 0 if is_on_policy else 150),
+        (100, 50 if is_on_policy else 250),
+    ):
+        agent.train(env, steps=n_more)
+        assert agent.n_learned == n_learned
+        assert ("learned" in repr(agent)) == (n_learned > 0)
+        agent.save(tmp_path / "agent.safetensors")
+        agent = load_agent(tmp_path / "agent.safetensors")
+        assert agent.n_learned == n_learned
+    assert f"learned {n_learned} steps" in repr(agent)
+    observation = env.reset(seed=1)[0]
+    agent.learn(Transition(observation, agent.act(observation), 0.0, observation, False))
+    assert agent.n_learned == n_learned + 1
 
 
 def test_small_curves_have_the_means_of_equal_parts():

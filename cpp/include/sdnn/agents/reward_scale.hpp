@@ -68,6 +68,7 @@ class RewardScale {
 
   /// The largest recent reward is 2^size to 2^(size + 1); none before a reward that is not 0.
   std::optional<std::int32_t> size() const noexcept { return size_; }
+  std::uint64_t n_rewards() const noexcept { return n_rewards_; }
   /// The first reward that was refused, and its number, from 1. It is for a warning, and not saved.
   std::optional<std::pair<double, std::uint64_t>> refused() const noexcept { return refused_; }
 
