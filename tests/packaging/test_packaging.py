@@ -192,7 +192,7 @@ SHIPPED = (
     r"python/sdnn/([a-z_]+/){0,2}[a-z_]+\.pyi?|python/sdnn/py\.typed",
     r"python/sdnn/(cli/[a-z]+\.txt|reports/page\.(html|md))\.jinja|cpp/c/sdnn_[a-z_]+\.h",
     r"python/sdnn/runs/(schema\.sql|baselines\.json)|python/sdnn/reproduction/(claims\.toml|reference-results\.csv)",
-    r"(tests|bench|docs)/.*\.(py|c|cpp|hpp|ino|conf|txt|md|json|csv|png|gif|svg|css|toml|ipynb|bin|safetensors)",
+    r"(tests|bench|docs)/.*\.(py|c|h|cpp|hpp|ino|conf|txt|md|json|csv|png|gif|svg|css|toml|ipynb|bin|safetensors)",
 )
 """Every file of a source distribution matches one of these."""
 
