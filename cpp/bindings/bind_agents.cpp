@@ -1,18 +1,13 @@
 #include <pybind11/functional.h>
-#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 #include <pybind11/typing.h>
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 
-#include "arrays.hpp"
 #include "bind_config.hpp"
 #include "bindings.hpp"
 #include "sdnn/agents/actor_critic_config.hpp"
-#include "sdnn/agents/detail/dimensions.hpp"
-#include "sdnn/agents/epsilon_greedy.hpp"
 #include "sdnn/agents/fixed_rate.hpp"
 #include "sdnn/agents/fuzzy_q_learning_config.hpp"
 #include "sdnn/agents/presets.hpp"
@@ -29,7 +24,6 @@ using agents::QLambdaConfig;
 using agents::QLearningConfig;
 using approximators::LinearSDNNConfig;
 using approximators::SDNNCConfig;
-using bindings::ArrayArgument;
 
 namespace {
 
@@ -47,19 +41,6 @@ auto by_name(
 }  // namespace
 
 void bind_agents(py::module_& module) {
-  bindings::bind_config<agents::EpsilonGreedyConfig>(
-      module, "EpsilonGreedyConfig",
-      "The parameters of the policy; the defaults are the paper's (section 4.2).");
-  bindings::Class<agents::EpsilonGreedy>(module, "EpsilonGreedy", "The policy, over rows of values")
-      .def(py::init<const agents::EpsilonGreedyConfig&, std::uint64_t>(), py::arg("config"),
-           py::arg("seed"))
-      .def(
-          "select",
-          [](agents::EpsilonGreedy& policy, const ArrayArgument<double>& values, int step,
-             bool explore) {
-            return policy.select(bindings::vector(values, "values"), step, explore);
-          },
-          py::arg("values"), py::arg("step"), py::arg("explore") = true);
   const auto def_schedule = []<class Config>(py::class_<Config> config) {
     config.def("learning_rate_at", &agents::learning_rate_at<Config>, py::arg("progress"))
         .def("epsilon_at", &agents::epsilon_at<Config>, py::arg("progress"));
@@ -96,7 +77,4 @@ void bind_agents(py::module_& module) {
       .def_property_readonly("n_misses", &agents::FixedRate::n_misses)
       .def_property_readonly("n_skipped", &agents::FixedRate::n_skipped)
       .def_property_readonly("worst_lateness", &agents::FixedRate::worst_lateness);
-
-  module.def("seed_of_dimension", &agents::seed_of_dimension, py::arg("seed"), py::arg("d"),
-             "The seed of the network of a dimension of the action");
 }

@@ -203,7 +203,6 @@ void bind_rbf_network(py::module_& module) {
 
   bind_network<RBFNetwork>(module, "RBFNetwork", "Q(s, a) linear in normalized Gaussian bases")
       .def(py::init<const RBFNetworkConfig&>(), py::arg("config"))
-      .def_property_readonly("n_joint_bases", &RBFNetwork::n_joint_bases)
       .def(
           "weights", [](const RBFNetwork& net) { return bindings::array_of(net.weights()); },
           "A copy, row-major over inputs and action: (n_bases^(d+1),)")

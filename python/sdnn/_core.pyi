@@ -530,9 +530,6 @@ class RBFNetwork:
     @property
     def n_actions(self) -> int:
         ...
-    @property
-    def n_joint_bases(self) -> int:
-        ...
 class LinearSDNNConfig:
     """
     Everything that defines a linear readout of the SDNN code; not in the paper.
@@ -1265,72 +1262,6 @@ class ProbabilityMixture:
         """
     @property
     def weights(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-class EpsilonGreedyConfig:
-    """
-    The parameters of the policy; the defaults are the paper's (section 4.2).
-    
-    Parameters
-    ----------
-    epsilon : float
-        Probability of a random action; in fuzzy Q-learning each fired rule picks one for itself. Must be in [0, 1].
-    n_greedy_steps : int
-        First steps of an episode in which epsilon is 0. Must be in [0, 1073741824].
-    tie_rule : {'uniform', 'lowest', 'middle'}
-        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
-    tie_tolerance : float
-        Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau. Must be finite and at least 0.
-    
-    Raises
-    ------
-    TypeError, ValueError
-        For a value of another type or out of its bounds; ``argument`` is its name.
-    """
-    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]
-    fields: typing.ClassVar[tuple[typing.Any, ...]]
-    def __eq__(self, arg0: typing.Any) -> bool:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __init__(self, *, epsilon: float = ..., n_greedy_steps: int = ..., tie_rule: typing.Literal['uniform', 'lowest', 'middle'] = ..., tie_tolerance: float = ...) -> None:
-        ...
-    def __reduce__(self) -> tuple[typing.Any, tuple]:
-        ...
-    def __replace__(self, **changes: typing.Any) -> EpsilonGreedyConfig:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def replace(self, **changes: typing.Any) -> EpsilonGreedyConfig:
-        """
-        Return a copy with other values of some fields.
-        """
-    @property
-    def epsilon(self) -> float:
-        """
-        Probability of a random action; in fuzzy Q-learning each fired rule picks one for itself.
-        """
-    @property
-    def n_greedy_steps(self) -> int:
-        """
-        First steps of an episode in which epsilon is 0.
-        """
-    @property
-    def tie_rule(self) -> typing.Literal['uniform', 'lowest', 'middle']:
-        """
-        Which of several best actions is taken: `uniform`: any with the same probability; `lowest`: the one with the lowest index; `middle`: the middle of the widest run of neighbours. An assumption.
-        """
-    @property
-    def tie_tolerance(self) -> float:
-        """
-        Values at most this far below the best tie with it. Not in the paper: with `middle` the agent acts from the middle of the widest high plateau.
-        """
-class EpsilonGreedy:
-    """
-    The policy, over rows of values
-    """
-    def __init__(self, config: EpsilonGreedyConfig, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def select(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step: typing.SupportsInt | typing.SupportsIndex, explore: bool = True) -> int:
         ...
 class QLearningConfig:
     """
@@ -2365,10 +2296,6 @@ def q_lambda_presets() -> dict[str, tuple[str, LinearSDNNConfig, QLambdaConfig]]
     """
 def random_inverse_patterns(n_units: typing.SupportsInt | typing.SupportsIndex, n_bins: typing.SupportsInt | typing.SupportsIndex, n_flipped: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int8]:
     ...
-def seed_of_dimension(seed: typing.SupportsInt | typing.SupportsIndex, d: typing.SupportsInt | typing.SupportsIndex) -> int:
-    """
-    The seed of the network of a dimension of the action
-    """
 def set_instruction_set(name: str) -> None:
     """
     Forces an instruction set, for the whole process

@@ -395,14 +395,19 @@ def learn_from(agent: AnyAgent, dataset: Dataset, *, epochs: int = 1) -> int:
     if n == 0:
         return 0
     for _ in range(epochs):
-        agent.begin_episode()
-        for logged in read():
-            transition = with_action(agent, logged.transition)
-            agent.learn(transition)
-            if logged.truncated or transition.terminated:
-                agent.begin_episode()
-        agent.begin_episode()  # learns the pending n-step returns
+        learn_log(agent, read())
     return n * epochs
+
+
+def learn_log(agent: AnyAgent, log: Iterable[Logged]) -> None:
+    """Learn logged transitions once, with all pending n-step returns."""
+    agent.begin_episode()
+    for logged in log:
+        transition = with_action(agent, logged.transition)
+        agent.learn(transition)
+        if logged.truncated or transition.terminated:
+            agent.begin_episode()
+    agent.begin_episode()
 
 
 def checked_length(agent: AnyAgent, log: Iterator[Logged]) -> int:

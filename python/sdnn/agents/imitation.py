@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from sdnn import _core
 from sdnn.agents.actor_critic import SDNNActorCritic
-from sdnn.agents.datasets import Dataset, Logged, checked_length, reader_of, with_action
+from sdnn.agents.datasets import Dataset, Logged, checked_length, learn_log, reader_of, with_action
 from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.support.arguments import is_of_class, require, whole
 from sdnn.training.interfaces import Transition, explained
@@ -91,12 +91,7 @@ def _end_warm_up(agent: LinearAgent, log: Iterator[Logged]) -> None:
 
     Learning the last one, too, would end it with the ranges of an agent without a teacher.
     """
-    agent.begin_episode()
-    for logged in islice(log, max(1, agent._n_warm_up_steps_left - 1)):
-        transition = with_action(agent, logged.transition)
-        agent.learn(transition)
-        if logged.truncated or transition.terminated:
-            agent.begin_episode()
+    learn_log(agent, islice(log, max(1, agent._n_warm_up_steps_left - 1)))
     if agent.is_warming_up:
         agent._end_warm_up_of_teacher()
 

@@ -98,7 +98,6 @@ GOOD = {
         "ridge": 0.1, "target_limit": 20.0,
     },
     "ProbabilityMixture": lambda: {"n_scorers": 2},
-    "EpsilonGreedy": lambda: {"config": core.EpsilonGreedyConfig(), "seed": 1},
     "LinearSDNN": lambda: {"config": linear_config(), "n_actions": [3, 4], "seed": 1},
     "BareAgent": lambda: {
         "approximator": linear_config(), "learning": core.QLambdaConfig(), "seed": 1,
@@ -130,7 +129,6 @@ GOOD = {
         "n_units": 3, "n_columns": 4, "low": -5, "high": 5, "seed": [1], "library": "libstdc++"
     },
     "n_units_for": lambda: {"scheme": "one_vs_one", "n_classes": 4},
-    "seed_of_dimension": lambda: {"seed": 1, "d": 2},
 }  # fmt: skip
 """Good arguments of everything that takes some; what is missing here fails the test."""
 
@@ -174,7 +172,6 @@ METHODS = {
         "torques": [1.0, 2.0, 3.0], "goal_tolerances": [1.0] * 3, "moving": [True] * 3
     },
     ("AcrobotBatch", "decisions"): {"index": 1},
-    ("EpsilonGreedy", "select"): {"values": [1.0, 2.0], "step": 3, "explore": True},
     ("LinearSDNN", "values"): {"state": [0.1, 0.2], "dimension": 1},
     ("BareAgent", "act"): {"state": [0.1, 0.2], "explore": True},
     ("BareAgent", "learn"): {

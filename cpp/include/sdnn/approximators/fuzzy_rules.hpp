@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -83,12 +82,7 @@ class FuzzyRules {
 
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
-    archive.fixed("values", {self.n_rules_, self.n_actions()}, self.table_.span());
-    if constexpr (Archive::kReads) {
-      for (const float value : self.table_.span()) {
-        archive.expect(std::isfinite(value), "values", "finite");
-      }
-    }
+    archive.finite("values", {self.n_rules_, self.n_actions()}, self.table_.span());
   }
 
   /// Writes the rules that fire in `state`. Rule numbers are row-major in the sets (last input

@@ -131,13 +131,8 @@ class RBFNetwork {
 
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
-    archive.fixed("weights", {self.n_joint_bases_}, self.weights_.span());
-    if constexpr (Archive::kReads) {
-      ++self.n_updates_;
-      for (const double weight : self.weights()) {
-        archive.expect(std::isfinite(weight), "weights", "finite");
-      }
-    }
+    archive.finite("weights", {self.n_joint_bases_}, self.weights_.span());
+    if constexpr (Archive::kReads) ++self.n_updates_;
   }
 
   /// Writes Q(state, a) for every action. Shapes: state (d,) in [0, 1], out (n_actions,).

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -152,6 +153,11 @@ class StateWriter : public detail::Nested<StateWriter> {
     using T = std::remove_cvref_t<decltype(*values.data())>;
     add<T>(name, std::move(shape), {values.data(), values.size()});
   }
+  /// Adds an array of a known shape, whose numbers are finite.
+  template <class Values>
+  void finite(std::string_view name, std::vector<std::size_t> shape, const Values& values) {
+    fixed(name, std::move(shape), values);
+  }
 
   State state;
 
@@ -205,6 +211,11 @@ class StateReader : public detail::Nested<StateReader> {
   void fixed(std::string_view name, const std::vector<std::size_t>& shape, Values&& values) {
     using T = std::remove_cvref_t<decltype(*values.data())>;
     copy<T>(find<T>(name, shape), {values.data(), values.size()});
+  }
+  template <class Values>
+  void finite(std::string_view name, const std::vector<std::size_t>& shape, Values&& values) {
+    fixed(name, shape, values);
+    expect(std::ranges::all_of(values, [](double x) { return std::isfinite(x); }), name, "finite");
   }
 
   /// Number of parts called `name`.1, `name`.2 and so on.

@@ -132,24 +132,18 @@ class KernelWindow {
     archive.number("next", next);
     archive.number("n_replaced", n_replaced);
     archive.number("n_learned", self.n_learned_);
-    archive.fixed("middle", {n}, self.middle_);
-    archive.fixed("half_width", {n}, self.half_width_);
-    archive.fixed("inputs", {size, n}, self.inputs_);
-    archive.fixed("targets", {size, n_outputs}, self.targets_);
-    archive.fixed("inverse", {size, size}, self.inverse_);
-    archive.fixed("mean_sizes", {n_outputs}, self.mean_sizes_);
+    archive.finite("middle", {n}, self.middle_);
+    archive.finite("half_width", {n}, self.half_width_);
+    archive.finite("inputs", {size, n}, self.inputs_);
+    archive.finite("targets", {size, n_outputs}, self.targets_);
+    archive.finite("inverse", {size, size}, self.inverse_);
+    archive.finite("mean_sizes", {n_outputs}, self.mean_sizes_);
     if constexpr (Archive::kReads) {
       archive.expect(n_samples <= size, "n_samples", "at most capacity");
       archive.expect(next < size && (n_samples == size || next == n_samples), "next",
                      "the slot after the samples");
       archive.expect(self.n_learned_ >= 0.0 && self.n_learned_ <= detail::kSizeMemory, "n_learned",
                      "in [0, 100]");
-      archive.expect(core::are_finite(self.middle_), "middle", "finite");
-      archive.expect(core::are_finite(self.half_width_), "half_width", "finite");
-      archive.expect(core::are_finite(self.inputs_), "inputs", "finite");
-      archive.expect(core::are_finite(self.targets_), "targets", "finite");
-      archive.expect(core::are_finite(self.inverse_), "inverse", "finite");
-      archive.expect(core::are_finite(self.mean_sizes_), "mean_sizes", "finite");
       self.n_samples_ = static_cast<std::size_t>(n_samples);
       self.next_ = static_cast<std::size_t>(next);
       self.n_replaced_ = static_cast<std::size_t>(n_replaced);

@@ -128,16 +128,16 @@ class RecursiveLeastSquares {
   static void serialize(Self& self, Archive& archive) {
     const std::size_t n = self.n_inputs(), n_outputs = self.n_outputs(), n_columns = n + 1;
     archive.number("n_learned", self.n_learned_);
-    archive.fixed("low", {n}, self.low_);
-    archive.fixed("high", {n}, self.high_);
-    archive.fixed("middle", {n}, self.middle_);
-    archive.fixed("half_width", {n}, self.half_width_);
-    archive.fixed("covariance", {n_columns, n_columns}, self.covariance_);
-    archive.fixed("weights", {n_outputs, n_columns}, self.weights_);
-    archive.fixed("origins", {n_outputs}, self.origins_);
-    archive.fixed("lowest", {n_outputs}, self.lowest_);
-    archive.fixed("highest", {n_outputs}, self.highest_);
-    archive.fixed("mean_errors", {n_outputs}, self.mean_errors_);
+    archive.finite("low", {n}, self.low_);
+    archive.finite("high", {n}, self.high_);
+    archive.finite("middle", {n}, self.middle_);
+    archive.finite("half_width", {n}, self.half_width_);
+    archive.finite("covariance", {n_columns, n_columns}, self.covariance_);
+    archive.finite("weights", {n_outputs, n_columns}, self.weights_);
+    archive.finite("origins", {n_outputs}, self.origins_);
+    archive.finite("lowest", {n_outputs}, self.lowest_);
+    archive.finite("highest", {n_outputs}, self.highest_);
+    archive.finite("mean_errors", {n_outputs}, self.mean_errors_);
     if constexpr (Archive::kReads) {
       const auto expect_least = [&archive](const char* name, const std::vector<double>& values,
                                            const std::vector<double>& least) {
@@ -146,16 +146,6 @@ class RecursiveLeastSquares {
       };
       archive.expect(self.n_learned_ >= 0.0 && self.n_learned_ <= detail::kSizeMemory, "n_learned",
                      "in [0, 100]");
-      archive.expect(core::are_finite(self.low_), "low", "finite");
-      archive.expect(core::are_finite(self.high_), "high", "finite");
-      archive.expect(core::are_finite(self.middle_), "middle", "finite");
-      archive.expect(core::are_finite(self.half_width_), "half_width", "finite");
-      archive.expect(core::are_finite(self.covariance_), "covariance", "finite");
-      archive.expect(core::are_finite(self.weights_), "weights", "finite");
-      archive.expect(core::are_finite(self.origins_), "origins", "finite");
-      archive.expect(core::are_finite(self.lowest_), "lowest", "finite");
-      archive.expect(core::are_finite(self.highest_), "highest", "finite");
-      archive.expect(core::are_finite(self.mean_errors_), "mean_errors", "finite");
       expect_least("high", self.high_, self.low_);
       expect_least("half_width", self.half_width_, std::vector<double>(n));
       expect_least("highest", self.highest_, self.lowest_);

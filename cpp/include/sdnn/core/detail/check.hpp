@@ -46,11 +46,6 @@ void require_greater(std::string_view name, Value value, std::string_view other_
   require(false, name, expected.str(), value);
 }
 
-/// Throws std::invalid_argument unless `value` is a finite number greater than zero.
-inline void require_positive(std::string_view name, double value) {
-  require(std::isfinite(value) && value > 0.0, name, "a finite number greater than 0", value);
-}
-
 /// Throws std::invalid_argument unless `value` is a finite number.
 inline void require_finite(std::string_view name, double value) {
   require(std::isfinite(value), name, "finite", value);
