@@ -7,15 +7,15 @@ nothing. Needs Debian's compilers and an emulator: apt install gcc gcc-arm-linux
 qemu-user.
 
 usage: python bench/arm/learning.py [cartpole|pendulum|wheel] [--agent sdnn-c] [--ram BYTES]
-       [--keep EPISODES] [--emulate]
+       [--keep EPISODES | --keep-block EPISODES] [--starts SEED] [--widen SENSOR] [--emulate]
 """
 
 import argparse
+import dataclasses
 import math
 import re
 import subprocess
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 
 import gymnasium as gym
@@ -33,7 +33,7 @@ ARM = "arm-linux-gnueabihf-gcc"
 CHIP = ("-mthumb", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Task:
     """The ranges of a task's sensors, and its actions."""
 
@@ -115,19 +115,33 @@ def main():
     parser.add_argument("task", nargs="?", choices=TASKS, default="cartpole")
     parser.add_argument("--agent", choices=AGENTS, default="q-lambda")
     parser.add_argument("--ram", type=int, help="Bytes that SDNN-C may take.")
-    parser.add_argument(
+    keeping = parser.add_mutually_exclusive_group()
+    keeping.add_argument(
         "--keep",
         type=int,
         help="Keep the best policy, measured by so many greedy episodes each 2,000 steps.",
     )
+    keeping.add_argument(
+        "--keep-block", type=int, help="Keep the best policy by blocks of learned episodes."
+    )
+    parser.add_argument(
+        "--starts", type=int, default=1, help="Seed of the states in which episodes begin."
+    )
+    parser.add_argument("--widen", type=int, help="A sensor whose range is twice as wide.")
     parser.add_argument("--first-seed", type=int, default=1)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--emulate", action="store_true", help="Train in the emulator.")
     arguments = parser.parse_args()
     name, task, kind = arguments.task, TASKS[arguments.task], arguments.agent
-    options = ["-DFOLLOWS_PROGRESS"] if kind == "sdnn-c" else []
-    if arguments.keep:
-        options.append(f"-DKEEP_EPISODES={arguments.keep}")
+    options = [f"-DSTART={arguments.starts}"]
+    if kind == "sdnn-c":
+        options.append("-DFOLLOWS_PROGRESS")
+    if arguments.keep or arguments.keep_block:
+        options.append(f"-DKEEP_EPISODES={arguments.keep or 0}")
+        options.append(f"-DKEEP_BLOCK={arguments.keep_block or 1}")
+    if arguments.widen is not None:
+        high = [(1 + (i == arguments.widen)) * end for i, end in enumerate(task.high)]
+        task = dataclasses.replace(task, high=tuple(high))
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         plugin = folder / "instruction_count.so"
@@ -138,11 +152,13 @@ def main():
             agent = task.agent(seed, kind, arguments.ram)
             header = export_c_header(agent, folder / "pole.h", learning=True)
             native = [program(folder / "native", name, "gcc", *options)]
-            emulated = program(folder / "emulated", name, ARM, "-mthumb", "-static", *options)
+            is_last = seed == arguments.first_seed + arguments.seeds - 1
+            if arguments.emulate or is_last:
+                emulated = program(folder / "emulated", name, ARM, "-mthumb", "-static", *options)
             runner = ["qemu-arm", emulated] if arguments.emulate else native
             returns.append(float(output(*runner, task.n_steps, EPISODES)[0]))
             print(f"seed {seed}: {returns[-1]:.1f}", flush=True)
-        n_solved = sum(one >= task.solved for one in returns)
+        n_solved = sum(score >= task.solved for score in returns)
         print(f"{n_solved} of {arguments.seeds} reach {task.solved:g} after {task.n_steps:,} steps")
         print(f"{header.ram_bytes:,} bytes of memory, {header.flash_bytes:,} bytes of constants")
         flash, static, stacks = sizes(folder, name, *options)

@@ -366,14 +366,6 @@ def by_model(columns):
     return markdown(("model", *columns), rows)
 
 
-def coverages(results):
-    """Between which two shares, of problems' medians, the targets are covered."""
-    medians = [
-        np.median([row["coverage"] for row in results[problem, "SDNN"]]) for problem in REGRESSION
-    ]
-    return min(medians), max(medians)
-
-
 def draw(results, path):
     """A dot for each model and problem at the median, a bar over the middle 80 % of seeds."""
     figure = Figure(figsize=(10, 6.4), layout="constrained")
