@@ -34,4 +34,5 @@ __getattr__, __dir__, __all__ = attach(
         "sdnn.estimators": "SDNNClassifier SDNNKernelClassifier SDNNKernelRidge SDNNRegressor",
         "sdnn.support.machine": "instruction_set set_instruction_set",
     },
+    others="sdnn.agents sdnn.environments",
 )

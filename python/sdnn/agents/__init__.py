@@ -1,5 +1,7 @@
 """Agents: ``agent.train(env, steps=...)``, or ``act(observation)`` and ``learn(transition)``."""
 
+from typing import TYPE_CHECKING, Never
+
 from sdnn.agents.actor_critic import SDNNActorCritic
 from sdnn.agents.agent import Agent, load_agent
 from sdnn.agents.base import Preset
@@ -11,6 +13,7 @@ from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.scaling import Scaling
 from sdnn.config import ActorCriticConfig, FuzzyQLearningConfig, QLambdaConfig, QLearningConfig
+from sdnn.support.habits import error_of_name
 from sdnn.training.callbacks import (
     JSONLines,
     SaveBestAgent,
@@ -57,3 +60,8 @@ __all__ = [
     "learn_from",
     "load_agent",
 ]
+
+if not TYPE_CHECKING:  # type checkers would accept every name
+
+    def __getattr__(name: str) -> Never:
+        raise error_of_name(__name__, name, __all__)

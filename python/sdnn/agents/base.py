@@ -53,7 +53,7 @@ from sdnn.support.arguments import (
 )
 from sdnn.support.files import Arrays, Description, write_file
 from sdnn.training.files import CLASSES, Statistics
-from sdnn.training.interfaces import CoreParts, Transition, explained
+from sdnn.training.interfaces import Advised, CoreParts, Transition, explained
 
 _MOST_ENVIRONMENTS = 2**14
 
@@ -79,7 +79,7 @@ def presets_of(listed: Mapping[str, Any], **more: Mapping[str, Any]) -> Mapping[
     )
 
 
-class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
+class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
     """An agent that acts, learns and can be saved; `Agent` adds trainings and properties."""
 
     kind: ClassVar[str]
@@ -329,8 +329,9 @@ class BaseAgent(abc.ABC, Generic[Approximator, Learning]):
             If a weight would leave its range. Earlier transitions, or other dimensions of the
             action, may have been learned: load a checkpoint.
         """
+        parts = self._parts_of(transition, environment)
         self._check_environment(environment)
-        self._controller.learn(*self._parts_of(transition, environment))
+        self._controller.learn(*parts)
         self.warn_of_problems()
 
     def check(self, transition: Transition) -> None:

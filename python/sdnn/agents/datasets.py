@@ -18,7 +18,6 @@ from sdnn.agents.agent import Agent, AnyAgent
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.environments.types import Data, Info
 from sdnn.support.arguments import (
-    advice,
     argument_error,
     array_of,
     duration_of,
@@ -29,6 +28,7 @@ from sdnn.support.arguments import (
     whole,
 )
 from sdnn.support.files import open_regular
+from sdnn.support.habits import advice
 from sdnn.training.interfaces import Transition, explained
 
 _MOST_BYTES = 2**20

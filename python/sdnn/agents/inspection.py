@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from sdnn.agents.base import BaseAgent
 from sdnn.environments.types import Data, Element, Env, Mask, Space
-from sdnn.support.arguments import advice, require
+from sdnn.support.arguments import require
+from sdnn.support.habits import advice
 from sdnn.training.evaluation import greedy_episode
 
 Floats: TypeAlias = NDArray[np.float64]

@@ -20,6 +20,7 @@ from sdnn.agents.inspection import (
     named_inputs,
 )
 from sdnn.agents.state_maps import Replay, StateMap, map_of
+from sdnn.environments.space_kinds import require_same_kind
 from sdnn.environments.types import Elements, Env
 from sdnn.reports.plots import COLORS, FAINT, INK, Axes, Figure, color_of, new_figure, style
 from sdnn.support.arguments import require, seed_of
@@ -259,6 +260,7 @@ def states_of(agent: AnyAgent, source: Env | Elements, seed: int) -> Floats:
     """Return states met in an environment, or the observed variables of given observations."""
     seed_of(seed)
     if isinstance(source, gym.Env):
+        require_same_kind(agent, source, "source")
         return meet_states(agent, source, seed)
     is_list = isinstance(source, Sequence | np.ndarray) and not isinstance(source, str | bytes)
     require(is_list, "source", "be an environment or a list of observations", source, TypeError)

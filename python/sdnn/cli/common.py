@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 import click
 
 from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
-from sdnn.support.arguments import advice
+from sdnn.support.habits import advice
 
 if TYPE_CHECKING:
     from rich.console import Console

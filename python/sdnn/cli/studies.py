@@ -21,6 +21,7 @@ from sdnn.cli.common import (
     rendered,
 )
 from sdnn.reproduction.cases import MOST_EPISODES, WORDS
+from sdnn.support.arguments import blamed
 
 if TYPE_CHECKING:
     from sdnn.runs.engine import Executor
@@ -91,7 +92,11 @@ def study_command(make_study: Callable[..., Study]) -> Function:
                 executor = _make_executor(where, jobs, scheduler, scheduler_timeout)
                 study = make_study(**options)
             except ValueError as error:
-                raise click.UsageError(str(error)) from error
+                argument, problem = blamed(error)
+                parameters = click.get_current_context().command.params
+                is_option = any(f"--{argument}" in parameter.opts for parameter in parameters)
+                text = f"--{argument} {problem}" if is_option else str(error)
+                raise click.UsageError(text) from error
             if dry_run:
                 estimate = forecast(study, out, executor.jobs)
                 shown = {"out": out, "duration": duration_words, **estimate}

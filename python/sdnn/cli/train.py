@@ -24,7 +24,7 @@ from sdnn.cli.common import (
     value_of,
 )
 from sdnn.runs.errors import ConfigError
-from sdnn.support.arguments import advice
+from sdnn.support.habits import advice
 
 
 class SpecCommand(click.Command):

@@ -108,7 +108,16 @@ def _reports(source: Path | None, consent: Consent) -> Reports:
 
         return ReferenceReports(source)
     from sdnn.runs.certificates import CertifiedReports
+    from sdnn.runs.run import CONFIG
+    from sdnn.runs.store import STORE_NAME
 
+    if source.suffix != ".json" or source.name == CONFIG:
+        problem = f"SOURCE must be a folder, or a file .json or .csv, got {source}"
+        if (source.parent / STORE_NAME).exists():
+            problem = (
+                f"SOURCE must be the folder of results, got a file in it: give {source.parent}"
+            )
+        raise click.UsageError(problem)
     return CertifiedReports(source)
 
 

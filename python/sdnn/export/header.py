@@ -109,7 +109,7 @@ def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool)
     require(is_possible, "agent", expected, agent)
     expected = (
         "have ranges of observations that stay, not running ones, to learn in C: make it with"
-        " observation_range=(low, high)"
+        " observation_range=(low, high), or sdnn train --range LOW:HIGH"
     )
     require(not (learns and _follows_ranges(agent)), "agent", expected, agent)
     if isinstance(agent, SDNNQLearning):

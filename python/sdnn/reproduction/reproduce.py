@@ -40,7 +40,7 @@ from sdnn.runs.study import Comparison, Layer, Setting, Study, StudyCase, StudyV
 from sdnn.runs.study_file import StudyFile
 from sdnn.runs.sweep import Addition
 from sdnn.runs.trial import ROW_HEADER, trial_rows
-from sdnn.support.arguments import one_of, whole
+from sdnn.support.arguments import argument_error, one_of, whole
 from sdnn.support.csv_files import csv_bytes
 
 QUICK_TRIALS = 2
@@ -200,7 +200,8 @@ def _experiment_with_sensors(
     """Return experiment B with a single case; ValueError unless it alone is to be run."""
     if word != "b":
         name = "noise" if sensors is None else "sensors"
-        raise ValueError(f"{name} needs the experiment 'b' (sdnn reproduce b), got {word!r}")
+        problem = f"needs the experiment 'b' (sdnn reproduce b), got {word!r}"
+        raise argument_error(name, problem)
     case = case_of_sensors(
         4 if sensors is None else whole("sensors", sensors, 4, 6),
         SENSOR_NOISE if noise is None else noise,

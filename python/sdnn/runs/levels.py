@@ -15,7 +15,6 @@ import numpy as np
 from sdnn.environments.types import Element, Space
 from sdnn.runs.environment import EnvironmentSpec
 from sdnn.runs.errors import RunError
-from sdnn.support.arguments import advice
 from sdnn.training.evaluation import greedy_episode
 
 MAX_EPISODES, MAX_STEPS = 20, 10_000
@@ -51,8 +50,8 @@ def levels_of(
     known = baseline_names()
     for name in baselines:
         if name not in known:
-            hint = advice(name, known)
-            raise RunError(f"baseline must be one of {', '.join(known)}, got {name!r}: {hint}")
+            names = ", ".join(map(repr, known))
+            raise RunError(f"baseline must be one of {names}, got {name!r}")
     levels, notes = [], []
     for task, environment in tasks.items():
         lines = {} if plain else {

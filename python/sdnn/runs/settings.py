@@ -18,7 +18,8 @@ from msgspec import Meta
 from sdnn.agents.registry import AGENTS
 from sdnn.config import WARM_UP, ProtocolConfig, fields_of
 from sdnn.runs.errors import ConfigError
-from sdnn.support.arguments import advice, blamed, shown
+from sdnn.support.arguments import blamed, shown
+from sdnn.support.habits import advice
 
 Values: TypeAlias = dict[str, Any]
 """A table as JSON and TOML have it."""

@@ -37,7 +37,7 @@ from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.study import Comparison, Layer, Setting, Study, StudyCase, StudyVariant
 from sdnn.runs.sweep import Addition, study_content
-from sdnn.support.arguments import advice
+from sdnn.support.habits import advice
 from sdnn.support.toml import KeyPath, dotted
 
 DEFAULT = "default"

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import difflib
-import functools
-import inspect
 import os
 import reprlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from numbers import Integral, Real
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, SupportsFloat, TypeVar
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Member = TypeVar("Member")
-Called = TypeVar("Called", bound=Callable[..., Any])
 
 _REPR = reprlib.Repr()
 _REPR.maxstring = _REPR.maxother = _REPR.maxlong = 200
@@ -241,157 +236,3 @@ def has_methods(name: str, value: object, what: str, *methods: str) -> None:
     """Check that an argument has methods; TypeError that calls it ``what`` if not."""
     has_all = all(callable(getattr(value, method, None)) for method in methods)
     require(has_all and not isinstance(value, type), name, f"be {what}", value, TypeError)
-
-
-_NO_BATCHES = "each transition or sample is learned by itself: omit it"
-_NO_GRADIENT = "there is no gradient descent: omit it"
-_NO_POLICY = "there is no policy network: approximator and learning hold the settings"
-_FIRST = "the environment is first: SDNNQLambda(env), train(env, steps=...), evaluate(agent, env)"
-
-_MEANINGS: Mapping[tuple[str, ...], tuple[str, ...]] = {
-    ("gamma", "discount_factor", "discount_rate"): ("discount",),
-    ("alpha", "lr", "eta", "eta0", "step_size", "learning_rate_init"): (
-        "learning_rate", "learning_coefficient", "correction_share"),
-    ("learning_rate",): ("learning_coefficient", "correction_share"),
-    ("gae_lambda", "lam", "lambda_", "lamda", "trace_lambda"): ("trace_decay",),
-    ("eps", "start_e", "epsilon_start", "initial_epsilon", "exploration_initial_eps",
-     "exploration_rate"): ("epsilon",),
-    ("end_e", "epsilon_end", "epsilon_min", "min_epsilon", "exploration_final_eps"): (
-        "final_epsilon",),
-    ("epsilon_decay", "exploration_decay", "exploration_steps"): ("exploration_fraction",),
-    ("learning_starts", "random_steps", "burn_in"): ("warm_up_steps", "start_steps"),
-    ("n_step", "multi_step"): ("n_steps",),
-    ("total_timesteps", "timesteps", "n_timesteps", "num_timesteps", "total_steps", "max_steps",
-     "n_steps"): ("steps",),
-    ("n_episodes", "num_episodes", "max_episodes", "total_episodes"): ("episodes",),
-    ("n_eval_episodes", "eval_episodes", "num_eval_episodes"): ("evaluation_episodes", "episodes"),
-    ("eval_freq", "eval_every", "evaluation_frequency"): ("evaluate_every",),
-    ("eval_env",): ("evaluation_env",),
-    ("callback", "eval_callback", "log_interval"): ("callbacks",),
-    ("verbose", "progress_bar", "show_progress", "use_tqdm"): (
-        "progress", "a bar shows by itself in a terminal: omit it"),
-    ("tensorboard_log", "tb_log_name", "track"): (
-        "tensorboard", "train(env, callbacks=[TensorBoard(folder)])"),
-    ("save_freq", "checkpoint_freq", "save_every"): (
-        "checkpoint_every", "train(env, callbacks=[CheckpointCallback(...)])"),
-    ("random_seed", "rng", "seed", "random_state"): ("seed", "random_state"),
-    ("n_envs", "num_envs"): (
-        "n_envs", "train takes a vector environment: gymnasium.make_vec(id, num_envs=...)"),
-    ("env", "env_id", "gym_id", "environment"): ("environment", _FIRST),
-    ("algo", "algorithm", "model"): ("agent", "name"),
-    ("obs",): ("observation",),
-    ("deterministic",): ("act(observation, explore=False) acts greedily",),
-    ("reset_num_timesteps",): ("Training.load resumes a training that Training.save wrote",),
-    ("normalize", "norm_obs", "normalize_observations"): ("observation_range",),
-    ("save_path", "log_dir", "logdir", "save_dir", "output_dir"): ("out", "path"),
-    ("epochs", "n_epochs", "num_epochs", "nb_epoch", "n_iter"): ("max_iter", "epochs"),
-    ("patience", "max_no_improvement_evals"): ("n_iter_no_change", "max_evaluations"),
-    ("validation_split",): ("validation_fraction",),
-    ("bins", "num_bins", "n_tilings"): ("n_bins", "approximator"),
-    ("hidden_layer_sizes", "hidden_size", "hidden_units", "units"): (
-        "n_hidden_units", "n_pattern_units"),
-    ("policy", "policy_kwargs", "net_arch", "q_network", "features_extractor_class"): (_NO_POLICY,),
-    ("batch_size", "buffer_size", "train_freq", "train_frequency", "gradient_steps", "tau",
-     "target_update_interval", "target_network_frequency", "replay_buffer_class",
-     "replay_buffer_kwargs", "optimize_memory_usage"): (_NO_BATCHES,),
-    ("optimizer", "optimizer_class", "loss", "activation", "dropout", "ent_coef", "vf_coef",
-     "clip_range", "max_grad_norm", "normalize_advantage", "metrics", "solver"): (_NO_GRADIENT,),
-    ("device", "cuda", "gpu"): ("everything runs on the CPU: omit it",),
-}  # fmt: skip
-"""Names in other libraries, and the corresponding names or advice here, the best first.
-
-Stable-Baselines3, CleanRL, scikit-learn and Keras have them.
-"""
-HABITS = {habit: meaning for habits, meaning in _MEANINGS.items() for habit in habits}
-
-
-def advice(
-    name: str, possible: Iterable[str], elsewhere: Mapping[str, str] = MappingProxyType({})
-) -> str:
-    """Return a hint for an unknown name: a suggestion, and all possible names by similarity.
-
-    ``elsewhere`` has names that are possible in other places, and how they are written there.
-
-    >>> advice("gamma", ("epsilon", "discount"))
-    'did you mean discount? possible: discount, epsilon'
-    >>> advice("steps", ("seed",), {"steps": "budget.steps"})
-    'did you mean budget.steps? possible: seed'
-    """
-    known = tuple(possible)
-    word = name.strip("-").replace("-", "_").lower()
-    meanings = (word, *HABITS.get(word, ()))
-    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
-    near = [meaning for meaning in meanings if meaning in known] + near
-    hints = [meaning for meaning in meanings if meaning in known]
-    hints += [elsewhere[meaning] for meaning in meanings if meaning in elsewhere]
-    hints += difflib.get_close_matches(name, known, n=1, cutoff=0.7)
-    hints += map(elsewhere.__getitem__, difflib.get_close_matches(name, elsewhere, 1, 0.8))
-    sentence = next((meaning for meaning in meanings if " " in meaning), "")
-    hint = f"did you mean {hints[0]}? " if hints else f"{sentence}; " if sentence else ""
-    listed = ", ".join(dict.fromkeys([*near, *known]))
-    return f"{hint}possible: {listed}" if known else hint.strip("; ")
-
-
-def explains_names(
-    elsewhere: Callable[[Any], Mapping[str, str]] = lambda _: {},
-) -> Callable[[Called], Called]:
-    """Make a decorator that adds hints to the errors of calls with unknown arguments.
-
-    ``elsewhere`` maps the first argument of a call to names in other places, as in `advice`.
-
-    >>> @explains_names()
-    ... def wait(seconds):
-    ...     pass
-    >>> wait(second=1)
-    Traceback (most recent call last):
-    TypeError: second is no argument of wait: did you mean seconds? possible: seconds
-    """
-
-    def decorate(called: Called) -> Called:
-        if isinstance(called, type):
-            called.__init__ = decorate(called.__init__)  # type: ignore[misc]
-            return called
-
-        @functools.wraps(called)
-        def call(*arguments: Any, **options: Any) -> object:
-            try:
-                return called(*arguments, **options)
-            except TypeError as error:
-                if error.__traceback__ is None or error.__traceback__.tb_next is not None:
-                    raise  # the function itself raised the TypeError
-                first = arguments[0] if arguments else None
-                problem = _error_of_call(called, arguments, options, elsewhere(first))
-                if problem is None:
-                    raise
-                raise problem from None
-
-        return call  # type: ignore[return-value]
-
-    return decorate
-
-
-def _error_of_call(
-    called: Callable[..., object], arguments: tuple[object, ...], options: Mapping[str, object],
-    elsewhere: Mapping[str, str],
-) -> Exception | None:  # fmt: skip
-    """Return the error that explains why arguments do not fit a function; None if they fit."""
-    is_made = called.__name__ == "__init__"
-    who = type(arguments[0]).__name__ if is_made else called.__name__
-    try:
-        signature = inspect.signature(called)
-    except ValueError:  # in the core, a class has the signature, not its `__init__`
-        signature = inspect.signature(type(arguments[0]))
-        arguments = arguments[1:]
-    parameters = signature.parameters.values()
-    names = [p.name for p in parameters if p.kind is not inspect.Parameter.VAR_KEYWORD]
-    possible = [name for name in names if name not in ("self", "cls")]
-    if len(names) == len(parameters):
-        for name in options:
-            if name not in names:
-                problem = f"is no argument of {who}: {advice(name, possible, elsewhere)}"
-                return argument_error(name, problem, TypeError)
-    try:
-        signature.bind(*arguments, **options)
-    except TypeError as error:
-        return TypeError(f"{who}: {error}; possible: {', '.join(possible)}")
-    return None

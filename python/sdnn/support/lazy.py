@@ -8,12 +8,13 @@ from typing import Any
 
 
 def attach(
-    package: str, names: Mapping[str, str]
+    package: str, names: Mapping[str, str], others: str = ""
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """Make ``__getattr__``, ``__dir__`` and ``__all__`` of a package that imports names on demand.
 
     ``names`` has the names of each module, with spaces between them; those of the package are its
     modules. Type checkers read them in the stub beside the package, which a frozen program lacks.
+    Errors about a name that is in one of the packages ``others`` say so.
 
     Examples
     --------
@@ -25,7 +26,9 @@ def attach(
 
     def load(name: str) -> Any:
         if name not in modules:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+            from sdnn.support.habits import error_of_name
+
+            raise error_of_name(package, name, modules, others)
         if modules[name] == package:
             return import_module(f"{package}.{name}")
         return getattr(import_module(modules[name]), name)

@@ -15,6 +15,7 @@ from sdnn.support.arguments import path_of, real, require, whole
 from sdnn.support.files import naming, open_to_append, read_bytes, write_whole
 from sdnn.support.progress import ProgressBars
 from sdnn.training.files import MOST_IN_BLOCK, EpisodeBlock
+from sdnn.training.interfaces import explained
 from sdnn.training.loop import Row
 from sdnn.training.training import Callback, Training
 
@@ -26,6 +27,7 @@ SHOWN_AFTER = 5.0
 """Seconds of a training after which its bar appears."""
 
 
+@explained
 class JSONLines(Callback):
     """Writes each row as a line of JSON in a file; a resumed training removes later lines first."""
 
@@ -52,6 +54,7 @@ class JSONLines(Callback):
             self._file.close()
 
 
+@explained
 class StopTrainingOnRewardThreshold(Callback):
     """Stops when ``patience`` evaluations in a row reach a mean return."""
 
@@ -72,6 +75,7 @@ class StopTrainingOnRewardThreshold(Callback):
         return len(last) == self.patience and all(mean >= self.mean_return for mean in last)
 
 
+@explained
 class SaveBestAgent(Callback):
     """Saves the agent whenever it was better than ever before in this training.
 
@@ -107,6 +111,7 @@ class SaveBestAgent(Callback):
             training.agent.save(self.path)
 
 
+@explained
 class StopTrainingOnNoImprovement(Callback):
     """Stops after ``max_evaluations`` evaluations in a row without a new best mean return."""
 
@@ -233,6 +238,7 @@ class ProgressBarCallback(Callback):
             self._bars = None
 
 
+@explained
 class TensorBoard(Callback):
     """Writes the numbers of each row for TensorBoard; needs ``tensorboardX`` or ``torch``."""
 

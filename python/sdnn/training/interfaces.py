@@ -6,7 +6,7 @@ import abc
 import inspect
 import warnings
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn._core import Controller
 from sdnn.config import fields_of
 from sdnn.environments.types import Array, Data, Element, Elements, Mask, Masks
-from sdnn.support.arguments import explains_names
+from sdnn.support.habits import advice, explains_names
 
 Seeds: TypeAlias = Mapping[int, int | None]
 Options: TypeAlias = Data | None
@@ -150,6 +150,25 @@ def _spellings(agent: Any) -> Mapping[str, str]:
 
 explained = explains_names(_spellings)
 """Decorator for functions of agents: errors about unknown arguments say where these belong."""
+
+
+class Advised:
+    """An agent whose missing attributes are explained where other libraries have them."""
+
+    if not TYPE_CHECKING:  # type checkers would accept every name
+
+        def __getattr__(self, name: str) -> object:
+            kind = type(self)
+            if not name.startswith("_") and not hasattr(kind, name):
+                elsewhere = {
+                    field.name: f"{part}.{field.name}"
+                    for part in ("approximator", "learning")
+                    for field in fields_of(getattr(kind, f"{part}_type"))
+                }
+                elsewhere |= {known: known for known in dir(kind) if not known.startswith("_")}
+                if hint := advice(name, (), elsewhere):
+                    raise AttributeError(f"{kind.__name__} has no {name}: {hint}")
+            return object.__getattribute__(self, name)  # raises its own error
 
 
 def warn_of_endless_episode(n_steps: int) -> None:

@@ -365,6 +365,7 @@ class Training(TrainingLoop):
         ]
 
 
+@explained
 class CheckpointCallback(Callback):
     """Saves agent and training at regular steps; `Training.load` resumes from there exactly.
 

@@ -1,5 +1,6 @@
 """Conventions of Stable-Baselines3, callbacks, and representations of agents and results."""
 
+import importlib
 import inspect
 import re
 
@@ -11,10 +12,13 @@ from refusals import refuses
 from sdnn import SDNNRegressor
 from sdnn.agents import (
     Callback,
+    CheckpointCallback,
     QLambdaConfig,
     SaveBestAgent,
+    SDNNActorCritic,
     SDNNQLambda,
     StopTrainingOnNoImprovement,
+    StopTrainingOnRewardThreshold,
     Training,
     Transition,
     evaluate,
@@ -85,6 +89,8 @@ CALLS = {
     },
     Training: {"eval_env": "mean evaluation_env"}, evaluate: {"n_eval_episodes": "mean episodes"},
     learn_from: {"n_epochs": "mean epochs"}, load_agent: {"env": "SDNNQLambda(env)"},
+    CheckpointCallback: {"save_freq": "mean every"},
+    StopTrainingOnRewardThreshold: {"reward_threshold": "mean mean_return"},
     QLambdaConfig: {"gamma": "mean discount"}, SDNNRegressor: {"epochs": "mean max_iter"},
 }  # fmt: skip
 """Names that functions do not have, and what the error must have."""
@@ -96,6 +102,55 @@ def test_arguments_of_other_libraries_are_refused_with_the_right_name(trained, f
         with pytest.raises(TypeError, match=f"^{name} .*{re.escape(hint)}") as refused:
             function(*trained[:1], **{name: 1})
         assert refused.value.argument == name
+
+
+ATTRIBUTES = {
+    "gamma": "learning.discount", "exploration_rate": "epsilon", "num_timesteps": "n_steps",
+    "get_env": "train(env, steps=...)", "set_env": "evaluate(agent, env)", "policy": "approximator",
+    "evaluate_policy": "evaluate(agent, env", "device": "CPU", "save_replay_buffer": "by itself",
+    "logger": "TensorBoard(folder)", "set_parameters": "load_agent", "choose_action": "act",
+    "fit": "train", "set_random_seed": "seed=1", "n_envs": "n_environments",
+}  # fmt: skip
+"""Attributes that agents do not have, and what the error must have."""
+
+IMPORTS = {
+    "PPO": "SDNNQLambda(env)", "evaluate_policy": "evaluate", "EvalCallback": "evaluate_every=",
+    "make_vec_env": "gymnasium.make_vec", "VecNormalize": "observation_range", "Monitor": "returns",
+    "DummyVecEnv": "gymnasium.make_vec", "BaseCallback": "Callback", "set_random_seed": "seed=1",
+    "StopTrainingOnNoModelImprovement": "OnNoImprovement", "ActionMasker": "ActionMasks",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ATTRIBUTES)
+def test_attributes_of_other_libraries_are_refused_with_the_right_name(trained, name):
+    with pytest.raises(AttributeError, match=f"^SDNNQLambda has no {name}: ") as refused:
+        getattr(trained[0], name)
+    assert ATTRIBUTES[name] in str(refused.value)
+    assert not hasattr(trained[0], name)
+
+
+def test_unknown_attributes_and_those_that_raise_have_their_own_error(trained):
+    with pytest.raises(AttributeError, match="'SDNNQLambda' object has no attribute 'qwerty'"):
+        trained[0].qwerty  # noqa: B018
+    with pytest.raises(AttributeError, match="learns no values of actions"):
+        SDNNActorCritic(trained[1]).q_values  # noqa: B018
+
+
+@pytest.mark.parametrize("package", ["sdnn", "sdnn.agents"])
+def test_imports_of_other_libraries_are_refused_with_the_right_name(package):
+    for name, hint in IMPORTS.items():
+        with pytest.raises(ImportError, match=f"^{package} has no {name}: .*{re.escape(hint)}"):
+            exec(f"from {package} import {name}")
+        assert not hasattr(importlib.import_module(package), name)
+    with pytest.raises(ImportError, match=f"cannot import name 'qwerty' from '{package}'"):
+        exec(f"from {package} import qwerty")
+
+
+def test_names_of_other_packages_are_found_where_they_are_imported():
+    for name, package in (("load_agent", "agents"), ("ActionMasks", "environments")):
+        with pytest.raises(ImportError, match=f"did you mean from sdnn.{package} import {name}"):
+            exec(f"from sdnn import {name}")
+    exec("from sdnn import training")  # a package that is not imported yet, or no attribute
 
 
 def test_train_accepts_positional_steps_and_whole_floats(trained):

@@ -332,6 +332,7 @@ def test_agents_draw_figures_of_environments_and_observations(switching_agent, t
     assert titles == ["change of values", "change of greedy actions"]
     refuses("inputs", agent.plot_values, env, inputs=["none"])
     refuses("source", agent.plot_policy, observations[:1])
+    refuses("source", agent.plot_policy, gym.make("MountainCar-v0"))
 
 
 def test_agents_that_are_warming_up_cannot_be_inspected():

@@ -52,4 +52,7 @@ def test_command_prints_the_digest_of_the_rows(tmp_path):
 def test_sensors_need_experiment_b(word):
     result = reproduce(word, "--sensors", 5)
     assert result.exit_code == 2
-    assert f"sensors needs the experiment 'b' (sdnn reproduce b), got '{word}'" in result.output
+    assert (
+        f"Error: --sensors needs the experiment 'b' (sdnn reproduce b), got '{word}'"
+        in result.output
+    )

@@ -287,7 +287,7 @@ def test_plot_draws_goals_random_actions_and_baselines(invoke, refused, tmp_path
 
     assert levels() == ["goal", "random actions"]
     assert levels("--plain", "--baseline", "PPO", "--baseline", "RBFN") == ["PPO", "RBFN"]
-    assert "PPO" in refused("plot", "pole", "--baseline", "nobody", code=1)
+    assert "'PPO', 'SAC'" in refused("plot", "pole", "--baseline", "nobody", code=1)
 
 
 def test_plot_names_runs_without_rows(invoke, tmp_path):

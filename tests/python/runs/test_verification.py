@@ -322,6 +322,17 @@ def test_folders_without_finished_trials_are_refused(tmp_path, invoke, refused):
     assert "none" in refused("verify", "none", code=1)
 
 
+def test_files_of_a_folder_are_refused_with_its_name(tmp_path, refused, real_records):
+    folder = stored(tmp_path, real_records)
+    for name in ("results.sqlite", "config.json"):
+        (folder / name).touch()
+        assert f"give {folder}" in refused("verify", folder / name, code=2)
+    other = tmp_path / "other" / "rows.txt"
+    other.parent.mkdir()
+    other.touch()
+    assert "must be a folder, or a file .json or .csv" in refused("verify", other, code=2)
+
+
 def test_trials_of_too_many_decisions_are_not_run(tmp_path, real_records):
     record = replace(real_records[0], n_decisions=10**12)
     difference = only_difference(verify_folder(stored(tmp_path / "out", [record])))
