@@ -22,6 +22,7 @@ from sdnn.support.habits import advice
 from sdnn.training.evaluation import greedy_episode
 
 Floats: TypeAlias = NDArray[np.float64]
+Flags: TypeAlias = NDArray[np.bool_]
 AnyAgent: TypeAlias = BaseAgent[Any, Any]
 InputType: TypeAlias = Literal["variable", "circular", "angle", "symbol"]
 
@@ -162,15 +163,36 @@ def require_learned(agent: AnyAgent) -> None:
         )
 
 
+class States(NamedTuple):
+    """States that were met: rows of variables (n, n_variables).
+
+    ``allowed`` are the actions that a mask allowed in each, of all dimensions, (n, n_actions); None
+    without masks.
+    """
+
+    rows: Floats
+    allowed: Flags | None = None
+
+    def chosen(self, which: Any) -> States:
+        """Return the states of these numbers, or where flags are set."""
+        return States(self.rows[which], None if self.allowed is None else self.allowed[which])
+
+    def thinned(self, n_most: int) -> States:
+        """Return at most a number of states, evenly spaced."""
+        n = min(len(self.rows), n_most)
+        return self.chosen(np.linspace(0, len(self.rows) - 1, n).astype(np.int64))
+
+
 class Reading(NamedTuple):
     """The knowledge of an agent about states: a row for each state.
 
     ``action_values`` of all actions, or of the state where an agent has no values of actions,
-    (n, n_values); ``values`` of the best action (n,); ``actions``, the numbers of a greedy action,
-    (n, n_dimensions).
+    (n, n_values), and which of them are ``allowed``; ``values`` of the best action (n,);
+    ``actions``, the numbers of a greedy action, (n, n_dimensions).
     """
 
     action_values: Floats
+    allowed: Flags
     values: Floats
     actions: Floats
 
@@ -206,25 +228,38 @@ class Reader:
         """Begin a greedy episode: the next state counts as its first observation."""
         self.agent.begin_greedy_episode()
 
-    def value(self, state: Floats) -> float:
-        """Return the value of a state: that of its best action."""
-        return self._value_of(self._parts(state))
+    def value(self, state: Floats, mask: Flags | None = None) -> float:
+        """Return the value of a state: that of its best action, of those that a mask allows."""
+        return self._value_of(self._allowed_parts(self._parts(state), mask))
 
-    def read(self, states: Floats) -> Reading:
+    def read(self, states: States) -> Reading:
         """Read states, each as the first observation of an episode.
 
         Of several best actions it is the first, so that equal values give equal actions.
         """
         self.forget()
-        parts = [self._parts(state) for state in states]
+        all_parts = [self._parts(state) for state in states.rows]
+        masks = [None] * len(all_parts) if states.allowed is None else list(states.allowed)
+        parts = [self._allowed_parts(*pair) for pair in zip(all_parts, masks, strict=True)]
         values = np.array([self._value_of(of_state) for of_state in parts])
         if self._has_state_values:
-            actions = np.array([self._act(state) for state in states])
+            pairs = zip(states.rows, masks, strict=True)
+            actions = np.array([self._act(state, mask) for state, mask in pairs])
         else:
             best = ([int(np.argmax(part)) for part in of_state] for of_state in parts)
             numbers = [self._numbers_of(d) for d in range(self._n_dimensions)]
             actions = np.array([[n[i] for n, i in zip(numbers, row, strict=True)] for row in best])
-        return Reading(np.array([np.concatenate(of_state) for of_state in parts]), values, actions)
+        rows, allowed = (
+            np.array([np.concatenate(of_state) for of_state in read]) for read in (all_parts, parts)
+        )
+        return Reading(rows, np.isfinite(allowed), values, actions)
+
+    def _allowed_parts(self, parts: list[Floats], mask: Flags | None) -> list[Floats]:
+        """Return values of actions, those that a mask forbids as minus infinity."""
+        if mask is None or self._has_state_values:
+            return parts
+        masks = np.split(mask, np.cumsum(self._core.n_actions)[:-1])
+        return [np.where(flags, part, -np.inf) for flags, part in zip(masks, parts, strict=True)]
 
     def _parts(self, state: Floats) -> list[Floats]:
         """Return the values of all actions of each dimension, or what is known of the state."""
@@ -240,9 +275,10 @@ class Reader:
         n_actions = self._core.n_actions[dimension]
         return np.array([self._core.action_of(i, dimension) for i in range(n_actions)])
 
-    def _act(self, state: Floats) -> Floats:
+    def _act(self, state: Floats, mask: Flags | None) -> Floats:
         self.forget()
-        return np.ravel(self._core.act(state, False))
+        allowed = None if mask is None else mask.astype(np.uint8)
+        return np.ravel(self._core.act(state, False, 0, allowed))
 
 
 class WatchedAgent:
@@ -262,6 +298,7 @@ class WatchedAgent:
         self._agent, self._random_action, self._reader = agent, random_action, reader
         self.wrappers = agent.wrappers
         self.states: list[Floats] = []
+        self.masks: list[Flags | None] = []
         self.values: list[float] = []
         self.actions: list[Floats] = []
 
@@ -273,8 +310,10 @@ class WatchedAgent:
         """Return the action of the agent, or a random one, and note it."""
         state = self._agent.flat_observation(observation)
         self.states.append(state)
+        allowed = self._agent._actions.mask("mask", mask)
+        self.masks.append(None if allowed is None else allowed.astype(np.bool_))
         if self._reader is not None:
-            self.values.append(self._reader.value(state))
+            self.values.append(self._reader.value(state, self.masks[-1]))
         action = self._agent.act(observation, explore, mask=mask)
         random = self._random_action(mask)
         action = action if random is None else random
@@ -282,7 +321,7 @@ class WatchedAgent:
         return action
 
 
-def meet_states(agent: AnyAgent, env: Env, seed: int = 0, options: Data | None = None) -> Floats:
+def meet_states(agent: AnyAgent, env: Env, seed: int = 0, options: Data | None = None) -> States:
     """Run greedy episodes with a tenth of random actions, and return states that were met.
 
     At most `MOST_STATES` of `MOST_STEPS` steps, evenly spaced. Nothing is learned.
@@ -304,16 +343,11 @@ def meet_states(agent: AnyAgent, env: Env, seed: int = 0, options: Data | None =
             if len(watched.states) == MOST_STEPS:
                 break
         number += 1
-    rows = np.array(watched.states)
-    rows = rows[np.isfinite(rows).all(axis=1)]
-    require(len(rows) > 1, "env", "give observations without missing readings", env)
-    return thinned(rows, MOST_STATES)
-
-
-def thinned(states: Floats, n_most: int) -> Floats:
-    """Return at most a number of states, evenly spaced."""
-    n = min(len(states), n_most)
-    return np.asarray(states[np.linspace(0, len(states) - 1, n).astype(np.int64)])
+    masks = [mask for mask in watched.masks if mask is not None]
+    states = States(np.array(watched.states), np.array(masks) if masks else None)
+    states = states.chosen(np.isfinite(states.rows).all(axis=1))
+    require(len(states.rows) > 1, "env", "give observations without missing readings", env)
+    return states.thinned(MOST_STATES)
 
 
 @dataclass(frozen=True)
@@ -331,29 +365,33 @@ class Influence:
 
 
 def influences(
-    reader: Reader, states: Floats, inputs: Sequence[AgentInput], seed: int = 0
+    reader: Reader, states: States, inputs: Sequence[AgentInput], seed: int = 0
 ) -> list[Influence]:
     """Return the influence of each input, the largest first.
 
-    Inputs are sorted by the mean of both influences, each as a share of the largest one.
+    Each state keeps its mask. Inputs are sorted by the mean of both influences, each as a share of
+    the largest one.
     """
     generator = np.random.default_rng(seed)
     n_used = max(1, sum(agent_input.is_used for agent_input in inputs))
-    states = thinned(states, max(50, reader.most_reads // (N_SHUFFLES * n_used)))
+    states = states.thinned(max(50, reader.most_reads // (N_SHUFFLES * n_used)))
     before = reader.read(states)
-    spread = math.sqrt(2.0) * float(np.sqrt(before.action_values.var(axis=0).mean()))
+    known = before.allowed.any(axis=0)
+    variances = before.action_values[:, known].var(axis=0, where=before.allowed[:, known])
+    spread = math.sqrt(2.0) * float(np.sqrt(variances.mean()))
     measured = []
     for agent_input in inputs:
         on_values, on_actions = 0.0, 0.0
         for _ in range(N_SHUFFLES if agent_input.is_used else 0):
-            shuffled = states.copy()
-            order = generator.permutation(len(states))
+            shuffled = states.rows.copy()
+            order = generator.permutation(len(shuffled))
             columns = list(agent_input.columns)
-            shuffled[:, columns] = states[order][:, columns]
-            after = reader.read(shuffled)
+            shuffled[:, columns] = states.rows[order][:, columns]
+            after = reader.read(states._replace(rows=shuffled))
             change = after.action_values - before.action_values
             if spread > 0.0:
-                on_values += float(np.sqrt(np.square(change).mean())) / spread / N_SHUFFLES
+                mean_square = np.square(change).mean(where=before.allowed)
+                on_values += float(np.sqrt(mean_square)) / spread / N_SHUFFLES
             on_actions += _action_change(reader.agent, before.actions, after.actions)
         measured.append(Influence(agent_input, on_values, on_actions / N_SHUFFLES))
     largest = [

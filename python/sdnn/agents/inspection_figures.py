@@ -14,6 +14,7 @@ from sdnn.agents.inspection import (
     Floats,
     Influence,
     Reader,
+    States,
     influences,
     inputs_of,
     meet_states,
@@ -256,7 +257,7 @@ def plain(figure: Figure) -> Figure:
 # The functions behind `Agent.plot_values`, `plot_policy` and `plot_inputs`.
 
 
-def states_of(agent: AnyAgent, source: Env | Elements, seed: int) -> Floats:
+def states_of(agent: AnyAgent, source: Env | Elements, seed: int) -> States:
     """Return states met in an environment, or the observed variables of given observations."""
     seed_of(seed)
     if isinstance(source, gym.Env):
@@ -265,11 +266,11 @@ def states_of(agent: AnyAgent, source: Env | Elements, seed: int) -> Floats:
     is_list = isinstance(source, Sequence | np.ndarray) and not isinstance(source, str | bytes)
     require(is_list, "source", "be an environment or a list of observations", source, TypeError)
     try:
-        states = np.array([agent.flat_observation(observation) for observation in source])
+        rows = np.array([agent.flat_observation(observation) for observation in source])
     except (TypeError, ValueError) as error:
         raise type(error)(f"source: {error}") from error
-    require(len(states) > 1, "source", "be an environment or at least two observations", source)
-    return states
+    require(len(rows) > 1, "source", "be an environment or at least two observations", source)
+    return States(rows)
 
 
 def map_for(
@@ -282,7 +283,7 @@ def map_for(
     states = states_of(agent, source, seed)
     if chosen is None:
         chosen = [i.input for i in influences(reader, states, inputs, seed) if i.input.is_used][:2]
-    return reader, map_of(reader, states, chosen, inputs), states
+    return reader, map_of(reader, states, chosen, inputs), states.rows
 
 
 def plot_values(

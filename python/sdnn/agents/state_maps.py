@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdnn.agents.inspection import MOST_STEPS, AgentInput, Floats, Reader, WatchedAgent
+from sdnn.agents.inspection import (
+    MOST_STEPS,
+    AgentInput,
+    Flags,
+    Floats,
+    Reader,
+    States,
+    WatchedAgent,
+)
 from sdnn.environments.types import Data, Env
 from sdnn.training.evaluation import greedy_episode
 
@@ -32,27 +40,29 @@ N_ON_MAP, N_ON_CURVE = 49, 301
 
 
 def map_of(
-    reader: Reader, states: Floats, chosen: Sequence[AgentInput], inputs: Sequence[AgentInput]
+    reader: Reader, states: States, chosen: Sequence[AgentInput], inputs: Sequence[AgentInput]
 ) -> StateMap:
     """Return values and actions over one or two chosen inputs, the others as typical of the states.
 
-    A numeric axis covers the states met, a symbolic one the symbols met.
+    A numeric axis covers the states met, a symbolic one the symbols met. With masks, values and
+    actions are those of actions that were allowed in the nearest state met.
     """
     n_points = N_ON_CURVE if len(chosen) == 1 else N_ON_MAP
-    axes = tuple(_axis(agent_input, states, n_points) for agent_input in chosen)
+    met = states.rows
+    axes = tuple(_axis(agent_input, met, n_points) for agent_input in chosen)
     grids = np.meshgrid(*axes)
     shape = grids[0].shape
-    rows = np.repeat(states[:1], grids[0].size, axis=0)
+    rows = np.repeat(met[:1], grids[0].size, axis=0)
     typical = {}
     for agent_input in inputs:
         if agent_input not in chosen:
-            number = agent_input.typical(states)
+            number = agent_input.typical(met)
             agent_input.place(rows, np.full(len(rows), number))
             if agent_input.is_used:
                 typical[agent_input.name] = number
     for agent_input, grid in zip(chosen, grids, strict=True):
         agent_input.place(rows, grid.ravel())
-    reading = reader.read(rows)
+    reading = reader.read(States(rows, _allowed_on(axes, chosen, states)))
     return StateMap(
         tuple(chosen),
         axes,
@@ -60,6 +70,27 @@ def map_of(
         reading.actions.reshape(*shape, -1),
         typical,
     )
+
+
+def _allowed_on(
+    axes: Sequence[Floats], chosen: Sequence[AgentInput], states: States
+) -> Flags | None:
+    """Return which actions are allowed at the points of a map: those of the nearest state met."""
+    if states.allowed is None:
+        return None
+    numbers = [agent_input.numbers(states.rows) for agent_input in chosen]
+    shape = tuple(len(axis) for axis in reversed(axes))
+    least, nearest = np.full(shape, np.inf), np.zeros(shape, np.int64)
+    for state in range(len(states.rows)):
+        distance = np.zeros(shape)
+        for i, (axis, agent_input) in enumerate(zip(axes, chosen, strict=True)):
+            away = np.abs(axis - numbers[i][state]) / max(np.ptp(axis), 1e-300)
+            if agent_input.has_symbols:
+                away = (away > 0.0) * 2.0  # symbols have no order, and are all equally apart
+            distance += np.square(away).reshape(-1, *[1] * i)
+        is_nearer = distance < least
+        least[is_nearer], nearest[is_nearer] = distance[is_nearer], state
+    return states.allowed[nearest.ravel()]
 
 
 def _axis(agent_input: AgentInput, states: Floats, n_points: int) -> Floats:

@@ -20,6 +20,7 @@ from sdnn.agents.inspection import (
     Floats,
     Influence,
     Reader,
+    States,
     influences,
     inputs_of,
     meet_states,
@@ -64,6 +65,7 @@ class Inspection:
     agent: AnyAgent
     value_name: str
     states: Floats
+    has_masks: bool
     inputs: Sequence[AgentInput]
     influences: Sequence[Influence]
     state_map: StateMap
@@ -91,6 +93,11 @@ class Inspection:
         others = ", ".join(f"{n} = {x:.4g}" for n, x in self.state_map.typical.items())
         notes = [f"Other inputs are at their median: {others}."] if others else []
         notes.append("Dots and ticks are states that were met; values elsewhere are extrapolated.")
+        if self.has_masks:
+            notes.append(
+                "Values and actions are those of actions that a mask allowed in the nearest state"
+                " that was met."
+            )
         if self.agent.history != "none":
             notes.append(
                 f"States have a history ({self.agent.history}): each state counts as the first"
@@ -230,10 +237,6 @@ class Inspection:
     def warnings(self) -> list[str]:
         """Return what may be wrong, a sentence each."""
         texts = [*self._warnings_of_values(), *self._warnings_of_ranges()]
-        if self.run.spec.environment.action_masks:
-            texts.append(
-                "Values, the map and influences consider all actions: they know no action masks."
-            )
         evaluations = [row["mean_return"] for row in self.rows if row["kind"] == "evaluation"]
         if len(evaluations) > 2:
             last, best, worst = evaluations[-1], max(evaluations), min(evaluations)
@@ -376,7 +379,8 @@ def inspect_run(
         run=run,
         agent=agent,
         value_name=reader.value_name,
-        states=states,
+        states=states.rows,
+        has_masks=states.allowed is not None,
         inputs=inputs,
         influences=measured,
         state_map=state_map,
@@ -386,7 +390,7 @@ def inspect_run(
     )
 
 
-def _states(agent: AnyAgent, env: Env, root: int, options: Data | None) -> Floats:
+def _states(agent: AnyAgent, env: Env, root: int, options: Data | None) -> States:
     try:
         return meet_states(agent, env, root % 2**32, options)
     except ValueError as error:

@@ -26,6 +26,7 @@ from sdnn.agents.inspection import (
 )
 from sdnn.agents.schedules import schedule_of
 from sdnn.agents.state_maps import map_of, replay
+from sdnn.environments import ActionMasks
 from sdnn.training.training import Callback
 
 FIXED = {"inputs": "all", "angle_pairs": "none", "history": "none"}
@@ -96,7 +97,7 @@ def test_the_policy_switches_where_the_optimal_one_does(switching_agent):
     right = over_two.actions[..., 0] == (over_two.axes[1] > SWITCH)[:, np.newaxis]
     assert right.mean() > 0.9
     assert over_two.typical.keys() == {"observation 2"}
-    assert over_two.typical["observation 2"] == pytest.approx(np.median(states[:, 2]))
+    assert over_two.typical["observation 2"] == pytest.approx(np.median(states.rows[:, 2]))
 
 
 def test_symbols_of_a_dictionary_that_decide_are_found():
@@ -147,7 +148,7 @@ def test_an_angle_is_one_input_in_degrees():
     assert (degrees[0], degrees[-1]) == (-180.0, 180.0)
     assert (actions[(degrees > 20) & (degrees < 160)] == 1.0).mean() > 0.9
     assert (actions[(degrees > -160) & (degrees < -20)] == 0.0).mean() > 0.9
-    placed = states[:3].copy()
+    placed = states.rows[:3].copy()
     angle.place(placed, np.array([90.0, -90.0, 180.0]))
     np.testing.assert_allclose(placed[:, :2], [[0, 1], [0, -1], [-1, 0]], atol=1e-12)
     np.testing.assert_allclose(angle.numbers(placed), [90.0, -90.0, 180.0])
@@ -161,9 +162,11 @@ def test_readings_are_those_of_the_agents_methods(agent_class):
     more = {} if agent_class in (RBFQLearning, FuzzyQLearning) else FIXED
     agent = agent_class(env, seed=1, **more)
     agent.train(env, steps=600)
-    states = meet_states(agent, env)[:20]
+    states = meet_states(agent, env).thinned(20)
     reading = Reader(agent).read(states)
-    for state, values, value, action in zip(states, *reading, strict=True):
+    assert reading.allowed.all()
+    columns = states.rows, reading.action_values, reading.values, reading.actions
+    for state, values, value, action in zip(*columns, strict=True):
         state = state.astype(np.float32)
         agent.begin_greedy_episode()
         if hasattr(agent, "value"):
@@ -255,7 +258,7 @@ def test_missing_readings_are_left_out_of_the_states_met():
     agent = SDNNQLambda(env, seed=1, missing="code")
     agent.train(env, steps=2000)
     states = meet_states(agent, env)
-    assert np.isfinite(states).all()
+    assert np.isfinite(states.rows).all()
     assert np.isnan(replay(Reader(agent), env).states).any()
 
 
@@ -333,6 +336,68 @@ def test_agents_draw_figures_of_environments_and_observations(switching_agent, t
     refuses("inputs", agent.plot_values, env, inputs=["none"])
     refuses("source", agent.plot_policy, observations[:1])
     refuses("source", agent.plot_policy, gym.make("MountainCar-v0"))
+
+
+class Doors(gym.Env):
+    """Action i is allowed where observation 0 has i or more thirds; the last one is the best."""
+
+    observation_space, action_space = box(2), gym.spaces.Discrete(3)
+
+    def __init__(self):
+        self.metadata = {"action_masks": True}
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self._meet()
+
+    def step(self, action):
+        assert action < self._n_allowed
+        observation, info = self._meet()
+        return observation, float(action), True, False, info
+
+    def _meet(self):
+        observation = self.np_random.uniform(-1.0, 1.0, 2).astype(np.float32)
+        self._n_allowed = 1 + int((observation[0] + 1.0) * 1.5)
+        return observation, {"action_mask": np.arange(3) < self._n_allowed}
+
+
+@pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNQLearning, SDNNActorCritic])
+def test_masked_actions_are_in_no_map_and_no_greedy_episode(agent_class):
+    env = Doors()
+    agent = agent_class(env, seed=1, inputs="all", angle_pairs="none", warm_up_steps=100)
+    agent.train(env, steps=3000)
+    reader, inputs = Reader(agent), inputs_of(agent)
+    states = meet_states(agent, env)
+    n_allowed = 1 + ((states.rows[:, 0] + 1.0) * 1.5).astype(int)
+    np.testing.assert_array_equal(states.allowed.sum(axis=1), n_allowed)
+    read = reader.read(states)
+    assert (read.actions[:, 0] < n_allowed).all()
+    assert (reader.read(states._replace(allowed=None)).actions[:, 0] >= n_allowed).any()
+    for state, value, mask in zip(states.rows, read.values, states.allowed, strict=True):
+        assert reader.value(state, mask) == value
+    over_one = map_of(reader, states, [inputs[0]], inputs)
+    at = over_one.axes[0]
+    numbers = states.rows[:, 0]
+    is_met = np.abs(at[:, None] - numbers).min(axis=1) < (at[1] - at[0]) / 2
+    possible = 1 + ((at + (at[1] - at[0]) / 2 + 1.0) * 1.5).astype(int)
+    assert is_met.mean() > 0.5
+    assert (over_one.actions[:, 0] < possible)[is_met].all()
+    over_two = map_of(reader, states, inputs[:2], inputs)
+    assert over_two.actions.shape == (49, 49, 1)
+    for influence in influences(reader, states, inputs):
+        assert np.isfinite([influence.on_values, influence.on_actions]).all()
+    assert replay(reader, env, 3).actions.shape == (1, 1)
+
+
+def test_masks_are_kept_at_the_symbols_where_they_hold():
+    name = max(name for name in gym.registry if name.startswith("Taxi-v"))
+    env = ActionMasks(gym.make(name))
+    agent = SDNNQLambda(env, seed=1)
+    agent.train(env, steps=3000)
+    inputs = inputs_of(agent)
+    over_symbols = map_of(Reader(agent), meet_states(agent, env), inputs, inputs)
+    for symbol, action in zip(over_symbols.axes[0], over_symbols.actions[:, 0], strict=True):
+        assert env.unwrapped.action_mask(int(symbol))[int(action)] == 1
 
 
 def test_agents_that_are_warming_up_cannot_be_inspected():

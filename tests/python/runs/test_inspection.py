@@ -170,13 +170,16 @@ def test_warnings_name_narrow_use_and_collapse(trained, monkeypatch):
     assert any("rounded" in text for text in rounded.warnings())
 
 
-def test_constant_inputs_and_masks_are_said(trained):
+def test_constant_inputs_are_said_and_masked_actions_left_out(trained):
     masks = ("--set", "environment.action_masks=true", "--set", "agent.inputs=all")
     inspection = inspect_run(Run.open(trained("tests/Masked-v0", *masks, steps=1500)))
     warnings = inspection.warnings()
     assert "observation 1 is constant: the agent can do without it." in warnings
     assert not any("uses only" in text for text in warnings)
-    assert any("no action masks" in text for text in warnings)
+    assert not any("mask" in text for text in warnings)
+    assert set(np.unique(inspection.state_map.actions)) <= {0.0, 1.0}
+    assert set(np.unique(inspection.episode.actions)) <= {0.0, 1.0}
+    assert "a mask allowed in the nearest state" in inspection.page().to_html("")
     table = inspection.input_table()
     met = {row[0]: row[table.header.index("met")] for row in table.rows}
     assert met["observation 1"] == "0.25"
