@@ -6,6 +6,7 @@ window, backend or style of the user's session is touched.
 
 from __future__ import annotations
 
+import textwrap
 from io import BytesIO
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -22,8 +23,9 @@ COLORS = (
     "#1f5a96", "#c2542d", "#3c7d4b", "#7a5195", "#8a6d1d", "#4a4a4a",
     "#2a9d9d", "#c65b8e", "#7fa328", "#9b3d3d",
 )  # fmt: skip
-NARROW_DPI = 144
-"""Resolution of figures for telephones, which are 5.4 inches wide: two pixels for each of 390."""
+NARROW_WIDTH, NARROW_DPI = 5.4, 144
+"""Inches and resolution of figures for telephones: two pixels for each of 390."""
+_NARROW_FOOTER = 100  # characters of a line below a narrow figure
 
 INK, FAINT, GRID = "#2b2b2b", "#6f6f6f", "#e4e4e4"
 
@@ -89,3 +91,8 @@ def label(figure: Figure, title: str, below: str, footer: str, color: str = FAIN
     figure.supxlabel(footer, x=0.012, ha="left", fontsize=6.5, color=FAINT, linespacing=1.4)
     for text in figure.findobj(Text):
         text.set_parse_math(False)
+
+
+def wrapped(text: str, n_characters: int = _NARROW_FOOTER) -> str:
+    """Break the lines of a text so that they fit a narrow figure, its footer by default."""
+    return "\n".join(textwrap.fill(line, n_characters) for line in text.splitlines())

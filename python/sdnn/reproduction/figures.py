@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 
 import numpy as np
 
-from sdnn.reports.plots import FAINT, INK, Axes, Figure, color_of, label, new_figure, style
+from sdnn.reports.plots import (
+    FAINT,
+    INK,
+    NARROW_WIDTH,
+    Axes,
+    Figure,
+    color_of,
+    label,
+    new_figure,
+    style,
+    wrapped,
+)
 from sdnn.reproduction.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.reproduction.cost import SERIES, CostRecord
 from sdnn.runs.figures import SMOOTHED_TESTS, agent_colors, draw_steps
@@ -17,7 +27,6 @@ MAX_STEPS = 50  # an episode's limit: the upper end of the steps axis
 LONG_EPISODES = 2_000  # from this number of learning episodes on, running medians are drawn
 _PANEL_HEIGHT = 3.3
 _WARNING_COLOR = "#a31515"
-_NARROW_FOOTER = 100  # characters of a line below a narrow figure
 _MARKERS = ("o", "s", "^", "v")
 
 
@@ -78,7 +87,7 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False, narrow: bool 
     what SDNN-C needs with 4 inputs by its number of columns. With `narrow` the legend is above the
     panel, for telephones.
     """
-    figure = new_figure(5.4, 6.2) if narrow else new_figure(9.4, 4.7)
+    figure = new_figure(NARROW_WIDTH, 6.2) if narrow else new_figure(9.4, 4.7)
     axes = figure.add_subplot()
     colors = [color_of(place) for place in range(len(SERIES))]
     for number, series in enumerate(SERIES):
@@ -119,7 +128,7 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False, narrow: bool 
         f" transition to it.\nsdnn {costs[0].version}; {machines}; one thread."
     )
     if narrow:
-        footer = _wrapped(footer)
+        footer = wrapped(footer)
     figure.supxlabel(footer, x=0.012, ha="left", fontsize=6.5, color=FAINT, linespacing=1.4)
     return figure
 
@@ -129,11 +138,6 @@ def _watermark(axes: Axes) -> None:
         0.5, 0.6, "quick", transform=axes.transAxes, ha="center", va="center",
         fontsize=44, color=_WARNING_COLOR, alpha=0.13, weight="bold", zorder=0,
     )  # fmt: skip
-
-
-def _wrapped(text: str) -> str:
-    """Break the lines of a footer so that they fit a narrow figure."""
-    return "\n".join(textwrap.fill(line, _NARROW_FOOTER) for line in text.splitlines())
 
 
 def _label(
@@ -164,4 +168,4 @@ def _label(
     versions = ", ".join(sorted({record.version for r in results for record in r.records}))
     footer = f"{lines_are} {scale} per case and agent.\nsdnn {versions}; configuration "
     footer += ",\n".join(lines)
-    label(figure, title, below, _wrapped(footer) if narrow else footer, _WARNING_COLOR)
+    label(figure, title, below, wrapped(footer) if narrow else footer, _WARNING_COLOR)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from sdnn.reports.plots import FAINT, INK, Axes, Figure, color_of, new_figure, style
+from sdnn.reports.plots import FAINT, INK, Axes, Figure, color_of, new_figure, style, wrapped
 from sdnn.runs.environment import EnvironmentSpec
 from sdnn.runs.errors import RunError
 from sdnn.runs.levels import Level
@@ -275,6 +275,7 @@ _LABELS = {
     "running median": f"running median of {WINDOW} episodes",
     "evaluation": "mean of greedy episodes",
 }
+_WIDTH = 6.0  # inches, so that texts can be read on a telephone
 _LABEL_HEIGHT = 0.055  # of the labels of levels, in parts of a panel
 _MANY_POINTS = 20_000  # from this number on, points are drawn as a picture, also in SVG and PDF
 
@@ -289,7 +290,7 @@ def draw_curves(curves: Sequence[Curve], levels: Sequence[Level] = ()) -> Figure
     tasks = list(dict.fromkeys(curve.task for curve in curves))
     agents = list(dict.fromkeys(curve.agent for curve in curves))
     colors = {agent: color_of(place) for place, agent in enumerate(agents)}
-    figure = new_figure(7.5, 0.9 + 3.3 * len(tasks))
+    figure = new_figure(_WIDTH, 0.9 + 3.3 * len(tasks))
     panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
     for task, axes in zip(tasks, panels, strict=True):
         for curve in (c for c in curves if c.task == task):
@@ -302,12 +303,12 @@ def draw_curves(curves: Sequence[Curve], levels: Sequence[Level] = ()) -> Figure
         style(axes)
     panels[-1].set_xlabel("steps")
     entries = _legend_entries(curves, colors if len(agents) > 1 else {})
-    figure.legend(handles=entries, loc="outside upper left", ncols=3, fontsize=9, frameon=False)
+    figure.legend(handles=entries, loc="outside upper left", ncols=2, fontsize=9, frameon=False)
     footer = "Bands: quartiles over the episodes of an evaluation."
     if any(curve.n_runs > 1 for curve in curves):
         footer = "Lines: medians over runs that differ in their seeds; bands: quartiles over them"
         footer += " (of a single run: over the episodes of an evaluation)."
-    figure.supxlabel(footer, x=0.012, ha="left", fontsize=7.5, color=FAINT)
+    figure.supxlabel(wrapped(footer, 90), x=0.012, ha="left", fontsize=7.5, color=FAINT)
     return figure
 
 

@@ -8,7 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.registry import labels, title_of
-from sdnn.reports.plots import FAINT, INK, Axes, Figure, color_of, label, new_figure, style
+from sdnn.reports.plots import (
+    FAINT,
+    INK,
+    NARROW_WIDTH,
+    Axes,
+    Figure,
+    color_of,
+    label,
+    new_figure,
+    style,
+    wrapped,
+)
 from sdnn.reports.statistics import estimate_mean, running_median
 from sdnn.runs.results import CaseResult, MeasureName
 from sdnn.runs.study import Comparison, Measured
@@ -60,39 +71,40 @@ def draw_steps(
     style(axes)
 
 
-def draw_study(comparison: Comparison, footer: str) -> Figure:
+def draw_study(comparison: Comparison, footer: str, *, narrow: bool = False) -> Figure:
     """Draw a study: for each case two panels, one below the other, with a line for each variant.
 
     Faint dots are trials, since outcomes often lie in two heaps; a large dot is their median, of
     shares their mean, and a bar its interval. It is filled for the reference and where a variant
     differs from it. Censored values are at the last episode. The footer names the source of the
-    rows.
+    rows. With `narrow` all panels are in one column, for telephones.
     """
     cases = comparison.cases
-    n_columns = min(len(cases), CASES_PER_ROW)
-    n_rows = 2 * -(-len(cases) // CASES_PER_ROW)
+    n_columns = 1 if narrow else min(len(cases), CASES_PER_ROW)
+    n_rows = 2 * -(-len(cases) // n_columns)
     names = 0.3 + 0.072 * max(len(variant.title) for variant in comparison.variants)
-    width = max(6.4, names + n_columns * _PANEL_WIDTH)
+    width = NARROW_WIDTH if narrow else max(6.4, names + n_columns * _PANEL_WIDTH)
     panel_height = 1.0 + _LINE_HEIGHT * len(comparison.variants)
     figure = new_figure(width, 1.2 + n_rows * panel_height)
     grid = figure.subplots(n_rows, n_columns, squeeze=False)
     for axes in grid.ravel():
         axes.set_visible(False)
     for place, case in enumerate(cases):
-        row, column = divmod(place, CASES_PER_ROW)
+        row, column = divmod(place, n_columns)
         pair = grid[2 * row : 2 * row + 2, column]
         _draw_case(pair, comparison, case.id, with_names=column == 0)
         pair[0].set_title(case.title, fontsize=9, loc="left", color=INK)
     study = comparison.study
-    label(
-        figure,
-        study.title,
-        f"{study.n_trials} trials per case and variant; compared with {study.reference} (dotted)",
+    below = (
+        f"{study.n_trials} trials per case and variant; compared with {study.reference} (dotted)"
+    )
+    text = (
         "Faint dots: trials. Large dot: their median (of the share solved: mean) with its 95 %"
         " interval; filled: the reference, and what\ndiffers from it trial by trial (the interval"
         " of the mean paired difference leaves 0 out)."
-        f" Numbers at the right: trials that end solved.\n{footer}",
+        f" Numbers at the right: trials that end solved.\n{footer}"
     )
+    label(figure, study.title, below, wrapped(text.replace("what\n", "what ")) if narrow else text)
     return figure
 
 

@@ -11,7 +11,7 @@ from typing import TypeAlias
 from sdnn import _core
 from sdnn.agents.registry import title_of
 from sdnn.reports.pages import Page, Section, Table
-from sdnn.reports.plots import figure_bytes
+from sdnn.reports.plots import NARROW_DPI, figure_bytes, png_bytes
 from sdnn.runs.engine import Executor, Observer, PlannedTrial, run_trials
 from sdnn.runs.errors import RunError
 from sdnn.runs.figures import draw_study
@@ -185,6 +185,7 @@ def study_content(comparison: Comparison, addition: Addition) -> Content | None:
     digest, source = records_digest(comparison.records), comparison.study.source
     footer = f"{source}; sdnn {_core.__version__}; digest of the rows {digest[:16]}"
     png, svg = figure_bytes(draw_study(comparison, footer))
+    narrow = png_bytes(draw_study(comparison, footer, narrow=True), NARROW_DPI)
     # Equal variants repeat their test episodes here.
     tests = (
         (variant, *row)
@@ -192,7 +193,7 @@ def study_content(comparison: Comparison, addition: Addition) -> Content | None:
         for row in trial_rows(measured.result.records)
     )
     return Content(
-        page=study_page(comparison, digest, addition, svg),
+        page=study_page(comparison, digest, addition, svg, narrow),
         table=study_json(comparison, digest, addition),
         files={
             "figure.png": png,
@@ -204,8 +205,10 @@ def study_content(comparison: Comparison, addition: Addition) -> Content | None:
     )
 
 
-def study_page(comparison: Comparison, digest: str, addition: Addition, picture: bytes) -> Page:
-    """Return the page of a study, with the digest of its rows and the SVG of its figure."""
+def study_page(
+    comparison: Comparison, digest: str, addition: Addition, picture: bytes, narrow: bytes = b""
+) -> Page:
+    """Return the page of a study, with the digest of its rows and its figures, SVG and PNG."""
     study = comparison.study
     n_all, n_measured = len(study.combinations), len(comparison.measured)
     counts = {"variant": study.variants, "case": study.cases, "trial": range(study.n_trials)}
@@ -227,7 +230,7 @@ def study_page(comparison: Comparison, digest: str, addition: Addition, picture:
         intro=f"{variants} in {cases}, {trials} each; reference: {study.reference}.",
         warnings=[missing] if n_measured < n_all else [],
         sections=[
-            Section(title="At a glance", picture=picture, alt=alt),
+            Section(title="At a glance", picture=picture, narrow_picture=narrow, alt=alt),
             *addition[0],
             *_case_sections(comparison),
             _measures_section(comparison),

@@ -382,6 +382,18 @@ def test_the_figure_shows_every_trial_and_is_reproducible(mixed):
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["a", "b", "c"]
 
 
+def test_a_narrow_figure_has_its_panels_and_names_below_each_other(mixed):
+    figure = draw_study(mixed, "footer", narrow=True)
+    figure.draw_without_rendering()
+    edges = [(axes.get_position().x0, axes.get_position().y1) for axes in figure.axes]
+    assert len({round(left, 3) for left, _ in edges}) == 1
+    assert [top for _, top in edges] == sorted((top for _, top in edges), reverse=True)
+    for axes in figure.axes:
+        assert [label.get_text() for label in axes.get_yticklabels()] == ["a", "b", "c"]
+    width = figure.get_window_extent().x1
+    assert all(text.get_window_extent().x1 <= width for text in figure.texts)
+
+
 def test_many_cases_wrap_to_the_next_row(study):
     mine = study(OWN + "[study]\ntrials = 1\n" + "".join(f"[cases.c{i}]\n" for i in range(7)))
     records = [record(mine, f"c{i}", "base", 0, steps_of((60, 4))) for i in range(7)]

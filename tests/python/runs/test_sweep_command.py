@@ -95,6 +95,7 @@ def test_the_report_shows_the_study_and_escapes_its_title(invoke, tmp_path):
     assert "learning.discount = [0.8, 0.9]" in page
     assert "Settings and seeds" in page
     assert page.count("<img") == 1
+    assert page.count('<source media="(max-width: 640px)" srcset="data:image/png') == 1
 
 
 def test_only_runs_the_selected_variants(invoke):
