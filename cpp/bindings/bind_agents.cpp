@@ -10,6 +10,7 @@
 #include "sdnn/agents/actor_critic_config.hpp"
 #include "sdnn/agents/fixed_rate.hpp"
 #include "sdnn/agents/fuzzy_q_learning_config.hpp"
+#include "sdnn/agents/observation_config.hpp"
 #include "sdnn/agents/presets.hpp"
 #include "sdnn/agents/q_lambda_config.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
@@ -27,13 +28,15 @@ using approximators::SDNNCConfig;
 
 namespace {
 
-/// Titles, settings of the approximator and of learning.
+/// Titles, settings of the approximator, of learning and of observations.
 template <class Approximator, class Learning, std::size_t N>
 auto by_name(
     const std::array<agents::Named<agents::Settings<Approximator, Learning>>, N>& presets) {
-  py::typing::Dict<py::str, py::typing::Tuple<py::str, Approximator, Learning>> named;
+  py::typing::Dict<py::str,
+                   py::typing::Tuple<py::str, Approximator, Learning, agents::ObservationConfig>>
+      named;
   for (const auto& [name, title, preset] : presets) {
-    named[name] = py::make_tuple(title, preset.approximator, preset.learning);
+    named[name] = py::make_tuple(title, preset.approximator, preset.learning, preset.observation);
   }
   return named;
 }
@@ -57,9 +60,12 @@ void bind_agents(py::module_& module) {
       module, "FuzzyQLearningConfig",
       "The parameters of fuzzy Q-learning; the defaults are the paper's (section 4.3).");
 
+  bindings::bind_config<agents::ObservationConfig>(module, "ObservationConfig",
+                                                   "The observed variables of a task.");
   module.def(
       "presets", [] { return by_name(agents::presets(SDNNCConfig{}.n_inputs)); },
-      "Named settings of Q-learning with SDNN-C: titles, settings of approximator and learning");
+      "Named settings of Q-learning with SDNN-C: titles, settings of approximator, learning and "
+      "observations");
   module.def(
       "q_lambda_presets",
       [] { return by_name(agents::q_lambda_presets(LinearSDNNConfig{}.n_inputs)); },

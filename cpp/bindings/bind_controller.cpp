@@ -176,8 +176,6 @@ void def_transition(py::class_<Controller>& type, const char* name, const char* 
 }  // namespace
 
 void bind_controller(py::module_& module) {
-  bindings::bind_config<agents::ObservationConfig>(module, "ObservationConfig",
-                                                   "The observed variables of a task.");
   bindings::bind_config<agents::ActionConfig>(module, "ActionConfig", "The actions of a task.");
   bindings::Class<Controller> type(module, "Controller", "An agent in the units of its task");
   type.attr("fields") = bindings::described_fields(bindings::fields_of(ControllerConfig{}));

@@ -1713,28 +1713,6 @@ class FuzzyQLearningConfig:
         """
         lambda of accumulating eligibility traces; 0: none, as in the paper. At most 0.99 / discount.
         """
-class FixedRate:
-    """
-    Waits for ticks at a fixed rate
-    """
-    def __init__(self, hz: typing.SupportsFloat | typing.SupportsIndex, clock: collections.abc.Callable[[], typing.SupportsFloat | typing.SupportsIndex], sleep: collections.abc.Callable[[float], None]) -> None:
-        ...
-    def wait(self) -> int:
-        """
-        Waits for the next tick and returns its number
-        """
-    @property
-    def hz(self) -> float:
-        ...
-    @property
-    def n_misses(self) -> int:
-        ...
-    @property
-    def n_skipped(self) -> int:
-        ...
-    @property
-    def worst_lateness(self) -> float:
-        ...
 class ObservationConfig:
     """
     The observed variables of a task.
@@ -1856,6 +1834,28 @@ class ObservationConfig:
         """
         First variables, and how many there are, of which one is 1.
         """
+class FixedRate:
+    """
+    Waits for ticks at a fixed rate
+    """
+    def __init__(self, hz: typing.SupportsFloat | typing.SupportsIndex, clock: collections.abc.Callable[[], typing.SupportsFloat | typing.SupportsIndex], sleep: collections.abc.Callable[[float], None]) -> None:
+        ...
+    def wait(self) -> int:
+        """
+        Waits for the next tick and returns its number
+        """
+    @property
+    def hz(self) -> float:
+        ...
+    @property
+    def n_misses(self) -> int:
+        ...
+    @property
+    def n_skipped(self) -> int:
+        ...
+    @property
+    def worst_lateness(self) -> float:
+        ...
 class ActionConfig:
     """
     The actions of a task.
@@ -2236,7 +2236,7 @@ def action_value(action: typing.SupportsInt | typing.SupportsIndex, n_actions: t
     """
     The value of an action in a range cut evenly
     """
-def actor_critic_presets() -> dict[str, tuple[str, LinearSDNNConfig, ActorCriticConfig]]:
+def actor_critic_presets() -> dict[str, tuple[str, LinearSDNNConfig, ActorCriticConfig, ObservationConfig]]:
     """
     The presets of the actor-critic, by name
     """
@@ -2286,11 +2286,11 @@ def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) 
     ...
 def power(base: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], exponent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
-def presets() -> dict[str, tuple[str, SDNNCConfig, QLearningConfig]]:
+def presets() -> dict[str, tuple[str, SDNNCConfig, QLearningConfig, ObservationConfig]]:
     """
-    Named settings of Q-learning with SDNN-C: titles, settings of approximator and learning
+    Named settings of Q-learning with SDNN-C: titles, settings of approximator, learning and observations
     """
-def q_lambda_presets() -> dict[str, tuple[str, LinearSDNNConfig, QLambdaConfig]]:
+def q_lambda_presets() -> dict[str, tuple[str, LinearSDNNConfig, QLambdaConfig, ObservationConfig]]:
     """
     The presets of Q(lambda), by name
     """

@@ -38,7 +38,7 @@ def run_example(cmake, configure, build, *options, target="all"):
 
 def rows_of_trial():
     """Return the expected output of the example: a trial of the same length and seed."""
-    approximator, learning = _core.presets()["robust"][1:]
+    approximator, learning = _core.presets()["robust"][1:3]
     trial = _core.AcrobotTrial(
         approximator=approximator,
         learning=learning,
@@ -103,7 +103,7 @@ def test_the_cpp_example_runs_with_the_installed_python_package(cmake, configure
 
 def test_a_missing_json_library_is_an_error_for_saved_agents_only(configure, tmp_path):
     (tmp_path / "main.cpp").write_text("int main() {}\n")
-    for target, fits in (("sdnn::sdnn", True), ("sdnn::saved_agent", False)):
+    for target, fits in (("sdnn::sdnn", True), ("sdnn::controller", False)):
         (tmp_path / "CMakeLists.txt").write_text(
             "cmake_minimum_required(VERSION 3.21)\nproject(robot LANGUAGES CXX)\n"
             f"add_subdirectory({ROOT.as_posix()} sdnn)\nadd_executable(robot main.cpp)\n"

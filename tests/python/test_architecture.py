@@ -18,7 +18,7 @@ LAYERS = {
 """Packages may include those of smaller numbers, and environments core only."""
 
 NOT_IN_UMBRELLA = {
-    "agents/agent_file.hpp", "agents/saved_agent.hpp", "core/safetensors.hpp",
+    "agents/agent_file.hpp", "agents/compiled_controller.hpp", "core/safetensors.hpp",
     "estimators/libsdnn.hpp",
 }  # fmt: skip
 """The reader of LIBSDNN's files, and what needs a library for JSON, or one to link to."""

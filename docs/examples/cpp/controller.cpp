@@ -9,12 +9,14 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <numbers>
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "sdnn/agents/agent_file.hpp"
-#include "sdnn/sdnn.hpp"
+#include "sdnn/agents/compiled_controller.hpp"
+#include "sdnn/agents/fixed_rate.hpp"
+#include "sdnn/environments/acrobot.hpp"
+#include "sdnn/environments/goal_schedule.hpp"
 
 namespace {
 
@@ -27,15 +29,15 @@ std::array<double, 4> observe(const environments::Acrobot& acrobot) {
   return {state[0], state[1], state[2], state[3]};
 }
 
-agents::Controller new_controller(double max_torque, std::uint64_t seed) {
-  const auto preset = agents::robust_preset(4);
-  return agents::Controller({.approximator = preset.approximator,
-                             .learning = preset.learning,
-                             .seed = seed,
-                             .observation = {.low = {-core::kPi, -core::kPi, -kSpeed, -kSpeed},
-                                             .high = {core::kPi, core::kPi, kSpeed, kSpeed},
-                                             .angles = {0, 1}},
-                             .action = {.low = {-max_torque}, .high = {max_torque}}});
+agents::CompiledController new_controller(double max_torque, std::uint64_t seed) {
+  constexpr double kPi = std::numbers::pi;
+  return agents::CompiledController(
+      {.agent = "sdnn-c",
+       .preset = "robust",
+       .observation = {.low = {-kPi, -kPi, -kSpeed, -kSpeed}, .high = {kPi, kPi, kSpeed, kSpeed}},
+       .action = agents::Box{{-max_torque}, {max_torque}},
+       .seed = seed,
+       .settings = {{"observation.angles", "[0, 1]"}}});
 }
 
 struct Outcome {
@@ -44,8 +46,8 @@ struct Outcome {
   bool solved = false;
 };
 
-Outcome run_episode(agents::Controller& controller, environments::Acrobot& acrobot, double lambda,
-                    bool learning, double rate) {
+Outcome run_episode(agents::CompiledController& controller, environments::Acrobot& acrobot,
+                    double lambda, bool learning, double rate) {
   Outcome outcome;
   acrobot.reset();
   controller.begin_episode();
@@ -80,15 +82,15 @@ int main(int argc, char** argv) try {
   const double rate = argc > 4 ? std::stod(argv[4]) : 0.0;
 
   environments::Acrobot acrobot;
-  agents::AgentFile file(new_controller(acrobot.config().max_torque, seed));
+  auto controller = new_controller(acrobot.config().max_torque, seed);
   const environments::GoalSchedule lambda;
   for (int episode = 1; episode <= n_episodes; ++episode) {
-    run_episode(file.controller, acrobot, lambda(episode), true, 0.0);
+    run_episode(controller, acrobot, lambda(episode), true, 0.0);
   }
-  file.write(path);
+  controller.write(path);
 
-  agents::AgentFile again(path);
-  const Outcome test = run_episode(again.controller, acrobot, lambda(n_episodes), false, rate);
+  agents::CompiledController again(path);
+  const Outcome test = run_episode(again, acrobot, lambda(n_episodes), false, rate);
   std::printf("%d %s %lld\n", test.n_decisions, test.solved ? "solved" : "-",
               static_cast<long long>(test.n_late));
 } catch (const std::exception& error) {

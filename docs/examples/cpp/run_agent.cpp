@@ -4,27 +4,25 @@
 // an observation, its numbers parted by blanks; each line of the output is the best action for it.
 #include <cstdio>
 #include <exception>
-#include <filesystem>
 #include <iostream>
 #include <sstream>
 #include <string>
 #include <vector>
 
-#include "sdnn/agents/agent_file.hpp"
+#include "sdnn/agents/compiled_controller.hpp"
 
 int main(int argc, char** argv) try {
   if (argc != 2) {
     std::fprintf(stderr, "usage: run_agent FILE < observations\n");
     return 2;
   }
-  sdnn::agents::AgentFile file(std::filesystem::path{argv[1]});
-  sdnn::agents::Controller& controller = file.controller;
-  controller.begin_episode();
+  sdnn::agents::CompiledController agent(argv[1]);
+  agent.begin_episode();
   for (std::string line; std::getline(std::cin, line);) {
     std::istringstream numbers(line);
     std::vector<double> observation;
     for (double number = 0.0; numbers >> number;) observation.push_back(number);
-    for (const double action : controller.act(observation, false)) std::printf("%.17g ", action);
+    for (const double action : agent.act(observation, false)) std::printf("%.17g ", action);
     std::printf("\n");
   }
 } catch (const std::exception& error) {

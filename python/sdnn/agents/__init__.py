@@ -4,11 +4,11 @@ from typing import TYPE_CHECKING, Never
 
 from sdnn.agents.actor_critic import SDNNActorCritic
 from sdnn.agents.agent import Agent, load_agent
-from sdnn.agents.base import Preset
 from sdnn.agents.datasets import learn_from
 from sdnn.agents.fixed_rate import FixedRate
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.imitation import imitate
+from sdnn.agents.presets import Preset
 from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.agents.scaling import Scaling

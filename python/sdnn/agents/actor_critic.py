@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.agents.base import presets_of
+from sdnn.agents.presets import presets_of
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.config import ActorCriticConfig, LinearSDNNConfig
 
@@ -50,10 +50,9 @@ warm_up_steps, missing, history
     """
 
     kind = "actor-critic"
-    default_range = "running"
     approximator_type = LinearSDNNConfig
     learning_type = ActorCriticConfig
-    presets = presets_of(_core.actor_critic_presets(), general={"history": "auto"})
+    presets = presets_of(_core.actor_critic_presets())
     """Settings by name: ``"general"``."""
 
     def action_probabilities(

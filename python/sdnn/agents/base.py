@@ -7,14 +7,14 @@ import secrets
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, ClassVar, Generic, Literal, NamedTuple, TypeVar, cast
+from typing import Any, ClassVar, Generic, TypeVar, cast
 
 import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
+from sdnn.agents.presets import Preset
 from sdnn.agents.scaling import Scaling
 from sdnn.approximators.sdnn_c import pattern_tables
 from sdnn.config import WARM_UP, values_of
@@ -61,24 +61,6 @@ Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
 
 
-class Preset(NamedTuple):
-    """Settings that belong together, with a title of a few words."""
-
-    title: str
-    approximator: Any
-    learning: Any
-    angle_pairs: AnglePairs = "none"
-    inputs: Inputs = "all"
-    history: History = "none"
-
-
-def presets_of(listed: Mapping[str, Any], **more: Mapping[str, Any]) -> Mapping[str, Preset]:
-    """Return the presets of the core by name; ``more`` adds settings to some of them."""
-    return MappingProxyType(
-        {name: Preset(*settings, **more.get(name, {})) for name, settings in listed.items()}
-    )
-
-
 class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
     """An agent that acts, learns and can be saved; `Agent` adds trainings and properties."""
 
@@ -89,10 +71,6 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
     presets: ClassVar[Mapping[str, Preset]]
     """Settings by name."""
     default_preset: ClassVar[str] = "general"
-    default_range: ClassVar[Literal["running"] | None] = None
-    """The default of ``observation_range``."""
-    narrows_ranges: ClassVar[bool] = False
-    """Whether a warm-up replaces bounds of the space that are far wider than its observations."""
     wrappers: Sequence[Statistics] = ()
     """Statistics of the wrappers of the training environment; kept in the agent's file."""
     learning: Learning
@@ -140,13 +118,13 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         has_code = isinstance(missing, str) and missing == "code"
         default_history = "none" if has_code else chosen.history
         self._observation = self._observations.config(
-            self.default_range if observation_range is None else observation_range,
+            chosen.observation_range if observation_range is None else observation_range,
             angles,
             chosen.angle_pairs if angle_pairs is None else angle_pairs,
             chosen.inputs if inputs is None else inputs,
             missing=missing,
             history=default_history if history is None else history,
-            narrows=self.narrows_ranges,
+            narrows=chosen.narrows_ranges,
         )
         self._action = self._actions.config
         self._make_controller(tables=[] if tables is None else list(pattern_tables(tables)))

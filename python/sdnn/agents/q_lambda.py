@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sdnn import _core
-from sdnn.agents.base import presets_of
+from sdnn.agents.presets import presets_of
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.config import LinearSDNNConfig, QLambdaConfig
 from sdnn.environments.types import Data
@@ -48,13 +48,9 @@ class SDNNQLambda(ValueAgent[LinearSDNNConfig, QLambdaConfig]):
     """
 
     kind = "q-lambda"
-    narrows_ranges = True
     approximator_type = LinearSDNNConfig
     learning_type = QLambdaConfig
-    presets = presets_of(
-        _core.q_lambda_presets(),
-        general={"angle_pairs": "find", "inputs": "relevant", "history": "auto"},
-    )
+    presets = presets_of(_core.q_lambda_presets())
     """Settings by name: ``"general"`` and ``"paper"``."""
 
     @property

@@ -16,8 +16,8 @@ from typing import Any
 from sdnn import _core
 from sdnn.agents.actor_critic import SDNNActorCritic
 from sdnn.agents.agent import AnyAgent
-from sdnn.agents.base import Preset
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
+from sdnn.agents.presets import Preset
 from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.agents.q_learning import RBFQLearning, SDNNQLearning
 from sdnn.support.arguments import argument_error, shown

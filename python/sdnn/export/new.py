@@ -73,7 +73,8 @@ def new_agent(
     agent_type = choice("kind", kind, _KINDS)
     most = _RAM_BYTES[kind] if ram_bytes is None else whole("ram_bytes", ram_bytes, 1, 2**31)
     settings = {**new_settings(kind), "inputs": "all", "angle_pairs": [], **options}
-    if agent_type.default_range == "running" and isinstance(observation_space, gym.spaces.Box):
+    is_running = agent_type.presets[agent_type.default_preset].observation_range == "running"
+    if is_running and isinstance(observation_space, gym.spaces.Box):
         bounds = observation_space.low.reshape(-1), observation_space.high.reshape(-1)
         settings.setdefault("observation_range", bounds)  # in C ranges stay
     config = settings["approximator"] if approximator is None else approximator

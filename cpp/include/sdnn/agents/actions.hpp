@@ -64,7 +64,8 @@ class Actions {
   /// Divides each dimension of a box into `n_in_box` actions; 0 stands for real numbers. Throws
   /// std::invalid_argument naming the field that does not fit.
   Actions(ActionConfig config, std::size_t n_in_box) : config_(std::move(config)) {
-    core::require_in_range("action.low", config_.low.size(), 1, kMostDimensions);
+    core::require(n_dimensions() >= 1 && n_dimensions() <= kMostDimensions, "action.low",
+                  "of 1 to 1024 dimensions", n_dimensions());
     core::require(config_.high.size() == n_dimensions(), "action.high", "as long as action.low",
                   config_.high.size());
     for (std::size_t d = 0; d < n_dimensions(); ++d) check(d);

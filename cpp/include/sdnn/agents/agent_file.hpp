@@ -158,8 +158,10 @@ Config config_from_json(const nlohmann::json& object, const std::string& name) {
   if (n_known == object.size()) return config;
   for (const auto& [key, value] : object.items()) {
     if (is_known(key)) continue;
-    std::string message = name;
-    throw std::invalid_argument(message.append(".").append(key).append(" is not known"));
+    std::string expected = "one of";
+    std::apply([&](const auto&... field) { ((expected.append(" ").append(field.name)), ...); },
+               Config::fields());
+    detail::refuse("fields of " + name, expected, key);
   }
   return config;
 }
@@ -176,6 +178,15 @@ inline constexpr std::array<AgentKind, 5> kAgentKinds{{{"sdnn-c", "SDNNQLearning
                                                        {"fuzzy", "FuzzyQLearning"},
                                                        {"q-lambda", "SDNNQLambda"},
                                                        {"actor-critic", "SDNNActorCritic"}}};
+/// The index of a type of agent. Throws std::invalid_argument with `argument` for an unknown name.
+inline std::size_t index_of_kind(const std::string& argument, const std::string& name) {
+  std::string expected = "one of";
+  for (std::size_t i = 0; i < kAgentKinds.size(); ++i) {
+    if (kAgentKinds.at(i).name == name) return i;
+    (expected += ' ') += kAgentKinds.at(i).name;
+  }
+  refuse(argument, expected, name);
+}
 inline const AgentKind& kind_of(const ControllerConfig& config) {
   const bool is_actor_critic = std::holds_alternative<ActorCriticConfig>(config.learning);
   return is_actor_critic ? kAgentKinds.back() : kAgentKinds.at(config.approximator.index());
@@ -188,14 +199,13 @@ inline ControllerConfig controller_config_in(const nlohmann::json& description) 
   };
   const auto& approximator = at("approximator");
   const auto& learning = at("learning");
-  const auto name = value_from<std::string>(at("kind"), "kind");
-  const auto kind = std::ranges::find(kAgentKinds, name, &AgentKind::name);
+  const auto kind = index_of_kind("kind", value_from<std::string>(at("kind"), "kind"));
   ControllerConfig config;
   const auto read = [&]<class Approximator, class Learning>(Approximator, Learning) {
     config.approximator = config_from_json<Approximator>(approximator, "approximator");
     config.learning = config_from_json<Learning>(learning, "learning");
   };
-  switch (kind - kAgentKinds.begin()) {
+  switch (kind) {
     case 0:
       read(approximators::SDNNCConfig(), QLearningConfig());
       break;
@@ -208,11 +218,8 @@ inline ControllerConfig controller_config_in(const nlohmann::json& description) 
     case 3:
       read(approximators::LinearSDNNConfig(), QLambdaConfig());
       break;
-    case 4:
-      read(approximators::LinearSDNNConfig(), ActorCriticConfig());
-      break;
     default:
-      refuse("kind", "sdnn-c, rbf, fuzzy, q-lambda or actor-critic", name);
+      read(approximators::LinearSDNNConfig(), ActorCriticConfig());
   }
   config.seed = value_from<std::uint64_t>(at("seed"), "seed");
   config.observation = config_from_json<ObservationConfig>(at("observation"), "observation");

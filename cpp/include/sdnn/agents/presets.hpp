@@ -1,9 +1,10 @@
-/// Named settings of Q-learning with SDNN-C: the paper's, and those we recommend.
+/// Named settings of agents: the paper's, and those we recommend.
 #pragma once
 
 #include <array>
 
 #include "sdnn/agents/actor_critic_config.hpp"
+#include "sdnn/agents/observation_config.hpp"
 #include "sdnn/agents/q_lambda_config.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
 #include "sdnn/approximators/linear_sdnn_config.hpp"
@@ -11,11 +12,13 @@
 
 namespace sdnn::agents {
 
-/// Settings of an approximator and a learning rule that belong together.
+/// Settings of an approximator and a learning rule that belong together, and how observations
+/// become states unless the task decides.
 template <class Approximator, class Learning>
 struct Settings {
   Approximator approximator = {};
   Learning learning = {};
+  ObservationConfig observation = {};
 };
 using Preset = Settings<approximators::SDNNCConfig, QLearningConfig>;
 using QLambdaPreset = Settings<approximators::LinearSDNNConfig, QLambdaConfig>;
@@ -96,12 +99,18 @@ inline QLambdaPreset paper_q_lambda_preset(int n_inputs) {
                        .schedule_steps = 0,
                        .max_action_repeat = 1,
                        .final_learning_rate = {},
-                       .final_epsilon = {}}};
+                       .final_epsilon = {}},
+          .observation = {.narrowed = true}};
 }
 
 /// The defaults: for any task.
 inline QLambdaPreset general_q_lambda_preset(int n_inputs) {
-  return {.approximator = {.n_inputs = n_inputs}};
+  return {.approximator = {.n_inputs = n_inputs},
+          .learning = {},
+          .observation = {.narrowed = true,
+                          .find_angle_pairs = true,
+                          .relevant_only = true,
+                          .history = History::automatic}};
 }
 
 inline std::array<NamedQLambdaPreset, 2> q_lambda_presets(int n_inputs) {
@@ -109,9 +118,11 @@ inline std::array<NamedQLambdaPreset, 2> q_lambda_presets(int n_inputs) {
            {"general", "as recommended for any task", general_q_lambda_preset(n_inputs)}}};
 }
 
-/// The defaults of the actor-critic: five actions in each dimension of a box.
+/// The defaults of the actor-critic with running ranges: five actions in each dimension of a box.
 inline ActorCriticPreset general_actor_critic_preset(int n_inputs) {
-  return {.approximator = {.n_inputs = n_inputs, .n_actions = 5}};
+  return {.approximator = {.n_inputs = n_inputs, .n_actions = 5},
+          .learning = {},
+          .observation = {.running = true, .history = History::automatic}};
 }
 
 inline std::array<NamedActorCriticPreset, 1> actor_critic_presets(int n_inputs) {

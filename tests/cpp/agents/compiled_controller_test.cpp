@@ -1,0 +1,192 @@
+#include "sdnn/agents/compiled_controller.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "errors.hpp"
+#include "folders.hpp"
+#include "sdnn/agents/agent_file.hpp"
+#include "sdnn/agents/presets.hpp"
+
+namespace sdnn::agents {
+namespace {
+
+using Vector = std::vector<double>;
+
+constexpr double kUnknown = std::numeric_limits<double>::infinity();
+
+const Box kBounds{.low = {-1.0, -kUnknown}, .high = {1.0, kUnknown}};
+
+/// Small agents of every type, with all kinds of actions.
+std::vector<AgentSpec> specs() {
+  std::vector<AgentSpec> all;
+  for (const char* const agent : {"q-lambda", "actor-critic", "sdnn-c", "rbf", "fuzzy"}) {
+    AgentSpec spec{.agent = agent,
+                   .observation = kBounds,
+                   .action = Box{.low = {-2.0}, .high = {2.0}},
+                   .seed = 18446744073709551615U,
+                   .settings = {{"warm_up_steps", 20}, {"learning.discount", 0.5}}};
+    if (spec.agent == "sdnn-c") spec.preset = "small";
+    if (spec.agent == "rbf") spec.settings["approximator.n_bases"] = 4;
+    all.push_back(spec);
+    if (spec.agent == "fuzzy") continue;  // has no discrete actions
+    spec.action = Discrete{.n = 3, .start = -1};
+    all.push_back(spec);
+    spec.action = MultiDiscrete{.n = {3, 2}};
+    all.push_back(spec);
+  }
+  return all;
+}
+
+/// A plant of two variables, in two environments.
+template <class Agent>
+void live(Agent& agent, int n_steps) {
+  agent.set_n_environments(2);
+  for (int t = 0; t < n_steps; ++t) {
+    const auto environment = static_cast<std::size_t>(t % 3 == 2);
+    if (t % 17 < 3) agent.begin_episode(environment);
+    const Vector observed{0.1 * (t % 10), 1.0 * (t % 7)}, next{0.1 * ((t + 1) % 10), 1.0};
+    const auto taken = agent.act(observed, true, environment);
+    const Vector action(taken.begin(), taken.end());
+    agent.learn(observed, action, 1.0 * (t % 3) - action[0], next, t % 13 == 12, environment, {},
+                t % 4 == 3 ? 2.5 : 1.0);
+  }
+}
+
+/// The error of a changed specification of the default agent.
+template <class Error = std::invalid_argument, class Change>
+std::string error_with(const Change& change) {
+  AgentSpec spec{.observation = kBounds, .action = Discrete{.n = 2}};
+  change(spec);
+  return testing::message_of<Error>([&] { const CompiledController agent(spec); });
+}
+std::string error_of_setting(const std::string& name, const SettingValue& value) {
+  return error_with([&](AgentSpec& spec) { spec.settings[name] = value; });
+}
+
+TEST(CompiledController, MakesLearnsAndWritesTheBitsOfTheController) {
+  const testing::Folder folder;
+  const auto preset = general_q_lambda_preset(4);
+  ControllerConfig config{
+      .approximator = preset.approximator,
+      .learning = preset.learning,
+      .seed = 7,
+      .observation = preset.observation,
+      .action = {.low = {-1.0}, .high = {1.0}, .discrete = true, .number = ActionNumber::whole},
+      .warm_up_steps = 30};
+  config.observation.low = {-1.0, std::nullopt};
+  config.observation.high = {1.0, std::nullopt};
+  config.observation.inputs = {1};
+  config.observation.history = History::none;
+  std::get<QLambdaConfig>(config.learning).policy.epsilon = 0.2;
+  AgentFile file{Controller(config)};
+  CompiledController agent({.observation = kBounds,
+                            .action = Discrete{.n = 3, .start = -1},
+                            .seed = 7,
+                            .settings = {{"learning.epsilon", 0.2},
+                                         {"observation.inputs", "[1]"},
+                                         {"observation.history", "none"},
+                                         {"warm_up_steps", 30}}});
+  EXPECT_EQ(agent.n_variables(), 2U);
+  EXPECT_EQ(agent.n_dimensions(), 1U);
+  EXPECT_TRUE(agent.is_warming_up());
+  live(agent, 200);
+  live(file.controller, 200);
+  EXPECT_FALSE(agent.is_warming_up());
+  agent.write(folder / "agent");
+  file.write(folder / "file");
+  EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "file"));
+}
+
+TEST(CompiledController, AReadAgentOfEveryTypeContinuesLikeTheWrittenOneAndAnAgentFile) {
+  const testing::Folder folder;
+  for (const AgentSpec& spec : specs()) {
+    SCOPED_TRACE(spec.agent);
+    CompiledController agent(spec);
+    live(agent, 60);
+    agent.set_progress(0.25);
+    agent.write(folder / "agent");
+    CompiledController again(folder / "agent");
+    AgentFile file(folder / "agent");
+    EXPECT_EQ(file.description()["kind"], spec.agent);
+    EXPECT_EQ(file.description()["learning"]["discount"], 0.5);
+    EXPECT_EQ(file.controller.n_dimensions(), agent.n_dimensions());
+    live(agent, 40);
+    live(again, 40);
+    live(file.controller, 40);
+    agent.write(folder / "agent");
+    again.write(folder / "again");
+    file.write(folder / "file");
+    EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "again"));
+    EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "file"));
+    const std::array<double, 2> observation = {0.5, 3.0};
+    again.begin_greedy_episode();
+    EXPECT_TRUE(std::ranges::equal(again.act(observation, false), agent.act(observation, false)));
+  }
+}
+
+TEST(CompiledController, NamesWhatIsWrongWithASpecification) {
+  const auto with_action = [](const auto& action) {
+    return error_with([&action](AgentSpec& spec) { spec.action = action; });
+  };
+  EXPECT_EQ(error_with([](AgentSpec& spec) { spec.agent = "sarsa"; }),
+            "agent must be one of sdnn-c rbf fuzzy q-lambda actor-critic, got \"sarsa\"");
+  EXPECT_EQ(error_with([](AgentSpec& spec) { spec.preset = "robust"; }),
+            "preset must be of the agent q-lambda, one of paper general, got \"robust\"");
+  EXPECT_EQ(error_with([](AgentSpec& spec) { spec.observation.high.pop_back(); }),
+            "observation.high must be 2 numbers, one per variable as in observation.low, got 1");
+  EXPECT_EQ(error_with([](AgentSpec& spec) { spec.observation = {}; }),
+            "observation.low must be of one variable at least, got 0");
+  EXPECT_EQ(error_with([](AgentSpec& spec) { spec.observation.low[0] = 1.0; }),
+            "observation.high[0] must be finite and greater than observation.low, got 1");
+  EXPECT_EQ(with_action(Discrete{.n = 0}), "action.n must be at least 1, got 0");
+  EXPECT_EQ(with_action(MultiDiscrete{.n = {2, 3}, .start = {0}}),
+            "action.start must be 2 numbers, one per dimension as in action.n, got 1");
+  EXPECT_EQ(with_action(Box{}), "action.low must be of 1 to 1024 dimensions, got 0");
+  EXPECT_EQ(with_action(Box{.low = {0.0}, .high = {kUnknown}}),
+            "action.high[0] must be in [-1e+300, 1e+300], got inf");
+  EXPECT_EQ(error_with([](AgentSpec& spec) { spec.agent = "fuzzy"; }),
+            "action must be a Box for the agent fuzzy, got whole numbers");
+}
+
+TEST(CompiledController, NamesWhatIsWrongWithASetting) {
+  const std::string known =
+      "settings must be warm_up_steps, or fields of approximator., learning., observation. and "
+      "action., such as learning.discount, got ";
+  EXPECT_EQ(error_of_setting("discount", 0.5), known + "\"discount\"");
+  EXPECT_EQ(error_of_setting("policy.epsilon", 0.5), known + "\"policy.epsilon\"");
+  const std::string error = error_of_setting("learning.discont", 0.5);
+  EXPECT_EQ(error.rfind("fields of learning must be one of learning_rate discount ", 0), 0U);
+  EXPECT_NE(error.find(", got \"discont\""), std::string::npos) << error;
+  EXPECT_EQ(error_of_setting("learning.discount", "much"),
+            "learning.discount must be a number, got \"much\"");
+  EXPECT_EQ(error_of_setting("learning.discount", 1.5), "discount must be in [0, 1], got 1.5");
+  EXPECT_EQ(error_of_setting("approximator.n_actions", 2.5),
+            "approximator.n_actions must be a whole number, got 2.5");
+  EXPECT_EQ(error_of_setting("observation.missing", "guess"),
+            "observation.missing must be one of error hold code, got \"guess\"");
+  EXPECT_EQ(error_of_setting("warm_up_steps", 1), "warm_up_steps must be in [2, 10000000], got 1");
+  const std::string size = error_with<std::length_error>(
+      [](AgentSpec& spec) { spec.settings["approximator.max_table_bytes"] = 1000; });
+  EXPECT_NE(size.find("max_table_bytes is 1000"), std::string::npos) << size;
+}
+
+TEST(CompiledController, MissingReadingsThatHaveAPatternExcludeAHistoryByDefault) {
+  EXPECT_EQ(error_of_setting("observation.missing", "code"), "no error");
+  EXPECT_NE(error_with([](AgentSpec& spec) {
+              spec.settings = {{"observation.missing", "code"}, {"observation.history", "auto"}};
+            }),
+            "no error");
+}
+
+}  // namespace
+}  // namespace sdnn::agents
