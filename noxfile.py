@@ -237,6 +237,12 @@ def emulation(session):
     pytest(session, "tests/emulation")
 
 
+@weekly()
+def boards(session):
+    """Run agents and estimators as firmware of emulated boards."""
+    pytest(session, "tests/boards")
+
+
 @quick()
 def packaging(session):
     """Check the source distribution, the wheel and the C++ library as others use it."""

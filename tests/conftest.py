@@ -35,6 +35,11 @@ def skip_unless_ci():
 
 PACKAGES = dict.fromkeys(("clang", "clang++"), "clang libclang-rt-dev")
 PACKAGES |= dict.fromkeys(("nm", "objdump"), "binutils")
+PACKAGES |= {
+    "arm-none-eabi-gcc": "gcc-arm-none-eabi picolibc-arm-none-eabi",
+    "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf",
+    "qemu-system-riscv32": "qemu-system-misc",
+}
 """The package to install for a tool, where its name differs."""
 
 

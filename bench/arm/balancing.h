@@ -21,7 +21,6 @@
 
 static pole_agent agent;
 #ifdef KEEP_EPISODES
-static uint8_t memory[POLE_KEPT_BYTES];
 static pole_keeper keeper;
 #endif
 static uint32_t noise = START;
@@ -89,6 +88,11 @@ static void keep_best(void) {
 }
 #endif
 
+#ifndef WITHOUT_MAIN
+#ifdef KEEP_EPISODES
+static uint8_t memory[POLE_KEPT_BYTES];
+#endif
+
 int main(int argc, char** argv) {
   const uint32_t n_steps = (uint32_t)atol(argv[1]), n_episodes = (uint32_t)atol(argv[2]);
   uint32_t step, k;
@@ -115,3 +119,4 @@ int main(int argc, char** argv) {
   if (n_episodes > 0) printf("%.1f\n", (double)score / ONE_POINT / n_episodes);
   return argc > 3;
 }
+#endif

@@ -47,7 +47,12 @@ class Task:
     def agent(self, seed, kind, ram_bytes=None):
         """Make the agent, which has learned nothing."""
         high = np.array(self.high)
-        arguments = {"approximator": self.approximator} if kind == "q-lambda" else {}
+        config = (
+            self.approximator
+            if ram_bytes is None
+            else dataclasses.replace(self.approximator, n_pattern_units=0)
+        )
+        arguments = {"approximator": config} if kind == "q-lambda" else {}
         space = gym.spaces.Box(-high, high, dtype=np.float64)
         return new_agent(
             space,
@@ -114,7 +119,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("task", nargs="?", choices=TASKS, default="cartpole")
     parser.add_argument("--agent", choices=AGENTS, default="q-lambda")
-    parser.add_argument("--ram", type=int, help="Bytes that SDNN-C may take.")
+    parser.add_argument("--ram", type=int, help="Bytes that the agent may take.")
     keeping = parser.add_mutually_exclusive_group()
     keeping.add_argument(
         "--keep",

@@ -33,6 +33,7 @@ static int64_t push(Plant* it, enum mode mode, const int32_t* observation, uint3
   int64_t force = accelerations[action] * ONE;
   const int64_t lost = times(force, it->wheel),
                 cube = times(times(it->angle, it->angle), it->angle);
+  (void)mode, (void)observation;
   if (lost > 0) force -= lost;
   it->turn += ((20 * (it->angle - ((cube * 10923) >> 16)) - force) * 1311) >> 16;
   it->angle += (it->turn * 1311) >> 16;

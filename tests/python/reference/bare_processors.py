@@ -14,11 +14,6 @@ _BARE = {
     "armv7e-m": ("--target=thumbv7em-none-eabi", "qemu-arm"),
     "riscv32": ("--target=riscv32-none-elf", "qemu-riscv32", "-march=rv32im", "-mno-relax"),
 }
-BARE_TARGETS = {
-    name: Target("clang", runner, (option, *more, *_ALONE))
-    for name, (option, runner, *more) in _BARE.items()
-}
-
 STDIO = """
 #include <stddef.h>
 #include <stdint.h>
@@ -128,3 +123,8 @@ int64_t __aeabi_lasr(int64_t a, int n) {
 #endif
 """
 """<stdio.h> as far as the programs need it."""
+
+BARE_TARGETS = {
+    name: Target("clang", runner, (option, *more, *_ALONE), stdio=STDIO)
+    for name, (option, runner, *more) in _BARE.items()
+}

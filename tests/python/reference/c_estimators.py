@@ -6,12 +6,12 @@ import warnings
 
 import numpy as np
 
-from bare_processors import BARE_TARGETS, STDIO
 from c_policies import STRICT, run
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import Anchor, Circular, CorrelationMatrix, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators.network import Network
 from sdnn.export import export_estimator_header
+from small_estimators import SMALL_ESTIMATORS
 
 SMALL = {"n_pattern_units": 24, "max_iter": 8, "random_state": 0}
 COLORS = ("blue", "gr\u00fcn", "red")
@@ -166,10 +166,10 @@ ESTIMATORS = {
 
 @functools.cache
 def fitted(name):
-    """An estimator of `ESTIMATORS`, and a function that draws samples."""
+    """An estimator with this name, and a function that draws samples."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return ESTIMATORS[name]()
+        return (ESTIMATORS | SMALL_ESTIMATORS)[name]()
 
 
 SIZES_OF_RESULTS = """
@@ -245,16 +245,9 @@ def rows_in_c(model, X):
 
 def compiled(folder, source, target, *options):
     """Compile a program with a header in its folder; return its command."""
-    if target in BARE_TARGETS.values():
-        (folder / "stdio.h").write_text(STDIO)
     include = '#include "model.h"\n'
     (folder / "program.c").write_text(source.replace(include, include + SIZES_OF_RESULTS))
-    run(
-        target.compiler, *STRICT, "-O2", *target.options, *options,
-        *(("-static",) if target.runner else ()),
-        "-I", folder, folder / "program.c", "-o", folder / "program",
-    )  # fmt: skip
-    return [target.runner, folder / "program"] if target.runner else [folder / "program"]
+    return target.compile(folder / "program.c", *STRICT, "-O2", *options)
 
 
 def predictions(model, X):

@@ -235,13 +235,8 @@ def check_policy(name, kind, target, folder, n_steps=3000):
     call = f"action[0] = {function}(&episode, x)" if one else f"{function}(&episode, x, action)"
     define = "" if kind == "int32_t" else "#define POLICY_USE_FLOAT"
     (folder / "main.c").write_text(DRIVER.format(define=define, type=kind, call=call))
-    program = folder / "main"
-    run(
-        target.compiler, *STRICT, "-O2", *target.options, *(("-static",) if target.runner else ()),
-        folder / "main.c", "-o", program,
-    )  # fmt: skip
+    command = target.compile(folder / "main.c", *STRICT, "-O2")
     lines, expected = expected_of(name, kind, header.fraction_bits, n_steps)
-    command = [target.runner, program] if target.runner else [program]
     written = np.frombuffer(run(*command, input=lines.tobytes()), "<u4")
     actions = [actions_at(agent, indices) for indices in written.reshape(-1, agent.n_dimensions)]
     np.testing.assert_array_equal(actions, np.reshape(expected, (n_steps, -1)))

@@ -15,10 +15,7 @@ def compiled(source, agent, folder, target, *options):
     """Compile a program with the header of an agent that learns; return it as a command."""
     (folder / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
     (folder / "main.c").write_text(source + "\n")
-    static = ("-static",) if target.runner else ()
-    flags = (*STRICT, *target.options, *options, *static)
-    run(target.compiler, *flags, folder / "main.c", "-o", folder / "main")
-    return [target.runner, folder / "main"] if target.runner else [folder / "main"]
+    return target.compile(folder / "main.c", *STRICT, *options)
 
 
 def cut_power(make, folder, target, n_states, stride, *options):

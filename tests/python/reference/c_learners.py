@@ -7,9 +7,8 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 
-from bare_processors import BARE_TARGETS, STDIO
 from c_histories import LEARNERS as HISTORIES
-from c_policies import STRICT, box, lies_between, place_of, run
+from c_policies import STRICT, box, lies_between, place_of
 from sdnn.agents import (
     ActorCriticConfig,
     QLambdaConfig,
@@ -329,21 +328,13 @@ def build(folder, agent, target, *options):
         f"agent_learn(&agent, line + 1, {'action[0]' if one else 'action'},"
         " line[1 + AGENT_N_OBSERVED], next, line[2 * AGENT_N_OBSERVED + 2])"
     )
-    if target in BARE_TARGETS.values():
-        (folder / "stdio.h").write_text(STDIO)
     begin = "agent_begin_greedy_episode(&agent, &episode)" if has_history else "(void)0"
     memory = "static agent_greedy_episode episode;" if has_history else ""
     source = DRIVER.replace("ACT;", f"{act};").replace("LEARN", learn)
     source = source.replace("BEGIN_GREEDY", begin).replace("GREEDY;", f"{greedy};")
     source = source.replace("static agent_agent agent;", f"static agent_agent agent; {memory}")
     (folder / "steps.c").write_text(source)
-    program = folder / "steps"
-    run(
-        target.compiler, *STRICT, "-O2", *target.options, *options,
-        *(("-static",) if target.runner else ()),
-        "-I", folder, folder / "steps.c", "-o", program,
-    )  # fmt: skip
-    return header, [target.runner, program] if target.runner else [program]
+    return header, target.compile(folder / "steps.c", *STRICT, "-O2", *options)
 
 
 def run_program(command, image, lines, n_dimensions):

@@ -28,6 +28,20 @@ class Target:
     runner: str | None = None
     options: tuple[str, ...] = ()
     prefix: str = ""
+    arguments: tuple[str, ...] = ()
+    """Arguments of the runner before the program."""
+    stdio: str = ""
+    """The file stdio.h, where there is no C library."""
+
+    def compile(self, source, *options):
+        """Compile a program beside its headers; return its command."""
+        folder, path = source.parent, source.with_suffix("")
+        if self.stdio:
+            (folder / "stdio.h").write_text(self.stdio)
+        # An emulated program finds no shared libraries.
+        static = ("-static",) if self.runner else ()
+        run(self.compiler, *self.options, *static, "-I", folder, *options, source, "-o", path)
+        return [self.runner, *self.arguments, path] if self.runner else [path]
 
 
 TARGETS = {
@@ -373,13 +387,7 @@ def compile_policy(folder, target, *options):
 
 def build(folder, target):
     """The program that answers observations with actions, as a command."""
-    program = folder / "program"
-    run(
-        # Static: an emulated program finds no shared libraries.
-        target.compiler, "-O1", *target.options, "-static", folder / "driver.c",
-        compile_policy(folder, target, "-O2"), "-o", program,
-    )  # fmt: skip
-    return [target.runner, program] if target.runner else [program]
+    return target.compile(folder / "driver.c", "-O1", compile_policy(folder, target, "-O2"))
 
 
 def actions_of(command, kind, observations, n_dimensions):
