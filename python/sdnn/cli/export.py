@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,14 +23,18 @@ from sdnn.cli.common import (
     value_of,
     words_of_run,
 )
-from sdnn.cli.export_estimator import estimator_in, export_estimator
 from sdnn.runs.errors import ConfigError
+from sdnn.support.arguments import blamed
 
 if TYPE_CHECKING:
     import gymnasium as gym
 
     from sdnn.agents.agent import AnyAgent
+    from sdnn.environments.types import Data
+    from sdnn.estimators.fitted import Fitted
+    from sdnn.export import CHeader, EstimatorHeader
 
+_ESTIMATORS = ("SDNNRegressor", "SDNNClassifier")
 _MOST_ACTIONS = 2**16
 _FEW_STEPS = 64  # of fixed point, in a range that is hardly resolved
 _LARGEST = 2**31  # limit of the ranges of observations and actions
@@ -139,8 +143,7 @@ def export(
     sdnn export --new --range -2.4:2.4 --range -3:3 --range -0.21:0.21
       --range -3.5:3.5 --actions 2 --c-header pole.h
     """  # noqa: D301
-    from sdnn.export import c_header
-    from sdnn.support.arguments import blamed
+    from sdnn.export import c_header, export_estimator_header
     from sdnn.support.files import write_whole
 
     if new and source is not None:
@@ -156,33 +159,24 @@ def export(
             raise click.UsageError(f"{option} needs --new: the agent of RUN has its own")
     learning = learning or new
     with run_command(option_words if source is None else words_of_run(source)):
-        model = None if source is None or source.is_dir() else estimator_in(source)
+        model = None if source is None or source.is_dir() else _estimator_in(source)
+        prefix = path.stem if name is None else name
         if model is not None:
             if fraction_bits is not None:
                 raise click.UsageError("--fraction-bits is for agents: an estimator has doubles")
-            export_estimator(
-                model, path, name=name, learning=learning, flash=flash, as_json=as_json
-            )
+            with _errors_of_options(name, flash_bytes="--flash"):
+                made = export_estimator_header(
+                    model, path, name=prefix, learning=learning, flash_bytes=flash
+                )
+            click.echo(_words(path, made, learning, {} if as_json else None))
             return
         agent = _new_agent(**options) if source is None else _read_agent_of(source)
         try:
-            header = c_header(
-                agent,
-                path.stem if name is None else name,
-                fraction_bits=fraction_bits,
-                learning=learning,
-            )
-        except ValueError as error:
-            argument, problem = blamed(error)
-            if argument not in ("name", "fraction_bits"):
-                raise click.ClickException(str(error)) from error
-            option = "--" + argument.replace("_", "-")
-            if argument == "name" and name is None:
-                option = "--c-header gives no name; use --name, which"
-            raise click.UsageError(f"{option} {problem}") from error
+            with _errors_of_options(name, fraction_bits="--fraction-bits"):
+                header = c_header(agent, prefix, fraction_bits=fraction_bits, learning=learning)
         except (TypeError, RuntimeError) as error:
-            prefix = "" if source is None else f"{source}: "
-            raise click.ClickException(f"{prefix}{error}") from error
+            place = "" if source is None else f"{source}: "
+            raise click.ClickException(f"{place}{error}") from error
         if flash is not None and header.flash_bytes > flash:
             raise click.UsageError(
                 f"--flash must be at least {header.flash_bytes}, for the constants of this agent,"
@@ -193,15 +187,11 @@ def export(
         click.echo(f"warning: {warning}", err=True)
     scaling = agent.scaling
     if as_json:
-        values = {k: v for k, v in dataclasses.asdict(header).items() if k != "text"}
-        values["scaling"] = None if scaling is None else scaling.values()
-        click.echo(json_text({"file": str(path), **values}))
+        more = {"scaling": None if scaling is None else scaling.values()}
+        click.echo(_words(path, header, learning, more))
         return
-    click.echo(
-        f"wrote {path}: {header.flash_bytes:,} bytes of constants, {header.ram_bytes:,} bytes of"
-        f" {'memory' if learning else 'arrays on the stack'},"
-        f" {header.n_words:,} words of weights read per decision"
-    )
+    words = _words(path, header, learning)
+    click.echo(f"{words}, {header.n_words:,} words of weights read per decision")
     for statistics in agent.wrappers:
         if lines := statistics.observation_lines():
             click.echo(
@@ -214,6 +204,47 @@ def export(
         click.echo("it observes each variable scaled from its range to [0, 1], as its run did:")
         for line in scaling.lines():
             click.echo(f"  {line}")
+
+
+@contextmanager
+def _errors_of_options(name: str | None, **options: str) -> Iterator[None]:
+    """Turn errors about arguments of a header into those of the command's options."""
+    options["name"] = "--c-header gives no name; use --name, which" if name is None else "--name"
+    try:
+        yield
+    except ValueError as error:
+        argument, problem = blamed(error)
+        if argument not in options:
+            raise click.ClickException(str(error)) from error
+        raise click.UsageError(f"{options[argument]} {problem}") from error
+
+
+def _words(
+    path: Path, header: CHeader | EstimatorHeader, learning: bool, more: Data | None = None
+) -> str:
+    """Describe a header that was written: in a line, or with ``more`` as JSON."""
+    if more is not None:
+        values = {k: v for k, v in dataclasses.asdict(header).items() if k != "text"}
+        return json_text({"file": str(path), **values, **more})
+    return (
+        f"wrote {path}: {header.flash_bytes:,} bytes of constants, {header.ram_bytes:,} bytes of"
+        f" {'memory' if learning else 'arrays on the stack'}"
+    )
+
+
+def _estimator_in(source: Path) -> Fitted | None:
+    """Read the estimator of a file; None if it holds something else, or is damaged."""
+    from sdnn.support.files import read_file
+
+    name = None
+    with suppress(ValueError):
+        name = read_file(source, "agent", "training", "estimator")[0].get("class")
+    if name not in _ESTIMATORS:
+        return None
+    from sdnn import estimators  # scikit-learn is slow to import
+
+    model: Fitted = getattr(estimators, name).load(source, memory_limit=2**32)
+    return model
 
 
 def _coarse_ranges(agent: AnyAgent, fraction_bits: int) -> Iterator[str]:
@@ -266,7 +297,6 @@ def _new_agent(
     from sdnn.export import new_agent
     from sdnn.export.new import new_settings
     from sdnn.runs.settings import with_changes
-    from sdnn.support.arguments import blamed
 
     bounds = [
         (-math.pi, math.pi) if text == "angle" else _bounds_in("--range", text) for text in ranges
