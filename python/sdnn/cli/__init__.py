@@ -64,7 +64,7 @@ class _Commands(click.Group):
         except click.NoSuchOption as error:
             raise explained_option(error) from None
         except KeyboardInterrupt:
-            exit_interrupted("Interrupted.")
+            exit_interrupted("")
         except OSError as error:
             if error.errno == errno.EPIPE:  # the reader of a pipe has ended: Click exits quietly
                 raise

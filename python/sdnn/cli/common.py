@@ -136,16 +136,16 @@ def errors_in_a_line(
     except ConfigError as error:
         raise click.UsageError(str(error) if error.place else words(error)) from error
     except RunTerminatedError:
-        exit_interrupted("terminated" + then(), SIGTERM)
+        exit_interrupted(then(), SIGTERM)
     except RunError as error:
         raise click.ClickException(str(error)) from error
     except KeyboardInterrupt:
-        exit_interrupted("interrupted" + then())
+        exit_interrupted(then())
 
 
-def exit_interrupted(message: str, number: int = SIGINT) -> NoReturn:
-    """Print a message and exit with a shell's code for a command that a signal has ended."""
-    click.echo(message, err=True)
+def exit_interrupted(then: str, number: int = SIGINT) -> NoReturn:
+    """Say that a signal has ended the command, and exit with a shell's code for it."""
+    click.echo(("terminated" if number == SIGTERM else "interrupted") + then, err=True)
     raise click.exceptions.Exit(128 + number)
 
 

@@ -6,7 +6,7 @@ import functools
 import json
 from collections.abc import Callable
 from pathlib import Path
-from signal import SIGINT, SIGTERM
+from signal import SIGINT
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -116,9 +116,8 @@ def study_command(make_study: Callable[..., Study]) -> Function:
             variants = ", ".join(study.variants_of(failure.planned.key))
             click.echo(f"Error: {failure.planned.title} ({variants}) failed: {message}", err=True)
         if outcome.interrupted:
-            what = "terminated" if outcome.signal == SIGTERM else "interrupted"
-            message = f"{what}; {stored}; the same command continues from there"
-            exit_interrupted(message, outcome.signal or SIGINT)
+            then = f"; {stored}; the same command continues from there"
+            exit_interrupted(then, outcome.signal or SIGINT)
         if done.page is None:
             click.echo(f"Error: nothing is complete, no figure drawn; {stored}", err=True)
         elif as_json:

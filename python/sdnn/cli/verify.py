@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from signal import SIGTERM
 from typing import TYPE_CHECKING
 
 import click
@@ -84,9 +83,8 @@ def verify(
             )
         _show(verification, as_json)
         if verification.signal is not None:
-            what = "terminated" if verification.signal == SIGTERM else "interrupted"
             done = f"{len(verification.equal)} of {verification.n_chosen} trials are equal so far"
-            exit_interrupted(f"{what}; {done}", verification.signal)
+            exit_interrupted(f"; {done}", verification.signal)
         if not verification.is_equal:
             if certificate is not None:
                 click.echo(f"no certificate: {certificate} is not written", err=True)
