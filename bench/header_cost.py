@@ -1,7 +1,8 @@
-"""Print what a changed header of the core costs: the CPU seconds of the units that include it.
+"""Print what units cost to compile, in CPU seconds and memory, and what a changed header costs.
 
-Compiles every unit of the Python core once, one after another, as a build folder would: `python
-bench/header_cost.py build/editable`.
+Compiles units once, one after another, as a build folder would: `python bench/header_cost.py
+build/editable` those of the Python core, with the seconds of the units that include each header;
+`python bench/header_cost.py FOLDER TARGET ...` those of CMake targets, such as train_agent.
 """
 
 from __future__ import annotations
@@ -38,19 +39,29 @@ def compiled(command: str, folder: str, scratch: Path) -> tuple[float, float, se
     )
 
 
-def main() -> None:
-    """Compile the units and print the headers by cost."""
-    if len(sys.argv) != 2:
-        sys.exit("usage: python bench/header_cost.py BUILD_FOLDER")
+def units_of(folder: str, targets: list[str]) -> list[dict[str, str]]:
+    """Return the commands that compile the units of CMake targets; exit if there are none."""
     listing = subprocess.run(
-        ["ninja", "-C", sys.argv[1], "-t", "compdb"], capture_output=True, text=True, check=True
+        ["ninja", "-C", folder, "-t", "compdb"], capture_output=True, text=True, check=True
     )
     start = listing.stdout.index("[\n")  # after the line that names the folder
-    units = [
+    units: list[dict[str, str]] = json.loads(listing.stdout[start:])
+    folders = {f"{target}.dir" for target in targets}
+    named = [
         unit
-        for unit in json.loads(listing.stdout[start:])
-        if "_core.dir" in unit["output"] and unit["output"].endswith(".o")
+        for unit in units
+        if unit["output"].endswith(".o") and folders & set(Path(unit["output"]).parts)
     ]
+    if not named:
+        sys.exit(f"{folder} has no units of {' or '.join(targets)}")
+    return named
+
+
+def main() -> None:
+    """Compile the units and print the headers by cost."""
+    if len(sys.argv) < 2:
+        sys.exit("usage: python bench/header_cost.py BUILD_FOLDER [TARGET ...]")
+    units = units_of(sys.argv[1], sys.argv[2:] or ["_core"])
     cost = {str(header): 0.0 for header in INCLUDE.rglob("*.hpp")}
     total = peak = 0.0
     with tempfile.TemporaryDirectory() as scratch:
@@ -60,6 +71,8 @@ def main() -> None:
             total, peak = total + seconds, max(peak, memory)
             for header in included & cost.keys():
                 cost[header] += seconds
+    if sys.argv[2:]:
+        return
     for header in sorted(cost, key=lambda header: cost[header]):
         print(f"{cost[header]:6.1f} s  {Path(header).relative_to(INCLUDE)}")
     median = statistics.median(cost.values())

@@ -3,9 +3,9 @@
 #
 # An agent's file is the same in both languages. Here an agent learns in Python to drive a car out
 # of a valley, and the C++ program [cpp/run_agent.cpp](cpp/run_agent.cpp) takes its file and
-# answers observations with actions. It needs no Python: a header-only library, nlohmann/json (`apt
-# install nlohmann-json3-dev`) and a C++20 compiler. A program that also learns is
-# [cpp/controller.cpp](cpp/controller.cpp).
+# answers observations with actions. It needs no Python: the library, nlohmann/json (`apt install
+# nlohmann-json3-dev`) and a C++20 compiler. A program that also learns is
+# [cpp/train_agent.cpp](cpp/train_agent.cpp).
 
 # %%
 import subprocess

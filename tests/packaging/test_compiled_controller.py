@@ -1,6 +1,8 @@
 """The compiled C++ library in a CMake project elsewhere, beside the same agents in Python."""
 
+import re
 import subprocess
+import sys
 from pathlib import Path
 
 import gymnasium as gym
@@ -38,7 +40,7 @@ PROGRAM = """
 
 using namespace sdnn::agents;
 
-#if defined(EIGEN_VERSION_H) || defined(EIGEN_CORE_H) || defined(INCLUDE_NLOHMANN_JSON_HPP_)
+#if defined(EIGEN_WORLD_VERSION) || defined(NLOHMANN_JSON_VERSION_MAJOR)
 #error "the header includes large libraries"
 #endif
 
@@ -84,8 +86,8 @@ int main(int argc, char** argv) try {
 
 
 @pytest.fixture(scope="module")
-def robot(cmake, configure, tmp_path_factory):
-    """The program, built with an installed prefix; its library is compiled for it once."""
+def build(cmake, configure, tmp_path_factory):
+    """The program's build folder, with an installed prefix; the library is compiled once."""
     folder = tmp_path_factory.mktemp("robot")
     (folder / "CMakeLists.txt").write_text(PROJECT)
     (folder / "main.cpp").write_text(PROGRAM)
@@ -97,9 +99,15 @@ def robot(cmake, configure, tmp_path_factory):
         cmake("--build", folder / "build"),
     ):
         assert process.returncode == 0, process.stdout + process.stderr
+    return folder / "build"
+
+
+@pytest.fixture
+def robot(build):
+    """Runs the program."""
 
     def run(*arguments):
-        command = [folder / "build" / "robot", *map(str, arguments)]
+        command = [build / "robot", *map(str, arguments)]
         process = subprocess.run(command, capture_output=True, text=True, check=False)
         assert process.returncode == 0, process.stderr
 
@@ -119,6 +127,15 @@ def live(agent, first):
         next_state = np.array([state[0] + 0.1 * speed, speed])
         agent.learn(Transition(state, action, -abs(next_state[0]), next_state, t % 40 == 39))
         state = next_state
+
+
+def test_a_program_compiles_in_three_seconds_and_300_mb(build, needs):
+    needs("ninja")
+    command = [sys.executable, ROOT / "bench" / "header_cost.py", build, "robot"]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    seconds, megabytes = map(float, re.findall(r"([\d.]+) (?:s|MB)", printed))
+    assert seconds < 3
+    assert 50 < megabytes < 300
 
 
 SPACES = {
