@@ -11,6 +11,8 @@
 #include "sdnn_thermometers.h"
 #ifdef SDNN_HISTORY
 #include "sdnn_history_learner.h"
+#elif defined(SDNN_CODES)
+#include "sdnn_last_bins.h"
 #else
 #include "sdnn_last_observation.h"
 #endif
@@ -226,6 +228,10 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
                                     uint32_t* action) {
   const sdnn_code* code;
   uint32_t bins[SDNN_N_INPUTS], d;
+  if (SDNN_IS_REFUSED(int32_t, observation)) {
+    sdnn_refuse(action);
+    return;
+  }
   sdnn_read_to_act(&agent->states, observation, bins);
   code = sdnn_other(agent, bins);
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
@@ -262,6 +268,7 @@ static inline uint32_t sdnn_greedy_of(int64_t* preferences, uint32_t d, int32_t 
 static inline int64_t sdnn_state_value(const sdnn_agent* agent, const int32_t* observation) {
   uint32_t bins[SDNN_N_INPUTS];
   sdnn_code code;
+  if (SDNN_IS_REFUSED(int32_t, observation)) return 0;
   sdnn_read_only(&agent->states, observation, bins);
   sdnn_encode_state(bins, &code);
   return sdnn_best_sum(agent, &code);
@@ -277,7 +284,9 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   const sdnn_code *code, *next_code;
   int64_t next = 0, error, drift;
   int32_t size;
-  const int is_accepted = sdnn_accepts(&agent->scale, reward);
+  int is_accepted;
+  if (SDNN_IS_REFUSED(int32_t, observation) || SDNN_IS_REFUSED(int32_t, next_observation)) return;
+  is_accepted = sdnn_accepts(&agent->scale, reward);
   if (!is_accepted && !SDNN_REMEMBERS) return;
   sdnn_limit_action(action, limited);
   is_next = sdnn_read_first(&agent->states, observation, bins);
@@ -328,6 +337,9 @@ static inline void sdnn_carry_head(sdnn_agent* agent, uint8_t* image, int reads)
 static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
   sdnn_clear(agent, sizeof *agent);
   sdnn_carry_head(agent, (uint8_t*)head, 1);
+#ifdef SDNN_HOLDS
+  sdnn_forget(&agent->states);
+#endif
   sdnn_apply_rates(agent);
 }
 

@@ -9,6 +9,12 @@
 #define SDNN_N_RANDOMS 5
 #include "sdnn_exploration.h"
 #include "sdnn_real.h"
+#ifdef SDNN_HOLDS
+#include "sdnn_readings.h"
+#else
+#define SDNN_EPISODE_PARAMETER
+#define SDNN_EPISODE
+#endif
 
 typedef uint32_t sdnn_score;
 #include "sdnn_ties.h"
@@ -74,6 +80,9 @@ typedef struct {
   uint32_t n_random_left; /* steps that will still be random */
   uint32_t n_kept, kept;  /* the random action, and steps that it will still last */
   uint32_t step;          /* of the episode */
+#ifdef SDNN_HOLDS
+  sdnn_greedy_episode readings;
+#endif
 } sdnn_agent;
 
 #if SDNN_ADAPTS
@@ -369,6 +378,9 @@ static inline void sdnn_learn_all(sdnn_agent* agent, sdnn_real value) {
 static inline void sdnn_begin_episode(sdnn_agent* agent) {
   agent->step = 0;
   agent->n_kept = 0;
+#ifdef SDNN_HOLDS
+  sdnn_forget_readings(&agent->readings);
+#endif
   if (agent->n_waiting > 0) sdnn_learn_all(agent, sdnn_state_value(agent, agent->next_bins));
 }
 
@@ -464,6 +476,10 @@ static inline uint32_t sdnn_highest(const uint32_t* ranks) {
 /* The number of the action to take, at times a random one. */
 static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation) {
   uint32_t bins[SDNN_N_INPUTS], ranks[SDNN_N_ACTIONS];
+  if (SDNN_IS_REFUSED(int32_t, observation)) return SDNN_REFUSED;
+#ifdef SDNN_HOLDS
+  observation = sdnn_note_readings(&agent->readings, observation);
+#endif
   if (sdnn_explores(agent)) return agent->kept;
   sdnn_bins_of_fixed(observation, bins);
   sdnn_rank(sdnn_state_of(agent, bins), agent->below, agent->above, ranks);
@@ -480,10 +496,24 @@ static inline void sdnn_read_state(const sdnn_agent* agent, const int32_t* obser
   sdnn_evaluate(agent, state, latest->last_use > 0 ? latest : 0);
 }
 
+#ifdef SDNN_HOLDS
+/* Begins an episode of greedy steps, apart from the one of which the agent learns. */
+static inline void sdnn_begin_greedy_episode(const sdnn_agent* agent,
+                                             sdnn_greedy_episode* episode) {
+  sdnn_forget_held(episode->held);
+  episode->n_reads = agent->readings.n_reads;
+}
+#endif
+
 /* The number of a best action. */
-static inline uint32_t sdnn_greedy(const sdnn_agent* agent, const int32_t* observation) {
+static inline uint32_t sdnn_greedy(const sdnn_agent* agent,
+                                   SDNN_EPISODE_PARAMETER const int32_t* observation) {
   uint32_t ranks[SDNN_N_ACTIONS];
   sdnn_state state;
+  if (SDNN_IS_REFUSED(int32_t, observation)) return SDNN_REFUSED;
+#ifdef SDNN_HOLDS
+  observation = sdnn_readings_of(&agent->readings, episode, observation);
+#endif
   sdnn_read_state(agent, observation, &state);
   sdnn_rank(&state, agent->below, agent->above, ranks);
   return sdnn_tied(ranks, SDNN_N_ACTIONS, sdnn_highest(ranks));
@@ -495,6 +525,12 @@ static inline int64_t sdnn_q(const sdnn_agent* agent, const int32_t* observation
   uint64_t fraction;
   sdnn_real value;
   sdnn_state state;
+#ifdef SDNN_HOLDS
+  int32_t held[SDNN_N_OBSERVED];
+  sdnn_read_held(&agent->readings, observation, held);
+  observation = held;
+#endif
+  if (SDNN_IS_REFUSED(int32_t, observation)) return 0;
   sdnn_read_state(agent, observation, &state);
   value =
       sdnn_value(agent, sdnn_count(&state, action < SDNN_N_ACTIONS ? action : SDNN_N_ACTIONS - 1));
@@ -516,6 +552,13 @@ static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uin
   uint32_t bins[SDNN_N_INPUTS], next_bins[SDNN_N_INPUTS], i, is_next = 1;
   sdnn_transition* newest;
   sdnn_real next_value;
+#ifdef SDNN_HOLDS
+  int32_t first[SDNN_N_OBSERVED];
+  sdnn_copy_32(first, sdnn_note_readings(&agent->readings, observation), SDNN_N_OBSERVED);
+  observation = first;
+  next_observation = sdnn_note_readings(&agent->readings, next_observation);
+#endif
+  if (SDNN_IS_REFUSED(int32_t, observation) || SDNN_IS_REFUSED(int32_t, next_observation)) return;
   if (!sdnn_accepts(&agent->scale, reward)) return;
 #if SDNN_ADAPTS
   if (sdnn_note_reward(agent, reward, terminated)) {
@@ -524,7 +567,12 @@ static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uin
 #endif
   sdnn_bins_of_fixed(next_observation, next_bins);
   next_value = terminated ? 0 : sdnn_state_value(agent, next_bins);
+#ifdef SDNN_CODES
+  sdnn_bins_of_fixed(observation, bins);
+  for (i = 0; i < SDNN_N_INPUTS; ++i) is_next &= agent->next_bins[i] == bins[i];
+#else
   for (i = 0; i < SDNN_N_OBSERVED; ++i) is_next &= agent->next_observation[i] == observation[i];
+#endif
   if (agent->n_waiting > 0 && !is_next) {
     sdnn_learn_all(agent, sdnn_state_value(agent, agent->next_bins));
   }

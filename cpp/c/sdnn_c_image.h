@@ -42,6 +42,9 @@ static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
   sdnn_carry_head(agent, (uint8_t*)head, 1);
   sdnn_follow_progress(agent, agent->progress);
   sdnn_set_range(agent, agent->q_low, agent->q_high);
+#ifdef SDNN_HOLDS
+  sdnn_forget_readings(&agent->readings);
+#endif
 }
 
 /* Makes the agent as it was exported. */
@@ -180,16 +183,21 @@ static inline int sdnn_evaluate_kept(const sdnn_keeper* keeper, sdnn_state* stat
 
 /* A greedy action of the kept policy, or of the present one where none is kept. */
 static inline uint32_t sdnn_best(const sdnn_agent* agent, const sdnn_keeper* keeper,
-                                 const int32_t* observation) {
+                                 SDNN_EPISODE_PARAMETER const int32_t* observation) {
   const uint32_t below = UINT32_C(2) * SDNN_U_LOW + ((uint32_t)keeper->scale >> 2);
   const uint32_t above = UINT32_C(2) * SDNN_U_HIGH + ((uint32_t)keeper->scale & 3);
   uint32_t bins[SDNN_N_INPUTS], ranks[SDNN_N_ACTIONS], unit;
   sdnn_state state;
-  if (!keeper->is_kept) return sdnn_greedy(agent, observation);
+  if (SDNN_IS_REFUSED(int32_t, observation)) return SDNN_REFUSED;
+  if (!keeper->is_kept) return sdnn_greedy(agent, SDNN_EPISODE observation);
+#ifdef SDNN_HOLDS
+  observation = sdnn_readings_of(&agent->readings, episode, observation);
+#endif
   sdnn_bins_of_fixed(observation, bins);
   sdnn_encode(&sdnn_the_coding, bins, &state.code);
   for (unit = 0; unit < SDNN_N_UNITS; unit += 4) {
-    if (!sdnn_evaluate_kept(keeper, &state, unit)) return sdnn_greedy(agent, observation);
+    if (!sdnn_evaluate_kept(keeper, &state, unit))
+      return sdnn_greedy(agent, SDNN_EPISODE observation);
   }
   sdnn_rank(&state, below, above, ranks);
   return sdnn_tied(ranks, SDNN_N_ACTIONS, sdnn_highest(ranks));

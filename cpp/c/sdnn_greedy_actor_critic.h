@@ -34,8 +34,8 @@ static inline void sdnn_greedy_in_each(const uint32_t* bins, uint32_t* action) {
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = sdnn_best_action(&code, d, 0);
 }
 
-#ifdef SDNN_HISTORY
-#include "sdnn_history_policy.h"
+#ifdef SDNN_HAS_EPISODES
+#include "sdnn_episode_policy.h"
 #else
 #include "sdnn_policy.h"
 #endif
@@ -47,7 +47,7 @@ static inline void sdnn_place_of_bins(const uint32_t* bins, uint32_t* place) {
   sdnn_encode_state(bins, &code);
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) sdnn_best_action(&code, d, &place[d]);
 }
-#ifdef SDNN_HISTORY
+#ifdef SDNN_HAS_EPISODES
 SDNN_POLICY(sdnn_place, int32_t, sdnn_place_of_bins, sdnn_note_places)
 #else
 SDNN_POLICY(sdnn_place, int32_t, sdnn_bins_of_fixed, sdnn_place_of_bins)

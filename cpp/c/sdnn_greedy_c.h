@@ -73,6 +73,10 @@ static inline void sdnn_greedy_in_each(const uint32_t* bins, uint32_t* action) {
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = sdnn_best_action(&sdnn_networks[d], bins);
 }
 
+#ifdef SDNN_HAS_EPISODES
+#include "sdnn_episode_policy.h"
+#else
 #include "sdnn_policy.h"
+#endif
 
 #endif /* SDNN_GREEDY_C_H */

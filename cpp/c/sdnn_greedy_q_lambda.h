@@ -22,8 +22,8 @@ static inline void sdnn_greedy_in_each(const uint32_t* bins, uint32_t* action) {
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = sdnn_best_action(&code, d);
 }
 
-#ifdef SDNN_HISTORY
-#include "sdnn_history_policy.h"
+#ifdef SDNN_HAS_EPISODES
+#include "sdnn_episode_policy.h"
 #else
 #include "sdnn_policy.h"
 #endif

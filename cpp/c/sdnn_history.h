@@ -7,6 +7,7 @@
 #define SDNN_HISTORY_H
 
 #include "sdnn_elementary.h"
+#include "sdnn_missing.h"
 
 /* Values of SDNN_HISTORY. */
 #define SDNN_HISTORY_DIFFERENCES 1
@@ -21,6 +22,12 @@ typedef struct {
   sdnn_real memory[SDNN_N_REMEMBERED]; /* the last inputs, their averages, or estimates */
 #if SDNN_IS_OBSERVER
   sdnn_real action[SDNN_N_DIMENSIONS]; /* the last one */
+#endif
+#ifdef SDNN_HOLDS
+  int32_t held[SDNN_N_OBSERVED]; /* the last readings */
+#ifdef SDNN_USE_FLOAT
+  double held_doubles[SDNN_N_OBSERVED];
+#endif
 #endif
   uint8_t has_begun;
 } sdnn_episode;
@@ -45,11 +52,14 @@ static inline sdnn_real sdnn_middle_of_symbol(uint32_t symbol, uint32_t n) {
 }
 
 /* How an input is computed from readings, which SDNN_READING(i) has as real numbers. */
-#define SDNN_VARIABLE(i, at, low, width) inputs[i] = sdnn_position(SDNN_READING(at), low, width);
-#define SDNN_CIRCULAR(i, at, low, width) \
-  inputs[i] = sdnn_part_of_turns(sdnn_over(sdnn_minus(SDNN_READING(at), low), width));
-#define SDNN_ANGLE(i, cosine, sine) \
-  inputs[i] = sdnn_direction(SDNN_READING(cosine), SDNN_READING(sine));
+#define SDNN_VARIABLE(i, at, low, width) \
+  inputs[i] = SDNN_HELD(SDNN_LACKS(at), SDNN_HALF, sdnn_position(SDNN_READING(at), low, width));
+#define SDNN_CIRCULAR(i, at, low, width)           \
+  inputs[i] = SDNN_HELD(SDNN_LACKS(at), SDNN_HALF, \
+                        sdnn_part_of_turns(sdnn_over(sdnn_minus(SDNN_READING(at), low), width)));
+#define SDNN_ANGLE(i, cosine, sine)                                                  \
+  inputs[i] = sdnn_direction(SDNN_HELD(SDNN_LACKS(cosine), 0, SDNN_READING(cosine)), \
+                             SDNN_HELD(SDNN_LACKS(sine), 0, SDNN_READING(sine)));
 #define SDNN_SYMBOL(i, at, n)                                                         \
   {                                                                                   \
     uint32_t k, symbol = 0;                                                           \
@@ -62,7 +72,9 @@ static inline sdnn_real sdnn_middle_of_symbol(uint32_t symbol, uint32_t n) {
 /* The inputs of an observation in fixed point. */
 static inline void sdnn_inputs_of_fixed(const int32_t* observation, sdnn_real* inputs) {
 #define SDNN_READING(i) sdnn_real_of(observation[i], -SDNN_FRACTION_BITS)
+#define SDNN_LACKS(i) (observation[i] == SDNN_MISSING)
   SDNN_INPUTS
+#undef SDNN_LACKS
 #undef SDNN_READING
 }
 

@@ -35,6 +35,17 @@ typedef struct {
 #define SDNN_EPISODE_PARAMETER sdnn_greedy_episode *episode,
 #define SDNN_EPISODE episode,
 
+/* An observation, of which the last readings replace those that are missing. */
+static inline const int32_t* sdnn_filled(sdnn_last_state* last, const int32_t* observation) {
+#ifdef SDNN_HOLDS
+  sdnn_hold(last->episode.held, observation);
+  return last->episode.held;
+#else
+  (void)last;
+  return observation;
+#endif
+}
+
 /* Continues an episode, or begins it, with an observation. */
 static inline void sdnn_advance(sdnn_last_state* last, const int32_t* observation) {
   sdnn_real inputs[SDNN_N_OBSERVED_INPUTS];
@@ -61,6 +72,7 @@ static inline void sdnn_restart(sdnn_last_state* last, const int32_t* observatio
 /* Makes it the state of an observation in which the agent acts. After an action that is the next
  * step. Otherwise an equal observation is the same state, and any other begins an episode. */
 static inline void sdnn_find_state(sdnn_last_state* last, const int32_t* observation) {
+  observation = sdnn_filled(last, observation);
   if (last->has_acted) {
     sdnn_advance(last, observation);
   } else {
@@ -76,6 +88,9 @@ static inline void sdnn_copy_bytes(void* to, const void* from, uint32_t n) {
 }
 
 static inline void sdnn_forget_state(sdnn_last_state* last) {
+#ifdef SDNN_HOLDS
+  sdnn_forget_held(last->episode.held);
+#endif
   last->episode.has_begun = 0;
   last->has_acted = 0;
 }
@@ -91,6 +106,12 @@ static inline void sdnn_read_to_act(sdnn_states* states, const int32_t* observat
   ++states->n_reads;
   sdnn_find_state(&states->learned, observation);
   sdnn_bins_of_state(states->learned.state, bins);
+}
+
+/* Begins a greedy episode, apart from the one of which the agent learns. */
+static inline void sdnn_begin_greedy(const sdnn_states* states, sdnn_greedy_episode* episode) {
+  sdnn_forget_state(&episode->last);
+  episode->n_reads = states->n_reads;
 }
 
 /* Notes the action that follows, as indices. */
@@ -128,6 +149,7 @@ static inline void sdnn_read_only(const sdnn_states* states, const int32_t* obse
   const sdnn_last_state* const last = &states->learned;
   sdnn_last_state next;
   sdnn_copy_bytes(&next, last, sizeof next);
+  observation = sdnn_filled(&next, observation);
   if (!sdnn_is_state_of(last, observation)) sdnn_find_state(&next, observation);
   sdnn_bins_of_state(next.state, bins);
 }
@@ -136,7 +158,7 @@ static inline void sdnn_read_only(const sdnn_states* states, const int32_t* obse
 static inline uint32_t sdnn_read_first(sdnn_states* states, const int32_t* observation,
                                        uint32_t* bins) {
   uint32_t i, is_next = 1;
-  sdnn_restart(&states->learned, observation);
+  sdnn_restart(&states->learned, sdnn_filled(&states->learned, observation));
   sdnn_bins_of_state(states->learned.state, bins);
   for (i = 0; i < SDNN_N_INPUTS; ++i) is_next &= states->next[i] == states->learned.state[i];
   return is_next;
@@ -146,7 +168,7 @@ static inline uint32_t sdnn_read_first(sdnn_states* states, const int32_t* obser
 static inline void sdnn_read_next(sdnn_states* states, const uint32_t* action,
                                   const int32_t* next_observation, uint32_t* bins) {
   sdnn_note_action(&states->learned.episode, action);
-  sdnn_advance(&states->learned, next_observation);
+  sdnn_advance(&states->learned, sdnn_filled(&states->learned, next_observation));
   sdnn_bins_of_state(states->learned.state, bins);
   ++states->n_reads;
 }

@@ -26,7 +26,7 @@ class sdnn_learner {
     sdnn_act(&agent_, observation, action);
   }
 #endif
-#ifdef SDNN_HISTORY
+#ifdef SDNN_HAS_EPISODES
   void begin_greedy_episode(sdnn_greedy_episode* episode) const {
     sdnn_begin_greedy_episode(&agent_, episode);
   }

@@ -60,6 +60,10 @@ static inline void sdnn_choose(const sdnn_agent* agent, const sdnn_keeper* keepe
   uint32_t bins[SDNN_N_INPUTS], d;
   int64_t sums[SDNN_MOST_ROWS];
   sdnn_code code;
+  if (SDNN_IS_REFUSED(int32_t, observation)) {
+    sdnn_refuse(place ? place : action);
+    return;
+  }
   sdnn_read_greedily(&agent->states, SDNN_EPISODE observation, bins);
   sdnn_encode_state(bins, &code);
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
@@ -150,12 +154,11 @@ static inline uint32_t sdnn_best_place(const sdnn_agent* agent, const sdnn_keepe
 #define sdnn_best_place sdnn_best_place_in_each
 #endif
 
-#ifdef SDNN_HISTORY
+#ifdef SDNN_HAS_EPISODES
 /* Begins an episode of greedy steps, apart from the one of which the agent learns. */
 static inline void sdnn_begin_greedy_episode(const sdnn_agent* agent,
                                              sdnn_greedy_episode* episode) {
-  sdnn_forget_state(&episode->last);
-  episode->n_reads = agent->states.n_reads;
+  sdnn_begin_greedy(&agent->states, episode);
 }
 #endif
 

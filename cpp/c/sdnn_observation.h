@@ -139,17 +139,28 @@ static inline uint32_t sdnn_symbol_of_fixed(const int32_t* readings, uint32_t n)
   return symbol;
 }
 
+#include "sdnn_missing.h"
+
 #ifndef SDNN_HISTORY
 /* The bins of all inputs, from readings in fixed point. */
 static inline void sdnn_bins_of_fixed(const int32_t* observation, uint32_t* bins) {
 #define SDNN_VARIABLE(i, at, n_bins, low, width, bounds) \
-  bins[i] = sdnn_bin_between(bounds, n_bins, observation[at]);
+  bins[i] = SDNN_NUMBER(SDNN_LACKS(at), n_bins, sdnn_bin_between(bounds, n_bins, observation[at]));
 #define SDNN_CIRCULAR(i, at, n_bins, low, width, rate, offset) \
-  bins[i] = sdnn_bin_of_turn((rate) * (uint64_t)(int64_t)observation[at] + (offset), n_bins);
-#define SDNN_ANGLE(i, cosine, sine, n_bins, bounds) \
-  bins[i] = sdnn_bin_of_direction(bounds, n_bins, observation[cosine], observation[sine]);
-#define SDNN_SYMBOL(i, at, n) bins[i] = sdnn_symbol_of_fixed(&observation[at], n);
+  bins[i] = SDNN_NUMBER(                                       \
+      SDNN_LACKS(at), n_bins,                                  \
+      sdnn_bin_of_turn((rate) * (uint64_t)(int64_t)observation[at] + (offset), n_bins));
+#define SDNN_ANGLE(i, cosine, sine, n_bins, bounds)                                                \
+  bins[i] = SDNN_CODED(                                                                            \
+      SDNN_LACKS(cosine) || SDNN_LACKS(sine), n_bins,                                              \
+      sdnn_bin_of_direction(bounds, n_bins, SDNN_HELD(SDNN_LACKS(cosine), 0, observation[cosine]), \
+                            SDNN_HELD(SDNN_LACKS(sine), 0, observation[sine])));
+#define SDNN_SYMBOL(i, at, n)                                      \
+  bins[i] = SDNN_CODED(sdnn_lacks_int32_t(&observation[at], n), n, \
+                       sdnn_symbol_of_fixed(&observation[at], n));
+#define SDNN_LACKS(i) (observation[i] == SDNN_MISSING)
   SDNN_INPUTS
+#undef SDNN_LACKS
 }
 #endif
 

@@ -207,6 +207,10 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
   uint32_t bins[SDNN_N_INPUTS], d;
   int64_t sums[SDNN_MOST_ROWS], least;
   const sdnn_code* code;
+  if (SDNN_IS_REFUSED(int32_t, observation)) {
+    sdnn_refuse(action);
+    return;
+  }
   if (sdnn_explores(agent)) {
     for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = agent->kept[d];
     if (SDNN_REMEMBERS) {
@@ -245,6 +249,7 @@ static inline int64_t sdnn_q_of_each(const sdnn_agent* agent, const int32_t* obs
                                      const uint32_t* action) {
   uint32_t bins[SDNN_N_INPUTS], limited[SDNN_N_DIMENSIONS];
   sdnn_code code;
+  if (SDNN_IS_REFUSED(int32_t, observation)) return 0;
   sdnn_limit_action(action, limited);
   sdnn_read_only(&agent->states, observation, bins);
   sdnn_encode_state(bins, &code);
@@ -260,7 +265,9 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   uint32_t bins[SDNN_N_INPUTS], limited[SDNN_N_DIMENSIONS], d, is_next;
   const sdnn_code* code;
   int32_t size;
-  const int is_accepted = sdnn_accepts(&agent->scale, reward);
+  int is_accepted;
+  if (SDNN_IS_REFUSED(int32_t, observation) || SDNN_IS_REFUSED(int32_t, next_observation)) return;
+  is_accepted = sdnn_accepts(&agent->scale, reward);
   if (!is_accepted && !SDNN_REMEMBERS) return;
   sdnn_limit_action(action, limited);
   is_next = sdnn_read_first(&agent->states, observation, bins);
@@ -340,6 +347,9 @@ static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
   sdnn_carry_head(agent, (uint8_t*)head, 1);
   sdnn_quotient((uint64_t)agent->n_steps, SDNN_AVERAGES ? SDNN_AVERAGING_INTERVAL : 1, &rest);
   agent->phase = (uint32_t)rest;
+#ifdef SDNN_HOLDS
+  sdnn_forget(&agent->states);
+#endif
   sdnn_apply_rates(agent);
 }
 

@@ -20,8 +20,9 @@ static inline void sdnn_encode_state(const uint32_t* bins, sdnn_code* code) {
   uint32_t column = UINT32_C(1) * SDNN_N_GROUPS * SDNN_N_PATTERN_UNITS, i, k;
   sdnn_encode(&sdnn_the_coding, bins, code);
   for (i = 0; i < n; ++i) {
-    const uint32_t n_above = sdnn_n_units_above(code->bins[sdnn_thermometers[i]]);
+    const uint32_t bin = code->bins[sdnn_thermometers[i]], n_above = sdnn_n_units_above(bin);
     for (k = 0; k < n_units; ++k, ++column) {
+      if (SDNN_CODED(bin + 1 == sdnn_n_bins[sdnn_thermometers[i]], 1, 0)) continue;
       if (k < n_above) {
         code->columns[code->n_positive++] = (sdnn_column)column;
       } else {

@@ -23,7 +23,11 @@ _LARGEST = 2**31 - 1  # of readings
 class ThermometerCode(Code):
     """The paired code, and after it the thermometers of some inputs."""
 
-    def __init__(self, network: _core.LinearSDNN, inputs: list[int], n_inputs: int) -> None:
+    def __init__(
+        self, network: _core.LinearSDNN, inputs: list[int], n_inputs: int, *, n_unread_bins: int
+    ) -> None:
+        self.n_unread_bins = n_unread_bins
+        """Bins of an input that stand for missing readings."""
         self.thermometers: list[int] = []
         self.n_units = 0
         super().__init__(network, n_inputs)
@@ -50,7 +54,7 @@ class ThermometerCode(Code):
 
     def defines(self) -> dict[str, int]:
         """Return the sizes of a code."""
-        bins = [len(self.network.table(i)) for i in self.thermometers]
+        bins = [len(self.network.table(i)) - self.n_unread_bins for i in self.thermometers]
         return {
             **super().defines(),
             "N_COLUMNS": self.n_columns,
@@ -65,11 +69,18 @@ class ActorCriticWriter(LinearWriter):
 
     agent: SDNNActorCritic
 
+    def unused_files(self) -> list[str]:
+        """Return the C files that the header does not need."""
+        last = "sdnn_last_observation.h" if self.codes_missing else "sdnn_last_bins.h"
+        return [*super().unused_files(), last]
+
     def code(self) -> ThermometerCode:
         """Return the code of its states."""
         inputs = [*self.inputs, *self.history.added]
         variables = [i for i, source in enumerate(inputs) if source.kind == "variable"]
-        return ThermometerCode(self.network, variables, self.n_inputs)
+        return ThermometerCode(
+            self.network, variables, self.n_inputs, n_unread_bins=int(self.codes_missing)
+        )
 
     @property
     def action_window(self) -> int:
@@ -110,7 +121,7 @@ class ActorCriticWriter(LinearWriter):
 
     def tie_remark(self) -> list[str]:
         """Describe how ties are broken, and the actions between those of a box."""
-        episode = "&episode, " if self.history.is_needed else ""
+        episode = "&episode, " if self.history.has_episodes else ""
         return [
             "Of several most probable actions it takes the middle of the widest run of neighbours,",
             "where the agent draws one.",
@@ -210,7 +221,7 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
         first_weights = weights.reshape(-1) if weights.any() else np.zeros(0, np.int32)
         tables.add("int32_t", "first_weights", first_weights)
         about = "The range of each observed number, beyond which all are equal."
-        if not self.history.is_needed:
+        if not self.history.is_needed and not self.codes_missing:
             tables.add("int32_t", "limits", self._limits(), about)
         defines = {
             **self.defines(),
@@ -261,6 +272,7 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
     def _ram_bytes(self, n_weights: int) -> int:
         """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
         n_bytes = 8 * 2 + 16 + 24 + 32 * 2 + 4 * 2 * n_weights + 4 * 3
-        n_bytes = self.with_states(n_bytes, 4 * self.n_observed, next_bins=False)
+        n_last = self.n_inputs if self.codes_missing else self.n_observed
+        n_bytes = self.with_states(n_bytes, 4 * n_last, next_bins=False)
         n_bytes += 2 * self.code_bytes() + 3 + self.n_critic_rows + sum(self.n_rows())
         return rounded_up(n_bytes, 8)

@@ -98,11 +98,9 @@ def c_header(
 def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool) -> Any:
     """Return the writer of an agent's header, a `Learner` if it learns.
 
-    TypeError for agents without a header. ValueError for an agent that accepts missing readings,
-    for SDNN-C with a history, and for running ranges in an agent that would learn.
+    TypeError for agents without a header. ValueError for SDNN-C with a history, and for running
+    ranges in an agent that would learn.
     """
-    expected = "have missing='error': a C header has no other treatment of missing readings"
-    require(getattr(agent, "missing", "error") == "error", "agent", expected, agent)
     has_history = getattr(agent, "history", "none") not in ("none", "auto")
     expected = "have history='none', as SDNNQLambda and SDNNActorCritic alone have a history in C"
     is_possible = not has_history or isinstance(agent, SDNNQLambda | SDNNActorCritic)

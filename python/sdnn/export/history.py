@@ -1,4 +1,4 @@
-"""Constants of states that include earlier observations."""
+"""Constants of states that depend on earlier observations: a history, or held readings."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ import numpy as np
 
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.environments.types import Data
-from sdnn.export.text import Input, Tables, bits_of, real_number
+from sdnn.export.text import Input, Tables, bits_of, real_number, rounded_up
 
-_FILES = ("sdnn_history.h", "sdnn_history_policy.h", "sdnn_history_learner.h")
-_FILES_WITHOUT = ("sdnn_policy.h", "sdnn_last_bins.h", "sdnn_last_observation.h")
+_OF_HISTORY = ("sdnn_history.h", "sdnn_history_learner.h")
+_WITHOUT_HISTORY = ("sdnn_float_bins.h", "sdnn_last_bins.h", "sdnn_last_observation.h")
+_OF_HELD = ("sdnn_readings.h", "sdnn_held_observations.h")
 _DIGITS = {"float64": (53, -1074), "float32": (24, -149), "float16": (11, -24), "whole": (0, 0)}
 """Binary digits of the numbers of a Box, and the exponent of their least bit; 0: whole numbers."""
 
 
 class StateHistory:
-    """The history of an agent with a linear readout, as its header has it.
+    """The memory of an agent's episode, as its header has it.
 
     Parameters
     ----------
@@ -33,6 +34,8 @@ class StateHistory:
         self.agent, self.inputs, self.kind = agent, inputs, agent.history
         self.fitted = agent._state_of("history")
         self.numbers = [i for i, source in enumerate(inputs) if source.kind != "symbol"]
+        self.holds = agent.missing == "hold"
+        """Whether the last readings replace those that are missing."""
 
     @property
     def is_needed(self) -> bool:
@@ -40,9 +43,18 @@ class StateHistory:
         return self.kind != "none" and bool(self.numbers)
 
     @property
+    def has_episodes(self) -> bool:
+        """Whether an action depends on more than one observation."""
+        return self.is_needed or self.holds
+
+    @property
     def unused_files(self) -> Sequence[str]:
         """The C files that its header does not need."""
-        return _FILES_WITHOUT if self.is_needed else _FILES
+        without = ["sdnn_policy.h" if self.has_episodes else "sdnn_episode_policy.h"]
+        if self.has_episodes:
+            without.append("sdnn_single_observations.h")
+        without += _WITHOUT_HISTORY if self.is_needed else _OF_HISTORY
+        return [*without, *(() if self.holds and not self.is_needed else _OF_HELD)]
 
     @property
     def added(self) -> list[Input]:
@@ -61,8 +73,11 @@ class StateHistory:
     @property
     def episode_bytes(self) -> int:
         """The bytes of an episode's memory."""
+        n_held_bytes = 4 * len(self.agent.observation_range[0]) * self.holds
+        if not self.is_needed:
+            return n_held_bytes
         n_actions = self.agent.n_dimensions if self.kind == "observer" else 0
-        return 8 * (self.n_remembered + n_actions + 1)
+        return 8 * (self.n_remembered + n_actions) + rounded_up(n_held_bytes + 1, 8)
 
     @property
     def stack_bytes(self) -> int:
@@ -92,7 +107,12 @@ class StateHistory:
 
     def defines(self, *, acts_between: bool) -> Data:
         """Return the macros; ``acts_between``: greedy actions may lie between those of a Box."""
-        sizes: Data = {
+        sizes: Data = {}
+        if self.holds:
+            sizes |= {"HOLDS": 1, "N_PARTS": len(self._part_sizes())}
+        if not self.is_needed:
+            return sizes
+        sizes |= {
             "HISTORY": {"differences": 1, "averages": 2, "observer": 3}[self.kind],
             "N_OBSERVED_INPUTS": len(self.inputs),
             "N_NUMBERS": len(self.numbers),
@@ -108,6 +128,11 @@ class StateHistory:
 
     def add_tables(self, tables: Tables, *, acts_between: bool) -> None:
         """Add the constants of the history; real numbers are the bits of IEEE 754."""
+        if self.holds:
+            about = "Variables that are missing if one is: a number, or those of a symbol."
+            tables.add("uint16_t", "part_sizes", np.array(self._part_sizes()), about)
+        if not self.is_needed:
+            return
         is_circular = [self.inputs[i].kind in ("angle", "circular") for i in self.numbers]
         about = "Inputs that are numbers, and whether they are angles."
         tables.add("uint16_t", "numbers", np.array(self.numbers), about)
@@ -142,6 +167,15 @@ class StateHistory:
             bounds = np.column_stack([self.agent._action.low, self.agent._action.high])
             tables.add("uint64_t", "action_bounds", bits_of(bounds))
 
+    def _part_sizes(self) -> list[int]:
+        """Return the numbers of variables that are missing together."""
+        sizes = {first: size for first, size in self.agent._observation.symbols}
+        parts, at = list[int](), 0
+        while at < len(self.agent.observation_range[0]):
+            parts.append(sizes.get(at, 1))
+            at += parts[-1]
+        return parts
+
     def usage(self) -> Iterator[str]:
         """Describe the inputs to a reader of the header."""
         if self.kind == "observer":
@@ -164,7 +198,7 @@ class StateHistory:
 
     def calls_of_episode(self, name: str) -> list[str]:
         """Return example lines of C that begin an episode, of a policy that remembers it."""
-        if not self.is_needed:
+        if not self.has_episodes:
             return []
         return [
             f"static {name}_episode episode; // the memory of an episode",

@@ -107,7 +107,7 @@ class Learner(Writer[Network]):
         ]
         if self.tie_rule() == "uniform":
             remark.append("Of several it takes the middle of the widest run.")
-        if self.history.is_needed:
+        if self.history.has_episodes:
             remark += [
                 f"A {self.name}_greedy_episode is the memory of greedy steps;"
                 f" {self.name}_begin_greedy_episode",
@@ -118,7 +118,7 @@ class Learner(Writer[Network]):
     @property
     def greedy_arguments(self) -> str:
         """The arguments of greedy functions."""
-        episode = "&episode, " if self.history.is_needed else ""
+        episode = "&episode, " if self.history.has_episodes else ""
         return f"&agent, {episode}observation"
 
     def calls(self) -> list[str]:

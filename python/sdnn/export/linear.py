@@ -90,19 +90,14 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         last = first if last is None else last
         return {f"{macro}_FIRST": round(first * _ONE), f"{macro}_LAST": round(last * _ONE)}
 
-    def history_bytes(self) -> int:
-        """Return the bytes of a greedy policy's history, on the stack and of an episode."""
-        if not self.history.is_needed:
-            return 0
-        return self.history.stack_bytes + self.history.episode_bytes
-
     def with_states(self, n_bytes: int, plain_bytes: int, *, next_bins: bool) -> int:
         """Add the bytes of the last states to those of the fields before them.
 
         Without a history they have ``plain_bytes``; with one they begin at a multiple of 8 bytes.
         """
         if not self.history.is_needed:
-            return n_bytes + plain_bytes
+            n_readings = (self.n_observed + 1) * self.history.holds
+            return n_bytes + 4 * n_readings + plain_bytes
         last = 8 * self.n_inputs + 4 * self.n_observed + self.history.episode_bytes + 1
         states = rounded_up(last, 8) + 8 * self.n_inputs + 4 * self.n_inputs * next_bins + 4
         return rounded_up(n_bytes, 8) + rounded_up(states, 8)

@@ -86,7 +86,7 @@ class SDNNCWriter(Writer[_core.SDNNC]):
             "NETWORKS": rows,
         }
         ram_bytes = codes[0].column_bytes * most_columns + 8 + 4 * -(-max(n_units) // 32)
-        ram_bytes += 2 * most_actions + 12 * self.n_inputs
+        ram_bytes += 2 * most_actions + 12 * self.n_inputs + self.history_bytes()
         sizes = {
             "weight_bytes": 4 * n_rows * codes[0].n_columns,
             "ram_bytes": ram_bytes,
@@ -369,6 +369,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         n_bytes = 5 * 32 + 24 + 5 * 8 + (n_steps + 1) * self._state_bytes() + 12 * n_steps
         n_bytes += 4 * self.n_words + 4 * self.n_units
         n_bytes += 4 * (10 + self.n_inputs + self.n_observed)
+        n_bytes += 4 * (self.n_observed + 1) * self.history.holds
         if self.adapts:
             n_bytes += 5 * 8 + 8 * _MOST_RETURNS + 8 * self.horizon + 12
         return rounded_up(n_bytes, 8)

@@ -83,11 +83,25 @@ class Writer(ABC, Generic[Network]):
     def header(self) -> CHeader:
         """Make the header."""
 
+    @property
+    def codes_missing(self) -> bool:
+        """Whether the last pattern of each input stands for missing readings."""
+        return self.agent.missing == "code"
+
+    def unused_files(self) -> list[str]:
+        """Return the C files that the header does not need."""
+        return [*self.history.unused_files]
+
+    def history_bytes(self) -> int:
+        """Return the bytes of a greedy policy's memory, on the stack and of an episode."""
+        return self.history.stack_bytes + self.history.episode_bytes
+
     def _inputs(self) -> list[Input]:
         inputs = []
         for i, (kind, at) in enumerate(self.agent.inputs):
             low, high = (float(end[at[0]]) for end in self.agent.observation_range)
-            inputs.append(Input(kind, list(at), low, high, len(self.network.table(i))))
+            n_bins = len(self.network.table(i)) - self.codes_missing
+            inputs.append(Input(kind, list(at), low, high, n_bins))
         return inputs
 
     def _box(self) -> Array | None:
@@ -131,8 +145,7 @@ class Writer(ABC, Generic[Network]):
             fixed = np.round(self.box.astype(np.float64) * 2.0**self.fraction_bits)
             about = f"The actions, times 2^{self.fraction_bits}."
             tables.add("int32_t", "action_fixed", by_dimension(fixed.astype(np.int64)), about)
-        if self.history.is_needed:
-            self.history.add_tables(tables, acts_between=self.acts_between)
+        self.history.add_tables(tables, acts_between=self.acts_between)
         return tables
 
     @property
@@ -160,6 +173,8 @@ class Writer(ABC, Generic[Network]):
         ]
         if self.history.is_needed:
             about += self.history.constants()
+        if self.agent.missing != "error":
+            about.append(self.agent.missing)
         return zlib.crc32(json.dumps(about).encode())
 
     def write(
@@ -187,8 +202,8 @@ class Writer(ABC, Generic[Network]):
             "FRACTION_BITS": self.fraction_bits,
             "TIES": f"{macro}_{_TIES[self.tie_rule()]}",
         }
-        if self.history.is_needed:
-            spaces |= self.history.defines(acts_between=self.acts_between)
+        spaces |= self.history.defines(acts_between=self.acts_between)
+        spaces |= {"CODES": 1} if self.codes_missing else {}
         normalizations = [
             line
             for statistics in self.agent.wrappers
@@ -214,7 +229,7 @@ class Writer(ABC, Generic[Network]):
                 *conversion_tables.lines,
                 *self._float_tables(),
             ],
-            code=c_source(file, self.name, self.history.unused_files),
+            code=c_source(file, self.name, self.unused_files()),
         )
         return CHeader(
             name=self.name,
@@ -223,6 +238,17 @@ class Writer(ABC, Generic[Network]):
             flash_bytes=flash_bytes,
             **sizes,
         )
+
+    def _missing_remark(self) -> list[str]:
+        name = self.name.upper()
+        if self.codes_missing:
+            return [f"A reading may be {name}_MISSING: each input has a pattern for that."]
+        if self.history.holds:
+            return [f"A reading may be {name}_MISSING: it counts as the last one of the episode."]
+        return [
+            f"Define {name}_REFUSES before the include, and an observation in which a reading is",
+            f"{name}_MISSING is told apart: its action is {name}_REFUSED, and nothing is learned.",
+        ]
 
     def _usage(self) -> list[str]:
         observation = f"int32_t observation[{self.name.upper()}_N_OBSERVED];"
@@ -234,6 +260,7 @@ class Writer(ABC, Generic[Network]):
             f"An action is a number; {self._action_value()} is its value.",
             *(line for i, source in enumerate(self.inputs) for line in source.usage(i)),
             *self.history.usage(),
+            *self._missing_remark(),
             *self.tie_remark(),
         ]
 
@@ -246,7 +273,7 @@ class Writer(ABC, Generic[Network]):
         return [
             f"Flash: {{flash}} bytes of constants, of which {weight_bytes:,} are weights; the code",
             f"       comes to {'2 to 5' if self.history.is_needed else '1 to 2'} kB.",
-            *(self.history.memory_lines(ram_bytes) if self.history.is_needed else stack),
+            *(self.history.memory_lines(ram_bytes) if self.history.has_episodes else stack),
             "       No heap, and nothing static that changes.",
             f"Time:  a decision reads {n_words:,} words of 32 bits of weights.",
         ]

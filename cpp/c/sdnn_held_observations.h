@@ -1,0 +1,48 @@
+/* Reads the states of an agent with a linear readout that holds the last readings. The file that
+ * includes this one defines sdnn_states, which begin with `readings`. */
+#ifndef SDNN_HELD_OBSERVATIONS_H
+#define SDNN_HELD_OBSERVATIONS_H
+
+#include "sdnn_readings.h"
+
+static inline void sdnn_forget(sdnn_states* states) { sdnn_forget_readings(&states->readings); }
+
+static inline void sdnn_read_to_act(sdnn_states* states, const int32_t* observation,
+                                    uint32_t* bins) {
+  sdnn_bins_of_fixed(sdnn_note_readings(&states->readings, observation), bins);
+}
+static inline void sdnn_note_act(sdnn_states* states, const uint32_t* action) {
+  (void)states;
+  (void)action;
+}
+
+static inline void sdnn_read_greedily(const sdnn_states* states, sdnn_greedy_episode* episode,
+                                      const int32_t* observation, uint32_t* bins) {
+  sdnn_bins_of_fixed(sdnn_readings_of(&states->readings, episode, observation), bins);
+}
+static inline void sdnn_note_greedy(const sdnn_greedy_episode* episode, const uint32_t* action,
+                                    const uint32_t* place) {
+  (void)episode;
+  (void)action;
+  (void)place;
+}
+
+static inline void sdnn_begin_greedy(const sdnn_states* states, sdnn_greedy_episode* episode) {
+  sdnn_forget_held(episode->held);
+  episode->n_reads = states->readings.n_reads;
+}
+
+static inline void sdnn_read_only(const sdnn_states* states, const int32_t* observation,
+                                  uint32_t* bins) {
+  int32_t held[SDNN_N_OBSERVED];
+  sdnn_read_held(&states->readings, observation, held);
+  sdnn_bins_of_fixed(held, bins);
+}
+
+static inline void sdnn_read_next(sdnn_states* states, const uint32_t* action,
+                                  const int32_t* next_observation, uint32_t* bins) {
+  (void)action;
+  sdnn_read_to_act(states, next_observation, bins);
+}
+
+#endif /* SDNN_HELD_OBSERVATIONS_H */
