@@ -11,6 +11,8 @@
 #include "sdnn_thermometers.h"
 #ifdef SDNN_HISTORY
 #include "sdnn_history_learner.h"
+#elif defined(SDNN_HOLDS)
+#include "sdnn_held_observations.h"
 #elif defined(SDNN_CODES)
 #include "sdnn_last_bins.h"
 #else

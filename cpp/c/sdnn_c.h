@@ -544,12 +544,29 @@ static inline int64_t sdnn_q(const sdnn_agent* agent, const int32_t* observation
   return value >> 63 ? -(int64_t)fraction : (int64_t)fraction;
 }
 
+/* Whether the last transition ended in the state of an observation. */
+static inline uint32_t sdnn_is_next(const sdnn_agent* agent, const int32_t* observation) {
+#ifdef SDNN_HOLDS
+  return sdnn_is_same_state(agent->next_observation, observation);
+#else
+  uint32_t i, is_next = 1;
+#ifdef SDNN_CODES
+  uint32_t bins[SDNN_N_INPUTS];
+  sdnn_bins_of_fixed(observation, bins);
+  for (i = 0; i < SDNN_N_INPUTS; ++i) is_next &= agent->next_bins[i] == bins[i];
+#else
+  for (i = 0; i < SDNN_N_OBSERVED; ++i) is_next &= agent->next_observation[i] == observation[i];
+#endif
+  return is_next;
+#endif
+}
+
 /* Learns a transition. Its reward is a number times 2^SDNN_FRACTION_BITS; `terminated` means that
  * the episode ended in a terminal state, not by a time limit. If the next transition does not begin
  * with the same readings, this one was the last of its episode. */
 static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uint32_t action,
                               int32_t reward, const int32_t* next_observation, int terminated) {
-  uint32_t bins[SDNN_N_INPUTS], next_bins[SDNN_N_INPUTS], i, is_next = 1;
+  uint32_t bins[SDNN_N_INPUTS], next_bins[SDNN_N_INPUTS];
   sdnn_transition* newest;
   sdnn_real next_value;
 #ifdef SDNN_HOLDS
@@ -567,13 +584,7 @@ static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uin
 #endif
   sdnn_bins_of_fixed(next_observation, next_bins);
   next_value = terminated ? 0 : sdnn_state_value(agent, next_bins);
-#ifdef SDNN_CODES
-  sdnn_bins_of_fixed(observation, bins);
-  for (i = 0; i < SDNN_N_INPUTS; ++i) is_next &= agent->next_bins[i] == bins[i];
-#else
-  for (i = 0; i < SDNN_N_OBSERVED; ++i) is_next &= agent->next_observation[i] == observation[i];
-#endif
-  if (agent->n_waiting > 0 && !is_next) {
+  if (agent->n_waiting > 0 && !sdnn_is_next(agent, observation)) {
     sdnn_learn_all(agent, sdnn_state_value(agent, agent->next_bins));
   }
   sdnn_bins_of_fixed(observation, bins);

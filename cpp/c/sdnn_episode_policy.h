@@ -43,7 +43,7 @@ static inline void sdnn_begin_episode(sdnn_episode* episode) {
 static inline const int32_t* sdnn_filled_int32_t(sdnn_episode* episode,
                                                  const int32_t* observation) {
 #ifdef SDNN_HOLDS
-  sdnn_hold(episode->held, observation);
+  sdnn_hold_readings(episode->held, observation);
   return episode->held;
 #else
   (void)episode;

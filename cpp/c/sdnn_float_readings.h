@@ -22,7 +22,7 @@ static inline int sdnn_lacks_float(const float* readings, uint32_t n) {
 }
 
 #ifdef SDNN_HOLDS
-/* As sdnn_hold and sdnn_forget_held, whose memory NaN fills here. */
+/* As sdnn_hold_readings and sdnn_forget_held, whose memory NaN fills here. */
 static inline void sdnn_hold_doubles(double* held, const double* observation) {
   uint32_t part, i, at = 0;
   for (part = 0; part < SDNN_N_PARTS; ++part) {

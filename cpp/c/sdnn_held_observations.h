@@ -1,9 +1,16 @@
-/* Reads the states of an agent with a linear readout that holds the last readings. The file that
- * includes this one defines sdnn_states, which begin with `readings`. */
+/* The states of an agent with a linear readout that holds the last readings. */
 #ifndef SDNN_HELD_OBSERVATIONS_H
 #define SDNN_HELD_OBSERVATIONS_H
 
 #include "sdnn_readings.h"
+
+typedef struct {
+  sdnn_greedy_episode readings;
+  int32_t next[SDNN_N_OBSERVED]; /* where the last transition ended */
+#ifndef SDNN_IS_ACTOR_CRITIC
+  uint32_t next_bins[SDNN_N_INPUTS];
+#endif
+} sdnn_states;
 
 static inline void sdnn_forget(sdnn_states* states) { sdnn_forget_readings(&states->readings); }
 
@@ -43,6 +50,19 @@ static inline void sdnn_read_next(sdnn_states* states, const uint32_t* action,
                                   const int32_t* next_observation, uint32_t* bins) {
   (void)action;
   sdnn_read_to_act(states, next_observation, bins);
+}
+
+/* Stores where a transition ends: at the readings that are held. */
+static inline void sdnn_keep_next(sdnn_states* states, const int32_t* next_observation) {
+  (void)next_observation;
+  sdnn_copy_32(states->next, states->readings.held, SDNN_N_OBSERVED);
+}
+
+/* The bins of the state in which a transition starts. Returns whether the last one ended there. */
+static inline uint32_t sdnn_read_first(sdnn_states* states, const int32_t* observation,
+                                       uint32_t* bins) {
+  sdnn_read_to_act(states, observation, bins);
+  return sdnn_is_same_state(states->next, states->readings.held);
 }
 
 #endif /* SDNN_HELD_OBSERVATIONS_H */

@@ -38,7 +38,7 @@ typedef struct {
 /* An observation, of which the last readings replace those that are missing. */
 static inline const int32_t* sdnn_filled(sdnn_last_state* last, const int32_t* observation) {
 #ifdef SDNN_HOLDS
-  sdnn_hold(last->episode.held, observation);
+  sdnn_hold_readings(last->episode.held, observation);
   return last->episode.held;
 #else
   (void)last;

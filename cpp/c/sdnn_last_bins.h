@@ -3,22 +3,12 @@
 #define SDNN_LAST_BINS_H
 
 #include "sdnn_observation.h"
-#ifdef SDNN_HOLDS
-#include "sdnn_readings.h"
-#endif
 
 typedef struct {
-#ifdef SDNN_HOLDS
-  sdnn_greedy_episode readings;
-#endif
   uint32_t next_bins[SDNN_N_INPUTS]; /* where the last transition ended */
 } sdnn_states;
 
-#ifdef SDNN_HOLDS
-#include "sdnn_held_observations.h"
-#else
 #include "sdnn_single_observations.h"
-#endif
 
 /* The bins of the state in which a transition starts. Returns whether the last one ended there. */
 static inline uint32_t sdnn_read_first(sdnn_states* states, const int32_t* observation,

@@ -3,49 +3,13 @@
 #define SDNN_LAST_OBSERVATION_H
 
 #include "sdnn_observation.h"
-#ifdef SDNN_HOLDS
-#include "sdnn_readings.h"
-#endif
 
 typedef struct {
-#ifdef SDNN_HOLDS
-  sdnn_greedy_episode readings;
-#endif
   int32_t next[SDNN_N_OBSERVED]; /* where the last transition ended */
 } sdnn_states;
 
-#ifdef SDNN_HOLDS
-#include "sdnn_held_observations.h"
-#else
 #include "sdnn_single_observations.h"
-#endif
 
-#ifdef SDNN_HOLDS
-/* A reading clipped to its range; one that is missing stays so. */
-static inline int32_t sdnn_limited(uint32_t i, int32_t reading) {
-  const int32_t low = sdnn_limits[i][0], high = sdnn_limits[i][1];
-  if (reading == SDNN_MISSING) return reading;
-  return reading < low ? low : reading > high ? high : reading;
-}
-
-/* Stores the held observation in which a transition ends. */
-static inline void sdnn_keep_next(sdnn_states* states, const int32_t* next_observation) {
-  uint32_t i;
-  (void)next_observation;
-  for (i = 0; i < SDNN_N_OBSERVED; ++i) states->next[i] = sdnn_limited(i, states->readings.held[i]);
-}
-
-/* The bins of the state in which a transition starts. Returns whether the last one ended there. */
-static inline uint32_t sdnn_read_first(sdnn_states* states, const int32_t* observation,
-                                       uint32_t* bins) {
-  uint32_t i, is_same = 1;
-  sdnn_read_to_act(states, observation, bins);
-  for (i = 0; i < SDNN_N_OBSERVED; ++i) {
-    is_same &= states->next[i] == sdnn_limited(i, states->readings.held[i]);
-  }
-  return is_same;
-}
-#else
 /* Stores the observation in which a transition ends, clipped to the ranges. Returns whether it is
  * the observation that was stored before. */
 static inline uint32_t sdnn_keep_next(sdnn_states* states, const int32_t* observation) {
@@ -66,6 +30,5 @@ static inline uint32_t sdnn_read_first(sdnn_states* states, const int32_t* obser
   sdnn_bins_of_fixed(observation, bins);
   return sdnn_keep_next(states, observation);
 }
-#endif
 
 #endif /* SDNN_LAST_OBSERVATION_H */

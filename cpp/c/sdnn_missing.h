@@ -56,7 +56,7 @@ static inline void sdnn_refuse(uint32_t* action) {
 #ifdef SDNN_HOLDS
 /* Replaces the last readings by those of an observation that are not missing. The variables of a
  * symbol are missing if one is. */
-static inline void sdnn_hold(int32_t* held, const int32_t* observation) {
+static inline void sdnn_hold_readings(int32_t* held, const int32_t* observation) {
   uint32_t part, i, at = 0;
   for (part = 0; part < SDNN_N_PARTS; ++part) {
     const uint32_t n = sdnn_part_sizes[part];

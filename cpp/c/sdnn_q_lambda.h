@@ -9,6 +9,8 @@
 #include "sdnn_readout.h"
 #ifdef SDNN_HISTORY
 #include "sdnn_history_learner.h"
+#elif defined(SDNN_HOLDS)
+#include "sdnn_held_observations.h"
 #else
 #include "sdnn_last_bins.h"
 #endif

@@ -17,7 +17,6 @@ from sdnn.export.text import Tables, rounded_up
 from sdnn.export.writer import CHeader
 
 _CRITIC, _ACTOR = "action_value.weights", "actor.weights"
-_LARGEST = 2**31 - 1  # of readings
 
 
 class ThermometerCode(Code):
@@ -220,9 +219,8 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
         weights = self.weights(state)
         first_weights = weights.reshape(-1) if weights.any() else np.zeros(0, np.int32)
         tables.add("int32_t", "first_weights", first_weights)
-        about = "The range of each observed number, beyond which all are equal."
-        if not self.history.is_needed and not self.codes_missing:
-            tables.add("int32_t", "limits", self._limits(), about)
+        if not self.history.has_episodes and not self.codes_missing:
+            self.add_limits(tables)
         defines = {
             **self.defines(),
             **self._learning_rule(),
@@ -240,20 +238,6 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
             ram_bytes=ram_bytes,
             n_words=self.code().most_columns * sum(self.n_rows()),
         )
-
-    def _limits(self) -> Array:
-        """Return the least and the largest reading that count, of each observed number."""
-        limits = np.zeros((self.n_observed, 2), np.int64)
-        scale = 2.0**self.fraction_bits
-        for source in self.inputs:
-            first = source.at[0]
-            if source.kind == "variable":
-                limits[first] = math.floor(source.low * scale), math.ceil(source.high * scale)
-            elif source.kind == "symbol":
-                limits[first : first + source.n_bins] = -_LARGEST, _LARGEST
-            else:
-                limits[list(source.at)] = -_LARGEST, _LARGEST
-        return limits
 
     def _learning_rule(self) -> Data:
         learning, state = self.agent.learning, self.agent._state_of("agent")

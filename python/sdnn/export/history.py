@@ -13,7 +13,7 @@ from sdnn.environments.types import Data
 from sdnn.export.text import Input, Tables, bits_of, real_number, rounded_up
 
 _OF_HISTORY = ("sdnn_history.h", "sdnn_history_learner.h")
-_WITHOUT_HISTORY = ("sdnn_float_bins.h", "sdnn_last_bins.h", "sdnn_last_observation.h")
+_SINGLE = ("sdnn_single_observations.h", "sdnn_last_bins.h", "sdnn_last_observation.h")
 _OF_HELD = ("sdnn_readings.h", "sdnn_held_observations.h")
 _DIGITS = {"float64": (53, -1074), "float32": (24, -149), "float16": (11, -24), "whole": (0, 0)}
 """Binary digits of the numbers of a Box, and the exponent of their least bit; 0: whole numbers."""
@@ -52,8 +52,8 @@ class StateHistory:
         """The C files that its header does not need."""
         without = ["sdnn_policy.h" if self.has_episodes else "sdnn_episode_policy.h"]
         if self.has_episodes:
-            without.append("sdnn_single_observations.h")
-        without += _WITHOUT_HISTORY if self.is_needed else _OF_HISTORY
+            without += _SINGLE
+        without += ["sdnn_float_bins.h"] if self.is_needed else _OF_HISTORY
         return [*without, *(() if self.holds and not self.is_needed else _OF_HELD)]
 
     @property

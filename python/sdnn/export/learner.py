@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -15,6 +16,7 @@ from sdnn.export.writer import Network, Writer
 
 _N_RECORD_WORDS, _PART_BYTES = 7, 64
 """Words after a kept policy, and bytes in which it is written: see cpp/c/sdnn_keeper.h."""
+_LARGEST = 2**31 - 1  # of readings
 NONE = -(2**31)
 """Number in an image that stands for a missing value."""
 SCALE = "reward_scale"
@@ -145,6 +147,28 @@ class Learner(Writer[Network]):
         tables.add(
             "uint8_t", "first_head", head, "The state that the agent begins with, as in an image."
         )
+
+    def add_limits(self, tables: Tables) -> None:
+        """Add the least and the largest reading that count, of each observed number."""
+        limits = np.zeros((self.n_observed, 2), np.int64)
+        scale = 2.0**self.fraction_bits
+        for source in self.inputs:
+            first = source.at[0]
+            if source.kind == "variable":
+                limits[first] = math.floor(source.low * scale), math.ceil(source.high * scale)
+            elif source.kind == "symbol":
+                limits[first : first + source.n_bins] = -_LARGEST, _LARGEST
+            else:
+                limits[list(source.at)] = -_LARGEST, _LARGEST
+        about = "The range of each observed number, beyond which all are equal."
+        tables.add("int32_t", "limits", limits, about)
+
+    def tables_of_spaces(self) -> Tables:
+        """Write the constants of observations and actions."""
+        tables = super().tables_of_spaces()
+        if self.history.holds and not self.history.is_needed:
+            self.add_limits(tables)
+        return tables
 
     def learning_defines(self) -> Data:
         """Return the macros that all headers of learning agents have."""

@@ -96,8 +96,8 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         Without a history they have ``plain_bytes``; with one they begin at a multiple of 8 bytes.
         """
         if not self.history.is_needed:
-            n_readings = (self.n_observed + 1) * self.history.holds
-            return n_bytes + 4 * n_readings + plain_bytes
+            n_readings = self.n_observed + 1 + self.n_observed * next_bins
+            return n_bytes + 4 * n_readings * self.history.holds + plain_bytes
         last = 8 * self.n_inputs + 4 * self.n_observed + self.history.episode_bytes + 1
         states = rounded_up(last, 8) + 8 * self.n_inputs + 4 * self.n_inputs * next_bins + 4
         return rounded_up(n_bytes, 8) + rounded_up(states, 8)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
+import pytest
 
 from c_histories import LEARNERS as HISTORIES
 from c_policies import STRICT, box, lies_between, place_of
@@ -208,6 +209,10 @@ int main(void) {
 """
 
 
+MISSING = -(2**31)
+REFUSED = 2**32 - 1
+
+
 def lines_of(agent, n_steps, seed, fraction_bits):
     """Lines with episodes that end in every way, and rewards of many sizes."""
     random = np.random.default_rng(seed)
@@ -239,9 +244,26 @@ def lines_of(agent, n_steps, seed, fraction_bits):
         now = None if ends < 0.06 else following
     table = np.array(lines)
     table[:, 1:-1] = np.clip(np.round(table[:, 1:-1] * scale), -(2**31), 2**31 - 1)
-    if agent.history != "none":
+    if has_episodes(agent):
         table = with_greedy_episodes(table, random)
     return table.astype("<i4")
+
+
+def has_episodes(agent):
+    """Whether greedy functions of the header have the memory of an episode."""
+    return agent.history != "none" or agent.missing == "hold"
+
+
+def with_missing(lines, random, share=0.2):
+    """Lines in which some readings are missing, several in a row at times."""
+    n = (lines.shape[1] - 3) // 2
+    lines = lines.copy()
+    for first in (1, n + 2):
+        readings = lines[:, first : first + n]
+        is_missing = random.random(readings.shape) < share
+        is_missing |= np.roll(is_missing, 1, axis=0) & (random.random(readings.shape) < 0.7)
+        readings[is_missing] = MISSING
+    return lines
 
 
 def with_greedy_episodes(table, random):
@@ -290,13 +312,20 @@ def run_agent(agent, lines, fraction_bits):
     agent._has_warned = True  # of rewards that are too large
     name, generator = generator_of_greedy_ties(agent)
     for line in lines.tolist():
-        now, following = np.array(line[1 : n + 1]) / scale, np.array(line[n + 2 : -1]) / scale
+        read = [np.array(part, float) for part in (line[1 : n + 1], line[n + 2 : -1])]
+        now, following = (np.where(part == MISSING, np.nan, part / scale) for part in read)
         if isinstance(agent.observation_space, gym.spaces.Discrete):
             now, following = now.argmax(), following.argmax()
         if line[0] == 0:
             agent.begin_episode()
         if line[0] == 3:
             agent.begin_greedy_episode()
+        is_refused = agent.missing == "error" and np.isnan(now).any()
+        if is_refused:
+            with pytest.raises(ValueError, match="observation"):
+                agent.act(now, explore=line[0] == 1)
+            actions.append([REFUSED] * agent.n_dimensions)
+            continue
         action = agent.act(now, explore=line[0] == 1)
         acts_between = line[0] != 1 and lies_between(agent)
         indices = [
@@ -307,7 +336,8 @@ def run_agent(agent, lines, fraction_bits):
         if line[0] != 1:
             indices = [index_without_draw(agent, now, d, index) for d, index in enumerate(indices)]
         actions.append(indices)
-        if line[0] == 1:
+        is_refused = agent.missing == "error" and np.isnan(following).any()
+        if line[0] == 1 and not is_refused:
             agent.learn(Transition(now, action, line[n + 1] / scale, following, bool(line[-1])))
     agent.begin_episode()
     state = agent._state_of("agent") | {name: generator}
@@ -319,7 +349,7 @@ def build(folder, agent, target, *options):
     """The header and its program, as a command."""
     header = export_c_header(agent, folder / "agent.h", learning=True)
     one = agent.n_dimensions == 1
-    has_history = agent.history != "none"
+    has_history = has_episodes(agent)
     function = "agent_place" if lies_between(agent) else "agent_greedy"
     episode = "&episode, " if has_history else ""
     act, greedy = "agent_act(&agent, line + 1", f"{function}(&agent, {episode}line + 1"
