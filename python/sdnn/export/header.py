@@ -98,9 +98,14 @@ def c_header(
 def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool) -> Any:
     """Return the writer of an agent's header, a `Learner` if it learns.
 
-    TypeError for agents without a header. ValueError for SDNN-C with a history, and for running
-    ranges in an agent that would learn.
+    TypeError for agents without a header. ValueError for an agent that has learned with action
+    masks, for SDNN-C with a history, and for running ranges in an agent that would learn.
     """
+    expected = (
+        "have learned without action masks, which no C header has: it would take actions that are"
+        " not allowed. Train without masks, with a reward that punishes such actions"
+    )
+    require(not getattr(agent, "_has_masks", False), "agent", expected, agent)
     has_history = getattr(agent, "history", "none") not in ("none", "auto")
     expected = "have history='none', as SDNNQLambda and SDNNActorCritic alone have a history in C"
     is_possible = not has_history or isinstance(agent, SDNNQLambda | SDNNActorCritic)

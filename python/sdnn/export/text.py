@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn._core import __version__
 from sdnn.environments.types import Array
-from sdnn.support.arguments import argument_error, path_of, shown
+from sdnn.support.arguments import argument_error, path_of, require, shown
 from sdnn.support.files import write_whole
 
 _DIRECTION_BITS = 30
@@ -59,6 +59,7 @@ def require_c_name(name: object) -> str:
 def write_header(path: str | Path, name: str | None, make: Callable[[str], AnyHeader]) -> AnyHeader:
     """Make a header with a name, by default the file's without its ending, and write it whole."""
     place = path_of("path", path)
+    require(not place.is_dir(), "path", f"be a file, such as {place / 'model.h'}", path)
     header = make(place.stem if name is None else name)
     write_whole(place, header.text.encode())
     return header

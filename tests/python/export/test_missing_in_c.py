@@ -149,7 +149,8 @@ def test_policies_treat_missing_readings_as_the_agent(make, missing, target, tmp
         doubles = np.where(fixed == MISSING, np.nan, fixed / scale)
         numbers = fixed if kind == 0 else doubles.astype(dtype)
         queries = [
-            bytes([kind, int(begin)]) + row.tobytes() for begin, row in zip(begins, numbers, strict=True)
+            bytes([kind, int(begin)]) + row.tobytes()
+            for begin, row in zip(begins, numbers, strict=True)
         ]
         written = run(policy, input=b"".join(queries))
         in_c = np.frombuffer(written, "<u4").reshape(-1, agent.n_dimensions)
@@ -195,7 +196,8 @@ def test_symbols_and_angles_are_missing_if_one_of_their_variables_is(missing, ta
     )  # fmt: skip
     header = c_header(agent, "policy")
     (tmp_path / "policy.h").write_text(header.text)
-    hold = "policy_hold_readings"
+    copy = "for (i = 0; i < POLICY_N_OBSERVED; ++i) held[i] = x[i];"
+    fill = "policy_hold_readings(held, x);" if missing == "hold" else copy
     source = f"""
         #include "policy.h"
         #include <stdio.h>
@@ -203,7 +205,7 @@ def test_symbols_and_angles_are_missing_if_one_of_their_variables_is(missing, ta
           int32_t x[POLICY_N_OBSERVED], held[POLICY_N_OBSERVED]; uint32_t bins[POLICY_N_INPUTS], i;
           for (i = 0; i < POLICY_N_OBSERVED; ++i) held[i] = POLICY_MISSING;
           while (fread(x, sizeof *x, POLICY_N_OBSERVED, stdin) == POLICY_N_OBSERVED) {{
-            {f"{hold}(held, x);" if missing == "hold" else "for (i = 0; i < 6; ++i) held[i] = x[i];"}
+            {fill}
             policy_bins_of_fixed(held, bins);
             fwrite(bins, sizeof *bins, POLICY_N_INPUTS, stdout);
           }}
