@@ -60,7 +60,8 @@ class Masked(gym.Env):
             assert part[index] == 1, (indices, self.allowed)
         self.n += 1
         reward = float(self.state[0] * indices[0])
-        return self.begin_state(), reward, self.n % 7 == 6, self.n == 11, {}
+        terminated, truncated = self.n % 7 == 6, self.n == 11
+        return self.begin_state(), reward, terminated, truncated, {}
 
 
 def new_env(actions="discrete", unbounded=False):
@@ -149,32 +150,35 @@ def test_targets_bootstrap_from_allowed_actions_only(agent_class):
             masked.begin_episode()
         return masked.q_values(x)[1], masked.q_values(next_x)
 
-    step = 1.2 if agent_class is SDNNQLearning else 0.05  # SDNN-C with few units has coarse values
+    # SDNN-C with few units has coarse values.
+    tolerance = 1.2 if agent_class is SDNNQLearning else 0.05
     value, next_values = learned(None)
-    assert value == pytest.approx(0.5 * next_values.max(), abs=step)
+    assert value == pytest.approx(0.5 * next_values.max(), abs=tolerance)
     value, next_values = learned([0, 0, 1, 0, 0])
-    assert value == pytest.approx(0.5 * next_values[2], abs=step)
+    assert value == pytest.approx(0.5 * next_values[2], abs=tolerance)
 
 
 @pytest.mark.parametrize("unbounded", [False, True], ids=["bounds", "warm-up"])
 @pytest.mark.parametrize("actions", SPACES)
 @pytest.mark.parametrize("agent_class", AGENTS)
-@pytest.mark.parametrize(("at", "n"), [(33, None), (100, None), (20, 3)])
-def test_a_training_with_masks_resumes_exactly(agent_class, actions, unbounded, at, n, tmp_path):
+@pytest.mark.parametrize(("stop", "n_envs"), [(33, None), (100, None), (20, 3)])
+def test_a_training_with_masks_resumes_exactly(
+    agent_class, actions, unbounded, stop, n_envs, tmp_path
+):
     more = {"n_steps": 3} if agent_class is SDNNQLearning else {"bootstrap": "sarsa"}
     learning = agent_class.learning_type(**more)
 
     def masked_env():
-        if n is None:
+        if n_envs is None:
             return new_env(actions, unbounded)
-        return gym.vector.SyncVectorEnv([lambda: new_env(actions, unbounded)] * n)
+        return gym.vector.SyncVectorEnv([lambda: new_env(actions, unbounded)] * n_envs)
 
     def begun(*callbacks):
         env = masked_env()
         agent = new_agent(agent_class, env, learning=learning)
         return Training(agent, env, steps=150, callbacks=callbacks)
 
-    check_exact_resume(begun, masked_env, tmp_path / "part", [at])
+    check_exact_resume(begun, masked_env, tmp_path / "part", [stop])
 
 
 def test_masks_in_a_log_file_are_learned(tmp_path):
@@ -266,7 +270,7 @@ def test_missing_or_misshapen_masks_of_environments_are_unusable_steps():
     for env in (forgetful, gym.vector.SyncVectorEnv([lambda: Forgetful(new_env())] * 2)):
         with pytest.raises(UnusableStepError, match="action_mask"):
             new_agent(SDNNQLambda, env).train(env, steps=40)
-    long = ActionMasks(Masked(), lambda env: [1] * 6)
-    for masked in (long, gym.vector.SyncVectorEnv([lambda: long])):
+    too_long = ActionMasks(Masked(), lambda env: [1] * 6)  # of five actions
+    for masked in (too_long, gym.vector.SyncVectorEnv([lambda: too_long])):
         with pytest.raises(UnusableStepError, match="action_mask"):
             new_agent(SDNNQLambda, masked).train(masked, steps=3)

@@ -120,7 +120,7 @@ def test_invalid_observations_of_a_vector_are_refused_with_the_number_of_the_ste
 
 @pytest.mark.parametrize("use", [trained, evaluated])
 def test_results_of_another_length_or_form_are_refused(use):
-    for n in (1, 4, 6):
+    for n in (1, 4, 6):  # instead of five
         with pytest.raises(UnusableStepError, match=rf"\b{n}\b"):
             use(Point(lambda made, n=n: (made * 2)[:n]))
     for first in (np.zeros(2), (np.zeros(2),), (np.zeros(2), None), (0.0, 0.0)):

@@ -359,7 +359,7 @@ def test_an_environment_that_announces_durations_must_give_them():
             agent.train(vector_class([Courier, Silent]), steps=10)
 
 
-def test_rare_values_of_discounts_and_durations_are_finite():
+def test_values_are_finite_at_the_shortest_and_longest_duration_and_any_discount():
     for discount in (0.0, 1e-300, 0.5, 1.0):
         for dt in (0.001, 1e6):
             agent = SDNNQLambda(UNIT, NEAR_OR_FAR, learning=QLambdaConfig(discount=discount))
@@ -368,7 +368,7 @@ def test_rare_values_of_discounts_and_durations_are_finite():
             assert np.isfinite(agent.q_values([0.5])).all()
 
 
-def test_many_short_transitions_stay_within_the_room_for_traces_of_fuzzy_rules(tmp_path):
+def test_a_fuzzy_agent_is_saved_after_many_transitions_of_the_shortest_duration(tmp_path):
     agent = FuzzyQLearning(
         UNIT,
         gym.spaces.Box(-1.0, 1.0, (1,)),

@@ -29,10 +29,12 @@ def test_a_fuzzy_agent_exposes_its_configurations_and_number_of_rules():
     assert agent.n_rules == 125  # 5 sets for each of 3 inputs
 
 
-def test_a_rule_that_fires_alone_learns_half_of_its_error():
+def test_a_rule_that_fires_alone_learns_its_error_times_the_learning_coefficient():
     agent = FuzzyQLearning(OBSERVATIONS, TORQUES, seed=2)
-    centre = [0.0, 0.0, 0.0]  # of set 4 of 9 in each of the three dimensions
-    agent.learn(Transition(centre, agent.act(centre), 1.0, centre, terminated=True))
-    values = agent.rule_values(4 * 81 + 4 * 9 + 4)
-    assert sorted(values.tolist())[-2:] == [0.0, 0.5]  # half of the error of 1
-    assert agent.value(centre) == 0.5
+    centre = [0.0, 0.0, 0.0]  # of the middle one of 9 fuzzy sets in each dimension
+    rule = 4 * 9**2 + 4 * 9 + 4  # three digits to base 9: the middle set in each dimension
+    error = reward = 1.0
+    agent.learn(Transition(centre, agent.act(centre), reward, centre, terminated=True))
+    learned = agent.learning.learning_coefficient * error
+    assert sorted(agent.rule_values(rule).tolist())[-2:] == [0.0, learned]
+    assert agent.value(centre) == learned

@@ -31,6 +31,7 @@ from sdnn.support.display import curve_svg
 
 @pytest.fixture(scope="module")
 def trained():
+    """An agent, its environment, and the result of 1,500 steps; tests add a few steps."""
     env = gym.make("CartPole-v1")
     agent = SDNNQLambda(env.observation_space, env.action_space, seed=1)
     return agent, env, agent.train(env, steps=1.5e3)
@@ -249,6 +250,7 @@ def test_an_agent_counts_all_steps_that_it_has_learned(name, tmp_path):
 
 def test_small_curves_have_the_means_of_equal_parts():
     svg = curve_svg([1.0, 3.0, 5.0, 7.0], n_points=2)
+    # From the lower left to the upper right corner of 240 x 48 pixels with a margin of 2.
     assert 'points="2.0,50.0 242.0,2.0"' in svg
     assert "4 returns, 2 to 6" in svg
     assert curve_svg([1.0, float("inf")]) == curve_svg([]) == ""
@@ -367,11 +369,13 @@ def test_a_resumed_training_continues_its_block_of_episodes(best_of, n_first):
     assert best_of((first, 2), (second, 2)) == [2, 6, 10]
 
 
-def test_the_best_block_is_remembered_while_no_callback_asks_for_it(best_of):
+def test_the_best_block_is_remembered_during_a_training_without_the_callback(best_of):
+    # Only the first and the last of four pairs are better than all before, after 2 and 8 episodes.
     assert best_of(([100, 100], 2), ([1, 1], None), ([2, 2, 101, 101], 2)) == [2, 8]
 
 
 def test_blocks_of_another_length_are_compared_anew(best_of):
+    # After a block of ten, the first pair is the best of its length, and later the third.
     assert best_of(([100] * 10, 10), ([-1, -1, -2, -2, 150, 150], 2)) == [10, 12, 16]
 
 

@@ -25,12 +25,12 @@ from sdnn.agents.inspection import (
     variable_names,
 )
 from sdnn.agents.schedules import schedule_of
-from sdnn.agents.state_maps import map_of, replay
+from sdnn.agents.state_maps import N_ON_MAP, map_of, replay
 from sdnn.environments import ActionMasks
 from sdnn.training.training import Callback
 
 FIXED = {"inputs": "all", "angle_pairs": "none", "history": "none"}
-SWITCH = 0.2
+SWITCH = 0.2  # value of an observation at which the best action changes
 
 
 class Bandit(gym.Env):
@@ -90,10 +90,11 @@ def test_the_policy_switches_where_the_optimal_one_does(switching_agent):
     over_one = map_of(Reader(agent), states, [inputs[1]], inputs)
     (numbers,) = over_one.axes
     actions = over_one.actions[:, 0]
-    np.testing.assert_array_equal(actions[numbers < SWITCH - 0.12], 0.0)
-    np.testing.assert_array_equal(actions[numbers > SWITCH + 0.12], 1.0)
+    tolerance = 0.12
+    np.testing.assert_array_equal(actions[numbers < SWITCH - tolerance], 0.0)
+    np.testing.assert_array_equal(actions[numbers > SWITCH + tolerance], 1.0)
     over_two = map_of(Reader(agent), states, [inputs[0], inputs[1]], inputs)
-    assert over_two.values.shape == (49, 49)
+    assert over_two.values.shape == (N_ON_MAP, N_ON_MAP)
     right = over_two.actions[..., 0] == (over_two.axes[1] > SWITCH)[:, np.newaxis]
     assert right.mean() > 0.9
     assert over_two.typical.keys() == {"observation 2"}
@@ -157,7 +158,7 @@ def test_an_angle_is_one_input_in_degrees():
 @pytest.mark.parametrize(
     "agent_class", [SDNNQLambda, SDNNQLearning, SDNNActorCritic, RBFQLearning, FuzzyQLearning]
 )
-def test_readings_are_those_of_the_agents_methods(agent_class):
+def test_a_reader_returns_the_values_and_greedy_actions_of_the_agents_methods(agent_class):
     env = Bandit(box(2), gym.spaces.Box(-1.0, 1.0, (2,)), lambda o, a: -abs(o[0] - a).sum())
     more = {} if agent_class in (RBFQLearning, FuzzyQLearning) else FIXED
     agent = agent_class(env, seed=1, **more)
@@ -191,8 +192,9 @@ def test_continuous_actions_follow_the_input_that_decides():
     assert ranked(agent, env)[0].input.columns == (1,)
     inputs = inputs_of(agent)
     over_one = map_of(Reader(agent), meet_states(agent, env), [inputs[1]], inputs)
-    assert over_one.actions[:40].mean() < -0.4
-    assert over_one.actions[-40:].mean() > 0.4
+    lowest, highest = over_one.actions[:40], over_one.actions[-40:]  # by the observed value
+    assert lowest.mean() < -0.4
+    assert highest.mean() > 0.4
 
 
 def test_inspecting_changes_nothing_that_is_learned(switching_agent):
@@ -317,7 +319,9 @@ def test_schedules_are_those_of_the_training(agent_class):
     np.testing.assert_allclose(schedule.learning_rate, learning_rate, atol=1e-3)
 
 
-def test_agents_draw_figures_of_environments_and_observations(switching_agent, tmp_path):
+def test_agents_draw_values_policies_and_inputs_and_refuse_unknown_inputs(
+    switching_agent, tmp_path
+):
     agent, env = switching_agent
     observations = [env.observation_space.sample() for _ in range(30)]
     for number, figure in enumerate(
@@ -330,7 +334,7 @@ def test_agents_draw_figures_of_environments_and_observations(switching_agent, t
     ):
         path = tmp_path / f"{number}.png"
         figure.savefig(path)
-        assert path.stat().st_size > 3000
+        assert path.stat().st_size > 3000, "more than an empty figure has"
     titles = [axes.get_title(loc="left") for axes in agent.plot_inputs(env).axes]
     assert titles == ["change of values", "change of greedy actions"]
     refuses("inputs", agent.plot_values, env, inputs=["none"])

@@ -108,7 +108,8 @@ def test_warm_ups_fit_ranges_and_angles_to_the_readings_that_are_present(missing
     full, part = agents
     assert full.inputs == part.inputs == [("angle", [0, 1]), ("variable", [2]), ("variable", [3])]
     assert np.array_equal(full.observation_range, part.observation_range)
-    assert part.observation_range[0][3] == -0.25  # of a variable that was never read
+    # The range of a variable that was never read is that of 0 and 1, widened by a quarter.
+    assert part.observation_range[0][3] == -0.25
 
 
 def test_evaluations_begin_episodes_with_the_middle_of_unread_ranges():

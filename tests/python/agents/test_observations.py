@@ -44,6 +44,7 @@ def test_a_warm_up_fits_ranges_and_finds_angle_pairs():
         here = [np.cos(turn), np.sin(turn), 4.0 * turn / 5]
         agent.learn(Transition(here, 1, 0.0, here, False))
     low, high = agent.observation_range
+    # The third variable was in 0 to 4, which is widened by a quarter at either end.
     assert (low.tolist(), high.tolist()) == ([-1.0, -1.0, -1.0], [1.0, 1.0, 5.0])
     assert agent.inputs == [("angle", [0, 1]), ("variable", [2])]
 

@@ -152,16 +152,19 @@ def test_the_angle_of_pendulum_is_found_by_default():
     assert agent.inputs == [("angle", [0, 1]), ("variable", [2])]
 
 
+N_WARM_UP = 400
+
+
 def changing_task(seed, n_steps):
     """Yield transitions of a position that actions move, three noise variables, and a last
-    variable that is rewarded from step 400 on.
+    variable that is rewarded after the steps of a warm-up.
     """
     rng = np.random.default_rng(seed)
     observation = rng.random(5)
     for t in range(n_steps):
         action = int(rng.integers(3))
         place = np.clip(observation[0] + 0.1 * (action - 1), 0.0, 1.0)
-        reward = abs(observation[0] - 0.5) + (5.0 * observation[4] if t >= 400 else 0.0)
+        reward = abs(observation[0] - 0.5) + (5.0 * observation[4] if t >= N_WARM_UP else 0.0)
         next_observation = np.array([place, *rng.random(4)])
         yield Transition(observation, action, reward, next_observation, False)
         observation = next_observation
@@ -170,7 +173,9 @@ def changing_task(seed, n_steps):
 @pytest.mark.parametrize("inputs", [[2], [1, 3]])
 def test_inputs_that_become_relevant_later_are_added(inputs, tmp_path):
     unit, three = gym.spaces.Box(0.0, 1.0, (5,), np.float64), gym.spaces.Discrete(3)
-    agent = SDNNQLambda(unit, three, angle_pairs="none", inputs=inputs, warm_up_steps=400, seed=2)
+    agent = SDNNQLambda(
+        unit, three, angle_pairs="none", inputs=inputs, warm_up_steps=N_WARM_UP, seed=2
+    )
     agent.n_environments = 2
     same, probe = copy.deepcopy(agent), np.full(5, 0.3)
     numbers = []
@@ -187,8 +192,8 @@ def test_inputs_that_become_relevant_later_are_added(inputs, tmp_path):
             numbers.append(len(agent.inputs))
             left_out = agent.learning_report()["left_out"]
             assert len(left_out) + len(agent.inputs) == 5
-            assert (4 in left_out) == (t == 399)
-            assert t + 1 in (400, 800)  # after the warm-up, and after twice as many steps
+            assert (4 in left_out) == (t + 1 == N_WARM_UP)
+            assert t + 1 in (N_WARM_UP, 2 * N_WARM_UP)
     assert len(numbers) == 2
     assert ("variable", [4]) in agent.inputs[numbers[0] :]
     assert agent.approximator.n_inputs == numbers[1]
@@ -198,10 +203,10 @@ def test_inputs_that_become_relevant_later_are_added(inputs, tmp_path):
 
 def test_a_network_without_linear_readout_keeps_the_inputs_of_its_warm_up():
     unit, three = gym.spaces.Box(0.0, 1.0, (5,), np.float64), gym.spaces.Discrete(3)
-    agent = RBFQLearning(unit, three, inputs=[2], warm_up_steps=400)
+    agent = RBFQLearning(unit, three, inputs=[2], warm_up_steps=N_WARM_UP)
     for t, transition in enumerate(changing_task(1, 850)):
         agent.learn(transition)
-        if t == 400:
+        if t == N_WARM_UP:
             inputs = agent.inputs
     assert agent.inputs == inputs
     assert 4 in agent.learning_report()["left_out"]
@@ -218,5 +223,5 @@ def test_an_outlier_reward_is_not_learned_and_keeps_the_reported_unit():
             learner.learn(Transition(0, 1, 3.0, 0, terminated=True))
     assert agent.q_values(0).tolist() == same.q_values(0).tolist()
     report = agent.learning_report()
-    assert report["recent_reward"] == 2.0
+    assert report["recent_reward"] == 2.0  # the power of two below rewards of 3
     assert report["value_unit"] == same.learning_report()["value_unit"] < 1e-5

@@ -56,14 +56,11 @@ def test_the_numpy_transcription_and_the_core_learn_the_same_trial(n_inputs, noi
     assert np.abs(core.weights()).max() > 5, "something was learned"
 
 
-# The Python face.
-
-
-def test_the_number_of_actions_follows_from_space_and_window():
+def test_the_number_of_actions_is_that_of_windows_or_of_a_discrete_space():
     agent = small_agent()
-    assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=91)
-    assert agent.learning == SDNNQLearning.presets["general"].learning
-    assert agent.networks[0].n_actions == 91
+    n_windows = SMALL.n_hidden_units - SMALL.n_active_units + 1
+    assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=n_windows)
+    assert agent.networks[0].n_actions == n_windows
     agent = small_agent(BUTTONS)
     assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=4)
 

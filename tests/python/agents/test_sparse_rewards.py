@@ -33,10 +33,12 @@ def longest_run(actions):
 
 
 def test_random_actions_are_repeated_while_all_rewards_were_zero():
-    assert longest_run(act_and_learn(new_agent(), [0.0] * 1000)) >= 40
-    assert longest_run(act_and_learn(new_agent(max_action_repeat=20), [0.0] * 1000)) < 40
+    no_rewards = [0.0] * 1000
+    assert longest_run(act_and_learn(new_agent(), no_rewards)) >= 40
+    # Two runs of the same action may meet.
+    assert longest_run(act_and_learn(new_agent(max_action_repeat=20), no_rewards)) < 2 * 20
     for learning in ({"max_action_repeat": 1}, {"epsilon": 0.0}):
-        assert longest_run(act_and_learn(new_agent(**learning), [0.0] * 1000)) < 15
+        assert longest_run(act_and_learn(new_agent(**learning), no_rewards)) < 15
 
 
 def test_random_actions_are_not_repeated_in_discrete_spaces():
@@ -63,7 +65,7 @@ def test_transitions_of_a_log_do_not_count_as_steps_of_a_search(has_warm_up):
 def test_ends_of_episodes_are_counted_only_after_the_search():
     agent = new_agent()
     act_and_learn(agent, [0.0] * 10)
-    agent.learn(Transition(HERE, 0, 1.0, HERE, True))
+    agent.learn(Transition(HERE, 0, 1.0, HERE, True))  # the first reward, which ends the search
     assert "agent.n_ended" not in agent.state()
     act_and_learn(agent, [1.0] * 20)
     agent.learn(Transition(HERE, 0, 1.0, HERE, True))

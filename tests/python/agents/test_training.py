@@ -388,7 +388,7 @@ def test_steps_before_a_failure_in_a_vector_are_kept_and_the_training_continues(
 def test_resuming_skips_an_episode_whose_reset_failed(tmp_path):
     env = Corridor()
     corridor_agent().train(env, episodes=4, seed=7)
-    bad = env.seeds[2:4]
+    bad = env.seeds[2:4]  # of the third and fourth episode
 
     class Picky(Corridor):
         def reset(self, *, seed=None, options=None):
@@ -404,7 +404,7 @@ def test_resuming_skips_an_episode_whose_reset_failed(tmp_path):
         assert training.n_episodes == 2
         training = Training.load(path, Picky(), callbacks=callbacks)
     assert training.run().n_episodes == 4
-    assert training.next_episode == 6
+    assert training.next_episode == 4 + len(bad)
 
 
 @pytest.mark.parametrize("n_envs", [1, 2])
@@ -647,6 +647,8 @@ def test_n_step_transitions_of_an_abandoned_episode_are_learned_on_resuming(tmp_
 
 @pytest.mark.filterwarnings("ignore:an episode has had")
 def test_an_endless_episode_takes_less_than_32_bytes_per_step_and_resumes_exactly(tmp_path):
+    early, late = 2_000, 20_000
+
     class Endless(Corridor):
         def step(self, action):
             self._at = int(np.clip(self._at + (1 if action else -1), 0, 4))
@@ -657,7 +659,7 @@ def test_an_endless_episode_takes_less_than_32_bytes_per_step_and_resumes_exactl
             self.bytes = {}
 
         def on_step(self, training):
-            if training.n_steps in (2_000, 20_000):
+            if training.n_steps in (early, late):
                 self.bytes[training.n_steps] = tracemalloc.get_traced_memory()[0]
 
     watch = Watch()
@@ -667,7 +669,7 @@ def test_an_endless_episode_takes_less_than_32_bytes_per_step_and_resumes_exactl
         training.run()
     finally:
         tracemalloc.stop()
-    assert (watch.bytes[20_000] - watch.bytes[2_000]) / 18_000 < 32
+    assert (watch.bytes[late] - watch.bytes[early]) / (late - early) < 32
     training.save(tmp_path / "t")
     again = Training.load(tmp_path / "t", Endless(), steps=20_600)
     training.steps = 20_600
@@ -700,8 +702,8 @@ def test_with_seed_none_no_reset_has_a_seed_and_no_episode_can_be_repeated(tmp_p
     )  # fmt: skip
     training.run()  # stops within an episode
     training.run()
-    # Six episodes, and ten of an evaluation after each second of them.
-    assert (env.seeds, tested.seeds) == ([None] * 6, [None] * 30)
+    # Six episodes, and an evaluation of ten after each second of them.
+    assert (env.seeds, tested.seeds) == ([None] * 6, [None] * (6 // 2 * 10))
     refuses("repeat_episodes", Training.load, tmp_path / "t", Corridor(), evaluation_env=Corridor())
     loaded = Training.load(
         tmp_path / "t", Corridor(), evaluation_env=Corridor(), repeat_episodes=False

@@ -280,7 +280,7 @@ def test_a_warm_up_may_continue_in_fewer_environments():
 
 
 def test_a_fuzzy_warm_up_ends_after_the_last_pending_action():
-    agent = fuzzy_agent(Unbounded(), warm_up_steps=10)
+    agent = fuzzy_agent(Unbounded(), warm_up_steps=3 * 3 + 1)
     agent.n_environments = 3
     x = np.zeros(2)
     for _ in range(3):
@@ -289,7 +289,7 @@ def test_a_fuzzy_warm_up_ends_after_the_last_pending_action():
             agent.learn(Transition(x, action, 0.0, x + i, False), i)
     actions = [agent.act(x, environment=i) for i in range(3)]
     agent.learn(Transition(x, actions[0], 0.0, x, False), 0)
-    assert agent.is_warming_up, "10 are learned, but two actions are pending"
+    assert agent.is_warming_up, "all steps are learned, but two actions are pending"
     agent.begin_episode(1)
     agent.learn(Transition(x, actions[2], 0.0, x, False), 2)
     assert not agent.is_warming_up

@@ -1,4 +1,4 @@
-"""Experts beside the network of a stream: who is trusted, and what learns beside it."""
+"""Weighted experts of a stream: regression, kernel regression and the network."""
 
 import copy
 import math
@@ -83,7 +83,7 @@ def test_recursive_least_squares_agrees_with_its_transcription(forgetting):
     np.testing.assert_allclose([model.predict(row)[0] for row in X], expected, rtol=1e-9)
 
 
-def test_columns_of_numbers_and_categories():
+def test_columns_are_numbers_and_indicators_of_categories_and_grow_with_new_ones():
     rows = [{"a": 2.0, "w": "u"}, {"a": None, "w": "v"}, {"a": 4.0}]
     codings = {"a": RandomInverse(), "w": WithMissing(base=Symbolic(categories=("u", "v")))}
     columns = LinearColumns()
@@ -128,7 +128,7 @@ def test_noise_is_left_to_the_mean_and_regression(river):
     assert model.weights_["network"] < 0.3
 
 
-def test_a_drift_that_changes_who_is_right(river):
+def test_weights_of_experts_follow_a_drift_from_a_wave_to_a_line(river):
     rows = points(1600)
     wave = [math.sin(4 * x["x0"]) * x["x1"] for x in rows]
     line = [x["x0"] + x["x1"] for x in rows]
@@ -140,7 +140,7 @@ def test_a_drift_that_changes_who_is_right(river):
     assert np.abs(errors_of(model, rows[1300:], line[1300:])).mean() < 0.03
 
 
-def test_the_network_alone_is_the_network(river):
+def test_without_other_experts_predictions_are_those_of_the_network(river):
     rows = points(150)
     targets = [x["x0"] * x["x1"] for x in rows]
     labels = [target > 0 for target in targets]
@@ -151,6 +151,9 @@ def test_the_network_alone_is_the_network(river):
         expected = [model.fitted.predict_one(model._sample(x)) for x in rows]
         assert [model.predict_one(x) for x in rows] == expected
         assert model.mixed is None
+
+
+def test_unknown_experts_are_refused(river):
     for experts in (None, 3, "kernel", ["linear"]):
         refuses("experts", river.RiverRegressor, experts=experts, error=(TypeError, ValueError))
 
@@ -173,7 +176,7 @@ def test_learning_does_not_depend_on_predictions(river, experts):
 
 @pytest.mark.parametrize("experts", ["network", "linear", "window"])
 @pytest.mark.parametrize("make", [regressor, classifier])
-def test_copies_and_pickles_learn_on_with_the_same_bits(river, make, experts):
+def test_copies_and_pickles_continue_learning_with_the_same_bits(river, make, experts):
     rows = [{**x, "word": "uvw"[i % 3]} for i, x in enumerate(points(300))]
     targets = [float(x["x0"] > 0) + (x["word"] == "u") for x in rows]
     model = make(river, experts)
@@ -213,7 +216,7 @@ def test_features_that_come_late_and_go_are_learned_by_regression(river, experts
     assert model.predict_one({}) == model.predict_one({"x0": None, "other": 3.0})
 
 
-def test_classes_of_a_linear_boundary_and_their_probabilities(river):
+def test_classes_with_a_linear_boundary_have_better_probabilities_with_regression(river):
     random = np.random.RandomState(2)
     rows = points(800, 8)
     names = ["no", "yes"]
@@ -232,7 +235,7 @@ def test_classes_of_a_linear_boundary_and_their_probabilities(river):
     assert model.weights_["linear"] > 0.5
 
 
-def test_a_late_class_and_single_units(river):
+def test_a_class_that_appears_late_is_predicted_also_with_single_units(river):
     rows = points(500)
     order = np.argsort([x["x0"] > 0.4 for x in rows], kind="stable")
     name = {False: "low", True: "middle"}
@@ -274,7 +277,7 @@ def test_an_outlier_among_the_targets_is_soon_forgotten(river):
         assert np.abs(errors[-200:]).max() < 0.1
 
 
-def test_a_window_learns_a_smooth_function_sooner(river):
+def test_the_window_expert_has_smaller_errors_on_a_smooth_function(river):
     rows = points(600)
     targets = [math.sin(3 * x["x0"]) * x["x1"] + x["x2"] ** 2 + x["x3"] for x in rows]
     model, linear = regressor(river, "window"), regressor(river)

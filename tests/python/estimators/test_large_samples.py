@@ -35,6 +35,7 @@ def test_training_forms_and_threads_give_the_same_bits(make):
 @pytest.mark.usefixtures("few_are_many")
 def test_predictions_average_the_networks_of_the_last_epochs():
     model = SDNNRegressor(**OPTIONS).fit(X, Y)
+    # The network after the sixth epoch is averaged with those after the three before it.
     for n_epochs, earlier in zip((3, 4, 5), model._earlier, strict=True):
         stopped = SDNNRegressor(**{**OPTIONS, "max_iter": n_epochs}).fit(X, Y)
         np.testing.assert_array_equal(earlier.layer.weights, stopped.weights_)
@@ -61,7 +62,7 @@ def test_blocks_in_any_order_have_the_bits_of_single_samples():
     network = code.fit(X, Y).network_
     bins = network.input_code.bins(X)
     targets = code._counts_of_targets(Y[:, None])
-    blocks = np.split(np.arange(len(X), dtype=np.int32), [512, 1024])
+    blocks = np.split(np.arange(len(X), dtype=np.int32), [512, 1024])  # of 512, but for the last
     orders = [
         np.concatenate([blocks[1], blocks[2], blocks[0]]),
         np.concatenate([blocks[2], blocks[2], blocks[0][:-1], blocks[1], blocks[0][1:]]),

@@ -13,6 +13,7 @@ from refusals import refuses
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import Circular, RandomInverse
 from sdnn.estimators import OutOfRangeWarning
+from sdnn.estimators.classifier import MOST_UNITS, STEEPNESS, UNITS_EACH
 from sdnn.estimators.network import code_bytes
 from sdnn.estimators.training import sample_weights
 
@@ -22,8 +23,8 @@ Y = np.sin(5 * X[:, 0]) * X[:, 1]
 LABELS = np.digitize(Y, [-0.3, 0.3])
 
 UNIT = RandomInverse(low=0.0, high=1.0, length_scale=0.2)
-GIVEN = {"coding": UNIT, "n_pattern_units": 128, "random_state": 3}
-REGRESSOR = {**GIVEN, "output_range": (-1.5, 1.5), "n_output_units": 60}
+SETTINGS = {"coding": UNIT, "n_pattern_units": 128, "random_state": 3}
+REGRESSOR = {**SETTINGS, "output_range": (-1.5, 1.5), "n_output_units": 60}
 
 
 def same(model, expected):
@@ -63,10 +64,10 @@ def test_partial_fit_in_any_portions_equals_one_epoch_of_fit(portions, regressio
         y = LABELS[:n].copy()
         y[: min(3, n)] = [0, 1, 2][: min(3, n)]
         classes = np.arange(3)
-        whole = SDNNClassifier(**GIVEN).partial_fit(X[:n], y, classes=classes)
+        whole = SDNNClassifier(**SETTINGS).partial_fit(X[:n], y, classes=classes)
         if n >= 3:
-            same(whole, SDNNClassifier(**GIVEN, max_iter=1, shuffle=False).fit(X[:n], y))
-        parts = SDNNClassifier(**GIVEN)
+            same(whole, SDNNClassifier(**SETTINGS, max_iter=1, shuffle=False).fit(X[:n], y))
+        parts = SDNNClassifier(**SETTINGS)
         for a, b in itertools.pairwise(bounds):
             parts.partial_fit(X[a:b], y[a:b], classes=classes)
     same(whole, parts)
@@ -86,7 +87,7 @@ def test_epochs_of_fit_equal_passes_of_partial_fit():
 
 @pytest.mark.parametrize(
     ("estimator", "options", "targets"),
-    [(SDNNRegressor, REGRESSOR, Y), (SDNNClassifier, {**GIVEN, "n_units_per_class": 8}, LABELS)],
+    [(SDNNRegressor, REGRESSOR, Y), (SDNNClassifier, {**SETTINGS, "n_units_per_class": 8}, LABELS)],
 )
 def test_a_warm_start_of_3_after_2_epochs_equals_5_epochs(estimator, options, targets):
     model = estimator(**options, shuffle=False, warm_start=True, max_iter=2).fit(X, targets)
@@ -105,22 +106,22 @@ def test_a_warm_start_refuses_other_features_outputs_and_classes():
     refuses("features", model.fit, X[:, :1], Y)
     refuses("outputs", model.fit, X, np.column_stack([Y, Y]))
     refuses("refit", model.set_params(refit=True).fit, X, Y)
-    labels = SDNNClassifier(**GIVEN, warm_start=True).fit(X[:, :1], LABELS > 0)
+    labels = SDNNClassifier(**SETTINGS, warm_start=True).fit(X[:, :1], LABELS > 0)
     refuses("classes", labels.fit, X[:, :1], np.full(len(X), 5))
 
 
 def test_multi_output_classification_is_learned():
     both = np.column_stack([LABELS, (X[:, 0] > 0.5).astype(int)])
-    model = MultiOutputClassifier(SDNNClassifier(**GIVEN, max_iter=50)).fit(X, both)
+    model = MultiOutputClassifier(SDNNClassifier(**SETTINGS, max_iter=50)).fit(X, both)
     assert (model.predict(X) == both).mean() > 0.95
 
 
 def test_partial_fit_refuses_unknown_ranges_classes_and_outputs():
     refuses("minimum", SDNNRegressor(coding=UNIT).partial_fit, X[:1], Y[:1])
-    model = SDNNClassifier(**GIVEN)
+    model = SDNNClassifier(**SETTINGS)
     refuses("classes", model.partial_fit, X, LABELS)
     refuses("classes", model.partial_fit, X, LABELS, classes=[0, 1])
-    model = SDNNClassifier(**GIVEN)
+    model = SDNNClassifier(**SETTINGS)
     refuses("classes", model.partial_fit, X, LABELS, classes=[0, 1])
     assert not hasattr(model, "network_"), "a refused first call leaves nothing behind"
     model.partial_fit(X, LABELS, classes=[0, 1, 2])
@@ -189,7 +190,7 @@ def test_early_stopping_restores_the_weights_of_the_best_epoch(estimator):
 @pytest.mark.parametrize("n_classes", [2, 4])
 def test_the_predicted_class_has_the_largest_decision(scheme, n_units_each, n_classes):
     labels = np.digitize(Y, np.quantile(Y, np.arange(1, n_classes) / n_classes))
-    options = {**GIVEN, "scheme": scheme, "n_units_per_class": n_units_each, "max_iter": 1}
+    options = {**SETTINGS, "scheme": scheme, "n_units_per_class": n_units_each, "max_iter": 1}
     model = SDNNClassifier(**options).fit(X, labels)
     decision = model.decision_function(X)
     if n_classes == 2:
@@ -204,7 +205,7 @@ def test_the_predicted_class_has_the_largest_decision(scheme, n_units_each, n_cl
 
 def test_one_versus_one_decisions_are_rounded_votes():
     labels = np.digitize(Y, [-0.3, 0.1, 0.3])
-    model = SDNNClassifier(**GIVEN, scheme="one_vs_one", max_iter=1).fit(X, labels)
+    model = SDNNClassifier(**SETTINGS, scheme="one_vs_one", max_iter=1).fit(X, labels)
     potentials = model.network_.potentials(model.network_.input_code.bins(X), 1)
     pairs = [(i, j) for i in range(4) for j in range(i + 1, 4)]
     votes = np.zeros((len(X), 4))
@@ -226,12 +227,12 @@ def test_many_units_per_class_learn_a_parity_that_one_unit_cannot(random_state):
 
 
 def test_decisions_are_shares_of_active_units_and_probabilities_their_softmax():
-    options = {**GIVEN, "n_units_per_class": 12, "n_averaged_epochs": 1}
+    options = {**SETTINGS, "n_units_per_class": 12, "n_averaged_epochs": 1}
     model = SDNNClassifier(**options).fit(X, LABELS)
     firing = model.network_.potentials(model.network_.input_code.bins(X), 1) > 0
     shares = firing.reshape(len(X), 3, 12).mean(axis=2)
     np.testing.assert_array_equal(model.decision_function(X), shares)
-    raised = np.exp(6 * shares)
+    raised = np.exp(STEEPNESS * shares)
     np.testing.assert_allclose(
         model.predict_proba(X), raised / raised.sum(axis=1, keepdims=True), rtol=1e-12
     )
@@ -239,14 +240,15 @@ def test_decisions_are_shares_of_active_units_and_probabilities_their_softmax():
 
 
 def test_the_default_number_of_units_per_class_falls_with_the_classes():
-    # 60 units for each class, but 1200 divided by the number of classes if that is less.
-    assert len(SDNNClassifier(**GIVEN).fit(X, LABELS).thresholds_) == 3 * 60
+    # UNITS_EACH for each class, but MOST_UNITS divided by the number of classes if that is less.
+    assert len(SDNNClassifier(**SETTINGS).fit(X, LABELS).thresholds_) == 3 * UNITS_EACH
     many = np.arange(len(X)) % 75
-    assert len(SDNNClassifier(**GIVEN, max_iter=1).fit(X, many).thresholds_) == 75 * 16
+    n_units = 75 * (MOST_UNITS // 75)
+    assert len(SDNNClassifier(**SETTINGS, max_iter=1).fit(X, many).thresholds_) == n_units
 
 
 def test_single_units_and_one_versus_one_have_no_probabilities():
-    of_pairs = SDNNClassifier(**GIVEN, scheme="one_vs_one", max_iter=1).fit(X, LABELS)
+    of_pairs = SDNNClassifier(**SETTINGS, scheme="one_vs_one", max_iter=1).fit(X, LABELS)
     assert len(of_pairs.thresholds_) == 3  # a unit for each pair of three classes
     assert not hasattr(of_pairs, "predict_proba")
     assert not hasattr(SDNNClassifier(n_units_per_class=1), "predict_proba")
@@ -256,7 +258,7 @@ def test_single_units_and_one_versus_one_have_no_probabilities():
 def test_class_weights_are_numbers_of_presentations():
     rare = (Y > 0.6).astype(int)
     assert 0 < rare.sum() < 20
-    options = {**GIVEN, "shuffle": False, "max_iter": 4}
+    options = {**SETTINGS, "shuffle": False, "max_iter": 4}
     weighted = SDNNClassifier(**options, class_weight={0: 1, 1: 3}).fit(X, rare)  # 1 or 3 times
     by_hand = SDNNClassifier(**options)
     by_hand.partial_fit(np.repeat(X, 1 + 2 * rare, axis=0), np.repeat(rare, 1 + 2 * rare), [0, 1])
@@ -267,7 +269,7 @@ def test_class_weights_are_numbers_of_presentations():
 
 def test_balanced_class_weights_predict_the_rare_class_more_often():
     noisy = np.where(RANDOM.uniform(size=len(Y)) < 0.2, 1, 0)
-    options = {**GIVEN, "max_iter": 8}
+    options = {**SETTINGS, "max_iter": 8}
     plain = SDNNClassifier(**options).fit(X, noisy)
     balanced = SDNNClassifier(**options, class_weight="balanced").fit(X, noisy)
     assert balanced.predict(X).mean() > plain.predict(X).mean()
@@ -280,7 +282,7 @@ def test_invalid_class_weights_and_those_of_online_learning_are_refused():
     refuses(
         "class_weight", SDNNClassifier(class_weight="balanced").partial_fit, X, rare, classes=[0, 1]
     )
-    balanced = SDNNClassifier(**GIVEN, class_weight="balanced", max_iter=1).fit(X, rare)
+    balanced = SDNNClassifier(**SETTINGS, class_weight="balanced", max_iter=1).fit(X, rare)
     refuses("class_weight", balanced.learn_one, X[0], 1)
 
 
@@ -288,9 +290,9 @@ def test_invalid_class_weights_and_those_of_online_learning_are_refused():
 def test_integer_sample_weights_equal_repeated_samples(make):
     times = np.arange(len(Y)) % 3
     targets = Y if make is SDNNRegressor else LABELS
-    plain = make(**GIVEN, max_iter=3).fit(X, targets)
-    same(plain, make(**GIVEN, max_iter=3).fit(X, targets, np.ones(len(Y))))
-    options = GIVEN | ({"output_range": (-10, 10)} if make is SDNNRegressor else {})
+    plain = make(**SETTINGS, max_iter=3).fit(X, targets)
+    same(plain, make(**SETTINGS, max_iter=3).fit(X, targets, np.ones(len(Y))))
+    options = SETTINGS | ({"output_range": (-10, 10)} if make is SDNNRegressor else {})
     weighted = make(**options, max_iter=3).fit(X, targets, times)
     repeated = make(**options, max_iter=3).fit(X.repeat(times, 0), targets.repeat(times))
     same(weighted, repeated)
@@ -301,17 +303,17 @@ def test_integer_sample_weights_equal_repeated_samples(make):
 def test_sample_weights_are_scaled_to_a_mean_of_one(make):
     targets = Y if make is SDNNRegressor else LABELS
     weights = RANDOM.uniform(0.5, 1.5, len(Y))
-    model = make(**GIVEN, max_iter=3).fit(X, targets, weights / weights.sum())
-    same(model, make(**GIVEN, max_iter=3).fit(X, targets, weights / weights.mean()))
+    model = make(**SETTINGS, max_iter=3).fit(X, targets, weights / weights.sum())
+    same(model, make(**SETTINGS, max_iter=3).fit(X, targets, weights / weights.mean()))
 
 
 def test_adaboost_boosts_classifiers_by_sample_weights():
-    boosted = AdaBoostClassifier(SDNNClassifier(**GIVEN, max_iter=3), n_estimators=2)
+    boosted = AdaBoostClassifier(SDNNClassifier(**SETTINGS, max_iter=3), n_estimators=2)
     assert boosted.fit(X, Y > 0).score(X, Y > 0) > 0.9
 
 
 def test_sample_and_class_weights_are_multiplied():
-    options = {**GIVEN, "max_iter": 4}
+    options = {**SETTINGS, "max_iter": 4}
     labels = (Y > 0).astype(int)
     both = SDNNClassifier(**options, class_weight={0: 2, 1: 1}).fit(X, labels, np.full(len(Y), 0.5))
     same(both, SDNNClassifier(**options).fit(X, labels, np.where(labels == 0, 1.0, 0.5)))
@@ -320,11 +322,11 @@ def test_sample_and_class_weights_are_multiplied():
 def test_sample_weights_apply_to_early_stopping_and_selection_of_pairs():
     weights = np.where(X[:, 0] > 0.5, 1.0, 1e-3)
     wrong = np.where(X[:, 0] > 0.5, Y, 5.0)
-    options = {**GIVEN, "early_stopping": True, "max_iter": 20, "n_iter_no_change": 20}
+    options = {**SETTINGS, "early_stopping": True, "max_iter": 20, "n_iter_no_change": 20}
     refitted = SDNNRegressor(**options, refit=True).fit(X, wrong, weights)
-    mine = X[:, 0] > 0.5
-    assert refitted.score(X[mine], Y[mine]) > 0.9 > refitted.score(X, wrong)
-    selected = SDNNRegressor(**GIVEN, pairs="auto", max_iter=3).fit(X, wrong, weights)
+    is_heavy = X[:, 0] > 0.5
+    assert refitted.score(X[is_heavy], Y[is_heavy]) > 0.9 > refitted.score(X, wrong)
+    selected = SDNNRegressor(**SETTINGS, pairs="auto", max_iter=3).fit(X, wrong, weights)
     assert set(selected.pairs_) == {(0, 1), (1, 0)}
 
 
@@ -337,7 +339,7 @@ def test_sample_weights_apply_to_early_stopping_and_selection_of_pairs():
     ],
 )  # fmt: skip
 def test_invalid_sample_weights_are_refused(make, bad):
-    model = make(**GIVEN)
+    model = make(**SETTINGS)
     refuses("sample_weight", model.fit, X, Y if make is SDNNRegressor else LABELS, bad)
     assert not hasattr(model, "network_")
 
@@ -348,7 +350,9 @@ def test_sample_weights_with_too_many_presentations_are_refused():
 
 def test_training_with_fractional_weights_ends_after_epochs_without_corrections():
     easy = (X[:, 0] > 0.5).astype(int)
-    model = SDNNClassifier(**GIVEN, n_units_per_class=1, class_weight={0: 0.25, 1: 1}).fit(X, easy)
+    model = SDNNClassifier(**SETTINGS, n_units_per_class=1, class_weight={0: 0.25, 1: 1}).fit(
+        X, easy
+    )
     assert model.n_iter_ < 100
     assert model.n_corrected_[-4:].tolist() == [0, 0, 0, 0]
     assert model.score(X, easy) == 1
@@ -360,7 +364,7 @@ def test_predictions_average_the_networks_of_three_epochs(tmp_path):
     model = SDNNRegressor(**options, max_iter=11, n_averaged_epochs=3).fit(X, noisy)
     answers = [
         SDNNRegressor(**options, max_iter=n, n_averaged_epochs=1).fit(X, noisy).predict(X)
-        for n in (6, 9, 11)
+        for n in (6, 9, 11)  # the last epoch, and each third one before
     ]
     means, spread = model.predict(X, return_std=True)
     np.testing.assert_allclose(means, np.mean(answers, axis=0), atol=1e-12)
@@ -426,7 +430,7 @@ def test_early_stopping_keeps_the_averages_of_its_best_epochs():
 
 def test_refit_trains_on_all_samples_for_the_best_number_of_epochs():
     noisy = Y + np.random.RandomState(1).normal(0, 0.3, len(Y))
-    options = {**GIVEN, "output_range": (-2, 2), "shuffle": False}
+    options = {**SETTINGS, "output_range": (-2, 2), "shuffle": False}
     model = SDNNRegressor(**options, early_stopping=True, refit=True, max_iter=60).fit(X, noisy)
     best = int(np.argmax(model.validation_scores_))
     whole = SDNNRegressor(**options, max_iter=best + 1).fit(X, noisy)

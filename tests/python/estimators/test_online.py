@@ -13,6 +13,7 @@ from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import Circular, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators import OutOfRangeWarning
 from sdnn.estimators.network import FEW_SAMPLES, FEW_TO_PREDICT, Network
+from sdnn.estimators.regressor import MARGIN
 from sdnn.estimators.training import samples_of_epoch
 
 RANDOM = np.random.RandomState(0)
@@ -207,10 +208,10 @@ def test_values_outside_a_range_are_counted_and_warned_about_once():
     with pytest.warns(OutOfRangeWarning, match="output_range_"):
         model.partial_fit(X[:3] + 7, [9.0, 9.0, 0.0])
     model.learn_one(X[0] + 5, 9.0)
-    assert model.n_inputs_out_of_range_ == 1 + 12 + 4
-    assert model.n_outputs_out_of_range_ == 3
+    assert model.n_inputs_out_of_range_ == 1 + 3 * 4 + 4  # of one column, three rows, and a row
+    assert model.n_outputs_out_of_range_ == 2 + 1
     model.predict(X + 5)
-    assert model.n_inputs_out_of_range_ == 17
+    assert model.n_inputs_out_of_range_ == 1 + 3 * 4 + 4, "predictions are not counted"
     model.fit(X, Y)
     assert model.n_inputs_out_of_range_ == model.n_outputs_out_of_range_ == 0
 
@@ -245,8 +246,8 @@ def test_fit_counts_and_warns_about_values_that_widen_a_range():
     assert len(caught) == 1
     assert caught[0].filename == __file__
     assert model.n_outputs_out_of_range_ == beyond > 0
-    low = 9 * Y.min() - 0.2 * (1.5 - 9 * Y.min())
-    high = 9 * Y.max() + 0.2 * (9 * Y.max() - low)
+    low = 9 * Y.min() - MARGIN * (1.5 - 9 * Y.min())
+    high = 9 * Y.max() + MARGIN * (9 * Y.max() - low)
     np.testing.assert_allclose(model.output_range_[0], [low, high])
     assert model.output_range_[1].tolist() == [-1.5, 1.5]
     model.set_params(warm_start=True).fit(X, targets)
