@@ -27,13 +27,13 @@ void expect_that_learning_begins_no_episode(A agent) {
   agent.begin_episode();
   agent.learn(state, agent.act(state), 1.0, next, false);  // the only greedy step
   const auto best = agent.act(state, false);
-  int others = 0;
+  int n_exploring = 0;
   for (int i = 0; i < 200; ++i) {
     const auto action = agent.act(state);
-    others += action != best;
+    n_exploring += action != best;
     agent.learn(state, action, 0.0, next, true);
   }
-  EXPECT_GT(others, 50);
+  EXPECT_GT(n_exploring, 50);
 }
 
 TEST(Agent, ATerminatedTransitionDoesNotRestartTheGreedyFirstSteps) {

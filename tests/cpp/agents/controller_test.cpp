@@ -69,7 +69,7 @@ ControllerConfig fuzzy_config() { return with(FuzzyRulesConfig{}, kTraces); }
 ControllerConfig fuzzy_of_vectors() { return with(FuzzyRulesConfig{.n_sets = 4}, kTraces, 2); }
 
 ControllerConfig whole(ControllerConfig config) {
-  config.action.number = ActionNumber::whole;  // then several actions of a network are one
+  config.action.number = ActionNumber::whole;  // several indices are rounded to the same action
   return config;
 }
 ControllerConfig with_warm_up(ControllerConfig config) {
@@ -175,7 +175,8 @@ TEST(Controller, GivesTheSameActionsToConcurrentReaders) {
       }
       return actions;
     };
-    const auto read_together = testing::in_threads(4, best);  // first: an average is rounded once
+    // Before any other reader: the first one rounds averaged weights.
+    const auto read_together = testing::in_threads(4, best);
     const std::array alone{best(0), best(1)};
     for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(read_together[i], alone[i % 2]);
 
@@ -262,7 +263,7 @@ TEST(Controller, RefusesBadArgumentsAndChangesNothing) {
         EXPECT_THROW(controller.learn(good, bad, 1.0, good, false), std::invalid_argument);
       }
       for (const double bad : {testing::kNaN, testing::kInfinity, 1e301}) {
-        if (is_fuzzy(config.approximator) && bad == 1e301) continue;  // leaves the floats
+        if (is_fuzzy(config.approximator) && bad == 1e301) continue;  // std::overflow_error instead
         EXPECT_THROW(controller.learn(good, action, bad, good, false), std::invalid_argument);
       }
       EXPECT_THROW(controller.set_progress(1.5), std::invalid_argument);

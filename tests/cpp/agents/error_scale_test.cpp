@@ -10,7 +10,7 @@
 namespace sdnn::agents::detail {
 namespace {
 
-constexpr double kOne = 4096.0;
+constexpr double kOne = 4096.0;  // normalized errors are integers, in units of 1 / 4096
 
 TEST(SquareRoot, IsRoundedDownToAnInteger) {
   for (const std::uint64_t root : {0ULL, 1ULL, 2ULL, 3ULL, 1000ULL, 4294967295ULL}) {
@@ -42,16 +42,17 @@ TEST(ErrorScale, NormalizesTheFirstErrorToPlusOrMinusOne) {
 }
 
 TEST(ErrorScale, DoesNotDependOnTheUnit) {
-  ErrorScale scale, finer_scale;
+  ErrorScale scale, coarser_scale;  // whose unit doubles every ten errors
+  const int rounding = 3;
   for (int i = 0; i < 50; ++i) {
     const std::int64_t error = (std::int64_t{i} - 20) << 24;
     const int n_doubled = i / 10;
     EXPECT_NEAR(scale.normalized(error, 3),
-                finer_scale.normalized(error >> n_doubled, 3 + n_doubled), 3);
+                coarser_scale.normalized(error >> n_doubled, 3 + n_doubled), rounding);
   }
 }
 
-TEST(ErrorScale, ClipsAnOutlierToThree) {
+TEST(ErrorScale, ClipsAnOutlierToThreeAndKeepsZero) {
   ErrorScale scale;
   for (int i = 0; i < 100; ++i) scale.normalized(1 << 20, 0);
   EXPECT_EQ(scale.normalized(std::int64_t{1} << 33, 0) / kOne, 3.0);

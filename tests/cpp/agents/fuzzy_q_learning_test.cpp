@@ -51,7 +51,7 @@ TEST(FuzzyQLearning, AStepMovesValuesOfFiredRulesAsWorkedByHand) {
   for (const std::size_t untouched : {0U, 1U}) EXPECT_EQ(agent.rules().values(0)[untouched], 0.0F);
 }
 
-// Every rule explores for itself: with 16 rules and epsilon 0.1 most late steps hold a random pick.
+// Each of 16 rules explores with epsilon = 0.1; a random one of 21 actions may be the best one.
 TEST(FuzzyQLearning, RulesExploreIndependentlyAfterTheGreedyFirstSteps) {
   FuzzyRules rules({.n_inputs = 4});
   for (std::size_t rule = 0; rule < rules.n_rules(); ++rule) {
@@ -72,7 +72,7 @@ TEST(FuzzyQLearning, RulesExploreIndependentlyAfterTheGreedyFirstSteps) {
       random_picks += others;
     }
   }
-  const double n = 500 * 10 * 16, p = 0.1 * 20 / 21;
+  const double n = 500.0 * 10 * 16, p = 0.1 * 20 / 21;  // 10 steps of 500 episodes, 16 rules
   EXPECT_NEAR(random_picks, n * p, 5 * std::sqrt(n * p * (1 - p)));
 }
 
@@ -169,8 +169,7 @@ TEST(FuzzyQLearning, ARefusedRewardDoesNotChangeTraces) {
   EXPECT_EQ(table(agent), table(without_refusals));
 }
 
-// Where two environments fire different rules, each goes as if it were alone, but for what is
-// drawn.
+// Two environments in which different rules fire learn as if each were alone.
 TEST(FuzzyQLearning, EnvironmentsHaveSeparateLastActionsAndTraces) {
   const FuzzyQLearningConfig config{.trace_decay = 0.5, .policy = kGreedy};
   const FuzzyRules rules({.n_inputs = 2, .n_sets = 4, .n_actions = 3});

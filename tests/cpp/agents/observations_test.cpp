@@ -66,8 +66,8 @@ TEST(Observations, AdaptiveRangesExcludeRareValuesAndStayWithinFixedOnes) {
     const double part = static_cast<double>(t - 2) / 35.0;
     const bool is_first = t < 2, is_last = t > 37;
     observed.push_back(is_first ? -90.0 + t : is_last ? 70.0 + t : 2.0 + 4.0 * part);
-    observed.push_back(0.1 * t);             // a quarter more is over the ends
-    observed.push_back(t == 0 ? 1.0 : 0.0);  // hardly moves
+    observed.push_back(0.1 * t);             // with a quarter more, beyond the fixed range
+    observed.push_back(t == 0 ? 1.0 : 0.0);  // constant but for a rare value
     observed.push_back(is_first ? -1e9 : is_last ? 1e9 : 8.0 * part);
     observed.push_back(0.1);                 // an angle
     observed.push_back(t < 20 ? 0.0 : 3.0);  // beyond its bounds
@@ -91,9 +91,10 @@ TEST(Observations, RangesMoreThanTwiceTooWideAreNarrowedForUpToFourInputs) {
   EXPECT_EQ(range(-6.0, 6.0, {0.0, 4.0}), std::pair(-6.0, 6.0));
   EXPECT_EQ(range(-6.0, 6.1, {0.0, 4.0}), std::pair(-1.0, 5.0));
   EXPECT_EQ(range(0.0, 100.0, {0.0, 4.0}), std::pair(0.0, 5.0));
-  EXPECT_EQ(range(-100.0, 100.0, {4.0, 4.0}), std::pair(-100.0, 100.0));      // a constant
-  EXPECT_EQ(range(-1.0, 1.0, {0.5, 0.5F + 0x1p-24F}), std::pair(-1.0, 1.0));  // but for rounding
-  EXPECT_EQ(range(-100.0, 3.0, {0.0, 4.0}), std::pair(-100.0, 3.0));          // beyond
+  EXPECT_EQ(range(-100.0, 100.0, {4.0, 4.0}), std::pair(-100.0, 100.0));  // a constant
+  // Observations that differ by rounding only, and an observation beyond the range.
+  EXPECT_EQ(range(-1.0, 1.0, {0.5, 0.5F + 0x1p-24F}), std::pair(-1.0, 1.0));
+  EXPECT_EQ(range(-100.0, 3.0, {0.0, 4.0}), std::pair(-100.0, 3.0));
   EXPECT_EQ(range(-100.0, 100.0, {0.0, 4.0}, 4), std::pair(-1.0, 5.0));
   EXPECT_EQ(range(-100.0, 100.0, {0.0, 4.0}, 5), std::pair(-100.0, 100.0));
 }
@@ -171,7 +172,7 @@ TEST(Observations, FindNoisyAnglesButNotPositions) {
   EXPECT_EQ(n_inputs(few), 2U);
 }
 
-TEST(Observations, AppendInputsThatAreAddedLater) {
+TEST(Observations, AppendInputsThatAreAddedLaterAndRestoreThem) {
   ObservationConfig config = unbounded(5);
   config.relevant_only = true;
   Observations first(config, true, 1), second = first;

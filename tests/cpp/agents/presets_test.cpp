@@ -7,7 +7,7 @@
 namespace sdnn::agents {
 namespace {
 
-TEST(Presets, SmallDiffersFromGeneralInItsSizesOnly) {
+TEST(Presets, SmallDiffersFromGeneralInItsSizesOnlyAndTakes512KBWithFourInputs) {
   const Preset small = small_preset(4);
   const Preset general = general_preset(4);
   EXPECT_EQ(small.learning, general.learning);
@@ -16,9 +16,11 @@ TEST(Presets, SmallDiffersFromGeneralInItsSizesOnly) {
   resized.n_hidden_units = general.approximator.n_hidden_units;
   resized.n_active_units = general.approximator.n_active_units;
   EXPECT_EQ(resized, general.approximator);
-  // At eight bits a weight, and 360 patterns for each of four inputs.
-  const int n_weights = 12 * small.approximator.n_pattern_units * small.approximator.n_hidden_units;
-  EXPECT_LE(n_weights + 4 * 360 * small.approximator.n_pattern_units / 8, 512 * 1024);
+  // A byte for each weight of 4 * 3 pairs of inputs, and 360 patterns of bits for each input.
+  const int n_units = small.approximator.n_pattern_units;
+  const int weight_bytes = 4 * 3 * n_units * small.approximator.n_hidden_units;
+  const int pattern_bytes = 4 * 360 * n_units / 8;
+  EXPECT_LE(weight_bytes + pattern_bytes, 512 * 1024);
 }
 
 }  // namespace

@@ -63,7 +63,7 @@ TEST(QLambda, TargetsOfOneStepAreAsWorkedByHand) {
   agent.learn(b, Indices{2}, 8.0, b, true);
   EXPECT_NEAR(q(agent, b, 2), 8.0, 1e-3);
   agent.learn(a, Indices{0}, 1.0, b, false);
-  EXPECT_EQ(q(agent, a, 0), 0.0);  // waits for the next action
+  EXPECT_EQ(q(agent, a, 0), 0.0);  // pending until the next action is known
   agent.learn(b, Indices{2}, 8.0, b, true);
   EXPECT_NEAR(q(agent, a, 0), 5.0, 0.5);
 }
@@ -190,9 +190,9 @@ TEST(QLambda, EpsilonDecaysToZeroButStaysConstantForSymbolsOnly) {
   EXPECT_EQ(agent.final_epsilon(), 0.5);
   learn_at_random(agent, 100, 1);
   EXPECT_EQ(agent.epsilon(), 0.5);
-  QLambdaConfig given = config;
-  given.final_epsilon = 0.25;
-  EXPECT_EQ(with_symbols({4, 3}, given).final_epsilon(), 0.25);
+  QLambdaConfig with_final = config;
+  with_final.final_epsilon = 0.25;
+  EXPECT_EQ(with_symbols({4, 3}, with_final).final_epsilon(), 0.25);
 }
 
 TEST(QLambda, LearnsTheSameBitsOnEveryInstructionSet) {
@@ -276,7 +276,7 @@ TEST(QLambda, EnvironmentsHaveSeparateTraces) {
   EXPECT_THROW(together.learn(a, Indices{0}, 0.0, b, false, 1), std::invalid_argument);
 }
 
-TEST(QLambda, UsesReplacingTracesInSeveralEnvironments) {
+TEST(QLambda, DutchTracesAreReplacingOnesInSeveralEnvironments) {
   const auto state_after = [](TraceKind traces, std::size_t n_environments) {
     QLambda agent = agent_of({.traces = traces});
     agent.set_n_environments(n_environments);

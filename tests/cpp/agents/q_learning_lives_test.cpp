@@ -54,7 +54,7 @@ TEST(QLearning, PendingStepsOfRemovedEnvironmentsAreLearned) {
   EXPECT_EQ(agent.network().value(cell(2), 1), 4.0);
 }
 
-// All that other environments share with it is drawn and learned here, and in nobody's name.
+// Weights, random numbers and other tensors without a copy for each environment are shared.
 TEST(QLearning, EachOfSeveralEnvironmentsLearnsLikeASingleOne) {
   auto alone = vector_agent();
   testing::World<decltype(alone)> world(2, 9);
@@ -80,7 +80,7 @@ TEST(QLearning, RefusesInconsistentStatesOfEnvironments) {
   auto agent = sdnn_agent();
   agent.set_n_environments(3);
   const std::vector<double> place = {0.5, 0.5};
-  for (int t = 0; t < 20; ++t) (void)agent.act(place);  // until none is left
+  for (int t = 0; t < 20; ++t) (void)agent.act(place);  // until no random start step is left
   agent.learn(place, 0, 1.0, place, false, 2);
   testing::expect_that_damage_is_refused(agent);
   const core::State good = core::state_of(agent);

@@ -217,7 +217,7 @@ TEST(QLearning, WithoutRepeatedActionsTheirRandomStreamIsNotUsed) {
   EXPECT_NE(after.at("policy.exploration.words"), before.at("policy.exploration.words"));
 }
 
-// gamma = 1/2: the first sum is 8, so the range is 8 and a quarter more.
+// gamma = 1/2. The range exceeds the largest known return by a quarter: first 8 * 5/4 = 10.
 TEST(QLearning, AnAdaptiveRangeOfValuesFollowsTheRewards) {
   OneDimension<QLearning<SDNNC>> agent(SDNNC(network(), 1),
                                        {.discount = 0.5, .value_range = ValueRange::adaptive}, 1);
@@ -232,12 +232,13 @@ TEST(QLearning, AnAdaptiveRangeOfValuesFollowsTheRewards) {
   for (int t = 0; t < 40; ++t) agent.learn(state, 0, -20.0, state, true);
   EXPECT_EQ(scale().q_low(), -22.5);
   for (int t = 0; t < 400; ++t) agent.learn(state, 0, 1.0, state, t % 2 == 1);
-  EXPECT_EQ(scale().q_low(), 0.0);  // 3/2 and 1 in turn, and a quarter of 3/2 more
-  EXPECT_EQ(scale().q_high(), 1.875);
+  // Episodes of two steps with returns of 1 + 1/2 and 1.
+  EXPECT_EQ(scale().q_low(), 0.0);
+  EXPECT_EQ(scale().q_high(), 1.5 * 1.25);
 
-  OneDimension<QLearning<SDNNC>> given(SDNNC(network(), 1), {.discount = 0.5}, 1);
-  given.learn(state, 0, 1000.0, state, false);
-  EXPECT_EQ(given.network().output_scale().q_high(), 16.0);
+  OneDimension<QLearning<SDNNC>> with_fixed_range(SDNNC(network(), 1), {.discount = 0.5}, 1);
+  with_fixed_range.learn(state, 0, 1000.0, state, false);
+  EXPECT_EQ(with_fixed_range.network().output_scale().q_high(), network().q_high);
 }
 
 TEST(QLearning, GreedyActionsFollowAveragedValues) {
@@ -255,11 +256,11 @@ TEST(QLearning, GreedyActionsFollowAveragedValues) {
     averaging.learn(state, Indices{random.below(7), random.below(7)}, reward, state, true);
     const auto action = averaging.act(state, false);
     const Indices greedy(action.begin(), action.end());
-    const auto own = averaging.act(state);
+    const auto learning_action = averaging.act(state);
     for (std::size_t d = 0; d < 2; ++d) {
       averaging.networks()[d].averaged_values(state, workspaces[d], values);
       ASSERT_EQ(greedy[d], std::ranges::max_element(values) - values.begin());
-      n_other += greedy[d] != own[d];
+      n_other += greedy[d] != learning_action[d];
     }
   }
   EXPECT_GT(n_other, 0);
@@ -309,7 +310,7 @@ void learn_at_random(OneDimension<QLearning<SDNNC>>& agent, const Check& check) 
   }
 }
 
-// An action is found by counts of firing units, without the values that it is the best by.
+// Where values rise with counts of firing units, counts are compared and values not computed.
 TEST(QLearning, TheBestActionByCountsIsTheBestByValues) {
   for (const int n_actions : {0, 7}) {
     for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
@@ -340,7 +341,7 @@ TEST(QLearning, TheBestActionByCountsIsTheBestByValues) {
   }
 }
 
-// A step between values may be lost by rounding: then values need not rise with the counts.
+// In a range this narrow and far from 0, rounding makes the values of successive counts equal.
 TEST(QLearning, ValuesThatDoNotRiseWithCountsAreComparedThemselves) {
   auto config = network();
   config.q_low = -7.262490008916344e+16;

@@ -17,17 +17,17 @@ TEST(RangeNotes, StateTheSharesOfRangesThatAreUsedAndOfValuesBeyondThem) {
   RangeNotes notes(4);
   for (int t = 0; t < 4000; ++t) {
     notes.note(Numbers{20.0 + t / 100.0, t % 4 == 0 ? 3.0 : 0.0, 1.0 * t, 0.5});
-    if (t == 80) {
+    if (t == 80) {  // too few notes
       EXPECT_FALSE(notes.use(observations)[0]);
     }
   }
   const auto use = notes.use(observations);
   // About one step in eight is noted and the last 256 notes are kept: 2048 steps of 1/100. The
   // middle 90 % of the noted values are the used range.
-  EXPECT_NEAR(use[0]->share_used, 0.9 * 20.48 / 100, 0.02);
+  EXPECT_NEAR(use[0]->share_used, 0.9 * 2048 / 100.0 / 100.0, 0.02);
   EXPECT_EQ(use[1]->share_used, 0.5);
   EXPECT_NEAR(use[1]->share_beyond, 0.25, 0.08);
-  EXPECT_FALSE(use[2]);
+  EXPECT_FALSE(use[2]);  // an angle
   EXPECT_EQ(use[3]->share_used, 0.0);
   EXPECT_EQ(use[0]->share_beyond, 0.0);
 }

@@ -34,7 +34,8 @@ TEST(RewardScale, StartsWithTheCommonSizeOfTheFirstRewards) {
   EXPECT_FALSE(scale.accepts(0x1p90));
 }
 
-// From 40 to 16 above the largest reward of a window, which is 0, less a quarter, and so on.
+// The size falls from 40 to the headroom of 16 above the largest reward of a window, whose size is
+// 0; then, as after each later window, by a quarter, rounded up.
 TEST(RewardScale, ForgetsASizeThatRewardsNoLongerReach) {
   RewardScale scale;
   ASSERT_TRUE(scale.accepts(0x1p40));
@@ -51,7 +52,8 @@ TEST(RewardScale, ForgetsASizeThatRewardsNoLongerReach) {
   EXPECT_FALSE(scale.end_window());
 }
 
-// The first reward of 2^60 has 31 bits, so that 1 is none; the smaller unit clips its value.
+// Values have 31 bits: beside a first reward of 2^60, a reward of 1 is no unit. With a finer unit
+// the value of 2^60 is clipped.
 TEST(QLambda, RefineUnitMakesSmallerRewardsLearnable) {
   QLambda agent({{.n_inputs = 2, .n_pattern_units = 40}, std::vector<std::size_t>{3}, 1}, {}, 1);
   const std::vector<double> state{0.3, 0.6};

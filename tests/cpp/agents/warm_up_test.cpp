@@ -35,7 +35,7 @@ void step(WarmUp& warm_up, std::size_t environment = 0) {
 
 // Warm-ups of two variables and one dimension of actions: {2, 1, n_steps, seed,
 // learns_any_transition}.
-TEST(WarmUp, RepeatsActionsForSomeStepsAndTakesAllOfThem) {
+TEST(WarmUp, TakesEveryActionAndRepeatsItForSomeSteps) {
   WarmUp warm_up(2, 1, 1000, 3, true);
   std::set<double> actions;
   int n_changes = 0;
@@ -80,7 +80,7 @@ TEST(WarmUp, RemembersMasks) {
   }
 }
 
-TEST(WarmUp, RemembersDurationsOnceOneIsUnusual) {
+TEST(WarmUp, RemembersDurationsFromTheFirstThatIsNotOneAndRestoresThem) {
   WarmUp warm_up(1, 1, 1000, 3, true);
   const Numbers here{0.5}, action{1.0};
   const Numbers dts{1.0, 1.0, 2.5, 1.0};
@@ -127,7 +127,8 @@ TEST(WarmUp, RemembersTransitionsInOrder) {
   EXPECT_FALSE(warm_up.step(2).begins);
   EXPECT_EQ(warm_up.step(2).action[0], 4.0);
   EXPECT_EQ(warm_up.step(2).next_observation[1], 2.5);
-  EXPECT_EQ(warm_up.seen().size(), 12U);
+  // Two variables of the observation and the next one of three transitions.
+  EXPECT_EQ(warm_up.seen().size(), 2U * 2U * 3U);
   warm_up.set_n_environments(1);
   EXPECT_EQ(warm_up.n_in_all(), 2U);
   EXPECT_THROW((void)warm_up.act(draw, always, true, 1), std::invalid_argument);
@@ -137,10 +138,10 @@ TEST(WarmUp, WaitsForPendingActionsIfOnlyTheAgentsActionsAreLearned) {
   WarmUp warm_up(2, 1, 2, 3, false);
   warm_up.set_n_environments(2);
   step(warm_up, 0);
-  const Numbers waits = warm_up.act(draw, always, true, 1);
+  const Numbers pending = warm_up.act(draw, always, true, 1);
   step(warm_up, 0);
   EXPECT_FALSE(warm_up.is_over());
-  learn(warm_up, 1, waits);
+  learn(warm_up, 1, pending);
   EXPECT_TRUE(warm_up.is_over());
 }
 

@@ -75,7 +75,7 @@ TEST(RBFNetwork, TheBasesSumToOne) {
   }
 }
 
-// The values are sums over the bases of the weights as they are written, in that order.
+// The sums are computed in the order of the weights, so that the bits are equal.
 TEST(RBFNetwork, ValuesAreSumsInTheOrderOfTheBases) {
   for (const int n_bases : {2, 3, 4, 7}) {
     UsedRBF network = taught({.n_inputs = 2, .n_bases = n_bases, .n_actions = 9}, 100);
@@ -83,15 +83,15 @@ TEST(RBFNetwork, ValuesAreSumsInTheOrderOfTheBases) {
     std::vector<double> out(9);
     network.values(state, out);
     const auto bases = [n_bases](double x) {  // widths in distances of centres
-      std::vector<double> own;
+      std::vector<double> gaussians;
       double total = 0.0;
       for (int k = 0; k < n_bases; ++k) {
         const double distance = (x * (n_bases - 1) - k) / RBFNetworkConfig{}.width;
-        own.push_back(core::exp(-0.5 * distance * distance));
-        total += own.back();
+        gaussians.push_back(core::exp(-0.5 * distance * distance));
+        total += gaussians.back();
       }
-      for (double& basis : own) basis /= total;
-      return own;
+      for (double& basis : gaussians) basis /= total;
+      return gaussians;
     };
     const auto first = bases(state[0]), second = bases(state[1]);
     const auto n = static_cast<std::size_t>(n_bases);
@@ -104,9 +104,9 @@ TEST(RBFNetwork, ValuesAreSumsInTheOrderOfTheBases) {
       }
     }
     for (std::size_t action = 0; action < 9; ++action) {
-      const auto own = bases(static_cast<double>(action) / 8.0);
+      const auto of_action = bases(static_cast<double>(action) / 8.0);
       double q = 0.0;
-      for (std::size_t b = 0; b < n; ++b) q += own[b] * sums[b];
+      for (std::size_t b = 0; b < n; ++b) q += of_action[b] * sums[b];
       EXPECT_EQ(out[action], q);
       EXPECT_EQ(network.value(state, action), q);
     }
@@ -124,6 +124,7 @@ TEST(RBFNetwork, KeepsItsBits) {
     for (const double q : out) digest = digest * 31 + std::bit_cast<std::uint64_t>(q);
     return digest;
   };
+
   EXPECT_EQ(digest_of({.width = 1.0}), 14708188747772810561U);
   EXPECT_EQ(digest_of({.n_bases = 3, .width = 1.0}), 12897390240334898970U);
 }

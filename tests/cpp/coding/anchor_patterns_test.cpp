@@ -15,7 +15,7 @@ PatternTable paper_table(std::uint64_t seed, AnchorConfig config = {.n_units = 2
 TEST(AnchorPatterns, AnchorsHaveHalfOfTheirUnitsOn) {
   const PatternTable table = paper_table(2);
   for (std::size_t anchor = 0; anchor < 8; ++anchor) {
-    EXPECT_EQ(table[45 * anchor].count(), 100U);
+    EXPECT_EQ(table[45 * anchor].count(), 200U / 2);
   }
 }
 
@@ -32,8 +32,8 @@ TEST(AnchorPatterns, AnchorsOfOddSizeAreBalancedToOneUnit) {
   EXPECT_EQ(table[0].count(), 3U);
 }
 
-// Between two anchors every differing unit flips once: distances to the first anchor are the cuts
-// floor(j * differing / 45), and the last portion leads to the next anchor.
+// Anchors are 45 of 360 bins apart. Between two of them each unit in which they differ flips once:
+// after j bins floor(j * differing / 45) units have flipped.
 TEST(AnchorPatterns, NeighboursDifferByEqualPortionsOfUnits) {
   for (const bool circular : {false, true}) {
     const PatternTable table = paper_table(3, {.n_units = 200, .circular = circular});
@@ -41,10 +41,11 @@ TEST(AnchorPatterns, NeighboursDifferByEqualPortionsOfUnits) {
       const std::size_t last = (first + 45) % 360;
       const std::size_t differing = table[first].distance(table[last]);
       for (std::size_t j = 0; j < 45; ++j) {
-        const std::size_t here = first + j, cut = j * differing / 45;
-        EXPECT_EQ(table[first].distance(table[here]), cut);
-        EXPECT_EQ(table[here].distance(table[last]), differing - cut);
-        EXPECT_EQ(table[here].distance(table[(here + 1) % 360]), (j + 1) * differing / 45 - cut);
+        const std::size_t here = first + j, n_flipped = j * differing / 45;
+        const std::size_t n_flipped_next = (j + 1) * differing / 45;
+        EXPECT_EQ(table[first].distance(table[here]), n_flipped);
+        EXPECT_EQ(table[here].distance(table[last]), differing - n_flipped);
+        EXPECT_EQ(table[here].distance(table[(here + 1) % 360]), n_flipped_next - n_flipped);
       }
     }
   }

@@ -78,7 +78,7 @@ struct Wiring {
   }
 };
 
-// With an even number of inputs, or an odd one of partners, columns are left that have no other.
+// Numbers of inputs and of partners that leave unpaired columns, and others that leave none.
 class StateCodeOfInputs : public ::testing::TestWithParam<Wiring> {};
 INSTANTIATE_TEST_SUITE_P(Inputs, StateCodeOfInputs,
                          ::testing::Values(Wiring{2}, Wiring{3}, Wiring{4}, Wiring{5}, Wiring{6},
@@ -113,7 +113,8 @@ TEST_P(StateCodeOfInputs, EqualsTheEquationOfLayer3) {
   EXPECT_TRUE(std::ranges::equal(code.groups(), groups));
 }
 
-// Half a sum and half a difference: one of the two is neutral, whatever the signs.
+// A pair of columns is stored as half its sum and half its difference. Where both are active, one
+// of the two is 0.
 TEST_P(StateCodeOfInputs, ThePairedCodeHasHalfAsManyActiveColumns) {
   const std::size_t l = GetParam().l;
   const std::size_t k = GetParam().n_partners();
@@ -188,11 +189,12 @@ TEST_P(StateCodeOfInputs, InnerProductsOfBinsEqualThoseOfDenseCodes) {
   }
 }
 
-// |x_SD|^2 = sum over groups of the ones of the modifier: 1200 at the paper's size for anchors.
+// The squared norm of a code is its number of active columns. In each of 4 * 3 pairs of inputs a
+// column is active where the modifier's anchor pattern is on, which half of its units are.
 TEST(StateCode, AnAnchorStateHasHalfOfItsColumnsActive) {
   const auto code = small_code(4, 64, 7);
   const std::vector<Bin> anchors = {0, 45, 90, 135};
-  EXPECT_EQ(code.inner_product(anchors, anchors), 12 * 32);
+  EXPECT_EQ(code.inner_product(anchors, anchors), 4 * 3 * (64 / 2));
 }
 
 TEST(StateCode, RefusesBadPermutationsAndStrides) {
@@ -206,7 +208,7 @@ TEST(StateCode, RefusesBadPermutationsAndStrides) {
   const std::vector<PatternTable> three = {code.table(0), code.table(1), code.table(0)};
   const std::vector<Permutation> one_each = {{0, 1, 2}, {2, 1, 0}, {1, 0, 2}};
   EXPECT_NO_THROW(StateCode(three, one_each, {2}));
-  EXPECT_THROW(StateCode(three, one_each), std::invalid_argument);  // all strides need six
+  EXPECT_THROW(StateCode(three, one_each), std::invalid_argument);  // all pairs need six
   EXPECT_THROW(StateCode(three, one_each, {0}), std::invalid_argument);
   EXPECT_THROW(StateCode(three, one_each, {3}), std::invalid_argument);
   EXPECT_THROW(StateCode(three, one_each, {2, 1}), std::invalid_argument);

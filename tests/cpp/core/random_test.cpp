@@ -40,8 +40,8 @@ TEST(Random, StreamsAreUncorrelated) {
   Random weights(1, Stream::weights), ties(1, Stream::ties);
   int equal_bits = 0;
   for (int i = 0; i < 1000; ++i) equal_bits += 64 - std::popcount(weights.bits() ^ ties.bits());
-  // Half of 64 * 1000 bits, within five standard deviations of sqrt(64000 / 4).
-  EXPECT_NEAR(equal_bits, 32000, 5 * 126.5);
+  const double n_bits = 64.0 * 1000;
+  EXPECT_NEAR(equal_bits, n_bits / 2, 5 * std::sqrt(n_bits / 4));
 }
 
 TEST(Random, UniformIsInTheHalfOpenUnitInterval) {
@@ -57,7 +57,7 @@ TEST(Random, UniformIsInTheHalfOpenUnitInterval) {
   EXPECT_LT(low, 1e-3);
   EXPECT_LT(high, 1.0);
   EXPECT_GT(high, 0.999);
-  EXPECT_NEAR(sum / 100000, 0.5, 5 * 0.2887 / 316.2);  // five deviations of the mean of 10^5
+  EXPECT_NEAR(sum / 100000, 0.5, 5 / std::sqrt(12.0 * 100000));  // five standard deviations
 }
 
 TEST(Random, BelowIsUniformAndWithinItsBound) {
@@ -108,15 +108,17 @@ TEST(Random, ShuffleKeepsTheItems) {
 TEST(Random, ShuffleReachesEveryOrderEquallyOften) {
   Random random(9, Stream::permutations);
   std::array<int, 27> counts{};
-  for (int i = 0; i < 60000; ++i) {
+  constexpr int kShuffles = 60000;
+  for (int i = 0; i < kShuffles; ++i) {
     std::array<unsigned, 3> items{0, 1, 2};
     random.shuffle(std::span<unsigned>(items));
     ++counts[items[0] * 9 + items[1] * 3 + items[2]];
   }
   EXPECT_EQ(std::count(counts.begin(), counts.end(), 0), 27 - 6);  // of 3^3 triples 3! are orders
+  const double sigma = std::sqrt(kShuffles / 6.0 * 5.0 / 6.0);
   for (const int count : counts) {
     if (count > 0) {
-      EXPECT_NEAR(count, 10000, 5 * 91.3);  // standard deviation sqrt(60000 * 1/6 * 5/6)
+      EXPECT_NEAR(count, kShuffles / 6, 5 * sigma);
     }
   }
 }

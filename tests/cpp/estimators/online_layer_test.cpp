@@ -106,7 +106,8 @@ TEST(OnlineLayer, AStoppedPresentationChangesNothing) {
 TEST(OnlineLayer, AnOverflowOfAWeightChangesNothing) {
   Problem problem = testing::random_problem(1);
   const std::size_t n_columns = problem.code->n_columns();
-  const std::vector<std::int32_t> weights(problem.n_units * n_columns, 16383);
+  constexpr std::int32_t kLargest = (1 << 14) - 1;
+  const std::vector<std::int32_t> weights(problem.n_units * n_columns, kLargest);
   const std::vector<std::int32_t> thresholds(problem.n_units, 0);
   const auto layer = std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units,
                                                                       weights, thresholds);
@@ -129,7 +130,8 @@ TEST(OnlineLayer, AnOverflowOfAWeightChangesNothing) {
 
 TEST(OnlineLayer, RefusesWeightsBeyond14BitsAndBadArguments) {
   const Problem problem = testing::random_problem(1);
-  const std::vector<std::int32_t> weights(problem.n_units * problem.code->n_columns(), 16384);
+  constexpr std::int32_t kTooLarge = 1 << 14;
+  const std::vector<std::int32_t> weights(problem.n_units * problem.code->n_columns(), kTooLarge);
   const std::vector<std::int32_t> thresholds(problem.n_units, 0);
   EXPECT_THROW(OnlineLayer(std::make_shared<estimators::ParallelPerceptron>(
                    problem.code, problem.n_units, weights, thresholds)),
@@ -142,7 +144,7 @@ TEST(OnlineLayer, RefusesWeightsBeyond14BitsAndBadArguments) {
   PDeltaRule of_more(2 * problem.n_units, problem.targets, problem.n_groups);
   EXPECT_THROW(online.present(problem.bins, of_more), std::invalid_argument);
   std::vector<std::int32_t> bins = problem.bins;
-  bins[0] = 1000;  // of fewer
+  bins[0] = 1000;  // beyond the number of bins
   EXPECT_THROW(online.present(bins, rule), std::invalid_argument);
 }
 

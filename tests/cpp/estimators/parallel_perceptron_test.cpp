@@ -48,8 +48,8 @@ TEST(ParallelPerceptron, PotentialsAndCountsAreAsWorkedByHand) {
   EXPECT_EQ(counts, (std::vector<std::int32_t>{0, 0, 1, 1}));
 }
 
-/// Random tables of `n_units` units for a plain pair, one way of two inputs and both ways of
-/// others.
+/// Random tables of `n_units` units for three inputs: input 1 alone, inputs 0 and 1 paired both
+/// ways, and input 2 modified by input 0.
 std::shared_ptr<const ParallelPerceptron::Code> code_of_three(std::size_t n_units) {
   core::Random random(n_units, core::Stream::code_books);
   constexpr std::size_t kBins = 40;
@@ -69,19 +69,21 @@ std::shared_ptr<const ParallelPerceptron::Code> code_of_three(std::size_t n_unit
 }
 
 TEST(ParallelPerceptron, BlocksOfQueriesHaveThePotentialsOfSingleOnes) {
+  constexpr std::size_t kQueries = 2500, kUnits = 100;
   for (const std::size_t n_units : {42U, 130U}) {
-    for (const int range : {3, 400, 100000}) {  // sums of 16 bits, and of 32
-      const ParallelPerceptron layer(code_of_three(n_units), 100, 5, range);
+    for (const int range : {3, 400, 100000}) {  // of weights: sums of 16 bits, and of 32
+      const ParallelPerceptron layer(code_of_three(n_units), kUnits, 5, range);
       core::Random random(7, core::Stream::exploration);
-      std::vector<std::int32_t> bins(3 * 2500);
+      std::vector<std::int32_t> bins(3 * kQueries);
       for (auto& bin : bins) bin = static_cast<std::int32_t>(random.below(40));
-      std::vector<std::int32_t> together(2500 * 100);
-      layer.potentials(bins, 1 + range % 2, together);
-      std::vector<std::int32_t> alone(100);
-      for (std::size_t q = 0; q < 2500; q += 7) {
+      std::vector<std::int32_t> together(kQueries * kUnits);
+      const int n_threads = 1 + range % 2;
+      layer.potentials(bins, n_threads, together);
+      std::vector<std::int32_t> alone(kUnits);
+      for (std::size_t q = 0; q < kQueries; q += 7) {
         layer.potentials(std::span(bins).subspan(3 * q, 3), 1, alone);
         ASSERT_TRUE(std::equal(alone.begin(), alone.end(),
-                               together.begin() + static_cast<std::ptrdiff_t>(100 * q)))
+                               together.begin() + static_cast<std::ptrdiff_t>(kUnits * q)))
             << n_units << ' ' << range << ' ' << q;
       }
     }

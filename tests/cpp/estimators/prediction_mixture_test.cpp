@@ -35,7 +35,7 @@ TEST(PredictionMixture, StartsWithThePriors) {
   EXPECT_EQ(mixture.weights(), (Numbers{0.75, 0.25}));
 }
 
-TEST(PredictionMixture, FollowsADriftThatChangesWhichExpertIsRight) {
+TEST(PredictionMixture, WeightsFollowADriftThatChangesTheBetterExpert) {
   PredictionMixture mixture(Numbers(2, 1.0));
   for (int i = 0; i < 1000; ++i) mixture.learn(Numbers{0.1, 1.0}, 0.0);
   EXPECT_GT(mixture.weights()[0], 0.99);

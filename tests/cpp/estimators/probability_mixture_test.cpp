@@ -46,7 +46,7 @@ TEST(ProbabilityMixture, WeightsAreTheLikelihoodsOfShareAndThreeSteepnesses) {
   EXPECT_NEAR(mixed(mixture, {0.5, 0.5}, {0.1, 0.6})[1], expected, 1e-15);
 }
 
-TEST(ProbabilityMixture, FollowsADriftThatChangesWhichExpertIsRight) {
+TEST(ProbabilityMixture, WeightsFollowADriftThatChangesTheBetterExpert) {
   ProbabilityMixture mixture(2);
   const Numbers shares{0.5, 0.5}, scores{1.0, 0.0, 0.0, 1.0};
   for (int i = 0; i < 500; ++i) mixture.learn(shares, scores, 0);

@@ -23,7 +23,7 @@ coding::SelectiveDesensitization demonstration_code(std::size_t n_pattern_units 
   return {tables, tables, {{0, 1}, {1, 0}}};
 }
 
-TEST(TrainingForm, FormsAreFoundByTheirNames) {
+TEST(TrainingForm, FormsAreFoundByTheirNamesAndUnknownNamesAreRefused) {
   ASSERT_EQ(estimators::kTrainingForms.size(), 4U);
   for (const auto form : estimators::kTrainingForms) {
     EXPECT_EQ(estimators::training_form_named(estimators::name_of(form)), form);

@@ -62,7 +62,8 @@ TEST(IntersectBits, FindsTheCommonColumnsForAnyNumberOfWords) {
       if (is_listed && is_set) expected.push_back(j);
     }
     sdnn::testing::on_every_instruction_set([&](auto level) {
-      std::vector<std::uint32_t> out(64 * n_words + 2);
+      constexpr std::size_t kSpare = 2;  // items behind the results that may be overwritten
+      std::vector<std::uint32_t> out(64 * n_words + kSpare);
       out.resize(static_cast<std::size_t>(
           intersect_bits(bits.data(), set.words(), n_words, out.data()) - out.data()));
       EXPECT_EQ(out, expected) << level;

@@ -74,7 +74,7 @@ TEST(LinearRows, SumsOfManyRowsEqualThoseOfSingleRows) {
 }
 
 TEST(LinearRows, AStepOfTracesAndWeightsIsAsWorkedByHand) {
-  // Traces 3 and -3 (of kTraceOne / 4 + 1) decay towards 0; a code of +1, -1, 0.
+  // Traces are halved towards 0 and increased by the code +1, -1, 0, where 4096 is kTraceOne.
   std::vector<std::int32_t> weights{100, 100, 100}, traces{3, -3, 4096};
   const std::vector<std::int32_t> active{-1, -1, 0}, negative{0, -1, 0};
   const RowStep step{.decay = kDecayOne / 2,

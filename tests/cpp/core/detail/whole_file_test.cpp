@@ -63,13 +63,13 @@ TEST(WholeFile, LeavesNoFileIfItIsNotFinished) {
   {
     WholeFile file(folder / "file"), other(folder / "file");
     write(file, "half");
-    EXPECT_EQ(folder.n_files(), 3U);  // two writers do not share their beginnings
+    EXPECT_EQ(folder.n_files(), 3U);  // the old file, and a temporary one of each writer
   }
   EXPECT_EQ(testing::content_of(folder / "file"), "before");
   EXPECT_EQ(folder.n_files(), 1U);
 }
 
-// Each has the same beginning, and 16 digits that nobody can foresee.
+// A temporary name has 16 random digits.
 TEST(WholeFile, HasADifferentTemporaryNameEachTime) {
   const testing::Folder folder;
   std::set<std::string> names;
@@ -112,9 +112,9 @@ TEST(RegularFile, RefusesDevicesAndFolders) {
 #if SDNN_HAS_POSIX_FILES
   const auto pipe = folder / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_EQ(error_of(pipe), "is not a regular file");  // without waiting for a writer
+  EXPECT_EQ(error_of(pipe), "is not a regular file");  // does not wait for a writer of the pipe
   {
-    WholeFile file(pipe);  // nor for a reader
+    WholeFile file(pipe);  // does not wait for a reader of the pipe
     write(file, "text");
     file.finish();
   }

@@ -15,7 +15,7 @@ TEST(AcrobotDynamicsForms, HeightAsWorkedByHand) {
               1e-15);
 }
 
-// (1/2) (4.5 - 1) 4 + (1/2) 1.25 + ... at theta2 = pi, theta1_dot = 2, theta2_dot = -1.
+// At theta2 = pi, theta1_dot = 2 and theta2_dot = -1: d11 = 2.5, d12 = 0.75 and d22 = 1.25.
 TEST(AcrobotDynamicsForms, EnergyAsWorkedByHand) {
   const AcrobotDynamics dynamics;
   const double kinetic = 0.5 * 2.5 * 4.0 + 0.5 * 1.25 - (1.25 - 0.5) * 2.0;

@@ -15,7 +15,7 @@ TEST(BlockTraining, HasTheBitsOfPlainTraining) {
   testing::expect_bits_of_plain_training(estimators::TrainingForm::block);
 }
 
-// Plans are kept from the second epoch in the order of the data on.
+// From the second epoch in the order of the data on, plans of blocks are kept and reused.
 TEST(BlockTraining, HasTheBitsOfPlainTrainingWithKeptPlans) {
   for (std::uint64_t seed = 300; seed < 330; ++seed) {
     auto problem = testing::in_data_order(testing::random_problem(seed), /*n_rounds=*/6);
@@ -30,8 +30,8 @@ TEST(BlockTraining, HasTheBitsOfPlainTrainingOverSeveralBlocks) {
   constexpr std::size_t kSeveralBlocks = 1300;  // samples, of 512 or 256 in a block
   const auto problem = testing::in_data_order(
       testing::with_samples(testing::random_problem(12), kSeveralBlocks, 12), /*n_rounds=*/4);
-  for (const std::size_t limit :
-       {std::size_t{1} << 30, std::size_t{3} << 20}) {  // with plans, without
+  constexpr std::size_t kWithPlans = std::size_t{1} << 30, kWithoutPlans = std::size_t{3} << 20;
+  for (const std::size_t limit : {kWithPlans, kWithoutPlans}) {
     const auto plain_layer = testing::layer_for(problem);
     const auto block_layer = testing::layer_for(problem);
     const auto rule = [&] {
@@ -52,8 +52,8 @@ TEST(BlockTraining, HasTheBitsOfPlainTrainingOverSeveralBlocks) {
 TEST(BlockTraining, HasTheBitsOfPlainTrainingWithWeightsBeyond16Bits) {
   auto problem = testing::random_problem(5);
   const std::size_t n_columns = problem.code->n_columns();
-  for (const std::int32_t start :
-       {127, 20000}) {  // 256 of them just fit into 16 bits, and not at all
+  // Sums of 256 weights of 127 just fit into 16 bits; those of 20,000 do not.
+  for (const std::int32_t start : {127, 20000}) {
     std::vector<std::int32_t> weights(problem.n_units * n_columns);
     for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = i % 2 == 0 ? start : -start;
     const std::vector<std::int32_t> thresholds(problem.n_units);

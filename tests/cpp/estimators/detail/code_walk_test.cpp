@@ -24,7 +24,7 @@ using estimators::WeightTiles;
 std::vector<testing::Code> some_codes(std::size_t n_words, core::Random& random) {
   std::vector<testing::Code> codes{testing::random_code(n_words, random)};
   for (int k = 0; k < 6; ++k) codes.push_back(testing::neighbour_of(codes.back(), 9, random));
-  codes.push_back(testing::random_code(n_words, random));  // too far to walk to
+  codes.push_back(testing::random_code(n_words, random));  // whose sum is begun anew
   return codes;
 }
 
@@ -46,6 +46,8 @@ CodeWalk walk_through(const std::vector<testing::Code>& codes, std::size_t n_wor
 template <class Weight>
 void check_walk(std::int32_t largest) {
   core::Random random(8, core::Stream::weights);
+  // Potential k is the start plus the sums of codes places[k] and others[k].
+  constexpr std::int32_t kStart = 11;
   const std::vector<std::uint16_t> places{3, 2, 2, 0, 4, 5, 7, 6, 1, 7};
   const std::vector<std::uint16_t> others{0, 1, 2, 3, 4, 5, 6, 7, 7, 6};
   for (const std::size_t n_words : {std::size_t{1}, std::size_t{2}, kChunkWords}) {
@@ -64,12 +66,12 @@ void check_walk(std::int32_t largest) {
         estimators::sum_steps(rows.data(), width, walk, sums.data());
         const std::vector<estimators::StepSums<Weight>> added{{sums.data(), places.data()},
                                                               {sums.data(), others.data()}};
-        std::vector<std::int32_t> potentials(places.size() * stride, 11);
+        std::vector<std::int32_t> potentials(places.size() * stride, kStart);
         estimators::add_step_sums(std::span(added), width, places.size(), potentials.data(),
                                   stride);
         for (std::size_t k = 0; k < places.size(); ++k) {
           for (std::size_t i = 0; i < stride; ++i) {
-            std::int32_t expected = 11;
+            std::int32_t expected = kStart;
             for (std::size_t c = 0; i < width && c < 64 * n_words; ++c) {
               expected += (codes[places[k]].at(c) + codes[others[k]].at(c)) * rows[c * width + i];
             }
@@ -82,7 +84,7 @@ void check_walk(std::int32_t largest) {
 }
 
 TEST(CodeWalk, SumsOfStepsEqualSumsOfCodes) {
-  check_walk<std::int16_t>(63);  // twice 256 columns of 63 just fit
+  check_walk<std::int16_t>(63);  // sums over 256 columns of two codes just fit into 16 bits
   check_walk<std::int32_t>(1000000);
 }
 

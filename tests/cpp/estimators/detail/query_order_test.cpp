@@ -50,14 +50,15 @@ TEST(QueryOrder, KeepsTheOrderOfALatticeAndShortensThatOfRandomPoints) {
   for (int i = 0; i < 5000; ++i) scattered.push_back(static_cast<std::int32_t>(random.below(500)));
   for (const auto& bins : {lattice, scattered}) {
     auto order = estimators::query_order(bins, 2);
-    std::vector<std::uint32_t> given(order.size());
-    std::iota(given.begin(), given.end(), 0U);
+    std::vector<std::uint32_t> unordered(order.size());
+    std::iota(unordered.begin(), unordered.end(), 0U);
     const auto length = [&](const std::vector<std::uint32_t>& o) {
       return estimators::detail::walk_length(bins, 2, o, 64);
     };
-    EXPECT_LE(length(order), bins.size() == lattice.size() ? length(given) : length(given) / 4);
+    const bool is_lattice = bins.size() == lattice.size();
+    EXPECT_LE(length(order), is_lattice ? length(unordered) : length(unordered) / 4);
     std::sort(order.begin(), order.end());
-    EXPECT_EQ(order, given);  // every query once
+    EXPECT_EQ(order, unordered);  // every query once
   }
 }
 

@@ -42,6 +42,7 @@ void check_sums(std::int32_t largest, std::size_t n_per_sum) {
 }
 
 TEST(SignedSums, AreExactForAllTypes) {
+  // The number of the largest entries whose sum their type holds, or 1.
   check_sums<std::int16_t, std::int8_t>(1, 127);
   check_sums<std::int32_t, std::int8_t>(127, 1);
   check_sums<std::int32_t, std::int16_t>(4000, 8);

@@ -14,7 +14,9 @@
 namespace sdnn {
 namespace {
 
-TEST(UnitRanking, CountsAndRanksUnits) {
+TEST(UnitRanking, CountsFiringUnitsAndRanksUnitsByDistanceThenIndex) {
+  constexpr int kIndexBits = 7;          // for fewer than 128 units
+  constexpr std::int32_t kFarthest = 3;  // larger distances to the threshold count as this
   core::Random random(2, core::Stream::weights);
   constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();
   for (std::size_t size = 0; size < 90; ++size) {
@@ -26,7 +28,8 @@ TEST(UnitRanking, CountsAndRanksUnits) {
       for (std::size_t i = 0; i < size; ++i) {
         n_firing += potentials[i] > 0 ? 1 : 0;
         if ((potentials[i] > 0) != firing) continue;
-        expected[i] = std::min(std::abs(potentials[i]), 3) * 128 + static_cast<std::int32_t>(i);
+        const std::int32_t distance = std::min(std::abs(potentials[i]), kFarthest);
+        expected[i] = (distance << kIndexBits) + static_cast<std::int32_t>(i);
       }
       auto sorted = expected;
       std::sort(sorted.begin(), sorted.end());
@@ -34,7 +37,8 @@ TEST(UnitRanking, CountsAndRanksUnits) {
       testing::on_every_instruction_set([&](auto level) {
         EXPECT_EQ(estimators::count_firing(potentials.data(), size), n_firing) << level;
         std::vector<std::int32_t> keys(size);
-        EXPECT_EQ(estimators::rank_units(potentials.data(), size, firing, 7, 3, keys.data()),
+        EXPECT_EQ(estimators::rank_units(potentials.data(), size, firing, kIndexBits, kFarthest,
+                                         keys.data()),
                   sorted[0]);
         EXPECT_EQ(keys, expected);
         for (std::size_t k = 0; k + 1 < sorted.size() && sorted[k] != kNone; ++k) {

@@ -81,6 +81,7 @@ void check_rows(std::int32_t largest, std::size_t n_per_sum) {
 }
 
 TEST(WeightTiles, RowsAreAddedExactly) {
+  // The number of the largest weights whose sum 16 bits hold.
   check_rows<std::int16_t>(327, 100);
   check_rows<std::int16_t>(32767, 1);
   check_rows<std::int32_t>(100000, std::size_t{1} << 30);
